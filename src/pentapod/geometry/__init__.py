@@ -1,0 +1,1 @@
+"""Geometry without a robot in it: rigid transforms, directions, polylines, Bernstein polynomials."""

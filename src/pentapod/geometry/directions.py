@@ -1,0 +1,42 @@
+"""Unit vectors: angles between them, tangent frames, cones."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.arrays import Floats, as_floats
+from pentapod.errors import ArrayError
+
+
+def normalised(vectors: ArrayLike, name: str = "direction") -> Floats:
+    """Return vectors (..., 3) scaled to unit length. Raises ArrayError where one has no length."""
+    v = as_floats(vectors, name, (3,))
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    if (length < 1e-300).any():
+        raise ArrayError(f"{name} has zero length", expected="a vector that points somewhere")
+    return v / length
+
+
+def angle_between(a: ArrayLike, b: ArrayLike) -> Floats:
+    """Return the angle in [0, π] radians between vectors (..., 3), accurate at 0 and at π.
+
+    Kahan's formula, 2 atan2(‖â − b̂‖, ‖â + b̂‖): the arc cosine loses half the digits near 0.
+    """
+    u, v = normalised(a), normalised(b)
+    return 2.0 * np.arctan2(np.linalg.norm(u - v, axis=-1), np.linalg.norm(u + v, axis=-1))
+
+
+def tangent_frame(directions: ArrayLike) -> tuple[Floats, Floats]:
+    """Return unit t1, t2 (..., 3) with (t1, t2, direction) right-handed; smooth away from direction = −z.
+
+    t1, t2 are e_x, e_y carried along the great circle from e_z to the direction. Directions are unit.
+    """
+    d = as_floats(directions, "directions", (3,))
+    x, y, z = d[..., 0], d[..., 1], d[..., 2]
+    # Below the equator the frame is that of the mirrored direction, so that 1 + |z| never cancels.
+    side = np.where(z < 0.0, -1.0, 1.0)
+    k = 1.0 / (1.0 + side * z)
+    t1 = np.stack([1.0 - x * x * k, -x * y * k, -side * x], axis=-1)
+    t2 = np.stack([-x * y * k, 1.0 - y * y * k, -side * y], axis=-1)
+    return t1, t2 * side[..., None]

@@ -1,0 +1,29 @@
+"""The four components of the configuration space of the quadratic family."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from pentapod.errors import ArrayError
+
+
+class Component(NamedTuple):
+    """The signs of w and of S (kinematics notes, section 4): each ±1. Usable where an array (2,) is."""
+
+    w: int
+    s: int
+
+    def __str__(self) -> str:
+        return "".join("+" if sign > 0 else "-" for sign in self)
+
+    @classmethod
+    def parse(cls, name: str) -> Component:
+        """Return the component named "++", "+-", "-+" or "--" (sign of w, sign of S). Raises ArrayError."""
+        for component in COMPONENTS:
+            if str(component) == name:
+                return component
+        raise ArrayError("unknown component", value=name, expected='"++", "+-", "-+" or "--" (signs of w and S)')
+
+
+COMPONENTS = (Component(1, 1), Component(1, -1), Component(-1, 1), Component(-1, -1))
+"""In the order of the assembly modes that `LinearPentapod.assembly_modes` returns."""

@@ -1,0 +1,60 @@
+"""Program: leg-length setpoints at the controller's period, with their provenance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from pentapod.arrays import Floats, frozen, set_frozen
+from pentapod.errors import ProgramError
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import Component
+
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What a program was made from: names and hashes, as they stand in its header."""
+
+    machine: str
+    machine_digest: str
+    job_digest: str
+    pentapod_version: str
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """Setpoints for the five legs.
+
+    legs (N, 5): lengths in metres, row k is due at k · period seconds. interpolation: how the controller
+    moves between rows: "linear", or "cubic": the C2 cubic spline through the rows with zero end
+    velocities. component: in which the motion must stay. placement: workpiece → machine.
+    """
+
+    period: float
+    legs: Floats
+    interpolation: Literal["linear", "cubic"]
+    component: Component
+    placement: RigidTransform
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        set_frozen(self, legs=frozen(self.legs, "legs", (None, 5)))
+        if self.legs.ndim != 2 or len(self.legs) < 2:
+            raise ProgramError("a program needs at least two rows", value=self.legs.shape)
+        if not (np.isfinite(self.period) and self.period > 0.0):
+            raise ProgramError("the period must be positive", value=self.period)
+
+    @cached_property
+    def times(self) -> Floats:
+        """Time (N,) of each row in seconds."""
+        return np.arange(len(self.legs)) * self.period
+
+    @property
+    def duration(self) -> float:
+        """Time of the last row in seconds."""
+        return (len(self.legs) - 1) * self.period

@@ -1,0 +1,110 @@
+"""Toolpath: where the tool goes, in the workpiece frame. No robot in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+
+import numpy as np
+
+from pentapod.arrays import Floats, Ints, frozen, set_frozen
+from pentapod.errors import ToolpathError
+from pentapod.geometry.rigid import RigidTransform
+
+JOIN_TOLERANCE_M = 1e-9
+
+
+class SegmentKind(StrEnum):
+    """What a segment is for: cut (the process is on), link (on feed, not cutting), rapid (clear of the part)."""
+
+    CUT = "cut"
+    LINK = "link"
+    RAPID = "rapid"
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A run of tool poses of one kind.
+
+    tips (N, 3): tool tips, metres, workpiece frame. axes (N, 3): unit, tip → spindle. feed: speed of the
+    tip in m/s that the process wants; infinite on rapids (the machine's rapid rate holds there). N ≥ 2.
+    Raises ToolpathError for an empty segment, a bad feed, or an axis that is not of unit length.
+    """
+
+    kind: SegmentKind
+    tips: Floats
+    axes: Floats
+    feed: float
+
+    def __post_init__(self) -> None:
+        tips, axes = frozen(self.tips, "tips", (None, 3)), frozen(self.axes, "axes", (None, 3))
+        set_frozen(self, tips=tips, axes=axes, kind=SegmentKind(self.kind))
+        if tips.ndim != 2 or tips.shape != axes.shape or len(tips) < 2:
+            raise ToolpathError("a segment needs at least two poses", value=(tips.shape, axes.shape), expected="(N, 3)")
+        if np.abs(np.linalg.norm(axes, axis=1) - 1.0).max() > 1e-9:
+            raise ToolpathError("tool axes must have unit length")
+        if not self.feed > 0.0:
+            raise ToolpathError("feed must be positive", value=self.feed)
+
+
+@dataclass(frozen=True, eq=False)
+class Toolpath:
+    """One continuous motion in the workpiece frame: each segment begins where the one before ends.
+
+    pivot: distance in metres from the tip along the axis to the point about which the tool may tilt
+    without leaving the surface: the ball's radius for a ball cutter, −stand-off for a beam or spray
+    (the spot on the surface), 0 for a fixed tip. Waypoints are the poses of all segments, joints once.
+    Raises ToolpathError where two segments do not join.
+    """
+
+    segments: tuple[Segment, ...]
+    pivot: float = 0.0
+
+    def __post_init__(self) -> None:
+        set_frozen(self, segments=tuple(self.segments))
+        if not self.segments:
+            raise ToolpathError("the toolpath is empty")
+        for k, (a, b) in enumerate(zip(self.segments, self.segments[1:], strict=False)):
+            gap = float(np.abs(a.tips[-1] - b.tips[0]).max() + np.abs(a.axes[-1] - b.axes[0]).max())
+            if gap > JOIN_TOLERANCE_M:
+                raise ToolpathError(f"segments {k} and {k + 1} do not join", value=gap, expected="the same pose")
+
+    @cached_property
+    def tips(self) -> Floats:
+        """Tool tips of all waypoints (N, 3), metres, workpiece frame."""
+        return self._joined("tips")
+
+    @cached_property
+    def axes(self) -> Floats:
+        """Nominal tool axes of all waypoints (N, 3), unit, tip → spindle, workpiece frame."""
+        return self._joined("axes")
+
+    @cached_property
+    def pivots(self) -> Floats:
+        """The points (N, 3) about which the axis may tilt: tips + pivot · axes, metres."""
+        return self.tips + self.pivot * self.axes
+
+    @cached_property
+    def starts(self) -> Ints:
+        """Index (S + 1,) of each segment's first waypoint, and of the last waypoint."""
+        return np.concatenate([[0], np.cumsum([len(s.tips) - 1 for s in self.segments])]).astype(np.intp)
+
+    @cached_property
+    def segment_of_interval(self) -> Ints:
+        """Index (N − 1,) of the segment to which the interval between waypoints k and k + 1 belongs."""
+        return np.repeat(np.arange(len(self.segments)), np.diff(self.starts))
+
+    def __len__(self) -> int:
+        return int(self.starts[-1]) + 1
+
+    def _joined(self, name: str) -> Floats:
+        parts = [getattr(s, name) for s in self.segments]
+        return frozen(np.concatenate([parts[0], *(p[1:] for p in parts[1:])]), name)
+
+    def transformed(self, transform: RigidTransform) -> Toolpath:
+        """Return the same motion seen after a rigid transform."""
+        return Toolpath(
+            tuple(Segment(s.kind, transform.apply(s.tips), transform.rotate(s.axes), s.feed) for s in self.segments),
+            self.pivot,
+        )
