@@ -71,5 +71,5 @@ def solve(
     c = q + delta * v * py
     k = 1.0 / (n1 * n1 + n2 * n2)
     px, pz = (c * n1 - root * n2) * k, (c * n2 + root * n1) * k
-    nan = np.where(exists, 0.0, np.nan)
+    nan = 0.0 * w  # py, u and v do not depend on the mode; they take its shape, and its absence
     return np.stack([px, py + nan, pz], axis=-1), np.stack([u + nan, v + nan, w], axis=-1)
