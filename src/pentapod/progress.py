@@ -1,0 +1,17 @@
+"""How long work tells how far it is."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class Progress(Protocol):
+    """Called by long stages: the stage's name, the fraction done in [0, 1], and a short note."""
+
+    def __call__(self, stage: str, fraction: float, note: str = "") -> None:
+        """Take the news; must return quickly and never raise."""
+        ...
+
+
+def silent(stage: str, fraction: float, note: str = "") -> None:
+    """Take the news and say nothing."""
