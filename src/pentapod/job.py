@@ -1,0 +1,249 @@
+"""Job: what a job file says, checked, with its paths resolved and its digest."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, cast
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from pentapod.errors import JobError, nearest
+from pentapod.job_tables import (
+    AxisTable,
+    FeedTable,
+    JobTables,
+    MachineTable,
+    OutputTable,
+    PartTable,
+    PlacementTable,
+    ToleranceTable,
+    ToolpathTable,
+    ToolTable,
+)
+
+_PLACE = re.compile(r"\(at line (\d+), column (\d+)\)")
+_START = '"pentapod new DIR" writes one to start from'
+_VARIABLE = re.compile(r"\$\{(\w+)\}")
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a job file says. Units are as in the file; `pentapod.pipeline` turns them into SI values.
+
+    path: the job file. mesh_path and machine_file: resolved against the job file's folder.
+    """
+
+    path: Path
+    tables: JobTables
+    mesh_path: Path
+    machine_file: Path | None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Job:
+        """Return the job of a TOML file. Raises JobError: one line with file, key, value and remedy."""
+        path = Path(path)
+        text = _read(path)
+        try:
+            content = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            place = _PLACE.search(str(error))
+            line, column = (int(place[1]), int(place[2])) if place else (len(text.splitlines()), None)
+            what = str(error).split(" (at ")[0]
+            raise JobError(f"not TOML: {what}", file=path, line=line, column=column) from error
+        try:
+            tables = JobTables.model_validate(_tuples(content))
+        except ValidationError as error:
+            raise _job_error(path, text, error) from error
+        mesh = _resolve(path, text, "mesh", tables.part.mesh)
+        machine = None if tables.machine.file is None else _resolve(path, text, "file", tables.machine.file)
+        return cls(path, tables, mesh, machine)
+
+    @property
+    def part(self) -> PartTable:
+        """The table [part]."""
+        return self.tables.part
+
+    @property
+    def machine(self) -> MachineTable:
+        """The table [machine]."""
+        return self.tables.machine
+
+    @property
+    def tool(self) -> ToolTable:
+        """The table [tool]."""
+        return self.tables.tool
+
+    @property
+    def toolpath(self) -> ToolpathTable:
+        """The table [toolpath]."""
+        return self.tables.toolpath
+
+    @property
+    def axis(self) -> AxisTable:
+        """The table [axis]."""
+        return self.tables.axis
+
+    @property
+    def feed(self) -> FeedTable:
+        """The table [feed]."""
+        return self.tables.feed
+
+    @property
+    def tolerance(self) -> ToleranceTable:
+        """The table [tolerance]."""
+        return self.tables.tolerance
+
+    @property
+    def placement(self) -> PlacementTable:
+        """The table [placement]."""
+        return self.tables.placement
+
+    @property
+    def output(self) -> OutputTable:
+        """The table [output]."""
+        return self.tables.output
+
+    @cached_property
+    def digest(self) -> str:
+        """16 hexadecimal digits over the meaning of the job: defaults filled in, files by their bytes.
+
+        Comments, the order of keys and the folders where files lie do not change it.
+        """
+        content = self.tables.model_dump(mode="json")
+        content["part"]["mesh"] = [self.mesh_path.suffix.lower(), _sha(self.mesh_path)]
+        if self.machine_file is not None:
+            content["machine"]["file"] = _sha(self.machine_file)
+        canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return hashlib.sha256(canonical.encode()).hexdigest()[:16]
+
+    def error(self, table: str, key: str, what: str, **details: Any) -> JobError:
+        """Return the JobError about a key of this job that only shows once the mesh or machine is known."""
+        value = getattr(getattr(self.tables, table), key)
+        return JobError(what, file=self.path, key=f"{table}.{key}", value=value, **details)
+
+
+def _sha(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _read(path: Path) -> str:
+    """Return the file's text. Raises JobError where it is missing, not readable, not text, or empty."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise JobError(
+            "no such job file", file=path, remedy='"pentapod new DIR" writes one to start from'
+        ) from error
+    except UnicodeDecodeError as error:
+        raise JobError("not a text file in UTF-8", file=path, expected="a job file in TOML") from error
+    except OSError as error:
+        raise JobError(f"cannot be read: {error.strerror}", file=path) from error
+    if not text.strip():
+        raise JobError(
+            "the job file is empty", file=path, remedy='"pentapod new DIR" writes one to start from'
+        )
+    return text
+
+
+def _tuples(value: Any) -> Any:
+    """Return TOML content with its arrays as tuples, which is what the strict tables take."""
+    if isinstance(value, dict):
+        return {key: _tuples(item) for key, item in cast(dict[str, Any], value).items()}
+    if isinstance(value, list):
+        return tuple(_tuples(item) for item in cast(list[Any], value))
+    return value
+
+
+def _resolve(job: Path, text: str, key: str, name: str) -> Path:
+    """Return the file that a key names. Raises JobError where a variable is not set or nothing is there."""
+    table = "part" if key == "mesh" else "machine"
+
+    def wrong(what: str, **details: Any) -> JobError:
+        line = _line_of(text, (table, key))
+        return JobError(what, file=job, line=line, key=f"{table}.{key}", value=name, **details)
+
+    for variable in _VARIABLE.findall(name):
+        if variable not in os.environ:
+            raise wrong(
+                f"the environment variable {variable} is not set", remedy=f"set {variable} to a folder"
+            )
+    path = job.parent / _VARIABLE.sub(lambda match: os.environ[match[1]], name)
+    if not path.is_file():
+        what = "is not a file" if path.exists() else "no such file"
+        raise wrong(what, expected="a path relative to the job file's folder")
+    return path
+
+
+def _job_error(path: Path, text: str, error: ValidationError) -> JobError:
+    """Return the one JobError to show: an unknown key first, since a misspelling is also a missing key."""
+    errors = error.errors(include_url=False)
+    first = min(errors, key=lambda e: e["type"] != "extra_forbidden")
+    where = tuple(str(part) for part in first["loc"])
+    details = _details(first, where)
+    where = (*where, details.pop("key")) if "key" in details else where
+    key = ".".join(where[:2]) + "".join(f"[{index}]" for index in where[2:])
+    return JobError(file=path, line=_line_of(text, where), key=key, **details)
+
+
+def _details(error: ErrorDetails, where: tuple[str, ...]) -> dict[str, Any]:
+    """Return what, value, expected and remedy of one error of pydantic."""
+    context = error.get("ctx", {})
+    if error["type"] == "extra_forbidden":
+        owner = _model(where[:-1])
+        kind = "table" if len(where) == 1 else "key"
+        known = list(owner.model_fields) if owner is not None else []
+        return {"what": f"unknown {kind}", "remedy": nearest(where[-1], known)}
+    if error["type"] == "rule":
+        return {"what": context["what"], "expected": context["expected"], "key": context["key"]}
+    if error["type"] == "missing" and len(where) > 2:
+        return {"what": "too few numbers", "expected": _description(where)}
+    if error["type"] == "missing":
+        kind = "table" if len(where) == 1 else "key"
+        return {
+            "what": f"the {kind} is missing",
+            "expected": _description(where),
+        }
+    message = error["msg"].removeprefix("Input should be ").removeprefix("a ").removeprefix("valid ")
+    what = "out of range" if set(context) & {"gt", "ge", "lt", "le"} else "wrong value"
+    return {"what": what, "value": error["input"], "expected": f"{message} ({_description(where)})"}
+
+
+def _model(where: tuple[str, ...]) -> type[BaseModel] | None:
+    """Return the table that a place in the file belongs to."""
+    if not where:
+        return JobTables
+    field = JobTables.model_fields.get(where[0])
+    return cast("type[BaseModel] | None", field.annotation if field else None)
+
+
+def _description(where: tuple[str, ...]) -> str:
+    """Return what the schema says of a key, or of a table what keys it must have."""
+    model = _model(where[:1])
+    if model is None:
+        return "see the README"
+    if len(where) == 1:
+        needed = [name for name, field in model.model_fields.items() if field.is_required()]
+        return f"[{where[0]}]" + (" with " + ", ".join(needed) if needed else "")
+    return model.model_fields[where[1]].description or ""
+
+
+def _line_of(text: str, where: Sequence[str]) -> int | None:
+    """Return the line of a key, or of its table's header: for messages, so a plain search is enough."""
+    table, header = "", None
+    for number, line in enumerate(text.splitlines(), start=1):
+        if match := re.match(r"\s*\[\s*(\w+)\s*\]", line):
+            table = match[1]
+            if table == where[0]:
+                header = number
+        elif len(where) > 1 and table == where[0] and re.match(rf"\s*{re.escape(where[1])}\s*=", line):
+            return number
+    return header
