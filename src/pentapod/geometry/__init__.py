@@ -1,1 +1,39 @@
 """Geometry without a robot in it: rigid transforms, directions, polylines, Bernstein polynomials."""
+
+from pentapod.geometry.bernstein import (
+    convolve,
+    derivative,
+    elevate,
+    evaluate,
+    from_power,
+    hull,
+    multiply,
+    scaled,
+    split,
+    to_power,
+    unscaled,
+)
+from pentapod.geometry.directions import angle_between, normalised, tangent_frame
+from pentapod.geometry.polyline import arc_length
+from pentapod.geometry.positivity import lower_bounds
+from pentapod.geometry.rigid import RigidTransform
+
+__all__ = [
+    "RigidTransform",
+    "angle_between",
+    "arc_length",
+    "convolve",
+    "derivative",
+    "elevate",
+    "evaluate",
+    "from_power",
+    "hull",
+    "lower_bounds",
+    "multiply",
+    "normalised",
+    "scaled",
+    "split",
+    "tangent_frame",
+    "to_power",
+    "unscaled",
+]

@@ -28,9 +28,11 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> Floats:
 
 
 def tangent_frame(directions: ArrayLike) -> tuple[Floats, Floats]:
-    """Return unit t1, t2 (..., 3) with (t1, t2, direction) right-handed; smooth away from direction = −z.
+    """Return unit t1, t2 (..., 3) with (t1, t2, direction) right-handed. Directions are unit.
 
-    t1, t2 are e_x, e_y carried along the great circle from e_z to the direction. Directions are unit.
+    In the upper half space they are e_x, e_y carried along the great circle from e_z to the direction; in the
+    lower one the same from −e_z (with e_x, −e_y). So they are smooth within each half space, at both poles
+    too, and jump at the equator.
     """
     d = as_floats(directions, "directions", (3,))
     x, y, z = d[..., 0], d[..., 1], d[..., 2]

@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pentapod.arrays import Floats, as_batch, as_floats, frozen, set_frozen
-from pentapod.errors import MachineError
+from pentapod.errors import ArrayError, MachineError
+from pentapod.kinematics.blocks import blocks
 from pentapod.kinematics.component import COMPONENTS
-from pentapod.kinematics.quadratic import LinearPart, solve
+from pentapod.kinematics.offsets import check_offsets, fit_delta
+from pentapod.kinematics.quadratic import LinearPart, reciprocal_condition, solve, w_and_s
+
+_SINGULAR = 1e-12  # below this reciprocal condition the closed form has no digits left
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,29 +22,56 @@ class LinearPentapod:
     """Five base attachments a_i = (x_i, y_i, 0) and offsets z_i along the platform line, b_i = p + z_i i.
 
     base (5, 2) and offsets (5,) in metres; delta: the constant z_i − z_3 = δ (x_i − x_3) of the quadratic
-    family. Build one with `LinearPentapod.quadratic`. Machine frame: the base plane is z = 0.
+    family. Build one with `LinearPentapod.quadratic` or `LinearPentapod.from_offsets`. Machine frame: the base
+    plane is z = 0; leg 3's attachment may be anywhere in it.
+
+    Raises MachineError: not five attachments or offsets, numbers that are not finite, offsets that do not fit
+    delta (to 1e-9 of the machine's size), an architecturally singular geometry.
     """
 
     base: Floats
     offsets: Floats
     delta: float
-    _reduced_base: Floats = field(init=False, repr=False)
-    _linear: LinearPart = field(init=False, repr=False)
+    linear_part: LinearPart = field(init=False, repr=False)
 
     @classmethod
     def quadratic(cls, base: ArrayLike, delta: float) -> LinearPentapod:
-        """Return the pentapod with offsets z_i = δ x_i. base (5, 2) metres. Raises MachineError if singular."""
-        xy = as_floats(base, "base", (5, 2))
-        return cls(xy, delta * xy[:, 0], float(delta))
+        """Return the pentapod with offsets z_i = δ x_i. base (5, 2) metres. Raises MachineError."""
+        xy, slope = _given(base, "base", (5, 2)), float(_given(delta, "delta", ()))
+        return cls(xy, slope * xy[:, 0], slope)
+
+    @classmethod
+    def from_offsets(
+        cls, base: ArrayLike, offsets: ArrayLike, delta: float | None = None, *, tolerance: float = 1e-9
+    ) -> LinearPentapod:
+        """Return the pentapod with these offsets z_i (5,) along the platform line, metres. base (5, 2) metres.
+
+        delta is fitted by least squares where it is not claimed. The offsets must then be z_3 + δ (x_i − x_3)
+        to within `tolerance` metres, and exactly these are stored. Raises MachineError that names the leg
+        which is farthest off, and by how much.
+        """
+        xy, z = _given(base, "base", (5, 2)), _given(offsets, "offsets", (5,))
+        slope = fit_delta(xy, z) if delta is None else float(_given(delta, "delta", ()))
+        return cls(xy, check_offsets(xy, z, slope, tolerance), slope)
 
     def __post_init__(self) -> None:
-        base = frozen(self.base, "base", (5, 2))
-        reduced = frozen(base - base[2], "base", (5, 2))
-        set_frozen(self, base=base, offsets=frozen(self.offsets, "offsets", (5,)), _reduced_base=reduced)
-        try:
-            set_frozen(self, _linear=LinearPart.of(reduced, self.delta))
-        except np.linalg.LinAlgError as error:
-            raise MachineError("the geometry is architecturally singular", remedy="move a base attachment") from error
+        base, offsets = _given(self.base, "base", (5, 2)), _given(self.offsets, "offsets", (5,))
+        delta = float(_given(self.delta, "delta", ()))
+        size = max(1.0, abs(delta)) * float(np.abs(base).max()) + float(np.abs(offsets).max())
+        check_offsets(base, offsets, delta, 1e-9 * size)
+        set_frozen(self, base=frozen(base, "base"), offsets=frozen(offsets, "offsets"), delta=delta)
+        measure = reciprocal_condition(base, delta)
+        if measure < _SINGULAR:
+            raise MachineError(
+                "the geometry is architecturally singular: no pose is held by its legs",
+                key="base" if delta else "delta",
+                value=measure,
+                expected="a reciprocal condition number well above 1e-3",
+                remedy="move a base attachment off the conic through the others"
+                if delta
+                else "choose delta ≠ 0",
+            )
+        set_frozen(self, linear_part=LinearPart.of(base, delta))
 
     def leg_vectors(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return b_i − a_i (..., 5, 3) in metres for positions p and unit directions i (..., 3)."""
@@ -51,28 +82,92 @@ class LinearPentapod:
 
     def leg_lengths(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return leg lengths (..., 5) in metres for positions p and unit directions i (..., 3), machine frame."""
-        d = self.leg_vectors(position, direction)
-        return np.sqrt(np.einsum("...ij,...ij->...i", d, d))
+        p, i = _broadcast(as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,)))
+        batch = p.shape[:-1]
+        p, i = p.reshape(-1, 3), i.reshape(-1, 3)
+        legs = np.empty((len(p), 5))
+        x, y, z = self.base[:, :1], self.base[:, 1:], self.offsets[:, None]
+        for block in blocks(len(p)):
+            (px, py, pz), (u, v, w) = p[block].T.copy(), i[block].T.copy()
+            squared = np.square(z * u + (px - x))
+            squared += np.square(z * v + (py - y))
+            squared += np.square(z * w + pz)
+            legs[block] = np.sqrt(squared, out=squared).T
+        return legs.reshape(*batch, 5)
 
     def assembly_modes(self, legs: ArrayLike) -> tuple[Floats, Floats]:
         """Return positions and directions (..., 4, 3) of the four modes, in the order of `COMPONENTS`.
 
         legs (..., 5) metres. NaN where no pose has these leg lengths: then all four modes are NaN.
         """
-        l2 = np.square(as_batch(legs, "legs", (5,)))[..., None, :]
         signs = np.array(COMPONENTS, dtype=np.float64)
-        return self._from_reduced(*solve(l2, self._linear, self.delta, signs[:, 0], signs[:, 1]))
+        lengths = as_batch(legs, "legs", (5,))
+        position, direction = self._solve(lengths.reshape(-1, 5), signs[:, None, :], modes=(4,))
+        batch = lengths.shape[:-1]
+        return position.reshape(*batch, 4, 3), direction.reshape(*batch, 4, 3)
 
     def pose(self, legs: ArrayLike, component: ArrayLike) -> tuple[Floats, Floats]:
         """Return positions and directions (..., 3) in a component: a `Component`, or signs (..., 2).
 
-        legs (..., 5) metres. NaN where no pose has these leg lengths.
+        legs (..., 5) metres; the signs, each ±1, broadcast against their batch. NaN where no pose has these leg
+        lengths, and where a sign is 0 or NaN. Raises ArrayError for other signs.
         """
-        l2 = np.square(as_batch(legs, "legs", (5,)))
-        signs = as_batch(component, "component", (2,))
-        return self._from_reduced(*solve(l2, self._linear, self.delta, signs[..., 0], signs[..., 1]))
+        lengths, signs = as_batch(legs, "legs", (5,)), as_batch(component, "component", (2,))
+        if signs.size and not (np.isnan(signs) | (np.abs(signs) == 1.0) | (signs == 0.0)).all():
+            raise ArrayError("component must hold signs", expected="+1 or −1 for w and for S")
+        if signs.ndim > 1:
+            lengths, signs = _broadcast(lengths, signs)
+        named = (np.abs(signs) == 1.0).all(axis=-1)
+        if not named.all():
+            lengths = np.where(named[..., None], lengths, np.nan)
+        batch = lengths.shape[:-1]
+        position, direction = self._solve(lengths.reshape(-1, 5), signs.reshape(-1, 2))
+        return position.reshape(*batch, 3), direction.reshape(*batch, 3)
 
-    def _from_reduced(self, position: Floats, direction: Floats) -> tuple[Floats, Floats]:
-        position = position - self.offsets[2] * direction
-        position[..., :2] += self.base[2]
+    def component(self, position: ArrayLike, direction: ArrayLike) -> NDArray[np.int8]:
+        """Return the signs (..., 2) of w and S: the component of each pose; 0 on a singularity and for NaN.
+
+        position and direction (..., 3), machine frame. Compare with a `Component`, or hand it to `pose`.
+        """
+        p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
+        signs = np.sign(np.stack(np.broadcast_arrays(*w_and_s(p, i, self.delta, self.lever)), axis=-1))
+        return np.where(np.isnan(signs), 0.0, signs).astype(np.int8)
+
+    @property
+    def lever(self) -> float:
+        """z_3 − δ x_3 in metres: 0 where z_i = δ x_i, that is, where p is the point with the simplest formulas."""
+        return float(self.offsets[2] - self.delta * self.base[2, 0])
+
+    def _solve(self, legs: Floats, signs: Floats, modes: tuple[int, ...] = ()) -> tuple[Floats, Floats]:
+        """Poses (N, *modes, 3) of legs (N, 5); signs (1 or N, 2), or (modes, 1, 2)."""
+        position, direction = np.empty((len(legs), *modes, 3)), np.empty((len(legs), *modes, 3))
+        (x3, y3), z3 = self.base[2], self.offsets[2]
+        with np.errstate(invalid="ignore", over="ignore"):
+            for block in blocks(len(legs)):
+                squared = np.square(legs[block].T, order="C")
+                sign = signs if modes or len(signs) == 1 else signs[block]
+                px, py, pz, u, v, w = solve(squared, self.linear_part, self.delta, sign[..., 0], sign[..., 1])
+                position[block] = _last(px - z3 * u + x3, py - z3 * v + y3, pz - z3 * w)
+                direction[block] = _last(u, v, w)
         return position, direction
+
+
+def _last(x: Floats, y: Floats, z: Floats) -> Floats:
+    """Return vectors (N, *modes, 3) of components (*modes, N); y may lack the modes."""
+    return np.stack(np.broadcast_arrays(x, y, z)).T
+
+
+def _broadcast(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Return both with the same leading axes."""
+    batch = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
+    return np.broadcast_to(a, batch + a.shape[-1:]), np.broadcast_to(b, batch + b.shape[-1:])
+
+
+def _given(value: ArrayLike, key: str, shape: tuple[int, ...]) -> Floats:
+    try:
+        array = as_floats(value, key, shape)
+    except ArrayError as error:
+        raise MachineError(error.what, key=key, value=error.value, expected=error.expected) from error
+    if array.shape != shape:
+        raise MachineError(f"{key} has shape {array.shape}", key=key, expected=f"shape {shape}")
+    return array

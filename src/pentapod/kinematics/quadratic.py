@@ -1,11 +1,13 @@
 """Forward kinematics of the quadratic family in closed form (kinematics notes, section 3).
 
+Source: J. Borràs, F. Thomas, C. Torras, "A Family of Quadratically-Solvable 5-SPU Parallel Robots", ICRA 2010.
 Everything here is in the *reduced* frame, where leg 3's base attachment and offset are zero.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
@@ -18,7 +20,8 @@ _OTHERS = (0, 1, 3, 4)  # the legs whose equations are taken relative to leg 3
 class LinearPart:
     """(q, py, u, v) = linear_map @ (squared legs) + constant: the linear half of the forward kinematics.
 
-    linear_map (4, 5), constant (4,), with q = px − δ t and t = p · i.
+    linear_map (4, 5), constant (4,), with q = px − δ t and t = p · i. Every entry is the exact one of the
+    given floating-point geometry, rounded once to nearest: the certificate's error bound relies on it.
     """
 
     linear_map: Floats
@@ -26,50 +29,89 @@ class LinearPart:
 
     @classmethod
     def of(cls, base: Floats, delta: float) -> LinearPart:
-        """Build it for reduced base attachments (5, 2) with base[2] = 0. The matrix must be regular."""
-        x, y = base[_OTHERS, 0], base[_OTHERS, 1]
-        inverse = np.linalg.inv(system_matrix(base, delta))
-        # x q + y py + δx² u + δxy v = −½ (l_i² − l_3² − k),  k = x² + y² + δ²x²
-        pick = np.zeros((4, 5))
-        pick[range(4), _OTHERS] = -0.5
-        pick[:, 2] = 0.5
-        return cls(inverse @ pick, inverse @ (0.5 * (x * x + y * y + (delta * x) ** 2)))
+        """Build it for base attachments (5, 2), leg 3's anywhere. Raises LinAlgError where F = 0 exactly."""
+        third, slope = [Fraction(float(c)) for c in base[2]], Fraction(float(delta))
+        rows: list[list[Fraction]] = []
+        for row, leg in enumerate(_OTHERS):
+            x, y = (Fraction(float(c)) - c3 for c, c3 in zip(base[leg], third, strict=True))
+            # x q + y py + δx² u + δxy v = −½ (l_i² − l_3² − k),  k = x² + y² + δ²x²
+            rhs = [Fraction(-1, 2) if column == row else Fraction(0) for column in range(4)]
+            k = x * x + y * y + (slope * x) ** 2
+            rows.append([x, y, slope * x * x, slope * x * y, *rhs, k / 2])
+        solution = _eliminate(rows)
+        linear_map, constant = np.zeros((4, 5)), np.zeros(4)
+        for row, entries in enumerate(solution):
+            linear_map[row, _OTHERS] = [float(entry) for entry in entries[:4]]
+            linear_map[row, 2] = float(-sum(entries[:4]))
+            constant[row] = float(entries[4])
+        return cls(linear_map, constant)
 
     def __call__(self, squared_legs: Floats) -> Floats:
-        """Return (..., 4): q, py, u, v of squared leg lengths (..., 5)."""
-        return squared_legs @ self.linear_map.T + self.constant
+        """Return (4, N): q, py, u, v of squared leg lengths (5, N)."""
+        return self.linear_map @ squared_legs + self.constant[:, None]
 
 
-def system_matrix(base: Floats, delta: float) -> Floats:
-    """Return the 4×4 matrix [x, y, δx², δxy] of the linear equations, reduced base attachments (5, 2)."""
-    x, y = base[_OTHERS, 0], base[_OTHERS, 1]
-    return np.stack([x, y, delta * x * x, delta * x * y], axis=1)
+def _eliminate(rows: list[list[Fraction]]) -> list[list[Fraction]]:
+    """Return the right-hand sides (4, m) after exact Gauss-Jordan elimination of (4, 4 + m)."""
+    for column in range(4):
+        pivot = next((r for r in range(column, 4) if rows[r][column] != 0), None)
+        if pivot is None:
+            raise np.linalg.LinAlgError("the linear equations of the legs are dependent")
+        rows[column], rows[pivot] = rows[pivot], rows[column]
+        rows[column] = [entry / rows[column][column] for entry in rows[column]]
+        for r in range(4):
+            if r != column and rows[r][column] != 0:
+                factor = rows[r][column]
+                rows[r] = [a - factor * b for a, b in zip(rows[r], rows[column], strict=True)]
+    return [row[4:] for row in rows]
 
 
-def discriminants(q: Floats, py: Floats, u: Floats, v: Floats, l3_squared: Floats, delta: float) -> tuple[Floats, Floats]:
-    """Return D1 = w² and D = S² (kinematics notes, sections 3 and 4); negative where no pose exists."""
-    d1 = 1.0 - u * u - v * v
-    c = q + delta * v * py
-    n_squared = 1.0 - 2.0 * delta * u + delta * delta * (1.0 - v * v)
-    return d1, (l3_squared - py * py) * n_squared - c * c
+def reciprocal_condition(base: Floats, delta: float) -> float:
+    """Return the reciprocal 2-norm condition number of the 4×4 matrix [x, y, δx², δxy] of the legs' equations.
+
+    Base attachments (5, 2), taken relative to leg 3's and divided by the largest distance from it: the figure
+    does not change with the unit of length. 0 where the matrix is zero or the attachments coincide.
+    """
+    relative = base[_OTHERS, :] - base[2]
+    size = float(np.linalg.norm(relative, axis=1).max())
+    if not size > 0.0:
+        return 0.0
+    x, y = (relative / size).T
+    values = np.linalg.svd(np.stack([x, y, delta * x * x, delta * x * y], axis=1), compute_uv=False)
+    return float(values[-1] / values[0])
 
 
 def solve(
     squared_legs: Floats, linear: LinearPart, delta: float, sign_w: Floats, sign_s: Floats
-) -> tuple[Floats, Floats]:
-    """Return reduced positions and directions (..., 3); NaN where the mode (sign_w, sign_s) does not exist.
+) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
+    """Return (px, py, pz, u, v, w), reduced; NaN where the mode (sign_w, sign_s) does not exist.
 
-    squared_legs (..., 5); the signs broadcast against its leading axes.
+    squared_legs (5, N); the signs broadcast against (N,), and so does the result: signs (4, 1) give (4, N)
+    for px, pz, w and (N,) for py, u, v, which do not depend on the mode. The square roots of negative
+    numbers are meant: the caller silences NumPy.
     """
-    q, py, u, v = np.moveaxis(linear(squared_legs), -1, 0)
-    d1, d = discriminants(q, py, u, v, squared_legs[..., 2], delta)
-    exists = (d1 >= 0.0) & (d >= 0.0)
-    w = sign_w * np.sqrt(np.where(exists, d1, np.nan))
-    root = sign_s * np.sqrt(np.where(exists, d, np.nan))
+    q, py, u, v = linear(squared_legs)
+    d1 = 1.0 - u * u
+    d1 -= v * v
+    w = np.sqrt(d1)  # |w|; NaN where there is no direction
     # (px, pz) lies on the line n · (px, pz) = c, at ±root along it, n = (1 − δu, −δw).
-    n1, n2 = 1.0 - delta * u, -delta * w
-    c = q + delta * v * py
-    k = 1.0 / (n1 * n1 + n2 * n2)
-    px, pz = (c * n1 - root * n2) * k, (c * n2 + root * n1) * k
-    nan = 0.0 * w  # py, u and v do not depend on the mode; they take its shape, and its absence
-    return np.stack([px, py + nan, pz], axis=-1), np.stack([u + nan, v + nan, w], axis=-1)
+    n1 = 1.0 - delta * u
+    n_squared = n1 * n1 + (delta * delta) * d1
+    c = q + delta * (v * py)
+    root = np.sqrt((squared_legs[2] - py * py) * n_squared - c * c)  # |S|
+    py = py + 0.0 * (w + root)  # NaN where one of them is; u and v likewise
+    u, v = u + (py - py), v + (py - py)
+    n2 = (-delta * sign_w) * w
+    root = sign_s * root
+    px, pz = (c * n1 - root * n2) / n_squared, (c * n2 + root * n1) / n_squared
+    return px, py, pz, u, v, sign_w * w + (py - py)
+
+
+def w_and_s(position: Floats, direction: Floats, delta: float, lever: float) -> tuple[Floats, Floats]:
+    """Return w and S (...) of poses (..., 3), machine frame (kinematics notes, section 4).
+
+    S = δ w px − (δu − 1) pz for the point of the line that leg 3 holds, relative to leg 3's base attachment; for
+    another point p of the line it is δ w px + (1 − δu) pz + (z_3 − δ x_3) w: lever = z_3 − δ x_3 in metres.
+    """
+    u, w = direction[..., 0], direction[..., 2]
+    return w, delta * w * position[..., 0] + (1.0 - delta * u) * position[..., 2] + lever * w
