@@ -2,21 +2,54 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 
 from pentapod.arrays import Floats, frozen, set_frozen
 from pentapod.errors import MachineError
 from pentapod.kinematics.pentapod import LinearPentapod
+from pentapod.kinematics.singularities import architectural_measure
+from pentapod.machine.digest import digest_of
 
 Interpolation = Literal["linear", "cubic"]
+
+ARCHITECTURAL_LIMIT = 0.005
+"""Least `architectural_measure` of a machine: below it, leg lengths say almost nothing about some motion."""
+
+
+def _per_leg(owner: object, *names: str) -> None:
+    """Replace scalars or five numbers by read-only arrays (5,). Raises MachineError naming the field."""
+    for name in names:
+        value = np.asarray(getattr(owner, name), dtype=np.float64)
+        if value.shape not in {(), (1,), (5,)}:
+            raise MachineError(
+                "wrong count", key=name, value=value.shape, expected="one number, or one for each of 5 legs"
+            )
+        if not np.isfinite(value).all():
+            raise MachineError("not finite", key=name, value=value.tolist())
+        set_frozen(owner, **{name: frozen(np.broadcast_to(value, (5,)), name, (5,))})
+
+
+def _positive(owner: object, *names: str) -> None:
+    """Raise MachineError where a field is not finite and positive."""
+    for name in names:
+        value = getattr(owner, name)
+        if not (np.isfinite(value).all() and np.min(value) > 0.0):
+            raise MachineError("must be positive", key=name, value=np.asarray(value).tolist())
 
 
 @dataclass(frozen=True, eq=False)
 class LegLimits:
-    """Limits of each leg, arrays (5,): lengths in m, rates in m/s, accelerations in m/s², jerks in m/s³."""
+    """Limits of each leg, arrays (5,): lengths in m, rates in m/s, accelerations in m/s², jerks in m/s³.
+
+    Scalars hold for all legs. Raises MachineError: not positive and finite, min_length ≥ max_length.
+    """
 
     min_length: Floats
     max_length: Floats
@@ -25,14 +58,21 @@ class LegLimits:
     max_jerk: Floats
 
     def __post_init__(self) -> None:
-        for name in self.__dataclass_fields__:
-            value = frozen(np.broadcast_to(getattr(self, name), (5,)), name, (5,))
-            if (value <= 0.0).any():
-                raise MachineError("must be positive", key=name, value=value.tolist())
-            set_frozen(self, **{name: value})
+        _per_leg(self, *self.__dataclass_fields__)
+        _positive(self, *self.__dataclass_fields__)
         if (self.min_length >= self.max_length).any():
-            leg = int(np.argmax(self.min_length >= self.max_length)) + 1
-            raise MachineError(f"leg {leg}: the shortest length is not below the longest", key="min_length")
+            leg = int(np.argmax(self.min_length >= self.max_length))
+            raise MachineError(
+                f"leg {leg + 1}: the shortest length is not below the longest",
+                key="min_length",
+                value=float(self.min_length[leg]),
+                expected=f"less than max_length, {self.max_length[leg]:g} m",
+            )
+
+    @property
+    def stroke(self) -> Floats:
+        """max_length − min_length, (5,) metres."""
+        return self.max_length - self.min_length
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +82,9 @@ class JointLimits:
     base_axes (5, 3): unit axis of each base joint's cone, machine frame. base_cone (5,): largest angle of the
     leg to that axis, radians. platform_range (5, 2): least and largest angle in radians between the leg
     (from platform joint towards base joint) and the tool axis tip → spindle.
+
+    Raises MachineError: axes that are not unit to 1e-3 (they are then normalised), a cone beyond 90°, a range
+    that is empty or beyond 0..180°.
     """
 
     base_axes: Floats
@@ -49,12 +92,24 @@ class JointLimits:
     platform_range: Floats
 
     def __post_init__(self) -> None:
-        set_frozen(
-            self,
-            base_axes=frozen(np.broadcast_to(self.base_axes, (5, 3)), "base_axes", (5, 3)),
-            base_cone=frozen(np.broadcast_to(self.base_cone, (5,)), "base_cone", (5,)),
-            platform_range=frozen(np.broadcast_to(self.platform_range, (5, 2)), "platform_range", (5, 2)),
-        )
+        _per_leg(self, "base_cone")
+        _positive(self, "base_cone")
+        axes = frozen(np.broadcast_to(self.base_axes, (5, 3)), "base_axes", (5, 3))
+        norms = np.linalg.norm(axes, axis=1, keepdims=True)
+        if (np.abs(norms - 1.0) > 1e-3).any():
+            leg = int(np.argmax(np.abs(norms - 1.0)))
+            raise MachineError(f"leg {leg + 1}: not a unit vector", key="base_axes", value=axes[leg].tolist())
+        limits = frozen(np.broadcast_to(self.platform_range, (5, 2)), "platform_range", (5, 2))
+        if (self.base_cone > 0.5 * np.pi).any():
+            raise MachineError(
+                "beyond 90 degrees", key="base_cone", value=np.degrees(self.base_cone).tolist()
+            )
+        if (limits[:, 0] < 0.0).any() or (limits[:, 1] > np.pi).any() or (limits[:, 0] >= limits[:, 1]).any():
+            value = np.degrees(limits).tolist()
+            raise MachineError(
+                "not a range", key="platform_range", value=value, expected="0 ≤ min < max ≤ 180 degrees"
+            )
+        set_frozen(self, base_axes=frozen(axes / norms, "base_axes"), platform_range=limits)
 
 
 @dataclass(frozen=True)
@@ -72,6 +127,9 @@ class Bodies:
     shaft_end: float
     joint_radius: float
 
+    def __post_init__(self) -> None:
+        _positive(self, *self.__dataclass_fields__)
+
 
 @dataclass(frozen=True)
 class ControllerSettings:
@@ -79,6 +137,16 @@ class ControllerSettings:
 
     period: float
     interpolation: Interpolation
+
+    def __post_init__(self) -> None:
+        _positive(self, "period")
+        if self.interpolation not in get_args(Interpolation):
+            raise MachineError(
+                "unknown interpolation",
+                key="interpolation",
+                value=self.interpolation,
+                expected='"linear" or "cubic"',
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +164,11 @@ class WorkVolume:
 
     def __post_init__(self) -> None:
         set_frozen(self, centre=frozen(self.centre, "centre", (3,)))
+        _positive(self, "diameter", "height")
+        if not 0.0 <= self.tilt < 0.5 * np.pi:
+            raise MachineError(
+                "out of range", key="tilt", value=float(np.degrees(self.tilt)), expected="0 to 90 degrees"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +177,9 @@ class Machine:
 
     tool_length: metres from p (the platform line's origin, where offset = 0) along i to the tool tip.
     rapid_velocity: largest tip speed in m/s on rapids.
-    digest: short hash of the machine's content, written into programs.
+
+    Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
+    spindle's nose would be above the lowest platform joint.
     """
 
     name: str
@@ -116,4 +191,50 @@ class Machine:
     rapid_velocity: float
     controller: ControllerSettings
     work: WorkVolume
-    digest: str
+    architecture: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        _positive(self, "tool_length", "rapid_velocity")
+        measure = architectural_measure(self.pentapod)
+        set_frozen(self, architecture=measure)
+        if measure < ARCHITECTURAL_LIMIT:
+            raise MachineError(
+                "the geometry is close to architecturally singular: the legs hold no pose firmly",
+                key="base",
+                value=float(f"{measure:.3g}"),
+                expected=f"a reciprocal condition number of at least {ARCHITECTURAL_LIMIT:g}",
+                remedy="spread the base joints: no four near one line, and not near a conic with a point at infinity in y",
+            )
+        room = self.tool_length - float(self.pentapod.offsets.max()) - self.bodies.shaft_end
+        if room < 0.0:
+            raise MachineError(
+                f"the tool is {-room * 1e3:.4g} mm too short: its holder would end above the lowest platform joint",
+                key="tool_length",
+                value=self.tool_length,
+                expected="at least the largest offset + shaft_end",
+            )
+
+    @classmethod
+    def load(cls, name_or_path: str | Path) -> Machine:
+        """Return a shipped machine by its name ("desk"), or the machine of a TOML file. Raises MachineError."""
+        from pentapod.machine.reader import load_machine  # noqa: PLC0415  the reader builds Machines
+
+        return load_machine(name_or_path)
+
+    @cached_property
+    def digest(self) -> str:
+        """16 hexadecimal digits over all numbers (not the name): equal machines have equal digests."""
+        return digest_of(dict(_numbers(self)))
+
+    def with_tool(self, tool_length: float) -> Machine:
+        """Return this machine with another tool: metres from p to the tip. Raises MachineError."""
+        return dataclasses.replace(self, tool_length=tool_length)
+
+
+def _numbers(machine: Machine) -> Iterator[tuple[str, object]]:
+    robot = machine.pentapod
+    yield from (("base", robot.base), ("offsets", robot.offsets), ("delta", robot.delta))
+    for part in (machine.legs, machine.joints, machine.bodies, machine.controller, machine.work):
+        for item in dataclasses.fields(part):
+            yield f"{type(part).__name__}.{item.name}", getattr(part, item.name)
+    yield from (("tool_length", machine.tool_length), ("rapid_velocity", machine.rapid_velocity))

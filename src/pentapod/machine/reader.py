@@ -1,0 +1,231 @@
+"""Machine files: TOML to `Machine`, with one clear error for whatever is wrong."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from pentapod.arrays import Floats
+from pentapod.errors import InputError, MachineError, nearest
+from pentapod.kinematics.pentapod import LinearPentapod
+from pentapod.machine.machine import Bodies, ControllerSettings, JointLimits, LegLimits, Machine, WorkVolume
+from pentapod.machine.tables import GeometryTable, MachineTables
+
+OFFSET_TOLERANCE_M = 1e-6  # offsets in a file are rounded; beyond a micrometre they mean another machine
+
+_PLACE = re.compile(r"\(at line (\d+), column (\d+)\)")
+# The key of the file that a field of the SI types comes from, where the names differ.
+_FILE_KEYS = {
+    "min_length": "legs.min_length_mm",
+    "max_length": "legs.max_length_mm",
+    "max_velocity": "legs.max_velocity_mm_s",
+    "max_acceleration": "legs.max_acceleration_mm_s2",
+    "max_jerk": "legs.max_jerk_mm_s3",
+    "base_axes": "joints.base_axis",
+    "base_cone": "joints.base_cone_deg",
+    "platform_range": "joints.platform_min_deg",
+    "base": "geometry.base_mm",
+    "delta": "geometry.delta",
+    "offsets": "geometry.platform_mm",
+    "tool_length": "tool.length_mm",
+    "tilt": "work.tilt_deg",
+}
+
+
+def shipped_machines() -> tuple[str, ...]:
+    """Return the names of the machines that come with pentapod, sorted."""
+    return tuple(
+        sorted(
+            entry.name.removesuffix(".toml") for entry in _library().iterdir() if entry.name.endswith(".toml")
+        )
+    )
+
+
+def load_machine(name_or_path: str | Path) -> Machine:
+    """Return a shipped machine by its name, or the machine of a TOML file.
+
+    A text without folder and suffix is taken for a name first. Raises MachineError: one line with file, line,
+    key, value and remedy.
+    """
+    name = str(name_or_path)
+    if name in shipped_machines():
+        return read_machine((_library() / f"{name}.toml").read_text(encoding="utf-8"), f"{name}.toml")
+    path = Path(name_or_path)
+    if not path.exists():
+        known = ", ".join(shipped_machines())
+        hint = nearest(name, shipped_machines()) if name else ""
+        remedy = f"shipped machines: {known}" + (f"; {hint}" if hint.startswith("did") else "")
+        raise MachineError("no such machine or machine file", file=name or '""', remedy=remedy)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise MachineError(
+            "not a text file in UTF-8", file=path, expected="a machine file in TOML"
+        ) from error
+    except OSError as error:
+        raise MachineError(f"cannot be read: {error.strerror}", file=path) from error
+    if not text.strip():
+        raise MachineError("the machine file is empty", file=path)
+    return read_machine(text, path)
+
+
+def read_machine(text: str, file: str | Path) -> Machine:
+    """Return the machine that TOML text describes; `file` is named in errors. Raises MachineError."""
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        place = _PLACE.search(str(error))
+        line, column = (int(place[1]), int(place[2])) if place else (len(text.splitlines()), None)
+        raise MachineError(
+            f"not TOML: {str(error).split(' (at ')[0]}", file=file, line=line, column=column
+        ) from error
+    try:
+        return _build(MachineTables.model_validate(content))
+    except ValidationError as error:
+        raise _from_pydantic(error, text, file) from error
+    except InputError as error:
+        key = _FILE_KEYS.get(error.key or "", error.key)
+        raise MachineError(
+            error.what,
+            file=file,
+            key=key,
+            line=_line_of(text, (key or "").split(".")),
+            value=error.value,
+            expected=error.expected,
+            remedy=error.remedy,
+        ) from error
+
+
+def _library() -> Traversable:
+    return resources.files("pentapod.machine") / "library"
+
+
+def _si(values: object) -> Floats:
+    """Return millimetres as metres: divided by 1000, which rounds once."""
+    return np.asarray(values, dtype=np.float64) / 1000.0
+
+
+def _build(tables: MachineTables) -> Machine:
+    legs, joints, bodies, work = tables.legs, tables.joints, tables.bodies, tables.work
+    return Machine(
+        name=tables.name,
+        pentapod=_geometry(tables.geometry),
+        legs=LegLimits(
+            min_length=_si(legs.min_length_mm),
+            max_length=_si(legs.max_length_mm),
+            max_velocity=_si(legs.max_velocity_mm_s),
+            max_acceleration=_si(legs.max_acceleration_mm_s2),
+            max_jerk=_si(legs.max_jerk_mm_s3),
+        ),
+        joints=JointLimits(
+            base_axes=np.asarray(joints.base_axis),
+            base_cone=np.radians(joints.base_cone_deg),
+            platform_range=np.radians(np.stack([joints.platform_min_deg, joints.platform_max_deg], axis=1)),
+        ),
+        bodies=Bodies(
+            leg_radius=bodies.leg_diameter_mm / 2000.0,
+            shaft_radius=bodies.shaft_diameter_mm / 2000.0,
+            shaft_end=bodies.shaft_end_mm / 1000.0,
+            joint_radius=bodies.joint_radius_mm / 1000.0,
+        ),
+        tool_length=tables.tool.length_mm / 1000.0,
+        rapid_velocity=tables.tool.rapid_mm_min / 60000.0,
+        controller=ControllerSettings(tables.controller.period_ms / 1000.0, tables.controller.interpolation),
+        work=WorkVolume(
+            centre=_si(work.centre_mm),
+            diameter=work.diameter_mm / 1000.0,
+            height=work.height_mm / 1000.0,
+            tilt=float(np.radians(work.tilt_deg)),
+        ),
+    )
+
+
+def _geometry(table: GeometryTable) -> LinearPentapod:
+    base = _si(table.base_mm)
+    if table.platform_mm is None:
+        if table.delta is None:
+            raise MachineError(
+                "the platform is missing", key="geometry", expected="delta, or platform_mm with five numbers"
+            )
+        return LinearPentapod.quadratic(base, table.delta)
+    try:
+        return LinearPentapod.from_offsets(
+            base, _si(table.platform_mm), table.delta, tolerance=OFFSET_TOLERANCE_M
+        )
+    except MachineError as error:
+        if table.delta is not None or error.key != "offsets":
+            raise
+        raise MachineError(
+            f"only the quadratic family is supported, platform offsets z_3 + delta (x_i − x_3); {error.what}",
+            key="offsets",
+            value=error.value,
+            expected=error.expected,
+        ) from error
+
+
+def _from_pydantic(error: ValidationError, text: str, file: str | Path) -> MachineError:
+    """Return the one error to show: an unknown key first, since a misspelling is also a missing key."""
+    first = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
+    where = [str(part) for part in first["loc"]]
+    return MachineError(
+        file=file, key=".".join(where[:2]), line=_line_of(text, where), **_details(first, where)
+    )
+
+
+def _details(error: ErrorDetails, where: list[str]) -> dict[str, Any]:
+    owner = MachineTables if len(where) == 1 else _table(where[0])
+    kind = "table" if len(where) == 1 and where[0] != "name" else "key"
+    if error["type"] == "extra_forbidden":
+        known = list(owner.model_fields)
+        if len(where) == 1 and not isinstance(error["input"], dict):
+            tables = [
+                f"{t}.{key}"
+                for t in MachineTables.model_fields
+                if t not in {"name", "description"}
+                for key in _table(t).model_fields
+            ]
+            known = [*known, *tables]
+            kind = "key"
+        return {"what": f"unknown {kind}", "remedy": nearest(where[-1], known)}
+    described = owner.model_fields[where[min(1, len(where) - 1)]]
+    meaning = described.description or f"[{where[0]}] with " + ", ".join(
+        key for key, item in _table(where[0]).model_fields.items() if item.is_required()
+    )
+    if error["type"] == "missing":
+        return {"what": f"the {kind} is missing", "expected": meaning}
+    context = error.get("ctx", {})
+    if error["type"] == "rule":
+        return {
+            "what": context["what"],
+            "value": error["input"],
+            "expected": f"{context['expected']} ({meaning})",
+        }
+    message = error["msg"].removeprefix("Input should be ").removeprefix("a ").removeprefix("valid ")
+    what = "out of range" if set(context) & {"gt", "ge", "lt", "le"} else "wrong value"
+    return {"what": what, "value": error["input"], "expected": f"{message} ({meaning})"}
+
+
+def _table(name: str) -> type[BaseModel]:
+    return cast("type[BaseModel]", MachineTables.model_fields[name].annotation)
+
+
+def _line_of(text: str, where: list[str]) -> int | None:
+    """Return the line of a key, or of its table's header: for messages, so a plain search is enough."""
+    table, header = "", None
+    for number, line in enumerate(text.splitlines(), start=1):
+        if match := re.match(r"\s*\[\s*(\w+)\s*\]", line):
+            table = match[1]
+            if table == where[0]:
+                header = number
+        elif (owner := [table, *where[1:2]] if table else where[:1]) and (table == where[0] or not table):
+            if re.match(rf"\s*{re.escape(owner[-1])}\s*=", line):
+                return number
+    return header
