@@ -1,4 +1,4 @@
-"""Polynomials in Bernstein form on [0, 1], in batches: coefficients (..., n + 1), the degree n along the last axis.
+"""Polynomials in Bernstein form on [0, 1], in batches: coefficients (..., n + 1), degree n.
 
 Source: R. T. Farouki, "The Bernstein polynomial basis: a centennial retrospective", CAGD 29 (2012).
 
@@ -115,7 +115,7 @@ def convolve(a: Floats, b: Floats) -> Floats:
 
 @cache
 def binomials(n: int) -> Floats:
-    """Return C(n, 0), ..., C(n, n) as floats (n + 1,), read-only: the constant 1 of degree n in scaled form."""
+    """Return C(n, 0), ..., C(n, n) as floats (n + 1,), read-only: the constant 1 in scaled form."""
     row = np.array([float(comb(n, j)) for j in range(n + 1)])
     row.flags.writeable = False
     return row

@@ -1,4 +1,4 @@
-"""Lower bounds of polynomials in Bernstein form over [0, 1], by subdivision where the coefficients do not decide."""
+"""Lower bounds of polynomials in Bernstein form over [0, 1], by subdivision where it is needed."""
 
 from __future__ import annotations
 

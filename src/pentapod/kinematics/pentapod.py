@@ -22,8 +22,8 @@ class LinearPentapod:
     """Five base attachments a_i = (x_i, y_i, 0) and offsets z_i along the platform line, b_i = p + z_i i.
 
     base (5, 2) and offsets (5,) in metres; delta: the constant z_i − z_3 = δ (x_i − x_3) of the quadratic
-    family. Build one with `LinearPentapod.quadratic` or `LinearPentapod.from_offsets`. Machine frame: the base
-    plane is z = 0; leg 3's attachment may be anywhere in it.
+    family. Build one with `LinearPentapod.quadratic` or `LinearPentapod.from_offsets`. Machine frame: the
+    base plane is z = 0; leg 3's attachment may be anywhere in it.
 
     Raises MachineError: not five attachments or offsets, numbers that are not finite, offsets that do not fit
     delta (to 1e-9 of the machine's size), an architecturally singular geometry.
@@ -44,7 +44,7 @@ class LinearPentapod:
     def from_offsets(
         cls, base: ArrayLike, offsets: ArrayLike, delta: float | None = None, *, tolerance: float = 1e-9
     ) -> LinearPentapod:
-        """Return the pentapod with these offsets z_i (5,) along the platform line, metres. base (5, 2) metres.
+        """Return the pentapod with offsets z_i (5,) along the platform line and base (5, 2), in metres.
 
         delta is fitted by least squares where it is not claimed. The offsets must then be z_3 + δ (x_i − x_3)
         to within `tolerance` metres, and exactly these are stored. Raises MachineError that names the leg
@@ -81,7 +81,7 @@ class LinearPentapod:
         return legs
 
     def leg_lengths(self, position: ArrayLike, direction: ArrayLike) -> Floats:
-        """Return leg lengths (..., 5) in metres for positions p and unit directions i (..., 3), machine frame."""
+        """Return leg lengths (..., 5), metres, of positions p and unit directions i (..., 3)."""
         p, i = _broadcast(as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,)))
         batch = p.shape[:-1]
         p, i = p.reshape(-1, 3), i.reshape(-1, 3)
@@ -109,8 +109,8 @@ class LinearPentapod:
     def pose(self, legs: ArrayLike, component: ArrayLike) -> tuple[Floats, Floats]:
         """Return positions and directions (..., 3) in a component: a `Component`, or signs (..., 2).
 
-        legs (..., 5) metres; the signs, each ±1, broadcast against their batch. NaN where no pose has these leg
-        lengths, and where a sign is 0 or NaN. Raises ArrayError for other signs.
+        legs (..., 5) metres; the signs, each ±1, broadcast against their batch. NaN where no pose has these
+        leg lengths, and where a sign is 0 or NaN. Raises ArrayError for other signs.
         """
         lengths, signs = as_batch(legs, "legs", (5,)), as_batch(component, "component", (2,))
         if signs.size and not (np.isnan(signs) | (np.abs(signs) == 1.0) | (signs == 0.0)).all():
@@ -135,7 +135,7 @@ class LinearPentapod:
 
     @property
     def lever(self) -> float:
-        """z_3 − δ x_3 in metres: 0 where z_i = δ x_i, that is, where p is the point with the simplest formulas."""
+        """z_3 − δ x_3 in metres: 0 where z_i = δ x_i."""
         return float(self.offsets[2] - self.delta * self.base[2, 0])
 
     def _solve(self, legs: Floats, signs: Floats, modes: tuple[int, ...] = ()) -> tuple[Floats, Floats]:

@@ -1,6 +1,7 @@
 """Forward kinematics of the quadratic family in closed form (kinematics notes, section 3).
 
-Source: J. Borràs, F. Thomas, C. Torras, "A Family of Quadratically-Solvable 5-SPU Parallel Robots", ICRA 2010.
+Source: J. Borràs, F. Thomas, C. Torras, "A Family of Quadratically-Solvable 5-SPU Parallel Robots", ICRA
+2010.
 Everything here is in the *reduced* frame, where leg 3's base attachment and offset are zero.
 """
 
@@ -67,7 +68,7 @@ def _eliminate(rows: list[list[Fraction]]) -> list[list[Fraction]]:
 
 
 def reciprocal_condition(base: Floats, delta: float) -> float:
-    """Return the reciprocal 2-norm condition number of the 4×4 matrix [x, y, δx², δxy] of the legs' equations.
+    """Return the reciprocal 2-norm condition number of the matrix [x, y, δx², δxy] (4, 4) of `LinearPart`.
 
     Base attachments (5, 2), taken relative to leg 3's and divided by the largest distance from it: the figure
     does not change with the unit of length. 0 where the matrix is zero or the attachments coincide.
@@ -110,8 +111,8 @@ def solve(
 def w_and_s(position: Floats, direction: Floats, delta: float, lever: float) -> tuple[Floats, Floats]:
     """Return w and S (...) of poses (..., 3), machine frame (kinematics notes, section 4).
 
-    S = δ w px − (δu − 1) pz for the point of the line that leg 3 holds, relative to leg 3's base attachment; for
-    another point p of the line it is δ w px + (1 − δu) pz + (z_3 − δ x_3) w: lever = z_3 − δ x_3 in metres.
+    S = δ w px − (δu − 1) pz for the point of the line that leg 3 holds, relative to leg 3's base attachment;
+    for another point p of the line it is δ w px + (1 − δu) pz + lever · w, lever = z_3 − δ x_3 in metres.
     """
     u, w = direction[..., 0], direction[..., 2]
     return w, delta * w * position[..., 0] + (1.0 - delta * u) * position[..., 2] + lever * w
