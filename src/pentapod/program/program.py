@@ -52,7 +52,7 @@ class Program:
     @cached_property
     def times(self) -> Floats:
         """Time (N,) of each row in seconds."""
-        return np.arange(len(self.legs)) * self.period
+        return np.arange(len(self.legs), dtype=np.float64) * self.period
 
     @property
     def duration(self) -> float:

@@ -1,0 +1,54 @@
+"""Writing files so that an interruption leaves the old file or none, never half of one."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+from pentapod.errors import InputError
+
+
+@contextmanager
+def atomic_write(path: str | Path) -> Generator[Path]:
+    """Yield the path of an empty temporary file beside `path`; rename it to `path` when the block succeeds.
+
+    The temporary name keeps the suffix, since some writers look at it. When the block raises (also on
+    KeyboardInterrupt) the temporary file is removed and what stood at `path` before is untouched.
+    Raises InputError where the folder does not exist or cannot be written, or `path` is a folder.
+
+        with atomic_write("verdict.json") as temporary:
+            temporary.write_text(text)
+    """
+    target = Path(path)
+    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(6)}{target.suffix}")
+    try:
+        if target.is_dir():
+            raise IsADirectoryError(21, "Is a directory")
+        # "x": never someone else's file; created with the user's usual permissions.
+        with temporary.open("xb"):
+            pass
+    except OSError as error:
+        raise _unwritable(target, error) from error
+    try:
+        yield temporary
+        # Without it a power cut after the rename may leave an empty file of the right name.
+        with temporary.open("rb+") as written:
+            os.fsync(written.fileno())
+        try:
+            temporary.replace(target)
+        except OSError as error:
+            raise _unwritable(target, error) from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _unwritable(path: Path, error: OSError) -> InputError:
+    reason = (error.strerror or str(error)).lower()
+    return InputError(
+        f"cannot be written: {reason}", file=path, expected="a folder that exists and can be written"
+    )

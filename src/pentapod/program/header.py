@@ -1,0 +1,207 @@
+"""The header of a program file: `# key = value` lines, each value in TOML syntax."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.errors import ArrayError, InputError, ProgramError
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import Component
+from pentapod.program.program import FORMAT_VERSION, Program, Provenance
+
+MAGIC = "pentapod_program"
+KEYS = (
+    MAGIC,
+    "pentapod_version",
+    "machine",
+    "machine_digest",
+    "job_digest",
+    "period_s",
+    "interpolation",
+    "component",
+    "placement_mm",
+    "rows",
+)
+
+
+@dataclass(frozen=True)
+class Header:
+    """What stands in front of the rows."""
+
+    period: float
+    interpolation: Any
+    component: Component
+    placement: RigidTransform
+    provenance: Provenance
+    rows: int
+
+
+def header_text(program: Program) -> str:
+    """Return the header lines of a program, each ended by a newline."""
+    source = program.provenance
+    values = (
+        str(FORMAT_VERSION),
+        _string(source.pentapod_version),
+        _string(source.machine),
+        _string(source.machine_digest),
+        _string(source.job_digest),
+        repr(float(program.period)),
+        _string(program.interpolation),
+        _string(str(program.component)),
+        _matrix(program.placement),
+        str(len(program.legs)),
+    )
+    return "".join(f"# {key} = {value}\n" for key, value in zip(KEYS, values, strict=True))
+
+
+def parse_header(lines: list[str], file: Path) -> Header:
+    """Return the header from its lines, which all begin with "#". Raises ProgramError with file and line."""
+    values: dict[str, Any] = {}
+    places: dict[str, int] = {}
+    for number, line in enumerate(lines, start=1):
+        try:
+            # Decimals, so that placements come back from millimetres bit for bit.
+            entry = tomllib.loads(line[1:].strip(), parse_float=Decimal)
+        except tomllib.TOMLDecodeError as error:
+            raise ProgramError(
+                "cannot read this header line",
+                file=file,
+                line=number,
+                value=line.strip()[:80],
+                expected="# key = value",
+            ) from error
+        for key, value in entry.items():
+            if key in values:
+                raise ProgramError("this key stands in the header twice", file=file, line=number, key=key)
+            values[key], places[key] = value, number
+        if number == 1 and values.get(MAGIC) != FORMAT_VERSION:
+            _reject_first_line(values, file)
+    for key in KEYS:
+        if key not in values:
+            raise ProgramError("the header lacks this key", file=file, key=key, remedy="plan the job again")
+    return _Reader(values, places, file).header()
+
+
+def _reject_first_line(values: dict[str, Any], file: Path) -> None:
+    if MAGIC in values:
+        raise ProgramError(
+            "unknown format version",
+            file=file,
+            line=1,
+            key=MAGIC,
+            value=values[MAGIC],
+            expected=str(FORMAT_VERSION),
+        )
+    raise ProgramError("not a pentapod program", file=file, line=1, expected=f"# {MAGIC} = {FORMAT_VERSION}")
+
+
+@dataclass(frozen=True)
+class _Reader:
+    values: dict[str, Any]
+    places: dict[str, int]
+    file: Path
+
+    def header(self) -> Header:
+        return Header(
+            period=self._period(),
+            interpolation=self._one_of("interpolation", ("linear", "cubic")),
+            component=Component.parse(self._one_of("component", ("++", "+-", "-+", "--"))),
+            placement=self._placement(),
+            provenance=Provenance(
+                machine=self._text("machine"),
+                machine_digest=self._text("machine_digest"),
+                job_digest=self._text("job_digest"),
+                pentapod_version=self._text("pentapod_version"),
+            ),
+            rows=self._rows(),
+        )
+
+    def _wrong(self, key: str, expected: str) -> ProgramError:
+        value = self.values[key]
+        shown = float(value) if isinstance(value, Decimal) else value
+        return ProgramError(
+            "bad value", file=self.file, line=self.places[key], key=key, value=shown, expected=expected
+        )
+
+    def _text(self, key: str) -> str:
+        if not isinstance(self.values[key], str):
+            raise self._wrong(key, "a string")
+        return self.values[key]
+
+    def _one_of(self, key: str, known: tuple[str, ...]) -> str:
+        if self.values[key] not in known:
+            raise self._wrong(key, " or ".join(f'"{name}"' for name in known))
+        return self.values[key]
+
+    def _period(self) -> float:
+        period = _number(self.values["period_s"])
+        if not (period > 0.0 and math.isfinite(period)):
+            raise self._wrong("period_s", "a positive number of seconds")
+        return period
+
+    def _rows(self) -> int:
+        rows = self.values["rows"]
+        if type(rows) is not int or rows < 2:
+            raise self._wrong("rows", "a count of at least 2")
+        return rows
+
+    def _placement(self) -> RigidTransform:
+        expected = "a rigid 4x4 matrix, translation in mm"
+        matrix = np.full((4, 4), np.nan)
+        rows: Any = self.values["placement_mm"]
+        if not isinstance(rows, list) or [len(r) if isinstance(r, list) else 0 for r in rows] != [4, 4, 4, 4]:
+            raise self._wrong("placement_mm", expected)
+        for k, row in enumerate(rows):
+            for j, entry in enumerate(row):
+                matrix[k, j] = _number(entry, shift=-3 if j == 3 and k < 3 else 0)
+        try:
+            return RigidTransform.from_matrix(matrix)
+        except ArrayError as error:
+            raise ProgramError(
+                error.what,
+                file=self.file,
+                line=self.places["placement_mm"],
+                key="placement_mm",
+                expected=expected,
+            ) from error
+
+
+def _number(value: Any, shift: int = 0) -> float:
+    """Return a TOML number times 10^shift, rounded once; NaN for anything else."""
+    if type(value) is int or isinstance(value, Decimal):
+        return float(Decimal(value).scaleb(shift)) if Decimal(value).is_finite() else math.nan
+    return math.nan
+
+
+def _string(text: str) -> str:
+    """Return a TOML basic string; JSON's escapes are TOML's, but for DEL."""
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise InputError("a name in the header is not text that UTF-8 can hold", value=text) from error
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _matrix(placement: RigidTransform) -> str:
+    matrix: Floats = placement.matrix
+    shifts = [[3 if j == 3 and k < 3 else 0 for j in range(4)] for k in range(4)]
+    rows = (
+        "[" + ", ".join(_decimal(float(x), n) for x, n in zip(row, shift, strict=True)) + "]"
+        for row, shift in zip(matrix, shifts, strict=True)
+    )
+    return "[" + ", ".join(rows) + "]"
+
+
+def _decimal(value: float, shift: int) -> str:
+    """Return the shortest digits that give `value` back, times 10^shift, as a TOML float."""
+    text = format(Decimal(repr(value)).scaleb(shift), "f")
+    return text if "." in text else text + ".0"

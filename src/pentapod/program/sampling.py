@@ -1,0 +1,44 @@
+"""From a trajectory to setpoints."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import Component
+from pentapod.machine.machine import Machine
+from pentapod.program.program import Program, Provenance
+from pentapod.program.resolution import quantised
+from pentapod.timing.trajectory import Trajectory
+
+_CHUNK = 100_000
+
+
+def sample(
+    trajectory: Trajectory,
+    machine: Machine,
+    placement: RigidTransform,
+    component: Component,
+    provenance: Provenance,
+) -> Program:
+    """Return the program: the trajectory at the controller's period, at the resolution of program files.
+
+    `retime` gives trajectories that last a whole number of the machine's periods; of any other the last
+    row is the end point, reached within the last period. placement: workpiece → machine, metres.
+    """
+    period = machine.controller.period
+    count = max(1, math.ceil(trajectory.duration / period - 1e-6))
+    times = np.minimum(np.arange(count + 1) * period, trajectory.duration)
+    times[-1] = trajectory.duration
+    legs: list[Floats] = [trajectory(times[k : k + _CHUNK]) for k in range(0, len(times), _CHUNK)]
+    return Program(
+        period=period,
+        legs=quantised(np.concatenate(legs)),
+        interpolation=machine.controller.interpolation,
+        component=component,
+        placement=placement,
+        provenance=provenance,
+    )

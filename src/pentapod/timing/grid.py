@@ -1,0 +1,78 @@
+"""Gridpoints: fine enough that limits kept at the points are kept between them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pentapod.arrays import Bools, Floats
+from pentapod.timing.constraints import Limits
+from pentapod.timing.paths import PieceLike
+
+LEAST_STAGES = 48
+"""Stages of a piece at least: what is lost where the law switches within a stage goes with their square."""
+
+_TOLERANCE = 0.01
+_ROUNDS = 7
+
+
+def first_grid(piece: PieceLike, limits: Limits) -> Floats:
+    """Return gridpoints (N + 1,) from 0 to the piece's length.
+
+    Holds the knots, the section ends and where their feeds begin to hold; stages are halved until, at the
+    largest speed and path acceleration that the limits leave there, the leg accelerations and rates in
+    the middle of a stage exceed those at its ends by less than 1 %.
+    """
+    s = _base_grid(piece, limits)
+    for _ in range(_ROUNDS):
+        rough = _rough(piece, limits, s)
+        if not rough.any():
+            break
+        s = halved(s, rough)
+    return s
+
+
+def halved(s: Floats, stages: Bools) -> Floats:
+    """Return the grid with the marked stages (N,) halved."""
+    return np.sort(np.concatenate([s, (s[:-1] + s[1:])[stages] / 2.0]))
+
+
+def _base_grid(piece: PieceLike, limits: Limits) -> Floats:
+    length = float(piece.length)
+    begins, ends, _ = limits.guarded_sections(piece)
+    marks = np.concatenate([piece.knots, piece.section_ends, begins, ends])
+    marks = np.unique(np.concatenate([[0.0], marks[(marks > 0.0) & (marks < length)], [length]]))
+    # Marks that rounding holds apart would make stages of no length; the ends stay exact.
+    keep = np.diff(marks) > 1e-9 * length
+    marks = np.concatenate([marks[:-1][keep], [length]])
+    marks[0] = 0.0
+    steps = np.diff(marks)
+    counts = np.ceil(steps / length * LEAST_STAGES - 1e-9).astype(np.intp)
+    stage = np.repeat(np.arange(len(steps)), counts)
+    within = np.arange(len(stage)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.append(marks[stage] + steps[stage] * (within / counts[stage]), length)
+
+
+def _rough(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
+    """Return which stages (N,) are too long, by what the constraints' coefficients do at their middle."""
+    points = np.empty(2 * len(s) - 1)
+    points[0::2], points[1::2] = s, (s[:-1] + s[1:]) / 2.0
+    first, second = piece(points, 1), piece(points, 2)
+    speed, _ = limits.tip_speed(piece, points)
+    ceiling = limits.ceiling(first, second, speed)
+    with np.errstate(divide="ignore"):
+        pushes = ((limits.acceleration + np.abs(second) * ceiling[:, None]) / np.abs(first)).min(axis=1)
+    a, m, b = slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2)
+    x = np.maximum(np.maximum(ceiling[a], ceiling[b]), ceiling[m])[:, None]
+    # No stage can gain more than the whole of x over its length.
+    u = np.minimum(np.maximum(np.maximum(pushes[a], pushes[b]), pushes[m]), x[:, 0] / (2.0 * np.diff(s)))[
+        :, None
+    ]
+    gain = np.minimum(2.0 * u * np.diff(s)[:, None], x)
+    bulge = (
+        np.abs(first[m] - (first[a] + first[b]) / 2.0) * u
+        + np.abs(second[m] - (second[a] + second[b]) / 2.0) * x
+        + np.abs(second[b] - second[a]) * gain / 4.0
+    )
+    rate = (np.abs(first[m]) - np.maximum(np.abs(first[a]), np.abs(first[b]))) * np.sqrt(x)
+    rough = (bulge > _TOLERANCE * limits.acceleration) | (rate > 0.2 * _TOLERANCE * limits.velocity)
+    return np.asarray(rough.any(axis=1))

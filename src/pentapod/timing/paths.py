@@ -1,0 +1,45 @@
+"""What timing needs to know of a path: the shape that a `LegPath` has."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from pentapod.arrays import Floats, Ints
+from pentapod.toolpath.toolpath import SegmentKind
+
+
+class PieceLike(Protocol):
+    """A smooth run of the path between two exact stops; s is the tip's arc length in metres from its start.
+
+    knots (K,): where the third derivative may jump. section_ends (M,): s where each section ends, the last
+    is `length`; section_feeds (M,): m/s, infinite on rapids; section_kinds and section_segments (M,): kind
+    and index of the toolpath's segment. `piece(s, order)` gives legs (n, 5) in metres and their
+    derivatives d^order/ds^order, order 0, 1, 2, the second continuous.
+    """
+
+    @property
+    def length(self) -> float: ...  # noqa: D102 (described above)
+    @property
+    def knots(self) -> Floats: ...  # noqa: D102
+    @property
+    def section_ends(self) -> Floats: ...  # noqa: D102
+    @property
+    def section_feeds(self) -> Floats: ...  # noqa: D102
+    @property
+    def section_kinds(self) -> Sequence[SegmentKind]: ...  # noqa: D102
+    @property
+    def section_segments(self) -> Ints: ...  # noqa: D102
+    def __call__(self, s: Floats, order: int = 0) -> Floats: ...  # noqa: D102
+
+
+class LegPathLike(Protocol):
+    """Pieces, each at rest at both ends.
+
+    starts (P + 1,): global arc length in metres at which each piece starts, and the end.
+    """
+
+    @property
+    def pieces(self) -> Sequence[PieceLike]: ...  # noqa: D102
+    @property
+    def starts(self) -> Floats: ...  # noqa: D102

@@ -1,0 +1,143 @@
+"""The time law of one piece: solved, measured between the gridpoints, mended until it holds there too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from pentapod.arrays import Bools, Floats, Ints
+from pentapod.timing.constraints import Limits
+from pentapod.timing.engine import Failure, fastest
+from pentapod.timing.grid import first_grid, halved
+from pentapod.timing.paths import PieceLike
+
+_BETWEEN = np.array([0.25, 0.5, 0.75])
+_REFINEMENTS = 3
+_EASINGS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class PieceProfile:
+    """Squared speeds x (N + 1,) in m²/s² at stations s (N + 1,) in metres of a piece, linear in s between.
+
+    ease_acceleration and ease_speed (N + 1,): factors ≤ 1 on the leg acceleration limits and on the speeds
+    at each gridpoint, where a plan at full limits was measured to exceed them.
+    """
+
+    piece: PieceLike
+    limits: Limits
+    s: Floats
+    x: Floats
+    ease_acceleration: Floats
+    ease_speed: Floats
+
+    @cached_property
+    def first(self) -> Floats:
+        """Leg derivatives q′ (N + 1, 5) at the gridpoints."""
+        return self.piece(self.s, 1)
+
+    @cached_property
+    def second(self) -> Floats:
+        """Leg derivatives q″ (N + 1, 5) at the gridpoints, 1/m."""
+        return self.piece(self.s, 2)
+
+    @cached_property
+    def tip_speed(self) -> tuple[Floats, Ints]:
+        """Largest speed of the tip (N + 1,) at the gridpoints, and the section from which it comes."""
+        return self.limits.tip_speed(self.piece, self.s)
+
+    def solved(self) -> PieceProfile | Failure:
+        """Return the fastest profile on this grid with these easings."""
+        ceiling = self.limits.ceiling(self.first, self.second, self.tip_speed[0]) * self.ease_speed**2
+        rows = 1.0 / (self.limits.acceleration * self.ease_acceleration[:, None])
+        x = fastest(self.s, self.first * rows, self.second * rows, ceiling)
+        return x if isinstance(x, Failure) else self.with_(x=x)
+
+    def eased(self, acceleration: Floats, speed: Floats) -> PieceProfile | Failure:
+        """Return the profile solved anew with further factors (N + 1,) on accelerations and speeds."""
+        return self.with_(
+            ease_acceleration=self.ease_acceleration * acceleration, ease_speed=self.ease_speed * speed
+        ).solved()
+
+    def with_(self, **changes: Floats) -> PieceProfile:
+        """Return a copy on the same grid, which keeps the path's derivatives."""
+        copy = replace(self, **changes)
+        for name in ("first", "second", "tip_speed"):
+            if name in self.__dict__:
+                copy.__dict__[name] = self.__dict__[name]
+        return copy
+
+    def refined(self, stages: Bools) -> PieceProfile:
+        """Return the problem on the grid with the marked stages (N,) halved."""
+        s = halved(self.s, stages)
+        return PieceProfile(self.piece, self.limits, s, *(np.interp(s, self.s, y) for y in self._columns))
+
+    @property
+    def _columns(self) -> tuple[Floats, Floats, Floats]:
+        return self.x, self.ease_acceleration, self.ease_speed
+
+    def path_accelerations(self) -> Floats:
+        """Return s̈ (N,) of each stage, m/s²."""
+        return np.diff(self.x) / (2.0 * np.diff(self.s))
+
+    def shares_between(self) -> tuple[Floats, Floats]:
+        """Return the largest shares (N,) of leg velocities and of leg accelerations inside each stage."""
+        ds, dx, u = np.diff(self.s), np.diff(self.x), self.path_accelerations()
+        s = (self.s[:-1, None] + _BETWEEN * ds[:, None]).ravel()
+        x = (self.x[:-1, None] + _BETWEEN * dx[:, None]).ravel()
+        shares = self.limits.shares(
+            self.piece(s, 1), self.piece(s, 2), x, np.repeat(u, len(_BETWEEN)), np.full(len(s), np.inf)
+        ).reshape(len(ds), len(_BETWEEN), 11)
+        worst = shares.max(axis=1)
+        return worst[:, :5].max(axis=1), worst[:, 5:10].max(axis=1)
+
+    def active(self) -> tuple[Ints, Floats]:
+        """Return the constraint (N + 1,) that holds each gridpoint back most, and its share of the limit."""
+        u = self.path_accelerations()
+        speed, section = self.tip_speed
+        before, after = (
+            self.limits.shares(self.first, self.second, self.x, pushes, speed)
+            for pushes in (np.append(u[0], u), np.append(u, u[-1]))
+        )
+        shares = np.maximum(before, after)
+        column = shares.argmax(axis=1)
+        rapid = ~np.isfinite(np.asarray(self.piece.section_feeds, dtype=np.float64))[section]
+        return np.where((column == 10) & rapid, 11, column), shares.max(axis=1)
+
+
+def time_piece(
+    piece: PieceLike, limits: Limits, velocity_slack: float, acceleration_slack: float
+) -> PieceProfile | Failure:
+    """Return the fastest profile of a piece that keeps the limits between gridpoints as well.
+
+    The slacks are the shares above 1 that are let pass, part of the margins. Stages that exceed them are
+    halved, those that still do are eased; what is left after that is run slower as a whole.
+    """
+    s = first_grid(piece, limits)
+    problem = PieceProfile(piece, limits, s, np.zeros_like(s), np.ones_like(s), np.ones_like(s))
+    profile = problem.solved()
+    for attempt in range(_REFINEMENTS + _EASINGS):
+        if isinstance(profile, Failure):
+            return profile
+        rates, accelerations = profile.shares_between()
+        fast, hard = rates > 1.0 + velocity_slack, accelerations > 1.0 + acceleration_slack
+        if not (fast | hard).any():
+            return profile
+        if attempt < _REFINEMENTS:
+            profile = profile.refined(fast | hard).solved()
+        else:
+            profile = profile.eased(_at_ends(accelerations, hard), _at_ends(rates, fast))
+    return profile if isinstance(profile, Failure) else _slowed(profile)
+
+
+def _at_ends(shares: Floats, bad: Bools) -> Floats:
+    """Return factors (N + 1,) for the gridpoints of the bad stages (N,)."""
+    factor = np.where(bad, 0.998 / shares, 1.0)
+    return np.minimum(np.append(factor, 1.0), np.append(1.0, factor))
+
+
+def _slowed(profile: PieceProfile) -> PieceProfile:
+    rates, accelerations = profile.shares_between()
+    return profile.with_(x=profile.x / max(1.0, float(rates.max()) ** 2, float(accelerations.max())))

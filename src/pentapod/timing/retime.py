@@ -1,0 +1,142 @@
+"""From a leg path to a trajectory: the fastest motion that the machine's limits and the feeds allow."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pentapod.errors import InputError
+from pentapod.machine.machine import Machine
+from pentapod.progress import Progress, silent
+from pentapod.refusal import Refusal
+from pentapod.timing.constraints import CONSTRAINTS, Limits
+from pentapod.timing.cubic import WINDOW_PERIODS, Unmended, smooth_laws, whole_periods
+from pentapod.timing.engine import Failure
+from pentapod.timing.law import MotionLaw
+from pentapod.timing.paths import LegPathLike, PieceLike
+from pentapod.timing.piece import PieceProfile, time_piece
+from pentapod.timing.trajectory import Profile, Trajectory
+
+STILL_M = 1e-12
+"""A piece shorter than this does not move."""
+
+_JOIN_M = 1e-9
+
+
+def retime(
+    path: LegPathLike,
+    machine: Machine,
+    *,
+    progress: Progress = silent,
+    velocity_margin: float = 0.002,
+    acceleration_margin: float = 0.005,
+) -> Trajectory | Refusal:
+    """Return the time-optimal trajectory along a path, or the named cause why there is none.
+
+    Leg velocities and accelerations, the feed on cuts and links and the rapid rate on rapids hold at and
+    between the gridpoints, and on the setpoints as the controller joins them (`machine.controller`). Each
+    piece goes from rest to rest and lasts a whole number of periods. The margins are fractions of the
+    limits that the plan leaves free; the rounding of setpoints and what happens between gridpoints uses part
+    of them. Pieces of no length are passed over. Method: TOPP-RA (Pham and Pham 2018), by toppra.
+
+    Raises InputError where a margin is not in (0, 0.5).
+    """
+    for name, margin in (("velocity_margin", velocity_margin), ("acceleration_margin", acceleration_margin)):
+        if not 0.0 < margin < 0.5:
+            raise InputError(
+                "a margin is a fraction of a limit", key=name, value=margin, expected="0 < margin < 0.5"
+            )
+    cubic = machine.controller.interpolation == "cubic"
+    period = machine.controller.period
+    limits = Limits.of(
+        machine,
+        velocity_margin,
+        acceleration_margin,
+        guard=period * (1.5 + (WINDOW_PERIODS / 2 if cubic else 0.0)),
+    )
+    unfit = _unfit(path)
+    if unfit is not None:
+        return unfit
+    indices = [k for k, piece in enumerate(path.pieces) if piece.length > STILL_M]
+    total = sum(path.pieces[k].length for k in indices)
+    profiles: list[PieceProfile] = []
+    done = 0.0
+    for k in indices:
+        profile = time_piece(path.pieces[k], limits, 0.5 * velocity_margin, 0.7 * acceleration_margin)
+        if isinstance(profile, Failure):
+            return _refusal(path, k, None, profile)
+        profiles.append(profile)
+        done += path.pieces[k].length
+        progress("timing", done / total, f"piece {len(profiles)} of {len(indices)}")
+    if cubic:
+        smoothed = smooth_laws(profiles, machine)
+        if isinstance(smoothed, Unmended):
+            return _refusal(path, indices[smoothed.index], profiles[smoothed.index], smoothed.failure)
+        profiles, laws = smoothed
+    else:
+        laws = [MotionLaw.from_profile(p.s, p.x) for p in profiles]
+        laws = [law.stretched(whole_periods(law.duration, period)) for law in laws]
+    return Trajectory(path, tuple(indices), tuple(laws), _profile(path, indices, profiles, laws))
+
+
+def _unfit(path: LegPathLike) -> Refusal | None:
+    """Return why a path cannot be timed at all: nothing moves, pieces do not join, or legs are not finite."""
+    previous = None
+    for k, piece in enumerate(path.pieces):
+        if not math.isfinite(piece.length) or piece.length < 0.0:
+            return Refusal("timing", f"piece {k} of the leg path has no length: {piece.length}")
+        s = np.unique(np.concatenate([[0.0], piece.knots, [piece.length]]))
+        values = [piece(s, order) for order in range(3)]
+        bad = ~np.isfinite(np.concatenate(values, axis=1)).all(axis=1)
+        if bad.any():
+            return _refusal(
+                path, k, None, Failure(-1, "the leg path or a derivative is not finite"), float(s[bad][0])
+            )
+        ends = values[0][[0, -1]]
+        if previous is not None and np.abs(ends[0] - previous).max() > _JOIN_M:
+            jump = 1e3 * float(np.abs(ends[0] - previous).max())
+            return _refusal(
+                path, k, None, Failure(-1, f"the legs jump by {jump:.3g} mm at an exact stop"), 0.0
+            )
+        if piece.length <= STILL_M and np.abs(ends[1] - ends[0]).max() > _JOIN_M:
+            return _refusal(path, k, None, Failure(-1, "the tool turns about a tip that stands still"), 0.0)
+        previous = ends[1]
+    if not any(piece.length > STILL_M for piece in path.pieces):
+        return Refusal("timing", "nothing moves: every piece of the leg path has no length")
+    return None
+
+
+def _refusal(
+    path: LegPathLike, k: int, profile: PieceProfile | None, failure: Failure, s: float | None = None
+) -> Refusal:
+    piece = path.pieces[k]
+    if s is None and profile is not None:
+        s = float(profile.s[min(failure.gridpoint, len(profile.s) - 1)])
+    where = f"piece {k}" if failure.gridpoint < 0 else f"piece {k}, gridpoint {failure.gridpoint}"
+    if s is not None:
+        where += f", {1e3 * (float(path.starts[k]) + s):.6g} mm along the path, segment {_segment(piece, s)}"
+    return Refusal("timing", f"{failure.reason}; {where}")
+
+
+def _segment(piece: PieceLike, s: float) -> int:
+    section = min(int(np.searchsorted(piece.section_ends, s, side="left")), len(piece.section_segments) - 1)
+    return int(piece.section_segments[section])
+
+
+def _profile(
+    path: LegPathLike, indices: list[int], profiles: list[PieceProfile], laws: list[MotionLaw]
+) -> Profile:
+    starts = np.concatenate([[0.0], np.cumsum([law.duration for law in laws])])
+    times = [np.interp(p.s, law.stations, law.times) for p, law in zip(profiles, laws, strict=True)]
+    active = [p.active() for p in profiles]
+    return Profile(
+        times=np.concatenate([start + t for start, t in zip(starts, times, strict=False)]),
+        stations=np.concatenate(
+            [float(path.starts[k]) + p.s for k, p in zip(indices, profiles, strict=True)]
+        ),
+        speeds=np.concatenate([law(t, 1) for law, t in zip(laws, times, strict=True)]),
+        active=np.concatenate([a for a, _ in active]),
+        shares=np.concatenate([share for _, share in active]),
+        constraint_names=CONSTRAINTS,
+    )

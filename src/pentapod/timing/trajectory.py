@@ -1,0 +1,114 @@
+"""Trajectory: the leg path with its time law."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.arrays import Floats, Ints, as_floats, set_frozen
+from pentapod.timing.law import MotionLaw
+from pentapod.timing.paths import LegPathLike, PieceLike
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """The plan at its gridpoints, for explanation: what holds the motion back, and where.
+
+    times (K,) s; stations (K,) global tip arc length, m; speeds (K,) tip, m/s; active (K,): index into
+    `constraint_names`; shares (K,): how much of that limit (less the margin) is used. Where smoothing
+    for a cubic controller follows, active and shares are those of the law before it.
+    """
+
+    times: Floats
+    stations: Floats
+    speeds: Floats
+    active: Ints
+    shares: Floats
+    constraint_names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Legs as functions of time, at rest at both ends and at each stop between pieces.
+
+    path: the leg path; indices: those of its pieces that move; laws: their motion laws, one after the other.
+    Each lasts a whole number of the controller's periods, so that exact stops fall on setpoints.
+    """
+
+    path: LegPathLike
+    indices: tuple[int, ...]
+    laws: tuple[MotionLaw, ...]
+    profile: Profile
+
+    def __post_init__(self) -> None:
+        set_frozen(self, indices=tuple(self.indices), laws=tuple(self.laws))
+
+    @property
+    def starts(self) -> Floats:
+        """Time (P + 1,) in seconds at which each moving piece starts, and the end."""
+        return np.concatenate([[0.0], np.cumsum([law.duration for law in self.laws])])
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return float(self.starts[-1])
+
+    def __call__(self, t: ArrayLike, order: int = 0) -> Floats:
+        """Return legs in m, m/s or m/s² (n, 5), order 0, 1, 2, at times (n,) in seconds.
+
+        At rest before the start and after the end. Raises ArrayError for times that are not finite.
+        """
+
+        def legs(piece: PieceLike, law: MotionLaw, time: Floats) -> Floats:
+            s = law(time)
+            if order == 0:
+                return piece(s, 0)
+            if order == 1:
+                return piece(s, 1) * law(time, 1)[:, None]
+            return piece(s, 1) * law(time, 2)[:, None] + piece(s, 2) * np.square(law(time, 1))[:, None]
+
+        return self._piecewise(t, legs, (5,))
+
+    def station(self, t: ArrayLike, order: int = 0) -> Floats:
+        """Return the tip's global arc length s (n,) in metres or its derivative in time, order 0, 1, 2."""
+        starts = np.asarray(self.path.starts)[list(self.indices)]
+
+        def stations(piece: PieceLike, law: MotionLaw, time: Floats, start: float) -> Floats:
+            return law(time, order) + (start if order == 0 else 0.0)
+
+        return self._piecewise(t, stations, (), starts)
+
+    def segment(self, t: ArrayLike) -> Ints:
+        """Return the index (n,) of the toolpath's segment at each time."""
+
+        def segments(piece: PieceLike, law: MotionLaw, time: Floats) -> Floats:
+            section = np.searchsorted(piece.section_ends, law(time), side="left")
+            return np.asarray(piece.section_segments, dtype=np.float64)[
+                np.minimum(section, len(piece.section_segments) - 1)
+            ]
+
+        return self._piecewise(t, segments, ()).astype(np.intp)
+
+    def _piecewise(
+        self,
+        t: ArrayLike,
+        evaluate: Callable[..., Floats],
+        shape: tuple[int, ...],
+        extra: Floats | None = None,
+    ) -> Floats:
+        """Return evaluate(piece, law, times in the piece[, extra]) for times (n,), piece by piece."""
+        time = np.atleast_1d(as_floats(t, "t"))
+        starts = self.starts
+        index = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(self.laws) - 1)
+        result = np.empty((len(time), *shape))
+        order = np.argsort(index, kind="stable")
+        borders = np.searchsorted(index[order], np.arange(len(self.laws) + 1))
+        for k in np.unique(index):
+            here = order[borders[k] : borders[k + 1]]
+            more = () if extra is None else (extra[k],)
+            piece = self.path.pieces[self.indices[k]]
+            result[here] = evaluate(piece, self.laws[k], time[here] - starts[k], *more)
+        return result
