@@ -1,6 +1,8 @@
 """Machines that were built: geometry with limits and bodies, their files, and what can be said about them."""
 
+from pentapod.machine.check import AMPLIFICATION_LIMIT, Finding, MachineReport, check
 from pentapod.machine.clearance import clearances, pair_names
+from pentapod.machine.explain import explain
 from pentapod.machine.machine import (
     ARCHITECTURAL_LIMIT,
     Bodies,
@@ -12,19 +14,26 @@ from pentapod.machine.machine import (
 )
 from pentapod.machine.reader import load_machine, read_machine, shipped_machines
 from pentapod.machine.segments import segment_distance
+from pentapod.machine.work_volume import sample_work_volume
 
 __all__ = [
+    "AMPLIFICATION_LIMIT",
     "ARCHITECTURAL_LIMIT",
     "Bodies",
     "ControllerSettings",
+    "Finding",
     "JointLimits",
     "LegLimits",
     "Machine",
+    "MachineReport",
     "WorkVolume",
+    "check",
     "clearances",
+    "explain",
     "load_machine",
     "pair_names",
     "read_machine",
+    "sample_work_volume",
     "segment_distance",
     "shipped_machines",
 ]

@@ -22,7 +22,7 @@ def pair_names(machine: Machine) -> tuple[str, ...]:
 
 
 def clearances(machine: Machine, position: ArrayLike, direction: ArrayLike) -> Floats:
-    """Return surface-to-surface distances (..., 15) in metres for poses (..., 3); negative where bodies overlap.
+    """Return surface-to-surface distances (..., 15) in metres of poses (..., 3), negative in an overlap.
 
     First the 10 pairs of legs, each a capsule from base joint to platform joint. Then the 5 legs against the
     shaft (`Bodies`): there a leg ends `joint_radius` short of its platform joint, where it is joined to the

@@ -203,12 +203,12 @@ class Machine:
                 key="base",
                 value=float(f"{measure:.3g}"),
                 expected=f"a reciprocal condition number of at least {ARCHITECTURAL_LIMIT:g}",
-                remedy="spread the base joints: no four near one line, and not near a conic with a point at infinity in y",
+                remedy="spread the base joints: no four near one line, no x or y shared by many",
             )
         room = self.tool_length - float(self.pentapod.offsets.max()) - self.bodies.shaft_end
         if room < 0.0:
             raise MachineError(
-                f"the tool is {-room * 1e3:.4g} mm too short: its holder would end above the lowest platform joint",
+                f"the tool is {-room * 1e3:.4g} mm too short: the spindle would end above a platform joint",
                 key="tool_length",
                 value=self.tool_length,
                 expected="at least the largest offset + shaft_end",
@@ -216,7 +216,7 @@ class Machine:
 
     @classmethod
     def load(cls, name_or_path: str | Path) -> Machine:
-        """Return a shipped machine by its name ("desk"), or the machine of a TOML file. Raises MachineError."""
+        """Return a shipped machine by its name ("desk"), or that of a TOML file. Raises MachineError."""
         from pentapod.machine.reader import load_machine  # noqa: PLC0415  the reader builds Machines
 
         return load_machine(name_or_path)

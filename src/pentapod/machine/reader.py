@@ -225,7 +225,8 @@ def _line_of(text: str, where: list[str]) -> int | None:
             table = match[1]
             if table == where[0]:
                 header = number
-        elif (owner := [table, *where[1:2]] if table else where[:1]) and (table == where[0] or not table):
-            if re.match(rf"\s*{re.escape(owner[-1])}\s*=", line):
-                return number
+            continue
+        wanted = where[1:2] if table == where[0] else [] if table else where[:1]
+        if wanted and re.match(rf"\s*{re.escape(wanted[0])}\s*=", line):
+            return number
     return header

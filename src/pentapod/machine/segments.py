@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats
+from pentapod.arrays import Floats, as_batch
 
 _TINY = 1e-30  # m²: keeps a division by the length of a degenerate segment finite
 
@@ -17,8 +17,9 @@ def segment_distance(start_a: ArrayLike, end_a: ArrayLike, start_b: ArrayLike, e
     Detection, section 5.1.9. Minimising over one segment's parameter, then the other's, then the first's
     again is exact for this convex problem, since the first guess is exact wherever no end is hit.
     """
-    a0, b0 = np.asarray(start_a, dtype=np.float64), np.asarray(start_b, dtype=np.float64)
-    along_a, along_b, between = end_a - a0, end_b - b0, a0 - b0
+    a0, a1 = as_batch(start_a, "start_a", (3,)), as_batch(end_a, "end_a", (3,))
+    b0, b1 = as_batch(start_b, "start_b", (3,)), as_batch(end_b, "end_b", (3,))
+    along_a, along_b, between = a1 - a0, b1 - b0, a0 - b0
     aa = np.maximum(_dot(along_a, along_a), _TINY)
     bb = np.maximum(_dot(along_b, along_b), _TINY)
     ab, a_gap, b_gap = _dot(along_a, along_b), _dot(along_a, between), _dot(along_b, between)
