@@ -34,7 +34,9 @@ class PartTable(Table):
         min_length=1,
         description="mesh file (.stl, .ply, .obj); relative to this job file, ${VARIABLE} is expanded",
     )
-    unit: Literal["mm", "cm", "m", "inch"] = Field(description="unit of the numbers in the mesh file")
+    unit: Literal["mm", "cm", "m", "inch"] | None = Field(
+        default=None, description="unit of the numbers in the mesh file: compulsory, for no format says it"
+    )
     scale: Positive = Field(default=1.0, description="factor applied to the mesh after its unit")
     repair: bool = Field(default=False, description="drop doubled and degenerate facets, unify the winding")
     region_box_mm: tuple[Vector, Vector] | None = Field(

@@ -1,0 +1,218 @@
+"""From a job file to every artefact: the stages in order, each timed, as far as they go."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, write_arrays, write_json
+from pentapod.errors import MeshError
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.job import Job
+from pentapod.kinematics.component import Component
+from pentapod.machine.machine import ControllerSettings, Machine
+from pentapod.outcome import Outcome, Stage, refusal_verdict
+from pentapod.plan_arrays import arrays_of
+from pentapod.planning import LegPath, Placement, PlacedPath, leg_path, plan
+from pentapod.program import Program, Provenance, sample, write_csv
+from pentapod.progress import Progress, silent
+from pentapod.refusal import Refusal
+from pentapod.timing import Trajectory, retime
+from pentapod.toolpath import BallCutter, Mesh, RasterOptions, StandOff, Toolpath, load_mesh, raster
+from pentapod.verify import Verdict, verify
+from pentapod.version import __version__
+
+_MM = 1e-3
+_MM_MIN = 1e-3 / 60.0
+_LARGEST_TOLERANCE = 0.1  # of the part's largest extent
+
+Value = TypeVar("Value")
+Writer = Callable[[Outcome, Path], object]
+
+
+def run(
+    job: Job,
+    out: str | Path,
+    progress: Progress = silent,
+    *,
+    writers: Mapping[str, Writer] | None = None,
+) -> Outcome:
+    """Plan a job and write program.csv, plan.npz and verdict.json into the folder `out`; return what was reached.
+
+    writers: further files, by name, each made from the outcome (the report, which stands above this floor).
+    The program is judged from the file, as it was written. What cannot be done ends in an outcome with a
+    refusal: verdict.json says so and there is no program. The folder changes only when the run ends: an
+    error or an interruption leaves it as it was. Raises InputError where job, mesh, machine or folder are bad.
+    """
+    folder = Path(out)
+    check_folder(folder)
+    clock = _Clock(progress)
+    machine = load_machine(job)
+    mesh = clock.time("mesh", lambda: load_part(job))
+    toolpath = clock.time("toolpath", lambda: make_toolpath(job, mesh))
+    with staged(folder) as staging:
+        verdict = _plan_and_verify(job, machine, toolpath, staging / PROGRAM, clock)
+        outcome = Outcome(job, machine, tuple(clock.stages), verdict)
+        write_arrays(arrays_of(outcome), staging / ARRAYS)
+        for name, write in (writers or {}).items():
+            progress("report", 0.0, name)
+            write(outcome, staging / name)
+        write_json(outcome.to_dict(), staging / VERDICT)
+    return outcome
+
+
+def load_machine(job: Job) -> Machine:
+    """Return the job's machine, with the job's tool length and controller settings. Raises MachineError."""
+    machine = Machine.load(job.machine_file or str(job.machine.name))
+    controller = ControllerSettings(
+        period=machine.controller.period if job.output.period_ms is None else job.output.period_ms * 1e-3,
+        interpolation=job.output.interpolation or machine.controller.interpolation,
+    )
+    length = machine.tool_length if job.tool.length_mm is None else job.tool.length_mm * _MM
+    return dataclasses.replace(machine, controller=controller, tool_length=length)
+
+
+def load_part(job: Job) -> Mesh:
+    """Return the job's mesh. Raises MeshError, or JobError where unit or tolerances do not go with it."""
+    part = job.part
+    try:
+        mesh = load_mesh(job.mesh_path, part.unit, scale=part.scale, repair=part.repair)
+    except MeshError as error:
+        if error.key != "unit":
+            raise
+        raise job.error("part", "unit", error.what, expected=error.expected, remedy=error.remedy) from error
+    extent = float(np.ptp(mesh.bounds, axis=0).max())
+    for key in ("chordal_mm", "path_mm"):
+        if getattr(job.tolerance, key) * _MM > _LARGEST_TOLERANCE * extent:
+            raise job.error(
+                "tolerance",
+                key,
+                f"the tolerance is too large for the part, whose largest extent is {extent / _MM:.4g} mm",
+                expected=f"at most {_LARGEST_TOLERANCE * extent / _MM:.3g}",
+                remedy="check part.unit and part.scale",
+            )
+    return mesh
+
+
+def make_toolpath(job: Job, mesh: Mesh) -> Toolpath:
+    """Return the job's toolpath, workpiece frame. Raises ToolpathError where nothing is there to machine."""
+    part, table, feed = job.part, job.toolpath, job.feed
+    link = feed.cut_mm_min if feed.link_mm_min is None else feed.link_mm_min
+    if job.tool.diameter_mm is not None:
+        tool = BallCutter(0.5 * job.tool.diameter_mm * _MM)
+    else:
+        tool = StandOff((job.tool.standoff_mm or 0.0) * _MM)
+    options = RasterOptions(
+        direction=np.radians(table.direction_deg),
+        pattern=table.pattern,
+        stepover=None if table.stepover_mm is None else table.stepover_mm * _MM,
+        scallop=None if table.scallop_mm is None else table.scallop_mm * _MM,
+        clearance=table.clearance_mm * _MM,
+        approach=table.approach_mm * _MM,
+        spacing=table.spacing_mm * _MM,
+        chordal_tolerance=job.tolerance.chordal_mm * _MM,
+        cut_feed=feed.cut_mm_min * _MM_MIN,
+        link_feed=link * _MM_MIN,
+        region_box=None if part.region_box_mm is None else np.array(part.region_box_mm) * _MM,
+        region_direction=part.region_direction,
+        region_angle=np.radians(part.region_angle_deg),
+    )
+    return raster(mesh, tool, options)
+
+
+def fixed_placement(job: Job) -> Placement | None:
+    """Return the placement that the job gives, or None where the planner chooses. Raises ArrayError."""
+    table = job.placement
+    if table.mode == "free":
+        return None
+    if table.matrix is not None:
+        matrix = np.array(table.matrix)
+        matrix[:3, 3] *= _MM
+        return Placement(RigidTransform.from_matrix(matrix), "job")
+    rotation = _turned(*np.radians(table.rotation_deg or (0.0, 0.0, 0.0)))
+    return Placement(RigidTransform(rotation, np.array(table.position_mm) * _MM), "job")
+
+
+def judge(
+    job: Job, machine: Machine, toolpath: Toolpath, program: Path, progress: Progress = silent
+) -> Verdict:
+    """Return the verdict on a program file, by what the job asks. Raises ProgramError where it cannot be read."""
+    return verify(
+        program,
+        machine,
+        toolpath,
+        tilt=float(np.radians(job.axis.tilt_deg)),
+        path_tolerance=job.tolerance.path_mm * _MM,
+        axis_tolerance=float(np.radians(job.tolerance.axis_deg)),
+        job_digest=job.digest,
+        progress=progress,
+    )
+
+
+def _plan_and_verify(job: Job, machine: Machine, toolpath: Toolpath, file: Path, clock: _Clock) -> Verdict:
+    """Return the verdict on the program that is written to `file`, or on the refusal that ends the run."""
+    component = None if job.placement.component is None else Component.parse(job.placement.component)
+    placement = fixed_placement(job)
+    tilt, axis_tolerance = float(np.radians(job.axis.tilt_deg)), float(np.radians(job.tolerance.axis_deg))
+
+    def placed_path() -> PlacedPath | Refusal:
+        return plan(
+            toolpath, machine, tilt=tilt, placement=placement, component=component, progress=clock.progress
+        )
+
+    def path_of(placed: PlacedPath) -> LegPath | Refusal:
+        return leg_path(
+            placed, machine, path_tolerance=job.tolerance.path_mm * _MM, axis_tolerance=axis_tolerance
+        )
+
+    placed = clock.time("placement", placed_path)
+    if isinstance(placed, Refusal):
+        return refusal_verdict(placed)
+    path = clock.time("leg path", lambda: path_of(placed))
+    if isinstance(path, Refusal):
+        return refusal_verdict(path)
+    trajectory: Trajectory | Refusal = clock.time(
+        "timing", lambda: retime(path, machine, progress=clock.progress)
+    )
+    if isinstance(trajectory, Refusal):
+        return refusal_verdict(trajectory)
+    source = Provenance(machine.name, machine.digest, job.digest, __version__)
+
+    def program() -> Program:
+        sampled = sample(trajectory, machine, placed.placement.transform, placed.component, source)
+        write_csv(sampled, file)
+        return sampled
+
+    clock.time("program", program)
+    return clock.time("verify", lambda: judge(job, machine, toolpath, file, clock.progress))
+
+
+def _turned(x: float, y: float, z: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """Return the rotation about the fixed x, then y, then z axis, radians."""
+    cx, sx, cy, sy, cz, sz = np.cos(x), np.sin(x), np.cos(y), np.sin(y), np.cos(z), np.sin(z)
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return about_z @ about_y @ about_x
+
+
+class _Clock:
+    """Runs stages and keeps their names, times and values."""
+
+    def __init__(self, progress: Progress) -> None:
+        self.progress = progress
+        self.stages: list[Stage] = []
+
+    def time(self, name: str, stage: Callable[[], Value]) -> Value:
+        """Return what a stage gives; it is kept with its wall time."""
+        self.progress(name, 0.0)
+        start = time.perf_counter()
+        value = stage()
+        self.stages.append(Stage(name, time.perf_counter() - start, value))
+        self.progress(name, 1.0)
+        return value

@@ -1,0 +1,92 @@
+"""The arrays of all stages, named and in the units of files: the content of plan.npz."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pentapod.arrays import Floats
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.outcome import Outcome
+from pentapod.planning.leg_path import LegPath
+from pentapod.planning.placed_path import PlacedPath
+from pentapod.program.program import Program
+from pentapod.timing.trajectory import Trajectory
+from pentapod.toolpath.toolpath import Toolpath
+
+Arrays = dict[str, NDArray[Any]]
+_MM = 1e3
+_MM_MIN = 6e4
+
+
+def arrays_of(outcome: Outcome) -> Arrays:
+    """Return every array of the stages that were reached, by name: `stage.quantity_unit`."""
+    arrays: Arrays = {}
+    if (toolpath := outcome.find(Toolpath)) is not None:
+        arrays |= toolpath_arrays(toolpath)
+    if (placed := outcome.find(PlacedPath)) is not None:
+        arrays |= _placed(placed)
+    if (path := outcome.find(LegPath)) is not None:
+        arrays |= _leg_path(path)
+    if (trajectory := outcome.find(Trajectory)) is not None:
+        arrays |= _trajectory(trajectory)
+    if (program := outcome.find(Program)) is not None:
+        arrays |= {"program.time_s": program.times, "program.legs_mm": program.legs * _MM}
+    return arrays
+
+
+def toolpath_arrays(toolpath: Toolpath) -> Arrays:
+    """Return the arrays of a toolpath, workpiece frame; a segment's first waypoint is its start."""
+    return {
+        "toolpath.tips_mm": toolpath.tips * _MM,
+        "toolpath.axes": toolpath.axes,
+        "toolpath.pivot_mm": np.array(toolpath.pivot * _MM),
+        "toolpath.segment_starts": toolpath.starts,
+        "toolpath.segment_kinds": np.array([str(s.kind) for s in toolpath.segments]),
+        "toolpath.segment_feeds_mm_min": np.array([s.feed for s in toolpath.segments]) * _MM_MIN,
+    }
+
+
+def matrix_mm(transform: RigidTransform) -> Floats:
+    """Return the homogeneous matrix (4, 4) with its translation in millimetres."""
+    matrix = transform.matrix
+    matrix[:3, 3] *= _MM
+    return matrix
+
+
+def _placed(placed: PlacedPath) -> Arrays:
+    return {
+        "placed.placement_mm": matrix_mm(placed.placement.transform),
+        "placed.component": np.array(placed.component, dtype=np.int8),
+        "placed.tips_mm": placed.tips * _MM,
+        "placed.axes": placed.axes,
+        "placed.margins": placed.margins,
+        "placed.margin_names": np.array(placed.margin_names),
+    }
+
+
+def _leg_path(path: LegPath) -> Arrays:
+    knots = [start + np.asarray(p.knots) for start, p in zip(path.starts, path.pieces, strict=False)]
+    values = [[p(np.asarray(p.knots), order) for p in path.pieces] for order in range(3)]
+    return {
+        "leg_path.piece_starts_mm": np.asarray(path.starts) * _MM,
+        "leg_path.knots_mm": np.concatenate(knots) * _MM,
+        "leg_path.legs_mm": np.concatenate(values[0]) * _MM,
+        "leg_path.legs_first": np.concatenate(values[1]),
+        "leg_path.legs_second_per_mm": np.concatenate(values[2]) / _MM,
+    }
+
+
+def _trajectory(trajectory: Trajectory) -> Arrays:
+    profile = trajectory.profile
+    return {
+        "trajectory.piece_starts_s": trajectory.starts,
+        "trajectory.time_s": profile.times,
+        "trajectory.station_mm": profile.stations * _MM,
+        "trajectory.speed_mm_s": profile.speeds * _MM,
+        "trajectory.active": profile.active,
+        "trajectory.shares": profile.shares,
+        "trajectory.constraint_names": np.array(profile.constraint_names),
+    }
