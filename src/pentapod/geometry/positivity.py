@@ -20,7 +20,7 @@ def lower_bounds(coefficients: Floats, error: Floats, error_per_split: Floats, d
     Raises nothing.
     """
     bounds = coefficients.min(axis=-1) - error
-    refused = ~(np.minimum(coefficients[:, 0], coefficients[:, -1]) - error > 0.0)
+    refused = ~(np.minimum(coefficients[:, 0], coefficients[:, -1]) - error > 0.0) | ~np.isfinite(bounds)
     owners = np.flatnonzero(~(bounds > 0.0) & ~refused)
     bounds[owners] = np.inf  # from here on the least over the pieces that are done
     pieces, slack = coefficients[owners], error[owners]
