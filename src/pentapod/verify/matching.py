@@ -1,0 +1,146 @@
+"""Which place of the toolpath each moment of the program belongs to.
+
+The program's pivot, sampled, and the polyline of the toolpath's pivots are matched by a monotone relation:
+each waypoint gets a time (`visits`), each sample a place on the interval whose waypoints enclose it in time.
+Between two neighbouring events (a sample, or a waypoint's visit) both sides move along straight lines, so the
+distance there is at most the larger of its values at the two events. Hence the largest distance over all
+events bounds the Fréchet distance of the two polylines from above, whatever the matching: a bad proposal can
+only make a good program look bad, never the reverse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.arrays import Bools, Floats, Ints
+from pentapod.geometry.directions import angle_between
+from pentapod.geometry.polyline import arc_length
+from pentapod.verify.visits import Course, find_visits
+
+# Where the path turns on the spot, an axis this far off counts as much as a pivot off by the tolerance.
+_AXIS_SCALE_RAD = 0.05
+# Radii of the search, in path tolerances: a good program is found by the first, the others serve to say how
+# far off a bad one is.
+_RADII = (1.05, 8.0, 60.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """A monotone matching of M samples of the program with the n waypoints of the toolpath.
+
+    times (n,): when each waypoint is visited, in samples. missed (n,): not passed in order, at any search
+    radius tried. places (M,): the place of each sample, in waypoints (2.25 is a quarter of the way from
+    waypoint 2 to 3), non-decreasing. arcs (M,): the same as arc length of the pivot's polyline, metres.
+    distances (M,), waypoint_distances (n,) in metres and angles (M,), waypoint_angles (n,) in radians:
+    between the matched pivots and axes.
+    """
+
+    times: Floats
+    missed: Bools
+    places: Floats
+    arcs: Floats
+    distances: Floats
+    waypoint_distances: Floats
+    angles: Floats
+    waypoint_angles: Floats
+
+
+def match(motion: Course, path: Course, tolerance: float) -> Match:
+    """Return the matching of a sampled motion with a path, closest where within `tolerance` metres."""
+    arc = arc_length(path.points)
+    turning = _turning(path, tolerance)
+    near_turn = np.append(turning, False) | np.append(False, turning)
+    weight = np.where(near_turn, (tolerance / _AXIS_SCALE_RAD) ** 2, 0.0)
+    tried = [None if tolerance <= 0.0 else find_visits(motion, path, arc, _RADII[0] * tolerance, weight)]
+    for radius in _RADII[1:]:
+        if tried[-1] is None or not tried[-1].missed.any():
+            break
+        tried.append(find_visits(motion, path, arc, radius * tolerance, weight))
+    done = [visits for visits in tried if visits is not None]
+    if done:
+        best = min(done, key=lambda visits: int(visits.missed.sum()))
+        times, missed = best.times, best.missed
+    else:
+        times, missed = _by_arc_length(motion.points, arc), np.ones(len(arc), dtype=np.bool_)
+    interval = np.searchsorted(times, np.arange(len(motion.points)), side="right") - 1
+    interval = np.clip(interval, 0, len(arc) - 2)
+    places = interval + _fractions(motion, path, turning, tolerance, interval)
+    # The matching begins and ends with both curves, and never turns back.
+    places[0], places[-1] = 0.0, len(arc) - 1.0
+    return _measure(motion, path, times, missed, np.maximum.accumulate(places))
+
+
+def _turning(path: Course, tolerance: float) -> Bools:
+    """Return the intervals (n − 1,) on which the axis turns while the pivot (as good as) stands."""
+    length = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
+    turn = np.linalg.norm(np.diff(path.axes, axis=0), axis=1)
+    return (length <= tolerance) & (turn * tolerance >= _AXIS_SCALE_RAD * length) & (turn > 1e-12)
+
+
+def _by_arc_length(samples: Floats, arc: Floats) -> Floats:
+    """Return visits (n,) by the fraction of the way: for motions that no search can match."""
+    way = arc_length(samples)
+    return np.interp(
+        arc / max(arc[-1], 1e-300), way / max(way[-1], 1e-300), np.arange(len(way), dtype=np.float64)
+    )
+
+
+def _measure(motion: Course, path: Course, times: Floats, missed: Bools, places: Floats) -> Match:
+    """Return the matching that has these visits (n,) and places (M,), measured."""
+    points, axes = _at(path, places)
+    chord = np.minimum(times.astype(np.intp), len(motion.points) - 2)
+    at = (times - chord)[:, None]
+    visited = motion.points[chord] * (1.0 - at) + motion.points[chord + 1] * at
+    pointed = motion.axes[chord] * (1.0 - at) + motion.axes[chord + 1] * at
+    return Match(
+        times=times,
+        missed=missed,
+        places=places,
+        arcs=np.interp(places, np.arange(len(path.points)), arc_length(path.points)),
+        distances=np.linalg.norm(motion.points - points, axis=1),
+        waypoint_distances=np.linalg.norm(visited - path.points, axis=1),
+        angles=angle_between(motion.axes, axes),
+        waypoint_angles=angle_between(pointed, path.axes),
+    )
+
+
+def _fractions(motion: Course, path: Course, turning: Bools, tolerance: float, interval: Ints) -> Floats:
+    """Return how far along its interval, in [0, 1], each sample is: by its pivot, or its axis on the spot."""
+    step = np.diff(path.points, axis=0)
+    square = np.einsum("ij,ij->i", step, step)
+    off = motion.points - path.points[interval]
+    along = np.einsum("ij,ij->i", off, step[interval]) / np.where(square > 0.0, square, 1.0)[interval]
+    along = np.clip(along, 0.0, 1.0)
+    spot = np.flatnonzero(turning[interval])
+    if len(spot):
+        k = interval[spot]
+        turned, turn = _arc_fraction(motion.axes[spot], path.axes[k], path.axes[k + 1])
+        by_pivot, by_axis = square[k] / tolerance**2, (turn / _AXIS_SCALE_RAD) ** 2
+        along[spot] = (by_pivot * along[spot] + by_axis * turned) / (by_pivot + by_axis)
+    return along
+
+
+def _arc_fraction(axes: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
+    """Return how far in [0, 1] each axis (P, 3) is along the great arc from first to second; and the arc."""
+    angle = angle_between(first, second)
+    cosine = np.einsum("ij,ij->i", first, second)[:, None]
+    across = second - cosine * first
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    turned = np.arctan2(np.einsum("ij,ij->i", axes, across), np.einsum("ij,ij->i", axes, first))
+    return np.clip(turned / angle, 0.0, 1.0), angle
+
+
+def _at(path: Course, places: Floats) -> tuple[Floats, Floats]:
+    """Return points (M, 3), linear, and axes (M, 3), along great arcs, of the path at these places."""
+    k = np.minimum(places.astype(np.intp), len(path.points) - 2)
+    f = places - k
+    points = path.points[k] * (1.0 - f)[:, None] + path.points[k + 1] * f[:, None]
+    angle = angle_between(path.axes[:-1], path.axes[1:])[k]
+    sine = np.sin(angle)
+    arc = sine > 1e-6
+    safe = np.where(arc, sine, 1.0)
+    a = np.where(arc, np.sin((1.0 - f) * angle) / safe, 1.0 - f)
+    b = np.where(arc, np.sin(f * angle) / safe, f)
+    return points, a[:, None] * path.axes[k] + b[:, None] * path.axes[k + 1]

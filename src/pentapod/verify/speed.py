@@ -1,0 +1,81 @@
+"""Claims about how fast the tool goes: feed on cuts and links, rapid rate, rest at both ends."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from pentapod.arrays import Floats, Ints
+from pentapod.toolpath.toolpath import SegmentKind
+from pentapod.verify.claim import ALLOWANCE, LIMIT_ALLOWANCE, Claim, Finding
+from pentapod.verify.replay import Replay
+
+_MM_MIN = 60e3  # mm/min in 1 m/s
+
+
+def feed(replay: Replay, kind: SegmentKind) -> Finding | None:
+    """Judge the tip's speed on the segments of one kind; None where the program has no such motion."""
+    limit, governing = _limits(replay)
+    kinds = np.array([segment.kind == kind for segment in replay.toolpath.segments])
+    chords = np.flatnonzero(kinds[governing])
+    if not len(chords):
+        return None
+    speed = np.linalg.norm(np.diff(replay.tips, axis=0), axis=1)[chords] / (0.5 * replay.program.period)
+    worst = int(np.argmax(speed / limit[chords]))
+    value, bound = float(speed[worst]), float(limit[chords[worst]])
+    method = (
+        "speed of the program's own tip, mean over each half period, where the matched place is on a "
+        f"{kind}; within the path tolerance of a segment's end the faster of both feeds counts; "
+        f"{ALLOWANCE:.1%} allowed"
+    )
+    passed = value <= bound * (1.0 + ALLOWANCE)
+    return Finding(
+        passed, _MM_MIN * value, _MM_MIN * bound, "mm/min", replay.place(int(chords[worst])), method
+    )
+
+
+def _limits(replay: Replay) -> tuple[Floats, Ints]:
+    """Return the speed limit (M − 1,) in m/s between consecutive samples, and the segment that sets it.
+
+    A chord that comes within the path tolerance of another segment, along the path, may go at the faster
+    limit: which side of a rounded corner belongs to which segment is not defined more closely than that.
+    """
+    segments, arcs = replay.toolpath.segments, replay.match.arcs
+    rapid = replay.machine.rapid_velocity
+    limits = np.array([rapid if s.kind == SegmentKind.RAPID else min(s.feed, rapid) for s in segments])
+    lengths = np.linalg.norm(np.diff(replay.toolpath.pivots, axis=0), axis=1)
+    bounds = np.concatenate([[0.0], np.cumsum(lengths)])[replay.toolpath.starts]
+    last = len(segments) - 1
+    low = np.searchsorted(bounds[1:], arcs[:-1] - replay.path_tolerance, side="left").clip(max=last)
+    high = (np.searchsorted(bounds, arcs[1:] + replay.path_tolerance, side="right") - 1).clip(0, last)
+    governing = low.copy()
+    for step in range(1, int((high - low).max()) + 1):
+        other = np.minimum(low + step, high)
+        governing = np.where(limits[other] > limits[governing], other, governing)
+    return limits[governing], governing
+
+
+def rest(replay: Replay, *, at_end: bool) -> Finding:
+    """Judge that the robot stands at one end of the program."""
+    rows = replay.program.legs
+    step = rows[-1] - rows[-2] if at_end else rows[1] - rows[0]
+    period, limit = replay.program.period, replay.machine.legs.max_acceleration
+    speed = np.abs(step) / period
+    leg = int(np.argmax(speed / limit))
+    value, bound = float(speed[leg]), float(limit[leg]) * period
+    method = (
+        f"speed of leg {leg + 1} over the {'last' if at_end else 'first'} period; the bound is what its "
+        f"greatest acceleration changes in one period; {LIMIT_ALLOWANCE:.0%} allowed"
+    )
+    where = replay.place(2 * len(rows) - 2 if at_end else 0)
+    return Finding(value <= bound * (1.0 + LIMIT_ALLOWANCE), 1e3 * value, 1e3 * bound, "mm/s", where, method)
+
+
+CLAIMS = (
+    Claim("feed on cuts", partial(feed, kind=SegmentKind.CUT)),
+    Claim("feed on links", partial(feed, kind=SegmentKind.LINK)),
+    Claim("rapid rate", partial(feed, kind=SegmentKind.RAPID)),
+    Claim("starts at rest", partial(rest, at_end=False), needs_pose=False),
+    Claim("ends at rest", partial(rest, at_end=True), needs_pose=False),
+)

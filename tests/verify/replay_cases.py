@@ -1,0 +1,181 @@
+"""A toolpath and a program that follows it, made without the planner: curves, a quintic time law, leg lengths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics import Component
+from pentapod.machine import load_machine
+from pentapod.program import Program, Provenance, quantised
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+
+BALL = 3e-3
+FEED = 0.03
+LINK_FEED = 0.02
+RAPID = 0.08
+TILT = np.radians(5.0)
+TOLERANCES = {"tilt": TILT, "path_tolerance": 20e-6, "axis_tolerance": np.radians(0.1)}
+PERIOD = 1e-3
+TURN_RATE = 0.5
+TOP = 8e-3
+
+
+def surface(x, y):
+    """Points and unit normals of a gentle hill, metres."""
+    x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+    z = 4e-3 * np.cos(x / 0.02) * np.cos(y / 0.03)
+    zx = -0.2 * np.sin(x / 0.02) * np.cos(y / 0.03)
+    zy = -4e-3 / 0.03 * np.cos(x / 0.02) * np.sin(y / 0.03)
+    normal = np.stack([-zx, -zy, np.ones_like(z)], axis=-1)
+    return np.stack([x, y, z], axis=-1), normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+
+def on_surface(x, y):
+    """Ball-cutter poses (tip, axis) that touch the surface at x, y."""
+    points, normals = surface(x, y)
+    # The tip lies a radius below the ball's centre along the axis; with the axis normal it is the contact.
+    return points, normals
+
+
+def slerp(a, b, f):
+    angle = np.arccos(np.clip(a @ b, -1, 1))
+    if angle < 1e-12:
+        return np.broadcast_to(a, (len(f), 3)).copy()
+    return (np.sin((1 - f) * angle)[:, None] * a + np.sin(f * angle)[:, None] * b) / np.sin(angle)
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A piece of the motion between exact stops: `pose(f)` → tips, axes for f in [0, 1]."""
+
+    kind: SegmentKind
+    feed: float
+    pose: object
+    count: int
+
+
+def cut(y, x0, x1):
+    return Stroke(SegmentKind.CUT, FEED, lambda f: on_surface(x0 + (x1 - x0) * f, y + 0 * f), 61)
+
+
+def straight(kind, feed, start, stop, axis, axis_end=None, count=2):
+    start, stop = np.asarray(start), np.asarray(stop)
+    axis_end = axis if axis_end is None else axis_end
+    return Stroke(
+        kind, feed, lambda f: (start + f[:, None] * (stop - start), slerp(axis, axis_end, f)), count
+    )
+
+
+def turn(pivot_tip, axis, axis_end, count):
+    """Turn about the ball's centre, which stands."""
+    pivot = pivot_tip + BALL * axis
+
+    def pose(f):
+        axes = slerp(axis, axis_end, f)
+        return pivot - BALL * axes, axes
+
+    return Stroke(SegmentKind.LINK, LINK_FEED, pose, count)
+
+
+def strokes():
+    """Plunge, two passes 0.5 mm apart with a link, retract along the plunge's way, turn on the spot, and again."""
+    rapid = SegmentKind.RAPID
+    at = lambda x, y: tuple(v[0] for v in on_surface(np.array([x]), np.array([y])))
+    up = np.array([0.0, 0.0, TOP])
+    a, na = at(-0.012, 0.0)
+    c, nc = at(0.012, 0.0)
+    d, nd = at(0.012, 5e-4)
+    e, ne = at(-0.012, 5e-4)
+    tilted = np.array([0.0, np.sin(0.2), np.cos(0.2)])
+    turned_tip = a + up + BALL * (na - tilted)
+    return [
+        straight(rapid, np.inf, a + up, a, na, count=4),
+        cut(0.0, -0.012, 0.012),
+        Stroke(SegmentKind.LINK, LINK_FEED, lambda f: on_surface(0.012 + 0 * f, 5e-4 * f), 4),
+        cut(5e-4, 0.012, -0.012),
+        straight(rapid, np.inf, e, e + up, ne, count=3),
+        straight(rapid, np.inf, e + up, a + up, ne, na, count=5),
+        straight(rapid, np.inf, a + up, a, na, count=4),
+        straight(rapid, np.inf, a, a + up, na, count=6),
+        turn(a + up, na, tilted, 7),
+        straight(rapid, np.inf, turned_tip, turned_tip + up, tilted, count=2),
+    ]
+
+
+def toolpath_of(parts):
+    return Toolpath(
+        tuple(Segment(p.kind, *p.pose(np.linspace(0, 1, p.count)), p.feed) for p in parts), pivot=BALL
+    )
+
+
+def quintic(f):
+    return f**3 * (10 - 15 * f + 6 * f * f)
+
+
+def timed(parts, feed_factor=0.98):
+    """Poses at the period, each stroke from rest to rest by a quintic whose peak is the stroke's feed."""
+    tips, axes = [], []
+    for part in parts:
+        fine_tips, fine_axes = part.pose(np.linspace(0, 1, 4001))
+        length, turn = (np.linalg.norm(np.diff(x, axis=0), axis=1).sum() for x in (fine_tips, fine_axes))
+        speed = min(part.feed, RAPID) * feed_factor
+        rows = int(np.ceil(1.875 * max(length / speed, turn / TURN_RATE) / PERIOD))
+        # Even in arc length, so that the quintic's speed is the tip's.
+        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(fine_tips, axis=0), axis=1))])
+        f = np.interp(quintic(np.arange(rows + 1) / rows), arc / arc[-1], np.linspace(0, 1, 4001))
+        f[0], f[-1] = 0.0, 1.0
+        t, x = part.pose(f)
+        first = 0 if not tips else 1
+        tips.append(t[first:])
+        axes.append(x[first:])
+    return np.concatenate(tips), np.concatenate(axes)
+
+
+def placement(machine):
+    """Workpiece z against the machine's: the part lies below the base, which hangs above."""
+    flip = np.diag([1.0, -1.0, -1.0])
+    return RigidTransform(flip, machine.work.centre)
+
+
+def tilted_axes(axes, angle, azimuth=0.7):
+    """Axes leaned by an angle to one side."""
+    side = np.cross(axes, [np.cos(azimuth), np.sin(azimuth), 0.0])
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    return np.cos(angle) * axes + np.sin(angle) * side
+
+
+def program_of(machine, tips, axes, *, lean=0.0, interpolation="cubic", component=Component(1, 1)):
+    """A program whose tool leans by a constant angle about the pivot."""
+    leaned = tilted_axes(axes, lean)
+    leaned_tips = tips + BALL * (axes - leaned)
+    place = placement(machine)
+    direction = -place.rotate(leaned)
+    position = place.apply(leaned_tips) - machine.tool_length * direction
+    legs = quantised(machine.pentapod.leg_lengths(position, direction))
+    provenance = Provenance(machine.name, machine.digest, "job-1", "0")
+    return Program(PERIOD, legs, interpolation, component, place, provenance)
+
+
+@dataclass(frozen=True)
+class Case:
+    machine: object
+    toolpath: Toolpath
+    program: Program
+    tips: np.ndarray
+    axes: np.ndarray
+
+
+def good_case(lean=0.0, interpolation="cubic"):
+    machine = replace(load_machine("desk"), rapid_velocity=RAPID)
+    parts = strokes()
+    tips, axes = timed(parts)
+    return Case(
+        machine,
+        toolpath_of(parts),
+        program_of(machine, tips, axes, lean=lean, interpolation=interpolation),
+        tips,
+        axes,
+    )
