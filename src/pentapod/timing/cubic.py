@@ -23,10 +23,12 @@ from pentapod.timing.piece import PieceProfile
 WINDOW_PERIODS = 4
 """Periods over which the law is averaged: fewer leave overshoot, more cost time at each stop."""
 
-_EASINGS = 6
+_EASINGS = 8
 _SLOWINGS = 6
 _GOAL = 0.999
 _EXTRA = 0.99
+_EXTRA_PER_ROUND = 0.01
+"""Each easing moves the setpoints against the corners of the path: a place that comes back gets more room."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,8 @@ def smooth_laws(
             return [piece.profile for piece in timed], laws
         for k in exceeding:
             if attempt < _EASINGS:
-                eased = _eased(timed[k].profile, laws[k], *shares[k], period)
+                rows = laws[k](np.arange(len(shares[k][0])) * period)
+                eased = _eased(timed[k].profile, rows, shares[k], _EXTRA - attempt * _EXTRA_PER_ROUND)
                 if isinstance(eased, Failure):
                     return Unmended(k, eased)
                 timed[k] = replace(timed[k], profile=eased)
@@ -96,7 +99,9 @@ def _shares(timed: list[_Timed], laws: list[MotionLaw], machine: Machine) -> lis
         s = law(np.arange(count + 1) * period)
         s[-1] = law.length
         columns.append(np.column_stack([piece.profile.piece(s, 0), start + s])[1 if columns else 0 :])
-        speeds.append(piece.profile.limits.tip_speed(piece.profile.piece, s)[0])
+        limits = piece.profile.limits
+        # Against the feeds themselves: the plan's margin is there to be used up.
+        speeds.append(limits.tip_speed(piece.profile.piece, s)[0] / limits.feed_fraction)
         start += law.length
     rates, accelerations = cubic_extrema(np.concatenate(columns), period)
     hard = (accelerations[:, :5] / machine.legs.max_acceleration).max(axis=1)
@@ -113,14 +118,14 @@ def _shares(timed: list[_Timed], laws: list[MotionLaw], machine: Machine) -> lis
 
 
 def _eased(
-    profile: PieceProfile, law: MotionLaw, speed: Floats, acceleration: Floats, period: float
+    profile: PieceProfile, rows: Floats, shares: tuple[Floats, Floats], room: float
 ) -> PieceProfile | Failure:
-    """Return the profile with limits lowered around the rows where a share exceeds the goal."""
-    rows = law(np.arange(len(speed)) * period)
-    return profile.eased(_factors(profile.s, rows, acceleration), _factors(profile.s, rows, speed))
+    """Return the profile with limits lowered around the rows (stations) where a share exceeds the goal."""
+    speed, acceleration = (_factors(profile.s, rows, share, room) for share in shares)
+    return profile.eased(acceleration, speed)
 
 
-def _factors(s: Floats, rows: Floats, shares: Floats) -> Floats:
+def _factors(s: Floats, rows: Floats, shares: Floats, room: float) -> Floats:
     """Return factors (N + 1,) at gridpoints s from shares at rows (n,), spread over the smoothing window."""
     near = maximum_filter1d(shares, 2 * (WINDOW_PERIODS // 2 + 1) + 1)
     # From the rows on both sides of a gridpoint, and from the rows inside the stages that it ends.
@@ -129,4 +134,4 @@ def _factors(s: Floats, rows: Floats, shares: Floats) -> Floats:
     stage = np.clip(np.searchsorted(s, rows, side="right") - 1, 0, len(s) - 2)
     np.maximum.at(worst, stage, near)
     np.maximum.at(worst, stage + 1, near)
-    return np.where(worst > _GOAL, _EXTRA / np.maximum(worst, _GOAL), 1.0)
+    return np.where(worst > _GOAL, room / np.maximum(worst, _GOAL), 1.0)

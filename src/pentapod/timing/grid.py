@@ -8,8 +8,8 @@ from pentapod.arrays import Bools, Floats
 from pentapod.timing.constraints import Limits
 from pentapod.timing.paths import PieceLike
 
-LEAST_STAGES = 48
-"""Stages of a piece at least: what is lost where the law switches within a stage goes with their square."""
+LEAST_STAGES = 24
+"""Stages of a piece at least."""
 
 _TOLERANCE = 0.01
 _ROUNDS = 7
@@ -27,19 +27,20 @@ def first_grid(piece: PieceLike, limits: Limits) -> Floats:
         rough = _rough(piece, limits, s)
         if not rough.any():
             break
-        s = halved(s, rough)
+        s = split(s, rough)
     return s
 
 
-def halved(s: Floats, stages: Bools) -> Floats:
-    """Return the grid with the marked stages (N,) halved."""
-    return np.sort(np.concatenate([s, (s[:-1] + s[1:])[stages] / 2.0]))
+def split(s: Floats, stages: Bools, where: float | Floats = 0.5) -> Floats:
+    """Return the grid with each marked stage (N,) split at the fraction `where` (or (N,)) of its length."""
+    points = s[:-1] + where * np.diff(s)
+    return np.sort(np.concatenate([s, points[stages]]))
 
 
 def _base_grid(piece: PieceLike, limits: Limits) -> Floats:
     length = float(piece.length)
     begins, ends, _ = limits.guarded_sections(piece)
-    marks = np.concatenate([piece.knots, piece.section_ends, begins, ends])
+    marks = np.concatenate([piece.knots, piece.section_ends, begins, ends, _ramps(piece, limits)])
     marks = np.unique(np.concatenate([[0.0], marks[(marks > 0.0) & (marks < length)], [length]]))
     # Marks that rounding holds apart would make stages of no length; the ends stay exact.
     keep = np.diff(marks) > 1e-9 * length
@@ -50,6 +51,21 @@ def _base_grid(piece: PieceLike, limits: Limits) -> Floats:
     stage = np.repeat(np.arange(len(steps)), counts)
     within = np.arange(len(stage)) - np.repeat(np.cumsum(counts) - counts, counts)
     return np.append(marks[stage] + steps[stage] * (within / counts[stage]), length)
+
+
+def _ramps(piece: PieceLike, limits: Limits) -> Floats:
+    """Return where speeding up from each stop or slower section, or braking for it, should about be done.
+
+    The law switches near there; a stage across that point would waste time.
+    """
+    begins, ends, speeds = limits.guarded_sections(piece)
+    before, after = np.append(0.0, speeds), np.append(speeds, 0.0)
+    slope = np.abs(piece(np.append(0.0, piece.section_ends), 1))
+    with np.errstate(divide="ignore"):
+        push = (limits.acceleration / slope).min(axis=1)
+    reach = np.abs(after**2 - before**2) / (2.0 * push)
+    up, down = np.append(0.0, ends) + reach, np.append(begins, piece.length) - reach
+    return np.where(after > before, up, down)
 
 
 def _rough(piece: PieceLike, limits: Limits, s: Floats) -> Bools:

@@ -10,11 +10,14 @@ import numpy as np
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.timing.constraints import Limits
 from pentapod.timing.engine import Failure, fastest
-from pentapod.timing.grid import first_grid, halved
+from pentapod.timing.grid import first_grid, split
 from pentapod.timing.paths import PieceLike
 
 _BETWEEN = np.array([0.25, 0.5, 0.75])
-_REFINEMENTS = 3
+_REFINEMENTS = 4
+_SWITCHING_LOSS = 3e-4
+"""Share of the duration that may be lost in stages too long to switch where the law should."""
+
 _EASINGS = 3
 
 
@@ -50,10 +53,13 @@ class PieceProfile:
 
     def solved(self) -> PieceProfile | Failure:
         """Return the fastest profile on this grid with these easings."""
-        ceiling = self.limits.ceiling(self.first, self.second, self.tip_speed[0]) * self.ease_speed**2
         rows = 1.0 / (self.limits.acceleration * self.ease_acceleration[:, None])
-        x = fastest(self.s, self.first * rows, self.second * rows, ceiling)
+        x = fastest(self.s, self.first * rows, self.second * rows, self.ceiling())
         return x if isinstance(x, Failure) else self.with_(x=x)
+
+    def ceiling(self) -> Floats:
+        """Return the largest x (N + 1,) at each gridpoint that any path acceleration allows, m²/s²."""
+        return self.limits.ceiling(self.first, self.second, self.tip_speed[0]) * self.ease_speed**2
 
     def eased(self, acceleration: Floats, speed: Floats) -> PieceProfile | Failure:
         """Return the profile solved anew with further factors (N + 1,) on accelerations and speeds."""
@@ -69,9 +75,9 @@ class PieceProfile:
                 copy.__dict__[name] = self.__dict__[name]
         return copy
 
-    def refined(self, stages: Bools) -> PieceProfile:
-        """Return the problem on the grid with the marked stages (N,) halved."""
-        s = halved(self.s, stages)
+    def refined(self, stages: Bools, where: Floats) -> PieceProfile:
+        """Return the problem on the grid with the marked stages (N,) split, at fractions `where` (N,)."""
+        s = split(self.s, stages, where)
         return PieceProfile(self.piece, self.limits, s, *(np.interp(s, self.s, y) for y in self._columns))
 
     @property
@@ -92,6 +98,34 @@ class PieceProfile:
         ).reshape(len(ds), len(_BETWEEN), 11)
         worst = shares.max(axis=1)
         return worst[:, :5].max(axis=1), worst[:, 5:10].max(axis=1)
+
+    def switching(self) -> tuple[Bools, Floats]:
+        """Return the stages (N,) within which the law should switch, and at which fraction (N,).
+
+        In a stage of an optimal law either an acceleration is at its limit or the speed is at its ceiling at
+        both ends. Where neither is, time is lost: at most what running at the faster end's speed would
+        save. None are returned where that adds up to little. A stage that ends at the ceiling and uses the
+        share r of the acceleration limit could get there within about the fraction r of its length.
+        """
+        u, ds = self.path_accelerations(), np.diff(self.s)
+        rows = 1.0 / (self.limits.acceleration * self.ease_acceleration[:, None])
+        ends = [
+            np.abs(self.first[k] * u[:, None] + self.second[k] * self.x[k][:, None]) * rows[k]
+            for k in (slice(0, -1), slice(1, None))
+        ]
+        capped = self.x > 0.99 * self.ceiling()
+        share = np.maximum(*ends).max(axis=1)
+        idle = (share < 0.98) & ~(capped[:-1] & capped[1:])
+        speed = np.sqrt(self.x)
+        taken = 2.0 * ds / (speed[:-1] + speed[1:])
+        loss = np.where(idle, taken - ds / np.maximum(speed[:-1], speed[1:]), 0.0)
+        worth = loss > 0.1 * _SWITCHING_LOSS * taken.sum()
+        # On a long grid solving again costs more than it finds: the ends are then a small part.
+        if loss.sum() <= _SWITCHING_LOSS * taken.sum() * min(max(len(self.x) / 4000.0, 1.0), 6.0):
+            worth[:] = False
+        near = (capped[:-1] | capped[1:]) & (share > 1e-3) & (share < 0.6)
+        where = np.where(near, np.where(u > 0.0, share, 1.0 - share), 0.5)
+        return worth, where
 
     def active(self) -> tuple[Ints, Floats]:
         """Return the constraint (N + 1,) that holds each gridpoint back most, and its share of the limit."""
@@ -123,10 +157,14 @@ def time_piece(
             return profile
         rates, accelerations = profile.shares_between()
         fast, hard = rates > 1.0 + velocity_slack, accelerations > 1.0 + acceleration_slack
-        if not (fast | hard).any():
-            return profile
         if attempt < _REFINEMENTS:
-            profile = profile.refined(fast | hard).solved()
+            switching, where = profile.switching()
+            coarse = fast | hard | switching
+            if not coarse.any():
+                return profile
+            profile = profile.refined(coarse, np.where(switching, where, 0.5)).solved()
+        elif not (fast | hard).any():
+            return profile
         else:
             profile = profile.eased(_at_ends(accelerations, hard), _at_ends(rates, fast))
     return profile if isinstance(profile, Failure) else _slowed(profile)
