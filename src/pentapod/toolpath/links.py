@@ -1,0 +1,124 @@
+"""Links: how the tool comes to a pass, leaves it, and travels between passes.
+
+A *rapid* leaves along the tool axis, rises along the view to the clearance level, crosses, and comes down the
+same way; its corners are rounded, and the axis turns along the great circle, gently at both ends. The last
+stretch to the surface and the first away from it, `approach` long along the axis, is a link on feed. A link
+to a pass close by stays on the surface (see `raster`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.geometry.directions import angle_between
+from pentapod.geometry.polyline import arc_length
+from pentapod.toolpath.toolpath import Segment, SegmentKind
+
+RAPID_SPACING_M = 5e-3
+_ROUNDING_M = 5e-3
+_ARC_STEP = np.radians(6.0)
+
+
+@dataclass(frozen=True)
+class LinkStyle:
+    """view (3,): unit, towards the tool. level: metres along it at which rapids cross. approach, spacing: metres.
+
+    feed: of links on feed, m/s.
+    """
+
+    view: Floats
+    level: float
+    approach: float
+    spacing: float
+    feed: float
+
+
+def approach(tip: Floats, axis: Floats, style: LinkStyle) -> Segment:
+    """Return the link on feed down to a pass that begins at `tip` (3,) with `axis` (3,)."""
+    return _straight(tip + style.approach * axis, tip, axis, style)
+
+
+def retract(tip: Floats, axis: Floats, style: LinkStyle) -> Segment:
+    """Return the link on feed away from a pass that ends at `tip` (3,) with `axis` (3,)."""
+    return _straight(tip, tip + style.approach * axis, axis, style)
+
+
+def rapid(start: Floats, start_axis: Floats, end: Floats, end_axis: Floats, style: LinkStyle) -> Segment:
+    """Return the rapid between two poses, off the surface by `approach`, over the clearance level."""
+    up = _rise(start, start_axis, style)
+    down = _rise(end, end_axis, style)[::-1]
+    tips = spaced(rounded(np.vstack([up, down])), RAPID_SPACING_M)
+    return Segment(SegmentKind.RAPID, tips, _turning(start_axis, end_axis, tips), np.inf)
+
+
+def entry(tip: Floats, axis: Floats, style: LinkStyle) -> Segment:
+    """Return the rapid from the clearance level down to the start of an approach at `tip` (3,)."""
+    tips = spaced(rounded(_rise(tip, axis, style)[::-1]), RAPID_SPACING_M)
+    return Segment(SegmentKind.RAPID, tips, np.tile(axis, (len(tips), 1)), np.inf)
+
+
+def leave(tip: Floats, axis: Floats, style: LinkStyle) -> Segment:
+    """Return the rapid from the end of a retract at `tip` (3,) up to the clearance level."""
+    tips = spaced(rounded(_rise(tip, axis, style)), RAPID_SPACING_M)
+    return Segment(SegmentKind.RAPID, tips, np.tile(axis, (len(tips), 1)), np.inf)
+
+
+def _rise(tip: Floats, axis: Floats, style: LinkStyle) -> Floats:
+    """Return the corners (3, 3) of the way up: on along the axis, then along the view to the level."""
+    knee = tip + style.approach * axis
+    return np.stack([tip, knee, knee + max(style.level - float(knee @ style.view), 0.0) * style.view])
+
+
+def _straight(start: Floats, end: Floats, axis: Floats, style: LinkStyle) -> Segment:
+    tips = spaced(np.stack([start, end]), style.spacing)
+    return Segment(SegmentKind.LINK, tips, np.tile(axis, (len(tips), 1)), style.feed)
+
+
+def _turning(start: Floats, end: Floats, tips: Floats) -> Floats:
+    """Return axes (N, 3) along the great circle from one axis to the other, at rest at both ends."""
+    length = arc_length(tips)
+    t = length / length[-1]
+    t = t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
+    angle = float(angle_between(start, end))
+    if angle < 1e-9:
+        axes = (1.0 - t)[:, None] * start + t[:, None] * end
+    else:
+        axes = np.sin((1.0 - t) * angle)[:, None] * start + np.sin(t * angle)[:, None] * end
+    axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    axes[0], axes[-1] = start, end
+    return axes
+
+
+def rounded(corners: Floats) -> Floats:
+    """Return a polyline (M, 3) with its inner corners replaced by parabolic arcs; ends and legs stay.
+
+    An arc takes up to 5 mm of each leg, less than half of it, so that arcs never meet.
+    """
+    keep = np.concatenate([[True], np.linalg.norm(np.diff(corners, axis=0), axis=1) > 1e-9])
+    corners = corners[keep]
+    parts = [corners[:1]]
+    for before, corner, after in zip(corners, corners[1:], corners[2:], strict=False):
+        turn = float(angle_between(corner - before, after - corner)) if len(corners) > 2 else 0.0
+        if turn < 1e-6:
+            continue
+        back, ahead = before - corner, after - corner
+        reach = min(_ROUNDING_M, 0.45 * float(np.linalg.norm(back)), 0.45 * float(np.linalg.norm(ahead)))
+        enter = corner + reach * back / np.linalg.norm(back)
+        leave_at = corner + reach * ahead / np.linalg.norm(ahead)
+        t = np.linspace(0.0, 1.0, 2 + int(np.ceil(turn / _ARC_STEP)))[:, None]
+        parts.append((1.0 - t) ** 2 * enter + 2.0 * t * (1.0 - t) * corner + t * t * leave_at)
+    parts.append(corners[-1:])
+    return np.vstack(parts)
+
+
+def spaced(corners: Floats, spacing: float) -> Floats:
+    """Return the polyline (M, 3) with points added so that none are further apart than `spacing` metres."""
+    steps = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    counts = np.maximum(np.ceil(steps / spacing - 1e-9), 1.0).astype(np.intp)
+    leg = np.repeat(np.arange(len(steps)), counts)
+    number = np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts, counts)
+    t = (number / counts[leg])[:, None]
+    return np.vstack([corners[leg] + t * (corners[leg + 1] - corners[leg]), corners[-1:]])
