@@ -235,26 +235,9 @@ def show(design: np.ndarray, cost: float, dense: tuple[np.ndarray, np.ndarray]) 
     print("  design = " + repr(np.round(design, 5).tolist()), flush=True)
 
 
-# Where the search starts: an earlier find, x1..x5, y1..y5, delta, tip beyond, work centre.
-KNOWN = np.array(
-    [
-        -0.326,
-        -0.597,
-        0.586,
-        -0.055,
-        0.224,
-        0.498,
-        -0.039,
-        -0.120,
-        -0.595,
-        0.554,
-        0.1847,
-        0.09,
-        0.085,
-        -0.017,
-        0.467,
-    ]
-)
+# Where the search starts: the shipped design before rounding. x1..x5, y1..y5, delta, tip beyond, work centre.
+_X, _Y = [0.5857, 0.2240, -0.3260, -0.5966, -0.0554], [-0.1203, 0.5538, 0.4981, -0.0389, -0.5952]
+KNOWN = np.array([*_X, *_Y, 0.1847, 0.0900, 0.0853, -0.0175, 0.4667])
 
 
 def main() -> None:

@@ -15,8 +15,8 @@ def explain(report: MachineReport) -> str:
     lines = [
         f"machine {m.name} ({m.digest})",
         f"  work volume: tips in a cylinder of {1e3 * work.diameter:.0f} mm diameter and "
-        f"{1e3 * work.height:.0f} mm height around ({centre}) mm; tool axes within {np.degrees(work.tilt):.3g}°"
-        " of -z",
+        f"{1e3 * work.height:.0f} mm height",
+        f"    around ({centre}) mm; tool axes within {np.degrees(work.tilt):.3g}° of -z",
         f"  tool {1e3 * m.tool_length:.1f} mm from the line's origin, "
         f"{1e3 * (m.tool_length - m.pentapod.offsets.max()):.1f} mm beyond the lowest platform joint; "
         f"delta {m.pentapod.delta:.6g}",
