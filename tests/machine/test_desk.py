@@ -101,7 +101,7 @@ def test_random_poses_in_the_volume_are_no_worse_than_the_sampled_ones(desk):
 
 @pytest.mark.parametrize("degrees", [0.0, 15.0, 75.0])
 def test_reaches_a_dome_of_150_mm_with_40_degree_slopes(desk, degrees):
-    """A square dome, 40 degrees steep at its corners; the tool within 15 degrees of the normal; retract 25 mm.
+    """A square dome, 40 degrees steep at its corners; tool within 15 degrees of the normal; retract 25 mm.
 
     Placed flat on the table near the middle of the work volume. Its corners lie outside of that, so it must
     be turned suitably about the vertical: the square's sides along x and y, or up to 25 degrees from there.
