@@ -36,5 +36,6 @@ class Refusal:
     def __str__(self) -> str:
         text = f"{self.stage}: {self.cause}"
         if self.blames:
-            text += ": " + "; ".join(str(blame) for blame in self.blames)
+            text += ": " + "; ".join(str(blame) for blame in self.blames[:3])
+            text += f"; and {len(self.blames) - 3} more limits" if len(self.blames) > 3 else ""
         return text + (f". {self.remedy}" if self.remedy else "")

@@ -1,1 +1,8 @@
-"""TODO"""
+"""Planning: where the workpiece stands, how the tool leans, and the smooth leg path that follows."""
+
+from pentapod.planning.leg_path import LegPath, LegPiece, leg_path
+from pentapod.planning.placed_path import PlacedPath
+from pentapod.planning.placement import Placement
+from pentapod.planning.plan import plan
+
+__all__ = ["LegPath", "LegPiece", "PlacedPath", "Placement", "leg_path", "plan"]

@@ -1,0 +1,41 @@
+"""From margins below zero to a refusal that a user can act on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pentapod.arrays import Bools, Floats
+from pentapod.planning.margins import Margins
+from pentapod.refusal import Blame, Refusal
+
+
+def blame(values: Floats, margins: Margins, needed: float) -> tuple[Blame, ...]:
+    """Return what falls short of the `needed` margin, worst first. values (N, M): each waypoint's margins."""
+    blames: list[tuple[float, Blame]] = []
+    for column, limit in zip((values - needed).T, margins.limits, strict=True):
+        if (short := column < 0.0).any():
+            worst = float(column.min())
+            blames.append((worst, Blame(limit.name, ranges(short), limit.shortfall(worst), limit.unit)))
+    return tuple(b for _, b in sorted(blames, key=lambda pair: pair[0]))
+
+
+def ranges(mask: Bools) -> tuple[tuple[int, int], ...]:
+    """Return the inclusive index ranges in which mask (N,) is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
+    return tuple((int(a), int(b) - 1) for a, b in edges.reshape(-1, 2))
+
+
+def refusal(values: Floats, margins: Margins, needed: float, *, fixed: bool, tilt: float) -> Refusal:
+    """Return the refusal of a placement whose best margins are values (N, M)."""
+    blames = blame(values, margins, needed)
+    short = int((values.min(axis=1) < needed).sum())
+    where = "at the given placement" if fixed else "at the best placement found"
+    remedies = ["turn or move the part"] if fixed else ["machine a smaller region, or scale the part down"]
+    if tilt < np.radians(20.0):
+        remedies.append(f"allow more tilt than {np.degrees(tilt):.0f}°")
+    return Refusal(
+        "placement",
+        f"the part does not fit the machine {where}: {short} of {len(values)} waypoints are out of limits",
+        blames,
+        remedy="Try to " + ", or to ".join(remedies),
+    )

@@ -1,0 +1,193 @@
+"""LegPath: the leg lengths along the placed path, untimed; C2 pieces between exact stops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.arrays import Bools, Floats, Ints, frozen, set_frozen
+from pentapod.errors import ToolpathError
+from pentapod.geometry.rounding import rounded
+from pentapod.kinematics.pentapod import LinearPentapod
+from pentapod.machine.machine import Machine
+from pentapod.planning.placed_path import PlacedPath
+from pentapod.planning.tool_curve import ToolCurve
+from pentapod.refusal import Blame, Refusal
+from pentapod.toolpath.toolpath import SegmentKind
+
+STOP_ANGLE = np.radians(135.0)
+"""A path that turns back more sharply than this stops at the corner: rounding it would need a crawl."""
+
+TOLERANCE_SHARE = 0.8
+"""Share of the tolerances given to corner rounding; the rest is for setpoints and interpolation."""
+
+_AXIS_LEVER_M = (
+    0.01  # metres of spline parameter per radian: keeps the parameter regular when only the axis turns
+)
+
+
+@dataclass(frozen=True, eq=False)
+class LegPiece:
+    """A C2 stretch of the leg path between two exact stops, parametrised by the tip's arc length s in metres.
+
+    section_ends (M,): arc lengths at which the toolpath's segments end, the last is `length`;
+    section_feeds (M,): m/s, infinite on rapids; section_kinds, section_segments (M,): kind and index of the segment.
+    """
+
+    curve: ToolCurve
+    robot: LinearPentapod
+    tool_length: float
+    section_ends: Floats
+    section_feeds: Floats
+    section_kinds: tuple[SegmentKind, ...]
+    section_segments: Ints
+
+    @property
+    def length(self) -> float:
+        """Arc length of the tip in metres."""
+        return self.curve.length
+
+    @property
+    def knots(self) -> Floats:
+        """Arc lengths (K,) where the third derivative may jump, both ends included."""
+        return self.curve.knots
+
+    def pose(self, s: ArrayLike, order: int = 0) -> tuple[Floats, Floats]:
+        """Return tips and tool axes (n, 3), machine frame, or their derivatives of order 1 or 2 in s."""
+        return self.curve(np.asarray(s, dtype=np.float64), order)
+
+    def __call__(self, s: ArrayLike, order: int = 0) -> Floats:
+        """Return leg lengths (n, 5) in metres at arc lengths s (n,), or their derivatives of order 1 or 2 in s."""
+        s = np.asarray(s, dtype=np.float64)
+        d = [self._leg_vectors(s, k) for k in range(order + 1)]
+        d[0][..., :2] -= self.robot.base
+        length = np.sqrt(_dot(d[0], d[0]))
+        if order == 0:
+            return length
+        rate = _dot(d[0], d[1]) / length
+        if order == 1:
+            return rate
+        return (_dot(d[1], d[1]) + _dot(d[0], d[2]) - rate * rate) / length
+
+    def _leg_vectors(self, s: Floats, order: int) -> Floats:
+        """Return platform joints b_i = tip + (tool length − z_i) axis (n, 5, 3), or their derivatives."""
+        tip, axis = self.curve(s, order)
+        return tip[:, None, :] + (self.tool_length - self.robot.offsets)[:, None] * axis[:, None, :]
+
+
+@dataclass(frozen=True, eq=False)
+class LegPath:
+    """Pieces in order; the machine rests between them. starts (P + 1,): arc length where each begins, and the end."""
+
+    pieces: tuple[LegPiece, ...]
+    starts: Floats
+
+    def __post_init__(self) -> None:
+        set_frozen(self, pieces=tuple(self.pieces), starts=frozen(self.starts, "starts", (None,)))
+
+    @property
+    def length(self) -> float:
+        """Total arc length of the tip in metres."""
+        return float(self.starts[-1])
+
+    def __call__(self, s: ArrayLike, order: int = 0) -> Floats:
+        """Return leg lengths (n, 5), or derivatives of order 1 or 2, at arc lengths s (n,) of the whole path."""
+        return self._each(s, lambda piece, local: piece(local, order), 5)
+
+    def pose(self, s: ArrayLike) -> tuple[Floats, Floats]:
+        """Return tips and tool axes (n, 3), machine frame, at arc lengths s (n,) of the whole path."""
+        both = self._each(s, lambda piece, local: np.hstack(piece.pose(local)), 6)
+        return both[:, :3], both[:, 3:]
+
+    def piece_at(self, s: ArrayLike) -> Ints:
+        """Return the index (n,) of the piece that holds each arc length s (n,)."""
+        k = np.searchsorted(self.starts, np.asarray(s, dtype=np.float64), side="right") - 1
+        return np.clip(k, 0, len(self.pieces) - 1)
+
+    def _each(self, s: ArrayLike, evaluate: object, columns: int) -> Floats:
+        s = np.atleast_1d(np.asarray(s, dtype=np.float64))
+        which = self.piece_at(s)
+        out = np.empty((len(s), columns))
+        for k in np.unique(which):
+            rows = which == k
+            out[rows] = evaluate(self.pieces[k], s[rows] - self.starts[k])  # type: ignore[operator]  # pyright: ignore
+        return out
+
+
+def leg_path(
+    placed: PlacedPath, machine: Machine, *, path_tolerance: float, axis_tolerance: float
+) -> LegPath | Refusal:
+    """Return the smooth leg path through the placed tool poses.
+
+    path_tolerance: how far in metres the pivot (the cutter's ball centre, the beam's spot) may leave the toolpath;
+    axis_tolerance: how far in radians the axis may leave the planned one. Corners are rounded within both. The machine
+    stops where a rapid meets another kind of motion, and at corners sharper than STOP_ANGLE. Raises
+    ToolpathError for tolerances that are not positive. Returns a Refusal where the tool would have to stand still.
+    """
+    for name, value in (("path_tolerance", path_tolerance), ("axis_tolerance", axis_tolerance)):
+        if not value > 0.0:
+            raise ToolpathError("must be positive", key=name, value=value)
+    toolpath = placed.toolpath
+    points = np.hstack([placed.pivots, placed.axes])
+    steps = np.sqrt(
+        np.square(np.diff(points[:, :3], axis=0)).sum(axis=1)
+        + np.square(_AXIS_LEVER_M * np.diff(points[:, 3:], axis=0)).sum(axis=1)
+    )
+    moving = steps > 1e-12
+    keep = np.concatenate([[True], moving])
+    if keep.sum() < 2:
+        return Refusal(
+            "leg path", "the toolpath does not move", (Blame("motion", ((0, len(toolpath) - 1),), 0.0, "mm"),)
+        )
+    points, u = points[keep], np.concatenate([[0.0], np.cumsum(steps[moving])])
+    segment = toolpath.segment_of_interval[moving]
+    stops = np.flatnonzero(_stops(points[:, :3], segment, toolpath.segments)) + 1
+    bounds = np.concatenate([[0], stops, [len(points) - 1]])
+    pieces = []
+    for a, b in zip(bounds[:-1], bounds[1:], strict=True):
+        spline = rounded(
+            u[a : b + 1] - u[a],
+            points[a : b + 1],
+            _tolerance(TOLERANCE_SHARE * path_tolerance, TOLERANCE_SHARE * axis_tolerance),
+        )
+        curve = ToolCurve.of(spline, toolpath.pivot)
+        ends = np.flatnonzero(np.diff(segment[a:b], append=-1)) + 1
+        which = segment[a:b][ends - 1]
+        pieces.append(
+            LegPiece(
+                curve,
+                machine.pentapod,
+                machine.tool_length,
+                section_ends=curve.arc_length(u[a + ends] - u[a]),
+                section_feeds=np.array([toolpath.segments[k].feed for k in which]),
+                section_kinds=tuple(toolpath.segments[k].kind for k in which),
+                section_segments=which,
+            )
+        )
+    return LegPath(tuple(pieces), np.concatenate([[0.0], np.cumsum([p.length for p in pieces])]))
+
+
+def _tolerance(path: float, axis: float):
+    def too_far(u: Floats, on_curve: Floats, on_polyline: Floats) -> Bools:
+        off = np.linalg.norm(on_curve[:, :3] - on_polyline[:, :3], axis=1)
+        a, b = on_curve[:, 3:], on_polyline[:, 3:]
+        cross = np.linalg.norm(np.cross(a, b), axis=1)
+        return (off > path) | (cross > np.sin(axis) * np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
+
+    return too_far
+
+
+def _stops(pivots: Floats, segment: Ints, segments: tuple) -> Bools:  # type: ignore[type-arg]
+    """Return for each inner waypoint (N − 2,) whether the machine stops there."""
+    rapid = np.array([s.kind is SegmentKind.RAPID for s in segments])[segment]
+    step = np.diff(pivots, axis=0)
+    length = np.linalg.norm(step, axis=1)
+    cosine = (step[1:] * step[:-1]).sum(axis=1)
+    sharp = cosine < np.cos(STOP_ANGLE) * length[1:] * length[:-1]
+    return (rapid[1:] != rapid[:-1]) | (sharp & (length[1:] > 0.0) & (length[:-1] > 0.0))
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.einsum("nij,nij->ni", a, b)

@@ -1,0 +1,225 @@
+"""Margins: one dimensionless number for every limit, positive inside and 0 at the limit.
+
+All are scaled so that 1 is comfortable, so that "the smallest margin" compares like with like. The one
+formula below serves NumPy arrays and casadi symbols alike: it uses element-wise arithmetic only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.kinematics.component import Component
+from pentapod.machine.machine import Machine
+
+W_COMFORTABLE = float(np.sin(np.radians(60.0)))
+"""|w| of a tool axis 30° off the base normal: margin 1."""
+
+S_COMFORTABLE_FRACTION = 0.25
+"""Distance to the surface S = 0, as a fraction of the mean leg length, that counts as margin 1."""
+
+CLEARANCE_COMFORTABLE_M = 0.05
+"""Gap between two legs that counts as margin 1."""
+
+_PAIRS = tuple(combinations(range(5), 2))
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What one margin row stands for. name: as a user knows it; unit: of the shortfall, mm or deg."""
+
+    name: str
+    unit: str
+    shortfall: Callable[[float], float]
+    """Converts a negative margin into how far beyond the limit it is, in `unit`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """The margins of one machine in one component.
+
+    Called with tips and tool axes (..., 3) in the machine frame it returns (..., M), M = len(limits).
+    """
+
+    machine: Machine
+    component: Component
+    limits: tuple[Limit, ...]
+    sides: tuple[float, ...]
+
+    @classmethod
+    def of(cls, machine: Machine, component: Component) -> Margins:
+        """Build the margins of `machine` in `component`."""
+        return cls(machine, component, _limits(machine), _home_sides(machine, component))
+
+    def __call__(self, tips: Floats, axes: Floats) -> Floats:
+        """Return margins (..., M) of tool tips and axes (tip → spindle), both (..., 3), machine frame."""
+        rows = self.rows(
+            np.moveaxis(tips, -1, 0), np.moveaxis(axes, -1, 0), np.sqrt, np.minimum, np.maximum, np.where
+        )
+        return np.stack(np.broadcast_arrays(*rows), axis=-1)
+
+    def symbolic(self, tip: Any, axis: Any) -> Any:
+        """Return the column of the same margins for casadi SX vectors tip and axis (3)."""
+        import casadi as ca  # noqa: PLC0415  heavy: only when planning
+
+        rows = self.rows(ca.vertsplit(tip), ca.vertsplit(axis), ca.sqrt, ca.fmin, ca.fmax, ca.if_else)
+        return ca.vertcat(*rows)
+
+    def rows(
+        self, tip: Sequence[Any], axis: Sequence[Any], sqrt: Any, least: Any, most: Any, where: Any
+    ) -> list[Any]:
+        """Return the margin expressions, in the order of `limits`; the arguments are three components each."""
+        m = self.machine
+        robot, legs, joints = m.pentapod, m.legs, m.joints
+        u, v, w = -axis[0], -axis[1], -axis[2]  # i points to the tip
+        p = [tip[k] + m.tool_length * axis[k] for k in range(3)]
+
+        def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
+            return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+        vectors, lengths = [], []
+        for (x, y), z in zip(robot.base.tolist(), robot.offsets.tolist(), strict=True):
+            d = [p[0] + z * u - x, p[1] + z * v - y, p[2] + z * w]
+            vectors.append(d)
+            lengths.append(sqrt(dot(d, d)))
+        half_stroke = (0.5 * (legs.max_length - legs.min_length)).tolist()
+        rows = [
+            (length - low) / h
+            for length, low, h in zip(lengths, legs.min_length.tolist(), half_stroke, strict=True)
+        ]
+        rows += [
+            (high - length) / h
+            for length, high, h in zip(lengths, legs.max_length.tolist(), half_stroke, strict=True)
+        ]
+
+        # The singular surfaces: w = 0, and S = 0 as the position distance (kinematics notes, section 4).
+        # S is taken in the reduced frame of leg 3, in which the formula of the notes holds.
+        delta, (x3, _) = robot.delta, robot.base[2].tolist()
+        z3 = float(robot.offsets[2])
+        px, pz = p[0] + z3 * u - x3, p[2] + z3 * w
+        s = delta * w * px - (delta * u - 1.0) * pz
+        distance = s / sqrt((delta * w) * (delta * w) + (1.0 - delta * u) * (1.0 - delta * u))
+        rows.append(self.component.w * w / W_COMFORTABLE)
+        rows.append(self.component.s * distance / _s_comfortable(m))
+
+        direction = [u, v, w]
+        for d, length, a, cone in zip(
+            vectors, lengths, joints.base_axes.tolist(), joints.base_cone.tolist(), strict=True
+        ):
+            edge = float(np.cos(cone))
+            rows.append((dot(d, a) / length - edge) / (1.0 - edge))
+        for k, (least_angle, most_angle) in enumerate(joints.platform_range.tolist()):
+            scale = 0.5 * (np.cos(least_angle) - np.cos(most_angle))
+            cosine = dot(vectors[k], direction) / lengths[k]
+            rows.append((cosine - float(np.cos(most_angle))) / scale)
+            rows.append((float(np.cos(least_angle)) - cosine) / scale)
+
+        for (j, k), side in zip(_PAIRS, self.sides, strict=True):
+            offset = (robot.base[k] - robot.base[j]).tolist()
+            gap = _segment_distance(offset, vectors[j], vectors[k], side, sqrt, least, most, where)
+            rows.append((gap - 2.0 * m.bodies.leg_radius) / CLEARANCE_COMFORTABLE_M)
+        return rows
+
+
+def _segment_distance(
+    offset: Sequence[float],
+    d1: Sequence[Any],
+    d2: Sequence[Any],
+    side: float,
+    sqrt: Any,
+    least: Any,
+    most: Any,
+    where: Any,
+) -> Any:
+    """Return the distance of segments α d1 and offset + β d2, α, β in [0, 1]; offset in the base plane.
+
+    It is negative where one has passed through the other: where the nearest points lie inside both and
+    the second runs on the other side of the first than `side`, the sign of offset · (d1 × d2), says.
+    The quadratic in (α, β) is minimised on the unit square by clamping α, then β, then α again.
+    """
+    ox, oy = offset
+    a = d1[0] * d1[0] + d1[1] * d1[1] + d1[2] * d1[2]
+    e = d2[0] * d2[0] + d2[1] * d2[1] + d2[2] * d2[2]
+    b = d1[0] * d2[0] + d1[1] * d2[1] + d1[2] * d2[2]
+    c, f = -(d1[0] * ox + d1[1] * oy), -(d2[0] * ox + d2[1] * oy)
+    area = a * e - b * b + 1e-12 * a * e  # parallel legs: any α will do, the later clamps repair it
+
+    def clamp(x: Any) -> Any:
+        return least(most(x, 0.0), 1.0)
+
+    alpha = clamp((b * f - c * e) / area)
+    beta = clamp((b * alpha + f) / e)
+    alpha = clamp((b * beta - c) / a)
+    gx = alpha * d1[0] - beta * d2[0] - ox
+    gy = alpha * d1[1] - beta * d2[1] - oy
+    gz = alpha * d1[2] - beta * d2[2]
+    gap = sqrt(gx * gx + gy * gy + gz * gz + 1e-18)  # the last term keeps the derivative finite at contact
+    triple = ox * (d1[1] * d2[2] - d1[2] * d2[1]) + oy * (d1[2] * d2[0] - d1[0] * d2[2])
+    inside = alpha * (1.0 - alpha) * beta * (1.0 - beta)
+    return where(side * triple * inside < 0.0, -gap, gap)
+
+
+def _home_sides(machine: Machine, component: Component) -> tuple[float, ...]:
+    """Return for each pair of legs on which side the second passes the first in the middle of the work volume."""
+    direction = np.array([0.0, 0.0, float(component.w)])
+    position = machine.work.centre - machine.tool_length * direction
+    legs, base = machine.pentapod.leg_vectors(position, direction), machine.pentapod.base
+    triples = [np.dot([*(base[k] - base[j]), 0.0], np.cross(legs[j], legs[k])) for j, k in _PAIRS]
+    return tuple(float(np.sign(t)) for t in triples)
+
+
+def _s_comfortable(machine: Machine) -> float:
+    return S_COMFORTABLE_FRACTION * float(np.mean(0.5 * (machine.legs.min_length + machine.legs.max_length)))
+
+
+def _limits(machine: Machine) -> tuple[Limit, ...]:
+    legs, joints = machine.legs, machine.joints
+
+    def length(half_stroke: float) -> Callable[[float], float]:
+        return lambda margin: -margin * half_stroke * 1e3
+
+    def cone(edge: float, scale: float, sign: float) -> Callable[[float], float]:
+        at_limit = float(np.arccos(edge))
+        return lambda margin: float(
+            abs(np.degrees(np.arccos(np.clip(edge + sign * margin * scale, -1.0, 1.0)) - at_limit))
+        )
+
+    half = (0.5 * (legs.max_length - legs.min_length)).tolist()
+    rows = [Limit(f"leg {k + 1} too short", "mm", length(half[k])) for k in range(5)]
+    rows += [Limit(f"leg {k + 1} too long", "mm", length(half[k])) for k in range(5)]
+    rows.append(
+        Limit(
+            "singular surface w = 0",
+            "deg",
+            lambda m: float(np.degrees(np.arcsin(min(1.0, -m * W_COMFORTABLE)))),
+        )
+    )
+    rows.append(Limit("singular surface S = 0", "mm", length(_s_comfortable(machine))))
+    for k, angle in enumerate(joints.base_cone.tolist()):
+        edge = float(np.cos(angle))
+        rows.append(Limit(f"base joint {k + 1} beyond its cone", "deg", cone(edge, 1.0 - edge, 1.0)))
+    for k, (least, most) in enumerate(joints.platform_range.tolist()):
+        scale = 0.5 * float(np.cos(least) - np.cos(most))
+        rows.append(
+            Limit(
+                f"platform joint {k + 1} beyond its largest angle",
+                "deg",
+                cone(float(np.cos(most)), scale, 1.0),
+            )
+        )
+        rows.append(
+            Limit(
+                f"platform joint {k + 1} below its least angle",
+                "deg",
+                cone(float(np.cos(least)), scale, -1.0),
+            )
+        )
+    rows += [
+        Limit(f"legs {j + 1} and {k + 1} touch", "mm", length(CLEARANCE_COMFORTABLE_M)) for j, k in _PAIRS
+    ]
+    return tuple(rows)

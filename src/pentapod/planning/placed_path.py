@@ -1,0 +1,46 @@
+"""PlacedPath: the toolpath in the machine, with the tool axes that were chosen and the margins that they leave."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pentapod.arrays import Floats, frozen, set_frozen
+from pentapod.kinematics.component import Component
+from pentapod.planning.placement import Placement
+from pentapod.toolpath.toolpath import Toolpath
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedPath:
+    """Tool poses in the machine frame, one for each waypoint of the toolpath.
+
+    tips (N, 3) metres; axes (N, 3) unit, tip → spindle; margins (N, M), normalised, 0 at a limit, named by
+    margin_names (M,).
+    """
+
+    toolpath: Toolpath
+    placement: Placement
+    component: Component
+    tips: Floats
+    axes: Floats
+    margins: Floats
+    margin_names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("tips", "axes", "margins"):
+            set_frozen(self, **{name: frozen(getattr(self, name), name, (len(self.toolpath), None))})
+
+    @property
+    def smallest_margin(self) -> float:
+        """The smallest margin over all waypoints and limits."""
+        return float(self.margins.min())
+
+    @property
+    def binding(self) -> str:
+        """The limit with the smallest margin."""
+        return self.margin_names[int(self.margins.min(axis=0).argmin())]
+
+    @property
+    def pivots(self) -> Floats:
+        """The points (N, 3) about which the tool is tilted, machine frame, metres."""
+        return self.tips + self.toolpath.pivot * self.axes

@@ -1,0 +1,206 @@
+"""plan: where to clamp the part, in which component to work, and how to tilt the tool."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pentapod.arrays import Floats, Ints
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import COMPONENTS, Component
+from pentapod.machine.machine import Machine
+from pentapod.planning.blame import refusal
+from pentapod.planning.margins import Margins
+from pentapod.planning.placed_path import PlacedPath
+from pentapod.planning.placement import Placement
+from pentapod.planning.problem import PlanningProblem
+from pentapod.planning.sampling import Guess, best_tilted_margins, first_guesses
+from pentapod.planning.task import Task
+from pentapod.planning.tilt import FieldDomain, lean
+from pentapod.progress import Progress, silent
+from pentapod.refusal import Refusal
+from pentapod.toolpath.toolpath import Toolpath
+
+NEEDED_MARGIN = 0.02
+"""A plan is accepted from this smallest margin on: what rounding corners between waypoints may cost."""
+
+CALM_SHARE = 0.9
+"""Share of the best smallest margin that is kept when the axis is made calm."""
+
+REFINED = 3
+"""How many first guesses are refined by IPOPT."""
+
+_CELLS = 2
+_POINTS, _ADDED, _ROUNDS = 48, 16, 6
+_ROW_SLACK = 0.6
+
+
+def plan(
+    toolpath: Toolpath,
+    machine: Machine,
+    *,
+    tilt: float = 0.0,
+    placement: Placement | None = None,
+    component: Component | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> PlacedPath | Refusal:
+    """Choose placement, component and tool axes that keep the path well inside the machine's limits.
+
+    tilt: half angle in radians of the cone around the nominal axis within which the tool may lean.
+    placement, component: honoured where given; where not, all components and many placements are tried and
+    the one with the largest smallest margin is kept. Deterministic for a seed. Returns a Refusal that names
+    limits, waypoints and shortfalls where the part does not fit.
+    """
+    task = Task.of(toolpath, tilt)
+    components = COMPONENTS if component is None else (component,)
+    search = _Search(task, machine, progress)
+    if placement is None:
+        progress("placement", 0.0, "sampling")
+        guesses = first_guesses(task, machine, components, seed)
+        best = search.refine(guesses[:REFINED])
+    else:
+        fixed = [
+            Guess(placement.transform, c, _strict(task, machine, c, placement.transform)) for c in components
+        ]
+        best = search.fixed(max(fixed, key=lambda g: g.margin))
+    margins, transform, coefficients, smallest = best
+    if smallest < NEEDED_MARGIN:
+        values = best_tilted_margins(task, margins, transform)
+        if (
+            values.min(axis=1) >= NEEDED_MARGIN
+        ).all():  # each waypoint alone would do, not all with one smooth field
+            values = margins(*task.machine_poses(transform, search.axes(coefficients)))
+        return refusal(values, margins, NEEDED_MARGIN, fixed=placement is not None, tilt=tilt)
+    if tilt > 0.0:
+        progress("tool axis", 0.0, f"smallest margin {smallest:.3f}")
+        coefficients = search.calm(margins, transform, coefficients, smallest)
+    tips, axes = task.machine_poses(transform, search.axes(coefficients))
+    chosen = placement if placement is not None else Placement(transform, "largest smallest margin")
+    names = tuple(limit.name for limit in margins.limits)
+    return PlacedPath(toolpath, chosen, margins.component, tips, axes, margins(tips, axes), names)
+
+
+_Best = tuple[Margins, RigidTransform, Floats, float]
+
+
+class _Search:
+    """The refinement of guesses, with constraint generation: waypoints that come out worst are added until none is."""
+
+    def __init__(self, task: Task, machine: Machine, progress: Progress) -> None:
+        self.task, self.machine, self.progress = task, machine, progress
+        self.domain = FieldDomain.around(task.pivots, task.nominal, _CELLS)
+        self.basis = self.domain.basis(task.pivots) if task.tilt > 0.0 else None
+        self.zero = np.zeros((self.domain.size, 2))
+
+    def axes(self, coefficients: Floats) -> Floats:
+        """Return the tool axes (N, 3), workpiece frame, of field coefficients."""
+        return (
+            self.task.nominal
+            if self.basis is None
+            else lean(self.task.nominal, self.basis @ coefficients @ self.domain.lean_plane)
+        )
+
+    def values(self, margins: Margins, transform: RigidTransform, coefficients: Floats) -> Floats:
+        """Return the margins (N, M) at every waypoint."""
+        return margins(*self.task.machine_poses(transform, self.axes(coefficients)))
+
+    def refine(self, guesses: list[Guess]) -> _Best:
+        """Return the best placement: every guess is improved once, the most promising one to the end."""
+        attempts: list[_Attempt] = []
+        for k, guess in enumerate(guesses):
+            attempt = _Attempt(self, guess, free=True)
+            attempt.improve()
+            attempts.append(attempt)
+            best = max(a.best[3] for a in attempts)
+            self.progress(
+                "placement", (k + 1) / (len(guesses) + 1), f"component {guess.component}, margin {best:.3f}"
+            )
+        return max(attempts, key=lambda a: a.best[3]).finished()
+
+    def fixed(self, guess: Guess) -> _Best:
+        """Return the best tilt field at a given placement."""
+        margins = Margins.of(self.machine, guess.component)
+        if self.task.tilt > 0.0:
+            return _Attempt(self, guess, free=False).finished()
+        values = self.values(margins, guess.transform, self.zero)
+        return margins, guess.transform, self.zero, float(values.min())
+
+    def calm(self, margins: Margins, transform: RigidTransform, start: Floats, smallest: float) -> Floats:
+        """Return coefficients of the calmest field that keeps a share of the smallest margin at every waypoint."""
+        keep = max(CALM_SHARE * smallest, NEEDED_MARGIN)
+        problem = self.problem(margins, transform, free=False)
+        rows, coefficients = self.task.representatives(_POINTS), start
+        for k in range(_ROUNDS):
+            coefficients = problem.solve(rows, transform, coefficients, "calm", keep).coefficients
+            values = self.values(margins, transform, coefficients)
+            excess = self._cone_excess(coefficients)
+            self.progress("tool axis", (k + 1) / _ROUNDS, f"smallest margin {values.min():.3f}")
+            worst = np.minimum(values.min(axis=1), keep - excess)
+            if worst.min() >= keep - 0.02 * abs(keep) - 1e-3 and excess.max() <= 0.0:
+                return coefficients
+            rows = self.with_worst(rows, worst, keep)
+        return start  # it keeps every limit, and only leans more than it would have to
+
+    def _cone_excess(self, coefficients: Floats) -> Floats:
+        cosine = (self.axes(coefficients) * self.task.nominal).sum(axis=1)
+        return np.maximum(np.cos(self.task.tilt) - cosine, 0.0)
+
+    def problem(self, margins: Margins, transform: RigidTransform, *, free: bool) -> PlanningProblem:
+        """State the problem with the margin rows that can come near the smallest one."""
+        rows = self.task.representatives(4 * _POINTS)
+        few = Task(self.task.pivots[rows], self.task.nominal[rows], self.task.pivot, self.task.tilt)
+        values = margins(*few.machine_poses(transform, few.nominal)).min(axis=0)
+        slack = _ROW_SLACK if free else 0.5 * _ROW_SLACK
+        near = np.flatnonzero(values < values.min() + slack)
+        return PlanningProblem(self.task, margins, self.domain, near.tolist(), free=free)
+
+    def with_worst(self, rows: Ints, worst: Floats, threshold: float) -> Ints:
+        """Return rows with the worst waypoints added, spread over the part."""
+        order = np.argsort(worst, kind="stable")[:2000]
+        order = order[worst[order] < threshold]
+        added: list[int] = []
+        size = float(np.ptp(self.task.pivots, axis=0).max())
+        for k in order:
+            apart = (
+                np.linalg.norm(self.task.pivots[[*added]] - self.task.pivots[k], axis=1)
+                if added
+                else np.array([1.0])
+            )
+            if apart.min() > 0.04 * size:
+                added.append(int(k))
+            if len(added) == _ADDED:
+                break
+        return np.unique(np.concatenate([rows, np.array(added, dtype=np.intp)]))
+
+
+class _Attempt:
+    """One guess on its way to the largest smallest margin, with the waypoints and solvers it has gathered."""
+
+    def __init__(self, search: _Search, guess: Guess, *, free: bool) -> None:
+        self.search, self.margins = search, Margins.of(search.machine, guess.component)
+        smallest = float(search.values(self.margins, guess.transform, search.zero).min())
+        self.best: _Best = (self.margins, guess.transform, search.zero, smallest)
+        self.rows = search.task.representatives(_POINTS)
+        self.problem = search.problem(self.margins, guess.transform, free=free)
+
+    def improve(self) -> bool:
+        """Solve once; return whether waypoints that were left out came out worse than those considered."""
+        _, transform, coefficients, smallest = self.best
+        solution = self.problem.solve(self.rows, transform, coefficients, "margin", smallest)
+        values = self.search.values(self.margins, solution.placement, solution.coefficients)
+        if values.min() > smallest:
+            self.best = (self.margins, solution.placement, solution.coefficients, float(values.min()))
+        on_chosen = float(values[self.rows].min())
+        self.rows = self.search.with_worst(self.rows, values.min(axis=1), on_chosen)
+        return bool(values.min() < on_chosen - 1e-3)
+
+    def finished(self) -> _Best:
+        """Improve until no waypoint is worse than those considered, and return the best."""
+        for _ in range(_ROUNDS):
+            if not self.improve():
+                break
+        return self.best
+
+
+def _strict(task: Task, machine: Machine, component: Component, transform: RigidTransform) -> float:
+    return float(Margins.of(machine, component)(*task.machine_poses(transform, task.nominal)).min())

@@ -1,0 +1,150 @@
+"""First guesses for the placement: many at random, ranked by their smallest margin over a few waypoints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.geometry.directions import tangent_frame
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import Component
+from pentapod.machine.machine import Machine
+from pentapod.planning.margins import Margins
+from pentapod.planning.task import Task
+from pentapod.planning.tilt import lean
+
+SAMPLES = 12_000
+KEPT = 4
+LARGEST_SLOPE = np.radians(40.0)
+"""How far the part's mean axis may lean from the base normal in a first guess."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A placement, the component, and the smallest margin over the representatives."""
+
+    transform: RigidTransform
+    component: Component
+    margin: float
+
+
+def first_guesses(
+    task: Task, machine: Machine, components: tuple[Component, ...], seed: int, samples: int = SAMPLES
+) -> list[Guess]:
+    """Return the best few placements for each component, best first; deterministic for a seed.
+
+    Each placement is judged on a dozen representatives with their nominal axes, the best ones again with a cone of tilts.
+    """
+    rng = np.random.default_rng(seed)
+    rows = task.representatives(12)
+    centre, mean_axis = task.pivots.mean(axis=0), task.nominal.mean(axis=0)
+    mean_axis = mean_axis / max(float(np.linalg.norm(mean_axis)), 1e-9)
+    guesses: list[Guess] = []
+    for component in components:
+        margins = Margins.of(machine, component)
+        rotations = _rotations(mean_axis, -float(component.w), samples, rng)
+        places = _places(machine, samples, rng)
+        for attempt in range(3):  # at random, then twice closer around the best
+            translations = places - rotations @ centre
+            score = _score(task, margins, rotations, translations, task.nominal[rows], rows)
+            best = np.argsort(-score, kind="stable")[: KEPT * 8]
+            if attempt < 2:
+                repeat = samples // 3 // len(best)
+                spread = 0.08 / (1 + 2 * attempt)
+                rotations = np.concatenate(
+                    [rotations[best], _turned(rotations[best].repeat(repeat, axis=0), spread, rng)]
+                )
+                near = places[best].repeat(repeat, axis=0)
+                places = np.concatenate([places[best], near + rng.normal(scale=spread, size=near.shape)])
+        tilted = [
+            _tilted_score(task, margins, rotations[k], translations[k], rows)
+            if task.tilt > 0.0
+            else float(score[k])
+            for k in best
+        ]
+        order = np.argsort([-t for t in tilted], kind="stable")[:KEPT]
+        guesses += [
+            Guess(
+                RigidTransform(_orthonormal(rotations[best[k]]), translations[best[k]]),
+                component,
+                float(tilted[k]),
+            )
+            for k in order
+        ]
+    return sorted(guesses, key=lambda g: -g.margin)
+
+
+def tilts(angle: float) -> Floats:
+    """Return lean vectors (K, 2) in a tangent frame that fill a cone of half angle `angle`: centre and two rings."""
+    rings = [np.zeros((1, 2))]
+    for share, count in ((0.5, 6), (0.95, 12)):
+        turn = 2.0 * np.pi * np.arange(count) / count
+        rings.append(share * np.tan(angle) * np.stack([np.cos(turn), np.sin(turn)], axis=1))
+    return np.concatenate(rings)
+
+
+def best_tilted_margins(task: Task, margins: Margins, placement: RigidTransform, block: int = 4096) -> Floats:
+    """Return the margins (N, M) of every waypoint at the best tilt of a grid over the cone, each waypoint by itself."""
+    grid = tilts(task.tilt) if task.tilt > 0.0 else np.zeros((1, 2))
+    out = np.empty((len(task.pivots), len(margins.limits)))
+    for start in range(0, len(out), block):
+        rows = np.arange(start, min(start + block, len(out)))
+        t1, t2 = tangent_frame(task.nominal[rows])
+        b = grid[:, None, :1] * t1 + grid[:, None, 1:] * t2
+        tips, axes = task.machine_poses(placement, lean(task.nominal[rows], b), rows)
+        all_margins = margins(tips, axes)
+        choice = all_margins.min(axis=-1).argmax(axis=0)
+        out[rows] = all_margins[choice, np.arange(len(rows))]
+    return out
+
+
+def _score(task: Task, margins: Margins, r: Floats, t: Floats, axes: Floats, rows: Floats) -> Floats:
+    turned = np.einsum("sij,nj->sni", r, axes)
+    tips = np.einsum("sij,nj->sni", r, task.pivots[rows]) + t[:, None, :] - task.pivot * turned
+    return margins(tips, turned).min(axis=(-1, -2))
+
+
+def _tilted_score(task: Task, margins: Margins, r: Floats, t: Floats, rows: Floats) -> float:
+    few = Task(task.pivots[rows], task.nominal[rows], task.pivot, task.tilt)
+    placement = RigidTransform(_orthonormal(r), t)
+    return float(best_tilted_margins(few, margins, placement).min())
+
+
+def _rotations(mean_axis: Floats, side: float, count: int, rng: np.random.Generator) -> Floats:
+    """Return rotations (count, 3, 3) that turn the mean tool axis to within LARGEST_SLOPE of side · z."""
+    cosine = rng.uniform(np.cos(LARGEST_SLOPE), 1.0, count)
+    azimuth, spin = rng.uniform(0.0, 2.0 * np.pi, (2, count))
+    sine = np.sqrt(1.0 - cosine * cosine)
+    target = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), side * cosine], axis=1)
+    t1, t2 = tangent_frame(target)
+    c, s = np.cos(spin)[:, None], np.sin(spin)[:, None]
+    to = np.stack([c * t1 + s * t2, -s * t1 + c * t2, target], axis=2)
+    m1, m2 = tangent_frame(mean_axis)
+    return to @ np.stack([m1, m2, mean_axis])
+
+
+def _places(machine: Machine, count: int, rng: np.random.Generator) -> Floats:
+    """Return places (count, 3) for the path's centre: a third near the advertised work, the rest anywhere in reach."""
+    base, reach = machine.pentapod.base, float(machine.legs.max_length.max()) + abs(machine.tool_length)
+    low, high = base.min(axis=0), base.max(axis=0)
+    side = np.sign(machine.joints.base_axes[:, 2].sum()) or 1.0
+    wide = np.column_stack([rng.uniform(low, high, (count, 2)), side * rng.uniform(0.1, 1.0, count) * reach])
+    near = machine.work.centre + rng.normal(scale=0.25 * machine.work.diameter, size=(count, 3))
+    return np.where((np.arange(count) % 3 == 0)[:, None], near, wide)
+
+
+def _turned(rotations: Floats, spread: float, rng: np.random.Generator) -> Floats:
+    """Return rotations turned by small random angles (to first order; made exact when one is chosen)."""
+    a = rng.normal(scale=2.0 * spread, size=(len(rotations), 3))
+    small = np.zeros((len(a), 3, 3))
+    small[:, 0, 1], small[:, 0, 2], small[:, 1, 2] = -a[:, 2], a[:, 1], -a[:, 0]
+    small -= small.transpose(0, 2, 1)
+    u, _, v = np.linalg.svd(rotations @ (np.eye(3) + small))
+    return u @ v
+
+
+def _orthonormal(rotation: Floats) -> Floats:
+    u, _, v = np.linalg.svd(rotation)
+    return u @ v
