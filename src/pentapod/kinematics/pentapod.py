@@ -130,8 +130,10 @@ class LinearPentapod:
         position and direction (..., 3), machine frame. Compare with a `Component`, or hand it to `pose`.
         """
         p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
-        signs = np.sign(np.stack(np.broadcast_arrays(*w_and_s(p, i, self.delta, self.lever)), axis=-1))
-        return np.where(np.isnan(signs), 0.0, signs).astype(np.int8)
+        w, s = w_and_s(p, i, self.delta, self.lever)
+        signs = np.sign(np.stack(np.broadcast_arrays(w, s), axis=-1))
+        known = np.isfinite(p.sum(axis=-1) + i.sum(axis=-1))
+        return np.where(known[..., None], signs, 0.0).astype(np.int8)
 
     @property
     def lever(self) -> float:
