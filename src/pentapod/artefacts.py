@@ -1,4 +1,4 @@
-"""The folder of a run's files: either all of them are of one run that ended, or those before stand untouched."""
+"""The folder of a run: its files are all of one run that ended, or those that stood there before."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 import shutil
 import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -41,7 +41,7 @@ def check_folder(folder: Path) -> None:
 
 
 @contextmanager
-def staged(folder: Path) -> Iterator[Path]:
+def staged(folder: Path) -> Generator[Path]:
     """Yield a new folder inside `folder`; what was written there moves into `folder` when the block ends.
 
     Files of an earlier run that this one did not write are removed (a refused job leaves no old program).

@@ -11,14 +11,14 @@ from typing import TypeVar
 import numpy as np
 
 from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, write_arrays, write_json
-from pentapod.errors import MeshError
+from pentapod.errors import ArrayError, MeshError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import Job
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import ControllerSettings, Machine
 from pentapod.outcome import Outcome, Stage, refusal_verdict
 from pentapod.plan_arrays import arrays_of
-from pentapod.planning import LegPath, Placement, PlacedPath, leg_path, plan
+from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
 from pentapod.program import Program, Provenance, sample, write_csv
 from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
@@ -42,21 +42,22 @@ def run(
     *,
     writers: Mapping[str, Writer] | None = None,
 ) -> Outcome:
-    """Plan a job and write program.csv, plan.npz and verdict.json into the folder `out`; return what was reached.
+    """Plan a job, write program.csv, plan.npz and verdict.json into `out`, and return what was reached.
 
     writers: further files, by name, each made from the outcome (the report, which stands above this floor).
     The program is judged from the file, as it was written. What cannot be done ends in an outcome with a
-    refusal: verdict.json says so and there is no program. The folder changes only when the run ends: an
-    error or an interruption leaves it as it was. Raises InputError where job, mesh, machine or folder are bad.
+    refusal: verdict.json says so, and there is no program. The folder changes when the run ends: an
+    error or an interruption leaves it as it was. Raises InputError for a bad job, mesh, machine or folder.
     """
     folder = Path(out)
     check_folder(folder)
     clock = _Clock(progress)
-    machine = load_machine(job)
-    mesh = clock.time("mesh", lambda: load_part(job))
-    toolpath = clock.time("toolpath", lambda: make_toolpath(job, mesh))
+    machine = job_machine(job)
+    placement = job_placement(job)
+    mesh = clock.time("mesh", lambda: job_mesh(job))
+    toolpath = clock.time("toolpath", lambda: job_toolpath(job, mesh))
     with staged(folder) as staging:
-        verdict = _plan_and_verify(job, machine, toolpath, staging / PROGRAM, clock)
+        verdict = _plan_and_verify(job, machine, toolpath, placement, staging / PROGRAM, clock)
         outcome = Outcome(job, machine, tuple(clock.stages), verdict)
         write_arrays(arrays_of(outcome), staging / ARRAYS)
         for name, write in (writers or {}).items():
@@ -66,7 +67,7 @@ def run(
     return outcome
 
 
-def load_machine(job: Job) -> Machine:
+def job_machine(job: Job) -> Machine:
     """Return the job's machine, with the job's tool length and controller settings. Raises MachineError."""
     machine = Machine.load(job.machine_file or str(job.machine.name))
     controller = ControllerSettings(
@@ -77,7 +78,7 @@ def load_machine(job: Job) -> Machine:
     return dataclasses.replace(machine, controller=controller, tool_length=length)
 
 
-def load_part(job: Job) -> Mesh:
+def job_mesh(job: Job) -> Mesh:
     """Return the job's mesh. Raises MeshError, or JobError where unit or tolerances do not go with it."""
     part = job.part
     try:
@@ -99,7 +100,7 @@ def load_part(job: Job) -> Mesh:
     return mesh
 
 
-def make_toolpath(job: Job, mesh: Mesh) -> Toolpath:
+def job_toolpath(job: Job, mesh: Mesh) -> Toolpath:
     """Return the job's toolpath, workpiece frame. Raises ToolpathError where nothing is there to machine."""
     part, table, feed = job.part, job.toolpath, job.feed
     link = feed.cut_mm_min if feed.link_mm_min is None else feed.link_mm_min
@@ -125,15 +126,18 @@ def make_toolpath(job: Job, mesh: Mesh) -> Toolpath:
     return raster(mesh, tool, options)
 
 
-def fixed_placement(job: Job) -> Placement | None:
-    """Return the placement that the job gives, or None where the planner chooses. Raises ArrayError."""
+def job_placement(job: Job) -> Placement | None:
+    """Return the placement that the job gives, or None where the planner chooses. Raises JobError."""
     table = job.placement
     if table.mode == "free":
         return None
     if table.matrix is not None:
         matrix = np.array(table.matrix)
         matrix[:3, 3] *= _MM
-        return Placement(RigidTransform.from_matrix(matrix), "job")
+        try:
+            return Placement(RigidTransform.from_matrix(matrix), "job")
+        except ArrayError as error:
+            raise job.error("placement", "matrix", error.what, expected=error.expected) from error
     rotation = _turned(*np.radians(table.rotation_deg or (0.0, 0.0, 0.0)))
     return Placement(RigidTransform(rotation, np.array(table.position_mm) * _MM), "job")
 
@@ -141,7 +145,7 @@ def fixed_placement(job: Job) -> Placement | None:
 def judge(
     job: Job, machine: Machine, toolpath: Toolpath, program: Path, progress: Progress = silent
 ) -> Verdict:
-    """Return the verdict on a program file, by what the job asks. Raises ProgramError where it cannot be read."""
+    """Return the verdict on a program file, by what the job asks. Raises ProgramError if there is none."""
     return verify(
         program,
         machine,
@@ -154,10 +158,11 @@ def judge(
     )
 
 
-def _plan_and_verify(job: Job, machine: Machine, toolpath: Toolpath, file: Path, clock: _Clock) -> Verdict:
+def _plan_and_verify(
+    job: Job, machine: Machine, toolpath: Toolpath, placement: Placement | None, file: Path, clock: _Clock
+) -> Verdict:
     """Return the verdict on the program that is written to `file`, or on the refusal that ends the run."""
     component = None if job.placement.component is None else Component.parse(job.placement.component)
-    placement = fixed_placement(job)
     tilt, axis_tolerance = float(np.radians(job.axis.tilt_deg)), float(np.radians(job.tolerance.axis_deg))
 
     def placed_path() -> PlacedPath | Refusal:

@@ -1,0 +1,67 @@
+"""pentapod machine: explain the machines that ship, and check one's own."""
+
+# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+
+from __future__ import annotations
+
+import click
+
+from pentapod.cli.output import echo_json, json_option
+
+
+@click.group()
+def machine() -> None:
+    """Explain and check machines."""
+
+
+@machine.command("list")
+@json_option
+def list_machines(as_json: bool) -> int:
+    """List the machines that ship with pentapod."""
+    from pentapod.machine import shipped_machines
+
+    names = list(shipped_machines())
+    if as_json:
+        echo_json(names)
+    else:
+        click.echo("\n".join(names))
+    return 0
+
+
+@machine.command()
+@click.argument("name_or_file")
+@json_option
+def check(name_or_file: str, as_json: bool) -> int:
+    """Explain a machine (a shipped NAME or a FILE.toml), and whether it keeps its limits in its work volume.
+
+    Exit code 1 where it does not; 2 where the file describes a machine that cannot exist.
+    """
+    from pentapod.machine import Machine, explain
+    from pentapod.machine import check as check_machine
+
+    report = check_machine(Machine.load(name_or_file))
+    passed = all(finding.passed for finding in report.findings)
+    if as_json:
+        findings = [
+            {
+                "name": finding.name,
+                "passed": bool(finding.passed),
+                "value": float(finding.value),
+                "must_be": finding.kind,
+                "limit": float(finding.limit),
+                "unit": finding.unit,
+                "where": finding.where,
+            }
+            for finding in report.findings
+        ]
+        echo_json(
+            {
+                "machine": report.machine.name,
+                "digest": report.machine.digest,
+                "passed": passed,
+                "findings": findings,
+            }
+        )
+    else:
+        click.echo(explain(report))
+    return 0 if passed else 1

@@ -1,0 +1,107 @@
+"""The entry point: verbs by name, loaded when used; errors become one line and an exit code."""
+
+# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any
+
+import click
+
+from pentapod.errors import InputError
+
+EXIT_FAILED, EXIT_INPUT, EXIT_BUG, EXIT_INTERRUPTED = 1, 2, 3, 130
+
+VERBS = {
+    "plan": "pentapod.cli.plan:plan",
+    "verify": "pentapod.cli.verify:verify",
+    "toolpath": "pentapod.cli.toolpath:toolpath",
+    "machine": "pentapod.cli.machine:machine",
+    "ik": "pentapod.cli.kinematics:ik",
+    "fk": "pentapod.cli.kinematics:fk",
+    "new": "pentapod.cli.new:new",
+}
+"""In the order of `pentapod --help`: name → module:command."""
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported when they are asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order of `VERBS`."""
+        del ctx
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return the command of a verb, None where there is none of that name."""
+        del ctx
+        if cmd_name not in VERBS:
+            return None
+        module, name = VERBS[cmd_name].split(":")
+        command: click.Command = getattr(import_module(module), name)
+        return command
+
+
+def _print_version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    if value:
+        from pentapod.version import __version__
+
+        click.echo(f"pentapod {__version__}")
+        ctx.exit()
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--version", is_flag=True, expose_value=False, is_eager=True, callback=_print_version,
+              help="Show the version and exit.")  # fmt: skip
+def cli() -> None:
+    """From a surface mesh to a checked leg-length program for a five-legged parallel robot.
+
+    Lengths are in millimetres, angles in degrees, feeds in mm/min.
+
+    Exit code 0: done, and the verdict passed. 1: the job cannot be done, or the verdict failed; the reason is
+    named. 2: bad input, one line says what and where. 3: an error of pentapod itself. 130: interrupted.
+    """
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and leave with its exit code."""
+    sys.exit(run(sys.argv[1:] if arguments is None else arguments))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run the command line and return its exit code. With --debug anywhere, errors show their traceback."""
+    debug = "--debug" in arguments
+    rest = [argument for argument in arguments if argument != "--debug"]
+    try:
+        result: Any = cli.main(args=rest, prog_name="pentapod", standalone_mode=False)
+    except (Exception, KeyboardInterrupt) as error:
+        if debug and not isinstance(error, click.ClickException):
+            raise
+        code, message = _answer(error)
+        click.echo(message, err=True)
+        return code
+    return result if isinstance(result, int) else 0
+
+
+def _answer(error: BaseException) -> tuple[int, str]:
+    """Return the exit code of an error, and its one line."""
+    if isinstance(error, (KeyboardInterrupt, click.exceptions.Abort)):
+        return EXIT_INTERRUPTED, "interrupted"
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        return EXIT_INPUT, error.format_message()
+    if isinstance(error, click.ClickException):
+        return EXIT_INPUT, _line(error.format_message())
+    if isinstance(error, InputError):
+        return EXIT_INPUT, _line(str(error))
+    if isinstance(error, OSError):
+        place = f"{error.filename}: " if error.filename else ""
+        return EXIT_INPUT, _line(f"{place}{error.strerror or error}")
+    hint = "this is an error of pentapod; --debug shows where"
+    return EXIT_BUG, _line(f"{type(error).__name__}: {error} ({hint})")
+
+
+def _line(message: str) -> str:
+    return "error: " + " ".join(message.split())

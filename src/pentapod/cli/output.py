@@ -1,0 +1,96 @@
+"""What the verbs share: options, the progress bar on stderr, JSON on stdout."""
+
+# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from pentapod.progress import Progress
+    from pentapod.verify.verdict import Certificate, Verdict
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def quiet_option(command: Command) -> Command:
+    """Add --quiet: nothing but errors and what was asked for with --json."""
+    return click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")(command)
+
+
+def json_option(command: Command) -> Command:
+    """Add --json."""
+    return click.option("--json", "as_json", is_flag=True, help="Print JSON on stdout, nothing else.")(command)
+
+
+def echo_json(content: Any) -> None:
+    """Print JSON on stdout; what is not finite becomes null."""
+    click.echo(json.dumps(_finite(content), indent=2, allow_nan=False, ensure_ascii=False))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and (not math.isfinite(value)):
+        return None
+    return value
+
+
+@contextmanager
+def progress_bar(*, quiet: bool) -> Generator[Progress]:
+    """Yield a Progress that draws bars on stderr, one for each stage; silent when stderr is no terminal."""
+    from pentapod.progress import silent
+
+    if quiet or not sys.stderr.isatty():
+        yield silent
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+
+    tasks: dict[str, TaskID] = {}
+    columns = (
+        TextColumn("{task.description:<10}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[note]}"),
+    )
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+
+        def show(stage: str, fraction: float, note: str = "") -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=1.0, note=note)
+            bars.update(tasks[stage], completed=fraction, note=note)
+
+        yield show
+
+
+def verdict_text(verdict: Verdict) -> str:
+    """Return a verdict as lines of text: every claim with value and bound, then the answer."""
+    lines = [_claim(certificate) for certificate in verdict.certificates]
+    failed = sum(not certificate.passed for certificate in verdict.certificates)
+    answer = "passed" if verdict.passed else f"FAILED: {failed} of {len(verdict.certificates)} claims"
+    return "\n".join([*lines, f"verdict: {answer}"])
+
+
+def _claim(certificate: Certificate) -> str:
+    mark = "ok  " if certificate.passed else "FAIL"
+    text = f"  {mark}  {certificate.claim}"
+    if certificate.value is not None:
+        text += f": {certificate.value:.6g} {certificate.unit}".rstrip()
+    if certificate.bound is not None:
+        text += f" (bound {certificate.bound:.6g})"
+    if not certificate.passed and certificate.where.time_s is not None:
+        text += f" at {certificate.where.time_s:.3f} s"
+    if not certificate.passed and certificate.value is None:
+        text += f": {certificate.method}"
+    return text

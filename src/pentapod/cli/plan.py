@@ -1,0 +1,50 @@
+"""pentapod plan: a job file → every artefact."""
+
+# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option, verdict_text
+
+
+@click.command()
+@click.argument("job", type=click.Path(path_type=Path))
+@click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True,
+              help="Folder for the files.")  # fmt: skip
+@json_option
+@quiet_option
+def plan(job: Path, out: Path, as_json: bool, quiet: bool) -> int:
+    """Plan JOB.toml: write program.csv, verdict.json, report.html and plan.npz.
+
+    The folder changes only when the run ends: then its four files are of one run. A job that cannot be done
+    leaves no program.csv.
+    """
+    from pentapod.artefacts import PROGRAM, REPORT
+    from pentapod.job import Job
+    from pentapod.pipeline import run
+    from pentapod.report import write_report
+    from pentapod.toolpath import Mesh
+
+    loaded = Job.load(job)
+    with progress_bar(quiet=quiet or as_json) as progress:
+        outcome = run(loaded, out, progress, writers={REPORT: write_report})
+    mesh, refusal = outcome.find(Mesh), outcome.refusal
+    if as_json:
+        seconds = {stage.name: round(stage.seconds, 3) for stage in outcome.stages}
+        echo_json({**outcome.to_dict(), "out": str(out), "seconds": seconds})
+    elif not quiet:
+        if mesh is not None:
+            click.echo(str(mesh.diagnosis))
+        if refusal is None:
+            click.echo(verdict_text(outcome.verdict))
+            click.echo(f"program: {out / PROGRAM}")
+        click.echo(f"report: {out / REPORT}")
+    if refusal is not None:
+        click.echo(f"refused: {refusal}", err=True)
+    elif not outcome.passed and quiet:
+        click.echo("the verdict failed", err=True)
+    return 0 if outcome.passed else 1

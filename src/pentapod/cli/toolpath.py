@@ -1,0 +1,49 @@
+"""pentapod toolpath: a job's toolpath alone, in the workpiece frame."""
+
+# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pentapod.cli.output import echo_json, json_option, quiet_option
+
+
+@click.command()
+@click.argument("job", type=click.Path(path_type=Path))
+@click.option("-o", "--out", required=True, type=click.Path(path_type=Path), help="File to write, .npz.")
+@json_option
+@quiet_option
+def toolpath(job: Path, out: Path, as_json: bool, quiet: bool) -> int:
+    """Write the toolpath of JOB.toml: no machine, no placement, no time.
+
+    The .npz holds toolpath.tips_mm (N, 3), toolpath.axes (N, 3) from the tip to the spindle, and for the
+    segments their first waypoint, kind and feed.
+    """
+    from pentapod.artefacts import write_arrays
+    from pentapod.errors import InputError
+    from pentapod.geometry import arc_length
+    from pentapod.job import Job
+    from pentapod.pipeline import job_mesh, job_toolpath
+    from pentapod.plan_arrays import toolpath_arrays
+
+    if out.suffix != ".npz":
+        raise InputError("unknown format", file=out, value=out.suffix, expected="a name that ends in .npz")
+    loaded = Job.load(job)
+    mesh = job_mesh(loaded)
+    path = job_toolpath(loaded, mesh)
+    write_arrays(toolpath_arrays(path), out)
+    kinds = [str(segment.kind) for segment in path.segments]
+    lengths = [1e3 * float(arc_length(segment.tips)[-1]) for segment in path.segments]
+    by_kind = {kind: sum(v for k, v in zip(kinds, lengths, strict=True) if k == kind) for kind in set(kinds)}
+    if as_json:
+        summary = {"waypoints": len(path), "segments": len(kinds), "length_mm": dict(sorted(by_kind.items()))}
+        echo_json({**summary, "file": str(out)})
+    elif not quiet:
+        click.echo(str(mesh.diagnosis))
+        shares = ", ".join(f"{kind} {by_kind[kind]:.0f} mm" for kind in sorted(by_kind))
+        click.echo(f"{len(path)} waypoints in {len(kinds)} segments: {shares}")
+        click.echo(f"toolpath: {out}")
+    return 0

@@ -1,0 +1,36 @@
+"""pentapod verify: judge a program file afresh."""
+
+# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option, verdict_text
+
+
+@click.command()
+@click.argument("program", type=click.Path(path_type=Path))
+@click.option("--job", required=True, type=click.Path(path_type=Path), help="The job it was made from.")
+@json_option
+@quiet_option
+def verify(program: Path, job: Path, as_json: bool, quiet: bool) -> int:
+    """Judge PROGRAM.csv against its job, from the file alone.
+
+    Nothing of the planner is used: the rows are replayed through the closed-form forward kinematics and
+    compared with the toolpath that the job asks for.
+    """
+    from pentapod.job import Job
+    from pentapod.pipeline import job_machine, job_mesh, job_toolpath, judge
+
+    loaded = Job.load(job)
+    machine = job_machine(loaded)
+    with progress_bar(quiet=quiet or as_json) as progress:
+        verdict = judge(loaded, machine, job_toolpath(loaded, job_mesh(loaded)), program, progress)
+    if as_json:
+        echo_json(verdict.to_dict())
+    elif not quiet:
+        click.echo(verdict_text(verdict))
+    return 0 if verdict.passed else 1
