@@ -15,11 +15,15 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage that ran: its name, its wall time in seconds, and the value that it gave."""
+    """One stage that ran: its name, its wall time in seconds, the value that it gave, and what it says of it.
+
+    A value that is a tuple is several values of one stage.
+    """
 
     name: str
     seconds: float
     value: Any
+    said: str = ""
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,11 @@ class Outcome:
 
     def find(self, kind: type[Value]) -> Value | None:
         """Return the value of this type, or None where no stage gave one."""
-        return next((stage.value for stage in self.stages if isinstance(stage.value, kind)), None)
+        for stage in self.stages:
+            for value in stage.value if isinstance(stage.value, tuple) else (stage.value,):
+                if isinstance(value, kind):
+                    return value
+        return None
 
     @property
     def refusal(self) -> Refusal | None:

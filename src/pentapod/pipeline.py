@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, write_arrays, write_json
-from pentapod.errors import ArrayError, MeshError
+from pentapod.errors import ArrayError, MachineError, MeshError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import Job
 from pentapod.kinematics.component import Component
@@ -23,7 +23,17 @@ from pentapod.program import Program, Provenance, sample, write_csv
 from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
 from pentapod.timing import Trajectory, retime
-from pentapod.toolpath import BallCutter, Mesh, RasterOptions, StandOff, Toolpath, load_mesh, raster
+from pentapod.toolpath import (
+    BallCutter,
+    Mesh,
+    RasterOptions,
+    RasterReport,
+    Region,
+    StandOff,
+    Toolpath,
+    load_mesh,
+    raster_with_report,
+)
 from pentapod.verify import Verdict, verify
 from pentapod.version import __version__
 
@@ -54,10 +64,14 @@ def run(
     clock = _Clock(progress)
     machine = job_machine(job)
     placement = job_placement(job)
-    mesh = clock.time("mesh", lambda: job_mesh(job))
-    toolpath = clock.time("toolpath", lambda: job_toolpath(job, mesh))
+    mesh = clock.time("mesh", lambda: job_mesh(job), says=lambda mesh: str(mesh.diagnosis))
+    toolpath, _ = clock.time("toolpath", lambda: job_toolpath(job, mesh), says=lambda made: str(made[1]))
     with staged(folder) as staging:
-        verdict = _plan_and_verify(job, machine, toolpath, placement, staging / PROGRAM, clock)
+        program = _Task(job, machine, toolpath, placement, clock).program(staging / PROGRAM)
+        if isinstance(program, Refusal):
+            verdict = refusal_verdict(program)
+        else:
+            verdict = clock.time("verify", lambda: judge(job, machine, toolpath, staging / PROGRAM, progress))
         outcome = Outcome(job, machine, tuple(clock.stages), verdict)
         write_arrays(arrays_of(outcome), staging / ARRAYS)
         for name, write in (writers or {}).items():
@@ -75,7 +89,10 @@ def job_machine(job: Job) -> Machine:
         interpolation=job.output.interpolation or machine.controller.interpolation,
     )
     length = machine.tool_length if job.tool.length_mm is None else job.tool.length_mm * _MM
-    return dataclasses.replace(machine, controller=controller, tool_length=length)
+    try:
+        return dataclasses.replace(machine, controller=controller, tool_length=length)
+    except MachineError as error:
+        raise job.error("tool", "length_mm", error.what) from error
 
 
 def job_mesh(job: Job) -> Mesh:
@@ -100,30 +117,36 @@ def job_mesh(job: Job) -> Mesh:
     return mesh
 
 
-def job_toolpath(job: Job, mesh: Mesh) -> Toolpath:
-    """Return the job's toolpath, workpiece frame. Raises ToolpathError where nothing is there to machine."""
+def job_toolpath(job: Job, mesh: Mesh) -> tuple[Toolpath, RasterReport]:
+    """Return the job's toolpath, workpiece frame, and what it came to.
+
+    Raises ToolpathError where nothing is there to machine.
+    """
     part, table, feed = job.part, job.toolpath, job.feed
     link = feed.cut_mm_min if feed.link_mm_min is None else feed.link_mm_min
     if job.tool.diameter_mm is not None:
         tool = BallCutter(0.5 * job.tool.diameter_mm * _MM)
     else:
         tool = StandOff((job.tool.standoff_mm or 0.0) * _MM)
+    region = Region(
+        direction=part.region_direction,
+        angle=float(np.radians(part.region_angle_deg)),
+        box=None if part.region_box_mm is None else np.array(part.region_box_mm) * _MM,
+    )
     options = RasterOptions(
-        direction=np.radians(table.direction_deg),
+        direction=float(np.radians(table.direction_deg)),
         pattern=table.pattern,
         stepover=None if table.stepover_mm is None else table.stepover_mm * _MM,
         scallop=None if table.scallop_mm is None else table.scallop_mm * _MM,
+        region=region,
+        chordal=job.tolerance.chordal_mm * _MM,
+        spacing=table.spacing_mm * _MM,
         clearance=table.clearance_mm * _MM,
         approach=table.approach_mm * _MM,
-        spacing=table.spacing_mm * _MM,
-        chordal_tolerance=job.tolerance.chordal_mm * _MM,
-        cut_feed=feed.cut_mm_min * _MM_MIN,
+        feed=feed.cut_mm_min * _MM_MIN,
         link_feed=link * _MM_MIN,
-        region_box=None if part.region_box_mm is None else np.array(part.region_box_mm) * _MM,
-        region_direction=part.region_direction,
-        region_angle=np.radians(part.region_angle_deg),
     )
-    return raster(mesh, tool, options)
+    return raster_with_report(mesh, tool, options)
 
 
 def job_placement(job: Job) -> Placement | None:
@@ -142,9 +165,7 @@ def job_placement(job: Job) -> Placement | None:
     return Placement(RigidTransform(rotation, np.array(table.position_mm) * _MM), "job")
 
 
-def judge(
-    job: Job, machine: Machine, toolpath: Toolpath, program: Path, progress: Progress = silent
-) -> Verdict:
+def judge(job: Job, machine: Machine, toolpath: Toolpath, program: Path, progress: Progress = silent) -> Verdict:
     """Return the verdict on a program file, by what the job asks. Raises ProgramError if there is none."""
     return verify(
         program,
@@ -158,43 +179,54 @@ def judge(
     )
 
 
-def _plan_and_verify(
-    job: Job, machine: Machine, toolpath: Toolpath, placement: Placement | None, file: Path, clock: _Clock
-) -> Verdict:
-    """Return the verdict on the program that is written to `file`, or on the refusal that ends the run."""
-    component = None if job.placement.component is None else Component.parse(job.placement.component)
-    tilt, axis_tolerance = float(np.radians(job.axis.tilt_deg)), float(np.radians(job.tolerance.axis_deg))
+@dataclasses.dataclass(frozen=True)
+class _Task:
+    """What the stages after the toolpath need."""
 
-    def placed_path() -> PlacedPath | Refusal:
+    job: Job
+    machine: Machine
+    toolpath: Toolpath
+    placement: Placement | None
+    clock: _Clock
+
+    def program(self, file: Path) -> Program | Refusal:
+        """Plan, write the program to `file` and return it; or return the first refusal."""
+        placed = self.clock.time("placement", self._placed)
+        if isinstance(placed, Refusal):
+            return placed
+        path = self.clock.time("leg path", lambda: self._path(placed))
+        if isinstance(path, Refusal):
+            return path
+        trajectory = self.clock.time("timing", lambda: retime(path, self.machine, progress=self.clock.progress))
+        if isinstance(trajectory, Refusal):
+            return trajectory
+        return self.clock.time("program", lambda: self._program(placed, trajectory, file))
+
+    def _placed(self) -> PlacedPath | Refusal:
+        wanted = self.job.placement.component
         return plan(
-            toolpath, machine, tilt=tilt, placement=placement, component=component, progress=clock.progress
+            self.toolpath,
+            self.machine,
+            tilt=float(np.radians(self.job.axis.tilt_deg)),
+            placement=self.placement,
+            component=None if wanted is None else Component.parse(wanted),
+            progress=self.clock.progress,
         )
 
-    def path_of(placed: PlacedPath) -> LegPath | Refusal:
+    def _path(self, placed: PlacedPath) -> LegPath | Refusal:
+        tolerance = self.job.tolerance
         return leg_path(
-            placed, machine, path_tolerance=job.tolerance.path_mm * _MM, axis_tolerance=axis_tolerance
+            placed,
+            self.machine,
+            path_tolerance=tolerance.path_mm * _MM,
+            axis_tolerance=float(np.radians(tolerance.axis_deg)),
         )
 
-    placed = clock.time("placement", placed_path)
-    if isinstance(placed, Refusal):
-        return refusal_verdict(placed)
-    path = clock.time("leg path", lambda: path_of(placed))
-    if isinstance(path, Refusal):
-        return refusal_verdict(path)
-    trajectory: Trajectory | Refusal = clock.time(
-        "timing", lambda: retime(path, machine, progress=clock.progress)
-    )
-    if isinstance(trajectory, Refusal):
-        return refusal_verdict(trajectory)
-    source = Provenance(machine.name, machine.digest, job.digest, __version__)
-
-    def program() -> Program:
-        sampled = sample(trajectory, machine, placed.placement.transform, placed.component, source)
-        write_csv(sampled, file)
-        return sampled
-
-    clock.time("program", program)
-    return clock.time("verify", lambda: judge(job, machine, toolpath, file, clock.progress))
+    def _program(self, placed: PlacedPath, trajectory: Trajectory, file: Path) -> Program:
+        source = Provenance(self.machine.name, self.machine.digest, self.job.digest, __version__)
+        program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
+        write_csv(program, file)
+        return program
 
 
 def _turned(x: float, y: float, z: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
@@ -213,11 +245,12 @@ class _Clock:
         self.progress = progress
         self.stages: list[Stage] = []
 
-    def time(self, name: str, stage: Callable[[], Value]) -> Value:
-        """Return what a stage gives; it is kept with its wall time."""
+    def time(self, name: str, stage: Callable[[], Value], says: Callable[[Value], str] | None = None) -> Value:
+        """Return what a stage gives; it is kept with its wall time, and with what `says` says of it."""
         self.progress(name, 0.0)
         start = time.perf_counter()
         value = stage()
-        self.stages.append(Stage(name, time.perf_counter() - start, value))
+        seconds = time.perf_counter() - start
+        self.stages.append(Stage(name, seconds, value, says(value) if says else ""))
         self.progress(name, 1.0)
         return value

@@ -27,18 +27,16 @@ def plan(job: Path, out: Path, as_json: bool, quiet: bool) -> int:
     from pentapod.job import Job
     from pentapod.pipeline import run
     from pentapod.report import write_report
-    from pentapod.toolpath import Mesh
 
     loaded = Job.load(job)
     with progress_bar(quiet=quiet or as_json) as progress:
         outcome = run(loaded, out, progress, writers={REPORT: write_report})
-    mesh, refusal = outcome.find(Mesh), outcome.refusal
+    refusal = outcome.refusal
     if as_json:
         seconds = {stage.name: round(stage.seconds, 3) for stage in outcome.stages}
         echo_json({**outcome.to_dict(), "out": str(out), "seconds": seconds})
     elif not quiet:
-        if mesh is not None:
-            click.echo(str(mesh.diagnosis))
+        click.echo("\n".join(stage.said for stage in outcome.stages if stage.said))
         if refusal is None:
             click.echo(verdict_text(outcome.verdict))
             click.echo(f"program: {out / PROGRAM}")

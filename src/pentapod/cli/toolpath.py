@@ -33,7 +33,7 @@ def toolpath(job: Path, out: Path, as_json: bool, quiet: bool) -> int:
         raise InputError("unknown format", file=out, value=out.suffix, expected="a name that ends in .npz")
     loaded = Job.load(job)
     mesh = job_mesh(loaded)
-    path = job_toolpath(loaded, mesh)
+    path, came_to = job_toolpath(loaded, mesh)
     write_arrays(toolpath_arrays(path), out)
     kinds = [str(segment.kind) for segment in path.segments]
     lengths = [1e3 * float(arc_length(segment.tips)[-1]) for segment in path.segments]
@@ -43,7 +43,6 @@ def toolpath(job: Path, out: Path, as_json: bool, quiet: bool) -> int:
         echo_json({**summary, "file": str(out)})
     elif not quiet:
         click.echo(str(mesh.diagnosis))
-        shares = ", ".join(f"{kind} {by_kind[kind]:.0f} mm" for kind in sorted(by_kind))
-        click.echo(f"{len(path)} waypoints in {len(kinds)} segments: {shares}")
+        click.echo(str(came_to))
         click.echo(f"toolpath: {out}")
     return 0

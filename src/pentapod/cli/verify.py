@@ -28,7 +28,7 @@ def verify(program: Path, job: Path, as_json: bool, quiet: bool) -> int:
     loaded = Job.load(job)
     machine = job_machine(loaded)
     with progress_bar(quiet=quiet or as_json) as progress:
-        verdict = judge(loaded, machine, job_toolpath(loaded, job_mesh(loaded)), program, progress)
+        verdict = judge(loaded, machine, job_toolpath(loaded, job_mesh(loaded))[0], program, progress)
     if as_json:
         echo_json(verdict.to_dict())
     elif not quiet:

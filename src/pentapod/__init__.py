@@ -1,0 +1,127 @@
+"""pentapod: from a surface mesh to a checked leg-length program for a five-legged parallel robot.
+
+    mesh → Toolpath → PlacedPath → LegPath → Trajectory → Program → Verdict
+
+The names below, in the order of the flow, are loaded when they are first used: `import pentapod` is light.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pentapod.geometry import RigidTransform as RigidTransform
+    from pentapod.job import Job as Job
+    from pentapod.kinematics import Component as Component
+    from pentapod.kinematics import LinearPentapod as LinearPentapod
+    from pentapod.machine import Machine as Machine
+    from pentapod.outcome import Outcome as Outcome
+    from pentapod.pipeline import run as run
+    from pentapod.planning import LegPath as LegPath
+    from pentapod.planning import PlacedPath as PlacedPath
+    from pentapod.planning import Placement as Placement
+    from pentapod.planning import leg_path as leg_path
+    from pentapod.planning import plan as plan
+    from pentapod.program import Program as Program
+    from pentapod.program import Provenance as Provenance
+    from pentapod.program import read_csv as read_csv
+    from pentapod.program import sample as sample
+    from pentapod.program import write_csv as write_csv
+    from pentapod.refusal import Refusal as Refusal
+    from pentapod.report import write_report as write_report
+    from pentapod.timing import Trajectory as Trajectory
+    from pentapod.timing import retime as retime
+    from pentapod.toolpath import BallCutter as BallCutter
+    from pentapod.toolpath import Mesh as Mesh
+    from pentapod.toolpath import RasterOptions as RasterOptions
+    from pentapod.toolpath import StandOff as StandOff
+    from pentapod.toolpath import Toolpath as Toolpath
+    from pentapod.toolpath import load_mesh as load_mesh
+    from pentapod.toolpath import raster as raster
+    from pentapod.verify import Certificate as Certificate
+    from pentapod.verify import Verdict as Verdict
+    from pentapod.version import __version__ as __version__
+
+# `verify` is the one verb that is missing: it has the name of its package. `from pentapod.verify import verify`.
+_HOMES = {
+    "Machine": "machine",
+    "LinearPentapod": "kinematics",
+    "Component": "kinematics",
+    "RigidTransform": "geometry",
+    "load_mesh": "toolpath",
+    "Mesh": "toolpath",
+    "BallCutter": "toolpath",
+    "StandOff": "toolpath",
+    "RasterOptions": "toolpath",
+    "raster": "toolpath",
+    "Toolpath": "toolpath",
+    "plan": "planning",
+    "Placement": "planning",
+    "PlacedPath": "planning",
+    "leg_path": "planning",
+    "LegPath": "planning",
+    "retime": "timing",
+    "Trajectory": "timing",
+    "sample": "program",
+    "Provenance": "program",
+    "Program": "program",
+    "write_csv": "program",
+    "read_csv": "program",
+    "Certificate": "verify",
+    "Verdict": "verify",
+    "Refusal": "refusal",
+    "Job": "job",
+    "run": "pipeline",
+    "Outcome": "outcome",
+    "write_report": "report",
+    "__version__": "version",
+}
+
+__all__ = [  # noqa: RUF022 - in the order of the flow
+    "Machine",
+    "LinearPentapod",
+    "Component",
+    "RigidTransform",
+    "load_mesh",
+    "Mesh",
+    "BallCutter",
+    "StandOff",
+    "RasterOptions",
+    "raster",
+    "Toolpath",
+    "plan",
+    "Placement",
+    "PlacedPath",
+    "leg_path",
+    "LegPath",
+    "retime",
+    "Trajectory",
+    "sample",
+    "Provenance",
+    "Program",
+    "write_csv",
+    "read_csv",
+    "Certificate",
+    "Verdict",
+    "Refusal",
+    "Job",
+    "run",
+    "Outcome",
+    "write_report",
+    "__version__",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a name of `__all__` from where it lives. Raises AttributeError for others."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'pentapod' has no attribute {name!r}")
+    value = getattr(import_module(f"pentapod.{_HOMES[name]}"), name)
+    globals()[name] = value  # so that it is looked up once
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return the public names."""
+    return sorted(__all__)
