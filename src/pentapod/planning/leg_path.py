@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +17,7 @@ from pentapod.machine.machine import Machine
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.planning.tool_curve import ToolCurve
 from pentapod.refusal import Blame, Refusal
-from pentapod.toolpath.toolpath import SegmentKind
+from pentapod.toolpath.toolpath import Segment, SegmentKind
 
 STOP_ANGLE = np.radians(135.0)
 """A path that turns back more sharply than this stops at the corner: rounding it would need a crawl."""
@@ -23,9 +25,7 @@ STOP_ANGLE = np.radians(135.0)
 TOLERANCE_SHARE = 0.8
 """Share of the tolerances given to corner rounding; the rest is for setpoints and interpolation."""
 
-_AXIS_LEVER_M = (
-    0.01  # metres of spline parameter per radian: keeps the parameter regular when only the axis turns
-)
+_AXIS_LEVER_M = 0.01  # metres of spline parameter per radian: keeps the parameter regular when only the axis turns
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,13 +106,13 @@ class LegPath:
         k = np.searchsorted(self.starts, np.asarray(s, dtype=np.float64), side="right") - 1
         return np.clip(k, 0, len(self.pieces) - 1)
 
-    def _each(self, s: ArrayLike, evaluate: object, columns: int) -> Floats:
+    def _each(self, s: ArrayLike, evaluate: Callable[[LegPiece, Floats], Floats], columns: int) -> Floats:
         s = np.atleast_1d(np.asarray(s, dtype=np.float64))
         which = self.piece_at(s)
         out = np.empty((len(s), columns))
         for k in np.unique(which):
             rows = which == k
-            out[rows] = evaluate(self.pieces[k], s[rows] - self.starts[k])  # type: ignore[operator]  # pyright: ignore
+            out[rows] = evaluate(self.pieces[k], s[rows] - self.starts[k])
         return out
 
 
@@ -146,7 +146,7 @@ def leg_path(
     stops = np.flatnonzero(_stops(points[:, :3], segment, toolpath.segments)) + 1
     bounds = np.concatenate([[0], stops, [len(points) - 1]])
     pieces = []
-    for a, b in zip(bounds[:-1], bounds[1:], strict=True):
+    for a, b in pairwise(bounds.tolist()):
         spline = rounded(
             u[a : b + 1] - u[a],
             points[a : b + 1],
@@ -179,7 +179,7 @@ def _tolerance(path: float, axis: float):
     return too_far
 
 
-def _stops(pivots: Floats, segment: Ints, segments: tuple) -> Bools:  # type: ignore[type-arg]
+def _stops(pivots: Floats, segment: Ints, segments: tuple[Segment, ...]) -> Bools:
     """Return for each inner waypoint (N − 2,) whether the machine stops there."""
     rapid = np.array([s.kind is SegmentKind.RAPID for s in segments])[segment]
     step = np.diff(pivots, axis=0)

@@ -58,9 +58,8 @@ class Margins:
 
     def __call__(self, tips: Floats, axes: Floats) -> Floats:
         """Return margins (..., M) of tool tips and axes (tip → spindle), both (..., 3), machine frame."""
-        rows = self.rows(
-            np.moveaxis(tips, -1, 0), np.moveaxis(axes, -1, 0), np.sqrt, np.minimum, np.maximum, np.where
-        )
+        tip, axis = list(np.moveaxis(tips, -1, 0)), list(np.moveaxis(axes, -1, 0))
+        rows = self.rows(tip, axis, np.sqrt, np.minimum, np.maximum, np.where)
         return np.stack(np.broadcast_arrays(*rows), axis=-1)
 
     def symbolic(self, tip: Any, axis: Any) -> Any:
@@ -70,9 +69,7 @@ class Margins:
         rows = self.rows(ca.vertsplit(tip), ca.vertsplit(axis), ca.sqrt, ca.fmin, ca.fmax, ca.if_else)
         return ca.vertcat(*rows)
 
-    def rows(
-        self, tip: Sequence[Any], axis: Sequence[Any], sqrt: Any, least: Any, most: Any, where: Any
-    ) -> list[Any]:
+    def rows(self, tip: Sequence[Any], axis: Sequence[Any], sqrt: Any, least: Any, most: Any, where: Any) -> list[Any]:
         """Return the margin expressions, in the order of `limits`; the arguments are three components each."""
         m = self.machine
         robot, legs, joints = m.pentapod, m.legs, m.joints
@@ -89,12 +86,10 @@ class Margins:
             lengths.append(sqrt(dot(d, d)))
         half_stroke = (0.5 * (legs.max_length - legs.min_length)).tolist()
         rows = [
-            (length - low) / h
-            for length, low, h in zip(lengths, legs.min_length.tolist(), half_stroke, strict=True)
+            (length - low) / h for length, low, h in zip(lengths, legs.min_length.tolist(), half_stroke, strict=True)
         ]
         rows += [
-            (high - length) / h
-            for length, high, h in zip(lengths, legs.max_length.tolist(), half_stroke, strict=True)
+            (high - length) / h for length, high, h in zip(lengths, legs.max_length.tolist(), half_stroke, strict=True)
         ]
 
         # The singular surfaces: w = 0, and S = 0 as the position distance (kinematics notes, section 4).
@@ -219,7 +214,5 @@ def _limits(machine: Machine) -> tuple[Limit, ...]:
                 cone(float(np.cos(least)), scale, -1.0),
             )
         )
-    rows += [
-        Limit(f"legs {j + 1} and {k + 1} touch", "mm", length(CLEARANCE_COMFORTABLE_M)) for j, k in _PAIRS
-    ]
+    rows += [Limit(f"legs {j + 1} and {k + 1} touch", "mm", length(CLEARANCE_COMFORTABLE_M)) for j, k in _PAIRS]
     return tuple(rows)

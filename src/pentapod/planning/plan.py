@@ -59,16 +59,12 @@ def plan(
         guesses = first_guesses(task, machine, components, seed)
         best = search.refine(guesses[:REFINED])
     else:
-        fixed = [
-            Guess(placement.transform, c, _strict(task, machine, c, placement.transform)) for c in components
-        ]
+        fixed = [Guess(placement.transform, c, _strict(task, machine, c, placement.transform)) for c in components]
         best = search.fixed(max(fixed, key=lambda g: g.margin))
     margins, transform, coefficients, smallest = best
     if smallest < NEEDED_MARGIN:
         values = best_tilted_margins(task, margins, transform)
-        if (
-            values.min(axis=1) >= NEEDED_MARGIN
-        ).all():  # each waypoint alone would do, not all with one smooth field
+        if (values.min(axis=1) >= NEEDED_MARGIN).all():  # each waypoint alone would do, not all with one smooth field
             values = margins(*task.machine_poses(transform, search.axes(coefficients)))
         return refusal(values, margins, NEEDED_MARGIN, fixed=placement is not None, tilt=tilt)
     if tilt > 0.0:
@@ -112,9 +108,7 @@ class _Search:
             attempt.improve()
             attempts.append(attempt)
             best = max(a.best[3] for a in attempts)
-            self.progress(
-                "placement", (k + 1) / (len(guesses) + 1), f"component {guess.component}, margin {best:.3f}"
-            )
+            self.progress("placement", (k + 1) / (len(guesses) + 1), f"component {guess.component}, margin {best:.3f}")
         return max(attempts, key=lambda a: a.best[3]).finished()
 
     def fixed(self, guess: Guess) -> _Best:
@@ -162,9 +156,7 @@ class _Search:
         size = float(np.ptp(self.task.pivots, axis=0).max())
         for k in order:
             apart = (
-                np.linalg.norm(self.task.pivots[[*added]] - self.task.pivots[k], axis=1)
-                if added
-                else np.array([1.0])
+                np.linalg.norm(self.task.pivots[[*added]] - self.task.pivots[k], axis=1) if added else np.array([1.0])
             )
             if apart.min() > 0.04 * size:
                 added.append(int(k))

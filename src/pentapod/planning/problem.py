@@ -26,7 +26,7 @@ CONE_SHARE = 0.98
 """Share of the tilt cone used by the optimiser; the rest absorbs what happens between waypoints."""
 
 _TRANSLATION_STEP_M, _ROTATION_STEP = 0.4, 0.8
-_OPTIONS: dict[str, object] = {
+_OPTIONS: dict[str, Any] = {
     "print_time": False,
     "error_on_fail": False,
     "ipopt.print_level": 0,
@@ -56,9 +56,7 @@ class PlanningProblem:
     free: whether the placement may move.
     """
 
-    def __init__(
-        self, task: Task, margins: Margins, domain: FieldDomain, rows: Sequence[int], *, free: bool
-    ) -> None:
+    def __init__(self, task: Task, margins: Margins, domain: FieldDomain, rows: Sequence[int], *, free: bool) -> None:
         self._task, self._margins, self._domain, self._free = task, margins, domain, free
         self._cone = float(np.tan(task.tilt) * CONE_SHARE)
         self._tilts = task.tilt > 0.0
@@ -80,9 +78,7 @@ class PlanningProblem:
         tip = ca.mtimes(turn, pivot) + translation + step[:3] - self._task.pivot * turned
         margins = self._margins.symbolic(tip, turned)[list(rows)]
         used = square / self._cone**2 if self._tilts else ca.SX(0.0)
-        return ca.Function(
-            "point", [step, a, pivot, nominal, rotation, translation], [margins, used], {"cse": True}
-        )
+        return ca.Function("point", [step, a, pivot, nominal, rotation, translation], [margins, used], {"cse": True})
 
     def _solver(self, count: int, goal: Goal) -> Any:
         """Return the IPOPT solver for `count` waypoints, built once.
@@ -107,9 +103,7 @@ class PlanningProblem:
         unknowns, constraints, calm = [step, least], [ca.vec(margins - least)], ca.MX(0.0)
         if self._tilts:
             bends = ca.mtimes(coefficients, ca.DM(self._domain.roughness().T))
-            calm = (ca.sumsqr(bends) + 1e-3 * ca.sumsqr(coefficients)) / (size * self._cone**2) + ca.sum2(
-                used
-            ) / count
+            calm = (ca.sumsqr(bends) + 1e-3 * ca.sumsqr(coefficients)) / (size * self._cone**2) + ca.sum2(used) / count
             unknowns += [ca.vec(coefficients), ca.vec(leans)]
             constraints = [ca.vec(leans - ca.mtimes(coefficients, basis)), *constraints, 1.0 - used.T]
         solver = ca.nlpsol(
@@ -126,9 +120,7 @@ class PlanningProblem:
         self._solvers[count, goal] = solver
         return solver
 
-    def solve(
-        self, rows: Ints, placement: RigidTransform, coefficients: Floats, goal: Goal, margin: float
-    ) -> Solution:
+    def solve(self, rows: Ints, placement: RigidTransform, coefficients: Floats, goal: Goal, margin: float) -> Solution:
         """Solve for the waypoints `rows`, starting from a placement and coefficients (size, 2).
 
         goal "margin": `margin` is the first guess of the smallest margin. goal "calm": it is the margin to keep.
@@ -145,9 +137,7 @@ class PlanningProblem:
         ]
         leans = [coefficients.ravel(), (basis @ coefficients).ravel()] if self._tilts else []
         start = np.concatenate([np.zeros(6), [margin], *leans])
-        reach = np.concatenate([np.full(3, _TRANSLATION_STEP_M), np.full(3, _ROTATION_STEP)]) * float(
-            self._free
-        )
+        reach = np.concatenate([np.full(3, _TRANSLATION_STEP_M), np.full(3, _ROTATION_STEP)]) * float(self._free)
         tilt = np.full(len(start) - 7, 3.0 * self._cone)
         low, high = (-10.0, 5.0) if goal == "margin" else (margin, margin)
         solver = self._solver(count, goal)

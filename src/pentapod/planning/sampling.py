@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.arrays import Floats, Ints
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
@@ -35,7 +35,7 @@ def first_guesses(
 ) -> list[Guess]:
     """Return the best few placements for each component, best first; deterministic for a seed.
 
-    Each placement is judged on a dozen representatives with their nominal axes, the best ones again with a cone of tilts.
+    Each placement is judged on a dozen representatives with their nominal axes, the best again with a cone of tilts.
     """
     rng = np.random.default_rng(seed)
     rows = task.representatives(12)
@@ -44,24 +44,18 @@ def first_guesses(
     guesses: list[Guess] = []
     for component in components:
         margins = Margins.of(machine, component)
-        rotations = _rotations(mean_axis, -float(component.w), samples, rng)
-        places = _places(machine, samples, rng)
-        for attempt in range(3):  # at random, then twice closer around the best
-            translations = places - rotations @ centre
-            score = _score(task, margins, rotations, translations, task.nominal[rows], rows)
-            best = np.argsort(-score, kind="stable")[: KEPT * 8]
-            if attempt < 2:
-                repeat = samples // 3 // len(best)
-                spread = 0.08 / (1 + 2 * attempt)
-                rotations = np.concatenate(
-                    [rotations[best], _turned(rotations[best].repeat(repeat, axis=0), spread, rng)]
-                )
-                near = places[best].repeat(repeat, axis=0)
-                places = np.concatenate([places[best], near + rng.normal(scale=spread, size=near.shape)])
+        rotations, places = _rotations(mean_axis, -float(component.w), samples, rng), _places(machine, samples, rng)
+        for spread in (0.08, 0.03):  # twice closer around the best
+            best = _best(_score(task, margins, rotations, places - rotations @ centre, rows))
+            repeat = samples // 3 // len(best)
+            turned, near = rotations[best].repeat(repeat, axis=0), places[best].repeat(repeat, axis=0)
+            rotations = np.concatenate([rotations[best], _turned(turned, spread, rng)])
+            places = np.concatenate([places[best], near + rng.normal(scale=spread, size=near.shape)])
+        translations = places - rotations @ centre
+        score = _score(task, margins, rotations, translations, rows)
+        best = _best(score)
         tilted = [
-            _tilted_score(task, margins, rotations[k], translations[k], rows)
-            if task.tilt > 0.0
-            else float(score[k])
+            _tilted_score(task, margins, rotations[k], translations[k], rows) if task.tilt > 0.0 else float(score[k])
             for k in best
         ]
         order = np.argsort([-t for t in tilted], kind="stable")[:KEPT]
@@ -100,13 +94,17 @@ def best_tilted_margins(task: Task, margins: Margins, placement: RigidTransform,
     return out
 
 
-def _score(task: Task, margins: Margins, r: Floats, t: Floats, axes: Floats, rows: Floats) -> Floats:
-    turned = np.einsum("sij,nj->sni", r, axes)
+def _best(score: Floats) -> Ints:
+    return np.argsort(-score, kind="stable")[: KEPT * 8]
+
+
+def _score(task: Task, margins: Margins, r: Floats, t: Floats, rows: Ints) -> Floats:
+    turned = np.einsum("sij,nj->sni", r, task.nominal[rows])
     tips = np.einsum("sij,nj->sni", r, task.pivots[rows]) + t[:, None, :] - task.pivot * turned
     return margins(tips, turned).min(axis=(-1, -2))
 
 
-def _tilted_score(task: Task, margins: Margins, r: Floats, t: Floats, rows: Floats) -> float:
+def _tilted_score(task: Task, margins: Margins, r: Floats, t: Floats, rows: Ints) -> float:
     few = Task(task.pivots[rows], task.nominal[rows], task.pivot, task.tilt)
     placement = RigidTransform(_orthonormal(r), t)
     return float(best_tilted_margins(few, margins, placement).min())

@@ -16,7 +16,7 @@ AXIS_LEVER_M = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Pivots and nominal axes (N, 3) in the workpiece frame; pivot: metres from the tip to the pivot; tilt in radians."""
+    """Pivots and nominal axes (N, 3), workpiece frame; pivot: metres from tip to pivot; tilt: radians of the cone."""
 
     pivots: Floats
     nominal: Floats

@@ -39,9 +39,7 @@ class FieldDomain:
         centred = pivots - pivots.mean(axis=0)
         # Directions of largest spread; the sign is fixed so that the same part gives the same field.
         _, _, rows = np.linalg.svd(centred.T @ centred)
-        directions = (
-            rows[:2] * np.where(rows[:2][range(2), np.abs(rows[:2]).argmax(axis=1)] < 0.0, -1.0, 1.0)[:, None]
-        )
+        directions = rows[:2] * np.where(rows[:2][range(2), np.abs(rows[:2]).argmax(axis=1)] < 0.0, -1.0, 1.0)[:, None]
         along = pivots @ directions.T
         low, high = along.min(axis=0), along.max(axis=0)
         origin = pivots.mean(axis=0)
@@ -88,4 +86,5 @@ class TiltField:
 def lean(nominal: Floats, b: Floats) -> Floats:
     """Return unit nominal axes (..., 3) tilted by b (..., 3): normalised n + b − (b·n) n."""
     across = b - (b * nominal).sum(axis=-1, keepdims=True) * nominal
-    return (nominal + across) / np.sqrt(1.0 + (across * across).sum(axis=-1, keepdims=True))
+    length = np.sqrt(1.0 + (across * across).sum(axis=-1, keepdims=True))
+    return np.asarray((nominal + across) / length, dtype=np.float64)

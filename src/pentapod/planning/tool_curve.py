@@ -25,8 +25,8 @@ class ToolCurve:
     """Tip and axis as C2 functions of s, the tip's arc length in metres.
 
     curve: pivot and un-normalised axis (6 columns) over the spline's own parameter u; parameter: u over s.
-    pivot: metres from the tip along the axis to the pivot. The arc length includes REORIENTATION_LEVER_M of path for each
-    radian that the axis turns, so the tip is never faster than ds/dt.
+    pivot: metres from the tip along the axis to the pivot. The arc length includes REORIENTATION_LEVER_M of path
+    for each radian that the axis turns, so the tip is never faster than ds/dt.
     """
 
     curve: PPoly
@@ -78,9 +78,9 @@ def _tip_and_axis(curve: PPoly, u: Floats, pivot: float, order: int) -> tuple[li
     if order >= 1:
         norm1 = _dot(axis[0], raw[1])
         axis.append((raw[1] - axis[0] * norm1) / norm)
-    if order >= 2:
-        norm2 = (_dot(raw[1], raw[1]) + _dot(raw[0], raw[2]) - norm1 * norm1) / norm  # pyright: ignore[reportPossiblyUnboundVariable]
-        axis.append((raw[2] - 2.0 * norm1 * axis[1] - norm2 * axis[0]) / norm)  # pyright: ignore[reportPossiblyUnboundVariable]
+        if order >= 2:
+            norm2 = (_dot(raw[1], raw[1]) + _dot(raw[0], raw[2]) - norm1 * norm1) / norm
+            axis.append((raw[2] - 2.0 * norm1 * axis[1] - norm2 * axis[0]) / norm)
     return [v[:, :3] - pivot * a for v, a in zip(values, axis, strict=True)], axis
 
 
@@ -103,6 +103,7 @@ def _parameter_over_arc_length(curve: PPoly, pivot: float) -> PPoly:
             "the tool stands still somewhere on the path",
             expected="a motion of tip or axis between waypoints",
         )
+    error = np.ones(1)
     for _ in range(12):
         widths = np.diff(nodes)
         at = nodes[:-1, None] + 0.5 * widths[:, None] * (1.0 + _GAUSS_X)
@@ -112,14 +113,12 @@ def _parameter_over_arc_length(curve: PPoly, pivot: float) -> PPoly:
         u_of_s = _quintic(s, nodes, 1.0 / speed, -change / speed**3)
         between = (s[:-1, None] + np.diff(s)[:, None] * np.array([0.25, 0.5, 0.75])).ravel()
         error = (
-            np.abs(u_of_s(between, 1) * _speed(curve, u_of_s(between), pivot, 0)[0] - 1.0)
-            .reshape(-1, 3)
-            .max(axis=1)
+            np.abs(u_of_s(between, 1) * _speed(curve, u_of_s(between), pivot, 0)[0] - 1.0).reshape(-1, 3).max(axis=1)
         )
         if error.max() <= ARC_LENGTH_ERROR:
-            break
+            return u_of_s
         nodes = np.sort(np.concatenate([nodes, 0.5 * (nodes[:-1] + nodes[1:])[error > ARC_LENGTH_ERROR]]))
-    return u_of_s  # pyright: ignore[reportPossiblyUnboundVariable]
+    raise ToolpathError("the path bends too sharply to measure its length", value=float(error.max()))
 
 
 def _quintic(x: Floats, y: Floats, y1: Floats, y2: Floats) -> PPoly:
@@ -133,9 +132,7 @@ def _quintic(x: Floats, y: Floats, y1: Floats, y2: Floats) -> PPoly:
     a3 = 10.0 * r0 - 4.0 * r1 + 0.5 * r2
     a4 = -15.0 * r0 + 7.0 * r1 - r2
     a5 = 6.0 * r0 - 3.0 * r1 + 0.5 * r2
-    return PPoly(
-        np.stack([a / h**k for k, a in zip((5, 4, 3, 2, 1, 0), (a5, a4, a3, a2, a1, a0), strict=True)]), x
-    )
+    return PPoly(np.stack([a / h**k for k, a in zip((5, 4, 3, 2, 1, 0), (a5, a4, a3, a2, a1, a0), strict=True)]), x)
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
