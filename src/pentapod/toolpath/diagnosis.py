@@ -36,15 +36,11 @@ class MeshDiagnosis:
         """What is still wrong after the repairs, with the remedy; empty for a sound surface."""
         found: list[str] = []
         if not self.consistent:
-            found.append(
-                "facets are wound inconsistently: some normals point the wrong way; load with repair = true"
-            )
+            found.append("facets are wound inconsistently: some normals point the wrong way; load with repair = true")
         if self.inverted:
             found.append("the closed surface is inside out: normals point inwards; load with repair = true")
         if self.non_manifold_edges:
-            found.append(
-                f"{_count(self.non_manifold_edges, 'edge')} with more than two facets: passes end there"
-            )
+            found.append(f"{_count(self.non_manifold_edges, 'edge')} with more than two facets: passes end there")
         return tuple(found)
 
     def __str__(self) -> str:

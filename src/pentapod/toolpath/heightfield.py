@@ -15,7 +15,7 @@ _MOST_ENTRIES = 20_000_000
 
 
 class HeightField:
-    """The topmost facet of a mesh over any point of the plane across `view` (3,), a direction towards the tool."""
+    """The topmost facet over any point of the plane across `view` (3,), a direction towards the tool."""
 
     def __init__(self, mesh: Mesh, view: Floats) -> None:
         self.mesh, self.view = mesh, normalised(view, "view")
@@ -56,8 +56,8 @@ class HeightField:
     def topmost(self, points: Floats, margin: float = 1e-9) -> tuple[Floats, Floats, Floats]:
         """Return the surface points (N, 3) on top over points (N, 3), normals (N, 3) there, and heights (N,).
 
-        Heights are metres along the view from the origin; −inf, with NaN points and normals, where nothing lies
-        below or above. margin: how far outside a facet (in barycentric coordinates) still counts as on
+        Heights are metres along the view from the origin; −inf, with NaN points and normals, where nothing
+        lies below or above. margin: how far outside a facet (in barycentric coordinates) still counts as on
         it; negative: only its interior.
         """
         local = points @ self._frame.T

@@ -18,15 +18,16 @@ from pentapod.geometry.polyline import arc_length
 from pentapod.toolpath.toolpath import Segment, SegmentKind
 
 RAPID_SPACING_M = 5e-3
+RAPID_AXIS_STEP = np.radians(3.0)
 _ROUNDING_M = 5e-3
 _ARC_STEP = np.radians(6.0)
 
 
 @dataclass(frozen=True)
 class LinkStyle:
-    """view (3,): unit, towards the tool. level: metres along it at which rapids cross. approach, spacing: metres.
+    """How links are made. view (3,): unit, towards the tool. level: metres along it at which rapids cross.
 
-    feed: of links on feed, m/s.
+    approach, spacing: metres. feed: of links on feed, m/s.
     """
 
     view: Floats
@@ -50,7 +51,11 @@ def rapid(start: Floats, start_axis: Floats, end: Floats, end_axis: Floats, styl
     """Return the rapid between two poses, off the surface by `approach`, over the clearance level."""
     up = _rise(start, start_axis, style)
     down = _rise(end, end_axis, style)[::-1]
-    tips = spaced(rounded(np.vstack([up, down])), RAPID_SPACING_M)
+    way = rounded(np.vstack([up, down]))
+    # Midway the axis turns 15/8 times as fast as on average.
+    turn = 1.875 * float(angle_between(start_axis, end_axis))
+    length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+    tips = spaced(way, min(RAPID_SPACING_M, length * RAPID_AXIS_STEP / max(turn, RAPID_AXIS_STEP)))
     return Segment(SegmentKind.RAPID, tips, _turning(start_axis, end_axis, tips), np.inf)
 
 
@@ -103,6 +108,9 @@ def rounded(corners: Floats) -> Floats:
     for before, corner, after in zip(corners, corners[1:], corners[2:], strict=False):
         turn = float(angle_between(corner - before, after - corner)) if len(corners) > 2 else 0.0
         if turn < 1e-6:
+            continue
+        if turn > np.pi - 1e-3:  # straight back: an arc would run through the same points twice
+            parts.append(corner[None])
             continue
         back, ahead = before - corner, after - corner
         reach = min(_ROUNDING_M, 0.45 * float(np.linalg.norm(back)), 0.45 * float(np.linalg.norm(ahead)))

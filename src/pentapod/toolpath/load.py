@@ -33,10 +33,10 @@ def load_mesh(
 ) -> Mesh:
     """Return the mesh of an STL, PLY or OBJ file, in metres; the suffix names the format.
 
-    unit: of the file's numbers, one of `UNITS`; compulsory, as no format says it. scale: factor after the unit.
-    repair: also wind facets alike (see `Mesh.of`). crease_angle: radians.
-    Raises MeshError, always in one line: no such file, a directory, empty, truncated, not a mesh, no
-    facets, zero area, coordinates that are not finite, unit missing (with the extents in each) or unknown.
+    unit: of the file's numbers, one of `UNITS`; compulsory, as no format says it. scale: factor after the
+    unit. repair: also wind facets alike (see `Mesh.of`). crease_angle: radians. Raises MeshError, always in
+    one line: no such file, a directory, empty, truncated, not a mesh, no facets, zero area, coordinates
+    that are not finite, unit missing (with the extents in each) or unknown.
     """
     path = Path(path)
     if unit is not None and unit not in UNITS:
@@ -99,9 +99,7 @@ def _through_trimesh(path: Path, suffix: str, data: bytes) -> tuple[Floats, Ints
     except Exception as error:  # what a reader raises on a broken file is not foreseeable
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         name = suffix[1:].upper()
-        raise MeshError(
-            f"cannot be read as {name}: {reason}", file=path, remedy="the file may be truncated"
-        ) from error
+        raise MeshError(f"cannot be read as {name}: {reason}", file=path, remedy="the file may be truncated") from error
     if suffix == ".ply":
         _check_ply_counts(path, data, len(vertices), len(faces))
     return vertices, faces.astype(np.intp)
@@ -114,7 +112,7 @@ def _check_ply_counts(path: Path, data: bytes, vertices: int, faces: int) -> Non
     for name, found in ((b"vertex", vertices), (b"face", faces)):
         if announced.get(name, 0) > found:
             raise MeshError(
-                f"truncated: the header announces {announced[name]:,} of {name.decode()}, the file holds {found:,}",
+                f"truncated: the header announces {announced[name]:,} {name.decode()}, the file holds {found:,}",
                 file=path,
                 remedy="export the mesh again",
             )

@@ -23,8 +23,8 @@ CREASE_ANGLE = np.radians(40.0)
 class Mesh:
     """A surface of triangles. Make one with `Mesh.of` or `load_mesh`; the constructor takes what is sound.
 
-    vertices (V, 3): metres, workpiece frame. faces (F, 3): vertex indices, counterclockwise seen from outside.
-    diagnosis: what was found and mended. crease_angle: radians, see `normals`.
+    vertices (V, 3): metres, workpiece frame. faces (F, 3): vertex indices, counterclockwise seen from
+    outside. diagnosis: what was found and mended. crease_angle: radians, see `normals`.
     """
 
     vertices: Floats
@@ -71,14 +71,13 @@ class Mesh:
         if repair:
             facets, said = mending.wind(points, facets)
             repairs.extend(said)
-        if len(repairs):
+        if repairs:
             points, facets = mending.weld(points, facets)
         topology = Topology(facets, len(points))
         mended = (int(duplicated.sum()), int(degenerate.sum()))
-        mesh = cls(points, facets, _diagnose(points, topology, source, mended, repairs, notes), crease_angle)
-        mesh.__dict__["topology"] = (
-            topology  # fills the cached property: sorting a million edges takes a second
-        )
+        diagnosis = _diagnose(points, topology, source=source, mended=mended, repairs=repairs, notes=notes)
+        mesh = cls(points, facets, diagnosis, crease_angle)
+        mesh.__dict__["topology"] = topology  # fills the cached property: sorting a million edges takes a second
         return mesh
 
     @cached_property
@@ -94,13 +93,11 @@ class Mesh:
     @cached_property
     def facet_areas(self) -> Floats:
         """Areas (F,) of the facets, square metres."""
-        return frozen(
-            0.5 * np.linalg.norm(normals.facet_cross(self.vertices, self.faces), axis=1), "facet_areas"
-        )
+        return frozen(0.5 * np.linalg.norm(normals.facet_cross(self.vertices, self.faces), axis=1), "facet_areas")
 
     @cached_property
     def vertex_normals(self) -> Floats:
-        """Unit normals (V, 3), smooth over all facets at a vertex; for display. Toolpaths use `corner_normals`."""
+        """Unit normals (V, 3), smooth over all facets at a vertex: for display, not for toolpaths."""
         return frozen(normals.vertex_normals(self.vertices, self.faces, self.facet_normals), "vertex_normals")
 
     @cached_property
@@ -131,8 +128,20 @@ class Mesh:
             notes=self.diagnosis.notes,
         )
 
+    def body(self, number: int) -> Mesh:
+        """Return one of the bodies that `diagnosis.bodies` counts. Raises MeshError for a number beyond them."""
+        count, body_of_facet = self.topology.bodies
+        if not 0 <= number < count:
+            raise MeshError("no such body", value=number, expected=f"0 to {count - 1}")
+        return Mesh.of(
+            self.vertices,
+            self.faces[body_of_facet == number],
+            source=f"{self.diagnosis.source}, body {number}",
+            crease_angle=self.crease_angle,
+        )
+
     def flipped(self) -> Mesh:
-        """Return the mesh with its other side out: for an open sheet whose winding faces away from the tool."""
+        """Return the mesh with its other side out: for an open sheet that faces away from the tool."""
         return Mesh.of(
             self.vertices,
             self.faces[:, ::-1],
@@ -158,10 +167,11 @@ def _checked(vertices: ArrayLike, faces: ArrayLike, source: str) -> tuple[Floats
             value=int(facets.max() if facets.max() >= len(points) else facets.min()),
             remedy="the file may be truncated",
         )
-    bad = ~np.isfinite(points).all(axis=1)
-    if bad.any() and (wrong := bad[facets].any(axis=1)).any():
+    finite = np.isfinite(points).all(axis=1)
+    wrong = np.flatnonzero(~np.take(finite, facets).all(axis=1))
+    if len(wrong):
         raise MeshError(
-            f"{int(wrong.sum()):,} facets have coordinates that are not finite, the first is facet {int(wrong.argmax())}",
+            f"{len(wrong):,} facets have coordinates that are not finite, the first is facet {int(wrong[0])}",
             file=source,
             remedy="export the mesh again",
         )
@@ -171,6 +181,7 @@ def _checked(vertices: ArrayLike, faces: ArrayLike, source: str) -> tuple[Floats
 def _diagnose(
     points: Floats,
     topology: Topology,
+    *,
     source: str,
     mended: tuple[int, int],
     repairs: list[str],

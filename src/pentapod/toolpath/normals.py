@@ -35,14 +35,14 @@ def corner_angles(vertices: Floats, faces: Ints) -> Floats:
 
 
 def smooth_pairs(topology: Topology, facet_normals: Floats, crease_angle: float) -> Bools:
-    """Return whether (M,) the facets of each pair of `topology.side_pairs` join smoothly: alike wound, no crease."""
+    """Return whether (M,) the facets of each of `topology.side_pairs` join without crease, wound alike."""
     a, b = (side // 3 for side in topology.side_pairs)
     cosine = (facet_normals[a] * facet_normals[b]).sum(axis=1)
     return topology.pair_agrees & (cosine >= np.cos(crease_angle))
 
 
 def corner_normals(vertices: Floats, topology: Topology, facet_normals: Floats, smooth: Bools) -> Floats:
-    """Return unit normals (F, 3, 3) at the facets' corners, smooth across the pairs marked in `smooth` (M,)."""
+    """Return unit normals (F, 3, 3) at the facets' corners, smooth across the pairs marked in `smooth`."""
     faces, count = topology.faces, 3 * len(topology.faces)
     a, b = (side[smooth] for side in topology.side_pairs)
     # The pair's facets run along the edge in opposite senses: one's first corner is the other's second.
@@ -54,9 +54,7 @@ def corner_normals(vertices: Floats, topology: Topology, facet_normals: Floats, 
 def vertex_normals(vertices: Floats, faces: Ints, facet_normals: Floats) -> Floats:
     """Return unit normals (V, 3) at the vertices, averaged over all facets there, creases or not."""
     normals = np.zeros_like(vertices)
-    normals[faces.ravel()] = _grouped_means(
-        vertices, faces, facet_normals, faces.ravel(), len(vertices)
-    ).reshape(-1, 3)
+    normals[faces.ravel()] = _grouped_means(vertices, faces, facet_normals, faces.ravel(), len(vertices)).reshape(-1, 3)
     return normals
 
 
@@ -64,9 +62,9 @@ def _grouped_means(vertices: Floats, faces: Ints, normals: Floats, group: Ints, 
     """Return the angle-weighted mean normal (F, 3, 3) of each corner's group (3F,), of unit length."""
     weights = corner_angles(vertices, faces).ravel()
     facet = np.repeat(np.arange(len(faces)), 3)
-    total = np.stack(
-        [np.bincount(group, weights=weights * normals[facet, k], minlength=number) for k in range(3)], axis=1
-    )
+    total = np.zeros((number, 3))
+    for k in range(3):
+        total[:, k] = np.bincount(group, weights=weights * normals[facet, k], minlength=number)
     # Where the normals around a vertex cancel, the facet's own is the only honest answer.
     length = np.linalg.norm(total, axis=1)
     scale = np.bincount(group, weights=weights, minlength=number)

@@ -24,14 +24,14 @@ class Pattern(StrEnum):
 class RasterOptions:
     """How a surface is covered by parallel passes. Lengths in metres, angles in radians, feeds in m/s.
 
-    stepover: distance between the slicing planes; or scallop: height of the ridge a ball leaves (one of the two).
-    direction: of the passes, about the view from its x axis towards its y axis; for the view +z these are x and
-    y, for others they are carried along (`geometry.tangent_frame`). view (3,): towards the tool, within the slicing
-    planes; the region's direction when None. region: what is machined. chordal: how far a chord may leave the
-    mesh's slice. spacing: most between waypoints. axis_step: most turning of the axis between waypoints. closest:
-    points nearer than this are one. shortest: shorter passes are dropped, and reported. clearance: of rapids above
-    the part. approach: length of the last stretch along the axis. feed, link_feed: of the tip.
-    Raises ToolpathError for values that make no sense.
+    stepover: distance between the slicing planes; or scallop: height of the ridge a ball leaves (one of the
+    two). direction: of the passes, about the view from its x axis towards its y axis; for the view +z these
+    are x and y, for others they are carried along (`geometry.tangent_frame`). view (3,): towards the tool,
+    within the slicing planes; the region's direction when None. region: what is machined. chordal: how far
+    a chord may leave the mesh's slice. spacing: most between waypoints. axis_step: most turning of the axis
+    between waypoints. closest: points nearer than this are one. shortest: shorter passes are dropped, and
+    reported. clearance: of rapids above the part. approach: length of the last stretch along the axis.
+    feed, link_feed: of the tip. Raises ToolpathError for values that make no sense.
     """
 
     stepover: float | None = None
@@ -63,9 +63,7 @@ class RasterOptions:
         ):
             _positive(name, getattr(self, name))
         if (self.stepover is None) == (self.scallop is None):
-            raise ToolpathError(
-                "give the distance between passes once", key="stepover", expected="stepover or scallop"
-            )
+            raise ToolpathError("give the distance between passes once", key="stepover", expected="stepover or scallop")
         if self.stepover is not None:
             _positive("stepover", self.stepover)
         if self.scallop is not None:
@@ -75,9 +73,7 @@ class RasterOptions:
         if not np.isfinite(self.direction):
             raise ToolpathError("must be finite", key="direction", value=self.direction)
         if self.pattern not in tuple(Pattern):
-            raise ToolpathError(
-                "unknown pattern", key="pattern", value=self.pattern, expected=" or ".join(Pattern)
-            )
+            raise ToolpathError("unknown pattern", key="pattern", value=self.pattern, expected=" or ".join(Pattern))
         set_frozen(self, pattern=Pattern(self.pattern))
         view = self.region.direction if self.view is None else self.view
         if not np.linalg.norm(frozen(view, "view", (3,))) > 0.0:

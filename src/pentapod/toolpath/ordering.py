@@ -13,7 +13,7 @@ from pentapod.toolpath.passes import Passes
 
 @dataclass(frozen=True)
 class Turn:
-    """One pass in the order of work: its index, whether it is cut backwards, whether it lies next to the last."""
+    """One pass in the order of work: its index, whether it is cut backwards, whether it is near the last."""
 
     index: int
     backwards: bool
@@ -34,15 +34,13 @@ def zigzag(passes: Passes, reach: float) -> list[Turn]:
     strips on either side of a hole are each finished in one go. The loop is over passes, not waypoints.
     """
     ends = np.stack([passes.points[passes.starts[:-1]], passes.points[passes.starts[1:] - 1]], axis=1)
-    waiting = {int(plane): list(np.flatnonzero(passes.planes == plane)) for plane in np.unique(passes.planes)}
+    waiting = {int(plane): np.flatnonzero(passes.planes == plane).tolist() for plane in np.unique(passes.planes)}
     lowest = deque(sorted(waiting))
     turns: list[Turn] = []
     here = ends[0, 0] if len(ends) else np.zeros(3)
     plane = lowest[0] if lowest else 0
     while lowest:
-        index, backwards, distance = (
-            _nearest(ends, waiting.get(plane + 1, []), here) if turns else (-1, False, np.inf)
-        )
+        index, backwards, distance = _nearest(ends, waiting.get(plane + 1, []), here) if turns else (-1, False, np.inf)
         near = distance <= reach
         if not near:
             index, backwards, _ = _nearest(ends, waiting[lowest[0]], here)
@@ -56,7 +54,7 @@ def zigzag(passes: Passes, reach: float) -> list[Turn]:
 
 
 def _nearest(ends: Floats, among: list[int], here: Floats) -> tuple[int, bool, float]:
-    """Return the pass among some whose end is nearest to a point, whether it is its far end, and the distance."""
+    """Return the pass among some with the end nearest to a point, whether the far end, and the distance."""
     if not among:
         return -1, False, np.inf
     distance = np.linalg.norm(ends[among] - here, axis=2)

@@ -14,8 +14,9 @@ from pentapod.arrays import Bools, Floats, Ints, set_frozen
 class Passes:
     """P polylines: pass k holds the points starts[k] to starts[k + 1] − 1, at least two.
 
-    points (N, 3): metres, on the surface. normals (N, 3): such that linear interpolation between points gives the
-    surface's normal up to its length (not unit). starts (P + 1,). planes (P,): the slicing plane of each.
+    points (N, 3): metres, on the surface. normals (N, 3): such that linear interpolation between points
+    gives the surface's normal up to its length (not unit). starts (P + 1,). planes (P,): the slicing plane
+    of each.
     """
 
     points: Floats
@@ -50,7 +51,8 @@ class Passes:
     @cached_property
     def lengths(self) -> Floats:
         """Length (P,) of each pass, metres."""
-        return np.bincount(self.pass_of_point[:-1], weights=self.steps, minlength=len(self))
+        sums = np.concatenate([[0.0], np.cumsum(self.steps)])
+        return sums[self.starts[1:] - 1] - sums[self.starts[:-1]] if len(self) else np.zeros(0)
 
     def where(self, keep: Bools) -> Passes:
         """Return the passes (P,) marked in `keep`."""

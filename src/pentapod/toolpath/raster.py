@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import cast
 
@@ -19,8 +20,8 @@ from pentapod.toolpath.passes import Passes
 from pentapod.toolpath.resampling import resample
 from pentapod.toolpath.slicing import Planes, crossings, slice_mesh
 from pentapod.toolpath.staydown import surface_links
-from pentapod.toolpath.tools import BallCutter, Tool
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+from pentapod.toolpath.tools import BallCutter, Tool
 
 MOST_CROSSINGS = 30_000_000
 _REACH_STEPOVERS = 3.0
@@ -33,9 +34,10 @@ class RasterReport:
     """What a raster came to. Lengths in metres.
 
     stepover: between the planes, after fitting a whole number into the region. stay_downs: links on the
-    surface; retracts: passes reached by a rapid, the first too. dropped: passes shorter than asked for, dropped_length
-    their sum. hidden: waypoints left out because the part itself lies above them. tight: waypoints where the
-    surface is hollow along the pass with a radius smaller than the ball's: the ball cannot touch there without gouging.
+    surface; retracts: passes reached by a rapid, the first too. dropped: passes shorter than asked for,
+    dropped_length their sum. hidden: waypoints left out because the part itself lies above them. tight:
+    waypoints where the surface is hollow along the pass with a radius below the ball's or the stand-off:
+    a ball gouges there, a beam's tip turns back.
     """
 
     passes: int
@@ -55,15 +57,11 @@ class RasterReport:
             f"{self.waypoints:,} waypoints; {self.stay_downs:,} links on the surface, {self.retracts:,} by rapid"
         )
         if self.dropped:
-            text += (
-                f"\n  note: {self.dropped:,} short passes dropped, {1e3 * self.dropped_length:.3g} mm in all"
-            )
+            text += f"\n  note: {self.dropped:,} short passes dropped, {1e3 * self.dropped_length:.3g} mm in all"
         if self.hidden:
             text += f"\n  note: {self.hidden:,} waypoints left out, the part lies above them"
         if self.tight:
-            text += (
-                f"\n  problem: at {self.tight:,} waypoints the surface is hollower than the ball: it gouges"
-            )
+            text += f"\n  problem: at {self.tight:,} waypoints the surface is hollower than the ball or the stand-off"
         return text
 
 
@@ -75,13 +73,14 @@ def raster(mesh: Mesh, tool: Tool, options: RasterOptions) -> Toolpath:
 def raster_with_report(mesh: Mesh, tool: Tool, options: RasterOptions) -> tuple[Toolpath, RasterReport]:
     """Return a toolpath that covers the region of a mesh by parallel passes, and what it came to.
 
-    Nominal axes are the surface's smooth normals. The motion begins and ends at the clearance level.
-    The first and last pass lie half a stepover inside the region. Raises ToolpathError where nothing is left to machine, the
-    scallop does not suit the tool, or the passes are so dense that there would be no end to it.
+    Nominal axes are the surface's smooth normals. The motion begins and ends at the clearance level. The
+    first and last pass lie half a stepover inside the region. Raises ToolpathError where nothing is left to
+    machine, the scallop does not suit the tool, or the passes are so dense that there would be no end to
+    it.
     """
     view = cast(Floats, options.view)
     x, y = tangent_frame(view)
-    along = np.cos(options.direction) * x + np.sin(options.direction) * y
+    along = math.cos(options.direction) * x + math.sin(options.direction) * y
     across = np.cross(view, along)
     planes = _planes(mesh, tool, options, along, across)
     field = HeightField(mesh, view)
@@ -105,7 +104,7 @@ def raster_with_report(mesh: Mesh, tool: Tool, options: RasterOptions) -> tuple[
         turns = one_way(passes, along)
     else:
         turns = zigzag(passes, _REACH_STEPOVERS * planes.step)
-    toolpath, stay_downs = _joined(mesh, tool, options, passes, turns, field, planes.step)
+    toolpath, stay_downs = _joined(mesh, tool, options, passes=passes, turns=turns, field=field, stepover=planes.step)
     report = RasterReport(
         passes=len(passes),
         waypoints=len(toolpath),
@@ -124,8 +123,9 @@ def raster_with_report(mesh: Mesh, tool: Tool, options: RasterOptions) -> tuple[
 def stepover_for(scallop: float, radius: float, slope: float) -> float:
     """Return the plane distance, metres, at which a ball of `radius` leaves ridges no higher than `scallop`.
 
-    On a plane inclined by `slope` (radians) across the passes: 2 √(2 r h − h²) along the surface,
-    times cos(slope). Curvature is not taken into account: on a dome of radius R ridges are higher by about (1 + r / R).
+    On a plane inclined by `slope` (radians) across the passes: 2 √(2 r h − h²) along the surface, times
+    cos(slope). Curvature is not taken into account: on a dome of radius R ridges are higher by about (1 + r
+    / R).
     """
     return 2.0 * float(np.sqrt(scallop * (2.0 * radius - scallop)) * np.cos(min(slope, _STEEPEST_SCALLOP)))
 
@@ -161,9 +161,7 @@ def _stepover(mesh: Mesh, tool: Tool, options: RasterOptions, across: Floats) ->
         return options.stepover
     scallop = cast(float, options.scallop)
     if not isinstance(tool, BallCutter):
-        raise ToolpathError(
-            "only a ball leaves a scallop", key="scallop", value=scallop, remedy="give the stepover"
-        )
+        raise ToolpathError("only a ball leaves a scallop", key="scallop", value=scallop, remedy="give the stepover")
     if scallop >= tool.radius:
         raise ToolpathError(
             "the scallop must be lower than the ball's radius",
@@ -181,6 +179,7 @@ def _joined(
     mesh: Mesh,
     tool: Tool,
     options: RasterOptions,
+    *,
     passes: Passes,
     turns: list[Turn],
     field: HeightField,
@@ -209,10 +208,8 @@ def _joined(
         )
     )
     view = cast(Floats, options.view)
-    top = max(
-        float((mesh.vertices @ view).max()) + max(-tool.pivot, 0.0),
-        max(float((t @ view).max()) for t in tips),
-    )
+    highest_tip = max(float((t @ view).max()) for t in tips)
+    top = max(float((mesh.vertices @ view).max()) + max(-tool.pivot, 0.0), highest_tip)
     # A rapid's knee is two approaches off the surface; no knee may reach above the level.
     level = top + max(options.clearance, 2.0 * options.approach)
     style = links.LinkStyle(view, level, options.approach, options.spacing, options.link_feed)
@@ -240,24 +237,24 @@ def _joined(
 
 
 def _tight(passes: Passes, tool: Tool) -> int:
-    """Return how many steps of the passes run through a hollow narrower than the ball."""
-    if not isinstance(tool, BallCutter):
-        return 0
+    """Return how many steps of the passes run through a hollow narrower than the ball or the stand-off."""
     closing = -(np.diff(passes.points, axis=0) * np.diff(passes.normals, axis=0)).sum(axis=1)
-    return int((passes.within & (closing * tool.radius > passes.steps**2)).sum())
+    return int((passes.within & (closing * abs(tool.pivot) > passes.steps**2)).sum())
 
 
 def _nothing_left(mesh: Mesh, options: RasterOptions, dropped: int) -> ToolpathError:
     """Return the error that says why no pass is left, as far as it can be told."""
-    away = float(
-        mesh.facet_areas[mesh.facet_normals @ options.region.direction < 0.0].sum() / mesh.facet_areas.sum()
-    )
+    away = float(mesh.facet_areas[mesh.facet_normals @ options.region.direction < 0.0].sum() / mesh.facet_areas.sum())
     if dropped:
-        remedy = f"all {dropped} passes are shorter than {1e3 * options.shortest:.3g} mm; check the unit of the mesh"
+        short = 1e3 * options.shortest
+        remedy = f"all {dropped} passes are shorter than {short:.3g} mm; check the unit of the mesh"
     elif options.region.box is not None:
         low, high = 1e3 * mesh.bounds
         extent = " x ".join(f"{a:.4g}..{b:.4g}" for a, b in zip(low, high, strict=True))
         remedy = f"check the box against the part, which spans {extent} mm"
     else:
-        remedy = f"{100.0 * away:.0f} % of the surface faces away from the direction; turn it, or repair the winding"
+        remedy = (
+            f"{100.0 * away:.0f} % of the surface faces away from the direction; "
+            "turn the direction, or repair the winding"
+        )
     return ToolpathError("the region holds nothing to machine", key="region", remedy=remedy)

@@ -33,9 +33,7 @@ class Region:
             raise ToolpathError("the direction has no length", key="region.direction")
         set_frozen(self, direction=frozen(normalised(direction), "region.direction"))
         if not 0.0 < self.angle <= np.pi / 2:
-            raise ToolpathError(
-                "the angle is out of range", key="region.angle", value=self.angle, expected="(0, pi/2]"
-            )
+            raise ToolpathError("the angle is out of range", key="region.angle", value=self.angle, expected="(0, pi/2]")
         if self.box is not None:
             box = frozen(self.box, "region.box", (2, 3))
             if (box[0] == box[1]).any():
@@ -55,12 +53,13 @@ class Region:
 
     def facets(self, mesh: Mesh) -> Bools:
         """Return which facets (F,) have a corner that faces the right way, and reach into the box."""
-        facing = (self.faces(mesh.corner_normals) >= 0.0).any(axis=1)
+        facing = np.any(self.faces(mesh.corner_normals) >= 0.0, axis=1)
         if self.box is None:
             return facing
         low, high = self.bounds
         corners = mesh.vertices[mesh.faces]
-        return facing & ((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)
+        reaches = (corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)
+        return facing & np.all(reaches, axis=1)
 
     def clip(self, points: Floats, normals: Floats) -> tuple[Floats, Floats]:
         """Return parameters t0, t1 (R,) of the part of each straight piece of surface that lies inside.

@@ -1,9 +1,10 @@
 """Resampling: waypoints along passes, as few as the tolerances allow, evenly spread.
 
-Density first: between waypoints at most `spacing`, at most `axis_step` of turning, and √(8 · chordal · R) where the
-surface curves with radius R; waypoints are spread evenly over the integral of that density. Then proof: wherever
-a corner of the mesh's own slice is further than `chordal` from the chord that passes it, the worst
-such corner becomes a waypoint, until there is none. So the result holds the tolerance on coarse meshes too.
+Density first: between waypoints at most `spacing`, at most `axis_step` of turning, and √(8 · chordal · R)
+where the surface curves with radius R; waypoints are spread evenly over the integral of that density. Then
+proof: wherever a corner of the mesh's own slice is further than `chordal` from the chord that passes it,
+the worst such corner becomes a waypoint, until there is none. So the result holds the tolerance on coarse
+meshes too.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def without_duplicates(passes: Passes, closest: float) -> Passes:
         short = np.concatenate([[False], passes.within & (passes.steps < closest)])
         if not short.any():
             break
-        # In a run of short steps every second point goes, so that what is left moves apart and nothing is lost.
+        # In a run of short steps every second point goes, so that what is left moves apart.
         index = np.arange(len(short))
         run = index - np.maximum.accumulate(np.where(short, -1, index))
         drop = short & (run % 2 == 1)

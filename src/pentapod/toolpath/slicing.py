@@ -1,10 +1,10 @@
 """Slicing: a mesh cut by many parallel planes at once.
 
-Each vertex gets the number of planes at or below it, an integer; from these follow without any tolerance which
-planes cross which edge, and each crossing's own number. A facet crossed by a plane gives one directed piece, from
-the side where its boundary comes down through the plane to the side where it goes up, so that neighbours' pieces
-join head to tail. Pieces are then chained by pointer doubling. The time is proportional to the number of
-crossings (times the logarithm of the longest chain), whatever the number of planes.
+Each vertex gets the number of planes at or below it, an integer; from these follow without any tolerance
+which planes cross which edge, and each crossing's own number. A facet crossed by a plane gives one directed
+piece, from the side where its boundary comes down through the plane to the side where it goes up, so that
+neighbours' pieces join head to tail. Pieces are then chained by pointer doubling. The time is proportional
+to the number of crossings (times the logarithm of the longest chain), whatever the number of planes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.arrays import Floats, Ints
+from pentapod.arrays import Bools, Floats, Ints
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.passes import Passes
 from pentapod.toolpath.region import Region
@@ -79,8 +79,7 @@ def slice_mesh(mesh: Mesh, planes: Planes, region: Region) -> Passes:
     step, turn = points[1] - points[0], normals[1] - normals[0]
     row = kept[order]
     tails, heads = (
-        [points[0][row] + t[row, None] * step[row], normals[0][row] + t[row, None] * turn[row]]
-        for t in (t0, t1)
+        [points[0][row] + t[row, None] * step[row], normals[0][row] + t[row, None] * turn[row]] for t in (t0, t1)
     )
     return _assembled(tails, heads, chain, plane[row])
 
@@ -102,7 +101,7 @@ def _crossing(mesh: Mesh, planes: Planes, facet: Ints, plane: Ints, side: Ints) 
     return start + t * (end - start), (1.0 - t) * normals[facet, a] + t * normals[facet, b]
 
 
-def _following(node_count: int, nodes: list[Ints], open_start: Ints, open_end: Ints, kept: Ints) -> Ints:
+def _following(node_count: int, nodes: list[Ints], open_start: Bools, open_end: Bools, kept: Ints) -> Ints:
     """Return for each kept piece (K,) the kept piece that goes on where it ends, or −1."""
     begins_at = np.full(node_count, -1, dtype=np.intp)
     starting = np.flatnonzero(open_start[kept])

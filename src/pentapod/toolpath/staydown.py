@@ -20,11 +20,12 @@ LinkEnds = tuple[Floats, Floats, Floats, Floats]
 def surface_links(
     field: HeightField, options: RasterOptions, stepover: float, ends: list[LinkEnds]
 ) -> list[tuple[Floats, Floats] | None]:
-    """Return for each pair of passes contacts and normals (n, 3) of a link on the surface; None where it must retract.
+    """Return for each pair of passes contacts and normals (n, 3) of a link on the surface, or None.
 
-    The link runs straight as seen along the view, on the topmost surface. It may bridge the outside of
-    a border that curves inwards, where nothing lies below; it may neither jump in height (a wall, a step), nor turn by more than
-    30° in all, nor leave the region by more than a stepover or 10°.
+    None: the tool must retract. The link runs straight as seen along the view, on the topmost surface. It
+    may bridge the outside of a border that curves inwards, where nothing lies below; it may neither jump in
+    height (a wall, a step), nor turn by more than 30° in all, nor leave the region by more than a stepover
+    or 10°.
     """
     if not ends:
         return []
@@ -44,16 +45,22 @@ def surface_links(
                 field,
                 options,
                 stepover,
-                np.concatenate([[0.0], t[rows], [1.0]]),
-                np.vstack([starts[k], surface[rows], stops[k]]),
-                np.vstack([before[-1], normals[rows], after[0]]),
+                t=np.concatenate([[0.0], t[rows], [1.0]]),
+                contacts=np.vstack([starts[k], surface[rows], stops[k]]),
+                normals=np.vstack([before[-1], normals[rows], after[0]]),
             )
         )
     return answers
 
 
 def _checked(
-    field: HeightField, options: RasterOptions, stepover: float, t: Floats, contacts: Floats, normals: Floats
+    field: HeightField,
+    options: RasterOptions,
+    stepover: float,
+    *,
+    t: Floats,
+    contacts: Floats,
+    normals: Floats,
 ) -> tuple[Floats, Floats] | None:
     """Return the link where it holds what `surface_links` promises."""
     found = np.isfinite(contacts).all(axis=1)
@@ -69,7 +76,7 @@ def _checked(
     leaves_box = ((contacts < low - stepover) | (contacts > high + stepover)).any()
     facing = angle_between(normals, region.direction)
     if (
-        (flat <= 0.0).any()
+        (flat < 0.1 * options.closest).any()
         or (rise > STEEPEST_RISE * flat).any()
         or angle_between(normals[1:], normals[:-1]).sum() > MOST_TURN
         or leaves_box

@@ -31,9 +31,7 @@ def read_stl(path: Path, data: bytes) -> tuple[Floats, tuple[str, ...]]:
     if data.lstrip()[:5].lower() == b"solid" and (_is_text(data[:4096]) or announced is None):
         return _ascii(path, data), ()
     if _is_text(data[:4096]):
-        raise MeshError(
-            "a text file, not STL", file=path, expected='binary STL, or text that begins with "solid"'
-        )
+        raise MeshError("a text file, not STL", file=path, expected='binary STL, or text that begins with "solid"')
     if announced is None:
         raise MeshError(
             f"truncated: {len(data)} bytes, shorter than the header of a binary STL", file=path, remedy=_AGAIN
@@ -50,7 +48,7 @@ def read_stl(path: Path, data: bytes) -> tuple[Floats, tuple[str, ...]]:
 
 
 def write_stl(triangles: Floats, name: str) -> bytes:
-    """Return a binary STL of triangles (F, 3, 3), the same bytes for the same numbers. name: ≤ 80 bytes of ASCII."""
+    """Return a binary STL of triangles (F, 3, 3): same numbers, same bytes. name: at most 80 of ASCII."""
     corners = np.asarray(triangles, dtype=np.float64).astype("<f4")
     sides = corners.astype(np.float64)
     normal = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])

@@ -16,7 +16,7 @@ JOIN_TOLERANCE_M = 1e-9
 
 
 class SegmentKind(StrEnum):
-    """What a segment is for: cut (the process is on), link (on feed, not cutting), rapid (clear of the part)."""
+    """What a segment is for: cut (process on), link (on feed, not cutting), rapid (clear of the part)."""
 
     CUT = "cut"
     LINK = "link"

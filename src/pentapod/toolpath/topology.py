@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pentapod.arrays import Bools, Ints
+from pentapod.arrays import Bools, Floats, Ints
 
 
 def components(count: int, a: Ints, b: Ints) -> tuple[int, Ints]:
@@ -40,9 +40,7 @@ class Topology:
         """Vertices (E, 2) of the edges, the lower index first."""
         order, starts = self._sorted
         side = order[starts]
-        ends = np.stack(
-            [self.faces.ravel()[side], self.faces.ravel()[side - side % 3 + (side + 1) % 3]], axis=1
-        )
+        ends = np.stack([self.faces.ravel()[side], self.faces.ravel()[side - side % 3 + (side + 1) % 3]], axis=1)
         return np.sort(ends, axis=1)
 
     @cached_property
@@ -73,7 +71,7 @@ class Topology:
 
     @cached_property
     def pair_agrees(self) -> Bools:
-        """Whether (M,) the two facets of each pair run along their edge in opposite senses, as they should."""
+        """Whether (M,) the facets of each pair run along their edge in opposite senses, as they should."""
         start = self.faces.ravel()
         a, b = self.side_pairs
         return start[a] != start[b]
@@ -107,12 +105,12 @@ class Topology:
         ends = ends.reshape(-1, 2)
         return components(len(vertices), ends[:, 0], ends[:, 1])[0]
 
-    def consistent_winding(self, areas: np.ndarray) -> tuple[Bools, bool]:
-        """Return which facets (F,) to turn so that all of a body are wound alike, and whether that is possible.
+    def consistent_winding(self, areas: Floats) -> tuple[Bools, bool]:
+        """Return which facets (F,) to turn so that bodies are wound alike, and whether that is possible.
 
         Two-colouring as connected components of the double cover: each facet is there as it is and turned;
-        neighbours that agree join like with like. The part of a body with the smaller area is turned.
-        A one-sided surface (a Möbius strip) cannot be wound consistently; its facets are left alone.
+        neighbours that agree join like with like. The part of a body with the smaller area is turned. A
+        one-sided surface (a Möbius strip) cannot be wound consistently; its facets are left alone.
         """
         count = len(self.faces)
         a, b = (side // 3 for side in self.side_pairs)
