@@ -13,9 +13,7 @@ def _pentapods() -> dict[str, LinearPentapod]:
     return {
         "paper": LinearPentapod.quadratic(PAPER, 0.5),
         "desk-sized, leg 3 off the origin": LinearPentapod.quadratic(shifted, 1.3),
-        "p anywhere on the line": LinearPentapod.from_offsets(
-            shifted, 0.07 - 0.8 * (shifted[:, 0] - 0.1), -0.8
-        ),
+        "p anywhere on the line": LinearPentapod.from_offsets(shifted, 0.07 - 0.8 * (shifted[:, 0] - 0.1), -0.8),
     }
 
 

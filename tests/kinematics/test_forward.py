@@ -60,9 +60,7 @@ def test_every_pose_is_found_again_in_its_own_component(pentapod: LinearPentapod
     assert (np.unique(component @ [2, 1], return_counts=True)[1] > 5000).all()
 
 
-def test_all_four_modes_have_the_leg_lengths_and_their_own_signs(
-    pentapod: LinearPentapod, random_poses
-) -> None:
+def test_all_four_modes_have_the_leg_lengths_and_their_own_signs(pentapod: LinearPentapod, random_poses) -> None:
     p, i = random_poses(pentapod, 5000, seed=1)
     legs = pentapod.leg_lengths(p, i)
     positions, directions = pentapod.assembly_modes(legs)

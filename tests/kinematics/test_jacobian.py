@@ -62,9 +62,7 @@ def test_the_jacobians_undo_each_other(pentapod: LinearPentapod, poses) -> None:
         np.broadcast_to(np.eye(5), (300, 5, 5)),
         atol=1e-9,
     )
-    np.testing.assert_allclose(
-        np.einsum("nj,njk->nk", i, pose_jacobian(pentapod, p, i)[:, 3:]), 0.0, atol=1e-10
-    )
+    np.testing.assert_allclose(np.einsum("nj,njk->nk", i, pose_jacobian(pentapod, p, i)[:, 3:]), 0.0, atol=1e-10)
 
 
 def test_square_jacobian_vanishes_with_the_leg_determinant(
@@ -96,9 +94,7 @@ def test_amplification_is_the_worst_of_all_directions(pentapod: LinearPentapod, 
     p, i = poses
     amplification = tip_force_amplification(pentapod, p, i, 0.2)
     loads = normalised(np.random.default_rng(0).normal(size=(4000, 3)))
-    tried = np.linalg.norm(np.einsum("nij,kj->nki", leg_force_map(pentapod, p, i, 0.2), loads), axis=-1).max(
-        axis=1
-    )
+    tried = np.linalg.norm(np.einsum("nij,kj->nki", leg_force_map(pentapod, p, i, 0.2), loads), axis=-1).max(axis=1)
     assert (tried <= amplification * (1 + 1e-12)).all()
     assert (tried >= amplification * 0.99).all()
 

@@ -14,14 +14,10 @@ def test_the_leg_determinant_is_delta_squared_w_f_s(
     p, i = random_poses(pentapod, 1000, seed=4)
     w, s = singularity_values(pentapod, p, i)
     expected = pentapod.delta**2 * w * conic_determinant(pentapod) * s
-    np.testing.assert_allclose(
-        leg_determinant(pentapod, p, i), expected, rtol=1e-9, atol=1e-12 * abs(expected).max()
-    )
+    np.testing.assert_allclose(leg_determinant(pentapod, p, i), expected, rtol=1e-9, atol=1e-12 * abs(expected).max())
 
 
-def test_the_determinant_of_the_papers_figure(
-    paper: LinearPentapod, leg_determinant, conic_determinant
-) -> None:
+def test_the_determinant_of_the_papers_figure(paper: LinearPentapod, leg_determinant, conic_determinant) -> None:
     assert conic_determinant(paper) == pytest.approx(264.0, rel=1e-13)
     p, i = np.array([0.5, 0.25, 3.0]), np.array([0.36, 0.48, 0.8])
     s = 0.5 * 0.8 * 0.5 - (0.5 * 0.36 - 1.0) * 3.0
@@ -36,9 +32,7 @@ def test_check_values_of_the_notes(paper: LinearPentapod) -> None:
     assert abs(np.degrees(orientation_distance(paper, [-4.0, 0.25, 1.0], i)) - 30.686411) < 5e-7
 
 
-def test_no_shorter_way_to_a_singular_position(
-    pentapod: LinearPentapod, random_poses, leg_determinant
-) -> None:
+def test_no_shorter_way_to_a_singular_position(pentapod: LinearPentapod, random_poses, leg_determinant) -> None:
     positions, directions = random_poses(pentapod, 12, seed=5)
     distances = position_distance(pentapod, positions, directions)
     size = np.abs(pentapod.base - pentapod.base[2]).max()
@@ -82,9 +76,7 @@ def test_no_smaller_turn_to_a_singular_direction(
 
         found = [first_crossing(heading) for heading in headings]
         best = headings[int(np.argmin(found))]
-        found += [
-            minimize_scalar(first_crossing, bounds=(best - 0.2, best + 0.2), options={"xatol": 1e-7}).fun
-        ]
+        found += [minimize_scalar(first_crossing, bounds=(best - 0.2, best + 0.2), options={"xatol": 1e-7}).fun]
         assert min(found) == pytest.approx(distance, abs=1e-8)
 
 

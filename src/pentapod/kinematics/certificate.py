@@ -33,7 +33,9 @@ class ComponentProof:
 
     proven (N,): from the pose of `component` at the start of the interval (and from no other: lengths alone
     cannot tell the mirror images apart) the motion is defined and continuous throughout, and stays in
-    `component`. Where consecutive intervals join and all are proven, this holds for the whole of them.
+    `component`. Where consecutive intervals join and all are proven, this holds for the whole of them. Legs
+    whose setpoints were taken from poses on both sides of a singularity may be proven too: the motion that
+    they describe turns back before it. Its forward kinematics in `component` then is not the planned path.
     w_lower (N,) and s_lower (N,) in metres: proven lower bounds of |w| and |S| over the interval; each is 0
     where its sign is not proven to last: the interval touches that singularity, leaves the component, loses
     the pose altogether, or comes closer to one of these than rounding and the depth of subdivision can tell.
@@ -95,9 +97,7 @@ def _named(component: ArrayLike) -> Component:
     for candidate in COMPONENTS:
         if signs.shape == (2,) and tuple(signs) == candidate:
             return candidate
-    raise ArrayError(
-        "component must be one pair of signs", value=signs.tolist(), expected="+1 or −1 for w and for S"
-    )
+    raise ArrayError("component must be one pair of signs", value=signs.tolist(), expected="+1 or −1 for w and for S")
 
 
 def _roundings(k: int) -> tuple[int, int]:

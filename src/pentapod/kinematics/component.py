@@ -22,9 +22,7 @@ class Component(NamedTuple):
         for component in COMPONENTS:
             if str(component) == name:
                 return component
-        raise ArrayError(
-            "unknown component", value=name, expected='"++", "+-", "-+" or "--" (signs of w and S)'
-        )
+        raise ArrayError("unknown component", value=name, expected='"++", "+-", "-+" or "--" (signs of w and S)')
 
 
 COMPONENTS = (Component(1, 1), Component(1, -1), Component(-1, 1), Component(-1, -1))

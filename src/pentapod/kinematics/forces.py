@@ -10,9 +10,7 @@ from pentapod.kinematics.jacobian import invert, line_tangents
 from pentapod.kinematics.pentapod import LinearPentapod
 
 
-def leg_force_map(
-    pentapod: LinearPentapod, position: ArrayLike, direction: ArrayLike, tool_length: float
-) -> Floats:
+def leg_force_map(pentapod: LinearPentapod, position: ArrayLike, direction: ArrayLike, tool_length: float) -> Floats:
     """Return the map (..., 5, 3) from a force on the tip to the five axial leg forces that hold it (N/N).
 
     The force acts on the tip p + tool_length · i (metres), machine frame, without a moment; a positive leg

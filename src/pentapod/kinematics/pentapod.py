@@ -67,9 +67,7 @@ class LinearPentapod:
                 key="base" if delta else "delta",
                 value=measure,
                 expected="a reciprocal condition number well above 1e-3",
-                remedy="move a base attachment off the conic through the others"
-                if delta
-                else "choose delta ≠ 0",
+                remedy="move a base attachment off the conic through the others" if delta else "choose delta ≠ 0",
             )
         set_frozen(self, linear_part=LinearPart.of(base, delta))
 

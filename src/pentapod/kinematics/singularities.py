@@ -13,9 +13,7 @@ from pentapod.kinematics.pentapod import LinearPentapod
 from pentapod.kinematics.quadratic import reciprocal_condition, w_and_s
 
 
-def singularity_values(
-    pentapod: LinearPentapod, position: ArrayLike, direction: ArrayLike
-) -> tuple[Floats, Floats]:
+def singularity_values(pentapod: LinearPentapod, position: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:
     """Return w (dimensionless) and S (metres), each (...), of poses (..., 3): zero on a singularity.
 
     w is the z component of the direction; S = δ w px − (δu − 1) pz. Their signs name the component.
@@ -57,9 +55,7 @@ def orientation_distance(
     norm_squared = n1 * n1 + n3 * n3
     sine_squared = norm_squared - fz * fz
     across = np.sqrt((n3 * v) ** 2 + (n3 * u - n1 * w) ** 2 + (n1 * v) ** 2)
-    to_cone = np.abs(
-        np.arctan2(across, n1 * u + n3 * w) - np.arctan2(np.sqrt(np.maximum(sine_squared, 0.0)), -fz)
-    )
+    to_cone = np.abs(np.arctan2(across, n1 * u + n3 * w) - np.arctan2(np.sqrt(np.maximum(sine_squared, 0.0)), -fz))
     to_cone = np.where(sine_squared < 0.0, np.inf, np.where(norm_squared == 0.0, 0.0, to_cone))
     return np.minimum(to_equator, to_cone)
 
