@@ -143,7 +143,7 @@ def leg_path(
         )
     points, u = points[keep], np.concatenate([[0.0], np.cumsum(steps[moving])])
     segment = toolpath.segment_of_interval[moving]
-    stops = np.flatnonzero(_stops(points[:, :3], segment, toolpath.segments)) + 1
+    stops = np.flatnonzero(_stops(points, toolpath.pivot, segment, toolpath.segments)) + 1
     bounds = np.concatenate([[0], stops, [len(points) - 1]])
     pieces = []
     for a, b in pairwise(bounds.tolist()):
@@ -179,14 +179,20 @@ def _tolerance(path: float, axis: float):
     return too_far
 
 
-def _stops(pivots: Floats, segment: Ints, segments: tuple[Segment, ...]) -> Bools:
-    """Return for each inner waypoint (N − 2,) whether the machine stops there."""
+def _stops(points: Floats, pivot: float, segment: Ints, segments: tuple[Segment, ...]) -> Bools:
+    """Return for each inner waypoint (N − 2,) whether the machine stops there. points (N, 6): pivots and axes."""
     rapid = np.array([s.kind is SegmentKind.RAPID for s in segments])[segment]
-    step = np.diff(pivots, axis=0)
+    pivots, tips = points[:, :3], points[:, :3] - pivot * points[:, 3:]
+    return (rapid[1:] != rapid[:-1]) | _turns_back(pivots) | _turns_back(tips)
+
+
+def _turns_back(points: Floats) -> Bools:
+    """Return for each inner point (N − 2,) of a polyline whether it turns more sharply than STOP_ANGLE there."""
+    step = np.diff(points, axis=0)
     length = np.linalg.norm(step, axis=1)
-    cosine = (step[1:] * step[:-1]).sum(axis=1)
-    sharp = cosine < np.cos(STOP_ANGLE) * length[1:] * length[:-1]
-    return (rapid[1:] != rapid[:-1]) | (sharp & (length[1:] > 0.0) & (length[:-1] > 0.0))
+    moves = length > 1e-9
+    sharp = (step[1:] * step[:-1]).sum(axis=1) < np.cos(STOP_ANGLE) * length[1:] * length[:-1]
+    return sharp & moves[1:] & moves[:-1]
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

@@ -1,0 +1,191 @@
+"""LegPath: true to inverse kinematics, parametrised by the tip's arc length, within tolerance, resting where it must."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from pentapod.errors import ToolpathError
+from pentapod.geometry.directions import angle_between
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import Component
+from pentapod.planning.leg_path import LegPath, leg_path
+from pentapod.planning.placed_path import PlacedPath
+from pentapod.planning.placement import Placement
+from pentapod.refusal import Refusal
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+
+TOLERANCE, AXIS_TOLERANCE = 20e-6, np.radians(0.1)
+
+
+def placed_on(machine, toolpath):
+    """The toolpath with its nominal axes, its origin in the middle of the work volume, z up towards the base."""
+    turn = RigidTransform(np.diag([1.0, -1.0, -1.0]), machine.work.centre)
+    axes = turn.rotate(toolpath.axes)
+    tips = turn.apply(toolpath.tips)
+    return PlacedPath(toolpath, Placement(turn, "test"), Component(1, 1), tips, axes, np.ones((len(tips), 1)), ("m",))
+
+
+def fan(points, lean):
+    axes = np.c_[lean, np.zeros(len(lean)), np.ones(len(lean))]
+    return np.asarray(points, dtype=float), axes / np.linalg.norm(axes, axis=1, keepdims=True)
+
+
+@pytest.fixture(scope="module")
+def mixed(desk):
+    """Rapid down, a cut round two corners while the axis turns, rapid up."""
+    up = np.array([0.0, 0.0, 0.02])
+    x = np.linspace(0.0, 0.05, 26)
+    side = np.c_[np.full(2, 0.05), [0.002, 0.004], np.zeros(2)]
+    cut = np.concatenate([np.c_[x, 0 * x, 0 * x], side, np.c_[x[::-1], 0 * x + 0.006, 0 * x]])
+    tips, axes = fan(cut, 0.2 * np.sin(np.linspace(0.0, 2.0, len(cut))))
+    segments = (
+        Segment(SegmentKind.RAPID, np.stack([tips[0] + up, tips[0] + 0.2 * up]), axes[[0, 0]], np.inf),
+        Segment(SegmentKind.LINK, np.stack([tips[0] + 0.2 * up, tips[0]]), axes[[0, 0]], 0.01),
+        Segment(SegmentKind.CUT, tips, axes, 0.02),
+        Segment(SegmentKind.LINK, np.stack([tips[-1], tips[-1] + 0.2 * up]), axes[[-1, -1]], 0.01),
+        Segment(SegmentKind.RAPID, np.stack([tips[-1] + 0.2 * up, tips[-1] + up]), axes[[-1, -1]], np.inf),
+    )
+    placed = placed_on(desk, Toolpath(segments, 0.003))
+    path = leg_path(placed, desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    return placed, path
+
+
+def test_legs_are_the_inverse_kinematics_of_the_pose(desk, mixed):
+    _, path = mixed
+    s = np.linspace(0.0, path.length, 3001)
+    tips, axes = path.pose(s)
+    expected = desk.pentapod.leg_lengths(tips + desk.tool_length * axes, -axes)
+    np.testing.assert_allclose(path(s), expected, atol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(axes, axis=1), 1.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_derivatives_by_finite_differences_inside_each_span(mixed, order):
+    _, path = mixed
+    for piece in path.pieces:
+        knots = piece.knots
+        wide = np.diff(knots) > 1e-4
+        s = (0.5 * (knots[:-1] + knots[1:]))[wide]
+        h = 1e-2 * np.diff(knots)[wide]
+        up, down = piece(s + h, order - 1), piece(s - h, order - 1)
+        up2, down2 = piece(s + 2 * h, order - 1), piece(s - 2 * h, order - 1)
+        fd = (8.0 * (up - down) - (up2 - down2)) / (12.0 * h[:, None])
+        np.testing.assert_allclose(piece(s, order), fd, rtol=2e-5, atol=2e-5)
+
+
+def test_parameter_is_the_arc_length_of_the_tip(mixed):
+    _, path = mixed
+    for piece in path.pieces:
+        s = np.linspace(0.0, piece.length, 500)
+        speed = np.linalg.norm(piece.pose(s, 1)[0], axis=1)
+        assert speed.max() <= 1.0 + 1e-6
+        assert speed.min() >= 1.0 - 1e-3  # what the lever of the axis takes
+
+        def rate(x, piece=piece):
+            return float(np.linalg.norm(piece.pose(np.array([x]), 1)[0]))
+
+        measured, _ = quad(rate, 0.0, piece.length, limit=400, points=piece.knots[1:-1:3][:100])
+        assert measured == pytest.approx(piece.length, rel=1e-4)
+
+
+def test_second_derivative_is_continuous_across_knots(mixed):
+    _, path = mixed
+    for piece in path.pieces:
+        knots = piece.knots[1:-1]
+        if len(knots) == 0:
+            continue
+        h = 1e-10
+        jump = np.abs(piece(knots + h, 2) - piece(knots - h, 2))
+        assert jump.max() <= 1e-3 * max(1.0, np.abs(piece(knots, 2)).max())
+
+
+def test_pivot_and_axis_stay_within_their_tolerances(mixed):
+    placed, path = mixed
+    s = np.linspace(0.0, path.length, 20_000)
+    tips, axes = path.pose(s)
+    pivots = tips + placed.toolpath.pivot * axes
+    a, b = placed.pivots[:-1], placed.pivots[1:]
+    share = np.einsum("nkj,kj->nk", pivots[:, None] - a, b - a) / np.maximum(np.square(b - a).sum(axis=1), 1e-30)
+    foot = a + np.clip(share, 0.0, 1.0)[..., None] * (b - a)
+    distance = np.linalg.norm(pivots[:, None] - foot, axis=2)
+    assert distance.min(axis=1).max() <= TOLERANCE
+    assert distance.min(axis=1).max() >= 0.3 * TOLERANCE  # corners use the tolerance: else needlessly slow
+    nearest = distance.argmin(axis=1)
+    either = np.minimum(angle_between(axes, placed.axes[nearest]), angle_between(axes, placed.axes[nearest + 1]))
+    assert either.max() <= AXIS_TOLERANCE + angle_between(placed.axes[:-1], placed.axes[1:]).max()
+
+
+def test_it_rests_between_rapids_and_feeds_and_nowhere_else(mixed):
+    _, path = mixed
+    assert [set(piece.section_kinds) for piece in path.pieces] == [
+        {SegmentKind.RAPID},
+        {SegmentKind.LINK, SegmentKind.CUT},
+        {SegmentKind.RAPID},
+    ]
+    for piece in path.pieces:
+        assert piece.section_ends[-1] == pytest.approx(piece.length, abs=1e-15)
+        assert (np.diff(piece.section_ends) > 0).all()
+    assert list(path.pieces[1].section_segments) == [1, 2, 3]
+    assert path.pieces[1].section_ends[0] == pytest.approx(0.004, abs=1e-4)
+
+
+def test_a_turn_on_the_spot_that_sends_the_tip_back_stops(desk):
+    """The pivot stands while the axis turns, and the tip reverses although the pivot's path has no sharp corner."""
+    tips, axes = fan([[0, 0, 0], [0.02, 0, 0], [0.02, 0, 0], [0.02, 0.02, 0]], [0.0, 0.0, 0.2, 0.2])
+    pivot = 0.003
+    toolpath = Toolpath((Segment(SegmentKind.CUT, tips - pivot * axes, axes, 0.01),), pivot)
+    path = leg_path(placed_on(desk, toolpath), desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    assert len(path.pieces) == 2
+    speed = np.linalg.norm(path.pieces[1].pose(np.linspace(0.0, path.pieces[1].length, 999), 1)[0], axis=1)
+    assert speed.min() > 0.3
+
+
+def test_pieces_join(mixed):
+    _, path = mixed
+    for a, b in zip(path.pieces, path.pieces[1:], strict=False):
+        np.testing.assert_allclose(a(np.array([a.length])), b(np.zeros(1)), atol=1e-14)
+
+
+def test_turning_on_the_spot_has_length(desk):
+    tips, axes = fan([[0.0, 0, 0]] * 5, np.linspace(0.0, 0.2, 5))
+    path = leg_path(
+        placed_on(desk, Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),))),
+        desk,
+        path_tolerance=TOLERANCE,
+        axis_tolerance=AXIS_TOLERANCE,
+    )
+    assert isinstance(path, LegPath)
+    assert path.length == pytest.approx(1e-3 * np.arctan(0.2), rel=1e-3)
+    np.testing.assert_allclose(path.pose([path.length])[1][0] * [1, -1, -1], axes[-1], atol=1e-12)
+
+
+def test_a_sharp_reversal_stops(desk):
+    tips, axes = fan([[0, 0, 0], [0.03, 0, 0], [0.0, 0.002, 0]], np.zeros(3))
+    toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),))
+    path = leg_path(placed_on(desk, toolpath), desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    assert len(path.pieces) == 2
+
+
+def test_duplicate_waypoints_are_passed_over(desk):
+    tips, axes = fan([[0, 0, 0], [0.01, 0, 0], [0.01, 0, 0], [0.03, 0, 0]], np.zeros(4))
+    toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),))
+    path = leg_path(placed_on(desk, toolpath), desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    assert path.length == pytest.approx(0.03, rel=1e-12)
+
+
+def test_a_path_that_does_not_move_is_refused(desk):
+    tips, axes = fan([[0, 0, 0], [0, 0, 0]], np.zeros(2))
+    placed = placed_on(desk, Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),)))
+    answer = leg_path(placed, desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(answer, Refusal)
+    assert "does not move" in answer.cause
+
+
+@pytest.mark.parametrize("bad", [0.0, -1e-6, np.nan])
+def test_tolerances_must_be_positive(desk, mixed, bad):
+    with pytest.raises(ToolpathError, match="path_tolerance"):
+        leg_path(mixed[0], desk, path_tolerance=bad, axis_tolerance=AXIS_TOLERANCE)

@@ -1,0 +1,135 @@
+"""plan: what it returns holds at every waypoint, is not beaten nearby, is repeatable, and refuses with reasons."""
+
+import numpy as np
+import pytest
+
+from pentapod.geometry.directions import angle_between
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import Component
+from pentapod.planning import PlacedPath, Placement, plan
+from pentapod.planning.margins import Margins
+from pentapod.planning.plan import NEEDED_MARGIN
+from pentapod.planning.problem import cayley
+from pentapod.planning.sampling import best_tilted_margins
+from pentapod.planning.task import Task
+from pentapod.refusal import Refusal
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+
+TILT = np.radians(15.0)
+
+
+@pytest.fixture(scope="module")
+def placed(desk, cap):
+    answer = plan(cap, desk, tilt=TILT)
+    assert isinstance(answer, PlacedPath), str(answer)
+    return answer
+
+
+def test_every_waypoint_keeps_every_limit(desk, placed):
+    """Limits from the robot's own kinematics, not from the margins' formula."""
+    p = placed.tips + desk.tool_length * placed.axes
+    legs = desk.pentapod.leg_lengths(p, -placed.axes)
+    assert (legs > desk.legs.min_length).all()
+    assert (legs < desk.legs.max_length).all()
+    np.testing.assert_array_equal(desk.pentapod.component(p, -placed.axes), np.tile(placed.component, (len(p), 1)))
+    back_p, back_i = desk.pentapod.pose(legs, placed.component)
+    np.testing.assert_allclose(back_p, p, atol=1e-10)
+    np.testing.assert_allclose(back_i, -placed.axes, atol=1e-10)
+    assert placed.smallest_margin >= NEEDED_MARGIN - 1e-3
+
+
+def test_axes_stay_in_the_cone_and_the_pivot_on_the_part(cap, placed):
+    nominal = placed.placement.transform.rotate(cap.axes)
+    assert angle_between(placed.axes, nominal).max() <= TILT
+    np.testing.assert_allclose(placed.pivots, placed.placement.transform.apply(cap.pivots), atol=1e-12)
+
+
+def test_axis_is_smooth_along_the_path(cap, placed):
+    """Along a pass the axis turns hardly faster than the nominal one anywhere."""
+    step = np.linalg.norm(np.diff(cap.pivots, axis=0), axis=1)
+    rate = angle_between(placed.axes[1:], placed.axes[:-1]) / step
+    nominal = angle_between(cap.axes[1:], cap.axes[:-1]) / step
+    assert rate.max() <= 1.5 * nominal.max()
+
+
+def test_placement_is_not_beaten_by_small_moves(desk, cap, placed):
+    """Random small placement moves, each with the best tilt at each waypoint alone, gain little."""
+    rng = np.random.default_rng(5)
+    rows = np.arange(0, len(cap), 4)
+    few = Task(cap.pivots[rows], cap.axes[rows], cap.pivot, TILT)
+    margins = Margins.of(desk, placed.component)
+    t = placed.placement.transform
+    here = best_tilted_margins(few, margins, t).min()
+    others = []
+    for _ in range(60):
+        turn = t.rotation @ cayley(rng.normal(scale=0.01, size=3))
+        shift = rng.normal(scale=0.003, size=3) + t.translation
+        others.append(best_tilted_margins(few, margins, RigidTransform(turn, shift)).min())
+    assert max(others) <= here + 0.03
+
+
+def test_tilt_gains_over_strict_normals(desk, cap, placed):
+    strict = plan(cap, desk, tilt=0.0)
+    if isinstance(strict, PlacedPath):
+        np.testing.assert_allclose(strict.axes, strict.placement.transform.rotate(cap.axes), atol=1e-12)
+        assert placed.smallest_margin > strict.smallest_margin
+    else:
+        assert strict.stage == "placement"
+
+
+def test_same_task_same_plan(desk, cap, placed):
+    again = plan(cap, desk, tilt=TILT)
+    assert isinstance(again, PlacedPath)
+    np.testing.assert_array_equal(again.axes, placed.axes)
+    np.testing.assert_array_equal(again.placement.transform.matrix, placed.placement.transform.matrix)
+
+
+def test_given_placement_and_component_are_honoured(desk, cap, placed):
+    given = Placement(placed.placement.transform, "job")
+    answer = plan(cap, desk, tilt=TILT, placement=given, component=placed.component)
+    assert isinstance(answer, PlacedPath)
+    assert answer.placement is given
+    assert answer.component == placed.component
+    assert answer.smallest_margin >= NEEDED_MARGIN - 1e-3
+
+
+def test_wrong_component_is_refused(desk, cap, placed):
+    given = Placement(placed.placement.transform, "job")
+    answer = plan(cap, desk, tilt=TILT, placement=given, component=Component(1, -1))
+    assert isinstance(answer, Refusal)
+    assert any("S = 0" in blame.constraint for blame in answer.blames)
+
+
+def test_placement_out_of_reach_is_refused_with_the_true_shortfall(desk, cap, placed):
+    """Pushed away along the base normal until legs are too short: the millimetres named are those missing."""
+    t = placed.placement.transform
+    far = Placement(RigidTransform(t.rotation, t.translation + [0.0, 0.0, 0.3]), "job")
+    answer = plan(cap, desk, placement=far, component=placed.component)
+    assert isinstance(answer, Refusal)
+    tips, axes = far.transform.apply(cap.tips), far.transform.rotate(cap.axes)
+    legs = desk.pentapod.leg_lengths(tips + desk.tool_length * axes, -axes)
+    for blame in answer.blames:
+        if "too long" in blame.constraint:
+            k = int(blame.constraint.split()[1]) - 1
+            missing_mm = (legs[:, k].max() - desk.legs.max_length[k]) * 1e3
+            margin_mm = NEEDED_MARGIN * 0.5 * desk.legs.stroke[k] * 1e3
+            assert blame.unit == "mm"
+            assert missing_mm <= blame.shortfall <= missing_mm + margin_mm + 1e-9
+            covered = np.concatenate([np.arange(a, b + 1) for a, b in blame.waypoints])
+            assert set(np.flatnonzero(legs[:, k] > desk.legs.max_length[k])) <= set(covered)
+            break
+    else:
+        pytest.fail(f"no leg is blamed: {answer}")
+
+
+def test_oversize_part_is_refused(desk):
+    size = 0.6
+    x = np.linspace(-0.5 * size, 0.5 * size, 40)
+    passes = [np.c_[x if k % 2 == 0 else x[::-1], np.full(40, y), np.zeros(40)] for k, y in enumerate(x[::4])]
+    tips = np.concatenate(passes)
+    flat = Toolpath((Segment(SegmentKind.CUT, tips, np.tile([0.0, 0.0, 1.0], (len(tips), 1)), 0.02),), 0.003)
+    answer = plan(flat, desk, tilt=TILT)
+    assert isinstance(answer, Refusal)
+    assert answer.blames
+    assert answer.blames[0].shortfall > 1.0
+    assert all(0 <= a <= b < len(tips) for blame in answer.blames for a, b in blame.waypoints)
