@@ -29,12 +29,8 @@ def test_angle_to_a_turned_vector_is_the_turn(angle: float) -> None:
     rng = np.random.default_rng(1)
     a = normalised(rng.normal(size=(50, 3)))
     t1, _ = tangent_frame(a)
-    np.testing.assert_allclose(
-        angle_between(a, np.cos(angle) * a + np.sin(angle) * t1), angle, rtol=0, atol=1e-15
-    )
-    np.testing.assert_allclose(
-        angle_between(a, -(np.cos(angle) * a + np.sin(angle) * t1)), np.pi - angle, atol=1e-15
-    )
+    np.testing.assert_allclose(angle_between(a, np.cos(angle) * a + np.sin(angle) * t1), angle, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(angle_between(a, -(np.cos(angle) * a + np.sin(angle) * t1)), np.pi - angle, atol=1e-15)
 
 
 def test_small_angles_keep_their_digits() -> None:
@@ -54,9 +50,7 @@ def test_tangent_frames_are_right_handed_and_orthonormal(longitude: float, polar
 def test_tangent_frames_are_smooth_through_each_pole(pole: float) -> None:
     at_pole = np.stack(tangent_frame([0.0, 0.0, pole]))
     for turn in np.linspace(0.0, 2 * np.pi, 16):
-        near = Rotation.from_rotvec(1e-6 * np.array([np.cos(turn), np.sin(turn), 0.0])).apply(
-            [0.0, 0.0, pole]
-        )
+        near = Rotation.from_rotvec(1e-6 * np.array([np.cos(turn), np.sin(turn), 0.0])).apply([0.0, 0.0, pole])
         assert np.abs(np.stack(tangent_frame(near)) - at_pole).max() < 2e-6
 
 

@@ -15,9 +15,7 @@ numbers = st.floats(-10.0, 10.0, allow_subnormal=False)
 @st.composite
 def transforms(draw: st.DrawFn) -> RigidTransform:
     vector = [draw(st.floats(-3.0, 3.0)) for _ in range(3)]
-    return RigidTransform(
-        Rotation.from_rotvec(vector).as_matrix(), np.array([draw(numbers) for _ in range(3)])
-    )
+    return RigidTransform(Rotation.from_rotvec(vector).as_matrix(), np.array([draw(numbers) for _ in range(3)]))
 
 
 def same(a: RigidTransform, b: RigidTransform) -> bool:
@@ -40,9 +38,7 @@ def test_they_act_on_points_and_keep_distances(a: RigidTransform, b: RigidTransf
     np.testing.assert_allclose((a @ b).apply(x), a.apply(b.apply(x)), atol=1e-12)
     np.testing.assert_allclose(a.inverse().apply(a.apply(x)), x, atol=1e-12)
     np.testing.assert_allclose(a.rotate(x[0] - x[1]), a.apply(x[0]) - a.apply(x[1]), atol=1e-12)
-    np.testing.assert_allclose(
-        np.linalg.norm(a.apply(x[0]) - a.apply(x[1])), np.linalg.norm(x[0] - x[1]), atol=1e-12
-    )
+    np.testing.assert_allclose(np.linalg.norm(a.apply(x[0]) - a.apply(x[1])), np.linalg.norm(x[0] - x[1]), atol=1e-12)
     homogeneous = np.c_[x, np.ones(len(x))] @ a.matrix.T
     np.testing.assert_allclose(a.apply(x), homogeneous[:, :3], atol=1e-12)
 

@@ -129,10 +129,7 @@ def _power_to_bernstein(n: int) -> Floats:
 
 @cache
 def _bernstein_to_power(n: int) -> Floats:
-    signed = [
-        [comb(n, i) * comb(i, j) * (-1) ** (i - j) if j <= i else 0 for j in range(n + 1)]
-        for i in range(n + 1)
-    ]
+    signed = [[comb(n, i) * comb(i, j) * (-1) ** (i - j) if j <= i else 0 for j in range(n + 1)] for i in range(n + 1)]
     return np.array(signed, dtype=np.float64)
 
 
