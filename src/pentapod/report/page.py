@@ -1,2 +1,179 @@
+"""write_report: one HTML file that needs nothing else: the verdict first, then what explains it."""
+
+from __future__ import annotations
+
+import platform
+from importlib import resources
 from pathlib import Path
-def write_report(outcome, path): Path(path).write_text("<html></html>")
+from typing import Any
+
+import numpy as np
+
+from pentapod.files import atomic_write
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.outcome import Outcome
+from pentapod.planning.placed_path import PlacedPath
+from pentapod.program.program import Program
+from pentapod.report import plots, scene, words
+from pentapod.report.figure import Figure, as_script
+from pentapod.report.signals import Signals
+from pentapod.report.worst import brakes, worst_places
+from pentapod.timing.trajectory import Trajectory
+from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.toolpath import Toolpath
+from pentapod.version import __version__
+
+_POSES = 240
+
+
+def write_report(outcome: Outcome, path: str | Path) -> Path:
+    """Write report.html on a run and return its path. Raises InputError where it cannot be written."""
+    text = render(outcome)
+    with atomic_write(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return Path(path)
+
+
+def render(outcome: Outcome) -> str:
+    """Return the page as text."""
+    import jinja2  # noqa: PLC0415 - heavy, and only needed here
+    import plotly.offline  # noqa: PLC0415
+
+    folder = resources.files("pentapod.report")
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters.update(number=words.number, duration=words.duration, where=words.where)
+    template = environment.from_string((folder / "page.html.j2").read_text(encoding="utf-8"))
+    return template.render(
+        style=(folder / "style.css").read_text(encoding="utf-8"),
+        script=(folder / "page.js").read_text(encoding="utf-8"),
+        plotly=plotly.offline.get_plotlyjs(),
+        **_context(outcome),
+    )
+
+
+def _context(outcome: Outcome) -> dict[str, Any]:
+    """Return what the template shows."""
+    failed = [c for c in outcome.verdict.certificates if not c.passed]
+    status = "refused" if outcome.refusal is not None else "passed" if outcome.passed else "failed"
+    placed, program = outcome.find(PlacedPath), outcome.find(Program)
+    trajectory, toolpath = outcome.find(Trajectory), outcome.find(Toolpath)
+    signals = None
+    if program is not None and trajectory is not None and toolpath is not None:
+        signals = Signals.of(program, outcome.machine, trajectory, toolpath)
+    figures: dict[str, Figure] = {"scene": _scene(outcome, signals)}
+    if signals is not None:
+        figures["time"] = plots.time_figure(signals, outcome.machine)
+    return {
+        "job": outcome.job,
+        "machine": outcome.machine,
+        "status": status,
+        "certificates": sorted(outcome.verdict.certificates, key=lambda c: c.passed),
+        "failed": failed,
+        "refusal": outcome.refusal,
+        "facts": _facts(outcome, signals),
+        "worst": [] if signals is None else worst_places(signals, outcome.machine),
+        "brakes": [] if trajectory is None else brakes(trajectory.profile),
+        "placement": None if placed is None else _placement(placed.placement.transform),
+        "chosen_by": "" if placed is None else placed.placement.chosen_by,
+        "component": "" if placed is None else str(placed.component),
+        "stages": outcome.stages,
+        "seconds": sum(stage.seconds for stage in outcome.stages),
+        "program": program,
+        "provenance": _provenance(outcome),
+        "figures": as_script(figures),
+        "poses": as_script(_poses(outcome, signals)),
+    }
+
+
+def _facts(outcome: Outcome, signals: Signals | None) -> list[tuple[str, str]]:
+    """Return the few numbers at the top: name and value."""
+    toolpath, placed = outcome.find(Toolpath), outcome.find(PlacedPath)
+    program = outcome.find(Program)
+    facts: list[tuple[str, str]] = []
+    if program is not None:
+        facts.append(("machining time", words.duration(program.duration)))
+        facts.append(("rows", f"{len(program.legs):,}"))
+    if toolpath is not None:
+        facts.append(("waypoints", f"{len(toolpath):,}"))
+    if signals is not None:
+        facts.append(("smallest margin", words.number(float(signals.smallest_margins.min()))))
+    elif placed is not None:
+        facts.append(("smallest margin", words.number(placed.smallest_margin)))
+    if placed is not None:
+        facts.append(("component", str(placed.component)))
+    return facts
+
+
+def _scene(outcome: Outcome, signals: Signals | None) -> Figure:
+    """Return the 3D figure: in the machine where a placement was found, else the workpiece alone."""
+    mesh, toolpath = outcome.find(Mesh), outcome.find(Toolpath)
+    placed = outcome.find(PlacedPath)
+    transform = RigidTransform.identity() if placed is None else placed.placement.transform
+    traces = [] if mesh is None else [scene.part_trace(mesh, transform)]
+    if signals is not None:
+        margins = np.interp(signals.times, signals.times[signals.margin_rows], signals.smallest_margins)
+        traces += scene.path_traces(signals.tips, signals.cutting.astype(np.intp), margins)
+        row = _start_row(signals)
+        traces += scene.machine_traces(outcome.machine, signals.tips[row], signals.axes[row])
+    elif toolpath is not None and outcome.refusal is not None:
+        traces += scene.blamed_traces(toolpath.tips if placed is None else placed.tips, outcome.refusal)
+        if placed is not None:
+            worst = int(placed.margins.min(axis=1).argmin())
+            traces += scene.machine_traces(outcome.machine, placed.tips[worst], placed.axes[worst])
+    return scene.scene_figure(traces, down=placed is not None)
+
+
+def _start_row(signals: Signals) -> int:
+    """Return the row shown first: the one with the smallest margin."""
+    return int(signals.margin_rows[int(signals.smallest_margins.argmin())])
+
+
+def _poses(outcome: Outcome, signals: Signals | None) -> dict[str, Any]:
+    """Return the poses of the slider and what the page's script needs to draw the machine there, mm."""
+    if signals is None:
+        return {"poses": []}
+    machine = outcome.machine
+    rows = np.linspace(0, len(signals.times) - 1, min(_POSES, len(signals.times))).astype(np.intp)
+    rows = np.unique(np.append(rows, _start_row(signals)))
+    tips, axes = np.round(1e3 * signals.tips[rows], 3), np.round(signals.axes[rows], 6)
+    return {
+        "poses": [
+            {"t": round(float(t), 3), "tip": tip, "axis": axis, "segment": int(segment)}
+            for t, tip, axis, segment in zip(
+                signals.times[rows], tips.tolist(), axes.tolist(), signals.segments[rows], strict=True
+            )
+        ],
+        "start": int(np.searchsorted(rows, _start_row(signals))),
+        "moving": scene.MACHINE_TRACES,
+        "base": (1e3 * machine.pentapod.base).tolist(),
+        "offsets": (1e3 * machine.pentapod.offsets).tolist(),
+        "tool_length": 1e3 * machine.tool_length,
+        "shaft_end": 1e3 * machine.bodies.shaft_end,
+    }
+
+
+def _placement(transform: RigidTransform) -> dict[str, Any]:
+    matrix = transform.matrix
+    matrix[:3, 3] *= 1e3
+    angles = words.rotation_angles_deg(transform.rotation)
+    position = ", ".join(f"{value:.6f}" for value in matrix[:3, 3])
+    return {
+        "sentences": words.placement_sentences(transform),
+        "matrix": [[f"{value:.6f}".replace("-", "−") for value in row] for row in matrix],
+        "toml": "[placement]\n"
+        'mode = "fixed"\n'
+        f"position_mm = [{position}]\n"
+        f"rotation_deg = [{', '.join(f'{angle:.8f}' for angle in angles)}]",
+    }
+
+
+def _provenance(outcome: Outcome) -> list[tuple[str, str]]:
+    job, machine = outcome.job, outcome.machine
+    return [
+        ("job", f"{job.path.name}, {job.digest}"),
+        ("mesh", job.mesh_path.name),
+        ("machine", f"{machine.name}, {machine.digest}"),
+        ("controller", f"a row every {1e3 * machine.controller.period:g} ms, {machine.controller.interpolation}"),
+        ("pentapod", __version__),
+        ("Python, NumPy", f"{platform.python_version()}, {np.__version__}"),
+    ]

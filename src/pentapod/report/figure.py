@@ -1,0 +1,30 @@
+"""Figures as plotly.js reads them: plain dictionaries, arrays packed as base64 of 32-bit floats."""
+
+from __future__ import annotations
+
+import base64
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+Figure = dict[str, Any]
+
+LEG_COLOURS = ("#2a78d6", "#1baa7a", "#e08a00", "#c2417c", "#7a5cd6")
+"""One for each leg, the same in every figure; they hold on light and dark ground."""
+
+LIMIT_COLOUR = "#d2413a"
+QUIET_COLOUR = "#8a8f98"
+
+
+def packed(values: ArrayLike, dtype: str = "f4") -> dict[str, str]:
+    """Return an array (N,) as plotly.js takes it; f4 for floats, i4 for indices. NaN stays NaN (a gap)."""
+    array = np.ascontiguousarray(values, dtype=f"<{dtype}")
+    return {"dtype": dtype, "bdata": base64.b64encode(array.tobytes()).decode("ascii")}
+
+
+def as_script(content: Any) -> str:
+    """Return JSON that may stand within a <script> element."""
+    text = json.dumps(content, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
+    return text.replace("<", "\\u003c")

@@ -1,0 +1,96 @@
+"use strict";
+(() => {
+  const figures = JSON.parse(document.getElementById("figures").textContent);
+  const machine = JSON.parse(document.getElementById("poses").textContent);
+  const drawn = {};
+
+  const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+  // Colours of text and grid follow the page; the rest of a figure is the same on light and dark.
+  function theme(layout) {
+    const ink = css("--ink"), line = css("--line"), sheet = css("--sheet");
+    const change = {
+      "font.color": ink, "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)",
+      "hoverlabel.bgcolor": sheet, "hoverlabel.font.color": ink, "hoverlabel.bordercolor": line,
+    };
+    const axes = layout.scene ? ["scene.xaxis", "scene.yaxis", "scene.zaxis"]
+      : Object.keys(layout).filter((key) => /^[xy]axis\d*$/.test(key));
+    for (const axis of axes) {
+      change[`${axis}.gridcolor`] = line;
+      change[`${axis}.linecolor`] = line;
+    }
+    return change;
+  }
+
+  function draw(id) {
+    const holder = document.getElementById(id);
+    if (!holder || !figures[id]) return;
+    const { data, layout } = figures[id];
+    layout.font = { family: getComputedStyle(document.body).fontFamily, size: 12 };
+    const config = { responsive: true, displaylogo: false, scrollZoom: false };
+    drawn[id] = Plotly.newPlot(holder, data, layout, config).then(() => Plotly.relayout(holder, theme(layout)));
+  }
+
+  function retheme() {
+    for (const id of Object.keys(drawn)) Plotly.relayout(id, theme(figures[id].layout));
+  }
+
+  draw("scene");
+  draw("time");
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", retheme);
+  addEventListener("beforeprint", retheme);
+  addEventListener("afterprint", retheme);
+
+  const poses = machine.poses;
+  if (!poses.length) return;
+
+  const along = (p, a, s) => p.map((value, k) => value + s * a[k]);
+
+  // The ends of what moves: five legs, the platform line, the tool, the tip (as the report's scene has them).
+  function lines({ tip, axis }) {
+    const joints = machine.offsets.map((offset) => along(tip, axis, machine.tool_length - offset));
+    const nose = along(tip, axis, machine.shaft_end);
+    const first = machine.offsets.indexOf(Math.min(...machine.offsets));
+    const legs = machine.base.map(([x, y], k) => [[x, y, 0], joints[k]]);
+    return [...legs, [joints[first], nose], [nose, tip], [tip, tip]];
+  }
+
+  const slider = document.getElementById("slider"), readout = document.getElementById("readout");
+  const play = document.getElementById("play");
+  slider.max = poses.length - 1;
+
+  function show(index) {
+    const pose = poses[index], ends = lines(pose), count = figures.scene.data.length;
+    const coordinate = (k) => ends.map((line) => line.map((point) => point[k]));
+    const traces = ends.map((_, k) => count - machine.moving + k);
+    Plotly.restyle("scene", { x: coordinate(0), y: coordinate(1), z: coordinate(2) }, traces);
+    const [x, y, z] = pose.tip.map((value) => value.toFixed(1));
+    readout.textContent = `${pose.t.toFixed(2)} s, segment ${pose.segment}, tip (${x}, ${y}, ${z}) mm`;
+    slider.value = index;
+  }
+
+  let timer = 0;
+  function stop() {
+    clearInterval(timer);
+    timer = 0;
+    play.textContent = "▶";
+    play.setAttribute("aria-label", "play");
+  }
+  slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
+  play.addEventListener("click", () => {
+    if (timer) return stop();
+    play.textContent = "❚❚";
+    play.setAttribute("aria-label", "pause");
+    timer = setInterval(() => show((Number(slider.value) + 1) % poses.length), 80);
+  });
+  drawn.scene.then(() => show(machine.start));
+  if (drawn.time) {
+    drawn.time.then((holder) => holder.on("plotly_click", (event) => {
+      const t = event.points[0].x;
+      let best = 0;
+      poses.forEach((pose, k) => { if (Math.abs(pose.t - t) < Math.abs(poses[best].t - t)) best = k; });
+      stop();
+      show(best);
+    }));
+  }
+})();

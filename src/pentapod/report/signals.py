@@ -1,0 +1,88 @@
+"""Signals: what the emitted program does in time, computed again from its rows for the plots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from pentapod.arrays import Floats, Ints, set_frozen
+from pentapod.machine.machine import Machine
+from pentapod.planning.margins import Margins
+from pentapod.program.program import Program
+from pentapod.timing.trajectory import Trajectory
+from pentapod.toolpath.toolpath import SegmentKind, Toolpath
+
+MOST_MARGIN_ROWS = 40_000
+_CHUNK = 50_000
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """At the rows of a program (N): SI units, machine frame.
+
+    times (N,) s; legs, rates, accelerations (N, 5) m, m/s, m/s², as the controller moves between rows;
+    tips, axes (N, 3); speeds (N,) of the tip, m/s; speed_limits (N,): the feed that is asked for, or the
+    rapid rate; segments (N,) of the toolpath; cutting (N,). margins (K, M) at rows `margin_rows` (K,).
+    """
+
+    times: Floats
+    legs: Floats
+    rates: Floats
+    accelerations: Floats
+    tips: Floats
+    axes: Floats
+    speeds: Floats
+    speed_limits: Floats
+    segments: Ints
+    cutting: NDArray[np.bool_]
+    margins: Floats
+    margin_rows: Ints
+    margin_names: tuple[str, ...]
+
+    @classmethod
+    def of(cls, program: Program, machine: Machine, trajectory: Trajectory, toolpath: Toolpath) -> Signals:
+        """Compute the signals of a program. The trajectory only tells which segment is due at which time."""
+        times = program.times
+        rates, accelerations = _derivatives(program)
+        tips, axes = _poses(program, machine)
+        speeds = np.linalg.norm(np.gradient(tips, program.period, axis=0), axis=1)
+        segments = trajectory.segment(np.minimum(times, trajectory.duration))
+        feeds = np.array([min(s.feed, machine.rapid_velocity) for s in toolpath.segments])
+        kinds = np.array([s.kind == SegmentKind.CUT for s in toolpath.segments])
+        margins = Margins.of(machine, program.component)
+        step = max(1, -(-len(times) // MOST_MARGIN_ROWS))
+        rows = np.unique(np.append(np.arange(0, len(times), step), len(times) - 1)).astype(np.intp)
+        values = [margins(tips[k], axes[k]) for k in np.array_split(rows, -(-len(rows) // _CHUNK))]
+        names = tuple(limit.name for limit in margins.limits)
+        return cls(
+            times, program.legs, rates, accelerations, tips, axes, speeds, feeds[segments], segments,
+            kinds[segments], np.concatenate(values), rows, names,
+        )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        set_frozen(self, margin_names=tuple(self.margin_names))
+
+    @property
+    def smallest_margins(self) -> Floats:
+        """The smallest margin (K,) at each of `margin_rows`."""
+        return self.margins.min(axis=1)
+
+
+def _derivatives(program: Program) -> tuple[Floats, Floats]:
+    """Return leg rates and accelerations (N, 5) at the rows, as the controller interpolates."""
+    if program.interpolation == "cubic" and len(program.legs) > 2:
+        spline = CubicSpline(program.times, program.legs, bc_type="clamped")
+        return spline(program.times, 1), spline(program.times, 2)
+    steps = np.diff(program.legs, axis=0) / program.period
+    still = np.zeros((1, 5))
+    rates = np.concatenate([still, steps])
+    return rates, np.diff(np.concatenate([rates, still]), axis=0) / program.period
+
+
+def _poses(program: Program, machine: Machine) -> tuple[Floats, Floats]:
+    """Return tips and tool axes (N, 3), machine frame, by the forward kinematics in the program's component."""
+    position, direction = machine.pentapod.pose(program.legs, program.component)
+    return position + machine.tool_length * direction, -direction

@@ -1,0 +1,71 @@
+"""Numbers and placements in words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.verify.verdict import Certificate
+
+
+def number(value: float | None, unit: str = "") -> str:
+    """Return a number as a person writes it, with its unit; a dash for None."""
+    if value is None:
+        return "–"
+    digits = 6 if abs(value) >= 1000 else 4
+    return f"{value:.{digits}g} {unit}".replace("-", "−").rstrip()
+
+
+def duration(seconds: float) -> str:
+    """Return a time as "1 h 02 min", "3 min 05 s" or "28.1 s"."""
+    if seconds >= 3600:
+        return f"{int(seconds // 3600)} h {int(seconds % 3600 // 60):02d} min"
+    if seconds >= 60:
+        return f"{int(seconds // 60)} min {int(seconds % 60):02d} s"
+    return f"{seconds:.3g} s"
+
+
+def where(certificate: Certificate) -> str:
+    """Return the place of a certificate."""
+    place = certificate.where
+    parts = [
+        "" if place.time_s is None else f"{place.time_s:.3f} s",
+        "" if place.row is None else f"row {place.row}",
+        "" if place.segment is None else f"segment {place.segment}",
+    ]
+    return ", ".join(part for part in parts if part)
+
+
+def rotation_angles_deg(rotation: Floats) -> tuple[float, float, float]:
+    """Return the turns about the fixed x, then y, then z axis (degrees) that make up a rotation (3, 3)."""
+    x = np.arctan2(rotation[2, 1], rotation[2, 2])
+    y = np.arctan2(-rotation[2, 0], np.hypot(rotation[2, 1], rotation[2, 2]))
+    z = np.arctan2(rotation[1, 0], rotation[0, 0])
+    if np.hypot(rotation[2, 1], rotation[2, 2]) < 1e-9:  # only the sum or difference of x and z is known
+        x, z = np.arctan2(-rotation[1, 2], rotation[1, 1]), 0.0
+    return float(np.degrees(x)), float(np.degrees(y)), float(np.degrees(z))
+
+
+def placement_sentences(transform: RigidTransform) -> list[str]:
+    """Return where the part stands, in words, for someone in front of the machine."""
+    x, y, z = 1e3 * transform.translation
+    up = transform.rotation[:, 2]
+    lean = float(np.degrees(np.arccos(np.clip(-up[2], -1.0, 1.0))))
+    sentences = [
+        f"The origin of the mesh stands {z:.2f} mm below the base plane, at x = {x:.2f} mm, y = {y:.2f} mm.".replace(
+            "-", "−"
+        )
+    ]
+    if lean < 0.005:
+        sentences.append("Its z axis points straight up to the base.")
+    else:
+        azimuth = float(np.degrees(np.arctan2(up[1], up[0])))
+        sentences.append(
+            f"Its z axis leans {lean:.2f}° from straight up, towards {azimuth:.1f}° (0° is the machine's x, "
+            "90° its y).".replace("-", "−")
+        )
+    ahead = transform.rotation[:, 0]
+    turn = float(np.degrees(np.arctan2(ahead[1], ahead[0])))
+    sentences.append(f"Its x axis points towards {turn:.1f}° in plan.".replace("-", "−"))
+    return sentences
