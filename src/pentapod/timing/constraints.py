@@ -87,9 +87,7 @@ class Limits:
         below = np.abs(two[:, i] * first[:, j] - two[:, j] * first[:, i])
         with np.errstate(divide="ignore", invalid="ignore"):
             pairs = np.where(below > 0.0, above / below, np.inf).min(axis=1)
-            rates = np.square(self.velocity / one).min(
-                axis=1
-            )  # the limit over 0 is infinite, as it should be
+            rates = np.square(self.velocity / one).min(axis=1)  # the limit over 0 is infinite, as it should be
         return np.minimum(np.minimum(pairs, rates), speed**2)
 
     def shares(self, first: Floats, second: Floats, x: Floats, u: Floats, speed: Floats) -> Floats:

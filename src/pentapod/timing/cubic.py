@@ -67,9 +67,7 @@ def smooth_laws(
         laws = [piece.law(period) for piece in timed]
         shares = _shares(timed, laws, machine)
         exceeding = [
-            k
-            for k, (speed, acceleration) in enumerate(shares)
-            if max(speed.max(), acceleration.max()) > _GOAL
+            k for k, (speed, acceleration) in enumerate(shares) if max(speed.max(), acceleration.max()) > _GOAL
         ]
         if not exceeding:
             return [piece.profile for piece in timed], laws
@@ -83,9 +81,7 @@ def smooth_laws(
             else:
                 worst = max(float(shares[k][0].max()), float(np.sqrt(shares[k][1].max())))
                 timed[k] = replace(timed[k], slower=timed[k].slower * worst / _EXTRA)
-    return Unmended(
-        exceeding[0], Failure(-1, "the cubic interpolant exceeds a limit however slowly it is run")
-    )
+    return Unmended(exceeding[0], Failure(-1, "the cubic interpolant exceeds a limit however slowly it is run"))
 
 
 def _shares(timed: list[_Timed], laws: list[MotionLaw], machine: Machine) -> list[tuple[Floats, Floats]]:
@@ -117,9 +113,7 @@ def _shares(timed: list[_Timed], laws: list[MotionLaw], machine: Machine) -> lis
     return shares
 
 
-def _eased(
-    profile: PieceProfile, rows: Floats, shares: tuple[Floats, Floats], room: float
-) -> PieceProfile | Failure:
+def _eased(profile: PieceProfile, rows: Floats, shares: tuple[Floats, Floats], room: float) -> PieceProfile | Failure:
     """Return the profile with limits lowered around the rows (stations) where a share exceeds the goal."""
     speed, acceleration = (_factors(profile.s, rows, share, room) for share in shares)
     return profile.eased(acceleration, speed)

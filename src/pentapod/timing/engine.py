@@ -63,15 +63,11 @@ class _Problem:
         with _quiet():
             from toppra.algorithm import TOPPRA  # noqa: PLC0415 (heavy: imported when needed)
 
-            instance: Any = TOPPRA(
-                [_constraint(self)], _Interval(self.grid), self.grid, solver_wrapper="seidel"
-            )
+            instance: Any = TOPPRA([_constraint(self)], _Interval(self.grid), self.grid, solver_wrapper="seidel")
             _, speeds, _, controllable = instance.compute_parameterization(0.0, 0.0, return_data=True)
         lost = np.isnan(controllable).any(axis=1)
         if lost.any():
-            return Failure(
-                int(np.argmax(lost)), "from here no law comes to rest at the end (not controllable)"
-            )
+            return Failure(int(np.argmax(lost)), "from here no law comes to rest at the end (not controllable)")
         if speeds is None:
             return Failure(0, "a start from rest is not among the controllable speeds")
         x = np.square(np.asarray(speeds, dtype=np.float64))

@@ -27,14 +27,8 @@ def first_grid(piece: PieceLike, limits: Limits) -> Floats:
         rough = _rough(piece, limits, s)
         if not rough.any():
             break
-        s = split(s, rough)
+        s = np.sort(np.concatenate([s, (s[:-1] + s[1:])[rough] / 2.0]))
     return s
-
-
-def split(s: Floats, stages: Bools, where: float | Floats = 0.5) -> Floats:
-    """Return the grid with each marked stage (N,) split at the fraction `where` (or (N,)) of its length."""
-    points = s[:-1] + where * np.diff(s)
-    return np.sort(np.concatenate([s, points[stages]]))
 
 
 def _base_grid(piece: PieceLike, limits: Limits) -> Floats:
@@ -80,15 +74,15 @@ def _rough(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
     a, m, b = slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2)
     x = np.maximum(np.maximum(ceiling[a], ceiling[b]), ceiling[m])[:, None]
     # No stage can gain more than the whole of x over its length.
-    u = np.minimum(np.maximum(np.maximum(pushes[a], pushes[b]), pushes[m]), x[:, 0] / (2.0 * np.diff(s)))[
-        :, None
-    ]
+    u = np.minimum(np.maximum(np.maximum(pushes[a], pushes[b]), pushes[m]), x[:, 0] / (2.0 * np.diff(s)))[:, None]
     gain = np.minimum(2.0 * u * np.diff(s)[:, None], x)
     bulge = (
         np.abs(first[m] - (first[a] + first[b]) / 2.0) * u
         + np.abs(second[m] - (second[a] + second[b]) / 2.0) * x
         + np.abs(second[b] - second[a]) * gain / 4.0
     )
-    rate = (np.abs(first[m]) - np.maximum(np.abs(first[a]), np.abs(first[b]))) * np.sqrt(x)
-    rough = (bulge > _TOLERANCE * limits.acceleration) | (rate > 0.2 * _TOLERANCE * limits.velocity)
+    # x is linear within the stage, its ceiling v²/q′² is not: the chord between two ceilings lies above.
+    low, high = np.minimum(ceiling[a], ceiling[b])[:, None], np.maximum(ceiling[a], ceiling[b])[:, None]
+    rate = np.abs(first[m]) * np.sqrt(np.minimum(low + gain, high) / 2.0 + low / 2.0)
+    rough = (bulge > _TOLERANCE * limits.acceleration) | (rate > (1.0 + 0.1 * _TOLERANCE) * limits.velocity)
     return np.asarray(rough.any(axis=1))

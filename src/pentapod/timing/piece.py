@@ -10,10 +10,10 @@ import numpy as np
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.timing.constraints import Limits
 from pentapod.timing.engine import Failure, fastest
-from pentapod.timing.grid import first_grid, split
+from pentapod.timing.grid import first_grid
 from pentapod.timing.paths import PieceLike
 
-_BETWEEN = np.array([0.25, 0.5, 0.75])
+_BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 _REFINEMENTS = 4
 _SWITCHING_LOSS = 3e-4
 """Share of the duration that may be lost in stages too long to switch where the law should."""
@@ -75,9 +75,15 @@ class PieceProfile:
                 copy.__dict__[name] = self.__dict__[name]
         return copy
 
-    def refined(self, stages: Bools, where: Floats) -> PieceProfile:
-        """Return the problem on the grid with the marked stages (N,) split, at fractions `where` (N,)."""
-        s = split(self.s, stages, where)
+    def refined(self, exceeding: Bools, switching: Bools, where: Floats) -> PieceProfile:
+        """Return the problem on a finer grid.
+
+        Exceeding stages (N,) get gridpoints where they were measured, switching ones are split at the
+        fractions `where` (N,).
+        """
+        added = [self.s[:-1][switching] + (where * np.diff(self.s))[switching]]
+        added += [(self.s[:-1] + between * np.diff(self.s))[exceeding] for between in _BETWEEN]
+        s = np.unique(np.concatenate([self.s, *added]))
         return PieceProfile(self.piece, self.limits, s, *(np.interp(s, self.s, y) for y in self._columns))
 
     @property
@@ -159,10 +165,9 @@ def time_piece(
         fast, hard = rates > 1.0 + velocity_slack, accelerations > 1.0 + acceleration_slack
         if attempt < _REFINEMENTS:
             switching, where = profile.switching()
-            coarse = fast | hard | switching
-            if not coarse.any():
+            if not (fast | hard | switching).any():
                 return profile
-            profile = profile.refined(coarse, np.where(switching, where, 0.5)).solved()
+            profile = profile.refined(fast | hard, switching & ~(fast | hard), where).solved()
         elif not (fast | hard).any():
             return profile
         else:

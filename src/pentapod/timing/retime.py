@@ -44,9 +44,7 @@ def retime(
     """
     for name, margin in (("velocity_margin", velocity_margin), ("acceleration_margin", acceleration_margin)):
         if not 0.0 < margin < 0.5:
-            raise InputError(
-                "a margin is a fraction of a limit", key=name, value=margin, expected="0 < margin < 0.5"
-            )
+            raise InputError("a margin is a fraction of a limit", key=name, value=margin, expected="0 < margin < 0.5")
     cubic = machine.controller.interpolation == "cubic"
     period = machine.controller.period
     limits = Limits.of(
@@ -90,15 +88,11 @@ def _unfit(path: LegPathLike) -> Refusal | None:
         values = [piece(s, order) for order in range(3)]
         bad = ~np.isfinite(np.concatenate(values, axis=1)).all(axis=1)
         if bad.any():
-            return _refusal(
-                path, k, None, Failure(-1, "the leg path or a derivative is not finite"), float(s[bad][0])
-            )
+            return _refusal(path, k, None, Failure(-1, "the leg path or a derivative is not finite"), float(s[bad][0]))
         ends = values[0][[0, -1]]
         if previous is not None and np.abs(ends[0] - previous).max() > _JOIN_M:
             jump = 1e3 * float(np.abs(ends[0] - previous).max())
-            return _refusal(
-                path, k, None, Failure(-1, f"the legs jump by {jump:.3g} mm at an exact stop"), 0.0
-            )
+            return _refusal(path, k, None, Failure(-1, f"the legs jump by {jump:.3g} mm at an exact stop"), 0.0)
         if piece.length <= STILL_M and np.abs(ends[1] - ends[0]).max() > _JOIN_M:
             return _refusal(path, k, None, Failure(-1, "the tool turns about a tip that stands still"), 0.0)
         previous = ends[1]
@@ -124,17 +118,13 @@ def _segment(piece: PieceLike, s: float) -> int:
     return int(piece.section_segments[section])
 
 
-def _profile(
-    path: LegPathLike, indices: list[int], profiles: list[PieceProfile], laws: list[MotionLaw]
-) -> Profile:
+def _profile(path: LegPathLike, indices: list[int], profiles: list[PieceProfile], laws: list[MotionLaw]) -> Profile:
     starts = np.concatenate([[0.0], np.cumsum([law.duration for law in laws])])
     times = [np.interp(p.s, law.stations, law.times) for p, law in zip(profiles, laws, strict=True)]
     active = [p.active() for p in profiles]
     return Profile(
         times=np.concatenate([start + t for start, t in zip(starts, times, strict=False)]),
-        stations=np.concatenate(
-            [float(path.starts[k]) + p.s for k, p in zip(indices, profiles, strict=True)]
-        ),
+        stations=np.concatenate([float(path.starts[k]) + p.s for k, p in zip(indices, profiles, strict=True)]),
         speeds=np.concatenate([law(t, 1) for law, t in zip(laws, times, strict=True)]),
         active=np.concatenate([a for a, _ in active]),
         shares=np.concatenate([share for _, share in active]),
