@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -20,6 +21,7 @@ TILT = np.radians(5.0)
 TOLERANCES = {"tilt": TILT, "path_tolerance": 20e-6, "axis_tolerance": np.radians(0.1)}
 PERIOD = 1e-3
 TURN_RATE = 0.5
+ACCELERATION = 2.5
 TOP = 8e-3
 
 
@@ -64,9 +66,7 @@ def cut(y, x0, x1):
 def straight(kind, feed, start, stop, axis, axis_end=None, count=2):
     start, stop = np.asarray(start), np.asarray(stop)
     axis_end = axis if axis_end is None else axis_end
-    return Stroke(
-        kind, feed, lambda f: (start + f[:, None] * (stop - start), slerp(axis, axis_end, f)), count
-    )
+    return Stroke(kind, feed, lambda f: (start + f[:, None] * (stop - start), slerp(axis, axis_end, f)), count)
 
 
 def turn(pivot_tip, axis, axis_end, count):
@@ -83,11 +83,12 @@ def turn(pivot_tip, axis, axis_end, count):
 def strokes():
     """Plunge, two passes 0.5 mm apart with a link, retract along the plunge's way, turn on the spot, and again."""
     rapid = SegmentKind.RAPID
-    at = lambda x, y: tuple(v[0] for v in on_surface(np.array([x]), np.array([y])))
+
+    def at(x, y):
+        return (v[0] for v in on_surface(np.array([x]), np.array([y])))
+
     up = np.array([0.0, 0.0, TOP])
     a, na = at(-0.012, 0.0)
-    c, nc = at(0.012, 0.0)
-    d, nd = at(0.012, 5e-4)
     e, ne = at(-0.012, 5e-4)
     tilted = np.array([0.0, np.sin(0.2), np.cos(0.2)])
     turned_tip = a + up + BALL * (na - tilted)
@@ -106,23 +107,22 @@ def strokes():
 
 
 def toolpath_of(parts):
-    return Toolpath(
-        tuple(Segment(p.kind, *p.pose(np.linspace(0, 1, p.count)), p.feed) for p in parts), pivot=BALL
-    )
+    return Toolpath(tuple(Segment(p.kind, *p.pose(np.linspace(0, 1, p.count)), p.feed) for p in parts), pivot=BALL)
 
 
 def quintic(f):
     return f**3 * (10 - 15 * f + 6 * f * f)
 
 
-def timed(parts, feed_factor=0.98):
+def timed(parts, feed_factor=0.98, cap=RAPID):
     """Poses at the period, each stroke from rest to rest by a quintic whose peak is the stroke's feed."""
     tips, axes = [], []
     for part in parts:
         fine_tips, fine_axes = part.pose(np.linspace(0, 1, 4001))
         length, turn = (np.linalg.norm(np.diff(x, axis=0), axis=1).sum() for x in (fine_tips, fine_axes))
-        speed = min(part.feed, RAPID) * feed_factor
-        rows = int(np.ceil(1.875 * max(length / speed, turn / TURN_RATE) / PERIOD))
+        speed = min(part.feed, cap) * feed_factor
+        slowest = max(1.875 * length / speed, 1.875 * turn / TURN_RATE, np.sqrt(5.774 * length / ACCELERATION))
+        rows = int(np.ceil(slowest / PERIOD))
         # Even in arc length, so that the quintic's speed is the tip's.
         arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(fine_tips, axis=0), axis=1))])
         f = np.interp(quintic(np.arange(rows + 1) / rows), arc / arc[-1], np.linspace(0, 1, 4001))
@@ -147,7 +147,7 @@ def tilted_axes(axes, angle, azimuth=0.7):
     return np.cos(angle) * axes + np.sin(angle) * side
 
 
-def program_of(machine, tips, axes, *, lean=0.0, interpolation="cubic", component=Component(1, 1)):
+def program_of(machine, tips, axes, *, lean=0.0, interpolation="cubic"):
     """A program whose tool leans by a constant angle about the pivot."""
     leaned = tilted_axes(axes, lean)
     leaned_tips = tips + BALL * (axes - leaned)
@@ -156,7 +156,7 @@ def program_of(machine, tips, axes, *, lean=0.0, interpolation="cubic", componen
     position = place.apply(leaned_tips) - machine.tool_length * direction
     legs = quantised(machine.pentapod.leg_lengths(position, direction))
     provenance = Provenance(machine.name, machine.digest, "job-1", "0")
-    return Program(PERIOD, legs, interpolation, component, place, provenance)
+    return Program(PERIOD, legs, interpolation, Component(1, 1), place, provenance)
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class Case:
 
 
 def good_case(lean=0.0, interpolation="cubic"):
-    machine = replace(load_machine("desk"), rapid_velocity=RAPID)
+    machine = replace(load_machine(Path(__file__).with_name("stand.toml")), rapid_velocity=RAPID)
     parts = strokes()
     tips, axes = timed(parts)
     return Case(

@@ -21,9 +21,7 @@ def clearance(replay: Replay) -> Finding:
     whose middle is farther apart than this bound can use up are never looked into.
     """
     machine, (position, direction) = replay.machine, replay.pose
-    reach = np.array(
-        [machine.pentapod.offsets.min(), max(machine.pentapod.offsets.max(), machine.tool_length)]
-    )
+    reach = np.array([machine.pentapod.offsets.min(), max(machine.pentapod.offsets.max(), machine.tool_length)])
     ends = position[:, None, :] + reach[:, None] * direction[:, None, :]
     chords = _SLACK * np.linalg.norm(np.diff(ends, axis=0), axis=2).max(axis=1)
     way = np.concatenate([[0.0], np.cumsum(chords)])

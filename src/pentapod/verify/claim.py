@@ -49,5 +49,6 @@ class Claim:
         found = self.judge(replay)
         if found is None:
             return None
-        value = found.value if found.value is not None and np.isfinite(found.value) else None
-        return Certificate(self.name, found.passed, value, found.bound, found.unit, found.where, found.method)
+        # Plain numbers, as the verdict's file wants them; what is not a number has no value.
+        value, bound = (None if x is None or not np.isfinite(x) else float(x) for x in (found.value, found.bound))
+        return Certificate(self.name, bool(found.passed), value, bound, found.unit, found.where, found.method)

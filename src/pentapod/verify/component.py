@@ -10,8 +10,8 @@ from pentapod.verify.claim import Claim, Finding
 from pentapod.verify.replay import Replay
 
 _METHOD = (
-    "proven for all times: {what} from Bernstein coefficients of the discriminants of the forward "
-    "kinematics, rounded outwards"
+    "component {component}; proven for all times: {what} by Bernstein coefficients of the discriminants of the "
+    "forward kinematics, rounded outwards, even if each leg is off by {error:g} mm at any time"
 )
 
 
@@ -34,7 +34,7 @@ def _finding(replay: Replay, values: Floats, proof: ComponentProof, unit: str, w
     worst = int(np.argmin(values))
     passed = bool((values > 0.0).all())
     where = replay.place(2 * worst)
-    method = f"component {proof.component}; " + _METHOD.format(what=what)
+    method = _METHOD.format(component=proof.component, what=what, error=1e3 * replay.path_tolerance)
     if not passed:
         method += f"; not proven on {int((values <= 0.0).sum())} of {len(values)} intervals"
     return Finding(passed, float(values[worst]), 0.0, unit, where, method)

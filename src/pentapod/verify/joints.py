@@ -17,22 +17,17 @@ _METHOD = (
 def base_cones(replay: Replay) -> Finding:
     """Judge the angle between each leg and the axis of its base joint's cone."""
     legs = replay.machine.pentapod.leg_vectors(*replay.pose)
-    angles = _angles(legs, replay.machine.joints.base_axes)
-    return _most(replay, angles, replay.machine.joints.base_cone)
+    return _finding(replay, _angles(legs, replay.machine.joints.base_axes), replay.machine.joints.base_cone, sign=1)
 
 
 def platform_least(replay: Replay) -> Finding:
     """Judge that no leg folds too close to the tool axis."""
-    found = _most(replay, -_platform_angles(replay), -replay.machine.joints.platform_range[:, 0])
-    value, bound = found.value, found.bound
-    assert value is not None
-    assert bound is not None
-    return Finding(found.passed, -value, -bound, found.unit, found.where, found.method)
+    return _finding(replay, _platform_angles(replay), replay.machine.joints.platform_range[:, 0], sign=-1)
 
 
 def platform_most(replay: Replay) -> Finding:
     """Judge that no leg opens too far from the tool axis."""
-    return _most(replay, _platform_angles(replay), replay.machine.joints.platform_range[:, 1])
+    return _finding(replay, _platform_angles(replay), replay.machine.joints.platform_range[:, 1], sign=1)
 
 
 def _platform_angles(replay: Replay) -> Floats:
@@ -42,14 +37,16 @@ def _platform_angles(replay: Replay) -> Floats:
     return _angles(replay.machine.pentapod.leg_vectors(position, direction), direction[:, None, :])
 
 
-def _most(replay: Replay, angles: Floats, limit: Floats) -> Finding:
-    """Judge angles (M, 5) against largest ones (5,), with what may happen between the samples added."""
-    between = np.maximum(np.maximum(angles[:-1:2], angles[1::2]), angles[2::2]) + excursion(angles)
-    interval, leg = np.unravel_index(int(np.argmax(between - limit)), between.shape)
-    value, bound = float(between[interval, leg]), float(limit[leg])
-    sample = 2 * int(interval) + int(np.argmax(angles[2 * interval : 2 * interval + 3, leg]))
+def _finding(replay: Replay, angles: Floats, limit: Floats, *, sign: int) -> Finding:
+    """Judge angles (M, 5) against limits (5,), the largest (sign 1) or the least ones (sign −1)."""
+    high = sign * angles
+    between = np.maximum(np.maximum(high[:-1:2], high[1::2]), high[2::2]) + excursion(angles)
+    interval, leg = np.unravel_index(int(np.argmax(between - sign * limit)), between.shape)
+    value, bound = sign * float(between[interval, leg]), float(limit[leg])
+    sample = 2 * int(interval) + int(np.argmax(high[2 * interval : 2 * interval + 3, leg]))
     method = _METHOD.format(leg=int(leg) + 1)
-    return Finding(value <= bound, np.degrees(value), np.degrees(bound), "deg", replay.place(sample), method)
+    passed = sign * value <= sign * bound
+    return Finding(passed, np.degrees(value), np.degrees(bound), "deg", replay.place(sample), method)
 
 
 def _angles(vectors: Floats, units: Floats) -> Floats:

@@ -17,13 +17,13 @@ import numpy as np
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length
-from pentapod.verify.visits import Course, find_visits
+from pentapod.verify.visits import Course, Visits, find_visits
 
 # Where the path turns on the spot, an axis this far off counts as much as a pivot off by the tolerance.
 _AXIS_SCALE_RAD = 0.05
-# Radii of the search, in path tolerances: a good program is found by the first, the others serve to say how
-# far off a bad one is.
-_RADII = (1.05, 8.0, 60.0)
+# Radii of the search, in path tolerances. The first finds a good program; the others find what to say about
+# a bad one: where it leaves the toolpath, and how far.
+_RADII = (1.05, 0.3, 8.0, 60.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,23 +53,34 @@ def match(motion: Course, path: Course, tolerance: float) -> Match:
     turning = _turning(path, tolerance)
     near_turn = np.append(turning, False) | np.append(False, turning)
     weight = np.where(near_turn, (tolerance / _AXIS_SCALE_RAD) ** 2, 0.0)
-    tried = [None if tolerance <= 0.0 else find_visits(motion, path, arc, _RADII[0] * tolerance, weight)]
-    for radius in _RADII[1:]:
-        if tried[-1] is None or not tried[-1].missed.any():
+    best: Match | None = None
+    least = (np.inf, np.inf)
+    for radius in _RADII:
+        visits = find_visits(motion, path, arc, radius * tolerance, weight)
+        if visits is None:
+            continue
+        found = _measure(motion, path, visits, _places(motion, path, turning, tolerance, visits.times))
+        distances = np.concatenate([found.distances, found.waypoint_distances])
+        badness = (float((distances > tolerance).sum()), float(distances.max()))
+        if badness < least:
+            best, least = found, badness
+        if not badness[0]:
             break
-        tried.append(find_visits(motion, path, arc, radius * tolerance, weight))
-    done = [visits for visits in tried if visits is not None]
-    if done:
-        best = min(done, key=lambda visits: int(visits.missed.sum()))
-        times, missed = best.times, best.missed
-    else:
-        times, missed = _by_arc_length(motion.points, arc), np.ones(len(arc), dtype=np.bool_)
+    if best is None:
+        visits = Visits(_by_arc_length(motion.points, arc), np.ones(len(arc), dtype=np.bool_))
+        best = _measure(motion, path, visits, _places(motion, path, turning, tolerance, visits.times))
+    return best
+
+
+def _places(motion: Course, path: Course, turning: Bools, tolerance: float, times: Floats) -> Floats:
+    """Return the place (M,) of each sample, from the visits (n,) of the waypoints."""
     interval = np.searchsorted(times, np.arange(len(motion.points)), side="right") - 1
-    interval = np.clip(interval, 0, len(arc) - 2)
+    interval = np.clip(interval, 0, len(times) - 2)
     places = interval + _fractions(motion, path, turning, tolerance, interval)
     # The matching begins and ends with both curves, and never turns back.
-    places[0], places[-1] = 0.0, len(arc) - 1.0
-    return _measure(motion, path, times, missed, np.maximum.accumulate(places))
+    places[0], places[-1] = 0.0, len(times) - 1.0
+    late, early = np.maximum.accumulate(places), np.minimum.accumulate(places[::-1])[::-1]
+    return 0.5 * (late + early)
 
 
 def _turning(path: Course, tolerance: float) -> Bools:
@@ -82,13 +93,12 @@ def _turning(path: Course, tolerance: float) -> Bools:
 def _by_arc_length(samples: Floats, arc: Floats) -> Floats:
     """Return visits (n,) by the fraction of the way: for motions that no search can match."""
     way = arc_length(samples)
-    return np.interp(
-        arc / max(arc[-1], 1e-300), way / max(way[-1], 1e-300), np.arange(len(way), dtype=np.float64)
-    )
+    return np.interp(arc / max(arc[-1], 1e-300), way / max(way[-1], 1e-300), np.arange(len(way), dtype=np.float64))
 
 
-def _measure(motion: Course, path: Course, times: Floats, missed: Bools, places: Floats) -> Match:
+def _measure(motion: Course, path: Course, visits: Visits, places: Floats) -> Match:
     """Return the matching that has these visits (n,) and places (M,), measured."""
+    times = visits.times
     points, axes = _at(path, places)
     chord = np.minimum(times.astype(np.intp), len(motion.points) - 2)
     at = (times - chord)[:, None]
@@ -96,7 +106,7 @@ def _measure(motion: Course, path: Course, times: Floats, missed: Bools, places:
     pointed = motion.axes[chord] * (1.0 - at) + motion.axes[chord + 1] * at
     return Match(
         times=times,
-        missed=missed,
+        missed=visits.missed,
         places=places,
         arcs=np.interp(places, np.arange(len(path.points)), arc_length(path.points)),
         distances=np.linalg.norm(motion.points - points, axis=1),

@@ -12,8 +12,7 @@ def machine(replay: Replay) -> Finding:
     made_for, judged = replay.program.provenance, replay.machine
     passed = made_for.machine == judged.name and made_for.machine_digest == judged.digest
     method = (
-        f"header: made for {made_for.machine} ({made_for.machine_digest}), "
-        f"judged on {judged.name} ({judged.digest})"
+        f"header: made for {made_for.machine} ({made_for.machine_digest}), judged on {judged.name} ({judged.digest})"
     )
     return Finding(passed, None, None, "", Place(), method)
 

@@ -42,8 +42,17 @@ class Replay:
 
     @cached_property
     def proof(self) -> ComponentProof:
-        """What is proven about the component on each interval between rows."""
-        return certify_component(self.machine.pentapod, self.motion.bernstein, self.program.component)
+        """What is proven about the component on each interval between rows.
+
+        For the program and for every motion whose legs stay within the path tolerance of it: legs that pass
+        through a singularity look like legs that turn back just before it.
+        """
+        return certify_component(
+            self.machine.pentapod,
+            self.motion.bernstein,
+            self.program.component,
+            leg_error=self.path_tolerance,
+        )
 
     @cached_property
     def pose(self) -> tuple[Floats, Floats]:

@@ -30,9 +30,7 @@ def feed(replay: Replay, kind: SegmentKind) -> Finding | None:
         f"{ALLOWANCE:.1%} allowed"
     )
     passed = value <= bound * (1.0 + ALLOWANCE)
-    return Finding(
-        passed, _MM_MIN * value, _MM_MIN * bound, "mm/min", replay.place(int(chords[worst])), method
-    )
+    return Finding(passed, _MM_MIN * value, _MM_MIN * bound, "mm/min", replay.place(int(chords[worst])), method)
 
 
 def _limits(replay: Replay) -> tuple[Floats, Ints]:

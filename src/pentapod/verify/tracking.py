@@ -76,9 +76,7 @@ def start(replay: Replay) -> Finding:
 def end(replay: Replay) -> Finding:
     """Judge that the program ends where the toolpath ends."""
     distance = float(np.linalg.norm(replay.pivots[-1] - replay.toolpath.pivots[-1]))
-    return _within(
-        replay, distance, len(replay.pivots) - 1, "pivot of the last row to that of the last waypoint"
-    )
+    return _within(replay, distance, len(replay.pivots) - 1, "pivot of the last row to that of the last waypoint")
 
 
 def _within(replay: Replay, value: float, sample: float, method: str) -> Finding:

@@ -37,9 +37,7 @@ class Course:
     axes: Floats
 
 
-def find_visits(
-    motion: Course, path: Course, arc: Floats, radius: float, axis_weight: Floats
-) -> Visits | None:
+def find_visits(motion: Course, path: Course, arc: Floats, radius: float, axis_weight: Floats) -> Visits | None:
     """Return when the motion passes each waypoint of the path within `radius` metres, as early as possible.
 
     arc (n,): arc length of the path at the waypoints, metres. axis_weight (n,) in m²/rad²: what the angle of
@@ -53,16 +51,17 @@ def find_visits(
     passes = _passes(motion, path, axis_weight, radius, pairs)
     chosen = _in_order(passes, n)
     seen = chosen >= 0
-    low, high, best = (
-        np.where(seen, value[chosen], np.nan) for value in (passes.enter, passes.leave, passes.best)
-    )
+    low, high, best = np.zeros(n), np.full(n, float(last)), np.zeros(n)
+    low[seen], high[seen] = passes.enter[chosen[seen]], passes.leave[chosen[seen]]
+    best[seen] = passes.best[chosen[seen]]
+    # Whatever else is seen, both begin together and end together.
     seen[[0, -1]] = True
     low[0] = high[0] = best[0] = 0.0
     low[-1] = high[-1] = best[-1] = last
     # The earliest and the latest times that keep the order, and the closest moments squeezed between them.
-    low = np.maximum.accumulate(np.where(seen, low, 0.0))
-    high = np.minimum.accumulate(np.where(seen, high, last)[::-1])[::-1]
-    best = np.maximum.accumulate(np.where(seen, best, 0.0))
+    best = _settled(motion, path, axis_weight, chosen, passes, best)
+    low, best = np.maximum.accumulate(low), np.maximum.accumulate(best)
+    high = np.minimum.accumulate(high[::-1])[::-1]
     times = np.minimum(np.maximum(best, low), high)
     times = np.maximum.accumulate(np.where(seen, times, np.interp(arc, arc[seen], times[seen])))
     return Visits(np.clip(times, 0.0, last), chosen < 0)
@@ -104,9 +103,7 @@ def _tree(points: Floats) -> KDTree:
     return KDTree(points, balanced_tree=False, compact_nodes=False)
 
 
-def _passes(
-    motion: Course, path: Course, axis_weight: Floats, radius: float, pairs: tuple[Ints, Ints]
-) -> _Passes:
+def _passes(motion: Course, path: Course, axis_weight: Floats, radius: float, pairs: tuple[Ints, Ints]) -> _Passes:
     """Return the stays within the radius, from pairs that are sorted by waypoint and chord."""
     waypoint, chord = pairs
     step, away = _differences(motion.points, path.points, chord, waypoint)
@@ -129,13 +126,11 @@ def _passes(
     first = np.flatnonzero(new)
     last = np.append(first[1:], len(new)) - 1
     order = np.lexsort((cost, np.cumsum(new)))
-    best = (closest + chord)[order[first]]
-    return _Passes(waypoint[first], (enter + chord)[first], (leave + chord)[last], best)
+    times: list[Floats] = [np.add(chord, at, dtype=np.float64) for at in (enter, leave, closest)]
+    return _Passes(waypoint[first], times[0][first], times[1][last], times[2][order[first]])
 
 
-def _closest(
-    motion: Course, path: Course, axis_weight: Floats, waypoint: Ints, chord: Ints
-) -> tuple[Floats, Floats]:
+def _closest(motion: Course, path: Course, axis_weight: Floats, waypoint: Ints, chord: Ints) -> tuple[Floats, Floats]:
     """Return the place (P,) in [0, 1] on each chord nearest its waypoint, and the squared distance there."""
     step, away = _differences(motion.points, path.points, chord, waypoint)
     turn, apart = _differences(motion.axes, path.axes, chord, waypoint)
@@ -164,6 +159,39 @@ def _in_order(passes: _Passes, n: int) -> Ints:
             chosen[k] = c
             now = max(now, enter[c])
     return np.array(chosen, dtype=np.intp)
+
+
+def _settled(motion: Course, path: Course, axis_weight: Floats, chosen: Ints, passes: _Passes, best: Floats) -> Floats:
+    """Return the closest moments (n,) where those of neighbouring waypoints contradict or may be mistaken.
+
+    Out of order are they where waypoints lie closer together than the motion is exact; mistaken where the
+    axis turns there and back on the spot. Such runs of waypoints are assigned together, in order, at the least
+    sum of squared distances, each within its own stay: a shortest path through the chords of the stays.
+    """
+    late = np.maximum.accumulate(best) > best
+    early = np.minimum.accumulate(best[::-1])[::-1] < best
+    doubtful = (chosen >= 0) & (late | early | (axis_weight > 0.0))
+    doubtful[[0, -1]] = False
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], doubtful, [False]])))
+    settled = best.copy()
+    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        stays: list[tuple[int, Floats, Floats]] = []
+        for k in range(start, stop):
+            first = int(passes.enter[chosen[k]])
+            last = min(int(passes.leave[chosen[k]]), len(motion.points) - 2)
+            chords = np.arange(first, last + 1)
+            place, cost = _closest(motion, path, axis_weight, np.full(len(chords), k), chords)
+            if stays:
+                before, _, sums = stays[-1]
+                reach = np.minimum(chords - before, len(sums) - 1)
+                cost = cost + np.where(reach >= 0, np.minimum.accumulate(sums)[np.maximum(reach, 0)], np.inf)
+            stays.append((first, place, cost))
+        limit = np.inf
+        for k in range(stop - 1, start - 1, -1):
+            first, place, cost = stays[k - start]
+            at = int(np.argmin(cost[: max(1, int(min(limit - first + 1, len(cost))))]))
+            limit, settled[k] = first + at, first + at + place[at]
+    return settled
 
 
 def _differences(samples: Floats, targets: Floats, chord: Ints, waypoint: Ints) -> tuple[Floats, Floats]:

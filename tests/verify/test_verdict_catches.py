@@ -1,0 +1,422 @@
+"""A good program passes; each corrupted one fails, and by the right claim."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import replay_cases as cases
+
+from pentapod.errors import ArrayError, InputError, ProgramError
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics import Component
+from pentapod.program import quantised, write_csv
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+from pentapod.verify import CLAIMS, verify, write_verdict
+
+GEOMETRY = {"tip deviation", "toolpath covered"}
+FEEDS = {"feed on cuts", "feed on links", "rapid rate"}
+
+
+def judge(case, **changes):
+    given = {"job_digest": "job-1", **cases.TOLERANCES, **changes}
+    return verify(case.program, case.machine, case.toolpath, **given)
+
+
+def failed(verdict):
+    assert verdict.passed == all(c.passed for c in verdict.certificates)
+    return {c.claim for c in verdict.certificates if not c.passed}
+
+
+def with_legs(case, legs):
+    return replace(case, program=replace(case.program, legs=quantised(legs)))
+
+
+def with_poses(case, tips, axes, **options):
+    given = {"lean": 0.5 * cases.TILT, "interpolation": case.program.interpolation, **options}
+    return replace(case, program=cases.program_of(case.machine, tips, axes, **given))
+
+
+def on_machine(case, **changes):
+    """The same rows, sent out for a machine that differs."""
+    machine = replace(case.machine, **changes)
+    provenance = replace(case.program.provenance, machine_digest=machine.digest)
+    return replace(case, machine=machine, program=replace(case.program, provenance=provenance))
+
+
+def rows_of(case, waypoint):
+    """The row whose tip is nearest to a waypoint of the toolpath."""
+    return int(np.argmin(np.linalg.norm(case.tips - case.toolpath.tips[waypoint], axis=1)))
+
+
+def middle_of_first_cut(case):
+    return rows_of(case, case.toolpath.starts[1] + 30)
+
+
+@pytest.fixture(params=["cubic", "linear"])
+def good(request):
+    return request.getfixturevalue(request.param)
+
+
+def test_good_program_passes_every_claim(good):
+    verdict = judge(good)
+    assert failed(verdict) == set()
+    assert {c.claim for c in verdict.certificates} == {claim.name for claim in CLAIMS}
+    assert all(c.method for c in verdict.certificates)
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.99 * cases.TILT])
+def test_any_lean_within_the_cone_passes(lean):
+    assert judge(cases.good_case(lean=lean)).passed
+
+
+def test_dwell_is_allowed(good):
+    stop = rows_of(good, good.toolpath.starts[4])
+    legs = good.program.legs
+    dwelling = np.concatenate([legs[: stop + 1], np.repeat(legs[stop : stop + 1], 300, axis=0), legs[stop + 1 :]])
+    assert failed(judge(with_legs(good, dwelling))) == set()
+
+
+@pytest.mark.parametrize("leg", range(5))
+def test_leg_shifted_by_50_micrometres(good, leg):
+    legs = good.program.legs.copy()
+    legs[:, leg] += 50e-6
+    assert failed(judge(with_legs(good, legs))) >= {"tip deviation"}
+
+
+def test_two_rows_swapped(good):
+    row, legs = middle_of_first_cut(good), good.program.legs.copy()
+    legs[[row, row + 1]] = legs[[row + 1, row]]
+    assert failed(judge(with_legs(good, legs))) >= {"leg accelerations"}
+
+
+def test_row_lost(good):
+    legs = np.delete(good.program.legs, middle_of_first_cut(good), axis=0)
+    assert failed(judge(with_legs(good, legs))) == {"leg accelerations", "feed on cuts"}
+
+
+@pytest.mark.parametrize("name", ["-+", "+-", "--"])
+def test_mirror_component(good, name):
+    mirrored = replace(good, program=replace(good.program, component=Component.parse(name)))
+    assert failed(judge(mirrored)) >= {"tip deviation", "starts at the toolpath's start"}
+
+
+def test_wrong_machine_by_digest(good):
+    other = replace(good.program.provenance, machine_digest="0123456789abcdef")
+    assert failed(judge(replace(good, program=replace(good.program, provenance=other)))) == {"machine"}
+
+
+def test_wrong_machine_by_geometry(good):
+    base = np.array(good.machine.pentapod.base)
+    base[3, 0] += 200e-6
+    pentapod = type(good.machine.pentapod).quadratic(base, good.machine.pentapod.delta)
+    other = replace(good.machine, pentapod=pentapod)
+    assert failed(judge(replace(good, machine=other))) >= {"machine", "tip deviation"}
+
+
+def test_wrong_job(good):
+    assert failed(judge(good, job_digest="job-2")) == {"job"}
+
+
+def test_job_is_not_asked_without_a_digest(good):
+    assert "job" not in {c.claim for c in judge(good, job_digest=None).certificates}
+
+
+def test_feed_5_percent_over_everywhere(good):
+    # Planned at 98 % of every feed.
+    faster = replace(good.program, period=good.program.period * 0.98 / 1.05)
+    assert failed(judge(replace(good, program=faster))) == FEEDS
+
+
+@pytest.mark.parametrize(
+    ("kind", "claim"), [("cut", "feed on cuts"), ("link", "feed on links"), ("rapid", "rapid rate")]
+)
+def test_feed_5_percent_over_on_one_kind(good, kind, claim):
+    def hurried(stroke):
+        speed = min(stroke.feed, cases.RAPID) * 1.05 / 0.98
+        return replace(stroke, feed=speed) if stroke.kind == kind else stroke
+
+    cap = cases.RAPID * (1.1 if kind == "rapid" else 1.0)
+    tips, axes = cases.timed([hurried(stroke) for stroke in cases.strokes()], cap=cap)
+    assert failed(judge(with_poses(good, tips, axes))) == {claim}
+
+
+def test_feed_allowance_is_small(good):
+    faster = replace(good.program, period=good.program.period * 0.98 / 1.004)
+    assert failed(judge(replace(good, program=faster))) == {"feed on cuts"}
+
+
+def test_tilt_beyond_the_cone(good):
+    leaned = with_poses(good, good.tips, good.axes, lean=cases.TILT + np.radians(0.15))
+    assert failed(judge(leaned)) == {"axis deviation"}
+
+
+def test_turn_on_the_spot_left_out(good):
+    """The toolpath nods by 20° while the pivot stands; the program does not."""
+    k = int(good.toolpath.starts[1])
+    tip, axis = good.toolpath.tips[k], good.toolpath.axes[k]
+    nod = cases.turn(tip, axis, cases.tilted_axes(axis[None], np.radians(20.0))[0], 9).pose(np.linspace(0, 1, 9))
+    link = Segment(SegmentKind.LINK, *(np.concatenate([x, x[-2::-1]]) for x in nod), cases.LINK_FEED)
+    first, *others = good.toolpath.segments
+    nodding = Toolpath((first, link, *others), good.toolpath.pivot)
+    assert failed(judge(replace(good, toolpath=nodding))) == {"axis deviation"}
+
+
+def through(case, position, direction):
+    legs = case.machine.pentapod.leg_lengths(position, direction)
+    return judge(with_legs(case, legs))
+
+
+def test_path_through_s_zero(good):
+    robot, delta = good.machine.pentapod, good.machine.pentapod.delta
+    position, direction = robot.pose(good.program.legs[0], good.program.component)
+    u, _, w = direction
+    normal = np.array([delta * w, 0.0, 1.0 - delta * u])
+    reduced = position + robot.offsets[2] * direction - np.append(robot.base[2], 0.0)
+    depth = reduced @ normal / (normal @ normal)
+    way = np.linspace(0.0, 1.1, 4000)[:, None]
+    names = failed(through(good, position - way * depth * normal, np.broadcast_to(direction, (4000, 3))))
+    assert "component kept, S" in names
+    assert "component kept, w" not in names
+
+
+def test_path_through_w_zero(good):
+    position, direction = good.machine.pentapod.pose(good.program.legs[0], good.program.component)
+    angle = np.linspace(0.0, 0.55 * np.pi, 4000)[:, None]
+    side = np.array([0.0, 1.0, 0.0]) - direction[1] * direction
+    side /= np.linalg.norm(side)
+    names = failed(
+        through(good, np.broadcast_to(position, (4000, 3)), np.cos(angle) * direction + np.sin(angle) * side)
+    )
+    assert "component kept, w" in names
+
+
+def test_no_pose_at_all(good):
+    legs = good.program.legs.copy()
+    legs[1000] = 0.02
+    verdict = judge(with_legs(good, legs))
+    assert failed(verdict) >= {"component kept, S", "tip deviation", "axis deviation", "legs not too short"}
+    write = json.dumps(verdict.to_dict(), allow_nan=False)
+    assert "NaN" not in write
+
+
+def spark_out():
+    """Three passes over the same line: forth, back, forth."""
+    lift = cases.straight(SegmentKind.RAPID, np.inf, (0.0, 0.0, 0.02), (0.0, 0.0, 4e-3), np.array([0.0, 0.0, 1.0]))
+    forth, back = cases.cut(0.0, 0.0, 0.01), cases.cut(0.0, 0.01, 0.0)
+    return lift, forth, back
+
+
+def test_skipped_passes_on_the_same_line(good):
+    lift, forth, back = spark_out()
+    tips, axes = cases.timed([lift, forth])
+    all_three = replace(good, toolpath=cases.toolpath_of([lift, forth, back, forth]))
+    assert failed(judge(with_poses(all_three, *cases.timed([lift, forth, back, forth])))) == set()
+    assert failed(judge(with_poses(all_three, tips, axes))) == {"toolpath covered"}
+
+
+def test_skipped_pass_of_a_raster(good):
+    parts = cases.strokes()
+    start = parts[1].pose(np.ones(1))
+    stop = parts[4].pose(np.ones(1))
+    over = cases.straight(SegmentKind.RAPID, np.inf, start[0][0], stop[0][0], start[1][0], stop[1][0])
+    tips, axes = cases.timed([*parts[:2], over, *parts[5:]])
+    assert failed(judge(with_poses(good, tips, axes))) >= {"toolpath covered"}
+
+
+def test_loop_added(good):
+    """The program is always on the toolpath, but goes back and forth once more than asked."""
+    lift, forth, back = spark_out()
+    once = replace(good, toolpath=cases.toolpath_of([lift, forth]))
+    assert failed(judge(with_poses(once, *cases.timed([lift, forth, back, forth])))) >= {"tip deviation"}
+
+
+def test_reversed_path(good):
+    names = failed(judge(with_legs(good, good.program.legs[::-1])))
+    assert names >= {"starts at the toolpath's start", "ends at the toolpath's end", *GEOMETRY}
+
+
+def test_wrong_placement(good):
+    shift = RigidTransform(np.eye(3), np.array([0.0, 100e-6, 0.0]))
+    moved = replace(good.program, placement=good.program.placement @ shift)
+    names = failed(judge(replace(good, program=moved)))
+    assert names == {"starts at the toolpath's start", "ends at the toolpath's end", *GEOMETRY}
+
+
+def test_placement_far_off(good):
+    shift = RigidTransform(np.eye(3), np.array([0.0, 0.3, 0.0]))
+    moved = replace(good.program, placement=good.program.placement @ shift)
+    verdict = judge(replace(good, program=moved))
+    found = {c.claim: c for c in verdict.certificates}
+    assert found["tip deviation"].value == pytest.approx(300.0, abs=10.0)
+
+
+def test_program_ends_early(good):
+    names = failed(judge(with_legs(good, good.program.legs[:-120])))
+    assert names >= {"ends at rest", "ends at the toolpath's end", "toolpath covered"}
+
+
+def test_not_at_rest_at_the_end(good):
+    """All the way, but the last stroke does not slow down."""
+    legs = good.program.legs
+    last = rows_of(good, good.toolpath.starts[-2])
+    tips, axes = good.tips[last:], good.axes[last:]
+    peak = int(np.argmax(np.linalg.norm(np.diff(tips, axis=0), axis=1)))
+    step = np.linalg.norm(tips[peak + 1] - tips[peak])
+    rest = np.linalg.norm(tips[-1] - tips[peak])
+    f = np.linspace(0.0, 1.0, int(np.ceil(rest / step)) + 1)[:, None]
+    hasty = tips[peak] + f * (tips[-1] - tips[peak])
+    tips = np.concatenate([good.tips[: last + peak], hasty])
+    axes = np.concatenate([good.axes[: last + peak], np.repeat(axes[-1:], len(hasty), axis=0)])
+    assert len(tips) < len(legs)
+    names = failed(judge(with_poses(good, tips, axes)))
+    # The spline overshoots where it is stopped that hard; the rows themselves are not too fast.
+    assert names - {"rapid rate"} == {"ends at rest", "leg accelerations"}
+
+
+def test_not_at_rest_at_the_start(good):
+    # From inside the plunge: the toolpath's start is missed, too.
+    names = failed(judge(with_legs(good, good.program.legs[100:])))
+    assert names >= {"starts at rest", "starts at the toolpath's start", "leg accelerations"}
+
+
+def test_spike_of_3_micrometres_in_one_row(good):
+    legs = good.program.legs.copy()
+    legs[rows_of(good, good.toolpath.starts[2]) + 5, 3] += 3e-6
+    assert failed(judge(with_legs(good, legs))) == {"leg accelerations"}
+
+
+def test_bulge_off_the_path(good):
+    """The axis-aligned detour of 60 µm is slow and smooth: only the deviation tells."""
+    row = middle_of_first_cut(good)
+    bump = 60e-6 * np.exp(-(((np.arange(len(good.tips)) - row) / 60.0) ** 2))
+    names = failed(judge(with_poses(good, good.tips + bump[:, None] * np.array([0.0, 0.0, 1.0]), good.axes)))
+    assert "tip deviation" in names
+    assert not names - GEOMETRY
+
+
+def extremes(case):
+    return {c.claim: c for c in judge(case).certificates}
+
+
+@pytest.mark.parametrize(
+    ("claim", "name", "sign", "slack", "part"),
+    [
+        ("legs not too long", "max_length", -1, 1e-6, "legs"),
+        ("legs not too short", "min_length", 1, 1e-6, "legs"),
+        ("leg rates", "max_velocity", -1, 2e-2, "legs"),
+        ("leg accelerations", "max_acceleration", -1, 2e-2, "legs"),
+        ("base joint cones", "base_cone", -1, 1e-5, "joints"),
+    ],
+)
+def test_limit_of_the_machine_exceeded(good, claim, name, sign, slack, part):
+    """With the limit just beyond what the program needs it passes; just before, that claim fails alone."""
+    scale = {"mm": 1e-3, "mm/s": 1e-3, "mm/s²": 1e-3, "deg": np.pi / 180}
+    found = extremes(good)[claim]
+    needed = found.value * scale[found.unit]
+    relative = slack if name in {"max_velocity", "max_acceleration"} else slack / needed
+    for wide, expected in ((1 - sign * relative, set()), (1 + sign * relative, {claim})):
+        limits = replace(getattr(good.machine, part), **{name: np.full(5, needed * wide)})
+        tight = on_machine(good, **{part: limits})
+        # A smaller greatest acceleration also means a slower step from rest.
+        assert failed(judge(tight)) - ({"starts at rest", "ends at rest"} - {claim}) == expected
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_platform_joint_range_exceeded(good, side):
+    claim = ("platform joints not too closed", "platform joints not too open")[side]
+    needed = np.radians(extremes(good)[claim].value)
+    for wide, expected in ((1e-5, set()), (-1e-5, {claim})):
+        limits = np.array(good.machine.joints.platform_range)
+        limits[:, side] = needed + (wide if side else -wide)
+        joints = replace(good.machine.joints, platform_range=limits)
+        assert failed(judge(on_machine(good, joints=joints))) == expected
+
+
+def test_bodies_touch(good):
+    free = 1e-3 * extremes(good)["clearance between legs and shaft"].value
+    assert free > 1e-3
+    for more, expected in ((-1e-4, set()), (1e-3, {"clearance between legs and shaft"})):
+        bodies = replace(good.machine.bodies, leg_radius=good.machine.bodies.leg_radius + 0.5 * free + more)
+        names = failed(judge(on_machine(good, bodies=bodies)))
+        assert names == expected
+
+
+# Files.
+
+
+def test_file_passes_like_the_program(good, tmp_path):
+    path = write_csv(good.program, tmp_path / "program.csv")
+    verdict = verify(path, good.machine, good.toolpath, **cases.TOLERANCES, job_digest="job-1")
+    assert verdict.passed
+    assert verdict.certificates[0].claim == "readable"
+    assert verdict.certificates[1:] == judge(good).certificates
+
+
+def spoil_nan(lines):
+    fields = lines[2000].split(",")
+    return [*lines[:2000], ",".join([*fields[:3], "nan", *fields[4:]]), *lines[2001:]]
+
+
+SPOILT = {
+    "NaN": spoil_nan,
+    "row lost": lambda lines: lines[:2000] + lines[2001:],
+    "rows swapped": lambda lines: [*lines[:2000], lines[2001], lines[2000], *lines[2002:]],
+    "truncated after a row": lambda lines: lines[:-50],
+    "truncated within a row": lambda lines: [*lines[:-50], lines[-50][:20]],
+    "header only": lambda lines: [line for line in lines if line.startswith("#")],
+    "column lost": lambda lines: [line.rsplit(",", 1)[0] for line in lines],
+    "a word": lambda lines: [*lines[:2000], lines[2000].replace(",", ",x", 1), *lines[2001:]],
+    "empty": lambda lines: [],
+}
+
+
+@pytest.mark.parametrize("name", SPOILT)
+def test_malformed_file_is_a_verdict(linear, tmp_path, name):
+    path = write_csv(linear.program, tmp_path / "program.csv")
+    lines = path.read_text().splitlines()
+    tail = "" if name == "truncated within a row" else "\n"
+    path.write_text("\n".join(SPOILT[name](lines)) + tail)
+    verdict = verify(path, linear.machine, linear.toolpath, **cases.TOLERANCES)
+    assert failed(verdict) == {"readable"}
+    assert "program.csv" in verdict.certificates[0].method
+
+
+def test_binary_file_is_a_verdict(linear, tmp_path):
+    path = tmp_path / "program.csv"
+    path.write_bytes(bytes(range(256)) * 40)
+    assert failed(verify(path, linear.machine, linear.toolpath, **cases.TOLERANCES)) == {"readable"}
+
+
+def test_missing_file_is_bad_input(linear, tmp_path):
+    with pytest.raises(ProgramError, match="no such file"):
+        verify(tmp_path / "none.csv", linear.machine, linear.toolpath, **cases.TOLERANCES)
+
+
+def test_nan_in_memory_is_bad_input(linear):
+    legs = linear.program.legs.copy()
+    legs[7, 2] = np.nan
+    with pytest.raises(InputError):
+        replace(linear.program, legs=legs)
+
+
+@pytest.mark.parametrize("name", ["tilt", "path_tolerance", "axis_tolerance"])
+@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
+def test_senseless_tolerance_is_bad_input(linear, name, value):
+    with pytest.raises(ArrayError, match=name):
+        judge(linear, **{name: value})
+
+
+def test_verdict_file(linear, tmp_path):
+    verdict = judge(linear)
+    content = json.loads(write_verdict(verdict, tmp_path / "verdict.json").read_text(encoding="utf-8"))
+    assert content == verdict.to_dict()
+    assert content["passed"] is True
+    assert [p.name for p in tmp_path.iterdir()] == ["verdict.json"]
+
+
+def test_progress_is_told(linear):
+    told = []
+    judge(linear, progress=lambda stage, fraction, note="": told.append((stage, fraction)))
+    assert told[-1] == ("verify", 1.0)
+    assert [f for _, f in told] == sorted(f for _, f in told)
