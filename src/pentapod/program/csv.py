@@ -13,7 +13,7 @@ from pentapod.errors import ProgramError
 from pentapod.files import atomic_write
 from pentapod.program.header import MAGIC, Header, header_text, parse_header
 from pentapod.program.program import FORMAT_VERSION, Program
-from pentapod.program.resolution import MM_DECIMALS, from_millimetres, to_millimetres
+from pentapod.program.resolution import LARGEST_M, MM_DECIMALS, from_millimetres, to_millimetres
 
 COLUMNS = "time_s,leg1_mm,leg2_mm,leg3_mm,leg4_mm,leg5_mm"
 _CHUNK = 20_000
@@ -69,9 +69,7 @@ def _split(data: bytes, file: Path) -> tuple[Header, int, bytes]:
     if not data.strip():
         raise ProgramError("the file is empty", file=file, expected="a pentapod program")
     if not data.startswith(b"#"):
-        raise ProgramError(
-            "not a pentapod program", file=file, line=1, expected=f"# {MAGIC} = {FORMAT_VERSION}"
-        )
+        raise ProgramError("not a pentapod program", file=file, line=1, expected=f"# {MAGIC} = {FORMAT_VERSION}")
     lines: list[str] = []
     position = 0
     while data.startswith(b"#", position):
@@ -81,17 +79,13 @@ def _split(data: bytes, file: Path) -> tuple[Header, int, bytes]:
         try:
             lines.append(data[position:end].decode())
         except UnicodeDecodeError as error:
-            raise ProgramError(
-                "not a pentapod program: not UTF-8 text", file=file, line=len(lines) + 1
-            ) from error
+            raise ProgramError("not a pentapod program: not UTF-8 text", file=file, line=len(lines) + 1) from error
         position = end + 1
     header = parse_header(lines, file)
     end = data.find(b"\n", position)
     names = data[position : end if end >= 0 else len(data)].decode(errors="replace").rstrip("\r")
     if names != COLUMNS:
-        raise ProgramError(
-            "wrong column names", file=file, line=len(lines) + 1, value=names[:80], expected=COLUMNS
-        )
+        raise ProgramError("wrong column names", file=file, line=len(lines) + 1, value=names[:80], expected=COLUMNS)
     return header, len(lines) + 2, data[end + 1 :] if end >= 0 else b""
 
 
@@ -122,9 +116,17 @@ def _legs(body: bytes, header: Header, first_line: int, file: Path) -> Floats:
             value=len(table),
             expected=str(header.rows),
         )
-    if (table[:, 1:] <= 0.0).any():
-        row = int(np.argmax((table[:, 1:] <= 0.0).any(axis=1)))
-        raise ProgramError("a leg length is not positive", file=file, line=first_line + row)
+    wrong = (table[:, 1:] <= 0.0) | (table[:, 1:] > 1e3 * LARGEST_M)
+    if wrong.any():
+        row, leg = np.argwhere(wrong)[0]
+        raise ProgramError(
+            "a leg length that no machine has",
+            file=file,
+            line=first_line + int(row),
+            key=f"leg{leg + 1}_mm",
+            value=float(table[row, leg + 1]),
+            expected="between 0 and 10 km",
+        )
     return from_millimetres(table[:, 1:])
 
 
@@ -153,9 +155,7 @@ def _blame_row(body: bytes, first_line: int, file: Path) -> NoReturn:
     for number, line in enumerate(body.split(b"\n")[:-1], start=first_line):
         fields = line.split(b",")
         if len(fields) != 6:
-            raise ProgramError(
-                "wrong number of columns", file=file, line=number, value=len(fields), expected="6"
-            )
+            raise ProgramError("wrong number of columns", file=file, line=number, value=len(fields), expected="6")
         for name, field in zip(COLUMNS.split(","), fields, strict=True):
             text = field.decode(errors="replace").strip()
             if not _finite(text):

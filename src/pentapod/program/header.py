@@ -128,9 +128,7 @@ class _Reader:
     def _wrong(self, key: str, expected: str) -> ProgramError:
         value = self.values[key]
         shown = float(value) if isinstance(value, Decimal) else value
-        return ProgramError(
-            "bad value", file=self.file, line=self.places[key], key=key, value=shown, expected=expected
-        )
+        return ProgramError("bad value", file=self.file, line=self.places[key], key=key, value=shown, expected=expected)
 
     def _text(self, key: str) -> str:
         if not isinstance(self.values[key], str):

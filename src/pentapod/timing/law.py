@@ -53,16 +53,19 @@ class MotionLaw:
 
     def __call__(self, t: ArrayLike, order: int = 0) -> Floats:
         """Return s, ṡ or s̈ (order 0, 1, 2) at times (n,); at rest before the start and after the end."""
-        time = np.clip(np.asarray(t, dtype=np.float64), 0.0, self.duration)
+        given = np.asarray(t, dtype=np.float64)
+        time = np.clip(given, 0.0, self.duration)
         k = np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, len(self.jerks) - 1)
         tau, a, j = time - self.times[k], self.accelerations[k], self.jerks[k]
         if order == 2:
-            return a + j * tau
+            return np.where(given == time, a + j * tau, 0.0)
         if order == 1:
-            return np.maximum(self.speeds[k] + tau * (a + tau * j / 2.0), 0.0)
+            speed = np.maximum(self.speeds[k] + tau * (a + tau * j / 2.0), 0.0)
+            return np.where(time < self.duration, speed, self.speeds[-1])
         s = self.stations[k] + tau * (self.speeds[k] + tau * (a / 2.0 + tau * j / 6.0))
         # The polynomial may miss its own end by an ulp; a station must never pass the next knot's.
-        return np.clip(s, self.stations[k], self.stations[k + 1])
+        s = np.clip(s, self.stations[k], self.stations[k + 1])
+        return np.where(time < self.duration, s, self.length)
 
     def stretched(self, duration: float) -> MotionLaw:
         """Return the same motion run uniformly slower (or faster), to last `duration` seconds."""

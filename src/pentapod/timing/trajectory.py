@@ -109,6 +109,9 @@ class Trajectory:
         for k in np.unique(index):
             here = order[borders[k] : borders[k + 1]]
             more = () if extra is None else (extra[k],)
-            piece = self.path.pieces[self.indices[k]]
-            result[here] = evaluate(piece, self.laws[k], time[here] - starts[k], *more)
+            piece, law = self.path.pieces[self.indices[k]], self.laws[k]
+            local = time[here] - starts[k]
+            # The sum of durations is rounded: its end must be the law's end.
+            local = np.where(time[here] >= starts[k + 1], np.maximum(local, law.duration), local)
+            result[here] = evaluate(piece, law, local, *more)
         return result
