@@ -304,8 +304,8 @@ def extremes(case):
     [
         ("legs not too long", "max_length", -1, 1e-6, "legs"),
         ("legs not too short", "min_length", 1, 1e-6, "legs"),
-        ("leg rates", "max_velocity", -1, 2e-2, "legs"),
-        ("leg accelerations", "max_acceleration", -1, 2e-2, "legs"),
+        ("leg rates", "max_velocity", -1, 2e-3, "legs"),
+        ("leg accelerations", "max_acceleration", -1, 2e-3, "legs"),
         ("base joint cones", "base_cone", -1, 1e-5, "joints"),
     ],
 )

@@ -11,9 +11,7 @@ from pentapod.verify.replay import Replay
 from pentapod.verify.verdict import Certificate, Place
 
 ALLOWANCE = 1e-3
-"""Relative allowance on deviations and feeds, for rounding and for the place where a feed changes."""
-LIMIT_ALLOWANCE = 1e-2
-"""Relative allowance on leg rates and accelerations: what a time law keeps between its gridpoints."""
+"""Relative allowance on deviations, feeds, leg rates and accelerations: rounding, and limits met exactly."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +47,10 @@ class Claim:
         found = self.judge(replay)
         if found is None:
             return None
-        # Plain numbers, as the verdict's file wants them; what is not a number has no value.
-        value, bound = (None if x is None or not np.isfinite(x) else float(x) for x in (found.value, found.bound))
+        value, bound = _plain(found.value), _plain(found.bound)
         return Certificate(self.name, bool(found.passed), value, bound, found.unit, found.where, found.method)
+
+
+def _plain(number: float | None) -> float | None:
+    """Return a plain float to 12 digits: 15 deg is not 14.999999999999998. What is no number has no value."""
+    return None if number is None or not np.isfinite(number) else float(f"{number:.12g}")

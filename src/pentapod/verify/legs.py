@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.arrays import Floats
-from pentapod.verify.claim import LIMIT_ALLOWANCE, Claim, Finding
+from pentapod.verify.claim import ALLOWANCE, Claim, Finding
 from pentapod.verify.replay import Replay
 
 _EXACT = "exact extrema of the controller's polynomials, rows and between"
@@ -47,8 +47,8 @@ def _below(replay: Replay, values: Floats, limit: Floats, unit: str, method: str
     """Judge values (N or N − 1, 5) against limits (5,), both SI."""
     row, leg = np.unravel_index(int(np.argmax(values / limit)), values.shape)
     value, bound = float(values[row, leg]), float(limit[leg])
-    passed = value <= bound * (1.0 + LIMIT_ALLOWANCE)
-    method += f"; {LIMIT_ALLOWANCE:.0%} allowed"
+    passed = value <= bound * (1.0 + ALLOWANCE)
+    method += f"; {ALLOWANCE:.1%} allowed"
     return _finding(replay, passed, (value, bound, unit), (2 * int(row), int(leg)), method)
 
 

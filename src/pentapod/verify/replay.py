@@ -97,7 +97,7 @@ class Replay:
             segment = int(self.toolpath.segment_of_interval[min(waypoint, len(self.toolpath) - 2)])
         else:
             segment = None
-        return Place(float(sample) * 0.5 * self.program.period, int(sample) // 2, segment)
+        return Place(round(float(sample) * 0.5 * self.program.period, 9), int(sample) // 2, segment)
 
 
 def excursion(values: Floats) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.toolpath.toolpath import SegmentKind
-from pentapod.verify.claim import ALLOWANCE, LIMIT_ALLOWANCE, Claim, Finding
+from pentapod.verify.claim import ALLOWANCE, Claim, Finding
 from pentapod.verify.replay import Replay
 
 _MM_MIN = 60e3  # mm/min in 1 m/s
@@ -64,10 +64,10 @@ def rest(replay: Replay, *, at_end: bool) -> Finding:
     value, bound = float(speed[leg]), float(limit[leg]) * period
     method = (
         f"speed of leg {leg + 1} over the {'last' if at_end else 'first'} period; the bound is what its "
-        f"greatest acceleration changes in one period; {LIMIT_ALLOWANCE:.0%} allowed"
+        f"greatest acceleration changes in one period; {ALLOWANCE:.1%} allowed"
     )
     where = replay.place(2 * len(rows) - 2 if at_end else 0)
-    return Finding(value <= bound * (1.0 + LIMIT_ALLOWANCE), 1e3 * value, 1e3 * bound, "mm/s", where, method)
+    return Finding(value <= bound * (1.0 + ALLOWANCE), 1e3 * value, 1e3 * bound, "mm/s", where, method)
 
 
 CLAIMS = (
