@@ -11,6 +11,7 @@
     const ink = css("--ink"), line = css("--line"), sheet = css("--sheet");
     const change = {
       "font.color": ink, "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)",
+      "modebar.bgcolor": "rgba(0,0,0,0)", "modebar.color": line, "modebar.activecolor": ink,
       "hoverlabel.bgcolor": sheet, "hoverlabel.font.color": ink, "hoverlabel.bordercolor": line,
     };
     const axes = layout.scene ? ["scene.xaxis", "scene.yaxis", "scene.zaxis"]
@@ -82,6 +83,16 @@
     play.textContent = "❚❚";
     play.setAttribute("aria-label", "pause");
     timer = setInterval(() => show((Number(slider.value) + 1) % poses.length), 80);
+  });
+  const near = document.getElementById("near");
+  near.addEventListener("click", () => {
+    const on = near.getAttribute("aria-pressed") !== "true";
+    near.setAttribute("aria-pressed", on);
+    const change = {};
+    ["x", "y", "z"].forEach((name, k) => {
+      change[`scene.${name}axis.${on ? "range" : "autorange"}`] = on ? machine.around[k] : true;
+    });
+    Plotly.relayout("scene", change);
   });
   drawn.scene.then(() => show(machine.start));
   if (drawn.time) {

@@ -41,7 +41,7 @@ def render(outcome: Outcome) -> str:
 
     folder = resources.files("pentapod.report")
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(number=words.number, duration=words.duration, where=words.where)
+    environment.filters.update(number=words.number, duration=words.duration)
     template = environment.from_string((folder / "page.html.j2").read_text(encoding="utf-8"))
     return template.render(
         style=(folder / "style.css").read_text(encoding="utf-8"),
@@ -109,14 +109,15 @@ def _scene(outcome: Outcome, signals: Signals | None) -> Figure:
     mesh, toolpath = outcome.find(Mesh), outcome.find(Toolpath)
     placed = outcome.find(PlacedPath)
     transform = RigidTransform.identity() if placed is None else placed.placement.transform
-    traces = [] if mesh is None else [scene.part_trace(mesh, transform)]
+    traces = [] if mesh is None else [scene.part_trace(mesh, transform, down=placed is not None)]
     if signals is not None:
         margins = np.interp(signals.times, signals.times[signals.margin_rows], signals.smallest_margins)
-        traces += scene.path_traces(signals.tips, signals.cutting.astype(np.intp), margins)
+        traces += scene.path_traces(signals.tips, signals.axes, signals.cutting.astype(np.intp), margins)
         row = _start_row(signals)
         traces += scene.machine_traces(outcome.machine, signals.tips[row], signals.axes[row])
     elif toolpath is not None and outcome.refusal is not None:
-        traces += scene.blamed_traces(toolpath.tips if placed is None else placed.tips, outcome.refusal)
+        shown = toolpath if placed is None else placed
+        traces += scene.blamed_traces(shown.tips, shown.axes, outcome.refusal)
         if placed is not None:
             worst = int(placed.margins.min(axis=1).argmin())
             traces += scene.machine_traces(outcome.machine, placed.tips[worst], placed.axes[worst])
@@ -144,12 +145,21 @@ def _poses(outcome: Outcome, signals: Signals | None) -> dict[str, Any]:
             )
         ],
         "start": int(np.searchsorted(rows, _start_row(signals))),
+        "around": _around(signals),
         "moving": scene.MACHINE_TRACES,
         "base": (1e3 * machine.pentapod.base).tolist(),
         "offsets": (1e3 * machine.pentapod.offsets).tolist(),
         "tool_length": 1e3 * machine.tool_length,
         "shaft_end": 1e3 * machine.bodies.shaft_end,
     }
+
+
+def _around(signals: Signals) -> list[list[float]]:
+    """Return ranges in x, y and z, mm, that hold the cuts and a little more."""
+    tips = 1e3 * signals.tips[signals.cutting] if signals.cutting.any() else 1e3 * signals.tips
+    low, high = tips.min(axis=0), tips.max(axis=0)
+    room = 0.1 * float((high - low).max()) + 2.0
+    return np.stack([low - room, high + room], axis=1).round(2).tolist()
 
 
 def _placement(transform: RigidTransform) -> dict[str, Any]:

@@ -17,13 +17,14 @@ from pentapod.toolpath.mesh import Mesh
 MACHINE_TRACES = 8
 """Traces that move with the pose: five legs, the platform line, the tool, the tip. They come last."""
 
-_MOST_FACETS = 30_000
+_MOST_FACETS = 60_000
 _BUCKETS = 4_000
+_LIFT_M = 0.5e-3  # along the tool axis: a ball's tip runs on and below the surface, which would hide its path
 _MARGIN_COLOURS = [[0.0, "#c8322b"], [0.15, "#ee8f3c"], [0.4, "#e9d35b"], [1.0, "#2f9e6e"]]
 
 
-def part_trace(mesh: Mesh, placement: RigidTransform) -> dict[str, Any]:
-    """Return the part's surface, thinned for display."""
+def part_trace(mesh: Mesh, placement: RigidTransform, *, down: bool) -> dict[str, Any]:
+    """Return the part's surface, thinned for display, lit from above. down: as in `scene_figure`."""
     vertices, faces = thinned_mesh(mesh.vertices, mesh.faces, _MOST_FACETS)
     x, y, z = 1e3 * placement.apply(vertices).T
     i, j, k = faces.T
@@ -31,29 +32,36 @@ def part_trace(mesh: Mesh, placement: RigidTransform) -> dict[str, Any]:
         "type": "mesh3d",
         "x": packed(x), "y": packed(y), "z": packed(z),
         "i": packed(i, "i4"), "j": packed(j, "i4"), "k": packed(k, "i4"),
-        "color": "#9fb3c4", "opacity": 1.0, "hoverinfo": "skip", "name": "part", "showlegend": True,
-        "lighting": {"ambient": 0.55, "diffuse": 0.7, "specular": 0.1, "roughness": 0.8},
-        "lightposition": {"x": 2000, "y": -3000, "z": -6000},
+        "color": "#c3ced9", "opacity": 1.0, "hoverinfo": "skip", "name": "part", "showlegend": True,
+        "lighting": {"ambient": 0.8, "diffuse": 0.35, "specular": 0.05, "roughness": 0.9, "fresnel": 0.1},
+        "lightposition": {"x": 30_000, "y": -60_000, "z": -40_000 if down else 40_000},
     }  # fmt: skip
 
 
-def path_traces(tips: Floats, cutting: Ints, margins: Floats) -> list[dict[str, Any]]:
-    """Return the cuts coloured by margin, and the other motion in grey. tips (N, 3), cutting, margins (N,)."""
+def path_traces(tips: Floats, axes: Floats, cutting: Ints, margins: Floats) -> list[dict[str, Any]]:
+    """Return the cuts coloured by margin, and the other motion in grey.
+
+    tips, axes (N, 3), cutting, margins (N,).
+    """
+    tips = 1e3 * (tips + _LIFT_M * axes)
     keep = keep_extremes(margins, _BUCKETS)
     cuts = np.where(cutting[:, None] != 0, tips, np.nan)[keep]
     other = _with_gaps(tips, cutting == 0)
     coloured = _line3d(cuts, "cuts, by smallest margin", "", 5)
     coloured["line"] = {
         "width": 5, "color": packed(margins[keep]), "colorscale": _MARGIN_COLOURS, "cmin": 0.0, "cmax": 0.5,
-        "colorbar": {"title": {"text": "margin"}, "thickness": 12, "len": 0.5, "x": 0.98, "y": 0.4},
+        "showscale": True,
+        "colorbar": {"title": {"text": "cuts:<br>smallest<br>margin"}, "thickness": 12, "len": 0.5, "x": 0.98, "y": 0.4},
     }  # fmt: skip
+    coloured["showlegend"] = False
     coloured["text"] = [f"margin {value:.3f}" for value in margins[keep]]
     coloured["hovertemplate"] = "%{text}<br>%{x:.1f}, %{y:.1f}, %{z:.1f} mm<extra></extra>"
     return [coloured, _line3d(other, "links and rapids", QUIET_COLOUR, 1.5, visible="legendonly")]
 
 
-def blamed_traces(tips: Floats, refusal: Refusal) -> list[dict[str, Any]]:
-    """Return the path in grey, and for each blame the waypoints that it names, as points."""
+def blamed_traces(tips: Floats, axes: Floats, refusal: Refusal) -> list[dict[str, Any]]:
+    """Return the path in grey, and for each blame the waypoints that it names, as points. tips, axes (N, 3)."""
+    tips = 1e3 * (tips + _LIFT_M * axes)
     path = _line3d(tips[keep_extremes(tips[:, 2], _BUCKETS)], "toolpath", QUIET_COLOUR, 1.5)
     traces = [path]
     colours = (LIMIT_COLOUR, *LEG_COLOURS)
@@ -103,10 +111,13 @@ def _pose_lines(machine: Machine, tip: Floats, axis: Floats) -> list[Floats]:
 def scene_figure(traces: list[dict[str, Any]], *, down: bool) -> Figure:
     """Return the figure of traces. down: z points down, as in the machine frame, from the base to the work."""
     sign = -1 if down else 1
+    eye = {"x": 0.8, "y": -0.95, "z": 0.45 * sign} if down else {"x": 1.3, "y": -1.5, "z": 1.0}
+    centre = {"x": 0.0, "y": 0.0, "z": 0.08 if down else 0.0}
     axis = {"showbackground": False, "zeroline": False}
     scene = {
         "aspectmode": "data",
-        "camera": {"up": {"x": 0, "y": 0, "z": sign}, "eye": {"x": 1.15, "y": -1.25, "z": 0.45 * sign}},
+        "dragmode": "orbit",  # the other mode knows no up but +z
+        "camera": {"up": {"x": 0, "y": 0, "z": sign}, "eye": eye, "center": centre},
         **{f"{name}axis": axis | {"title": {"text": f"{name}, mm"}} for name in "xyz"},
     }
     legend = {"x": 0.0, "y": 1.0, "itemsizing": "constant", "bgcolor": "rgba(0,0,0,0)"}

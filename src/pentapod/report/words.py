@@ -6,7 +6,6 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.verify.verdict import Certificate
 
 
 def number(value: float | None, unit: str = "") -> str:
@@ -24,17 +23,6 @@ def duration(seconds: float) -> str:
     if seconds >= 60:
         return f"{int(seconds // 60)} min {int(seconds % 60):02d} s"
     return f"{seconds:.3g} s"
-
-
-def where(certificate: Certificate) -> str:
-    """Return the place of a certificate."""
-    place = certificate.where
-    parts = [
-        "" if place.time_s is None else f"{place.time_s:.3f} s",
-        "" if place.row is None else f"row {place.row}",
-        "" if place.segment is None else f"segment {place.segment}",
-    ]
-    return ", ".join(part for part in parts if part)
 
 
 def rotation_angles_deg(rotation: Floats) -> tuple[float, float, float]:
