@@ -12,6 +12,7 @@ from pentapod.toolpath.mesh import Mesh
 
 _FACETS_PER_CELL = 2.0
 _MOST_ENTRIES = 20_000_000
+_ASIDE_M = 1e-7
 
 
 class HeightField:
@@ -74,8 +75,14 @@ class HeightField:
         return surface, normals, heights
 
     def hides(self, points: Floats, slack: float) -> Bools:
-        """Return whether the mesh lies above points (N, 3), along the view, by more than `slack` metres."""
-        return self.topmost(points, margin=-1e-9)[2] > points @ self.view + slack
+        """Return whether the mesh lies above points (N, 3), along the view, by more than `slack` metres.
+
+        Looked up a hair's breadth to either side, and hidden only if so on both: what stands at the foot of a
+        wall is not hidden by it, what lies under a seam between two facets is.
+        """
+        aside = _ASIDE_M * (0.83 * self._frame[0] + 0.56 * self._frame[1])
+        height = points @ self.view + slack
+        return (self.topmost(points + aside)[2] > height) & (self.topmost(points - aside)[2] > height)
 
     def _candidates(self, points: Floats, margin: float) -> tuple[Ints, Ints, Floats]:
         """Return pairs (M,), (M,) of points and facets over each other, and barycentric weights (M, 3)."""

@@ -16,35 +16,41 @@ from pentapod.geometry.directions import angle_between
 from pentapod.toolpath.passes import Passes
 
 _MAX_ROUNDS = 64
+_SAME_POINT_M = 1e-9
 
 
 def resample(passes: Passes, *, chordal: float, spacing: float, axis_step: float, closest: float) -> Passes:
     """Return the passes with their points chosen anew on the same lines; first and last points stay.
 
-    chordal, spacing, closest: metres; axis_step: radians. Points closer than `closest` are not kept apart.
+    chordal, spacing, closest: metres; axis_step: radians. No two points come closer than `closest`; what
+    lies closer to a waypoint than that may leave its chord by as much. Passes shorter than twice that vanish.
     """
-    passes = without_duplicates(passes, closest)
+    passes = without_duplicates(passes.where(passes.lengths >= 2.0 * closest), _SAME_POINT_M)
     if not len(passes):
         return passes
     place = np.concatenate([[0.0], np.cumsum(np.where(passes.within, passes.steps, 1.0))])
     samples = _evenly(passes, place, chordal, spacing, axis_step)
-    fixed = np.isin(samples, place)
+    fixed = np.zeros(len(samples), dtype=np.bool_)
+    fixed[np.searchsorted(samples, place[passes.starts[:-1]])] = True
+    fixed[np.searchsorted(samples, place[passes.starts[1:] - 1])] = True
     for _ in range(_MAX_ROUNDS):
-        worst = _worst_corners(passes, place, samples, chordal)
+        worst = place[_worst_corners(passes, place, samples, samples[fixed], chordal, closest)]
+        worst = worst[np.diff(worst, prepend=-np.inf) >= closest]
         if not len(worst):
             break
-        samples, index = np.unique(np.concatenate([samples, place[worst]]), return_index=True)
-        fixed = np.concatenate([fixed, np.ones(len(worst), dtype=np.bool_)])[index]
-        near = np.diff(samples) < closest
-        crowded = np.concatenate([near, [False]]) | np.concatenate([[False], near])
-        samples, fixed = samples[fixed | ~crowded], fixed[fixed | ~crowded]
+        # Corners of the slice go in; waypoints that were only spread evenly make room for them.
+        free = ~fixed & (_gap(worst, samples) >= closest)
+        samples = np.concatenate([samples[fixed], worst, samples[free]])
+        fixed = np.concatenate([np.ones(len(samples) - int(free.sum()), np.bool_), np.zeros(int(free.sum()), np.bool_)])
+        order = np.argsort(samples, kind="stable")
+        samples, fixed = samples[order], fixed[order]
     return _at(passes, place, samples)
 
 
 def without_duplicates(passes: Passes, closest: float) -> Passes:
-    """Return the passes without points closer than `closest` to the one before; shorter passes vanish."""
-    passes = passes.where(passes.lengths >= 2.0 * closest)
+    """Return the passes without points closer than `closest` to the one before; ends stay, unless they meet."""
     while len(passes):
+        passes = passes.where(passes.lengths >= 2.0 * closest)
         short = np.concatenate([[False], passes.within & (passes.steps < closest)])
         if not short.any():
             break
@@ -56,6 +62,8 @@ def without_duplicates(passes: Passes, closest: float) -> Passes:
         ends = last[drop[last]]
         drop[ends] = False
         drop[ends - 1] |= ~np.isin(ends - 1, passes.starts[:-1])
+        if not drop.any():
+            break
         counts = np.bincount(passes.pass_of_point[~drop], minlength=len(passes))
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
         passes = Passes(passes.points[~drop], passes.normals[~drop], starts, passes.planes)
@@ -81,7 +89,9 @@ def _evenly(passes: Passes, place: Floats, chordal: float, spacing: float, axis_
     return np.where(number == intervals[owner], place[last][owner], samples)
 
 
-def _worst_corners(passes: Passes, place: Floats, samples: Floats, chordal: float) -> Ints:
+def _worst_corners(
+    passes: Passes, place: Floats, samples: Floats, fixed: Floats, chordal: float, closest: float
+) -> Ints:
     """Return the points of the passes that are worst within their chord, where beyond `chordal`."""
     ends = _interpolated(passes.points, place, samples)
     chord = np.clip(np.searchsorted(samples, place, side="right") - 1, 0, len(samples) - 2)
@@ -90,10 +100,15 @@ def _worst_corners(passes: Passes, place: Floats, samples: Floats, chordal: floa
     square = np.maximum((along * along).sum(axis=1), 1e-300)
     t = np.clip((offset * along).sum(axis=1) / square, 0.0, 1.0)
     distance = np.linalg.norm(offset - t[:, None] * along, axis=1)
-    distance[np.isin(place, samples)] = 0.0
-    beyond = np.flatnonzero(distance > chordal)
+    beyond = np.flatnonzero((distance > chordal) & (_gap(fixed, place) >= closest))
     order = beyond[np.lexsort((-distance[beyond], chord[beyond]))]
     return order[np.flatnonzero(np.diff(chord[order], prepend=-1))]
+
+
+def _gap(among: Floats, places: Floats) -> Floats:
+    """Return the distance (N,) of places from the nearest of the ascending numbers `among`, not empty."""
+    after = np.clip(np.searchsorted(among, places), 1, max(len(among) - 1, 1))
+    return np.minimum(np.abs(places - among[after - 1]), np.abs(places - among[np.minimum(after, len(among) - 1)]))
 
 
 def _at(passes: Passes, place: Floats, samples: Floats) -> Passes:

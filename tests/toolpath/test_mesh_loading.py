@@ -1,0 +1,174 @@
+"""Mesh files: good ones are read as another reader reads them; bad ones get one clear line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import toolpath_surfaces as surfaces
+
+from pentapod.errors import InputError, MeshError
+from pentapod.toolpath import UNITS, load_mesh, write_stl
+
+
+@pytest.fixture
+def ball():
+    vertices, faces = surfaces.sphere(50.0, 2)
+    return vertices[faces]
+
+
+def ascii_stl(triangles):
+    lines = ["solid ball"]
+    for corners in triangles:
+        lines += ["facet normal 0 0 0", "outer loop"]
+        lines += ["vertex {:.9g} {:.9g} {:.9g}".format(*p) for p in corners]
+        lines += ["endloop", "endfacet"]
+    return "\n".join([*lines, "endsolid ball", ""])
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ascii.stl", "ply", "ascii.ply", "obj", "STL"])
+def test_every_format_gives_the_same_closed_ball(tmp_path, ball, suffix):
+    import trimesh
+
+    path = tmp_path / f"ball.{suffix}"
+    shape = trimesh.Trimesh(*surfaces.sphere(50.0, 2), process=False)
+    if suffix == "ascii.ply":
+        path.write_bytes(trimesh.exchange.ply.export_ply(shape, encoding="ascii"))
+    elif suffix == "ascii.stl":
+        path.write_text(ascii_stl(ball))
+    elif suffix == "STL":
+        path.write_bytes(write_stl(ball, "solid that is binary all the same"))
+    else:
+        shape.export(path)
+    mesh = load_mesh(path, "mm")
+    assert len(mesh.faces) == 320
+    assert len(mesh.vertices) == 162
+    assert mesh.diagnosis.watertight
+    assert mesh.diagnosis.consistent
+    assert not mesh.diagnosis.inverted
+    np.testing.assert_allclose(np.linalg.norm(mesh.vertices, axis=1), 0.05, rtol=1e-6)
+    assert str(mesh.diagnosis).startswith(path.name)
+
+
+def test_writing_stl_agrees_with_another_reader(tmp_path, ball):
+    import trimesh
+
+    path = tmp_path / "ball.stl"
+    path.write_bytes(write_stl(ball, "ball"))
+    other = trimesh.load(path, process=False)
+    np.testing.assert_allclose(other.triangles, ball, rtol=1e-6, atol=1e-5)
+    outward = (other.face_normals * other.triangles_center).sum(axis=1)
+    assert (outward > 0).all()
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_units_and_scale_are_factors(tmp_path, ball, unit):
+    path = tmp_path / "ball.stl"
+    path.write_bytes(write_stl(ball, "ball"))
+    metres = {"mm": 0.001, "cm": 0.01, "inch": 0.0254, "m": 1.0}[unit]
+    assert load_mesh(path, unit, scale=0.5).diagnosis.extents[2] == pytest.approx(50.0 * metres, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("size_mm", "in_file", "likely"), [(100.0, 100.0, "mm"), (100.0, 100.0 / 25.4, "inch"), (100.0, 0.1, "m")]
+)
+def test_missing_unit_shows_the_extents_and_the_likely_one(tmp_path, size_mm, in_file, likely):
+    vertices, faces = surfaces.sphere(in_file / 2, 1)
+    path = tmp_path / "ball.stl"
+    path.write_bytes(write_stl(vertices[faces], "ball"))
+    with pytest.raises(MeshError, match=f'unit = "{likely}" is likely') as caught:
+        load_mesh(path)
+    assert caught.value.key == "unit"
+    assert f"{size_mm:.4g} x" in str(caught.value) or "99." in str(caught.value) or "95" in str(caught.value)
+
+
+def test_unknown_unit_names_the_nearest(tmp_path, ball):
+    path = tmp_path / "ball.stl"
+    path.write_bytes(write_stl(ball, "ball"))
+    with pytest.raises(MeshError, match='did you mean "inch"'):
+        load_mesh(path, "inches")
+    with pytest.raises(MeshError, match="known: cm, inch, m, mm"):
+        load_mesh(path, "furlong")
+
+
+def nan_stl(ball):
+    broken = ball.copy()
+    broken[7, 1, 2] = np.nan
+    return write_stl(broken, "ball")
+
+
+PLY_HEAD = b"ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\n"
+PLY_FACES = b"element face %d\nproperty list uchar int vertex_indices\nend_header\n"
+PLY_POINTS = b"0 0 0\n1 0 0\n0 1 0\n"
+
+BAD = {
+    "empty.stl": (lambda _: b"", "empty"),
+    "blank.stl": (lambda _: b" \n\n", "empty"),
+    "short.stl": (lambda _: b"\0" * 40, "truncated"),
+    "cut.stl": (lambda ball: write_stl(ball, "ball")[:-77], "announces 320 facets, the file holds 318"),
+    "cut_ascii.stl": (lambda ball: ascii_stl(ball)[: len(ascii_stl(ball)) // 2].encode(), "truncated"),
+    "no_endsolid.stl": (lambda ball: ascii_stl(ball).replace("endsolid", "").encode(), "endsolid"),
+    "words.stl": (lambda _: b"Dear reader,\nthis is not a mesh but a letter.\n" * 20, "a text file, not STL"),
+    "solid_words.stl": (lambda _: b"solid advice for everyone who reads this letter" * 9, "no facet follows"),
+    "letters.stl": (
+        lambda ball: ascii_stl(ball).replace("vertex ", "vertex x", 1).encode(),
+        "letters.stl:4: a vertex is not three numbers",
+    ),
+    "none.stl": (lambda _: write_stl(np.zeros((0, 3, 3)), "none"), "no facets"),
+    "none_ascii.stl": (lambda _: b"solid x\nendsolid x\n", "no facets"),
+    "flat.stl": (lambda ball: write_stl(ball[:, [0, 0, 1]], "flat"), "zero area"),
+    "nan.stl": (nan_stl, "1 facets have coordinates that are not finite, the first is facet 7"),
+    "noise.ply": (lambda _: bytes(range(256)) * 9, "cannot be read as PLY"),
+    "words.ply": (lambda _: b"a letter, not a mesh", "cannot be read as PLY"),
+    "cut.ply": (lambda _: PLY_HEAD % 3 + PLY_FACES % 5 + PLY_POINTS + b"3 0 1 2\n", "PLY|truncated"),
+    "points.ply": (lambda _: PLY_HEAD % 3 + b"end_header\n" + PLY_POINTS, "no facets|cannot be read"),
+    "index.ply": (lambda _: PLY_HEAD % 3 + PLY_FACES % 1 + PLY_POINTS + b"3 0 1 9\n", "not there|cannot be read"),
+    "words.obj": (lambda _: b"a letter, not a mesh", "no facets|cannot be read"),
+    "index.obj": (lambda _: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 8\n", "not there|cannot be read"),
+    "nan.obj": (lambda _: b"v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", "not finite|cannot be read"),
+    "part.step": (lambda _: b"ISO-10303-21;", "not a mesh format"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_files_get_one_clear_line(tmp_path, ball, name):
+    make, message = BAD[name]
+    path = tmp_path / name
+    path.write_bytes(make(ball))
+    with pytest.raises(MeshError, match=message) as caught:
+        load_mesh(path, "mm")
+    assert "\n" not in str(caught.value)
+    assert name in str(caught.value)
+
+
+def test_missing_file_directory_and_bad_scale(tmp_path):
+    with pytest.raises(MeshError, match="no such file"):
+        load_mesh(tmp_path / "nowhere.stl", "mm")
+    (tmp_path / "folder.stl").mkdir()
+    with pytest.raises(MeshError, match="a directory"):
+        load_mesh(tmp_path / "folder.stl", "mm")
+    with pytest.raises(MeshError, match="scale"):
+        load_mesh(tmp_path / "nowhere.stl", "mm", scale=-1.0)
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ply", "obj"])
+def test_no_truncation_ends_in_a_raw_traceback(tmp_path, suffix):
+    """Every cut of a file is read (a text may end early and still be whole) or refused with an InputError."""
+    import trimesh
+
+    path = tmp_path / f"ball.{suffix}"
+    trimesh.Trimesh(*surfaces.sphere(50.0, 1), process=False).export(path)
+    data = path.read_bytes()
+    refused = 0
+    for size in range(0, len(data), max(1, len(data) // 60)):
+        path.write_bytes(data[:size])
+        try:
+            load_mesh(path, "mm")
+        except InputError:
+            refused += 1
+    assert refused > (5 if suffix == "obj" else 55)
+
+
+def test_bytes_after_the_last_facet_are_noted(tmp_path, ball):
+    path = tmp_path / "ball.stl"
+    path.write_bytes(write_stl(ball, "ball") + b"\0\0")
+    assert "2 bytes after the last facet ignored" in str(load_mesh(path, "mm").diagnosis)

@@ -1,0 +1,117 @@
+"""Meshes that others made, read from the folder that PENTAPOD_PARTS names: none ends in a traceback."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import toolpath_surfaces as surfaces
+
+from pentapod.errors import InputError
+from pentapod.geometry import tangent_frame
+from pentapod.toolpath import (
+    BallCutter,
+    HeightField,
+    RasterOptions,
+    Region,
+    SegmentKind,
+    StandOff,
+    load_mesh,
+    raster_with_report,
+)
+
+pytestmark = pytest.mark.parts
+
+FILES = {  # facets; closed; as found in the files by another reader
+    "wavy_mesh_with_hole.ply": (1_347, False),
+    "facade_infill_open_mid_res.stl": (11_737, False),
+    "wavy_vase_open_low_res.stl": (3_312, False),
+    "1002_tray_bottom.STL": (4_520, True),
+    "octagonal_pocket.stl": (3_262, True),
+    "fandisk.obj": (5_750, True),
+    "torus.STL": (8_700, True),
+    "unit_sphere.STL": (1_280, True),
+    "busted.STL": (3_878, True),
+    "soup.stl": (100, False),
+    "teapot.stl": (894, False),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_part_is_diagnosed(parts, name):
+    for repair in (False, True):
+        diagnosis = load_mesh(parts / name, "mm", repair=repair).diagnosis
+        assert (diagnosis.facets, diagnosis.watertight) == FILES[name]
+        assert str(diagnosis).count("\n") >= 1
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("direction", [0.0, 1.0])
+def test_every_part_is_rastered_on_its_surface(parts, name, direction):
+    mesh = load_mesh(parts / name, "mm")
+    mesh = load_mesh(parts / name, "mm", scale=0.1 / max(mesh.diagnosis.extents))
+    options = RasterOptions(stepover=4e-3, direction=direction)
+    toolpath, report = raster_with_report(mesh, BallCutter(3e-3), options)
+    cuts = np.concatenate([s.tips for s in toolpath.segments if s.kind is SegmentKind.CUT])
+    assert surfaces.surface_distance(mesh, cuts).max() < 1e-9
+    assert report.cut_length > 0
+
+
+def test_unit_sphere_and_torus_have_the_right_normals(parts):
+    sphere = load_mesh(parts / "unit_sphere.STL", "m")
+    np.testing.assert_allclose(np.linalg.norm(sphere.vertices, axis=1), 1.0, atol=1e-6)
+    assert (sphere.vertex_normals * sphere.vertices).sum(axis=1).min() > np.cos(np.radians(0.5))
+    torus = load_mesh(parts / "torus.STL", "m")
+    ring = np.hypot(*torus.vertices[:, :2].T)
+    exact = torus.vertices * np.stack([1 - 1 / ring, 1 - 1 / ring, 1 + 0 * ring], 1)
+    exact /= np.linalg.norm(exact, axis=1, keepdims=True)
+    assert (torus.vertex_normals * exact).sum(axis=1).min() > np.cos(np.radians(1.0))
+
+
+JOBS = {
+    "wavy_mesh_with_hole.ply": ("mm", 10.0, Region()),
+    "facade_infill_open_mid_res.stl": (
+        "mm",
+        1.0,
+        Region(direction=(1, 0, 0), box=((-1, -0.06, 0.04), (1, 0.06, 0.16))),
+    ),
+    "octagonal_pocket.stl": ("m", 0.6, Region()),
+    "torus.STL": ("mm", 40.0, Region(angle=np.radians(45.0))),
+}
+
+
+@pytest.mark.parametrize("name", JOBS)
+@pytest.mark.parametrize("tool", [BallCutter(3e-3), StandOff(5e-3)], ids=["ball", "standoff"])
+def test_parts_of_the_jobs_are_covered(parts, name, tool):
+    unit, scale, region = JOBS[name]
+    mesh = load_mesh(parts / name, unit, scale=scale)
+    toolpath, report = raster_with_report(mesh, tool, RasterOptions(stepover=3e-3, region=region))
+    cuts = [s for s in toolpath.segments if s.kind is SegmentKind.CUT]
+    axes = np.concatenate([s.axes for s in cuts])
+    contacts = np.concatenate([s.tips for s in cuts]) + min(tool.pivot, 0.0) * axes
+    assert surfaces.surface_distance(mesh, contacts).max() < 1e-9
+    assert np.degrees(np.arccos(axes @ region.direction)).max() <= np.degrees(region.angle) + 1e-6
+    # The cut's length times the stepover, against the area found by random points.
+    random = np.random.default_rng(7)
+    facet = random.choice(len(mesh.faces), 50_000, p=mesh.facet_areas / mesh.facet_areas.sum())
+    points = (mesh.vertices[mesh.faces[facet]] * random.dirichlet([1, 1, 1], len(facet))[:, :, None]).sum(axis=1)
+    low, high = region.bounds
+    facing = mesh.facet_normals[facet] @ region.direction
+    inside = (facing >= np.cos(region.angle)) & ((points >= low) & (points <= high)).all(axis=1)
+    inside &= ~HeightField(mesh, region.direction).hides(points, 1e-6)
+    # Passes run along the surface but their planes are apart as seen along the direction.
+    along = mesh.facet_normals[facet] @ tangent_frame(region.direction)[0]
+    area = mesh.facet_areas.sum() * (np.hypot(facing, along) * inside).mean()
+    assert report.cut_length * report.stepover == pytest.approx(area, rel=0.05)
+
+
+def test_the_hole_of_the_wavy_mesh_is_left_out(parts):
+    mesh = load_mesh(parts / "wavy_mesh_with_hole.ply", "mm", scale=10.0)
+    report = raster_with_report(mesh, BallCutter(3e-3), RasterOptions(stepover=3e-3))[1]
+    assert mesh.diagnosis.border_loops == 2
+    assert report.passes > 36
+    assert report.retracts <= 4
+
+
+def test_missing_unit_of_the_pocket_suggests_metres(parts):
+    with pytest.raises(InputError, match='unit = "m" is likely'):
+        load_mesh(parts / "octagonal_pocket.stl")
