@@ -51,7 +51,9 @@ def path_traces(tips: Floats, axes: Floats, cutting: Ints, margins: Floats) -> l
     coloured["line"] = {
         "width": 5, "color": packed(margins[keep]), "colorscale": _MARGIN_COLOURS, "cmin": 0.0, "cmax": 0.5,
         "showscale": True,
-        "colorbar": {"title": {"text": "cuts:<br>smallest<br>margin"}, "thickness": 12, "len": 0.5, "x": 0.98, "y": 0.4},
+        "colorbar": {
+            "title": {"text": "cuts:<br>smallest<br>margin"}, "thickness": 12, "len": 0.5, "x": 0.98, "y": 0.4,
+        },
     }  # fmt: skip
     coloured["showlegend"] = False
     coloured["text"] = [f"margin {value:.3f}" for value in margins[keep]]

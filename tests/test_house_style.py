@@ -1,0 +1,30 @@
+"""House rules that a linter does not know."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import pentapod
+
+SOURCE = Path(pentapod.__file__).parent
+ROOT = SOURCE.parents[1]
+FILES = sorted(SOURCE.rglob("*.py"))
+LONGEST = 320
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(SOURCE)))
+def test_one_concept_to_a_file(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= LONGEST, "two rooms with the wall missing"
+    assert not re.search(r"\b(TODO|FIXME|XXX)\b", text)
+    assert not re.search(r"^\s*assert ", text, re.M), "inputs are checked by errors, not by assert"
+
+
+def test_every_dependency_is_justified() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    wanted = {re.split(r"[<>=~!\[ ]", d)[0] for d in project["dependencies"]}
+    wanted |= {re.split(r"[<>=~!\[ ]", d)[0] for d in project["optional-dependencies"]["dev"]}
+    text = (ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8")
+    assert wanted == set(re.findall(r"^\| `([\w-]+)` \|", text, re.M))

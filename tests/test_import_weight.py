@@ -1,0 +1,36 @@
+"""What is heavy is loaded when it is used, not before."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+HEAVY = ("casadi", "toppra", "matplotlib", "plotly", "trimesh", "scipy", "pydantic", "rich", "jinja2")
+
+FIND = "import json, sys; print(json.dumps([m for m in {heavy!r} if m in sys.modules]))"
+
+
+def loaded_after(code: str, heavy: tuple[str, ...]) -> list[str]:
+    program = f"{code}\n{FIND.format(heavy=heavy)}"
+    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    return json.loads(answer.stdout.splitlines()[-1])
+
+
+def test_import_pentapod_is_light() -> None:
+    assert loaded_after("import pentapod", (*HEAVY, "numpy", "click")) == []
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["plan", "--help"], ["machine", "check", "--help"]])
+def test_help_is_light(arguments: list[str]) -> None:
+    code = f"from pentapod.cli.main import run\nassert run({arguments!r}) == 0"
+    assert loaded_after(code, (*HEAVY, "numpy")) == []
+
+
+def test_every_name_loads_without_the_solvers() -> None:
+    code = "import pentapod\nfor name in pentapod.__all__: getattr(pentapod, name)"
+    assert loaded_after(code, ("casadi", "toppra", "matplotlib", "plotly", "trimesh")) == []
+
+
+def test_the_check_can_fail() -> None:
+    assert loaded_after("import rich", HEAVY) == ["rich"]
