@@ -71,6 +71,10 @@ def smooth_laws(
         ]
         if not exceeding:
             return [piece.profile for piece in timed], laws
+        if attempt < _EASINGS:
+            # Easing shifts all later setpoints against the path: ease for the rows between as well.
+            between = _shares(timed, laws, machine, 0.5)
+            shares = [(np.maximum(a[0], b[0]), np.maximum(a[1], b[1])) for a, b in zip(shares, between, strict=True)]
         for k in exceeding:
             if attempt < _EASINGS:
                 rows = laws[k](np.arange(len(shares[k][0])) * period)
@@ -84,15 +88,20 @@ def smooth_laws(
     return Unmended(exceeding[0], Failure(-1, "the cubic interpolant exceeds a limit however slowly it is run"))
 
 
-def _shares(timed: list[_Timed], laws: list[MotionLaw], machine: Machine) -> list[tuple[Floats, Floats]]:
-    """Return for each piece the shares (rows,) of the rates or the feed, and of the accelerations."""
+def _shares(
+    timed: list[_Timed], laws: list[MotionLaw], machine: Machine, phase: float = 0.0
+) -> list[tuple[Floats, Floats]]:
+    """Return for each piece the shares (rows,) of the rates or the feed, and of the accelerations.
+
+    phase: by how many periods the rows come later than the program's.
+    """
     period = machine.controller.period
     counts = [round(law.duration / period) for law in laws]
     columns: list[Floats] = []
     speeds: list[Floats] = []
     start = 0.0
     for piece, law, count in zip(timed, laws, counts, strict=True):
-        s = law(np.arange(count + 1) * period)
+        s = law((np.arange(count + 1) + phase) * period)
         s[-1] = law.length
         columns.append(np.column_stack([piece.profile.piece(s, 0), start + s])[1 if columns else 0 :])
         limits = piece.profile.limits
