@@ -49,6 +49,4 @@ def atomic_write(path: str | Path) -> Generator[Path]:
 
 def _unwritable(path: Path, error: OSError) -> InputError:
     reason = (error.strerror or str(error)).lower()
-    return InputError(
-        f"cannot be written: {reason}", file=path, expected="a folder that exists and can be written"
-    )
+    return InputError(f"cannot be written: {reason}", file=path, expected="a folder that exists and can be written")
