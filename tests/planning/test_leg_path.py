@@ -1,4 +1,4 @@
-"""LegPath: true to inverse kinematics, parametrised by the tip's arc length, within tolerance, resting where it must."""
+"""LegPath: true to inverse kinematics, over the tip's arc length, within tolerance, resting where it must."""
 
 import numpy as np
 import pytest

@@ -85,7 +85,7 @@ def test_shortfalls_are_in_the_units_of_the_limit(desk):
     margins = Margins.of(desk, PLUS)
     by_name = {limit.name: k for k, limit in enumerate(margins.limits)}
     axis = np.array([0.0, 0.0, -1.0])
-    tip = desk.work.centre + (0.0, 0.0, 0.4)  # too deep: the legs are too short for it
+    tip = desk.work.centre + np.array([0.0, 0.0, 0.4])  # too deep: the legs are too short for it
     values = margins(tip, axis)
     length = desk.pentapod.leg_lengths(tip + desk.tool_length * axis, -axis)
     k = int(np.argmax(length - desk.legs.max_length))

@@ -59,12 +59,12 @@ def test_placement_is_not_beaten_by_small_moves(desk, cap, placed):
     few = Task(cap.pivots[rows], cap.axes[rows], cap.pivot, TILT)
     margins = Margins.of(desk, placed.component)
     t = placed.placement.transform
-    here = best_tilted_margins(few, margins, t).min()
+    here = best_tilted_margins(few, margins, t)[0].min()
     others = []
     for _ in range(60):
         turn = t.rotation @ cayley(rng.normal(scale=0.01, size=3))
         shift = rng.normal(scale=0.003, size=3) + t.translation
-        others.append(best_tilted_margins(few, margins, RigidTransform(turn, shift)).min())
+        others.append(best_tilted_margins(few, margins, RigidTransform(turn, shift))[0].min())
     assert max(others) <= here + 0.03
 
 
@@ -103,7 +103,7 @@ def test_wrong_component_is_refused(desk, cap, placed):
 def test_placement_out_of_reach_is_refused_with_the_true_shortfall(desk, cap, placed):
     """Pushed away along the base normal until legs are too short: the millimetres named are those missing."""
     t = placed.placement.transform
-    far = Placement(RigidTransform(t.rotation, t.translation + [0.0, 0.0, 0.3]), "job")
+    far = Placement(RigidTransform(t.rotation, t.translation + np.array([0.0, 0.0, 0.3])), "job")
     answer = plan(cap, desk, placement=far, component=placed.component)
     assert isinstance(answer, Refusal)
     tips, axes = far.transform.apply(cap.tips), far.transform.rotate(cap.axes)

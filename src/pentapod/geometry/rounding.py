@@ -32,16 +32,12 @@ def rounded(parameter: Floats, points: Floats, too_far: Callable[[Floats, Floats
     for _ in range(HALVINGS):
         curve = schoenberg(knots, parameter, points)
         u = knots[:-1, None] + _INSIDE * np.diff(knots)[:, None]
-        far = too_far(u.ravel(), curve(u.ravel()), interpolated(u.ravel(), parameter, points)).reshape(
-            u.shape
-        )
+        far = too_far(u.ravel(), curve(u.ravel()), interpolated(u.ravel(), parameter, points)).reshape(u.shape)
         spans = far.any(axis=1)
         if not spans.any():
             return curve
         knots = np.sort(np.concatenate([knots, 0.5 * (knots[:-1] + knots[1:])[spans]]))
-    raise ArrayError(
-        "the tolerance is too small for the spacing of numbers", value=float(np.diff(knots).min())
-    )
+    raise ArrayError("the tolerance is too small for the spacing of numbers", value=float(np.diff(knots).min()))
 
 
 def schoenberg(knots: Floats, parameter: Floats, points: Floats) -> BSpline:

@@ -26,8 +26,8 @@ NEEDED_MARGIN = 0.02
 CALM_SHARE = 0.9
 """Share of the best smallest margin that is kept when the axis is made calm."""
 
-REFINED = 3
-"""How many first guesses are refined by IPOPT."""
+REFINED = 6
+"""How many first guesses are improved by IPOPT; the best of them are brought to the end, until one is good."""
 
 _CELLS = 2
 _POINTS, _ADDED, _ROUNDS = 48, 16, 6
@@ -63,7 +63,7 @@ def plan(
         best = search.fixed(max(fixed, key=lambda g: g.margin))
     margins, transform, coefficients, smallest = best
     if smallest < NEEDED_MARGIN:
-        values = best_tilted_margins(task, margins, transform)
+        values, _ = best_tilted_margins(task, margins, transform)
         if (values.min(axis=1) >= NEEDED_MARGIN).all():  # each waypoint alone would do, not all with one smooth field
             values = margins(*task.machine_poses(transform, search.axes(coefficients)))
         return refusal(values, margins, NEEDED_MARGIN, fixed=placement is not None, tilt=tilt)
@@ -100,6 +100,18 @@ class _Search:
         """Return the margins (N, M) at every waypoint."""
         return margins(*self.task.machine_poses(transform, self.axes(coefficients)))
 
+    def fitted(self, margins: Margins, transform: RigidTransform) -> Floats:
+        """Return coefficients of a smooth field near the tilts that are best for each representative by itself."""
+        if self.basis is None:
+            return self.zero
+        rows = self.task.representatives(4 * _POINTS)
+        _, leans = best_tilted_margins(self.task.at(rows), margins, transform)
+        # Smoothness, lightly weighed, decides where the representatives do not.
+        smooth = 0.3 * self.domain.roughness()
+        matrix = np.vstack([self.basis[rows], smooth, 1e-3 * np.eye(self.domain.size)])
+        wanted = np.vstack([leans @ self.domain.lean_plane.T, np.zeros((len(smooth) + self.domain.size, 2))])
+        return np.asarray(np.linalg.lstsq(matrix, wanted, rcond=None)[0], dtype=np.float64)
+
     def refine(self, guesses: list[Guess]) -> _Best:
         """Return the best placement: every guess is improved once, the most promising one to the end."""
         attempts: list[_Attempt] = []
@@ -108,8 +120,12 @@ class _Search:
             attempt.improve()
             attempts.append(attempt)
             best = max(a.best[3] for a in attempts)
-            self.progress("placement", (k + 1) / (len(guesses) + 1), f"component {guess.component}, margin {best:.3f}")
-        return max(attempts, key=lambda a: a.best[3]).finished()
+            self.progress("placement", (k + 1) / (len(guesses) + 2), f"component {guess.component}, margin {best:.3f}")
+        attempts.sort(key=lambda a: -a.best[3])
+        for attempt in attempts:
+            if attempt.finished()[3] >= NEEDED_MARGIN:
+                break
+        return max((a.best for a in attempts), key=lambda b: b[3])
 
     def fixed(self, guess: Guess) -> _Best:
         """Return the best tilt field at a given placement."""
@@ -142,7 +158,7 @@ class _Search:
     def problem(self, margins: Margins, transform: RigidTransform, *, free: bool) -> PlanningProblem:
         """State the problem with the margin rows that can come near the smallest one."""
         rows = self.task.representatives(4 * _POINTS)
-        few = Task(self.task.pivots[rows], self.task.nominal[rows], self.task.pivot, self.task.tilt)
+        few = self.task.at(rows)
         values = margins(*few.machine_poses(transform, few.nominal)).min(axis=0)
         slack = _ROW_SLACK if free else 0.5 * _ROW_SLACK
         near = np.flatnonzero(values < values.min() + slack)
@@ -170,8 +186,9 @@ class _Attempt:
 
     def __init__(self, search: _Search, guess: Guess, *, free: bool) -> None:
         self.search, self.margins = search, Margins.of(search.machine, guess.component)
-        smallest = float(search.values(self.margins, guess.transform, search.zero).min())
-        self.best: _Best = (self.margins, guess.transform, search.zero, smallest)
+        start = search.fitted(self.margins, guess.transform)
+        smallest = float(search.values(self.margins, guess.transform, start).min())
+        self.best: _Best = (self.margins, guess.transform, start, smallest)
         self.rows = search.task.representatives(_POINTS)
         self.problem = search.problem(self.margins, guess.transform, free=free)
 

@@ -16,7 +16,11 @@ from pentapod.planning.task import Task
 from pentapod.planning.tilt import lean
 
 SAMPLES = 12_000
-KEPT = 4
+KEPT = 6
+"""Guesses returned for each component; they differ from each other."""
+
+_RANKED = 48
+_APART_M, _APART_RAD = 0.02, np.radians(15.0)
 LARGEST_SLOPE = np.radians(40.0)
 """How far the part's mean axis may lean from the base normal in a first guess."""
 
@@ -54,19 +58,12 @@ def first_guesses(
         translations = places - rotations @ centre
         score = _score(task, margins, rotations, translations, rows)
         best = _best(score)
-        tilted = [
-            _tilted_score(task, margins, rotations[k], translations[k], rows) if task.tilt > 0.0 else float(score[k])
+        found = [
+            Guess(t, component, float(_smallest(task, margins, t, rows) if task.tilt > 0.0 else score[k]))
             for k in best
+            for t in (RigidTransform(_orthonormal(rotations[k]), translations[k]),)
         ]
-        order = np.argsort([-t for t in tilted], kind="stable")[:KEPT]
-        guesses += [
-            Guess(
-                RigidTransform(_orthonormal(rotations[best[k]]), translations[best[k]]),
-                component,
-                float(tilted[k]),
-            )
-            for k in order
-        ]
+        guesses += _different(sorted(found, key=lambda g: -g.margin), centre)
     return sorted(guesses, key=lambda g: -g.margin)
 
 
@@ -79,10 +76,12 @@ def tilts(angle: float) -> Floats:
     return np.concatenate(rings)
 
 
-def best_tilted_margins(task: Task, margins: Margins, placement: RigidTransform, block: int = 4096) -> Floats:
-    """Return the margins (N, M) of every waypoint at the best tilt of a grid over the cone, each waypoint by itself."""
+def best_tilted_margins(
+    task: Task, margins: Margins, placement: RigidTransform, block: int = 4096
+) -> tuple[Floats, Floats]:
+    """Return margins (N, M) at the best tilt of a grid over the cone, each waypoint by itself, and the lean (N, 3)."""
     grid = tilts(task.tilt) if task.tilt > 0.0 else np.zeros((1, 2))
-    out = np.empty((len(task.pivots), len(margins.limits)))
+    out, leans = np.empty((len(task.pivots), len(margins.limits))), np.empty((len(task.pivots), 3))
     for start in range(0, len(out), block):
         rows = np.arange(start, min(start + block, len(out)))
         t1, t2 = tangent_frame(task.nominal[rows])
@@ -91,11 +90,28 @@ def best_tilted_margins(task: Task, margins: Margins, placement: RigidTransform,
         all_margins = margins(tips, axes)
         choice = all_margins.min(axis=-1).argmax(axis=0)
         out[rows] = all_margins[choice, np.arange(len(rows))]
-    return out
+        leans[rows] = b[choice, np.arange(len(rows))]
+    return out, leans
 
 
 def _best(score: Floats) -> Ints:
-    return np.argsort(-score, kind="stable")[: KEPT * 8]
+    return np.argsort(-score, kind="stable")[:_RANKED]
+
+
+def _different(guesses: list[Guess], centre: Floats) -> list[Guess]:
+    """Return the first KEPT guesses that are not all but the same as one before."""
+    kept: list[Guess] = []
+    for guess in guesses:
+        for other in kept:
+            apart = float(np.linalg.norm(guess.transform.apply(centre) - other.transform.apply(centre)))
+            turn = 0.5 * (float(np.trace(guess.transform.rotation.T @ other.transform.rotation)) - 1.0)
+            if apart < _APART_M and turn > np.cos(_APART_RAD):
+                break
+        else:
+            kept.append(guess)
+        if len(kept) == KEPT:
+            break
+    return kept
 
 
 def _score(task: Task, margins: Margins, r: Floats, t: Floats, rows: Ints) -> Floats:
@@ -104,10 +120,8 @@ def _score(task: Task, margins: Margins, r: Floats, t: Floats, rows: Ints) -> Fl
     return margins(tips, turned).min(axis=(-1, -2))
 
 
-def _tilted_score(task: Task, margins: Margins, r: Floats, t: Floats, rows: Ints) -> float:
-    few = Task(task.pivots[rows], task.nominal[rows], task.pivot, task.tilt)
-    placement = RigidTransform(_orthonormal(r), t)
-    return float(best_tilted_margins(few, margins, placement).min())
+def _smallest(task: Task, margins: Margins, placement: RigidTransform, rows: Ints) -> float:
+    return float(best_tilted_margins(task.at(rows), margins, placement)[0].min())
 
 
 def _rotations(mean_axis: Floats, side: float, count: int, rng: np.random.Generator) -> Floats:

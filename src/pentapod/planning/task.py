@@ -35,6 +35,10 @@ class Task:
         """Return the task that a toolpath and a tilt cone (half angle, radians) pose."""
         return cls(toolpath.pivots, toolpath.axes, toolpath.pivot, tilt)
 
+    def at(self, rows: Ints) -> Task:
+        """Return the task of the waypoints `rows` only."""
+        return Task(self.pivots[rows], self.nominal[rows], self.pivot, self.tilt)
+
     def machine_poses(
         self, placement: RigidTransform, axes: Floats, rows: Ints | slice = slice(None)
     ) -> tuple[Floats, Floats]:

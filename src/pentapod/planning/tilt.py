@@ -86,5 +86,5 @@ class TiltField:
 def lean(nominal: Floats, b: Floats) -> Floats:
     """Return unit nominal axes (..., 3) tilted by b (..., 3): normalised n + b − (b·n) n."""
     across = b - (b * nominal).sum(axis=-1, keepdims=True) * nominal
-    length = np.sqrt(1.0 + (across * across).sum(axis=-1, keepdims=True))
-    return np.asarray((nominal + across) / length, dtype=np.float64)
+    length: Floats = np.sqrt(1.0 + np.square(across).sum(axis=-1, keepdims=True))
+    return (nominal + across) / length

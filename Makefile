@@ -1,0 +1,37 @@
+# Everything sets itself up: a virtual environment in .venv, the package and its tools in it.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+# Tests are spread over processes; a numerical library that starts threads of its own would only get in the way.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+.PHONY: demo test test-all lint bench clean
+
+demo: $(READY)  ## plan a dome and judge the program
+	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
+
+test: $(READY)  ## the fast suite
+	$(BIN)/pytest -n 2 -m "not slow"
+
+test-all: $(READY)  ## everything, the long forms too
+	$(BIN)/pytest -n 2
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+
+bench: $(READY)  ## stage times, and kinematics against Newton
+	$(BIN)/python benchmarks/pipeline.py
+
+$(READY): pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "pentapod needs Python 3.11 or newer")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --editable ".[dev]"
+	touch $@
+
+clean:
+	rm -rf $(VENV) out .pytest_cache .ruff_cache .hypothesis
