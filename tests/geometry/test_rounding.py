@@ -1,5 +1,7 @@
 """Rounded polylines: C2, exact at the ends and on straight stretches, within the tolerance everywhere."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -26,7 +28,7 @@ def test_curve_stays_within_the_tolerance(seed, count, tolerance):
     curve = rounded(u, points, within(tolerance))
     # An oracle that knows nothing of parameters: dense points of the curve against dense points of the polyline.
     dense = np.unique(np.concatenate([curve.t + k * np.append(np.diff(curve.t), 0.0) for k in np.linspace(0, 1, 9)]))
-    fine = np.concatenate([np.linspace(a, b, 3000) for a, b in zip(points[:-1], points[1:], strict=True)])
+    fine = np.concatenate([np.linspace(a, b, 3000) for a, b in pairwise(points)])
     distance, _ = cKDTree(fine).query(curve(np.clip(dense, u[0], u[-1])))
     spacing = np.diff(u).max() / 3000
     assert distance.max() <= np.hypot(1.05 * tolerance, spacing)

@@ -59,7 +59,7 @@ class FieldDomain:
         along = np.clip((pivots - self.origin) @ self.directions.T / self.lengths, 0.0, 1.0)
         knots = np.concatenate([np.zeros(DEGREE), np.linspace(0.0, 1.0, self.cells + 1), np.ones(DEGREE)])
         b0, b1 = (BSpline.design_matrix(along[:, k], knots, DEGREE).toarray() for k in range(2))
-        return (b0[:, :, None] * b1[:, None, :]).reshape(len(along), self.size)
+        return np.einsum("ni,nj->nij", b0, b1).reshape(len(along), self.size)
 
     def roughness(self) -> Floats:
         """Return the matrix (R, size) that takes coefficients to their second differences in both directions."""
@@ -85,6 +85,6 @@ class TiltField:
 
 def lean(nominal: Floats, b: Floats) -> Floats:
     """Return unit nominal axes (..., 3) tilted by b (..., 3): normalised n + b − (b·n) n."""
-    across = b - (b * nominal).sum(axis=-1, keepdims=True) * nominal
-    length: Floats = np.sqrt(1.0 + np.square(across).sum(axis=-1, keepdims=True))
+    across: Floats = b - (b * nominal).sum(axis=-1, keepdims=True) * nominal
+    length = np.sqrt(1.0 + np.square(across).sum(axis=-1, keepdims=True))
     return (nominal + across) / length

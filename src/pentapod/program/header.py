@@ -174,10 +174,14 @@ class _Reader:
 
 
 def _number(value: Any, shift: int = 0) -> float:
-    """Return a TOML number times 10^shift, rounded once; NaN for anything else."""
-    if type(value) is int or isinstance(value, Decimal):
-        return float(Decimal(value).scaleb(shift)) if Decimal(value).is_finite() else math.nan
-    return math.nan
+    """Return a TOML number times 10^shift, rounded once; NaN for anything else, and for what no double holds."""
+    if type(value) is not int and not isinstance(value, Decimal):
+        return math.nan
+    exact = Decimal(value)
+    # Beyond this a double overflows anyway, and Decimal's own arithmetic would raise.
+    if not exact.is_finite() or exact.adjusted() > 400:
+        return math.nan
+    return float(exact.scaleb(shift)) if exact.adjusted() > -400 else 0.0
 
 
 def _string(text: str) -> str:
