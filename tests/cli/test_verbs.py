@@ -1,0 +1,306 @@
+"""The command line as a user or a script meets it: real processes' exit codes, stdout, stderr."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pentapod.cli import main as entry
+from pentapod.cli.main import VERBS, run
+from pentapod.machine import Machine
+from pentapod.program import read_csv, write_csv
+
+PENTAPOD = [sys.executable, "-c", "from pentapod.cli.main import main; main()"]
+TOO_FAR = ("position_mm = [", "position_mm = [1000.0, 0, 700] # [")
+
+
+def test_plan_and_verify(make_job, tmp_path, capsys):
+    job, out = make_job(), tmp_path / "out"
+    assert run(["plan", str(job), "-o", str(out)]) == 0
+    said = capsys.readouterr()
+    assert "part.stl: 288 facets" in said.out
+    assert "verdict: passed" in said.out
+    assert said.err == ""
+    assert {p.name for p in out.iterdir()} == {"program.csv", "verdict.json", "report.html", "plan.npz"}
+    assert run(["verify", str(out / "program.csv"), "--job", str(job)]) == 0
+    assert "verdict: passed" in capsys.readouterr().out
+    assert run(["verify", str(out / "program.csv"), "--job", str(job), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads((out / "verdict.json").read_text())
+
+
+def test_verify_fails_a_program_that_was_changed(make_job, tmp_path, capsys):
+    job, out = make_job(), tmp_path / "out"
+    run(["plan", str(job), "-o", str(out), "-q"])
+    program = read_csv(out / "program.csv")
+    legs = program.legs.copy()
+    legs[len(legs) // 2 :, 2] += 1e-4
+    write_csv(type(program)(program.period, legs, program.interpolation, program.component, program.placement,
+                            program.provenance), out / "program.csv")  # fmt: skip
+    assert run(["verify", str(out / "program.csv"), "--job", str(job)]) == 1
+    said = capsys.readouterr().out
+    assert "FAIL  tip deviation" in said
+    assert "verdict: FAILED" in said
+    assert (
+        run(["verify", str(out / "program.csv"), "--job", str(make_job(("cut_mm_min = 3000", "cut_mm_min = 2900")))])
+        == 1
+    )
+    assert "FAIL  job" in capsys.readouterr().out
+
+
+def test_json_and_quiet(make_job, tmp_path, capsys):
+    job, out = make_job(), tmp_path / "out"
+    assert run(["plan", str(job), "-o", str(out), "--json"]) == 0
+    said = capsys.readouterr()
+    content = json.loads(said.out)
+    assert content["passed"] is True
+    assert set(content["seconds"]) >= {"placement", "timing", "verify"}
+    assert said.err == ""
+    assert run(["plan", str(job), "-o", str(out), "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_what_cannot_be_done_is_exit_code_1_with_the_reason(make_job, tmp_path, capsys):
+    job, out = make_job(TOO_FAR), tmp_path / "out"
+    assert run(["plan", str(job), "-o", str(out)]) == 1
+    said = capsys.readouterr()
+    assert said.err.startswith("refused: placement: ")
+    assert said.err.count("\n") == 1
+    assert " mm at waypoints " in said.err
+    assert not (out / "program.csv").exists()
+    assert (out / "report.html").exists()
+
+
+BAD_MESHES = {
+    "empty": b"",
+    "text": b"this is a letter, not a mesh\n" * 9,
+    "truncated": None,
+    "zero area": "flat",
+    "NaN": "nan",
+}
+
+
+def mesh(kind: str) -> bytes:
+    from pentapod.cli.new import dome_stl
+
+    whole = dome_stl(cells=12)
+    if kind == "truncated":
+        return whole[: len(whole) // 2]
+    facets = np.frombuffer(whole, dtype=[("n", "<f4", 3), ("c", "<f4", (3, 3)), ("s", "<u2")], offset=84).copy()
+    if kind == "zero area":
+        facets["c"] = 0.0
+    elif kind == "NaN":
+        facets["c"][5, 1, 1] = np.nan
+    else:
+        content = BAD_MESHES[kind]
+        assert isinstance(content, bytes)
+        return content
+    return whole[:84] + facets.tobytes()
+
+
+@pytest.mark.parametrize("kind", BAD_MESHES)
+def test_bad_meshes(kind, make_job, tmp_path, capsys):
+    bad_input(["plan", str(make_job(mesh=mesh(kind))), "-o", str(tmp_path / "out")], tmp_path, capsys)
+
+
+BAD_JOBS = [
+    ('"part.stl"', '"other.stl"'),
+    ('unit = "mm"\n', ""),
+    ('unit = "mm"', 'unit = "yard"'),
+    ("stepover_mm", "stepovr_mm"),
+    ("stepover_mm = 15", "stepover_mm = -15"),
+    ("cut_mm_min = 3000", "cut_mm_min = 0"),
+    ("path_mm = 0.05", "path_mm = 60"),
+    ("[axis]", "[axis"),
+    ('"desk"', '"dsek"'),
+    ('name = "desk"', 'file = "part.stl"'),
+    ("diameter_mm = 10", "diameter_mm = 10\nlength_mm = 1"),
+    ("[180, 0, 0]", '[180, 0, "x"]'),
+]
+
+
+@pytest.mark.parametrize("change", BAD_JOBS, ids=lambda c: c[1].strip() or "missing")
+def test_bad_jobs(change, make_job, tmp_path, capsys):
+    bad_input(["plan", str(make_job(change)), "-o", str(tmp_path / "out")], tmp_path, capsys)
+
+
+def test_a_machine_with_four_legs(make_job, tmp_path, capsys):
+    from importlib import resources
+
+    text = (resources.files("pentapod.machine") / "library" / "desk.toml").read_text()
+    start = text.index("base_mm")
+    first = text.index("[", text.index("[", start) + 1)
+    end = text.index("]", first) + 1
+    cut = text[:first] + text[end:].lstrip(", \n")
+    (tmp_path / "four.toml").write_text(cut)
+    job = make_job(('name = "desk"', 'file = "four.toml"'))
+    line = bad_input(["plan", str(job), "-o", str(tmp_path / "out")], tmp_path, capsys)
+    assert "base_mm" in line
+    assert run(["machine", "check", str(tmp_path / "four.toml")]) == 2
+
+
+def test_folder_that_cannot_be_written(make_job, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    bad_input(["plan", str(make_job()), "-o", str(tmp_path / "file" / "out")], tmp_path, capsys)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["plan", "nowhere.toml"],
+        ["verify", "nowhere.csv", "--job", "nowhere.toml"],
+        ["verify", "nowhere.csv"],
+        ["plan"],
+        ["plant", "x"],
+        ["plan", "x", "--nonsense"],
+        ["ik", "1", "2", "3"],
+        ["ik", "1", "2", "3", "0", "0", "0"],
+        ["ik", "1", "2", "3", "0", "0", "nan"],
+        ["fk", "1", "2", "3", "4", "5", "-c", "+"],
+        ["fk", "1", "2", "3", "4", "x"],
+        ["machine", "check", "nowhere"],
+        ["toolpath", "nowhere.toml", "-o", "x.npz"],
+    ],
+)
+def test_bad_arguments(arguments, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    bad_input(arguments, tmp_path, capsys)
+
+
+def bad_input(arguments: list[str], folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    """Exit code 2, one line on stderr, nothing on stdout, nothing written."""
+    before = {p: p.stat().st_mtime_ns for p in folder.rglob("*")}
+    capsys.readouterr()
+    assert run(arguments) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("error: ")
+    assert said.err.count("\n") == 1
+    assert "Traceback" not in said.err
+    assert {p: p.stat().st_mtime_ns for p in folder.rglob("*")} == before
+    return said.err
+
+
+def test_bugs_are_told_from_bad_input(monkeypatch, capsys):
+    def broken() -> None:
+        raise ZeroDivisionError("one\ntwo")
+
+    monkeypatch.setattr(entry.cli, "main", lambda **_: broken())
+    assert run(["plan"]) == 3
+    line = capsys.readouterr().err
+    assert line.startswith("error: ZeroDivisionError: one two")
+    assert "--debug" in line
+    with pytest.raises(ZeroDivisionError):
+        run(["plan", "--debug"])
+
+
+def test_debug_shows_the_traceback_of_bad_input_too():
+    from pentapod.errors import JobError
+
+    with pytest.raises(JobError):
+        run(["plan", "nowhere.toml", "--debug"])
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_has_help(verb, capsys):
+    assert run([verb, "--help"]) == 0
+    assert f"pentapod {verb}" in capsys.readouterr().out
+
+
+def test_new_gives_a_job_that_plans(tmp_path, capsys):
+    folder = tmp_path / "mine"
+    assert run(["new", str(folder)]) == 0
+    assert "pentapod plan" in capsys.readouterr().out
+    text = (folder / "job.toml").read_text()
+    from pentapod.job_tables import JobTables
+
+    for table, field in JobTables.model_fields.items():
+        assert f"[{table}]" in text
+        assert field.annotation is not None
+        for key in field.annotation.model_fields:
+            assert f"{key} = " in text
+    # Quick form: the same job, fewer passes.
+    (folder / "job.toml").write_text(text.replace("stepover_mm = 6.0", "stepover_mm = 20.0"))
+    assert run(["plan", str(folder / "job.toml"), "-o", str(folder / "out")]) == 0
+    assert run(["new", str(folder)]) == 2
+
+
+def test_toolpath(make_job, tmp_path, capsys):
+    job, file = make_job(), tmp_path / "path.npz"
+    assert run(["toolpath", str(job), "-o", str(file), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    with np.load(file) as arrays:
+        assert len(arrays["toolpath.tips_mm"]) == said["waypoints"]
+        assert len(arrays["toolpath.segment_kinds"]) == said["segments"]
+        steps = np.linalg.norm(np.diff(arrays["toolpath.tips_mm"], axis=0), axis=1)
+        assert steps.sum() == pytest.approx(sum(said["length_mm"].values()))
+        assert np.allclose(np.linalg.norm(arrays["toolpath.axes"], axis=1), 1.0)
+    assert run(["toolpath", str(job), "-o", str(tmp_path / "path.xyz")]) == 2
+
+
+def test_machines(capsys):
+    assert run(["machine", "list", "--json"]) == 0
+    assert "desk" in json.loads(capsys.readouterr().out)
+    assert run(["machine", "check", "desk"]) == 0
+    assert "desk" in capsys.readouterr().out
+    assert run(["machine", "check", "desk", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["passed"] is True
+
+
+def test_fk_undoes_ik(capsys):
+    x, y, z = Machine.load("desk").work.centre * 1e3
+    pose = [x, y + 10.0, z, 0.1, -0.2, -1.0]
+    assert run(["ik", *map(str, pose), "--json"]) == 0
+    legs = json.loads(capsys.readouterr().out)
+    assert legs["within_strokes"] is True
+    numbers = [str(legs[f"leg{k}_mm"]) for k in range(1, 6)]
+    assert run(["fk", *numbers, "-c", legs["component"], "--json"]) == 0
+    back = json.loads(capsys.readouterr().out)
+    assert [back[name] for name in ("x_mm", "y_mm", "z_mm")] == pytest.approx(pose[:3], abs=1e-6)
+    axis = np.array(pose[3:]) / np.linalg.norm(pose[3:])
+    assert [back[name] for name in "ijk"] == pytest.approx(axis, abs=1e-9)
+    assert back["singularity_mm"] > 10
+    assert run(["fk", *numbers, "--json"]) == 0
+    modes = json.loads(capsys.readouterr().out)
+    assert [mode["component"] for mode in modes] == ["++", "+-", "-+", "--"]
+    assert run(["fk", "600", "600", "600", "600", "6000"]) == 1
+
+
+def test_ik_and_fk_as_a_pipe():
+    x, y, z = Machine.load("desk").work.centre * 1e3
+    poses = "x_mm,y_mm,z_mm,i,j,k\n" + "".join(f"{x + d},{y},{z},0,0,-1\n" for d in range(5))
+    ik = subprocess.run([*PENTAPOD, "ik"], input=poses, capture_output=True, text=True, check=True)
+    rows = [line.split(",") for line in ik.stdout.splitlines()]
+    legs = "\n".join(",".join(row[:5]) for row in rows)
+    fk = subprocess.run([*PENTAPOD, "fk", "-c", rows[1][5]], input=legs, capture_output=True, text=True, check=True)
+    back = np.array([[float(v) for v in line.split(",")[2:8]] for line in fk.stdout.splitlines()[1:]])
+    assert back[:, 0] == pytest.approx(x + np.arange(5), abs=1e-5)
+    bad = subprocess.run([*PENTAPOD, "ik"], input="x,y\n1,2\n", capture_output=True, text=True, check=False)
+    assert bad.returncode == 2
+    assert bad.stderr.startswith("error: stdin:1: wrong header")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_ctrl_c_leaves_nothing_and_says_so(tmp_path):
+    job = Path(__file__).parents[2] / "toolpaths" / "dome.toml"
+    process = subprocess.Popen(
+        [*PENTAPOD, "plan", str(job), "-o", str(tmp_path / "out")], stderr=subprocess.PIPE, text=True
+    )
+    for _ in range(600):  # until work is under way
+        time.sleep(0.05)
+        if (tmp_path / "out").exists():
+            break
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert said.strip().endswith("interrupted")
+    assert "Traceback" not in said
+    assert not (tmp_path / "out").exists()

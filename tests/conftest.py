@@ -1,0 +1,77 @@
+"""Shared by all floors: a small job that plans in a second or two."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pentapod.cli.new import dome_stl
+from pentapod.machine import Machine
+
+JOB = """\
+[part]
+mesh = "part.stl"
+unit = "mm"
+
+[machine]
+name = "desk"
+
+[tool]
+type = "ball"
+diameter_mm = 10
+
+[toolpath]
+stepover_mm = 15
+spacing_mm = 4
+
+[axis]
+tilt_deg = 0
+
+[feed]
+cut_mm_min = 3000
+
+[tolerance]
+path_mm = 0.05
+
+[placement]
+mode = "fixed"
+position_mm = {position}
+rotation_deg = [180, 0, 0]
+component = "++"
+"""
+
+
+def job_text() -> str:
+    """The part in the middle of the work volume, its top towards the base: nothing is left to search for."""
+    centre = Machine.load("desk").work.centre * 1e3
+    return JOB.format(position=np.round(centre, 3).tolist())
+
+
+@pytest.fixture
+def make_job(tmp_path: Path) -> Callable[..., Path]:
+    """Write a job, with pieces of its text replaced, beside its mesh; return its path."""
+
+    def make(*changes: tuple[str, str], mesh: bytes | None = None, name: str = "job.toml") -> Path:
+        text = job_text()
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        (tmp_path / "part.stl").write_bytes(dome_stl(cells=12) if mesh is None else mesh)
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return make
+
+
+@pytest.fixture
+def parts() -> Path:
+    """The folder of real meshes by others; without it the test is skipped."""
+    folder = os.environ.get("PENTAPOD_PARTS")
+    if not folder or not Path(folder).is_dir():
+        pytest.skip("PENTAPOD_PARTS does not name a folder of real meshes")
+    return Path(folder).resolve()

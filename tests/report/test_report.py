@@ -1,0 +1,218 @@
+"""The report: self-contained, small, the verdict first, and true to the numbers."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pentapod.geometry import RigidTransform
+from pentapod.job import Job
+from pentapod.outcome import Outcome
+from pentapod.pipeline import job_placement, run
+from pentapod.program import Program
+from pentapod.report import write_report
+from pentapod.report.decimate import keep_extremes, thinned_mesh
+from pentapod.report.signals import Signals
+from pentapod.report.words import duration, number, placement_sentences, rotation_angles_deg
+from pentapod.timing import Trajectory
+from pentapod.toolpath import Toolpath
+
+TOO_FAR = ("position_mm = [", "position_mm = [1000.0, 0, 700] # [")
+
+
+class Page(HTMLParser):
+    """Tags that are opened and closed, links to elsewhere, and the text outside scripts."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.outside: list[str] = []
+        self.text = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in ("meta", "input", "br", "link", "img"):
+            self.open.append(tag)
+        self.outside += [f"{k}={v}" for k, v in attrs if k in ("src", "href")]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] not in ("script", "style"):
+            self.text += data + " "
+
+
+def page_of(outcome: Outcome, folder) -> tuple[str, Page]:
+    text = write_report(outcome, folder / "report.html").read_text(encoding="utf-8")
+    page = Page(text)
+    assert page.open == []
+    assert page.outside == [], "nothing is fetched from elsewhere"
+    assert len(text) < 10e6
+    return text, page
+
+
+def data(text: str, name: str):
+    match = re.search(rf'id="{name}">(.*?)</script>', text, re.S)
+    assert match is not None
+    return json.loads(match[1])
+
+
+def unpacked(array: dict[str, str]) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(array["bdata"]), dtype=array["dtype"])
+
+
+def test_report_of_a_passed_job(make_job, tmp_path):
+    outcome = run(Job.load(make_job()), tmp_path / "out")
+    text, page = page_of(outcome, tmp_path)
+    assert page.text.index("All 23 claims") < page.text.index("Verdict") < page.text.index("Worst places")
+    for certificate in outcome.verdict.certificates:
+        assert certificate.claim in page.text
+    for stage in outcome.stages:
+        assert stage.name in page.text
+    assert outcome.job.digest in page.text
+    assert outcome.machine.digest in page.text
+    assert "prefers-color-scheme: dark" in text
+    assert "@media print" in text
+
+    figures = data(text, "figures")
+    program, machine = outcome.find(Program), outcome.machine
+    assert program is not None
+    by_axis: dict[str, list] = {}
+    for trace in figures["time"]["data"]:
+        by_axis.setdefault(trace["yaxis"], []).append(trace)
+    legs = np.array([[unpacked(t["y"]).min(), unpacked(t["y"]).max()] for t in by_axis["y"][:5]])
+    assert legs[:, 0] == pytest.approx(1e3 * program.legs.min(axis=0), rel=1e-6)
+    assert legs[:, 1] == pytest.approx(1e3 * program.legs.max(axis=0), rel=1e-6)
+    dashed = {float(unpacked(t["y"])[0]) for t in by_axis["y"][5:]}
+    assert dashed == {np.float32(v) for v in 1e3 * np.unique([machine.legs.min_length, machine.legs.max_length])}
+    kinds = [trace["name"] for trace in figures["scene"]["data"]]
+    assert kinds[-8:] == ["leg 1", "leg 2", "leg 3", "leg 4", "leg 5", "platform", "tool", "tip"]
+    poses = data(text, "poses")
+    assert poses["moving"] == 8
+    # Legs drawn have the lengths of the rows they are drawn for.
+    pose = poses["poses"][0]
+    tip, axis = np.array(pose["tip"]), np.array(pose["axis"])
+    joints = tip + (poses["tool_length"] - np.array(poses["offsets"]))[:, None] * axis
+    base = np.column_stack([poses["base"], np.zeros(5)])
+    assert np.linalg.norm(joints - base, axis=1) == pytest.approx(1e3 * program.legs[0], abs=2e-3)
+
+
+def test_signals_are_those_of_the_program(make_job, tmp_path):
+    outcome = run(Job.load(make_job()), tmp_path / "out")
+    program, trajectory, toolpath = (outcome.find(kind) for kind in (Program, Trajectory, Toolpath))
+    assert program is not None
+    assert trajectory is not None
+    assert toolpath is not None
+    signals = Signals.of(program, outcome.machine, trajectory, toolpath)
+    by_claim = {c.claim: c for c in outcome.verdict.certificates}
+    rate = by_claim["leg rates"].value
+    assert rate is not None
+    assert 1e3 * np.abs(signals.rates).max() == pytest.approx(rate, rel=2e-3)
+    acceleration = by_claim["leg accelerations"].value
+    assert acceleration is not None
+    assert 1e3 * np.abs(signals.accelerations).max() == pytest.approx(acceleration, rel=2e-2)
+    assert np.abs(signals.rates[[0, -1]]).max() < 1e-9
+    assert signals.margins.min() > 0
+
+
+def test_report_of_a_refused_job(make_job, tmp_path):
+    outcome = run(Job.load(make_job(TOO_FAR)), tmp_path / "out")
+    text, page = page_of(outcome, tmp_path)
+    refusal = outcome.refusal
+    assert refusal is not None
+    assert page.text.index("cannot be done") < page.text.index("Why not")
+    for blame in refusal.blames:
+        assert blame.constraint in page.text
+    assert "time" not in data(text, "figures")
+    assert data(text, "poses") == {"poses": []}
+
+
+def test_report_of_a_failed_verdict_puts_the_failures_first(make_job, tmp_path):
+    outcome = run(Job.load(make_job()), tmp_path / "out")
+    broken = outcome.verdict.certificates
+    broken = (*broken[:-1], type(broken[-1])("a claim that fails", False, 2.0, 1.0, "mm", broken[-1].where, "by hand"))
+    failed = Outcome(outcome.job, outcome.machine, outcome.stages, type(outcome.verdict)(broken))
+    _, page = page_of(failed, tmp_path)
+    assert "Do not run it" in page.text
+    assert page.text.index("a claim that fails") < page.text.index("leg rates")
+
+
+def test_names_cannot_break_the_page(make_job, tmp_path):
+    path = make_job(name="a<script>alert(1)</script>&.toml".replace("/", "_"))
+    _, page = page_of(run(Job.load(path), tmp_path / "out"), tmp_path)
+    assert "a<script>alert(1)<_script>&" in page.text
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=400), st.integers(1, 30))
+def test_decimation_keeps_extremes_and_ends(values, buckets):
+    array = np.array(values)
+    keep = keep_extremes(array, buckets)
+    assert (np.diff(keep) > 0).all()
+    assert len(keep) <= 4 * buckets or len(keep) == len(array)
+    assert {keep[0], keep[-1]} == {0, len(array) - 1}
+    assert array[keep].min() == array.min()
+    assert array[keep].max() == array.max()
+
+
+def test_a_long_program_stays_small():
+    values = np.sin(np.arange(1_000_000) / 300.0)
+    values[777_777] = 9.0
+    keep = keep_extremes(values, 600)
+    assert len(keep) <= 2400
+    assert 777_777 in keep
+
+
+def test_thinned_mesh_keeps_the_shape():
+    x, y = np.meshgrid(np.linspace(0, 1, 201), np.linspace(0, 1, 201), indexing="ij")
+    vertices = np.stack([x, y, 0.1 * np.sin(6 * x)], axis=-1).reshape(-1, 3)
+    corner = (np.arange(200)[:, None] * 201 + np.arange(200)).ravel()
+    faces = np.concatenate(
+        [np.stack([corner, corner + 201, corner + 202], 1), np.stack([corner, corner + 202, corner + 1], 1)]
+    )
+    thin, few = thinned_mesh(vertices, faces, 5000)
+    assert 1000 < len(few) <= 5000
+    assert np.ptp(thin, axis=0) == pytest.approx(np.ptp(vertices, axis=0), abs=0.05)
+    assert thinned_mesh(vertices, faces, 10**6)[1] is faces
+
+
+@given(st.tuples(*[st.floats(-179, 179)] * 3))
+def test_rotation_angles_go_into_a_job_and_back(angles):
+    from pentapod.pipeline import _turned
+
+    rotation = _turned(*np.radians(angles))
+    again = _turned(*np.radians(rotation_angles_deg(rotation)))
+    assert np.allclose(again, rotation, atol=1e-9)
+
+
+def test_the_placement_shown_can_be_used(make_job, tmp_path):
+    outcome = run(Job.load(make_job(("[180, 0, 0]", "[171, 4, 30]"))), tmp_path / "out")
+    text, _ = page_of(outcome, tmp_path)
+    shown = re.search(r"\[placement\]\n.*?rotation_deg = \[[^\]]*\]", text, re.S)
+    assert shown is not None
+    job = make_job().read_text().split("[placement]")[0] + shown[0].replace("&#34;", '"')
+    (tmp_path / "again.toml").write_text(job)
+    first, again = job_placement(outcome.job), job_placement(Job.load(tmp_path / "again.toml"))
+    assert first is not None
+    assert again is not None
+    assert np.abs(first.transform.matrix - again.transform.matrix).max() < 1e-8
+
+
+def test_words():
+    assert number(None) == "–"
+    assert number(-0.5, "mm") == "−0.5 mm"
+    assert (duration(28.08), duration(185), duration(3720)) == ("28.1 s", "3 min 05 s", "1 h 02 min")
+    upside = RigidTransform(np.diag([1.0, -1.0, -1.0]), np.array([0.1, -0.2, 0.5]))
+    sentences = placement_sentences(upside)
+    assert "500.00 mm below the base plane" in sentences[0]
+    assert "straight up" in sentences[1]
+    leaning = RigidTransform(np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]]), np.zeros(3))
+    assert "leans 90.00°" in placement_sentences(leaning)[1]
+    assert "towards 0.0°" in placement_sentences(leaning)[1]

@@ -1,0 +1,231 @@
+"""From a job to its artefacts: what is written, when, and what is never left behind."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pentapod import pipeline
+from pentapod.artefacts import check_folder
+from pentapod.errors import InputError, JobError, MeshError, ToolpathError
+from pentapod.job import Job
+from pentapod.pipeline import job_mesh, job_placement, job_toolpath, run
+from pentapod.planning import PlacedPath
+from pentapod.program import read_csv
+from pentapod.refusal import Refusal
+
+TOOLPATHS = Path(__file__).parents[1] / "toolpaths"
+SHIPPED = sorted(path.stem for path in TOOLPATHS.glob("*.toml"))
+WHOLE = {"program.csv", "plan.npz", "verdict.json"}
+TOO_FAR = ("position_mm = [", "position_mm = [1000.0, 0, 700] # [")
+
+
+def names(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_jobs_are_shipped():
+    assert SHIPPED == ["dome", "laser", "oversize", "saddle", "wavy"]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_jobs(name, tmp_path):
+    outcome = run(Job.load(TOOLPATHS / f"{name}.toml"), tmp_path)
+    assert outcome.passed is (name != "oversize"), outcome.refusal or [
+        c for c in outcome.verdict.certificates if not c.passed
+    ]
+    if name == "oversize":
+        refusal = outcome.refusal
+        assert refusal is not None
+        assert refusal.stage == "placement"
+        assert any("too long" in blame.constraint for blame in refusal.blames)
+        assert all(blame.shortfall > 0 and blame.waypoints for blame in refusal.blames)
+        assert names(tmp_path) == WHOLE - {"program.csv"}
+    else:
+        assert names(tmp_path) == WHOLE
+        assert len(outcome.verdict.certificates) > 15
+
+
+PARTS = {  # mesh, [part], stepover
+    "wavy_mesh_with_hole.ply": ('unit = "mm"\nscale = 10', 8),
+    "facade_infill_open_mid_res.stl": (
+        'unit = "mm"\nregion_direction = [1, 0, 0]\nregion_box_mm = [[-100, -60, 40], [100, 60, 160]]',
+        10,
+    ),
+    "octagonal_pocket.stl": ('unit = "m"\nscale = 0.6\nregion_angle_deg = 30', 10),
+    "torus.STL": ('unit = "mm"\nscale = 40\nregion_angle_deg = 40', 10),
+    "wavy_vase_open_low_res.stl": ('unit = "mm"', 25),
+}
+
+
+@pytest.mark.parts
+@pytest.mark.parametrize("mesh", PARTS)
+def test_parts_by_others(mesh, tmp_path, parts):
+    assert (parts / mesh).is_file()
+    part, stepover = PARTS[mesh]
+    job = tmp_path / "job.toml"
+    job.write_text(
+        f'[part]\nmesh = "${{PENTAPOD_PARTS}}/{mesh}"\n{part}\n[tool]\ntype = "ball"\ndiameter_mm = 6\n'
+        f"[toolpath]\nstepover_mm = {stepover}\n[feed]\ncut_mm_min = 3000\n"
+    )
+    outcome = run(Job.load(job), tmp_path / "out")
+    if "vase" in mesh:
+        assert outcome.refusal is not None
+        assert outcome.refusal.blames
+        assert not (tmp_path / "out" / "program.csv").exists()
+    else:
+        assert outcome.passed, outcome.refusal or [c for c in outcome.verdict.certificates if not c.passed]
+
+
+def test_artefacts_agree_with_each_other(make_job, tmp_path):
+    out = tmp_path / "deep" / "out"
+    outcome = run(Job.load(make_job()), out)
+    assert outcome.passed
+    assert names(out) == WHOLE
+    program = read_csv(out / "program.csv")
+    assert program.provenance.job_digest == outcome.job.digest
+    verdict = json.loads((out / "verdict.json").read_text())
+    assert verdict == outcome.to_dict()
+    assert verdict["passed"] is True
+    assert set(verdict["certificates"][0]) == {"claim", "passed", "value", "bound", "unit", "where", "method"}
+    with np.load(out / "plan.npz") as arrays:
+        assert np.array_equal(arrays["program.legs_mm"], program.legs * 1e3)
+        count = len(arrays["toolpath.tips_mm"])
+        assert arrays["placed.margins"].shape == (count, len(arrays["placed.margin_names"]))
+        placed = outcome.find(PlacedPath)
+        assert placed is not None
+        moved = placed.placement.transform.apply(arrays["toolpath.tips_mm"] * 1e-3)
+        assert np.allclose(arrays["placed.tips_mm"] * 1e-3, moved)  # no tilt: the tips only move with the part
+        assert np.isfinite(arrays["leg_path.legs_mm"]).all()
+        assert (np.diff(arrays["trajectory.time_s"]) >= 0).all()
+    assert [stage.name for stage in outcome.stages] == [
+        "mesh", "toolpath", "placement", "leg path", "timing", "program", "verify",
+    ]  # fmt: skip
+    assert all(stage.seconds >= 0 for stage in outcome.stages)
+
+
+def test_two_runs_give_the_same_bytes(make_job, tmp_path):
+    job = Job.load(make_job(("tilt_deg = 0", "tilt_deg = 10")))
+    run(job, tmp_path / "a")
+    run(job, tmp_path / "b")
+    assert contents(tmp_path / "a") == contents(tmp_path / "b")
+
+
+def test_free_placement_gives_the_same_bytes_twice(make_job, tmp_path):
+    text = make_job().read_text().split("[placement]")[0].replace("tilt_deg = 0", "tilt_deg = 12")
+    path = tmp_path / "free.toml"
+    path.write_text(text)
+    for name in ("a", "b"):
+        assert run(Job.load(path), tmp_path / name).passed
+    assert contents(tmp_path / "a") == contents(tmp_path / "b")
+
+
+def test_a_refused_job_leaves_no_program_not_even_an_old_one(make_job, tmp_path):
+    out = tmp_path / "out"
+    run(Job.load(make_job()), out)
+    (out / "notes.txt").write_text("mine")
+    outcome = run(Job.load(make_job(TOO_FAR)), out)
+    assert isinstance(outcome.refusal, Refusal)
+    assert not outcome.passed
+    assert names(out) == {"plan.npz", "verdict.json", "notes.txt"}
+    verdict = json.loads((out / "verdict.json").read_text())
+    assert verdict["passed"] is False
+    assert verdict["refusal"]["cause"]
+    assert verdict["refusal"]["blames"][0]["shortfall"] > 0
+    assert all(c["passed"] is False for c in verdict["certificates"])
+
+
+@pytest.mark.parametrize("stage", ["plan", "leg_path", "retime", "sample", "verify", "write_arrays", "write_json"])
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
+def test_interrupted_runs_change_nothing(stage, error, make_job, tmp_path, monkeypatch):
+    job, old, fresh = Job.load(make_job()), tmp_path / "old", tmp_path / "deep" / "fresh"
+    run(job, old)
+    before = contents(old)
+
+    def stop(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr(pipeline, stage, stop)
+    for folder in (old, fresh):
+        with pytest.raises(error):
+            run(job, folder)
+    assert contents(old) == before
+    assert not fresh.exists()
+
+
+def test_bad_mesh_changes_nothing(make_job, tmp_path):
+    out = tmp_path / "out"
+    run(Job.load(make_job()), out)
+    before = contents(out)
+    with pytest.raises(MeshError):
+        run(Job.load(make_job(mesh=b"solid text, not a mesh\n")), out)
+    assert contents(out) == before
+
+
+def test_folder_that_cannot_be_written(make_job, tmp_path, monkeypatch):
+    job = Job.load(make_job())
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(pipeline, "job_mesh", lambda _: pytest.fail("checked before the work starts"))
+    for folder in (tmp_path / "file", tmp_path / "file" / "below", Path("/proc/nothing/here")):
+        with pytest.raises(InputError, match="cannot be written"):
+            run(job, folder)
+    check_folder(tmp_path / "not" / "yet")
+    assert not (tmp_path / "not").exists()
+
+
+def test_tolerances_and_units_are_checked_against_the_mesh(make_job):
+    for old, new in (("path_mm = 0.05", "path_mm = 50"), ("[tolerance]", "[tolerance]\nchordal_mm = 7")):
+        with pytest.raises(JobError, match="too large for the part") as caught:
+            job_mesh(Job.load(make_job((old, new))))
+        assert "60 mm" in str(caught.value)
+    with pytest.raises(JobError, match="unit of the mesh is missing") as caught:
+        job_mesh(Job.load(make_job(('unit = "mm"\n', ""))))
+    assert "part.unit" in str(caught.value)
+    assert "likely" in str(caught.value)
+
+
+def test_nothing_to_machine_is_bad_input(make_job):
+    job = Job.load(make_job(('unit = "mm"', 'unit = "mm"\nregion_direction = [0, 0, -1]')))
+    with pytest.raises(ToolpathError):
+        job_toolpath(job, job_mesh(job))
+
+
+def test_placements_in_both_spellings_are_one(make_job):
+    angles = job_placement(Job.load(make_job(("[180, 0, 0]", "[170, 20, 30]"))))
+    assert angles is not None
+    rows = angles.transform.matrix.copy()
+    rows[:3, 3] *= 1e3
+    text = make_job().read_text()
+    position = next(line for line in text.splitlines() if line.startswith("position_mm"))
+    matrix = job_placement(
+        Job.load(make_job((position, f"matrix = {rows.tolist()}"), ("rotation_deg = [180, 0, 0]\n", "")))
+    )
+    assert matrix is not None
+    assert np.allclose(matrix.transform.matrix, angles.transform.matrix, atol=1e-15)
+    rows[0, 0] += 0.1
+    with pytest.raises(JobError, match=r"placement\.matrix"):
+        job_placement(Job.load(make_job((position, f"matrix = {rows.tolist()}"), ("rotation_deg = [180, 0, 0]\n", ""))))
+
+
+def test_rotation_turns_about_fixed_axes_x_first(make_job):
+    placement = job_placement(Job.load(make_job(("[180, 0, 0]", "[90, 0, 90]"))))
+    assert placement is not None
+    # y turns about x to z, which a turn about z leaves; x turns about z to y.
+    assert np.allclose(placement.transform.rotate([0, 1, 0]), [0, 0, 1])
+    assert np.allclose(placement.transform.rotate([1, 0, 0]), [0, 1, 0])
+
+
+@pytest.mark.parametrize(("period", "interpolation"), [(2, "cubic"), (1, "linear")])
+def test_output_settings_reach_the_program(period, interpolation, make_job, tmp_path):
+    output = f'[output]\nperiod_ms = {period}\ninterpolation = "{interpolation}"\n\n[placement]'
+    outcome = run(Job.load(make_job(("[placement]", output))), tmp_path / "out")
+    assert outcome.passed, [c for c in outcome.verdict.certificates if not c.passed]
+    program = read_csv(tmp_path / "out" / "program.csv")
+    assert (program.period, program.interpolation) == (period * 1e-3, interpolation)
