@@ -58,14 +58,15 @@ class FieldDomain:
         """Return the spline basis (N, size) at pivots (N, 3)."""
         along = np.clip((pivots - self.origin) @ self.directions.T / self.lengths, 0.0, 1.0)
         knots = np.concatenate([np.zeros(DEGREE), np.linspace(0.0, 1.0, self.cells + 1), np.ones(DEGREE)])
-        b0, b1 = (BSpline.design_matrix(along[:, k], knots, DEGREE).toarray() for k in range(2))
-        return np.einsum("ni,nj->nij", b0, b1).reshape(len(along), self.size)
+        first, second = (BSpline.design_matrix(x, knots, DEGREE).toarray() for x in along.T)
+        return (first[:, :, None] * second[:, None, :]).reshape(len(along), self.size)
 
     def roughness(self) -> Floats:
         """Return the matrix (R, size) that takes coefficients to their second differences in both directions."""
         n = self.cells + DEGREE
         second = np.diff(np.eye(n), 2, axis=0)
-        return np.vstack([np.kron(second, np.eye(n)), np.kron(np.eye(n), second)])
+        along_both = [np.kron(second, np.eye(n)), np.kron(np.eye(n), second)]
+        return np.concatenate(along_both, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
