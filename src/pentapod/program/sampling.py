@@ -13,6 +13,7 @@ from pentapod.machine.machine import Machine
 from pentapod.program.program import Program, Provenance
 from pentapod.program.resolution import quantised
 from pentapod.timing.trajectory import Trajectory
+from pentapod.version import __version__
 
 _CHUNK = 100_000
 
@@ -22,12 +23,13 @@ def sample(
     machine: Machine,
     placement: RigidTransform,
     component: Component,
-    provenance: Provenance,
+    provenance: Provenance | None = None,
 ) -> Program:
     """Return the program: the trajectory at the controller's period, at the resolution of program files.
 
     `retime` gives trajectories that last a whole number of the machine's periods; of any other the last
     row is the end point, reached within the last period. placement: workpiece → machine, metres.
+    provenance: without it the program names the machine and no job.
     """
     period = machine.controller.period
     count = max(1, math.ceil(trajectory.duration / period - 1e-6))
@@ -40,5 +42,5 @@ def sample(
         interpolation=machine.controller.interpolation,
         component=component,
         placement=placement,
-        provenance=provenance,
+        provenance=provenance or Provenance(machine.name, machine.digest, "", __version__),
     )
