@@ -213,9 +213,7 @@ def minimise(
         path_s = (1 - cs) * path_s + np.sqrt(cs * (2 - cs) * mu) * (vectors @ (weights @ (z[order])))
         short = np.linalg.norm(path_s) / np.sqrt(1 - (1 - cs) ** (2 * g + 2)) < (1.4 + 2 / (n + 1)) * expected
         path_c = (1 - cc) * path_c + short * np.sqrt(cc * (2 - cc) * mu) * step
-        spread = (
-            (1 - c1 - cmu) * spread + c1 * np.outer(path_c, path_c) + cmu * (y[order].T * weights) @ y[order]
-        )
+        spread = (1 - c1 - cmu) * spread + c1 * np.outer(path_c, path_c) + cmu * (y[order].T * weights) @ y[order]
         sigma *= np.exp((cs / damping) * (np.linalg.norm(path_s) / expected - 1))
         if g == generations // 3 and best_cost > give_up:
             break

@@ -52,9 +52,7 @@ def staged(folder: Path) -> Generator[Path]:
     staging = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
     try:
         yield staging
-        (folder / VERDICT).unlink(
-            missing_ok=True
-        )  # until the new one is there, no verdict is better than the old
+        (folder / VERDICT).unlink(missing_ok=True)  # until the new one is there, no verdict is better than the old
         for name in NAMES:
             if (staging / name).exists():
                 (staging / name).replace(folder / name)

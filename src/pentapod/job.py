@@ -140,17 +140,13 @@ def _read(path: Path) -> str:
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
-        raise JobError(
-            "no such job file", file=path, remedy='"pentapod new DIR" writes one to start from'
-        ) from error
+        raise JobError("no such job file", file=path, remedy='"pentapod new DIR" writes one to start from') from error
     except UnicodeDecodeError as error:
         raise JobError("not a text file in UTF-8", file=path, expected="a job file in TOML") from error
     except OSError as error:
         raise JobError(f"cannot be read: {error.strerror}", file=path) from error
     if not text.strip():
-        raise JobError(
-            "the job file is empty", file=path, remedy='"pentapod new DIR" writes one to start from'
-        )
+        raise JobError("the job file is empty", file=path, remedy='"pentapod new DIR" writes one to start from')
     return text
 
 
@@ -173,9 +169,7 @@ def _resolve(job: Path, text: str, key: str, name: str) -> Path:
 
     for variable in _VARIABLE.findall(name):
         if variable not in os.environ:
-            raise wrong(
-                f"the environment variable {variable} is not set", remedy=f"set {variable} to a folder"
-            )
+            raise wrong(f"the environment variable {variable} is not set", remedy=f"set {variable} to a folder")
     path = job.parent / _VARIABLE.sub(lambda match: os.environ[match[1]], name)
     if not path.is_file():
         what = "is not a file" if path.exists() else "no such file"

@@ -88,9 +88,7 @@ class ToolTable(Table):
 
     @model_validator(mode="after")
     def _own_size(self) -> ToolTable:
-        needed, other = (
-            ("diameter_mm", "standoff_mm") if self.type == "ball" else ("standoff_mm", "diameter_mm")
-        )
+        needed, other = ("diameter_mm", "standoff_mm") if self.type == "ball" else ("standoff_mm", "diameter_mm")
         if getattr(self, needed) is None:
             _wrong(needed, f'missing for a tool of type "{self.type}"', "a length in mm")
         if getattr(self, other) is not None:
@@ -109,9 +107,7 @@ class ToolpathTable(Table):
     stepover_mm: Positive | None = Field(default=None, description="between passes; or scallop_mm")
     scallop_mm: Positive | None = Field(default=None, description="height of the ridge left between passes")
     clearance_mm: Positive = Field(default=10.0, description="height of rapids above the part")
-    approach_mm: Positive = Field(
-        default=3.0, description="stretch along the axis, on feed, to and from a cut"
-    )
+    approach_mm: Positive = Field(default=3.0, description="stretch along the axis, on feed, to and from a cut")
     spacing_mm: Positive = Field(default=2.0, description="largest distance between waypoints on the surface")
 
     @model_validator(mode="after")
@@ -156,9 +152,7 @@ class ToleranceTable(Table):
 class PlacementTable(Table):
     """Where the part stands in the machine: left to the planner, or fixed by you."""
 
-    mode: Literal["free", "fixed"] = Field(
-        default="free", description='"free" (the planner chooses) or "fixed"'
-    )
+    mode: Literal["free", "fixed"] = Field(default="free", description='"free" (the planner chooses) or "fixed"')
     position_mm: Vector | None = Field(
         default=None, description="fixed: where the mesh's origin goes, machine frame (base plane: z = 0)"
     )

@@ -60,9 +60,7 @@ def test_finds_crossing_legs(desk):
 
 def test_names_match_columns(desk):
     names = pair_names(desk)
-    assert (
-        len(names) == len(set(names)) == clearances(desk, desk.work.centre, [0.0, 0.0, 1.0]).shape[-1] == 15
-    )
+    assert len(names) == len(set(names)) == clearances(desk, desk.work.centre, [0.0, 0.0, 1.0]).shape[-1] == 15
     assert names[0] == "legs 1-2"
     assert names[9] == "legs 4-5"
     assert names[10] == "leg 1-shaft"

@@ -71,9 +71,7 @@ def test_five_numbers_or_one():
 def test_platform_alone_gives_the_same_machine():
     m = read_machine(DESK, "m")
     platform = [round(1000 * z, 7) for z in m.pentapod.offsets.tolist()]
-    other = read_machine(
-        replaced("delta", None).replace("[legs]", f"platform_mm = {platform}\n[legs]", 1), "m"
-    )
+    other = read_machine(replaced("delta", None).replace("[legs]", f"platform_mm = {platform}\n[legs]", 1), "m")
     # The insertion lands before the header of [legs], so still in [geometry].
     assert other.pentapod.delta == pytest.approx(m.pentapod.delta, rel=1e-6)
     np.testing.assert_allclose(other.pentapod.offsets, m.pentapod.offsets, atol=1e-9)
@@ -116,9 +114,7 @@ def test_missing_file_lists_what_is_shipped(tmp_path):
         Machine.load(tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("content", "words"), [(b"", "empty"), (b"  \n", "empty"), (b"\xff\xfe\x00binary", "UTF-8")]
-)
+@pytest.mark.parametrize(("content", "words"), [(b"", "empty"), (b"  \n", "empty"), (b"\xff\xfe\x00binary", "UTF-8")])
 def test_files_that_are_no_text(tmp_path, content, words):
     path = tmp_path / "m.toml"
     path.write_bytes(content)
@@ -156,9 +152,7 @@ def test_syntax_error_has_line_and_column():
         ),
         (replaced("min_length_mm", "2000"), ["legs.min_length_mm", "leg 1", "not below the longest"]),
         (
-            replaced("min_length_mm", "[500, 500, 930, 500, 500]").replace(
-                "max_length_mm = 9", "max_length_mm = 8"
-            ),
+            replaced("min_length_mm", "[500, 500, 930, 500, 500]").replace("max_length_mm = 9", "max_length_mm = 8"),
             ["leg 3"],
         ),
         (replaced("max_velocity_mm_s", "nan"), ["legs.max_velocity_mm_s", "finite"]),

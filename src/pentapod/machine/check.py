@@ -107,12 +107,8 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = 5
     for k in range(5):
         low, high = 1e3 * limits.min_length[k], 1e3 * limits.max_length[k]
         findings += [
-            Finding(
-                f"leg {k + 1} shortest", 1e3 * lengths[:, k].min(), "at least", low, "mm", where(short[:, k])
-            ),
-            Finding(
-                f"leg {k + 1} longest", 1e3 * lengths[:, k].max(), "at most", high, "mm", where(long[:, k])
-            ),
+            Finding(f"leg {k + 1} shortest", 1e3 * lengths[:, k].min(), "at least", low, "mm", where(short[:, k])),
+            Finding(f"leg {k + 1} longest", 1e3 * lengths[:, k].max(), "at most", high, "mm", where(long[:, k])),
         ]
     for k in range(5):
         cone, (least, most) = np.degrees(joints.base_cone[k]), np.degrees(joints.platform_range[k])
@@ -130,9 +126,7 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = 5
             Finding(f"leg {k + 1} platform joint, most", seen.max(), "at most", most, "deg", where(-seen)),
         ]
     findings += [
-        Finding(
-            "components met", len(signs), "at most", 1, "", where(np.minimum(np.abs(w), np.abs(s_distance)))
-        ),
+        Finding("components met", len(signs), "at most", 1, "", where(np.minimum(np.abs(w), np.abs(s_distance)))),
         Finding("|w|", np.abs(w).min(), "more than", 0.0, "", where(np.abs(w))),
         Finding("distance to S = 0", 1e3 * s_distance.min(), "more than", 0.0, "mm", where(s_distance)),
         Finding(
@@ -144,9 +138,7 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = 5
             where(turn),
         ),
         Finding("tip force to leg forces", force.max(), "at most", AMPLIFICATION_LIMIT, "N/N", where(-force)),
-        Finding(
-            f"clearance, {names[pair]}", 1e3 * gaps.min(), "more than", 0.0, "mm", where(gaps.min(axis=1))
-        ),
+        Finding(f"clearance, {names[pair]}", 1e3 * gaps.min(), "more than", 0.0, "mm", where(gaps.min(axis=1))),
         Finding("architectural measure", machine.architecture, "at least", ARCHITECTURAL_LIMIT, ""),
     ]
     return MachineReport(

@@ -36,9 +36,7 @@ def explain(report: MachineReport) -> str:
             f"{np.degrees(report.base_angle[k]):5.1f}° of {np.degrees(m.joints.base_cone[k]):.0f}°   "
             f"{least:5.1f}° to {most:5.1f}°"
         )
-    component = (
-        "several: a singularity runs through it" if report.component is None else str(report.component)
-    )
+    component = "several: a singularity runs through it" if report.component is None else str(report.component)
     lines += [
         "",
         f"  component                             {component}",

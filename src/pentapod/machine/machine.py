@@ -101,14 +101,10 @@ class JointLimits:
             raise MachineError(f"leg {leg + 1}: not a unit vector", key="base_axes", value=axes[leg].tolist())
         limits = frozen(np.broadcast_to(self.platform_range, (5, 2)), "platform_range", (5, 2))
         if (self.base_cone > 0.5 * np.pi).any():
-            raise MachineError(
-                "beyond 90 degrees", key="base_cone", value=np.degrees(self.base_cone).tolist()
-            )
+            raise MachineError("beyond 90 degrees", key="base_cone", value=np.degrees(self.base_cone).tolist())
         if (limits[:, 0] < 0.0).any() or (limits[:, 1] > np.pi).any() or (limits[:, 0] >= limits[:, 1]).any():
             value = np.degrees(limits).tolist()
-            raise MachineError(
-                "not a range", key="platform_range", value=value, expected="0 ≤ min < max ≤ 180 degrees"
-            )
+            raise MachineError("not a range", key="platform_range", value=value, expected="0 ≤ min < max ≤ 180 degrees")
         set_frozen(self, base_axes=frozen(axes / norms, "base_axes"), platform_range=limits)
 
 

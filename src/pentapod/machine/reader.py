@@ -43,9 +43,7 @@ _FILE_KEYS = {
 def shipped_machines() -> tuple[str, ...]:
     """Return the names of the machines that come with pentapod, sorted."""
     return tuple(
-        sorted(
-            entry.name.removesuffix(".toml") for entry in _library().iterdir() if entry.name.endswith(".toml")
-        )
+        sorted(entry.name.removesuffix(".toml") for entry in _library().iterdir() if entry.name.endswith(".toml"))
     )
 
 
@@ -67,9 +65,7 @@ def load_machine(name_or_path: str | Path) -> Machine:
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
-        raise MachineError(
-            "not a text file in UTF-8", file=path, expected="a machine file in TOML"
-        ) from error
+        raise MachineError("not a text file in UTF-8", file=path, expected="a machine file in TOML") from error
     except OSError as error:
         raise MachineError(f"cannot be read: {error.strerror}", file=path) from error
     if not text.strip():
@@ -84,9 +80,7 @@ def read_machine(text: str, file: str | Path) -> Machine:
     except tomllib.TOMLDecodeError as error:
         place = _PLACE.search(str(error))
         line, column = (int(place[1]), int(place[2])) if place else (len(text.splitlines()), None)
-        raise MachineError(
-            f"not TOML: {str(error).split(' (at ')[0]}", file=file, line=line, column=column
-        ) from error
+        raise MachineError(f"not TOML: {str(error).split(' (at ')[0]}", file=file, line=line, column=column) from error
     try:
         return _build(MachineTables.model_validate(content))
     except ValidationError as error:
@@ -157,9 +151,7 @@ def _geometry(table: GeometryTable) -> LinearPentapod:
             )
         return LinearPentapod.quadratic(base, table.delta)
     try:
-        return LinearPentapod.from_offsets(
-            base, _si(table.platform_mm), table.delta, tolerance=OFFSET_TOLERANCE_M
-        )
+        return LinearPentapod.from_offsets(base, _si(table.platform_mm), table.delta, tolerance=OFFSET_TOLERANCE_M)
     except MachineError as error:
         if table.delta is not None or error.key != "offsets":
             raise
@@ -175,9 +167,7 @@ def _from_pydantic(error: ValidationError, text: str, file: str | Path) -> Machi
     """Return the one error to show: an unknown key first, since a misspelling is also a missing key."""
     first = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
     where = [str(part) for part in first["loc"]]
-    return MachineError(
-        file=file, key=".".join(where[:2]), line=_line_of(text, where), **_details(first, where)
-    )
+    return MachineError(file=file, key=".".join(where[:2]), line=_line_of(text, where), **_details(first, where))
 
 
 def _details(error: ErrorDetails, where: list[str]) -> dict[str, Any]:

@@ -74,9 +74,7 @@ class GeometryTable(Table):
     """Where the joints are. Give delta, or platform_mm, or both if they agree."""
 
     base_mm: FivePairs = Field(description="base joints [x, y] in the base plane z = 0, leg 1 to leg 5")
-    delta: float | None = Field(
-        default=None, description="platform joint i is at delta · x_i along the tool axis"
-    )
+    delta: float | None = Field(default=None, description="platform joint i is at delta · x_i along the tool axis")
     platform_mm: FiveNumbers | None = Field(
         default=None, description="platform joints along the line towards the tip, leg 1 to leg 5"
     )
@@ -95,13 +93,9 @@ class LegsTable(Table):
 class JointsTable(Table):
     """How far the joints turn."""
 
-    base_axis: FiveAxes = Field(
-        description="axis of each base joint's cone, unit vectors, from the base into the work"
-    )
+    base_axis: FiveAxes = Field(description="axis of each base joint's cone, unit vectors, from the base into the work")
     base_cone_deg: PerLeg = Field(description="largest angle between leg and that axis")
-    platform_min_deg: PerLeg = Field(
-        description="least angle between leg (seen from its platform joint) and tool axis"
-    )
+    platform_min_deg: PerLeg = Field(description="least angle between leg (seen from its platform joint) and tool axis")
     platform_max_deg: PerLeg = Field(description="largest angle between leg and tool axis")
 
 
@@ -111,9 +105,7 @@ class BodiesTable(Table):
     leg_diameter_mm: Positive = Field(description="each leg is a cylinder with round ends")
     shaft_diameter_mm: Positive = Field(description="the spindle is one too, along the platform line")
     shaft_end_mm: Positive = Field(description="the spindle ends this far short of the tip")
-    joint_radius_mm: Positive = Field(
-        description="so close to its own platform joint a leg may be inside the spindle"
-    )
+    joint_radius_mm: Positive = Field(description="so close to its own platform joint a leg may be inside the spindle")
 
 
 class ToolTable(Table):
@@ -133,14 +125,10 @@ class ControllerTable(Table):
 class WorkTable(Table):
     """What the machine is advertised for: `pentapod machine check` samples it."""
 
-    centre_mm: Annotated[list[float], Field(min_length=3, max_length=3)] = Field(
-        description="centre of the cylinder"
-    )
+    centre_mm: Annotated[list[float], Field(min_length=3, max_length=3)] = Field(description="centre of the cylinder")
     diameter_mm: Positive = Field(description="of the cylinder of tip positions")
     height_mm: Positive = Field(description="of the cylinder, along z")
-    tilt_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = Field(
-        description="largest angle between tool axis and −z"
-    )
+    tilt_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = Field(description="largest angle between tool axis and −z")
 
 
 class MachineTables(Table):
