@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-HEAVY = ("casadi", "toppra", "matplotlib", "plotly", "trimesh", "scipy", "pydantic", "rich", "jinja2")
+HEAVY = ("casadi", "toppra", "matplotlib", "plotly", "trimesh", "scipy", "pydantic", "rich", "jinja2", "numba")
 
 FIND = "import json, sys; print(json.dumps([m for m in {heavy!r} if m in sys.modules]))"
 
@@ -29,7 +29,7 @@ def test_help_is_light(arguments: list[str]) -> None:
 
 def test_every_name_loads_without_the_solvers() -> None:
     code = "import pentapod\nfor name in pentapod.__all__: getattr(pentapod, name)"
-    assert loaded_after(code, ("casadi", "toppra", "matplotlib", "plotly", "trimesh")) == []
+    assert loaded_after(code, ("casadi", "toppra", "matplotlib", "plotly", "trimesh", "numba")) == []
 
 
 def test_the_check_can_fail() -> None:
