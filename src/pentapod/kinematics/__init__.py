@@ -2,6 +2,7 @@
 
 from pentapod.kinematics.certificate import ComponentProof, certify_component
 from pentapod.kinematics.component import COMPONENTS, Component
+from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.forces import leg_force_map, tip_force_amplification
 from pentapod.kinematics.jacobian import leg_jacobian, pose_jacobian, square_jacobian
 from pentapod.kinematics.pentapod import LinearPentapod
@@ -16,6 +17,7 @@ __all__ = [
     "COMPONENTS",
     "Component",
     "ComponentProof",
+    "FiveLegs",
     "LinearPentapod",
     "architectural_measure",
     "certify_component",

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.arrays import Floats, as_batch
+from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.jacobian import invert, line_tangents
-from pentapod.kinematics.pentapod import LinearPentapod
 
 
-def leg_force_map(pentapod: LinearPentapod, position: ArrayLike, direction: ArrayLike, tool_length: float) -> Floats:
+def leg_force_map(pentapod: FiveLegs, position: ArrayLike, direction: ArrayLike, tool_length: float) -> Floats:
     """Return the map (..., 5, 3) from a force on the tip to the five axial leg forces that hold it (N/N).
 
     The force acts on the tip p + tool_length · i (metres), machine frame, without a moment; a positive leg
@@ -29,7 +29,7 @@ def leg_force_map(pentapod: LinearPentapod, position: ArrayLike, direction: Arra
 
 
 def tip_force_amplification(
-    pentapod: LinearPentapod, position: ArrayLike, direction: ArrayLike, tool_length: float
+    pentapod: FiveLegs, position: ArrayLike, direction: ArrayLike, tool_length: float
 ) -> Floats:
     """Return the largest norm (...) of the five leg forces that a tip force of 1 N in any direction calls up.
 

@@ -7,10 +7,10 @@ from numpy.typing import ArrayLike
 
 from pentapod.arrays import Floats, as_batch
 from pentapod.geometry.directions import tangent_frame
-from pentapod.kinematics.pentapod import LinearPentapod
+from pentapod.kinematics.five_legs import FiveLegs
 
 
-def leg_jacobian(pentapod: LinearPentapod, position: ArrayLike, direction: ArrayLike) -> Floats:
+def leg_jacobian(pentapod: FiveLegs, position: ArrayLike, direction: ArrayLike) -> Floats:
     """Return ∂legs/∂(p, i) (..., 5, 6) at poses (..., 3): rows [e_i, z_i e_i], e_i the leg's unit vector.
 
     The first three columns have no unit (m/m), the last three metres. i is taken as a free vector of R³; a
@@ -21,7 +21,7 @@ def leg_jacobian(pentapod: LinearPentapod, position: ArrayLike, direction: Array
     return np.concatenate([unit, pentapod.offsets[:, None] * unit], axis=-1)
 
 
-def square_jacobian(pentapod: LinearPentapod, position: ArrayLike, direction: ArrayLike) -> Floats:
+def square_jacobian(pentapod: FiveLegs, position: ArrayLike, direction: ArrayLike) -> Floats:
     """Return ∂legs/∂(p, α, β) (..., 5, 5): di = α t1 + β t2, with (t1, t2) = `tangent_frame(direction)`.
 
     Columns 1-3 m/m, columns 4-5 m/rad. Singular exactly on the singularities.
@@ -31,7 +31,7 @@ def square_jacobian(pentapod: LinearPentapod, position: ArrayLike, direction: Ar
     return np.concatenate([unit, pentapod.offsets[:, None] * (unit @ tangents)], axis=-1)
 
 
-def pose_jacobian(pentapod: LinearPentapod, position: ArrayLike, direction: ArrayLike) -> Floats:
+def pose_jacobian(pentapod: FiveLegs, position: ArrayLike, direction: ArrayLike) -> Floats:
     """Return ∂(p, i)/∂legs (..., 6, 5) at poses (..., 3): rows m/m, then 1/m. NaN on a singularity."""
     i = as_batch(direction, "direction", (3,))
     inverse = invert(square_jacobian(pentapod, position, i), np.nan)

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pentapod.arrays import Floats, as_batch, as_floats, frozen, set_frozen
+from pentapod.arrays import Floats, as_batch, frozen, set_frozen
 from pentapod.errors import ArrayError, MachineError
 from pentapod.kinematics.blocks import blocks
 from pentapod.kinematics.component import COMPONENTS
+from pentapod.kinematics.five_legs import FiveLegs, broadcast, given
 from pentapod.kinematics.offsets import check_offsets, fit_delta
 from pentapod.kinematics.quadratic import LinearPart, reciprocal_condition, solve, w_and_s
 
@@ -18,7 +19,7 @@ _SINGULAR = 1e-12  # below this reciprocal condition the closed form has no digi
 
 
 @dataclass(frozen=True, eq=False)
-class LinearPentapod:
+class LinearPentapod(FiveLegs):
     """Five base attachments a_i = (x_i, y_i, 0) and offsets z_i along the platform line, b_i = p + z_i i.
 
     base (5, 2) and offsets (5,) in metres; delta: the constant z_i − z_3 = δ (x_i − x_3) of the quadratic
@@ -37,7 +38,7 @@ class LinearPentapod:
     @classmethod
     def quadratic(cls, base: ArrayLike, delta: float) -> LinearPentapod:
         """Return the pentapod with offsets z_i = δ x_i. base (5, 2) metres. Raises MachineError."""
-        xy, slope = _given(base, "base", (5, 2)), float(_given(delta, "delta", ()))
+        xy, slope = given(base, "base", (5, 2)), float(given(delta, "delta", ()))
         return cls(xy, slope * xy[:, 0], slope)
 
     @classmethod
@@ -50,13 +51,13 @@ class LinearPentapod:
         to within `tolerance` metres, and exactly these are stored. Raises MachineError that names the leg
         which is farthest off, and by how much.
         """
-        xy, z = _given(base, "base", (5, 2)), _given(offsets, "offsets", (5,))
-        slope = fit_delta(xy, z) if delta is None else float(_given(delta, "delta", ()))
+        xy, z = given(base, "base", (5, 2)), given(offsets, "offsets", (5,))
+        slope = fit_delta(xy, z) if delta is None else float(given(delta, "delta", ()))
         return cls(xy, check_offsets(xy, z, slope, tolerance), slope)
 
     def __post_init__(self) -> None:
-        base, offsets = _given(self.base, "base", (5, 2)), _given(self.offsets, "offsets", (5,))
-        delta = float(_given(self.delta, "delta", ()))
+        base, offsets = given(self.base, "base", (5, 2)), given(self.offsets, "offsets", (5,))
+        delta = float(given(self.delta, "delta", ()))
         size = max(1.0, abs(delta)) * float(np.abs(base).max()) + float(np.abs(offsets).max())
         check_offsets(base, offsets, delta, 1e-9 * size)
         set_frozen(self, base=frozen(base, "base"), offsets=frozen(offsets, "offsets"), delta=delta)
@@ -70,28 +71,6 @@ class LinearPentapod:
                 remedy="move a base attachment off the conic through the others" if delta else "choose delta ≠ 0",
             )
         set_frozen(self, linear_part=LinearPart.of(base, delta))
-
-    def leg_vectors(self, position: ArrayLike, direction: ArrayLike) -> Floats:
-        """Return b_i − a_i (..., 5, 3) in metres for positions p and unit directions i (..., 3)."""
-        p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
-        legs = p[..., None, :] + self.offsets[:, None] * i[..., None, :]
-        legs[..., :2] -= self.base
-        return legs
-
-    def leg_lengths(self, position: ArrayLike, direction: ArrayLike) -> Floats:
-        """Return leg lengths (..., 5), metres, of positions p and unit directions i (..., 3)."""
-        p, i = _broadcast(as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,)))
-        batch = p.shape[:-1]
-        p, i = p.reshape(-1, 3), i.reshape(-1, 3)
-        legs = np.empty((len(p), 5))
-        x, y, z = self.base[:, :1], self.base[:, 1:], self.offsets[:, None]
-        for block in blocks(len(p)):
-            (px, py, pz), (u, v, w) = p[block].T.copy(), i[block].T.copy()
-            squared = np.square(z * u + (px - x))
-            squared += np.square(z * v + (py - y))
-            squared += np.square(z * w + pz)
-            legs[block] = np.sqrt(squared, out=squared).T
-        return legs.reshape(*batch, 5)
 
     def assembly_modes(self, legs: ArrayLike) -> tuple[Floats, Floats]:
         """Return positions and directions (..., 4, 3) of the four modes, in the order of `COMPONENTS`.
@@ -114,7 +93,7 @@ class LinearPentapod:
         if signs.size and not (np.isnan(signs) | (np.abs(signs) == 1.0) | (signs == 0.0)).all():
             raise ArrayError("component must hold signs", expected="+1 or −1 for w and for S")
         if signs.ndim > 1:
-            lengths, signs = _broadcast(lengths, signs)
+            lengths, signs = broadcast(lengths, signs)
         named = (np.abs(signs) == 1.0).all(axis=-1)
         if not named.all():
             lengths = np.where(named[..., None], lengths, np.nan)
@@ -155,19 +134,3 @@ class LinearPentapod:
 def _last(x: Floats, y: Floats, z: Floats) -> Floats:
     """Return vectors (N, *modes, 3) of components (*modes, N); y may lack the modes."""
     return np.stack(np.broadcast_arrays(x, y, z)).T
-
-
-def _broadcast(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Return both with the same leading axes."""
-    batch = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
-    return np.broadcast_to(a, batch + a.shape[-1:]), np.broadcast_to(b, batch + b.shape[-1:])
-
-
-def _given(value: ArrayLike, key: str, shape: tuple[int, ...]) -> Floats:
-    try:
-        array = as_floats(value, key, shape)
-    except ArrayError as error:
-        raise MachineError(error.what, key=key, value=error.value, expected=error.expected) from error
-    if array.shape != shape:
-        raise MachineError(f"{key} has shape {array.shape}", key=key, expected=f"shape {shape}")
-    return array

@@ -1,0 +1,56 @@
+"""FiveLegs: what every linear pentapod has, whatever its offsets: joints, leg vectors and leg lengths."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.arrays import Floats, as_batch, as_floats
+from pentapod.errors import ArrayError, MachineError
+from pentapod.kinematics.blocks import blocks
+
+
+class FiveLegs:
+    """Base attachments a_i = (x_i, y_i, 0), base (5, 2), and platform joints b_i = p + z_i i, offsets (5,), metres."""
+
+    base: Floats
+    offsets: Floats
+
+    def leg_vectors(self, position: ArrayLike, direction: ArrayLike) -> Floats:
+        """Return b_i − a_i (..., 5, 3) in metres for positions p and unit directions i (..., 3)."""
+        p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
+        legs = p[..., None, :] + self.offsets[:, None] * i[..., None, :]
+        legs[..., :2] -= self.base
+        return legs
+
+    def leg_lengths(self, position: ArrayLike, direction: ArrayLike) -> Floats:
+        """Return leg lengths (..., 5), metres, of positions p and unit directions i (..., 3)."""
+        p, i = broadcast(as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,)))
+        batch = p.shape[:-1]
+        p, i = p.reshape(-1, 3), i.reshape(-1, 3)
+        legs = np.empty((len(p), 5))
+        x, y, z = self.base[:, :1], self.base[:, 1:], self.offsets[:, None]
+        for block in blocks(len(p)):
+            (px, py, pz), (u, v, w) = p[block].T.copy(), i[block].T.copy()
+            squared = np.square(z * u + (px - x))
+            squared += np.square(z * v + (py - y))
+            squared += np.square(z * w + pz)
+            legs[block] = np.sqrt(squared, out=squared).T
+        return legs.reshape(*batch, 5)
+
+
+def broadcast(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Return both with the same leading axes."""
+    batch = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
+    return np.broadcast_to(a, batch + a.shape[-1:]), np.broadcast_to(b, batch + b.shape[-1:])
+
+
+def given(value: ArrayLike, key: str, shape: tuple[int, ...]) -> Floats:
+    """Return the design's numbers as finite float64 of exactly this shape. Raises MachineError under the key."""
+    try:
+        array = as_floats(value, key, shape)
+    except ArrayError as error:
+        raise MachineError(error.what, key=key, value=error.value, expected=error.expected) from error
+    if array.shape != shape:
+        raise MachineError(f"{key} has shape {array.shape}", key=key, expected=f"shape {shape}")
+    return array
