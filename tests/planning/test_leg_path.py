@@ -60,7 +60,7 @@ def test_legs_are_the_inverse_kinematics_of_the_pose(desk, mixed):
     np.testing.assert_allclose(np.linalg.norm(axes, axis=1), 1.0, atol=1e-14)
 
 
-@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("order", [1, 2, 3])
 def test_derivatives_by_finite_differences_inside_each_span(mixed, order):
     _, path = mixed
     for piece in path.pieces:
@@ -89,15 +89,38 @@ def test_parameter_is_the_arc_length_of_the_tip(mixed):
         assert measured == pytest.approx(piece.length, rel=1e-4)
 
 
-def test_second_derivative_is_continuous_across_knots(mixed):
+@pytest.mark.parametrize("order", [0, 1, 2, 3])
+def test_legs_are_c3_across_knots(mixed, order):
+    """Jumps at the knots shrink with the step across them, up to the third derivative."""
     _, path = mixed
     for piece in path.pieces:
         knots = piece.knots[1:-1]
         if len(knots) == 0:
             continue
-        h = 1e-10
-        jump = np.abs(piece(knots + h, 2) - piece(knots - h, 2))
-        assert jump.max() <= 1e-3 * max(1.0, np.abs(piece(knots, 2)).max())
+        h = 1e-4 * np.minimum(np.diff(piece.knots)[:-1], np.diff(piece.knots)[1:])
+        jump = np.abs(piece(knots + h, order) - piece(knots - h, order)).max(axis=1)
+        change = np.abs(piece(knots, order)).max()
+        assert (jump <= 5e-3 * max(change, 1e-9)).all()
+
+
+def test_all_derivatives_at_once_are_those_one_by_one(mixed):
+    _, path = mixed
+    piece = path.pieces[1]
+    s = np.linspace(0.0, piece.length, 100)
+    for order, values in enumerate(piece.derivatives(s, 3)):
+        np.testing.assert_array_equal(values, piece(s, order))
+
+
+def test_waypoints_have_stations(mixed):
+    placed, path = mixed
+    seen = np.concatenate([piece.waypoints for piece in path.pieces])
+    assert set(seen) == set(range(len(placed.toolpath)))
+    for piece in path.pieces:
+        assert len(piece.waypoints) == len(piece.waypoint_stations)
+        assert piece.waypoint_stations[[0, -1]] == pytest.approx([0.0, piece.length], abs=1e-15)
+        tips, axes = piece.pose(piece.waypoint_stations)
+        pivots = tips + placed.toolpath.pivot * axes
+        assert np.linalg.norm(pivots - placed.pivots[piece.waypoints], axis=1).max() <= TOLERANCE
 
 
 def test_pivot_and_axis_stay_within_their_tolerances(mixed):
@@ -159,6 +182,23 @@ def test_turning_on_the_spot_has_length(desk):
     assert isinstance(path, LegPath)
     assert path.length == pytest.approx(1e-3 * np.arctan(0.2), rel=1e-3)
     np.testing.assert_allclose(path.pose([path.length])[1][0] * [1, -1, -1], axes[-1], atol=1e-12)
+
+
+def test_the_way_of_the_tip_alone_is_kept(desk):
+    """Half way with the axis turning as the tip moves, then turning on the spot: against scipy's quadrature."""
+    tips, axes = fan([[0, 0, 0], [0.002, 0, 0], [0.004, 0, 0], [0.004, 0, 0]], [0.0, 0.3, 0.1, 0.4])
+    toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),))
+    path = leg_path(placed_on(desk, toolpath), desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    (piece,) = path.pieces
+    s = np.linspace(0.0, piece.length, 300)
+    way = piece.tip_length(s)
+    assert way[0] == 0.0
+    assert (np.diff(way) >= -1e-15).all()
+    fine = piece.pose(np.linspace(0.0, piece.length, 400_001))[0]
+    expected = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(fine, axis=0), axis=1))])
+    np.testing.assert_allclose(way, np.interp(s, np.linspace(0.0, piece.length, 400_001), expected), atol=2e-9)
+    assert way[-1] < piece.length - 1e-4  # the turn on the spot
 
 
 def test_a_sharp_reversal_stops(desk):

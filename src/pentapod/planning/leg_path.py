@@ -1,4 +1,4 @@
-"""LegPath: the leg lengths along the placed path, untimed; C2 pieces between exact stops."""
+"""LegPath: the leg lengths along the placed path, untimed; C3 pieces between exact stops."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.arrays import Bools, Floats, Ints, frozen, set_frozen
 from pentapod.errors import ToolpathError
-from pentapod.geometry.rounding import rounded
+from pentapod.geometry.rounding import TooFar, rounded
 from pentapod.kinematics.pentapod import LinearPentapod
 from pentapod.machine.machine import Machine
 from pentapod.planning.placed_path import PlacedPath
@@ -30,10 +30,11 @@ _AXIS_LEVER_M = 0.01  # metres of spline parameter per radian: keeps the paramet
 
 @dataclass(frozen=True, eq=False)
 class LegPiece:
-    """A C2 stretch of the leg path between two exact stops, parametrised by the tip's arc length s in metres.
+    """A C3 stretch of the leg path between two exact stops, parametrised by s in metres, as `ToolCurve` says.
 
-    section_ends (M,): arc lengths at which the toolpath's segments end, the last is `length`;
+    section_ends (M,): s at which the toolpath's segments end, the last is `length`;
     section_feeds (M,): m/s, infinite on rapids; section_kinds, section_segments (M,): kind and index of the segment.
+    waypoint_stations (W,): s nearest to each waypoint; waypoints (W,): its index in the toolpath.
     """
 
     curve: ToolCurve
@@ -43,43 +44,51 @@ class LegPiece:
     section_feeds: Floats
     section_kinds: tuple[SegmentKind, ...]
     section_segments: Ints
+    waypoint_stations: Floats
+    waypoints: Ints
 
     @property
     def length(self) -> float:
-        """Arc length of the tip in metres."""
+        """Length in s, metres."""
         return self.curve.length
 
     @property
     def knots(self) -> Floats:
-        """Arc lengths (K,) where the third derivative may jump, both ends included."""
+        """Stations (K,) where the fourth derivative may jump, both ends included."""
         return self.curve.knots
 
     def pose(self, s: ArrayLike, order: int = 0) -> tuple[Floats, Floats]:
-        """Return tips and tool axes (n, 3), machine frame, or their derivatives of order 1 or 2 in s."""
+        """Return tips and tool axes (n, 3), machine frame, or their derivatives of order 1 to 3 in s."""
         return self.curve(np.asarray(s, dtype=np.float64), order)
 
-    def __call__(self, s: ArrayLike, order: int = 0) -> Floats:
-        """Return leg lengths (n, 5) in metres at arc lengths s (n,), or their derivatives of order 1 or 2 in s."""
-        s = np.asarray(s, dtype=np.float64)
-        d = [self._leg_vectors(s, k) for k in range(order + 1)]
-        d[0][..., :2] -= self.robot.base
-        length = np.sqrt(_dot(d[0], d[0]))
-        if order == 0:
-            return length
-        rate = _dot(d[0], d[1]) / length
-        if order == 1:
-            return rate
-        return (_dot(d[1], d[1]) + _dot(d[0], d[2]) - rate * rate) / length
+    def tip_length(self, s: ArrayLike) -> Floats:
+        """Return how far (n,) in metres the tip itself has moved at stations s (n,)."""
+        return self.curve.tip_length(np.asarray(s, dtype=np.float64))
 
-    def _leg_vectors(self, s: Floats, order: int) -> Floats:
-        """Return platform joints b_i = tip + (tool length − z_i) axis (n, 5, 3), or their derivatives."""
-        tip, axis = self.curve(s, order)
-        return tip[:, None, :] + (self.tool_length - self.robot.offsets)[:, None] * axis[:, None, :]
+    def __call__(self, s: ArrayLike, order: int = 0) -> Floats:
+        """Return leg lengths (n, 5) in metres at stations s (n,), or their derivatives of order 1 to 3 in s."""
+        return self.derivatives(s, order)[-1]
+
+    def derivatives(self, s: ArrayLike, order: int) -> list[Floats]:
+        """Return leg lengths and their derivatives (n, 5) up to `order` ≤ 3: cheaper than one by one."""
+        poses = self.curve.derivatives(np.asarray(s, dtype=np.float64), order)
+        lever = (self.tool_length - self.robot.offsets)[:, None]
+        # From the base joints to the platform joints b_i = tip + (tool length − z_i) axis.
+        d = [tip[:, None, :] + lever * axis[:, None, :] for tip, axis in poses]
+        d[0][..., :2] -= self.robot.base
+        legs = [np.sqrt(_dot(d[0], d[0]))]
+        if order >= 1:
+            legs.append(_dot(d[0], d[1]) / legs[0])
+        if order >= 2:
+            legs.append((_dot(d[1], d[1]) + _dot(d[0], d[2]) - legs[1] * legs[1]) / legs[0])
+        if order >= 3:
+            legs.append((3.0 * _dot(d[1], d[2]) + _dot(d[0], d[3]) - 3.0 * legs[1] * legs[2]) / legs[0])
+        return legs
 
 
 @dataclass(frozen=True, eq=False)
 class LegPath:
-    """Pieces in order; the machine rests between them. starts (P + 1,): arc length where each begins, and the end."""
+    """Pieces in order; the machine rests between them. starts (P + 1,): station where each begins, and the end."""
 
     pieces: tuple[LegPiece, ...]
     starts: Floats
@@ -89,20 +98,20 @@ class LegPath:
 
     @property
     def length(self) -> float:
-        """Total arc length of the tip in metres."""
+        """Total length in s, metres."""
         return float(self.starts[-1])
 
     def __call__(self, s: ArrayLike, order: int = 0) -> Floats:
-        """Return leg lengths (n, 5), or derivatives of order 1 or 2, at arc lengths s (n,) of the whole path."""
+        """Return leg lengths (n, 5), or derivatives of order 1 to 3, at stations s (n,) of the whole path."""
         return self._each(s, lambda piece, local: piece(local, order), 5)
 
     def pose(self, s: ArrayLike) -> tuple[Floats, Floats]:
-        """Return tips and tool axes (n, 3), machine frame, at arc lengths s (n,) of the whole path."""
+        """Return tips and tool axes (n, 3), machine frame, at stations s (n,) of the whole path."""
         both = self._each(s, lambda piece, local: np.hstack(piece.pose(local)), 6)
         return both[:, :3], both[:, 3:]
 
     def piece_at(self, s: ArrayLike) -> Ints:
-        """Return the index (n,) of the piece that holds each arc length s (n,)."""
+        """Return the index (n,) of the piece that holds each station s (n,)."""
         k = np.searchsorted(self.starts, np.asarray(s, dtype=np.float64), side="right") - 1
         return np.clip(k, 0, len(self.pieces) - 1)
 
@@ -164,19 +173,33 @@ def leg_path(
                 section_feeds=np.array([toolpath.segments[k].feed for k in which]),
                 section_kinds=tuple(toolpath.segments[k].kind for k in which),
                 section_segments=which,
+                waypoint_stations=curve.arc_length(u[a : b + 1] - u[a]),
+                waypoints=np.flatnonzero(keep)[a : b + 1],
             )
         )
     return LegPath(tuple(pieces), np.concatenate([[0.0], np.cumsum([p.length for p in pieces])]))
 
 
-def _tolerance(path: float, axis: float):
-    def too_far(u: Floats, on_curve: Floats, on_polyline: Floats) -> Bools:
-        off = np.linalg.norm(on_curve[:, :3] - on_polyline[:, :3], axis=1)
-        a, b = on_curve[:, 3:], on_polyline[:, 3:]
-        cross = np.linalg.norm(np.cross(a, b), axis=1)
-        return (off > path) | (cross > np.sin(axis) * np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
+def _tolerance(path: float, axis: float) -> TooFar:
+    """Return the test of a rounded path: pivots within `path` metres, axes within `axis` radians, proven.
+
+    Both are read off the Bernstein coefficients of curve minus polyline, which enclose it. An axis that ends within
+    ε of a vector of length n is at most asin(ε / n) from it.
+    """
+
+    def too_far(differences: Floats, chords: Floats) -> Bools:
+        off, turned = (np.linalg.norm(differences[:, part], axis=1).max(axis=1) for part in (slice(3), slice(3, 6)))
+        nearest = _distance_to_origin(chords[:, 3:, 0], chords[:, 3:, 1])
+        return np.asarray((off > path) | (turned > np.sin(axis) * nearest))
 
     return too_far
+
+
+def _distance_to_origin(a: Floats, b: Floats) -> Floats:
+    """Return the least distance (K,) from the origin to the segments from a to b (K, 3)."""
+    step = b - a
+    foot = -np.einsum("kj,kj->k", a, step) / np.maximum(np.einsum("kj,kj->k", step, step), 1e-300)
+    return np.linalg.norm(a + np.clip(foot, 0.0, 1.0)[:, None] * step, axis=1)
 
 
 def _stops(points: Floats, pivot: float, segment: Ints, segments: tuple[Segment, ...]) -> Bools:
