@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from functools import cached_property
+
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
@@ -138,73 +141,104 @@ class _Search:
     def calm(self, margins: Margins, transform: RigidTransform, start: Floats, smallest: float) -> Floats:
         """Return coefficients of the calmest field that keeps a share of the smallest margin at every waypoint."""
         keep = max(CALM_SHARE * smallest, NEEDED_MARGIN)
-        problem = self.problem(margins, transform, free=False)
-        rows, coefficients = self.task.representatives(_POINTS), start
+        few = self.few(margins, transform, 0.5 * _ROW_SLACK, free=False)
+        coefficients = start
         for k in range(_ROUNDS):
-            coefficients = problem.solve(rows, transform, coefficients, "calm", keep).coefficients
-            values = self.values(margins, transform, coefficients)
-            excess = self._cone_excess(coefficients)
+            coefficients = few.problem.solve(few.rows, transform, coefficients, "calm", keep).coefficients
+            values, steepness = self.values(margins, transform, coefficients), self.steepness(coefficients)
             self.progress("tool axis", (k + 1) / _ROUNDS, f"smallest margin {values.min():.3f}")
-            worst = np.minimum(values.min(axis=1), keep - excess)
-            if worst.min() >= keep - 0.02 * abs(keep) - 1e-3 and excess.max() <= 0.0:
+            if values.min() >= keep - 0.02 * abs(keep) - 1e-3 and steepness.max() <= 1.0:
                 return coefficients
-            rows = self.with_worst(rows, worst, keep)
+            few = few.with_worst(values, steepness, keep)
         return start  # it keeps every limit, and only leans more than it would have to
 
-    def _cone_excess(self, coefficients: Floats) -> Floats:
-        cosine = (self.axes(coefficients) * self.task.nominal).sum(axis=1)
-        return np.maximum(np.cos(self.task.tilt) - cosine, 0.0)
+    def steepness(self, coefficients: Floats) -> Floats:
+        """Return how much of the tilt cone each waypoint uses (N,): 1 on its edge."""
+        if self.basis is None:
+            return np.zeros(len(self.task.pivots))
+        b = self.basis @ coefficients @ self.domain.lean_plane
+        across = b - (b * self.task.nominal).sum(axis=1, keepdims=True) * self.task.nominal
+        return np.asarray(np.linalg.norm(across, axis=1) / np.tan(self.task.tilt), dtype=np.float64)
 
-    def problem(self, margins: Margins, transform: RigidTransform, *, free: bool) -> PlanningProblem:
-        """State the problem with the margin rows that can come near the smallest one."""
+    def within_cone(self, coefficients: Floats) -> Floats:
+        """Return coefficients scaled down until every waypoint keeps the cone; a lean is linear in them."""
+        return coefficients / max(1.0, float(self.steepness(coefficients).max()))
+
+    def few(self, margins: Margins, transform: RigidTransform, slack: float, *, free: bool) -> _Few:
+        """Return what to begin with: waypoints spread over the part, and the kinds of margin near the worst."""
         rows = self.task.representatives(4 * _POINTS)
         few = self.task.at(rows)
         values = margins(*few.machine_poses(transform, few.nominal)).min(axis=0)
-        slack = _ROW_SLACK if free else 0.5 * _ROW_SLACK
-        near = np.flatnonzero(values < values.min() + slack)
-        return PlanningProblem(self.task, margins, self.domain, near.tolist(), free=free)
+        kinds = np.flatnonzero(values < values.min() + slack)
+        return _Few(self, margins, self.task.representatives(_POINTS), kinds, free)
 
-    def with_worst(self, rows: Ints, worst: Floats, threshold: float) -> Ints:
-        """Return rows with the worst waypoints added, spread over the part."""
+
+@dataclass(frozen=True, eq=False)
+class _Few:
+    """The waypoints and the kinds of margin that a solver considers; those left out that come out worst are added."""
+
+    search: _Search
+    margins: Margins
+    rows: Ints
+    kinds: Ints
+    free: bool
+
+    @cached_property
+    def problem(self) -> PlanningProblem:
+        """The problem with these kinds of margin, built once."""
+        return PlanningProblem(self.search.task, self.margins, self.search.domain, self.kinds.tolist(), free=self.free)
+
+    def with_worst(self, values: Floats, steepness: Floats, threshold: float) -> _Few:
+        """Return also the waypoints, and the kinds of margin, whose values (N, M) fall below a threshold."""
+        kinds = np.union1d(self.kinds, np.flatnonzero(values.min(axis=0) < threshold))
+        # A lean beyond the cone counts like a margin that much too small.
+        worst = np.minimum(values.min(axis=1), threshold + 1.0 - np.maximum(steepness, 1.0))
+        rows = np.union1d(self.rows, self._spread(worst, threshold))
+        if len(kinds) == len(self.kinds):
+            same = replace(self, rows=rows)
+            same.__dict__["problem"] = self.problem
+            return same
+        return replace(self, rows=rows, kinds=kinds)
+
+    def _spread(self, worst: Floats, threshold: float) -> Ints:
+        """Return the worst waypoints below a threshold that lie apart from each other."""
+        pivots = self.search.task.pivots
         order = np.argsort(worst, kind="stable")[:2000]
-        order = order[worst[order] < threshold]
         added: list[int] = []
-        size = float(np.ptp(self.task.pivots, axis=0).max())
-        for k in order:
-            apart = (
-                np.linalg.norm(self.task.pivots[[*added]] - self.task.pivots[k], axis=1) if added else np.array([1.0])
-            )
-            if apart.min() > 0.04 * size:
+        apart = 0.04 * float(np.ptp(pivots, axis=0).max())
+        for k in order[worst[order] < threshold]:
+            if not added or np.linalg.norm(pivots[added] - pivots[k], axis=1).min() > apart:
                 added.append(int(k))
             if len(added) == _ADDED:
                 break
-        return np.unique(np.concatenate([rows, np.array(added, dtype=np.intp)]))
+        return np.array(added, dtype=np.intp)
 
 
 class _Attempt:
-    """One guess on its way to the largest smallest margin, with the waypoints and solvers it has gathered."""
+    """One guess on its way to the largest smallest margin, with the waypoints and margins it has gathered."""
 
     def __init__(self, search: _Search, guess: Guess, *, free: bool) -> None:
         self.search, self.margins = search, Margins.of(search.machine, guess.component)
-        start = search.fitted(self.margins, guess.transform)
+        start = search.within_cone(search.fitted(self.margins, guess.transform))
         smallest = float(search.values(self.margins, guess.transform, start).min())
         self.best: _Best = (self.margins, guess.transform, start, smallest)
-        self.rows = search.task.representatives(_POINTS)
-        self.problem = search.problem(self.margins, guess.transform, free=free)
+        self.few = search.few(self.margins, guess.transform, _ROW_SLACK, free=free)
 
     def improve(self) -> bool:
-        """Solve once; return whether waypoints that were left out came out worse than those considered."""
+        """Solve once; return whether something that was left out came out worse than what was considered."""
         _, transform, coefficients, smallest = self.best
-        solution = self.problem.solve(self.rows, transform, coefficients, "margin", smallest)
-        values = self.search.values(self.margins, solution.placement, solution.coefficients)
+        few = self.few
+        solution = few.problem.solve(few.rows, transform, coefficients, "margin", smallest)
+        found = self.search.within_cone(solution.coefficients)
+        values = self.search.values(self.margins, solution.placement, found)
         if values.min() > smallest:
-            self.best = (self.margins, solution.placement, solution.coefficients, float(values.min()))
-        on_chosen = float(values[self.rows].min())
-        self.rows = self.search.with_worst(self.rows, values.min(axis=1), on_chosen)
-        return bool(values.min() < on_chosen - 1e-3)
+            self.best = (self.margins, solution.placement, found, float(values.min()))
+        considered = max(float(values[np.ix_(few.rows, few.kinds)].min()), smallest)
+        self.few = few.with_worst(values, self.search.steepness(solution.coefficients), considered)
+        return len(self.few.rows) > len(few.rows) or len(self.few.kinds) > len(few.kinds)
 
     def finished(self) -> _Best:
-        """Improve until no waypoint is worse than those considered, and return the best."""
+        """Improve until nothing left out is worse than what is considered, and return the best."""
         for _ in range(_ROUNDS):
             if not self.improve():
                 break
