@@ -6,9 +6,9 @@ import replay_cases as cases
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
+from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine import clearances
 from pentapod.verify import Replay, verify
-from pentapod.verify.motion import LegMotion
 
 
 @pytest.fixture(params=["cubic", "linear"])
@@ -45,8 +45,12 @@ def newton_pose(machine, legs, guess):
     return solved.x
 
 
+def motion_of(program):
+    return Interpolant.through(program.legs, program.period, program.interpolation)
+
+
 def test_motion_is_the_interpolant(good):
-    motion, spline = LegMotion.of(good.program), interpolant(good.program)
+    motion, spline = motion_of(good.program), interpolant(good.program)
     times = dense_times(good.program, 2)
     np.testing.assert_allclose(motion.halves, spline(times), atol=1e-13)
     # The polynomials, at a third of each interval.
@@ -61,40 +65,6 @@ def test_extrema_of_the_legs(good, found):
     dense = interpolant(good.program)(dense_times(good.program, 16))
     assert found["legs not too long"].value == pytest.approx(1e3 * dense.max(), abs=1e-6)
     assert found["legs not too short"].value == pytest.approx(1e3 * dense.min(), abs=1e-6)
-
-
-def test_random_spline_extrema():
-    """A wild spline, where extrema lie between the rows: dense sampling never exceeds them, and comes close."""
-    rows = 0.6 + 0.1 * np.random.default_rng(5).standard_normal((40, 5))
-    motion = LegMotion.of(cases_program(rows, "cubic"))
-    spline = CubicSpline(np.arange(40) * cases.PERIOD, rows, axis=0, bc_type="clamped")
-    fine = np.linspace(0.0, 1.0, 400)
-    times = (np.arange(39)[:, None] + fine).reshape(-1) * cases.PERIOD
-    values, rates, accelerations = (spline(times, order).reshape(39, 400, 5) for order in range(3))
-    low, high = motion.lengths
-    assert (low <= values.min(axis=1) + 1e-12).all()
-    assert (high >= values.max(axis=1) - 1e-12).all()
-    np.testing.assert_allclose(low, values.min(axis=1), atol=1e-5)
-    np.testing.assert_allclose(high, values.max(axis=1), atol=1e-5)
-    np.testing.assert_allclose(motion.rates, np.abs(rates).max(axis=1), rtol=1e-3, atol=1e-2)
-    np.testing.assert_allclose(motion.accelerations.max(axis=0), np.abs(accelerations).max(axis=(0, 1)), rtol=1e-6)
-
-
-def cases_program(rows, interpolation):
-    from pentapod.geometry.rigid import RigidTransform
-    from pentapod.kinematics import Component
-    from pentapod.program import Program, Provenance
-
-    provenance = Provenance("none", "0", "0", "0")
-    return Program(cases.PERIOD, rows, interpolation, Component(1, 1), RigidTransform.identity(), provenance)
-
-
-def test_linear_acceleration_by_hand():
-    rows = np.full((4, 5), 0.5)
-    rows[:, 2] += [0.0, 1e-6, 3e-6, 3e-6]
-    found = LegMotion.of(cases_program(rows, "linear")).accelerations[:, 2]
-    # Steps 0 | 1, 2, 0 | 0 micrometres.
-    np.testing.assert_allclose(found, [1.0, 1.0, 2.0, 0.0], atol=1e-9)
 
 
 def test_poses_and_deviation_by_newton(good, found):

@@ -1,9 +1,20 @@
 """Timing: from a leg path to a trajectory that keeps the machine's limits (TOPP-RA)."""
 
+from pentapod.timing.certificates import LimitUse, certify
 from pentapod.timing.constraints import CONSTRAINTS
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.paths import LegPathLike, PieceLike
 from pentapod.timing.retime import retime
 from pentapod.timing.trajectory import Profile, Trajectory
 
-__all__ = ["CONSTRAINTS", "LegPathLike", "MotionLaw", "PieceLike", "Profile", "Trajectory", "retime"]
+__all__ = [
+    "CONSTRAINTS",
+    "LegPathLike",
+    "LimitUse",
+    "MotionLaw",
+    "PieceLike",
+    "Profile",
+    "Trajectory",
+    "certify",
+    "retime",
+]

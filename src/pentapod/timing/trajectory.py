@@ -83,14 +83,18 @@ class Trajectory:
 
     def segment(self, t: ArrayLike) -> Ints:
         """Return the index (n,) of the toolpath's segment at each time."""
+        return self._of_section(t, "section_segments").astype(np.intp)
 
-        def segments(piece: PieceLike, law: MotionLaw, time: Floats) -> Floats:
+    def feeds(self, t: ArrayLike) -> Floats:
+        """Return the feed (n,) in m/s of the segment at each time, infinite on rapids."""
+        return self._of_section(t, "section_feeds")
+
+    def _of_section(self, t: ArrayLike, name: str) -> Floats:
+        def values(piece: PieceLike, law: MotionLaw, time: Floats) -> Floats:
             section = np.searchsorted(piece.section_ends, law(time), side="left")
-            return np.asarray(piece.section_segments, dtype=np.float64)[
-                np.minimum(section, len(piece.section_segments) - 1)
-            ]
+            return np.asarray(getattr(piece, name), dtype=np.float64)[np.minimum(section, len(piece.section_ends) - 1)]
 
-        return self._piecewise(t, segments, ()).astype(np.intp)
+        return self._piecewise(t, values, ())
 
     def _piecewise(
         self,

@@ -13,7 +13,7 @@ _EXACT = "exact extrema of the controller's polynomials, rows and between"
 
 def shortest(replay: Replay) -> Finding:
     """Judge that no leg gets shorter than its stroke allows."""
-    low, limit = replay.motion.lengths[0], replay.machine.legs.min_length
+    low, limit = replay.motion.ranges[0], replay.machine.legs.min_length
     interval, leg = np.unravel_index(int(np.argmin(low - limit)), low.shape)
     value, bound = float(low[interval, leg]), float(limit[leg])
     return _finding(replay, value >= bound, (value, bound, "mm"), (2 * int(interval), int(leg)), _EXACT)
@@ -21,7 +21,7 @@ def shortest(replay: Replay) -> Finding:
 
 def longest(replay: Replay) -> Finding:
     """Judge that no leg gets longer than its stroke allows."""
-    high, limit = replay.motion.lengths[1], replay.machine.legs.max_length
+    high, limit = replay.motion.ranges[1], replay.machine.legs.max_length
     interval, leg = np.unravel_index(int(np.argmax(high - limit)), high.shape)
     value, bound = float(high[interval, leg]), float(limit[leg])
     return _finding(replay, value <= bound, (value, bound, "mm"), (2 * int(interval), int(leg)), _EXACT)

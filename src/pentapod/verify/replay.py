@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
+from pentapod.geometry.interpolant import Interpolant
 from pentapod.kinematics.certificate import ComponentProof, certify_component
 from pentapod.machine.machine import Machine
 from pentapod.program.program import Program
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify.matching import Match, match
-from pentapod.verify.motion import LegMotion
 from pentapod.verify.verdict import Place
 from pentapod.verify.visits import Course
 
@@ -36,9 +36,9 @@ class Replay:
     job_digest: str | None = None
 
     @cached_property
-    def motion(self) -> LegMotion:
-        """The polynomials that the legs follow between the rows."""
-        return LegMotion.of(self.program)
+    def motion(self) -> Interpolant:
+        """The polynomials that the legs follow between the rows, metres."""
+        return Interpolant.through(self.program.legs, self.program.period, self.program.interpolation)
 
     @cached_property
     def proof(self) -> ComponentProof:

@@ -1,0 +1,167 @@
+"""Interpolant: what a controller makes of rows at equal periods, as polynomials, with their exact extrema."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.geometry.bernstein import multiply, split
+
+_ROUNDS = 60
+_CLOSE = 1e-13
+
+
+@dataclass(frozen=True, eq=False)
+class Interpolant:
+    """One polynomial for each of d columns and each of the N − 1 intervals between rows, from rest to rest.
+
+    bernstein (N − 1, d, k + 1): Bernstein coefficients, over the interval's own time in [0, 1]; k = 1 for linear
+    interpolation, 3 for cubic. period in seconds.
+    """
+
+    bernstein: Floats
+    period: float
+
+    @classmethod
+    def through(cls, rows: Floats, period: float, interpolation: Literal["linear", "cubic"]) -> Interpolant:
+        """Return what joins rows (N, d): straight lines, or the C2 cubic spline with zero end velocities."""
+        if interpolation == "linear":
+            return cls(np.stack([rows[:-1], rows[1:]], axis=-1), period)
+        # In units of the period, so that knots are integers and the slopes have the size of the steps.
+        third = _clamped_slopes(rows) / 3.0
+        inner = (rows[:-1], rows[:-1] + third[:-1], rows[1:] - third[1:], rows[1:])
+        return cls(np.stack(inner, axis=-1), period)
+
+    @property
+    def degree(self) -> int:
+        """Degree of the polynomials: 1 or 3."""
+        return self.bernstein.shape[-1] - 1
+
+    @cached_property
+    def halves(self) -> Floats:
+        """Values (2N − 1, d) at the rows and halfway between them."""
+        b = self.bernstein
+        weights = np.array([0.5, 0.5]) if self.degree == 1 else np.array([1.0, 3.0, 3.0, 1.0]) / 8.0
+        values = np.empty((2 * len(b) + 1, b.shape[1]))
+        values[:-1:2], values[1::2], values[-1] = b[..., 0], b @ weights, b[-1, :, -1]
+        return values
+
+    @cached_property
+    def ranges(self) -> tuple[Floats, Floats]:
+        """Least and largest value (N − 1, d) on each interval."""
+        b = self.bernstein
+        low, high = np.minimum(b[..., 0], b[..., -1]), np.maximum(b[..., 0], b[..., -1])
+        if self.degree == 3:
+            for t in _roots(self._steps):
+                value = _cubic(b, t)
+                low, high = np.minimum(low, value), np.maximum(high, value)
+        return low, high
+
+    @cached_property
+    def rates(self) -> Floats:
+        """Largest |rate| (N − 1, d) on each interval, per second."""
+        d = self._steps / self.period
+        speed = np.abs(d[..., [0, -1]]).max(axis=-1)
+        if self.degree == 3:
+            bend = d[..., 0] - 2.0 * d[..., 1] + d[..., 2]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                t = (d[..., 0] - d[..., 1]) / bend
+            t = np.where((t > 0.0) & (t < 1.0), t, 0.0)
+            vertex = (1 - t) ** 2 * d[..., 0] + 2 * t * (1 - t) * d[..., 1] + t * t * d[..., 2]
+            speed = np.maximum(speed, np.abs(vertex))
+        return speed
+
+    @cached_property
+    def accelerations(self) -> Floats:
+        """Largest |acceleration| (N, d) at each row, per s²; nothing between the rows exceeds it.
+
+        Linear: the second difference of the rows by the period squared, with the first and the last row
+        repeated: the robot stands before and after. Cubic: the second derivative, which is linear between the rows.
+        """
+        return np.abs(self.second)
+
+    @cached_property
+    def second(self) -> Floats:
+        """Accelerations (N, d) at the rows with their signs, as `accelerations` says, per s²."""
+        still = np.zeros((1, self.bernstein.shape[1]))
+        if self.degree == 1:
+            return np.diff(np.concatenate([still, self._steps[..., 0], still]), axis=0) / self.period**2
+        bends = 2.0 * np.diff(self._steps, axis=-1) / self.period**2
+        rows = np.concatenate([bends[..., 0], bends[-1:, :, 1]])
+        # From both sides they differ by rounding alone: the larger counts.
+        before = bends[:-1, :, 1]
+        rows[1:-1] = np.where(np.abs(before) > np.abs(rows[1:-1]), before, rows[1:-1])
+        return rows
+
+    @cached_property
+    def jerks(self) -> Floats:
+        """|Jerk| (N − 1, d) on each interval, per s³: the change of the rows' accelerations over the period.
+
+        An acceleration from which or to which the motion starts or stops at once counts as a change over one period.
+        """
+        a = self.second
+        jerk = np.abs(np.diff(a, axis=0))
+        jerk[0], jerk[-1] = np.maximum(jerk[0], np.abs(a[0])), np.maximum(jerk[-1], np.abs(a[-1]))
+        return jerk / self.period
+
+    @cached_property
+    def steps(self) -> Floats:
+        """Bernstein coefficients (N − 1, d, k) of the rates, per second."""
+        return self._steps / self.period
+
+    @property
+    def _steps(self) -> Floats:
+        return self.degree * np.diff(self.bernstein, axis=-1)
+
+
+def largest_length(vectors: Floats) -> tuple[float, int]:
+    """Return the largest |v(t)| over all of M vectors of polynomials, t in [0, 1], and in which of them it is.
+
+    vectors (M, d, n + 1): Bernstein coefficients. Branch and bound on |v|²: its coefficients enclose it, its end
+    coefficients are values; to 1e-13 of the largest.
+    """
+    square = multiply(vectors, vectors).sum(axis=1)
+    owners = np.arange(len(square))
+    best, where = 0.0, 0
+    for _ in range(_ROUNDS):
+        ends = np.maximum(square[:, 0], square[:, -1])
+        k = int(np.argmax(ends))
+        if ends[k] > best:
+            best, where = float(ends[k]), int(owners[k])
+        open_ = square.max(axis=1) > best * (1.0 + _CLOSE)
+        if not open_.any():
+            break
+        square, owners = np.concatenate(split(square[open_])), np.tile(owners[open_], 2)
+    return float(np.sqrt(best)), where
+
+
+def _clamped_slopes(rows: Floats) -> Floats:
+    """Return slopes (N, d), per row, of the C2 cubic spline through rows (N, d) from rest to rest."""
+    # scipy.interpolate takes a while to import; programs for linear controllers never need it.
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415
+
+    knots = np.arange(len(rows), dtype=np.float64)
+    return np.asarray(CubicSpline(knots, rows, axis=0, bc_type="clamped")(knots, 1), dtype=np.float64)
+
+
+def _roots(quadratic: Floats) -> tuple[Floats, Floats]:
+    """Return both roots (...) in [0, 1] of quadratics in Bernstein form (..., 3); 0 where there is none."""
+    a = quadratic[..., 0] - 2.0 * quadratic[..., 1] + quadratic[..., 2]
+    half_b = quadratic[..., 1] - quadratic[..., 0]
+    c = quadratic[..., 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # The two quotients that do not cancel.
+        q = -(half_b + np.copysign(np.sqrt(half_b * half_b - a * c), half_b))
+        roots = q / a, c / q
+    first, second = (np.where((t > 0.0) & (t < 1.0), t, 0.0) for t in roots)
+    return first, second
+
+
+def _cubic(b: Floats, t: Floats) -> Floats:
+    """Return the values (...) of cubics in Bernstein form (..., 4) at t (...)."""
+    s = 1.0 - t
+    return s**3 * b[..., 0] + 3 * s * s * t * b[..., 1] + 3 * s * t * t * b[..., 2] + t**3 * b[..., 3]

@@ -1,0 +1,93 @@
+"""How much of each limit a sampled program uses at most, and where: exact extrema of what the controller does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.geometry.interpolant import Interpolant, largest_length
+from pentapod.machine.machine import Machine
+from pentapod.timing.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class LimitUse:
+    """The largest share of one limit. quantity: "leg velocity", ...; value and bound in `unit` (SI).
+
+    leg: 1 to 5 where the limit is a leg's. time: seconds, of the row at or after which the share is reached; segment:
+    the toolpath's segment there; station: global s in metres.
+    """
+
+    quantity: str
+    value: float
+    bound: float
+    unit: str
+    leg: int | None
+    time: float
+    station: float
+    segment: int
+
+    @property
+    def share(self) -> float:
+        """Value over bound: 1 is the limit."""
+        return self.value / self.bound
+
+    def __str__(self) -> str:
+        whose = f"leg {self.leg}: " if self.leg else ""
+        return (
+            f"{self.quantity} {100.0 * self.share:.2f} % ({whose}{self.value:.4g} of {self.bound:.4g} {self.unit}) "
+            f"at {self.time:.3f} s, segment {self.segment}"
+        )
+
+
+def certify(
+    trajectory: Trajectory,
+    machine: Machine,
+    *,
+    legs: Floats | None = None,
+    tips: Floats | None = None,
+    tip_acceleration: float | None = None,
+) -> tuple[LimitUse, ...]:
+    """Return the largest share of leg velocity, acceleration and jerk, feed, and tip acceleration where it is limited.
+
+    Of the setpoints as the controller joins them: every polynomial's exact extrema, no samples between. legs (N, 5) m
+    and tips (N, 3) m: the program's rows, at the controller's period; without them the trajectory is sampled, and its
+    station stands for the tip, which is never faster. tip_acceleration: limit in m/s². Jerk counts the step
+    of acceleration at either end over one period. An interval that two sections share is judged by the slower feed.
+    """
+    period, interpolation = machine.controller.period, machine.controller.interpolation
+    count = max(1, round(trajectory.duration / period)) if legs is None else len(legs) - 1
+    times = np.minimum(np.arange(count + 1) * period, trajectory.duration)
+    stations, segments = trajectory.station(times), trajectory.segment(times)
+    motion = Interpolant.through(trajectory(times) if legs is None else legs, period, interpolation)
+    tip = Interpolant.through(stations[:, None] if tips is None else tips, period, interpolation)
+
+    def use(quantity: str, unit: str, value: float, bound: float, row: int, leg: int | None = None) -> LimitUse:
+        where = (float(times[row]), float(stations[row]), int(segments[row]))
+        return LimitUse(quantity, value, bound, unit, leg, *where)
+
+    def of_legs(quantity: str, unit: str, values: Floats, limit: Floats) -> LimitUse:
+        row, leg = np.unravel_index(int(np.argmax(values / limit)), values.shape)
+        return use(quantity, unit, float(values[row, leg]), float(limit[leg]), int(row), int(leg) + 1)
+
+    uses = [
+        of_legs("leg velocity", "m/s", motion.rates, machine.legs.max_velocity),
+        of_legs("leg acceleration", "m/s²", motion.accelerations, machine.legs.max_acceleration),
+        of_legs("leg jerk", "m/s³", motion.jerks, machine.legs.max_jerk),
+    ]
+    feeds = _slower(trajectory.feeds(times), machine.rapid_velocity)
+    share, row = largest_length(tip.steps / feeds[:, None, None])
+    uses.append(use("feed", "m/s", share * float(feeds[row]), float(feeds[row]), row))
+    if tip_acceleration is not None:
+        pushes = np.linalg.norm(tip.second, axis=1)
+        row = int(np.argmax(pushes))
+        uses.append(use("tip acceleration", "m/s²", float(pushes[row]), tip_acceleration, row))
+    return tuple(uses)
+
+
+def _slower(feeds: Floats, rapid: float) -> Floats:
+    """Return for each interval (N − 1,) the slower of the feeds (N,) at its ends; infinite ones are rapids."""
+    speeds = np.where(np.isfinite(feeds), feeds, rapid)
+    return np.minimum(speeds[:-1], speeds[1:])

@@ -1,0 +1,87 @@
+"""LimitUse: the largest share of each limit on the sampled program, against dense samples of scipy's splines."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline, make_interp_spline
+from timing_paths import Path, Piece, by_tip, line, machine, nodding, raster, straight
+
+from pentapod.timing import Trajectory, certify, retime
+from pentapod.toolpath.toolpath import SegmentKind
+
+
+def timed(piece, m):
+    trajectory = retime(Path((piece,)), m)
+    assert isinstance(trajectory, Trajectory), str(trajectory)
+    return trajectory
+
+
+def shares(uses):
+    return {use.quantity: use for use in uses}
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+def test_uses_are_those_of_the_spline(interpolation):
+    m = machine(interpolation=interpolation)
+    trajectory = timed(raster(lines=3, feed=0.2), m)
+    found = shares(certify(trajectory, m, tip_acceleration=2.0))
+    t = np.arange(round(trajectory.duration / 1e-3) + 1) * 1e-3
+    rows = np.column_stack([trajectory(t), trajectory.station(t)])
+    if interpolation == "cubic":
+        spline = CubicSpline(t, rows, bc_type="clamped")
+        dense = (t[:-1, None] + 1e-3 * np.linspace(0, 1, 21)).ravel()
+        rates, pushes = np.abs(spline(dense, 1)), np.abs(spline(t, 2))
+        jerks = np.abs(spline(t[:-1] + 5e-4, 3))
+    else:
+        rates = np.abs(make_interp_spline(t, rows, k=1)(t[:-1] + 5e-4, 1))
+        steps = np.concatenate([0 * rows[:1], np.diff(rows, axis=0), 0 * rows[:1]])
+        pushes = np.abs(np.diff(steps, axis=0)) / 1e-6
+        jerks = np.abs(np.diff(steps, 2, axis=0)) / 1e-9
+    assert found["leg velocity"].value == pytest.approx(rates[:, :5].max(), rel=1e-3)
+    assert found["leg acceleration"].value == pytest.approx(pushes[:, :5].max(), rel=1e-6)
+    assert found["leg jerk"].value >= jerks[:, :5].max() * (1 - 1e-6)
+    assert found["feed"].value == pytest.approx(rates[:, 5].max(), rel=1e-3)
+    assert found["tip acceleration"].value == pytest.approx(pushes[:, 5].max(), rel=1e-6)
+    assert max(found[name].share for name in ("leg velocity", "leg acceleration", "feed")) <= 1.01
+    assert "segment 0" in str(found["feed"])
+
+
+def test_the_tip_itself_is_judged_where_it_is_given():
+    """Tips on a circle, started at once: the spline overshoots between the first rows, to the maximum of a quartic."""
+    m = machine(interpolation="cubic")
+    trajectory = timed(straight([0.1, 0, 0, 0, 0], 0.05, 0.1), m)
+    n = round(trajectory.duration / 1e-3) + 1
+    turn = 4.0 * np.arange(n) * 1e-3
+    tips = 0.01 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    found = shares(certify(trajectory, m, tips=tips, tip_acceleration=1.0))
+    spline = CubicSpline(np.arange(n) * 1e-3, tips, bc_type="clamped")
+    at = np.linspace(0, (n - 1) * 1e-3, 50 * n)
+    top = at[np.linalg.norm(spline(at, 1), axis=1).argmax()]
+    near = np.linspace(max(top - 1e-3, 0.0), min(top + 1e-3, at[-1]), 20_001)
+    dense = np.linalg.norm(spline(near, 1), axis=1).max()
+    assert found["feed"].value == pytest.approx(dense, rel=1e-7)
+
+
+def test_place_and_leg_are_named():
+    """Leg 4 is the one that moves most, and the second section is the fast one."""
+    m = machine(a=50.0)
+    sections = [(0.05, 0.05, SegmentKind.CUT, 7), (0.1, 0.2, SegmentKind.CUT, 8)]
+    trajectory = timed(straight([0, 0.1, 0, 0.9, 0], 0.1, sections=sections), m)
+    found = shares(certify(trajectory, m))
+    assert found["leg velocity"].leg == 4
+    assert found["leg velocity"].segment == 8
+    assert found["leg velocity"].station > 0.05
+    assert found["feed"].share <= 1.0
+    assert "tip acceleration" not in found
+
+
+def test_a_program_that_exceeds_says_where():
+    m = machine()
+    trajectory = timed(
+        Piece(by_tip(line(), nodding()), 0.05, 0.2, inner_knots=tuple(np.linspace(0, 0.05, 52)[1:-1])), m
+    )
+    legs = trajectory(np.arange(round(trajectory.duration / 1e-3) + 1) * 1e-3)
+    legs[40, 2] += 1e-4
+    found = shares(certify(trajectory, m, legs=legs))
+    assert found["leg acceleration"].share > 20.0
+    assert found["leg acceleration"].leg == 3
+    assert found["leg acceleration"].time == pytest.approx(0.04)
