@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from pentapod.timing.constraints import Limits
-from pentapod.timing.engine import Failure, fastest
+from pentapod.timing.engine import fastest
 from pentapod.timing.interpolant import cubic_extrema
+from pentapod.timing.stages import Failure
 
 
 @pytest.mark.parametrize("length", [1e-9, 1e-6, 1e-3, 1.0, 1e3])

@@ -360,9 +360,9 @@ def test_turning_about_a_still_tip_and_no_motion_at_all_are_refused():
 
 def test_a_failing_solver_is_a_refusal_that_names_the_gridpoint(monkeypatch):
     from pentapod.timing import piece as module
-    from pentapod.timing.engine import Failure
+    from pentapod.timing.stages import Failure
 
-    monkeypatch.setattr(module, "fastest", lambda *_: Failure(7, "not controllable"))
+    monkeypatch.setattr(module, "fastest", lambda *_, **__: Failure(7, "not controllable"))
     result = retime(Path((nod(),)), machine())
     assert isinstance(result, Refusal)
     assert "piece 0, gridpoint 7" in result.cause

@@ -15,10 +15,10 @@ from scipy.ndimage import maximum_filter1d
 
 from pentapod.arrays import Floats
 from pentapod.machine.machine import Machine
-from pentapod.timing.engine import Failure
 from pentapod.timing.interpolant import cubic_extrema
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.piece import PieceProfile
+from pentapod.timing.stages import Failure
 
 WINDOW_PERIODS = 4
 """Periods over which the law is averaged: fewer leave overshoot, more cost time at each stop."""

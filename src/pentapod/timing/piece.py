@@ -9,9 +9,10 @@ import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.timing.constraints import Limits
-from pentapod.timing.engine import Failure, fastest
+from pentapod.timing.engine import Engine, fastest
 from pentapod.timing.grid import first_grid
 from pentapod.timing.paths import PieceLike
+from pentapod.timing.stages import Failure
 
 _BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 _REFINEMENTS = 4
@@ -35,6 +36,7 @@ class PieceProfile:
     x: Floats
     ease_acceleration: Floats
     ease_speed: Floats
+    engine: Engine = "core"
 
     @cached_property
     def first(self) -> Floats:
@@ -54,7 +56,7 @@ class PieceProfile:
     def solved(self) -> PieceProfile | Failure:
         """Return the fastest profile on this grid with these easings."""
         rows = 1.0 / (self.limits.acceleration * self.ease_acceleration[:, None])
-        x = fastest(self.s, self.first * rows, self.second * rows, self.ceiling())
+        x = fastest(self.s, self.first * rows, self.second * rows, self.ceiling(), engine=self.engine)
         return x if isinstance(x, Failure) else self.with_(x=x)
 
     def ceiling(self) -> Floats:
@@ -84,11 +86,8 @@ class PieceProfile:
         added = [self.s[:-1][switching] + (where * np.diff(self.s))[switching]]
         added += [(self.s[:-1] + between * np.diff(self.s))[exceeding] for between in _BETWEEN]
         s = np.unique(np.concatenate([self.s, *added]))
-        return PieceProfile(self.piece, self.limits, s, *(np.interp(s, self.s, y) for y in self._columns))
-
-    @property
-    def _columns(self) -> tuple[Floats, Floats, Floats]:
-        return self.x, self.ease_acceleration, self.ease_speed
+        x, acceleration, speed = (np.interp(s, self.s, y) for y in (self.x, self.ease_acceleration, self.ease_speed))
+        return PieceProfile(self.piece, self.limits, s, x, acceleration, speed, self.engine)
 
     def path_accelerations(self) -> Floats:
         """Return s̈ (N,) of each stage, m/s²."""
@@ -148,7 +147,7 @@ class PieceProfile:
 
 
 def time_piece(
-    piece: PieceLike, limits: Limits, velocity_slack: float, acceleration_slack: float
+    piece: PieceLike, limits: Limits, velocity_slack: float, acceleration_slack: float, engine: Engine = "core"
 ) -> PieceProfile | Failure:
     """Return the fastest profile of a piece that keeps the limits between gridpoints as well.
 
@@ -156,7 +155,7 @@ def time_piece(
     halved, those that still do are eased; what is left after that is run slower as a whole.
     """
     s = first_grid(piece, limits)
-    problem = PieceProfile(piece, limits, s, np.zeros_like(s), np.ones_like(s), np.ones_like(s))
+    problem = PieceProfile(piece, limits, s, np.zeros_like(s), np.ones_like(s), np.ones_like(s), engine)
     profile = problem.solved()
     for attempt in range(_REFINEMENTS + _EASINGS):
         if isinstance(profile, Failure):

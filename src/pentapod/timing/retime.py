@@ -12,10 +12,11 @@ from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
 from pentapod.timing.constraints import CONSTRAINTS, Limits
 from pentapod.timing.cubic import WINDOW_PERIODS, Unmended, smooth_laws, whole_periods
-from pentapod.timing.engine import Failure
+from pentapod.timing.engine import Engine
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.paths import LegPathLike, PieceLike
 from pentapod.timing.piece import PieceProfile, time_piece
+from pentapod.timing.stages import Failure
 from pentapod.timing.trajectory import Profile, Trajectory
 
 STILL_M = 1e-12
@@ -31,6 +32,7 @@ def retime(
     progress: Progress = silent,
     velocity_margin: float = 0.002,
     acceleration_margin: float = 0.005,
+    engine: Engine = "core",
 ) -> Trajectory | Refusal:
     """Return the time-optimal trajectory along a path, or the named cause why there is none.
 
@@ -38,9 +40,10 @@ def retime(
     between the gridpoints, and on the setpoints as the controller joins them (`machine.controller`). Each
     piece goes from rest to rest and lasts a whole number of periods. The margins are fractions of the
     limits that the plan leaves free; the rounding of setpoints and what happens between gridpoints uses part
-    of them. Pieces of no length are passed over. Method: TOPP-RA (Pham and Pham 2018), by toppra.
+    of them. Pieces of no length are passed over. Method: TOPP-RA (Pham and Pham 2018), by a compiled core; engine
+    "toppra" takes the reference instead, "numpy" the form that needs no compiler.
 
-    Raises InputError where a margin is not in (0, 0.5).
+    Raises InputError where a margin is not in (0, 0.5), or for an unknown engine.
     """
     for name, margin in (("velocity_margin", velocity_margin), ("acceleration_margin", acceleration_margin)):
         if not 0.0 < margin < 0.5:
@@ -61,7 +64,7 @@ def retime(
     profiles: list[PieceProfile] = []
     done = 0.0
     for k in indices:
-        profile = time_piece(path.pieces[k], limits, 0.5 * velocity_margin, 0.7 * acceleration_margin)
+        profile = time_piece(path.pieces[k], limits, 0.5 * velocity_margin, 0.7 * acceleration_margin, engine)
         if isinstance(profile, Failure):
             return _refusal(path, k, None, profile)
         profiles.append(profile)

@@ -1,0 +1,224 @@
+"""The two passes without a compiler: the path cut into windows through which NumPy moves side by side.
+
+A window starts its pass a lead too early, from rest; after the lead it has forgotten that. It has for certain
+where its value at the seam is its neighbour's, bit for bit: then the windows together are the pass over the whole.
+Where a seam differs the lead is doubled, until at last there is one window, which is the whole.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.arrays import Bools, Floats
+from pentapod.timing.stages import NOT_CONTROLLABLE, TOO_FAST_END, UNBOUNDED, Failure, Stages, admitted
+
+_LEAD = 32
+_WIDTH = 6
+"""Width of a window in leads: the narrower, the more is done at once, and the more is done twice."""
+
+_TOUCH = 1e-13
+_VAIN = 1e-13
+_STEPS = 100
+
+
+def solve(stages: Stages, x_start: float, x_end: float) -> Floats | Failure:
+    """Return the largest x (N + 1,), or why there is none."""
+    if x_end > stages.ceiling[-1]:
+        return Failure(len(stages) - 1, TOO_FAST_END)
+    lead, x = _LEAD, None
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        while x is None:
+            x = _Windows.of(stages, lead).solve(x_start, x_end)
+            lead *= 2
+    return x
+
+
+@dataclass(frozen=True, eq=False)
+class _Windows:
+    """The stages of W windows of M gridpoints, M first: each step works on a row of windows.
+
+    A stage's rows are lows − slopes x ≤ u ≤ highs − slopes x, arrays (M, 2R + 1, W): R at its start, R at its end, and
+    last the reach of the next gridpoint's speeds, which the backward pass fills in. twice (M, W): 2 Δs, 0 past the
+    path's end, where x stays. ceiling (M, W). count: gridpoints of the path.
+    """
+
+    lows: Floats
+    highs: Floats
+    slopes: Floats
+    twice: Floats
+    ceiling: Floats
+    count: int
+    lead: int
+
+    @classmethod
+    def of(cls, stages: Stages, lead: int) -> _Windows:
+        """Return windows with a lead, or one window where the lead is not small against the path."""
+        count = len(stages)
+        width = _WIDTH * lead if 2 * _WIDTH * lead < count else count
+        windows = -(-count // width)
+        twice = np.append(2.0 * np.diff(stages.s), 0.0)
+        a, b = stages.first, stages.second
+        c = np.broadcast_to(stages.offset, a.shape)
+        after = np.minimum(np.arange(count) + 1, count - 1)
+        f = np.hstack([a, a[after] + twice[:, None] * b[after]])
+        g, shift = np.hstack([b, b[after]]), np.hstack([c, c[after]])
+        sign = np.where(f < 0.0, -1.0, 1.0)
+        f, g, shift = f * sign, g * sign, shift * sign
+        # Rows whose u-term is vain bound x alone.
+        ceiling = np.array(stages.ceiling)
+        vain = f <= (_VAIN * twice / np.maximum(np.maximum(ceiling, ceiling[after]), 1e-300))[:, None]
+        alone = np.where(vain & (g != 0.0), (1.0 + shift * np.sign(g)) / np.abs(g), np.inf).min(axis=1)
+        ceiling = np.minimum(ceiling, np.where(twice > 0.0, alone, np.inf))
+        r = 1.0 / np.where(vain, 1.0, f)
+        per = (1.0 / twice)[:, None]
+        lows = np.hstack([np.where(vain, -np.inf, (shift - 1.0) * r), np.full_like(per, -np.inf)])
+        highs = np.hstack([np.where(vain, np.inf, (shift + 1.0) * r), np.full_like(per, np.inf)])
+        slopes = np.hstack([np.where(vain, 0.0, g * r), per])
+        columns = ((lows, -np.inf), (highs, np.inf), (slopes, 0.0), (twice, 0.0), (ceiling, np.inf))
+        lows, highs, slopes, twice, ceiling = (_cut(y, windows, width, fill) for y, fill in columns)
+        return cls(lows, highs, slopes, twice, ceiling, count, lead)
+
+    def solve(self, x_start: float, x_end: float) -> Floats | Failure | None:
+        """Return the largest x (count,), why there is none, or None where a seam differs."""
+        speeds = self._backward(x_end)
+        if speeds is None or isinstance(speeds, Failure):
+            return speeds
+        low, high = speeds
+        start = admitted(x_start, float(low[0, 0]), float(high[0, 0]))
+        return start if isinstance(start, Failure) else self._forward(low, high, start)
+
+    def _backward(self, x_end: float) -> tuple[Floats, Floats] | Failure | None:
+        """Return the controllable speeds (M, W)."""
+        low, high = np.empty_like(self.ceiling), np.empty_like(self.ceiling)
+        width, windows = self.ceiling.shape
+        seam = np.zeros((2, windows))
+        seam[:, -1] = x_end
+        if windows > 1:  # through the neighbours' first gridpoints
+            state = np.zeros((2, windows - 1))
+            for k in range(min(self.lead, width - 1) - 1, -1, -1):
+                state, _ = self._before(k, slice(1, None), state)
+            seam[:, :-1] = state
+        state, failed = seam, -1
+        why = NOT_CONTROLLABLE
+        for k in range(width - 1, -1, -1):
+            state, lost = self._before(k, slice(None), state)
+            if lost.any() and failed < 0:
+                failed = int(np.flatnonzero(lost)[-1]) * width + k
+                why = UNBOUNDED if np.isinf(state[1, lost][-1]) else NOT_CONTROLLABLE
+            low[k], high[k] = state
+        if failed >= 0:
+            return Failure(failed, why)
+        same = (seam[0, :-1] == low[0, 1:]) & (seam[1, :-1] == high[0, 1:])
+        return (low, high) if same.all() else None
+
+    def _before(self, k: int, part: slice, after: Floats) -> tuple[Floats, Bools]:
+        """Return least and largest controllable x (2, w) at the stages k of windows, and where there are none."""
+        twice, x = self.twice[k, part], self.ceiling[k, part].copy()
+        still = twice == 0.0
+        low = np.zeros_like(x)
+        if still.all():
+            x = np.minimum(x, after[1])
+            return np.stack([after[0], x]), after[0] > x
+        lows, highs, slopes = self.lows[k][:, part], self.highs[k][:, part], self.slopes[k][:, part]
+        lows[-1], highs[-1] = after / twice
+        # Far above what can be reached, Newton would lose digits.
+        far = ~(x <= 1e3 * after[1]) & ~still
+        if far.any():
+            x[far] = np.minimum(x[far], _reach(lows[:, far], highs[:, far], slopes[:, far]))
+        lost = np.isinf(x) & ~still
+        if still.any() or lost.any():
+            moving = ~still & ~lost
+            x[moving], lost[moving] = _right_root(lows[:, moving], highs[:, moving], slopes[:, moving], x[moving])
+            x[still], low[still] = np.minimum(x[still], after[1, still]), after[0, still]
+            lost |= still & (low > x)
+        else:
+            x, lost = _right_root(lows, highs, slopes, x)
+        must = np.flatnonzero((after[0] > 0.0) & ~still & ~lost)
+        if len(must):
+            low[must], lost[must] = _left_root(lows[:, must], highs[:, must], slopes[:, must], x[must])
+        return np.stack([low, x]), lost
+
+    def _forward(self, low: Floats, high: Floats, x_start: float) -> Floats | None:
+        """Return the largest x (count,), None where a seam differs."""
+        width, windows = self.ceiling.shape
+        x = np.empty_like(high)
+        x[0] = x_start
+        if windows > 1:  # through the neighbours' last gridpoints
+            first = width - min(self.lead, width - 1)
+            state = low[first, :-1]
+            for k in range(first, width - 1):
+                state = self._after(k, slice(None, -1), state, low[k + 1, :-1], high[k + 1, :-1])
+            x[0, 1:] = self._after(width - 1, slice(None, -1), state, low[0, 1:], high[0, 1:])
+        for k in range(width - 1):
+            x[k + 1] = self._after(k, slice(None), x[k], low[k + 1], high[k + 1])
+        last = self._after(width - 1, slice(None, -1), x[-1, :-1], low[0, 1:], high[0, 1:])
+        return x.T.ravel()[: self.count] if (last == x[0, 1:]).all() else None
+
+    def _after(self, k: int, part: slice, x: Floats, low: Floats, high: Floats) -> Floats:
+        """Return the largest x (w,) at the ends of the stages k of windows."""
+        twice = self.twice[k, part]
+        u = (self.highs[k][:, part] - self.slopes[k][:, part] * x).min(axis=0)
+        return np.where(twice > 0.0, np.minimum(np.maximum(x + twice * u, low), high), np.minimum(x, high))
+
+
+def _cut(y: Floats, windows: int, width: int, fill: float) -> Floats:
+    """Return (M, …, W) of y (count, …), filled up past the end."""
+    whole = np.full((windows * width, *y.shape[1:]), fill)
+    whole[: len(y)] = y
+    return np.ascontiguousarray(np.moveaxis(whole.reshape(windows, width, *y.shape[1:]), 0, -1))
+
+
+def _reach(lows: Floats, highs: Floats, slopes: Floats) -> Floats:
+    """Return a bound (w,) of x: that of each row together with the last, which is the reach of the next x."""
+    tilt = slopes[:-1] - slopes[-1]
+    bound = np.where(tilt > 0.0, highs[:-1] / tilt, (highs[-1] - lows[:-1]) / -tilt)
+    return 1.01 * np.where((tilt != 0.0) & np.isfinite(bound), bound, np.inf).min(axis=0)
+
+
+def _right_root(lows: Floats, highs: Floats, slopes: Floats, cap: Floats) -> tuple[Floats, Bools]:
+    """Return the largest x (w,) up to cap that leaves an interval of u, and where there is none."""
+    result, bad = cap.copy(), np.zeros(len(cap), dtype=bool)
+    at, x = np.arange(len(cap)), cap
+    for attempt in range(_STEPS):
+        t = slopes * x
+        below, above = lows - t, highs - t
+        least, most = below.max(axis=0), above.min(axis=0)
+        gap, close = least - most, _TOUCH * (np.abs(least) + np.abs(most))
+        go = np.flatnonzero((gap > close) | ((gap < -close) & (attempt > 0)))
+        if not len(go):
+            break
+        at, x, gap = at[go], x[go], gap[go]
+        lows, highs, slopes = lows[:, go], highs[:, go], slopes[:, go]
+        column = np.arange(len(go))
+        slope = slopes[above[:, go].argmin(axis=0), column] - slopes[below[:, go].argmax(axis=0), column]
+        new = np.where(slope > 0.0, np.minimum(x - gap / slope, cap[at]), np.where(gap > 0.0, -1.0, x))
+        result[at] = np.maximum(new, 0.0)
+        under = np.flatnonzero(new < 0.0)
+        if len(under):
+            least, most = lows[:, under].max(axis=0), highs[:, under].min(axis=0)
+            bad[at[under]] = least - most > _TOUCH * (np.abs(least) + np.abs(most))
+        more = np.flatnonzero((new != x) & (new >= 0.0))
+        at, x, lows, highs, slopes = at[more], new[more], lows[:, more], highs[:, more], slopes[:, more]
+    return result, bad
+
+
+def _left_root(lows: Floats, highs: Floats, slopes: Floats, top: Floats) -> tuple[Floats, Bools]:
+    """Return the least x (w,) up to top that leaves an interval of u, and where there is none."""
+    x, bad = np.zeros_like(top), np.zeros(len(top), dtype=bool)
+    column = np.arange(len(top))
+    for _ in range(_STEPS):
+        below, above = lows - slopes * x, highs - slopes * x
+        least, most = below.max(axis=0), above.min(axis=0)
+        gap = least - most
+        go = (gap > _TOUCH * (np.abs(least) + np.abs(most))) & ~bad
+        if not go.any():
+            break
+        slope = slopes[above.argmin(axis=0), column] - slopes[below.argmax(axis=0), column]
+        new = np.where(go, np.where(slope < 0.0, x - gap / slope, np.inf), x)
+        bad |= ~(new <= top * (1.0 + 1e-12))
+        if (bad | (new == x)).all():
+            break
+        x = np.where(bad, x, new)
+    return np.minimum(x, top), bad
