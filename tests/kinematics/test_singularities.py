@@ -5,7 +5,13 @@ import pytest
 from scipy.optimize import brentq, minimize, minimize_scalar
 
 from pentapod.geometry import tangent_frame
-from pentapod.kinematics import LinearPentapod, orientation_distance, position_distance, singularity_values
+from pentapod.kinematics import (
+    LinearPentapod,
+    orientation_distance,
+    position_distance,
+    singular_plane,
+    singularity_values,
+)
 
 
 def test_the_leg_determinant_is_delta_squared_w_f_s(
@@ -95,3 +101,28 @@ def test_distances_take_batches(pentapod: LinearPentapod, random_poses) -> None:
         assert whole.shape == (2, 3)
         np.testing.assert_allclose(whole[1, 2], function(pentapod, p[5], i[5]))
         assert function(pentapod, p[0], i).shape == (6,)
+
+
+@pytest.mark.parametrize("tool_length", [0.0, 0.4])
+def test_the_plane_of_singular_tips(
+    pentapod: LinearPentapod, random_poses, leg_determinant, tool_length: float
+) -> None:
+    p, i = random_poses(pentapod, 300, seed=9)
+    normal, offset = singular_plane(pentapod, i, tool_length=tool_length)
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=-1), 1.0, rtol=1e-14)
+    tips = p + tool_length * i
+    height = (normal * tips).sum(axis=-1) - offset
+    np.testing.assert_allclose(np.abs(height), position_distance(pentapod, p, i), rtol=1e-9, atol=1e-12)
+    np.testing.assert_array_equal(np.sign(height), pentapod.component(p, i)[:, 1])
+    foot = tips - height[:, None] * normal - tool_length * i
+    scale = np.abs(leg_determinant(pentapod, p, i)).max()
+    np.testing.assert_allclose(leg_determinant(pentapod, foot, i), 0.0, atol=1e-12 * scale)
+
+
+def test_no_plane_where_every_position_is_singular(paper: LinearPentapod) -> None:
+    one = LinearPentapod.quadratic(paper.base, 1.0)
+    normal, offset = singular_plane(one, [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    assert np.isnan(normal[0]).all()
+    assert np.isnan(offset[0])
+    np.testing.assert_allclose(normal[1], np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0))  # paper's (21)
+    assert offset[1] == 0.0

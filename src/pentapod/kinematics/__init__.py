@@ -1,32 +1,57 @@
 """The robot as mathematics: leg lengths, assembly modes, singularities, Jacobian, forces, certificates."""
 
+from pentapod.kinematics.architecture import ArchitecturalDistance, architectural_distance
 from pentapod.kinematics.certificate import ComponentProof, certify_component
 from pentapod.kinematics.component import COMPONENTS, Component
+from pentapod.kinematics.conics import Conic, attachment_conic, conic_determinant, forbidden_conic
 from pentapod.kinematics.five_legs import FiveLegs
-from pentapod.kinematics.forces import leg_force_map, tip_force_amplification
+from pentapod.kinematics.forces import (
+    leg_force_map,
+    leg_load_map,
+    leg_moment_map,
+    tip_force_amplification,
+    tip_moment_amplification,
+)
 from pentapod.kinematics.jacobian import leg_jacobian, pose_jacobian, square_jacobian
 from pentapod.kinematics.pentapod import LinearPentapod
 from pentapod.kinematics.singularities import (
     architectural_measure,
     orientation_distance,
     position_distance,
+    singular_plane,
     singularity_values,
 )
+from pentapod.kinematics.sphere import SingularityFreeSphere, singularity_free_sphere
+from pentapod.kinematics.stiffness import tip_compliance, tip_stiffness
 
 __all__ = [
     "COMPONENTS",
+    "ArchitecturalDistance",
     "Component",
     "ComponentProof",
+    "Conic",
     "FiveLegs",
     "LinearPentapod",
+    "SingularityFreeSphere",
+    "architectural_distance",
     "architectural_measure",
+    "attachment_conic",
     "certify_component",
+    "conic_determinant",
+    "forbidden_conic",
     "leg_force_map",
     "leg_jacobian",
+    "leg_load_map",
+    "leg_moment_map",
     "orientation_distance",
     "pose_jacobian",
     "position_distance",
+    "singular_plane",
+    "singularity_free_sphere",
     "singularity_values",
     "square_jacobian",
+    "tip_compliance",
     "tip_force_amplification",
+    "tip_moment_amplification",
+    "tip_stiffness",
 ]

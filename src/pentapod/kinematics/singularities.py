@@ -35,6 +35,24 @@ def position_distance(pentapod: LinearPentapod, position: ArrayLike, direction: 
         return np.where(slope == 0.0, 0.0, np.abs(s) / slope)
 
 
+def singular_plane(
+    pentapod: LinearPentapod, direction: ArrayLike, *, tool_length: float = 0.0
+) -> tuple[Floats, Floats]:
+    """Return the plane of positions with S = 0 for directions (..., 3): unit normals (..., 3), offsets (...) metres.
+
+    n · x = offset for the tips x = p + tool_length · i (p itself by default); n points to where S > 0. The plane
+    contains the y direction. Paper's (20) and (21), divided by w: with that factor, as printed, (20) holds for every
+    position when w = 0. NaN for the direction u = 1/δ, w = 0, for which S = 0 wherever the platform is.
+    """
+    i = as_batch(direction, "direction", (3,))
+    u, w = i[..., 0], i[..., 2]
+    n1, n3 = pentapod.delta * w, 1.0 - pentapod.delta * u
+    slope = np.hypot(n1, n3)
+    slope = np.where(slope == 0.0, np.nan, slope)
+    # n · p = −lever · w, and the tip lies n · i = δwu + (1 − δu)w = w tool lengths further along the normal.
+    return np.stack([n1, np.zeros_like(n1), n3], axis=-1) / slope[..., None], (tool_length - pentapod.lever) * w / slope
+
+
 def orientation_distance(
     pentapod: LinearPentapod, position: ArrayLike, direction: ArrayLike, *, about: float = 0.0
 ) -> Floats:
