@@ -1,11 +1,8 @@
 """The robot as mathematics: leg lengths, assembly modes, singularities, Jacobian, forces, certificates."""
 
-<<<<<<< HEAD
 from pentapod.kinematics.architecture import ArchitecturalDistance, architectural_distance
-=======
 from pentapod.kinematics.as_built import AsBuiltPentapod
 from pentapod.kinematics.as_built_forward import ProvenPoses, as_built_pose
->>>>>>> bebca1b (Machines as built: exact inverse kinematics, forward kinematics proven pose by pose)
 from pentapod.kinematics.certificate import ComponentProof, certify_component
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.conics import Conic, attachment_conic, conic_determinant, forbidden_conic
@@ -31,26 +28,19 @@ from pentapod.kinematics.stiffness import tip_compliance, tip_stiffness
 
 __all__ = [
     "COMPONENTS",
-<<<<<<< HEAD
     "ArchitecturalDistance",
-=======
     "AsBuiltPentapod",
->>>>>>> bebca1b (Machines as built: exact inverse kinematics, forward kinematics proven pose by pose)
     "Component",
     "ComponentProof",
     "Conic",
     "FiveLegs",
     "LinearPentapod",
-<<<<<<< HEAD
+    "ProvenPoses",
     "SingularityFreeSphere",
     "architectural_distance",
     "architectural_measure",
-    "attachment_conic",
-=======
-    "ProvenPoses",
-    "architectural_measure",
     "as_built_pose",
->>>>>>> bebca1b (Machines as built: exact inverse kinematics, forward kinematics proven pose by pose)
+    "attachment_conic",
     "certify_component",
     "conic_determinant",
     "forbidden_conic",
