@@ -3,6 +3,7 @@
 from pentapod.kinematics.architecture import ArchitecturalDistance, architectural_distance
 from pentapod.kinematics.as_built import AsBuiltPentapod
 from pentapod.kinematics.as_built_forward import ProvenPoses, as_built_pose
+from pentapod.kinematics.assembly import AssemblyObstacles, Obstacle, assembly_obstacles
 from pentapod.kinematics.certificate import ComponentProof, certify_component
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.conics import Conic, attachment_conic, conic_determinant, forbidden_conic
@@ -14,7 +15,9 @@ from pentapod.kinematics.forces import (
     tip_force_amplification,
     tip_moment_amplification,
 )
+from pentapod.kinematics.general import GeneralPentapod
 from pentapod.kinematics.jacobian import leg_jacobian, pose_jacobian, square_jacobian
+from pentapod.kinematics.mode import MODES, Mode
 from pentapod.kinematics.pentapod import LinearPentapod
 from pentapod.kinematics.singularities import (
     architectural_measure,
@@ -23,23 +26,30 @@ from pentapod.kinematics.singularities import (
     singular_plane,
     singularity_values,
 )
+from pentapod.kinematics.singularity_polynomial import singularity_cofactors, singularity_polynomial
 from pentapod.kinematics.sphere import SingularityFreeSphere, singularity_free_sphere
 from pentapod.kinematics.stiffness import tip_compliance, tip_stiffness
 
 __all__ = [
     "COMPONENTS",
+    "MODES",
     "ArchitecturalDistance",
     "AsBuiltPentapod",
+    "AssemblyObstacles",
     "Component",
     "ComponentProof",
     "Conic",
     "FiveLegs",
+    "GeneralPentapod",
     "LinearPentapod",
+    "Mode",
+    "Obstacle",
     "ProvenPoses",
     "SingularityFreeSphere",
     "architectural_distance",
     "architectural_measure",
     "as_built_pose",
+    "assembly_obstacles",
     "attachment_conic",
     "certify_component",
     "conic_determinant",
@@ -52,7 +62,9 @@ __all__ = [
     "pose_jacobian",
     "position_distance",
     "singular_plane",
+    "singularity_cofactors",
     "singularity_free_sphere",
+    "singularity_polynomial",
     "singularity_values",
     "square_jacobian",
     "tip_compliance",

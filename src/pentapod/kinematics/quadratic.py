@@ -13,6 +13,7 @@ from fractions import Fraction
 import numpy as np
 
 from pentapod.arrays import Floats
+from pentapod.kinematics.exact import eliminate
 
 _OTHERS = (0, 1, 3, 4)  # the legs whose equations are taken relative to leg 3
 
@@ -39,7 +40,7 @@ class LinearPart:
             rhs = [Fraction(-1, 2) if column == row else Fraction(0) for column in range(4)]
             k = x * x + y * y + (slope * x) ** 2
             rows.append([x, y, slope * x * x, slope * x * y, *rhs, k / 2])
-        solution = _eliminate(rows)
+        solution = eliminate(rows)
         linear_map, constant = np.zeros((4, 5)), np.zeros(4)
         for row, entries in enumerate(solution):
             linear_map[row, _OTHERS] = [float(entry) for entry in entries[:4]]
@@ -50,21 +51,6 @@ class LinearPart:
     def __call__(self, squared_legs: Floats) -> Floats:
         """Return (4, N): q, py, u, v of squared leg lengths (5, N)."""
         return self.linear_map @ squared_legs + self.constant[:, None]
-
-
-def _eliminate(rows: list[list[Fraction]]) -> list[list[Fraction]]:
-    """Return the right-hand sides (4, m) after exact Gauss-Jordan elimination of (4, 4 + m)."""
-    for column in range(4):
-        pivot = next((r for r in range(column, 4) if rows[r][column] != 0), None)
-        if pivot is None:
-            raise np.linalg.LinAlgError("the linear equations of the legs are dependent")
-        rows[column], rows[pivot] = rows[pivot], rows[column]
-        rows[column] = [entry / rows[column][column] for entry in rows[column]]
-        for r in range(4):
-            if r != column and rows[r][column] != 0:
-                factor = rows[r][column]
-                rows[r] = [a - factor * b for a, b in zip(rows[r], rows[column], strict=True)]
-    return [row[4:] for row in rows]
 
 
 def reciprocal_condition(base: Floats, delta: float) -> float:

@@ -1,0 +1,107 @@
+"""Why leg lengths have no pose: the inequality that they violate, and by how much."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pentapod.arrays import Bools, Floats, as_batch
+from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.kinematics.line_equations import LineEquations
+from pentapod.kinematics.line_roots import interior
+from pentapod.kinematics.solution_line import SolutionLine
+
+
+class Obstacle(IntEnum):
+    """The first inequality, in this order, that no point of the solution line fulfils (kinematics notes, section 5)."""
+
+    NONE = 0
+    NOT_A_LENGTH = 1
+    DIRECTION = 2
+    POSITION = 3
+    APART = 4
+    ANGLE = 5
+
+    @property
+    def inequality(self) -> str:
+        """The inequality that is violated, in the formulas' symbols (p is leg 3's platform joint)."""
+        return _INEQUALITIES[self]
+
+
+_INEQUALITIES = {
+    Obstacle.NONE: "none: a pose exists",
+    Obstacle.NOT_A_LENGTH: "0 ≤ l_i < ∞ for every leg",
+    Obstacle.DIRECTION: "u² + v² ≤ 1: the direction's horizontal part is too long",
+    Obstacle.POSITION: "px² + py² ≤ l_3²: leg 3 is too short for the horizontal position",
+    Obstacle.APART: "u² + v² ≤ 1 and px² + py² ≤ l_3² at once: each can hold, but not both together",
+    Obstacle.ANGLE: "|t − px u − py v| ≤ |pz w|: leg 3 and the line cannot include the angle",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class AssemblyObstacles:
+    """What keeps legs (..., 5) from being assembled: an `Obstacle` (...) for each, and the shortfall (...).
+
+    The shortfall is by how much the inequality fails where it fails least, relative to its right-hand side, for
+    ANGLE relative to l_3; 0 where a pose exists, NaN for NOT_A_LENGTH. For APART it is taken in the middle of the gap.
+    """
+
+    obstacle: NDArray[np.int8]
+    shortfall: Floats
+
+    @property
+    def exists(self) -> Bools:
+        """Whether a pose exists (...)."""
+        return self.obstacle == Obstacle.NONE
+
+    def explain(self, *index: int) -> str:
+        """Return a sentence on the element at this index."""
+        obstacle, shortfall = Obstacle(int(self.obstacle[index])), float(self.shortfall[index])
+        if obstacle is Obstacle.NONE:
+            return "a pose exists"
+        amount = "" if np.isnan(shortfall) else f" (missed by {shortfall:.3g} of the right-hand side)"
+        return f"no assembly: violates {obstacle.inequality}{amount}"
+
+
+def assembly_obstacles(pentapod: FiveLegs, legs: ArrayLike) -> AssemblyObstacles:
+    """Return for leg lengths (..., 5), metres, whether a pose exists, and if none the inequality that fails.
+
+    For any linear pentapod, in the quadratic family or not. Rounding is forgiven as in `GeneralPentapod.pose`.
+    Raises ArrayError for a wrong shape; LinAlgError cannot occur for a pentapod that was built.
+    """
+    lengths = as_batch(legs, "legs", (5,))
+    flat = lengths.reshape(-1, 5)
+    obstacle = np.full(len(flat), Obstacle.NOT_A_LENGTH, dtype=np.int8)
+    shortfall = np.full(len(flat), np.nan)
+    known = np.flatnonzero(np.isfinite(flat).all(axis=-1) & (flat >= 0.0).all(axis=-1))
+    line = SolutionLine.of(LineEquations.of(pentapod.base, pentapod.offsets), np.square(flat[known].T))
+    obstacle[known], shortfall[known] = _judge(line)
+    return AssemblyObstacles(obstacle.reshape(lengths.shape[:-1]), shortfall.reshape(lengths.shape[:-1]))
+
+
+def _judge(line: SolutionLine) -> tuple[NDArray[np.int8], Floats]:
+    """Return obstacle and shortfall (N,) of solution lines."""
+    best = interior(line, thorough=True)
+    (low1, high1), (low2, high2) = line.directions(), line.positions()
+    reach = line.reach_squared
+    safe = np.where(reach > 0.0, reach, 1.0)
+
+    def excess(low: Floats, high: Floats) -> tuple[Floats, Floats]:
+        bounded = np.isfinite(low)  # else it is the same everywhere
+        values = line.factors(0.5 * (np.where(bounded, low, 0.0) + np.where(bounded, high, 0.0)))
+        return -values.d1, -values.e / safe
+
+    in_direction, in_position = excess(low1, high1)[0], excess(low2, high2)[1]
+    apart = np.maximum(*excess(best.tau, best.tau))
+    angle = -line.factors(best.tau).margin()[0] / np.sqrt(safe)
+    missed = np.stack([in_direction, in_position, apart, angle])
+    failed = np.stack([~(low1 < high1) | np.isinf(low1), ~(low2 < high2) | np.isinf(low2)])
+    failed &= np.stack([in_direction, in_position]) > 0.0
+    failed = np.concatenate([failed, [np.maximum(low1, low2) > np.minimum(high1, high2)], [np.ones_like(best.exists)]])
+    first = np.argmax(failed, axis=0)
+    shortfall = np.take_along_axis(missed, first[None], axis=0)[0]
+    obstacle = np.where(best.exists, Obstacle.NONE, first + Obstacle.DIRECTION)
+    return obstacle.astype(np.int8), np.where(best.exists, 0.0, shortfall)
