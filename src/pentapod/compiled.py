@@ -3,23 +3,55 @@
 Files named `*_kernels.py` hold them, each function marked with `kernel`; they are imported where they are first used,
 so that `import pentapod` stays light. The machine code is cached on disk, beside the file or in the user's
 cache folder: only the first run on a machine compiles.
+
+Loading numba takes about as long as NumPy needs for ten million poses. So work that NumPy can do as well, to the
+last bit, asks `kernels_pay` before it loads kernels: like a skier who rents until the rents add up to a pair of skis,
+it stays with NumPy until the time lost so far would have paid for loading. Which of the two did the work cannot be
+told from the result.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from importlib.util import find_spec
-from typing import TypeVar, cast
+from typing import Literal, TypeVar, cast
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
+_Policy = Literal["when they pay", "always", "never"]
+
+_policy: ContextVar[_Policy] = ContextVar("kernels", default="when they pay")
+_lost = [0.0]  # seconds that kernels would have saved so far
+_NUMBA, _CACHED = 0.5, 0.05  # seconds: loading numba, and kernels from the cache once it is there
 
 
 @cache
 def kernels_available() -> bool:
     """Return whether numba can be had; PENTAPOD_NUMPY_ONLY=1 in the environment says no."""
     return os.environ.get("PENTAPOD_NUMPY_ONLY", "") != "1" and find_spec("numba") is not None
+
+
+def kernels_pay(saved: float) -> bool:
+    """Return whether to use kernels for work on which they save this many seconds. See the module's docstring."""
+    policy = _policy.get()
+    if policy == "never" or not kernels_available():
+        return False
+    _lost[0] += saved
+    return policy == "always" or _lost[0] > (_CACHED if "numba" in sys.modules else _NUMBA)
+
+
+@contextmanager
+def kernels_used(policy: _Policy) -> Generator[None]:
+    """Use kernels always, never or when they pay, within a `with` block."""
+    token = _policy.set(policy)
+    try:
+        yield
+    finally:
+        _policy.reset(token)
 
 
 def kernel(function: _Function) -> _Function:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.arrays import Floats, as_batch, as_floats
+from pentapod.compiled import kernels_pay
 from pentapod.errors import ArrayError, MachineError
 from pentapod.kinematics.blocks import blocks
+
+SAVED_BY_KERNELS = 30e-9
+"""Seconds a pose that compiled kernels save, forwards and backwards."""
 
 
 class FiveLegs:
@@ -23,12 +29,20 @@ class FiveLegs:
         legs[..., :2] -= self.base
         return legs
 
-    def leg_lengths(self, position: ArrayLike, direction: ArrayLike) -> Floats:
-        """Return leg lengths (..., 5), metres, of positions p and unit directions i (..., 3)."""
+    def leg_lengths(self, position: ArrayLike, direction: ArrayLike, *, out: Floats | None = None) -> Floats:
+        """Return leg lengths (..., 5), metres, of positions p and unit directions i (..., 3).
+
+        out: a contiguous array (..., 5) to write them to, for large batches again and again. Raises ArrayError.
+        """
         p, i = broadcast(as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,)))
         batch = p.shape[:-1]
         p, i = p.reshape(-1, 3), i.reshape(-1, 3)
-        legs = np.empty((len(p), 5))
+        (legs,) = outputs(None if out is None else (out,), batch, (5,))
+        if kernels_pay(SAVED_BY_KERNELS * len(p)):
+            from pentapod.kinematics.five_legs_kernels import lengths  # noqa: PLC0415
+
+            lengths(p, i, self.base, self.offsets, legs)
+            return legs.reshape(*batch, 5)
         x, y, z = self.base[:, :1], self.base[:, 1:], self.offsets[:, None]
         for block in blocks(len(p)):
             (px, py, pz), (u, v, w) = p[block].T.copy(), i[block].T.copy()
@@ -37,6 +51,18 @@ class FiveLegs:
             squared += np.square(z * w + pz)
             legs[block] = np.sqrt(squared, out=squared).T
         return legs.reshape(*batch, 5)
+
+
+def outputs(out: tuple[Floats, ...] | None, batch: tuple[int, ...], *tails: tuple[int, ...]) -> tuple[Floats, ...]:
+    """Return arrays (N, *tail) of a batch to write to: views of those given, or new ones. Raises ArrayError."""
+    if out is None:
+        return tuple(np.empty((math.prod(batch), *tail)) for tail in tails)
+    for array, tail in zip(out, tails, strict=True):
+        if array.shape != batch + tail or array.dtype != np.float64 or not array.flags.c_contiguous:
+            raise ArrayError(
+                f"out has shape {array.shape} of {array.dtype}", expected=f"contiguous float64 of shape {batch + tail}"
+            )
+    return tuple(array.reshape(-1, *tail) for array, tail in zip(out, tails, strict=True))
 
 
 def broadcast(a: Floats, b: Floats) -> tuple[Floats, Floats]:

@@ -7,13 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pentapod.arrays import Floats, as_batch, frozen, set_frozen
+from pentapod.arrays import Floats, Ints, as_batch, frozen, set_frozen
+from pentapod.compiled import kernels_pay
 from pentapod.errors import ArrayError, MachineError
 from pentapod.kinematics.blocks import blocks
 from pentapod.kinematics.component import COMPONENTS
-from pentapod.kinematics.five_legs import FiveLegs, broadcast, given
+from pentapod.kinematics.five_legs import SAVED_BY_KERNELS, FiveLegs, broadcast, given, outputs
 from pentapod.kinematics.offsets import check_offsets, fit_delta
-from pentapod.kinematics.quadratic import LinearPart, reciprocal_condition, solve, w_and_s
+from pentapod.kinematics.quadratic import NEAR_W_SQUARED, LinearPart, Reduced, reciprocal_condition, solve, w_and_s
+from pentapod.kinematics.quadratic_near import solve_near
 
 _SINGULAR = 1e-12  # below this reciprocal condition the closed form has no digits left
 
@@ -79,26 +81,31 @@ class LinearPentapod(FiveLegs):
         """
         signs = np.array(COMPONENTS, dtype=np.float64)
         lengths = as_batch(legs, "legs", (5,))
-        position, direction = self._solve(lengths.reshape(-1, 5), signs[:, None, :], modes=(4,))
         batch = lengths.shape[:-1]
+        position, direction = outputs(None, batch, (4, 3), (4, 3))
+        self._solve(lengths.reshape(-1, 5), signs[:, None, :], position, direction)
         return position.reshape(*batch, 4, 3), direction.reshape(*batch, 4, 3)
 
-    def pose(self, legs: ArrayLike, component: ArrayLike) -> tuple[Floats, Floats]:
+    def pose(
+        self, legs: ArrayLike, component: ArrayLike, *, out: tuple[Floats, Floats] | None = None
+    ) -> tuple[Floats, Floats]:
         """Return positions and directions (..., 3) in a component: a `Component`, or signs (..., 2).
 
         legs (..., 5) metres; the signs, each ±1, broadcast against their batch. NaN where no pose has these
-        leg lengths, and where a sign is 0 or NaN. Raises ArrayError for other signs.
+        leg lengths, and where a sign is 0 or NaN. out: contiguous arrays (..., 3) to write both to, for large
+        batches again and again. Raises ArrayError for other signs or an `out` of the wrong shape.
         """
         lengths, signs = as_batch(legs, "legs", (5,)), as_batch(component, "component", (2,))
-        if signs.size and not (np.isnan(signs) | (np.abs(signs) == 1.0) | (signs == 0.0)).all():
-            raise ArrayError("component must hold signs", expected="+1 or −1 for w and for S")
-        if signs.ndim > 1:
-            lengths, signs = broadcast(lengths, signs)
         named = (np.abs(signs) == 1.0).all(axis=-1)
         if not named.all():
+            if not (np.isnan(signs) | (np.abs(signs) == 1.0) | (signs == 0.0)).all():
+                raise ArrayError("component must hold signs", expected="+1 or −1 for w and for S")
             lengths = np.where(named[..., None], lengths, np.nan)
+        if signs.ndim > 1:
+            lengths, signs = broadcast(lengths, signs)
         batch = lengths.shape[:-1]
-        position, direction = self._solve(lengths.reshape(-1, 5), signs.reshape(-1, 2))
+        position, direction = outputs(out, batch, (3,), (3,))
+        self._solve(lengths.reshape(-1, 5), signs.reshape(-1, 2), position, direction)
         return position.reshape(*batch, 3), direction.reshape(*batch, 3)
 
     def component(self, position: ArrayLike, direction: ArrayLike) -> NDArray[np.int8]:
@@ -117,18 +124,44 @@ class LinearPentapod(FiveLegs):
         """z_3 − δ x_3 in metres: 0 where z_i = δ x_i."""
         return float(self.offsets[2] - self.delta * self.base[2, 0])
 
-    def _solve(self, legs: Floats, signs: Floats, modes: tuple[int, ...] = ()) -> tuple[Floats, Floats]:
-        """Poses (N, *modes, 3) of legs (N, 5); signs (1 or N, 2), or (modes, 1, 2)."""
-        position, direction = np.empty((len(legs), *modes, 3)), np.empty((len(legs), *modes, 3))
-        (x3, y3), z3 = self.base[2], self.offsets[2]
-        with np.errstate(invalid="ignore", over="ignore"):
-            for block in blocks(len(legs)):
-                squared = np.square(legs[block].T, order="C")
-                sign = signs if modes or len(signs) == 1 else signs[block]
-                px, py, pz, u, v, w = solve(squared, self.linear_part, self.delta, sign[..., 0], sign[..., 1])
-                position[block] = _last(px - z3 * u + x3, py - z3 * v + y3, pz - z3 * w)
-                direction[block] = _last(u, v, w)
-        return position, direction
+    def _solve(self, legs: Floats, signs: Floats, position: Floats, direction: Floats) -> None:
+        """Fill poses (N, 3) of legs (N, 5) and signs (1 or N, 2); or (N, modes, 3) with signs (modes, 1, 2)."""
+        linear, modes, near = self.linear_part, position.ndim == 3, np.empty(len(legs), dtype=np.bool_)
+        with np.errstate(invalid="ignore", over="ignore", under="ignore"):
+            if not modes and kernels_pay(SAVED_BY_KERNELS * len(legs)):
+                from pentapod.kinematics.quadratic_kernels import poses  # noqa: PLC0415
+
+                limits = np.array([NEAR_W_SQUARED, linear.near_s_squared])
+                geometry = (linear.linear_map, linear.constant, self.delta, self._origin, limits)
+                poses(legs, signs, *geometry, position, direction, near)
+            else:
+                for block in blocks(len(legs)):
+                    squared = np.square(legs[block].T, order="C")
+                    sign = signs if modes or len(signs) == 1 else signs[block]
+                    reduced, near[block] = solve(squared, linear, self.delta, sign[..., 0], sign[..., 1])
+                    position[block], direction[block] = self._shifted(reduced)
+            self._solve_near(np.flatnonzero(near), legs, signs, position, direction)
+
+    def _solve_near(self, rows: Ints, legs: Floats, signs: Floats, position: Floats, direction: Floats) -> None:
+        """Fill the poses of the rows (K,) that are near a singularity; else as `_solve`."""
+        reach = float(np.abs(self._origin[[0, 2]]).sum())
+        for block in blocks(len(rows)):
+            chosen = rows[block]
+            columns = legs[chosen].T.copy()
+            for mode in range(position.shape[1]) if position.ndim == 3 else (...,):
+                sign = signs[mode] if position.ndim == 3 else signs if len(signs) == 1 else signs[chosen]
+                found = solve_near(columns, self.linear_part, self.delta, sign[:, 0], sign[:, 1], reach)
+                position[chosen, mode], direction[chosen, mode] = self._shifted(found)
+
+    def _shifted(self, reduced: Reduced) -> tuple[Floats, Floats]:
+        """Return positions and directions (N, *modes, 3), machine frame, of reduced poses (*modes, N)."""
+        (px, py, pz, u, v, w), (x3, y3, z3) = reduced, self._origin
+        return _last(px - z3 * u + x3, py - z3 * v + y3, pz - z3 * w), _last(u, v, w)
+
+    @property
+    def _origin(self) -> Floats:
+        """x_3, y_3, z_3 (3,): what the reduced frame leaves out."""
+        return np.append(self.base[2], self.offsets[2])
 
 
 def _last(x: Floats, y: Floats, z: Floats) -> Floats:

@@ -9,13 +9,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.arrays import Bools, Floats
+from pentapod.geometry.double_double import DoubleDouble
 from pentapod.kinematics.exact import eliminate
 
 _OTHERS = (0, 1, 3, 4)  # the legs whose equations are taken relative to leg 3
+
+NEAR_W_SQUARED = 2.0**-20
+"""w² below which `quadratic_near` solves instead: |w| < 1e-3."""
+
+NEAR_S = 0.05
+"""|S| below which `quadratic_near` solves instead, in units of the machine's size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,10 +32,14 @@ class LinearPart:
 
     linear_map (4, 5), constant (4,), with q = px − δ t and t = p · i. Every entry is the exact one of the
     given floating-point geometry, rounded once to nearest: the certificate's error bound relies on it.
+    remainder (4, 6): what that rounding left out, of both. near_s_squared, m²: S² below which a pose counts as
+    near S = 0.
     """
 
     linear_map: Floats
     constant: Floats
+    remainder: Floats
+    near_s_squared: float
 
     @classmethod
     def of(cls, base: Floats, delta: float) -> LinearPart:
@@ -40,17 +52,33 @@ class LinearPart:
             rhs = [Fraction(-1, 2) if column == row else Fraction(0) for column in range(4)]
             k = x * x + y * y + (slope * x) ** 2
             rows.append([x, y, slope * x * x, slope * x * y, *rhs, k / 2])
-        solution = eliminate(rows)
-        linear_map, constant = np.zeros((4, 5)), np.zeros(4)
-        for row, entries in enumerate(solution):
-            linear_map[row, _OTHERS] = [float(entry) for entry in entries[:4]]
-            linear_map[row, 2] = float(-sum(entries[:4]))
-            constant[row] = float(entries[4])
-        return cls(linear_map, constant)
+        solution = [[*row[:2], -sum(row[:4], Fraction(0)), *row[2:]] for row in eliminate(rows)]
+        exact = DoubleDouble.table(solution)
+        size = float(np.hypot(*(base - base[2]).T).max())
+        return cls(exact.high[:, :5].copy(), exact.high[:, 5].copy(), exact.low, (NEAR_S * size) ** 2)
 
     def __call__(self, squared_legs: Floats) -> Floats:
-        """Return (4, N): q, py, u, v of squared leg lengths (5, N)."""
-        return self.linear_map @ squared_legs + self.constant[:, None]
+        """Return (4, ...): q, py, u, v of squared leg lengths (5, ...).
+
+        Summed leg by leg, not by a matrix product: there the order, and so the last bit, is the library's choice.
+        """
+        column = (slice(None), *(None,) * (squared_legs.ndim - 1))
+        forms = self.linear_map[:, 0][column] * squared_legs[0]
+        product = np.empty_like(forms)
+        for leg in range(1, 5):
+            forms += np.multiply(self.linear_map[:, leg][column], squared_legs[leg], out=product)
+        forms += self.constant[column]
+        return forms
+
+    def twofold(self, squared_legs: DoubleDouble) -> list[DoubleDouble]:
+        """Return q, py, u, v, each (N,), of squared leg lengths (5, N), all with twice the digits."""
+        forms: list[DoubleDouble] = []
+        for row, constant, low in zip(self.linear_map, self.constant, self.remainder, strict=True):
+            form = DoubleDouble(constant, low[5])
+            for leg in range(5):
+                form += DoubleDouble(squared_legs.high[leg], squared_legs.low[leg]) * DoubleDouble(row[leg], low[leg])
+            forms.append(form)
+        return forms
 
 
 def reciprocal_condition(base: Floats, delta: float) -> float:
@@ -68,30 +96,40 @@ def reciprocal_condition(base: Floats, delta: float) -> float:
     return float(values[-1] / values[0])
 
 
+class Reduced(NamedTuple):
+    """Poses in the reduced frame, by coordinate; arrays that broadcast."""
+
+    px: Floats
+    py: Floats
+    pz: Floats
+    u: Floats
+    v: Floats
+    w: Floats
+
+
 def solve(
     squared_legs: Floats, linear: LinearPart, delta: float, sign_w: Floats, sign_s: Floats
-) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
-    """Return (px, py, pz, u, v, w), reduced; NaN where the mode (sign_w, sign_s) does not exist.
+) -> tuple[Reduced, Bools]:
+    """Return the poses, and (N,) where they are near a singularity or do not exist: see `quadratic_near` for these.
 
     squared_legs (5, N); the signs broadcast against (N,), and so does the result: signs (4, 1) give (4, N)
     for px, pz, w and (N,) for py, u, v, which do not depend on the mode. The square roots of negative
-    numbers are meant: the caller silences NumPy.
+    numbers are meant: the caller silences NumPy. `quadratic_kernels.poses` repeats these operations one by one.
     """
     q, py, u, v = linear(squared_legs)
     d1 = 1.0 - u * u
     d1 -= v * v
-    w = np.sqrt(d1)  # |w|; NaN where there is no direction
+    w = np.sqrt(d1)
     # (px, pz) lies on the line n · (px, pz) = c, at ±root along it, n = (1 − δu, −δw).
     n1 = 1.0 - delta * u
     n_squared = n1 * n1 + (delta * delta) * d1
     c = q + delta * (v * py)
-    root = np.sqrt((squared_legs[2] - py * py) * n_squared - c * c)  # |S|
-    py = py + 0.0 * (w + root)  # NaN where one of them is; u and v likewise
-    u, v = u + (py - py), v + (py - py)
+    d = (squared_legs[2] - py * py) * n_squared - c * c
+    near = ~((d1 > NEAR_W_SQUARED) & (d > linear.near_s_squared))
     n2 = (-delta * sign_w) * w
-    root = sign_s * root
+    root = sign_s * np.sqrt(d)
     px, pz = (c * n1 - root * n2) / n_squared, (c * n2 + root * n1) / n_squared
-    return px, py, pz, u, v, sign_w * w + (py - py)
+    return Reduced(px, py, pz, u, v, sign_w * w), near
 
 
 def w_and_s(position: Floats, direction: Floats, delta: float, lever: float) -> tuple[Floats, Floats]:
