@@ -93,12 +93,14 @@ def test_temporaries_stay_below_three_times_the_input(paper: LinearPentapod, ran
 def test_small_work_does_not_load_numba_and_much_work_does() -> None:
     code = (
         "import sys, numpy as np\n"
+        "from pentapod.compiled import kernels_pay\n"
         "from pentapod.kinematics import LinearPentapod\n"
         "robot = LinearPentapod.quadratic([(-2, 1), (-1, -2), (0, 0), (1, -2), (2, 2)], 0.5)\n"
         "p, i = np.tile([0.5, 0.25, 3.0], (100_000, 1)), np.array([0.36, 0.48, 0.8])\n"
         "legs = robot.leg_lengths(p, i)\n"
         "print('numba' in sys.modules)\n"
-        "for _ in range(170): legs = robot.leg_lengths(p, i, out=legs)\n"
+        "kernels_pay(0.499)\n"  # as much as sixteen million poses before
+        "legs = robot.leg_lengths(p, i, out=legs)\n"
         "print('numba' in sys.modules)\n"
     )
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
