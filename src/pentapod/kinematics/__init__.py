@@ -4,6 +4,8 @@ from pentapod.kinematics.architecture import ArchitecturalDistance, architectura
 from pentapod.kinematics.as_built import AsBuiltPentapod
 from pentapod.kinematics.as_built_forward import ProvenPoses, as_built_pose
 from pentapod.kinematics.assembly import AssemblyObstacles, Obstacle, assembly_obstacles
+from pentapod.kinematics.cell_poses import cell_of, poses_in_cell
+from pentapod.kinematics.cells import Cell, CellDecomposition, cell_decomposition
 from pentapod.kinematics.certificate import ComponentProof, certify_component
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.conics import Conic, attachment_conic, conic_determinant, forbidden_conic
@@ -36,6 +38,8 @@ __all__ = [
     "ArchitecturalDistance",
     "AsBuiltPentapod",
     "AssemblyObstacles",
+    "Cell",
+    "CellDecomposition",
     "Component",
     "ComponentProof",
     "Conic",
@@ -51,6 +55,8 @@ __all__ = [
     "as_built_pose",
     "assembly_obstacles",
     "attachment_conic",
+    "cell_decomposition",
+    "cell_of",
     "certify_component",
     "conic_determinant",
     "forbidden_conic",
@@ -60,6 +66,7 @@ __all__ = [
     "leg_moment_map",
     "orientation_distance",
     "pose_jacobian",
+    "poses_in_cell",
     "position_distance",
     "singular_plane",
     "singularity_cofactors",
