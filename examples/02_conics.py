@@ -2,7 +2,7 @@
 
 A conic through four attachments and the point at infinity of the y direction has no y² term: it is the graph of a
 quotient of two polynomials, with a vertical asymptote. On it the fifth attachment would make the machine singular in
-every pose. The dashed line is the shortest way there for that attachment alone; the last panel moves all five at once.
+every pose. The dashed circle touches it: so far is that attachment alone. The last panel moves all five at once.
 
     python examples/02_conics.py --out docs/conics.png
 """
@@ -53,9 +53,7 @@ def draw(out: str) -> None:
         axes.plot(*end, "o", mfc="white", color="crimson", zorder=3)
     attachments(axes, BASE, None)
     axes.set_title(f"all five: {distance.together:.3f} m (root sum of squares)")
-    figure.suptitle(
-        f"Architectural singularity: F = {conic_determinant(BASE):.0f} m$^6$; no attachment may be on its conic"
-    )
+    figure.suptitle(f"F = {conic_determinant(BASE):.0f} m$^6$, and 0 where an attachment meets the conic of the others")
     figure.savefig(out, dpi=110)
     plt.close(figure)
 

@@ -149,7 +149,7 @@ def test_boundaries_can_be_approached_and_no_others(delta: Fraction, random_pose
     pentapod = pentapod_of(delta)
     decomposition = cell_decomposition(pentapod.delta)
     rng = np.random.default_rng(42)
-    slope, count, near = pentapod.delta, 20_000, 1e-3
+    slope, count, near = pentapod.delta, 60_000, 1e-3
     for a in range(4, len(decomposition.cells)):  # a component is open, and bounds nothing
         p0, i0 = (array[0] for array in poses_in_cell(pentapod, a, 1, seed=43))
         # Each coordinate is left alone or changed by anything between 1e-9 and 1e-4 ...
