@@ -106,7 +106,7 @@ def test_artefacts_agree_with_each_other(make_job, tmp_path):
         assert np.isfinite(arrays["leg_path.legs_mm"]).all()
         assert (np.diff(arrays["trajectory.time_s"]) >= 0).all()
     assert [stage.name for stage in outcome.stages] == [
-        "mesh", "toolpath", "placement", "leg path", "timing", "program", "verify",
+        "mesh", "toolpath", "placement", "leg path", "timing", "program", "explain", "verify",
     ]  # fmt: skip
     assert all(stage.seconds >= 0 for stage in outcome.stages)
 

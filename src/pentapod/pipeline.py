@@ -22,7 +22,7 @@ from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
 from pentapod.program import Program, Provenance, sample, write_csv
 from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
-from pentapod.timing import Trajectory, retime
+from pentapod.timing import Explanation, Trajectory, certify, explain, retime
 from pentapod.toolpath import (
     BallCutter,
     Mesh,
@@ -200,7 +200,9 @@ class _Task:
         trajectory = self.clock.time("timing", lambda: retime(path, self.machine, progress=self.clock.progress))
         if isinstance(trajectory, Refusal):
             return trajectory
-        return self.clock.time("program", lambda: self._program(placed, trajectory, file))
+        program = self.clock.time("program", lambda: self._program(placed, trajectory, file))
+        self.clock.time("explain", lambda: self._explanation(trajectory, program), says=str)
+        return program
 
     def _placed(self) -> PlacedPath | Refusal:
         wanted = self.job.placement.component
@@ -227,6 +229,11 @@ class _Task:
         program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
         write_csv(program, file)
         return program
+
+    def _explanation(self, trajectory: Trajectory, program: Program) -> Explanation:
+        position, direction = self.machine.pentapod.pose(program.legs, program.component)
+        tips = position + self.machine.tool_length * direction
+        return explain(trajectory, self.machine, certify(trajectory, self.machine, legs=program.legs, tips=tips))
 
 
 def _turned(x: float, y: float, z: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:

@@ -10,7 +10,8 @@ class Blame:
     """One constraint that cannot be met, the waypoints where, and the shortfall.
 
     constraint: a name a user knows, "leg 2 too long". waypoints: inclusive index ranges into the
-    toolpath's waypoints. shortfall: how far beyond the limit the best attempt is, in `unit` (mm, deg, ...).
+    toolpath's waypoints. shortfall: how far beyond the limit the best attempt is, in `unit` (mm, deg, ...); 0 where
+    no attempt can be measured.
     """
 
     constraint: str
@@ -21,7 +22,8 @@ class Blame:
     def __str__(self) -> str:
         ranges = ", ".join(f"{a}-{b}" if b > a else f"{a}" for a, b in self.waypoints[:4])
         more = ", ..." if len(self.waypoints) > 4 else ""
-        return f"{self.constraint} by {self.shortfall:.3g} {self.unit} at waypoints {ranges}{more}"
+        amount = f" by {self.shortfall:.3g} {self.unit}" if self.shortfall else ""
+        return f"{self.constraint}{amount} at waypoints {ranges}{more}"
 
 
 @dataclass(frozen=True)

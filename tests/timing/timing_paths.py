@@ -39,6 +39,7 @@ class Piece:
         self.section_kinds = tuple(s[2] for s in sections)
         self.section_segments = np.array([s[3] for s in sections])
         self.knots = np.array([0.0, *self.inner_knots, self.length])
+        self.waypoint_stations, self.waypoints = self.knots, np.arange(len(self.knots))
 
     def __call__(self, s, order=0):
         return self.legs(np.asarray(s, float))[order]

@@ -27,6 +27,7 @@ def plan(job: Path, out: Path, as_json: bool, quiet: bool) -> int:
     from pentapod.job import Job
     from pentapod.pipeline import run
     from pentapod.report import write_report
+    from pentapod.timing import Explanation
 
     loaded = Job.load(job)
     with progress_bar(quiet=quiet or as_json) as progress:
@@ -34,7 +35,9 @@ def plan(job: Path, out: Path, as_json: bool, quiet: bool) -> int:
     refusal = outcome.refusal
     if as_json:
         seconds = {stage.name: round(stage.seconds, 3) for stage in outcome.stages}
-        echo_json({**outcome.to_dict(), "out": str(out), "seconds": seconds})
+        story = outcome.find(Explanation)
+        told = {} if story is None else {"timing": story.to_dict()}
+        echo_json({**outcome.to_dict(), **told, "out": str(out), "seconds": seconds})
     elif not quiet:
         click.echo("\n".join(stage.said for stage in outcome.stages if stage.said))
         if refusal is None:

@@ -17,7 +17,8 @@ from pentapod.program.program import Program
 from pentapod.report import plots, scene, words
 from pentapod.report.figure import Figure, as_script
 from pentapod.report.signals import Signals
-from pentapod.report.worst import brakes, worst_places
+from pentapod.report.worst import worst_places
+from pentapod.timing.explain import Explanation
 from pentapod.timing.trajectory import Trajectory
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.toolpath import Toolpath
@@ -72,7 +73,7 @@ def _context(outcome: Outcome) -> dict[str, Any]:
         "refusal": outcome.refusal,
         "facts": _facts(outcome, signals),
         "worst": [] if signals is None else worst_places(signals, outcome.machine),
-        "brakes": [] if trajectory is None else brakes(trajectory.profile),
+        "story": outcome.find(Explanation),
         "placement": None if placed is None else _placement(placed.placement.transform),
         "chosen_by": "" if placed is None else placed.placement.chosen_by,
         "component": "" if placed is None else str(placed.component),

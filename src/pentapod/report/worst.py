@@ -1,4 +1,4 @@
-"""The worst places by name, and what holds the motion back."""
+"""The worst places by name."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from pentapod.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.report.signals import Signals
 from pentapod.report.words import number
-from pentapod.timing.trajectory import Profile
 
 FULL_FEED = 0.98
 """Share of the feed asked for from which a cut counts as running at full feed."""
@@ -23,15 +22,6 @@ class WorstPlace:
     what: str
     value: str
     where: str
-
-
-@dataclass(frozen=True)
-class Brake:
-    """One constraint and the time in seconds for which it holds the motion back, with its share of the whole."""
-
-    constraint: str
-    seconds: float
-    share: float
 
 
 def worst_places(signals: Signals, machine: Machine) -> list[WorstPlace]:
@@ -63,21 +53,6 @@ def worst_places(signals: Signals, machine: Machine) -> list[WorstPlace]:
             WorstPlace("cutting below the feed asked for", f"{share:.1%} of the cutting time", _longest(signals, slow))
         )
     return places
-
-
-def brakes(profile: Profile, most: int = 6) -> list[Brake]:
-    """Return what limits the speed for how long, the longest first."""
-    steps: Floats = np.maximum(np.diff(profile.times), 0.0)
-    total = float(steps.sum())
-    if total <= 0.0:
-        return []
-    seconds = np.bincount(profile.active[:-1], weights=steps, minlength=len(profile.constraint_names))
-    order = np.argsort(-seconds, kind="stable")[:most]
-    return [
-        Brake(profile.constraint_names[k], float(seconds[k]), float(seconds[k] / total))
-        for k in order
-        if seconds[k] > 1e-3 * total
-    ]
 
 
 def _argmin(values: Floats) -> tuple[int, int]:

@@ -2,13 +2,18 @@
 
 from pentapod.timing.certificates import LimitUse, certify
 from pentapod.timing.constraints import CONSTRAINTS
+from pentapod.timing.explain import Cause, CostlyPlace, Explanation, explain
 from pentapod.timing.law import MotionLaw
+from pentapod.timing.override import override
 from pentapod.timing.paths import LegPathLike, PieceLike
 from pentapod.timing.retime import retime
 from pentapod.timing.trajectory import Profile, Trajectory
 
 __all__ = [
     "CONSTRAINTS",
+    "Cause",
+    "CostlyPlace",
+    "Explanation",
     "LegPathLike",
     "LimitUse",
     "MotionLaw",
@@ -16,5 +21,7 @@ __all__ = [
     "Profile",
     "Trajectory",
     "certify",
+    "explain",
+    "override",
     "retime",
 ]

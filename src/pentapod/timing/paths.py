@@ -14,7 +14,8 @@ class PieceLike(Protocol):
 
     knots (K,): where the third derivative may jump. section_ends (M,): s where each section ends, the last
     is `length`; section_feeds (M,): m/s, infinite on rapids; section_kinds and section_segments (M,): kind
-    and index of the toolpath's segment. `piece(s, order)` gives legs (n, 5) in metres and their
+    and index of the toolpath's segment. waypoint_stations, waypoints (W,): s of the toolpath's waypoints, not
+    falling, and their indices. `piece(s, order)` gives legs (n, 5) in metres and their
     derivatives d^order/ds^order, order 0, 1, 2, the second continuous.
     """
 
@@ -30,6 +31,10 @@ class PieceLike(Protocol):
     def section_kinds(self) -> Sequence[SegmentKind]: ...  # noqa: D102
     @property
     def section_segments(self) -> Ints: ...  # noqa: D102
+    @property
+    def waypoint_stations(self) -> Floats: ...  # noqa: D102
+    @property
+    def waypoints(self) -> Ints: ...  # noqa: D102
     def __call__(self, s: Floats, order: int = 0) -> Floats: ...  # noqa: D102
 
 

@@ -57,7 +57,9 @@ class PieceProfile:
         """Return the fastest profile on this grid with these easings."""
         rows = 1.0 / (self.limits.acceleration * self.ease_acceleration[:, None])
         x = fastest(self.s, self.first * rows, self.second * rows, self.ceiling(), engine=self.engine)
-        return x if isinstance(x, Failure) else self.with_(x=x)
+        if isinstance(x, Failure):
+            return replace(x, station=float(self.s[x.gridpoint])) if x.gridpoint >= 0 else x
+        return self.with_(x=x)
 
     def ceiling(self) -> Floats:
         """Return the largest x (N + 1,) at each gridpoint that any path acceleration allows, m²/s²."""

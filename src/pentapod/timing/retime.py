@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from pentapod.errors import InputError
@@ -14,15 +12,11 @@ from pentapod.timing.constraints import CONSTRAINTS, Limits
 from pentapod.timing.cubic import WINDOW_PERIODS, Unmended, smooth_laws, whole_periods
 from pentapod.timing.engine import Engine
 from pentapod.timing.law import MotionLaw
-from pentapod.timing.paths import LegPathLike, PieceLike
+from pentapod.timing.paths import LegPathLike
 from pentapod.timing.piece import PieceProfile, time_piece
+from pentapod.timing.refusals import STILL_M, refusal, unfit
 from pentapod.timing.stages import Failure
 from pentapod.timing.trajectory import Profile, Trajectory
-
-STILL_M = 1e-12
-"""A piece shorter than this does not move."""
-
-_JOIN_M = 1e-9
 
 
 def retime(
@@ -56,9 +50,9 @@ def retime(
         acceleration_margin,
         guard=period * (1.5 + (WINDOW_PERIODS / 2 if cubic else 0.0)),
     )
-    unfit = _unfit(path)
-    if unfit is not None:
-        return unfit
+    wrong = unfit(path)
+    if wrong is not None:
+        return wrong
     indices = [k for k, piece in enumerate(path.pieces) if piece.length > STILL_M]
     total = sum(path.pieces[k].length for k in indices)
     profiles: list[PieceProfile] = []
@@ -66,59 +60,19 @@ def retime(
     for k in indices:
         profile = time_piece(path.pieces[k], limits, 0.5 * velocity_margin, 0.7 * acceleration_margin, engine)
         if isinstance(profile, Failure):
-            return _refusal(path, k, None, profile)
+            return refusal(path, k, profile)
         profiles.append(profile)
         done += path.pieces[k].length
         progress("timing", done / total, f"piece {len(profiles)} of {len(indices)}")
     if cubic:
         smoothed = smooth_laws(profiles, machine)
         if isinstance(smoothed, Unmended):
-            return _refusal(path, indices[smoothed.index], profiles[smoothed.index], smoothed.failure)
+            return refusal(path, indices[smoothed.index], smoothed.failure)
         profiles, laws = smoothed
     else:
         laws = [MotionLaw.from_profile(p.s, p.x) for p in profiles]
         laws = [law.stretched(whole_periods(law.duration, period)) for law in laws]
     return Trajectory(path, tuple(indices), tuple(laws), _profile(path, indices, profiles, laws))
-
-
-def _unfit(path: LegPathLike) -> Refusal | None:
-    """Return why a path cannot be timed at all: nothing moves, pieces do not join, or legs are not finite."""
-    previous = None
-    for k, piece in enumerate(path.pieces):
-        if not math.isfinite(piece.length) or piece.length < 0.0:
-            return Refusal("timing", f"piece {k} of the leg path has no length: {piece.length}")
-        s = np.unique(np.concatenate([[0.0], piece.knots, [piece.length]]))
-        values = [piece(s, order) for order in range(3)]
-        bad = ~np.isfinite(np.concatenate(values, axis=1)).all(axis=1)
-        if bad.any():
-            return _refusal(path, k, None, Failure(-1, "the leg path or a derivative is not finite"), float(s[bad][0]))
-        ends = values[0][[0, -1]]
-        if previous is not None and np.abs(ends[0] - previous).max() > _JOIN_M:
-            jump = 1e3 * float(np.abs(ends[0] - previous).max())
-            return _refusal(path, k, None, Failure(-1, f"the legs jump by {jump:.3g} mm at an exact stop"), 0.0)
-        if piece.length <= STILL_M and np.abs(ends[1] - ends[0]).max() > _JOIN_M:
-            return _refusal(path, k, None, Failure(-1, "the tool turns about a tip that stands still"), 0.0)
-        previous = ends[1]
-    if not any(piece.length > STILL_M for piece in path.pieces):
-        return Refusal("timing", "nothing moves: every piece of the leg path has no length")
-    return None
-
-
-def _refusal(
-    path: LegPathLike, k: int, profile: PieceProfile | None, failure: Failure, s: float | None = None
-) -> Refusal:
-    piece = path.pieces[k]
-    if s is None and profile is not None:
-        s = float(profile.s[min(failure.gridpoint, len(profile.s) - 1)])
-    where = f"piece {k}" if failure.gridpoint < 0 else f"piece {k}, gridpoint {failure.gridpoint}"
-    if s is not None:
-        where += f", {1e3 * (float(path.starts[k]) + s):.6g} mm along the path, segment {_segment(piece, s)}"
-    return Refusal("timing", f"{failure.reason}; {where}")
-
-
-def _segment(piece: PieceLike, s: float) -> int:
-    section = min(int(np.searchsorted(piece.section_ends, s, side="left")), len(piece.section_segments) - 1)
-    return int(piece.section_segments[section])
 
 
 def _profile(path: LegPathLike, indices: list[int], profiles: list[PieceProfile], laws: list[MotionLaw]) -> Profile:

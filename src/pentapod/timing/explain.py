@@ -1,0 +1,160 @@
+"""Where the time goes: which limit holds the motion back, where, and what that costs against a lower bound."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from pentapod.arrays import Floats, Ints
+from pentapod.machine.machine import Machine
+from pentapod.timing.certificates import LimitUse
+from pentapod.timing.trajectory import Trajectory
+
+STANDING = "standing still"
+MOST_PLACES = 10
+_GAUSS = 0.5 + np.array([-0.5, 0.0, 0.5]) * np.sqrt(0.6)
+_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
+_NEIGHBOURS = 2  # segments between two of the same cause: cuts and links take turns
+_WORTH = 1e-4  # of the gap: what costs less in a segment is not told
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A limit: seconds during which it is the one that holds the motion back, and what that costs in seconds.
+
+    cost: beyond the least time that these stretches of the path could take.
+    """
+
+    name: str
+    time: float
+    cost: float
+
+
+@dataclass(frozen=True)
+class CostlyPlace:
+    """A run of segments, both ends included, where one cause costs time.
+
+    cost in seconds; time (s) and station (global s, m) of the stage that costs most.
+    """
+
+    cause: str
+    cost: float
+    segments: tuple[int, int]
+    time: float
+    station: float
+
+    def __str__(self) -> str:
+        a, b = self.segments
+        where = f"segment {a}" if a == b else f"segments {a}–{b}"
+        most = f"most at {self.time:.2f} s, {1e3 * self.station:.1f} mm along the path"
+        return f"{_possessive(self.cause)} costs {self.cost:.3g} s in {where} ({most})"
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Why a trajectory takes as long as it does.
+
+    duration (s); lower_bound (s): ∫ max(1/feed, max_i |l_i′|/v_i) ds, which no motion along this path can beat; causes:
+    most costly first, their times add up to the duration and their costs to the gap; places: the ten
+    that cost most; uses: how much of each limit the sampled program uses.
+    """
+
+    duration: float
+    lower_bound: float
+    causes: tuple[Cause, ...]
+    places: tuple[CostlyPlace, ...]
+    uses: tuple[LimitUse, ...] = ()
+
+    @property
+    def gap(self) -> float:
+        """Seconds beyond the lower bound."""
+        return self.duration - self.lower_bound
+
+    def __str__(self) -> str:
+        lines = [
+            f"cycle time {self.duration:.3f} s, {100.0 * self.gap / self.duration:.1f} % above what feeds and leg "
+            f"velocities alone would take ({self.lower_bound:.3f} s)"
+        ]
+        lines += [f"  {c.name}: holds the motion for {c.time:.3g} s, costs {c.cost:.3g} s" for c in self.causes]
+        lines += [f"  {place}" for place in self.places]
+        lines += [f"  {use}" for use in self.uses]
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as JSON tells it: SI units."""
+        content = asdict(self)
+        content["gap"] = self.gap
+        content["words"] = [str(place) for place in self.places]
+        for use, told in zip(self.uses, content["uses"], strict=True):
+            told["share"] = use.share
+        return content
+
+
+def explain(trajectory: Trajectory, machine: Machine, uses: tuple[LimitUse, ...] = ()) -> Explanation:
+    """Return why the trajectory takes as long as it does, from its profile at the gridpoints."""
+    profile = trajectory.profile
+    taken, steps = np.diff(profile.times), np.diff(profile.stations)
+    least, segments = _least_times(trajectory, machine, steps)
+    cost = taken - least
+    names = (*profile.constraint_names, STANDING)
+    # A stage belongs by halves to the constraints of its two ends; what stands still belongs to neither.
+    ends = np.where(steps > 0.0, np.stack([profile.active[:-1], profile.active[1:]]), len(names) - 1)
+    times, costs = (np.bincount(ends.ravel(), np.tile(0.5 * y, 2), len(names)) for y in (taken, cost))
+    causes = [
+        Cause(name, float(time), float(lost)) for name, time, lost in zip(names, times, costs, strict=True) if time
+    ]
+    places: list[CostlyPlace] = []
+    for k in np.flatnonzero(times):
+        share = 0.5 * ((ends[0] == k).astype(float) + (ends[1] == k)) * cost
+        places += _places(names[k], share, segments, profile.times, profile.stations, _WORTH * float(cost.sum()))
+    return Explanation(
+        float(profile.times[-1]),
+        float(least.sum()),
+        tuple(sorted(causes, key=lambda c: -c.cost)),
+        tuple(sorted(places, key=lambda p: -p.cost)[:MOST_PLACES]),
+        uses,
+    )
+
+
+def _least_times(trajectory: Trajectory, machine: Machine, steps: Floats) -> tuple[Floats, Ints]:
+    """Return the least time (K − 1,) of each stage by feed and leg velocities, and its segment (K − 1,)."""
+    stations, starts = trajectory.profile.stations, np.asarray(trajectory.path.starts)
+    middle = 0.5 * (stations[:-1] + stations[1:])
+    piece_of = np.clip(np.searchsorted(starts, middle, side="right") - 1, 0, len(starts) - 2)
+    slowness, segments = np.zeros((len(steps), len(_GAUSS))), np.zeros(len(steps), dtype=np.intp)
+    for k in np.unique(piece_of):
+        rows, piece = piece_of == k, trajectory.path.pieces[k]
+        s = (stations[:-1][rows, None] + _GAUSS * steps[rows, None]).ravel() - starts[k]
+        section = np.minimum(np.searchsorted(piece.section_ends, s, side="left"), len(piece.section_ends) - 1)
+        feeds = np.asarray(piece.section_feeds, dtype=np.float64)[section]
+        by_feed = 1.0 / np.where(np.isfinite(feeds), feeds, machine.rapid_velocity)
+        by_legs = (np.abs(piece(s, 1)) / machine.legs.max_velocity).max(axis=1)
+        slowness[rows] = np.maximum(by_feed, by_legs).reshape(-1, len(_GAUSS))
+        segments[rows] = np.asarray(piece.section_segments)[section.reshape(-1, len(_GAUSS))[:, 1]]
+    return steps * (slowness @ _WEIGHTS), segments
+
+
+def _places(
+    cause: str, cost: Floats, segments: Ints, times: Floats, stations: Floats, worth: float
+) -> list[CostlyPlace]:
+    """Return the runs of neighbouring segments in which a cause costs at least `worth` seconds each."""
+    of_segment = np.bincount(segments, cost)
+    told = np.flatnonzero(of_segment > worth)
+    if not len(told):
+        return []
+    runs = np.split(told, np.flatnonzero(np.diff(told) > _NEIGHBOURS) + 1)
+    places: list[CostlyPlace] = []
+    for run in runs:
+        first, last = int(run[0]), int(run[-1])
+        worst = int(np.argmax(np.where((segments >= first) & (segments <= last), cost, -np.inf)))
+        total = float(of_segment[first : last + 1].sum())
+        places.append(CostlyPlace(cause, total, (first, last), float(times[worst]), float(stations[worst])))
+    return places
+
+
+def _possessive(cause: str) -> str:
+    """Return "leg 2's acceleration" for "leg 2 acceleration"; other names as they are."""
+    words = cause.split(" ")
+    return f"leg {words[1]}'s {' '.join(words[2:])}" if words[0] == "leg" and len(words) > 2 else cause

@@ -1,0 +1,78 @@
+"""Explanation: times and costs add up, the bound is one, and places are named where they were put."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from timing_paths import Path, Piece, by_tip, line, machine, nodding, raster, straight
+
+from pentapod.timing import Trajectory, certify, explain, retime
+from pentapod.toolpath.toolpath import SegmentKind
+
+
+def timed(path, m, **options):
+    trajectory = retime(path, m, **options)
+    assert isinstance(trajectory, Trajectory), str(trajectory)
+    return trajectory
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+def test_times_and_costs_add_up(interpolation):
+    m = machine(interpolation=interpolation)
+    trajectory = timed(Path((raster(lines=4, feed=0.2), straight([0.5, 0, 0, 0, 0.2], 0.02, start=raster_end()))), m)
+    story = explain(trajectory, m)
+    assert story.duration == trajectory.duration
+    assert sum(c.time for c in story.causes) == pytest.approx(story.duration)
+    assert sum(c.cost for c in story.causes) == pytest.approx(story.gap)
+    assert 0.0 < story.lower_bound < story.duration
+    assert len(story.places) <= 10
+    assert [p.cost for p in story.places] == sorted((p.cost for p in story.places), reverse=True)
+    assert min(c.cost for c in story.causes) >= -1e-9
+
+
+def raster_end():
+    piece = raster(lines=4, feed=0.2)
+    return piece(np.array([piece.length]))[0]
+
+
+def test_lower_bound_against_quadrature():
+    m = machine(v=0.05)
+    knots = tuple(np.linspace(0, 0.05, 52)[1:-1])
+    piece = Piece(by_tip(line(), nodding(0.02, 0.3)), 0.05, 0.03, inner_knots=knots)
+    trajectory = timed(Path((piece,)), m)
+
+    def slowness(s):
+        return max(1.0 / 0.03, float((np.abs(piece(np.array([s]), 1)[0]) / 0.05).max()))
+
+    expected, _ = quad(slowness, 0.0, 0.05, limit=2000, points=np.linspace(0, 0.05, 200)[1:-1], epsrel=1e-6)
+    assert explain(trajectory, m).lower_bound == pytest.approx(expected, rel=2e-4)
+
+
+def test_a_slow_leg_is_named_where_it_is_slow():
+    """Leg 3 alone moves in segments 4 and 6, and speeds up and slows down there; segment 5 is slow by its feed."""
+    sections = [(0.1, 0.3, SegmentKind.CUT, 4), (0.12, 0.001, SegmentKind.LINK, 5), (0.22, 0.3, SegmentKind.CUT, 6)]
+    m = machine(v=9.0, a=0.5)
+    trajectory = timed(Path((straight([0, 0, 1, 0, 0], 0.22, sections=sections),)), m)
+    story = explain(trajectory, m)
+    costs = {c.name: c for c in story.causes}
+    assert costs["leg 3 acceleration"].cost > 0.95 * story.gap
+    assert costs["feed"].time > 19.9
+    worst = story.places[0]
+    assert worst.cause == "leg 3 acceleration"
+    assert worst.segments == (4, 6)
+    assert str(worst).startswith("leg 3's acceleration costs ")
+    assert "in segments 4–6" in str(worst)
+    # By hand: from rest to 0.3 m/s and down to 0.001, twice, each time v²/2a at half the speed.
+    assert story.gap == pytest.approx(4 * 0.5 * 0.3 / 0.5, rel=0.03)
+
+
+def test_the_value_is_ready_for_a_report():
+    m = machine()
+    trajectory = timed(Path((raster(lines=3, feed=0.1),)), m)
+    story = explain(trajectory, m, certify(trajectory, m))
+    content = json.loads(json.dumps(story.to_dict(), allow_nan=False))
+    assert content["gap"] == pytest.approx(story.gap)
+    assert len(content["words"]) == len(content["places"])
+    assert max(use["share"] for use in content["uses"] if "jerk" not in use["quantity"]) <= 1.01
+    assert str(story).splitlines()[0].startswith("cycle time ")
