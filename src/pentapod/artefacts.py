@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-import io
 import json
 import shutil
 import tempfile
-import zipfile
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from pentapod.errors import InputError
-from pentapod.files import atomic_write
+from pentapod.files import atomic_write, packed_arrays
 
 PROGRAM, VERDICT, REPORT, ARRAYS = "program.csv", "verdict.json", "report.html", "plan.npz"
 NAMES = (PROGRAM, ARRAYS, REPORT, VERDICT)
 """In the order in which they move into the folder: the verdict comes last and stands for all."""
-
-_EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 def check_folder(folder: Path) -> None:
@@ -76,8 +71,5 @@ def write_json(content: Mapping[str, Any], path: Path) -> None:
 
 def write_arrays(arrays: Mapping[str, NDArray[Any]], path: Path) -> None:
     """Write an .npz, atomically; the same arrays give the same bytes."""
-    with atomic_write(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as archive:
-        for name, array in arrays.items():
-            buffer = io.BytesIO()
-            np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
-            archive.writestr(zipfile.ZipInfo(f"{name}.npy", _EPOCH), buffer.getvalue())
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(packed_arrays(arrays))

@@ -14,11 +14,11 @@ from pentapod.planning.leg_path import LegPath
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.program.program import Program
 from pentapod.timing.trajectory import Trajectory
+from pentapod.toolpath.formats.npz import toolpath_arrays
 from pentapod.toolpath.toolpath import Toolpath
 
 Arrays = dict[str, NDArray[Any]]
 _MM = 1e3
-_MM_MIN = 6e4
 
 
 def arrays_of(outcome: Outcome) -> Arrays:
@@ -35,18 +35,6 @@ def arrays_of(outcome: Outcome) -> Arrays:
     if (program := outcome.find(Program)) is not None:
         arrays |= {"program.time_s": program.times, "program.legs_mm": program.legs * _MM}
     return arrays
-
-
-def toolpath_arrays(toolpath: Toolpath) -> Arrays:
-    """Return the arrays of a toolpath, workpiece frame; a segment's first waypoint is its start."""
-    return {
-        "toolpath.tips_mm": toolpath.tips * _MM,
-        "toolpath.axes": toolpath.axes,
-        "toolpath.pivot_mm": np.array(toolpath.pivot * _MM),
-        "toolpath.segment_starts": toolpath.starts,
-        "toolpath.segment_kinds": np.array([str(s.kind) for s in toolpath.segments]),
-        "toolpath.segment_feeds_mm_min": np.array([s.feed for s in toolpath.segments]) * _MM_MIN,
-    }
 
 
 def matrix_mm(transform: RigidTransform) -> Floats:

@@ -13,28 +13,29 @@ from pentapod.cli.output import echo_json, json_option, quiet_option
 
 @click.command()
 @click.argument("job", type=click.Path(path_type=Path))
-@click.option("-o", "--out", required=True, type=click.Path(path_type=Path), help="File to write, .npz.")
+@click.option(
+    "-o", "--out", required=True, type=click.Path(path_type=Path), help="File to write; its suffix tells the format."
+)
+@click.option("--format", "format_name", help="Format, where the suffix does not tell: see above.")
 @json_option
 @quiet_option
-def toolpath(job: Path, out: Path, as_json: bool, quiet: bool) -> int:
+def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet: bool) -> int:
     """Write the toolpath of JOB.toml: no machine, no placement, no time.
 
-    The .npz holds toolpath.tips_mm (N, 3), toolpath.axes (N, 3) from the tip to the spindle, and for the
-    segments their first waypoint, kind and feed.
+    Formats: apt (.apt .cls .cl .cldata), xyzab G-code of LinuxCNC's pentakins (.ngc), xyzbc G-code with G43.4 (.nc
+    .tap), both also as xyzab-g93 and xyzbc-g93 with inverse time feed, robodk (.robodk.csv), csv, npz. Axes point
+    from the tip to the spindle; the frame is that of the workpiece.
     """
-    from pentapod.artefacts import write_arrays
-    from pentapod.errors import InputError
     from pentapod.geometry import arc_length
     from pentapod.job import Job
     from pentapod.pipeline import job_mesh, job_toolpath
-    from pentapod.plan_arrays import toolpath_arrays
+    from pentapod.toolpath.formats import format_of, write_toolpath
 
-    if out.suffix != ".npz":
-        raise InputError("unknown format", file=out, value=out.suffix, expected="a name that ends in .npz")
+    format_of(out, format_name)  # an unknown one is said at once
     loaded = Job.load(job)
     mesh = job_mesh(loaded)
     path, came_to = job_toolpath(loaded, mesh)
-    write_arrays(toolpath_arrays(path), out)
+    write_toolpath(path, out, format_name)
     kinds = [str(segment.kind) for segment in path.segments]
     lengths = [1e3 * float(arc_length(segment.tips)[-1]) for segment in path.segments]
     by_kind = {kind: sum(v for k, v in zip(kinds, lengths, strict=True) if k == kind) for kind in set(kinds)}

@@ -1,0 +1,196 @@
+"""APT / CLDATA: GOTO with i, j, k, MULTAX, RAPID, FEDRAT, UNITS. ISO 4343; the words of everyday cutter location files.
+
+The reader is strict: what it cannot honour (a missing unit, CUTCOM, TRACUT, a word it does not know) is an error,
+not a guess. i, j, k point from the tip to the spindle. RAPID counts for the next GOTO alone. A `$$` remark
+"pentapod link" or "pentapod cut" tells moves on feed apart, for APT has no word for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from pentapod.errors import ToolpathError, nearest
+from pentapod.toolpath.formats.moves import Moves, plain, poses
+from pentapod.toolpath.formats.reading import number, read_lines
+from pentapod.toolpath.formats.registry import Defaults, Format, register
+from pentapod.toolpath.toolpath import SegmentKind, Toolpath
+
+_REMARK = "pentapod "
+_MM = {"MM": 1.0, "INCHES": 25.4, "INCH": 25.4}
+_PER_MINUTE = {"MMPM": 1.0, "IPM": 25.4}
+_NAMED = ("PARTNO", "PPRINT", "REMARK", "TITLE", "INSERT")  # a text follows, with or without a slash
+_SILENT = frozenset(
+    (*_NAMED, "MACHIN", "LOADTL", "TOOLNO", "SPINDL", "COOLNT", "STOP", "OPSTOP", "CLDATE", "TLNAME", "END")
+)
+"""Words that do not move the tool."""
+
+_REFUSED = {
+    "CUTCOM": "cutter compensation shifts the path: export without it",
+    "TRACUT": "a transformation of what follows: export it applied",
+    "COPY": "a repetition of what came before: export it applied",
+    "CIRCLE": "arcs are not read: export points",
+    "ARCSLP": "arcs are not read: export points",
+    "CYCLE": "drilling cycles are not read: export points",
+    "GODLTA": "increments are not read: export absolute points",
+}
+_WORDS = ("UNITS", "MULTAX", "FEDRAT", "RAPID", "GOTO", "FROM", "CUTTER", "FINI")
+
+
+@dataclass
+class _Reader:
+    file: Path
+    defaults: Defaults
+    moves: Moves = field(init=False)
+    unit: float | None = None
+    five_axis: bool = False
+    feed: float | None = None
+    rapid: bool = False
+    kind: SegmentKind = SegmentKind.CUT
+    pivot: float | None = None
+    finished: int | None = None
+
+    def __post_init__(self) -> None:
+        self.moves = Moves(self.file)
+
+    def wrong(self, what: str, line: int, word: str, **details: object) -> ToolpathError:
+        return ToolpathError(what, file=self.file, line=line, key=word, **details)  # type: ignore[arg-type]
+
+    def toolpath(self) -> Toolpath:
+        line, pending, lines = 0, "", read_lines(self.file)
+        for line, raw in enumerate(lines, start=1):
+            text, _, remark = raw.partition("$$")
+            self._remark(remark, line)
+            text = text.strip()
+            if text.endswith("$"):
+                pending += text[:-1]
+                continue
+            statement, pending = pending + text, ""
+            if statement:
+                self._statement(statement, line)
+        if pending:
+            raise self.wrong("the file ends within a statement", line, pending.split("/")[0].strip())
+        if self.finished is None:
+            raise self.wrong("FINI is missing: the file was cut off", line, "FINI", expected="FINI as the last word")
+        pivot = self.defaults.pivot if self.pivot is None else self.pivot
+        return self.moves.toolpath(pivot)
+
+    def _remark(self, text: str, line: int) -> None:
+        text = text.strip()
+        if text.startswith(_REMARK):
+            name, _, value = text.removeprefix(_REMARK).partition(" ")
+            if name in ("cut", "link"):
+                self.kind = SegmentKind(name)
+            elif name == "pivot_mm":
+                self.pivot = 1e-3 * number(value, self.file, line, name)
+
+    def _statement(self, text: str, line: int) -> None:
+        head, _, tail = text.partition("/")
+        word = head.strip().upper()
+        if self.finished is not None:
+            raise self.wrong("a word after FINI", line, word)
+        if word in _SILENT or word.startswith(_NAMED):
+            return
+        if word in _REFUSED:
+            raise self.wrong("a word that is not read", line, word, remedy=_REFUSED[word])
+        if word not in _WORDS:
+            raise self.wrong("an unknown word", line, word[:20], remedy=nearest(word, _WORDS))
+        getattr(self, f"_{word.lower()}")([part.strip() for part in tail.split(",")] if tail.strip() else [], line)
+
+    def _units(self, words: list[str], line: int) -> None:
+        if len(words) != 1 or words[0].upper() not in _MM:
+            raise self.wrong("unknown unit", line, "UNITS", value=",".join(words)[:40], expected="MM or INCHES")
+        if self.moves.tips:
+            raise self.wrong("the unit changes after the first point", line, "UNITS")
+        self.unit = _MM[words[0].upper()]
+
+    def _multax(self, words: list[str], line: int) -> None:
+        if words not in ([], ["ON"], ["OFF"]):
+            raise self.wrong("neither ON nor OFF", line, "MULTAX", value=",".join(words)[:40])
+        self.five_axis = words != ["OFF"]
+
+    def _fedrat(self, words: list[str], line: int) -> None:
+        if len(words) != 2 or words[1].upper() not in _PER_MINUTE:
+            raise self.wrong(
+                "a feed needs its unit", line, "FEDRAT", value=",".join(words)[:40], expected="FEDRAT/f,MMPM or f,IPM"
+            )
+        feed = number(words[0], self.file, line, "FEDRAT") * _PER_MINUTE[words[1].upper()]
+        if feed <= 0.0:
+            raise self.wrong("the feed must be positive", line, "FEDRAT", value=words[0])
+        self.feed, self.rapid = feed, False
+
+    def _rapid(self, words: list[str], line: int) -> None:
+        if words:
+            raise self.wrong("RAPID takes no value", line, "RAPID", value=",".join(words)[:40])
+        self.rapid = True
+
+    def _cutter(self, words: list[str], line: int) -> None:
+        numbers = [number(word, self.file, line, "CUTTER") for word in words]
+        if not numbers or numbers[0] <= 0.0:
+            raise self.wrong("a cutter needs its diameter", line, "CUTTER", value=",".join(words)[:40])
+        if self.unit is None:
+            raise self.wrong("the unit is missing", line, "CUTTER", expected="UNITS/MM or UNITS/INCHES before it")
+        ball = len(numbers) > 1 and abs(numbers[1] - 0.5 * numbers[0]) <= 1e-6 * numbers[0]
+        self.pivot = numbers[1] * self.unit * 1e-3 if ball else 0.0
+
+    def _from(self, words: list[str], line: int) -> None:
+        if self.moves.tips:
+            raise self.wrong("FROM after the first point", line, "FROM")
+        self.rapid = True
+        self._point(words, line, "FROM")
+
+    def _goto(self, words: list[str], line: int) -> None:
+        self._point(words, line, "GOTO")
+
+    def _point(self, words: list[str], line: int, name: str) -> None:
+        if self.unit is None:
+            raise self.wrong("the unit is missing", line, name, expected="UNITS/MM or UNITS/INCHES before it")
+        expected = "x,y,z,i,j,k" if self.five_axis else "x,y,z"
+        if len(words) != (6 if self.five_axis else 3):
+            remedy = "MULTAX/ON is missing" if len(words) == 6 else None
+            raise self.wrong("wrong number of values", line, name, value=len(words), expected=expected, remedy=remedy)
+        values = [number(word, self.file, line, name) for word in words]
+        axis = values[3:] if self.five_axis else [0.0, 0.0, 1.0]
+        feed = self.defaults.feed if self.feed is None else self.feed / 6e4
+        if feed is None and not self.rapid:
+            raise self.wrong("the feed is missing", line, name, expected="FEDRAT before it")
+        kind = SegmentKind.RAPID if self.rapid else self.kind
+        speed = float("inf") if self.rapid or feed is None else feed * 6e4
+        self.moves.add([v * self.unit for v in values[:3]], axis, kind, speed, line, name)
+        self.rapid = False
+
+    def _fini(self, words: list[str], line: int) -> None:
+        if words:
+            raise self.wrong("FINI takes no value", line, "FINI", value=",".join(words)[:40])
+        self.finished = line
+
+
+def _read(file: Path, defaults: Defaults) -> Toolpath:
+    return _Reader(file, defaults).toolpath()
+
+
+def _write(toolpath: Toolpath) -> bytes:
+    tips, axes, kinds, feeds = poses(toolpath)
+    lines = ["PARTNO PENTAPOD", "UNITS/MM", f"$$ {_REMARK}pivot_mm {1e3 * toolpath.pivot!r}", "MULTAX/ON"]
+    kind, feed = SegmentKind.CUT, np.nan
+    for k in range(len(tips)):
+        move = kinds[k - 1] if k else SegmentKind.RAPID
+        if move == SegmentKind.RAPID:
+            lines.append("RAPID")
+            # FEDRAT is modal in most readers, in some RAPID ends it: it is said again.
+            feed = np.nan
+        else:
+            if move != kind:
+                lines.append(f"$$ {_REMARK}{move}")
+                kind = move
+            if feeds[k - 1] != feed:
+                feed = float(feeds[k - 1])
+                lines.append(f"FEDRAT/{plain(feed, 6)},MMPM")
+        point = ",".join([*(plain(v, 7) for v in tips[k]), *(plain(v, 12) for v in axes[k])])
+        lines.append(f"GOTO/{point}")
+    return ("\n".join([*lines, "FINI"]) + "\n").encode()
+
+
+APT = register(Format("apt", (".apt", ".cls", ".cl", ".cldata"), "APT / CLDATA cutter locations", _read, _write))

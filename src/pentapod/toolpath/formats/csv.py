@@ -1,0 +1,96 @@
+"""Plain CSV: one waypoint a row, units in the column names, and how the waypoint is reached."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from pentapod.errors import ToolpathError
+from pentapod.toolpath.formats.moves import Moves, plain, poses
+from pentapod.toolpath.formats.reading import number, read_lines
+from pentapod.toolpath.formats.registry import Defaults, Format, register
+from pentapod.toolpath.toolpath import SegmentKind, Toolpath
+
+_MAGIC = "pentapod_toolpath"
+_COLUMNS = "x_mm,y_mm,z_mm,i,j,k,kind,feed_mm_min"
+_MM = {"mm": 1.0, "m": 1e3, "inch": 25.4}
+_HEADER = re.compile(r"#\s*(\w+)\s*=\s*(\S+)\s*$")
+_START = "start"
+
+
+def _read(file: Path, defaults: Defaults) -> Toolpath:
+    lines = read_lines(file)
+    header: dict[str, tuple[str, int]] = {}
+    row = 0
+    while row < len(lines) and lines[row].startswith("#"):
+        if match := _HEADER.match(lines[row]):
+            header[match[1]] = (match[2], row + 1)
+        row += 1
+    if row == len(lines):
+        raise ToolpathError("there are no columns", file=file, line=row, expected=_COLUMNS)
+    scale = _unit(file, row + 1, lines[row])
+    names = lines[row].split(",")
+    moves = Moves(file)
+    for line, text in enumerate(lines[row + 1 :], start=row + 2):
+        cells = text.split(",")
+        if len(cells) != len(names):
+            raise ToolpathError(
+                "wrong number of columns", file=file, line=line, value=len(cells), expected=str(len(names))
+            )
+        values = [number(cell, file, line, name) for cell, name in zip(cells[:6], names[:6], strict=True)]
+        kind, feed = _how(file, line, cells[6:], defaults, first=not moves.tips)
+        moves.add([v * scale for v in values[:3]], values[3:], kind, feed, line, "i,j,k")
+    if "waypoints" in header:
+        text, line = header["waypoints"]
+        if number(text, file, line, "waypoints") != len(moves.tips):
+            raise ToolpathError(
+                "the number of rows is not that of the header: the file was cut off or rows were added",
+                file=file, line=len(lines), key="waypoints", value=len(moves.tips), expected=text,
+            )  # fmt: skip
+    pivot = defaults.pivot
+    if "pivot_mm" in header:
+        pivot = 1e-3 * number(*(header["pivot_mm"][0], file, header["pivot_mm"][1], "pivot_mm"))
+    return moves.toolpath(pivot)
+
+
+def _unit(file: Path, line: int, names: str) -> float:
+    """Return millimetres in the unit of the first three columns. Raises ToolpathError for other columns."""
+    for unit, scale in _MM.items():
+        known = _COLUMNS.replace("x_mm,y_mm,z_mm", f"x_{unit},y_{unit},z_{unit}")
+        if names in (known, known.removesuffix(",kind,feed_mm_min")):
+            return scale
+    bare = names.split(",")[:3] == ["x", "y", "z"]
+    what = "the columns x, y, z have no unit" if bare else "wrong column names"
+    raise ToolpathError(what, file=file, line=line, value=names[:80], expected=f"{_COLUMNS} (or m, inch)")
+
+
+def _how(file: Path, line: int, cells: list[str], defaults: Defaults, *, first: bool) -> tuple[SegmentKind, float]:
+    """Return kind and feed, mm/min, of the move to a row."""
+    word, text = cells if cells else (SegmentKind.CUT.value, "")
+    if first and word == _START:
+        return SegmentKind.RAPID, float("inf")
+    if word not in tuple(SegmentKind):
+        known = ", ".join(SegmentKind)
+        raise ToolpathError("unknown kind of move", file=file, line=line, key="kind", value=word[:40], expected=known)
+    if word == SegmentKind.RAPID:
+        return SegmentKind.RAPID, float("inf")
+    if text == "" and defaults.feed is not None:
+        return SegmentKind(word), 6e4 * defaults.feed
+    feed = number(text, file, line, "feed_mm_min")
+    if feed <= 0.0:
+        raise ToolpathError("the feed must be positive", file=file, line=line, key="feed_mm_min", value=feed)
+    return SegmentKind(word), feed
+
+
+def _write(toolpath: Toolpath) -> bytes:
+    tips, axes, kinds, feeds = poses(toolpath)
+    lines = [f"# {_MAGIC} = 1", f"# pivot_mm = {1e3 * toolpath.pivot!r}", f"# waypoints = {len(tips)}", _COLUMNS]
+    for k in range(len(tips)):
+        cells = [*(plain(v, 7) for v in tips[k]), *(plain(v, 12) for v in axes[k])]
+        kind = str(kinds[k - 1]) if k else _START
+        feed = plain(float(feeds[k - 1]), 6) if k and kinds[k - 1] != SegmentKind.RAPID else ""
+        lines.append(",".join([*cells, kind, feed]))
+    return ("\n".join(lines) + "\n").encode()
+
+
+CSV = register(Format("csv", (".csv",), "one waypoint a row, units in the column names", _read, _write))

@@ -1,0 +1,87 @@
+"""Moves: a toolpath as files tell it, one pose after the other, each with how it is reached."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.errors import ToolpathError
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+
+AXIS_TOLERANCE = 1e-4
+"""How far an axis in a file may be from unit length: room for four decimals."""
+
+_SAME_FEED = 1e-6
+
+
+@dataclass
+class Moves:
+    """Poses in the order of a file, gathered by a reader. Millimetres, mm/min; a rapid's feed is infinite.
+
+    Each pose has the kind and feed of the move that leads to it; those of the first are of no account.
+    """
+
+    file: Path
+    tips: list[tuple[float, float, float]] = field(default_factory=list)
+    axes: list[tuple[float, float, float]] = field(default_factory=list)
+    kinds: list[SegmentKind] = field(default_factory=list)
+    feeds: list[float] = field(default_factory=list)
+
+    def add(
+        self, tip: Sequence[float], axis: Sequence[float], kind: SegmentKind, feed: float, line: int, word: str
+    ) -> None:
+        """Add a pose. Raises ToolpathError where the axis has not unit length."""
+        length = float(np.linalg.norm(axis))
+        if abs(length - 1.0) > AXIS_TOLERANCE:
+            raise ToolpathError(
+                "the tool axis has not unit length", file=self.file, line=line, key=word, value=round(length, 6),
+                expected="1",
+            )  # fmt: skip
+        self.tips.append((tip[0], tip[1], tip[2]))
+        self.axes.append((axis[0] / length, axis[1] / length, axis[2] / length))
+        self.kinds.append(kind)
+        self.feeds.append(feed)
+
+    def toolpath(self, pivot: float) -> Toolpath:
+        """Return the toolpath: neighbours of one kind and feed make a segment; poses that repeat are left out.
+
+        pivot: metres. Raises ToolpathError for fewer than two poses.
+        """
+        tips, axes = np.array(self.tips).reshape(-1, 3) * 1e-3, np.array(self.axes).reshape(-1, 3)
+        moved = np.ones(len(tips), dtype=np.bool_)
+        moved[1:] = (np.diff(tips, axis=0) != 0.0).any(axis=1) | (np.diff(axes, axis=0) != 0.0).any(axis=1)
+        rows = np.flatnonzero(moved)
+        if len(rows) < 2:
+            raise ToolpathError("the file holds no motion", file=self.file, expected="at least two different poses")
+        feeds = np.array(self.feeds)[rows]
+        kinds = [self.kinds[row] for row in rows]
+        breaks = [1]
+        for k in range(2, len(rows)):
+            same_feed = feeds[k] == feeds[k - 1] or abs(feeds[k] - feeds[k - 1]) <= _SAME_FEED * feeds[k - 1]
+            if kinds[k] != kinds[k - 1] or not same_feed:
+                breaks.append(k)
+        segments = [
+            Segment(kinds[a], tips[rows[a - 1 : b]], axes[rows[a - 1 : b]], feeds[a] / 6e4)
+            for a, b in pairwise([*breaks, len(rows)])
+        ]
+        return Toolpath(tuple(segments), pivot)
+
+
+def poses(toolpath: Toolpath) -> tuple[Floats, Floats, list[SegmentKind], Floats]:
+    """Return tips (N, 3) in mm, axes (N, 3), and for each of the N − 1 moves its kind and its feed in mm/min."""
+    owner = toolpath.segment_of_interval
+    kinds = [toolpath.segments[k].kind for k in owner]
+    feeds = np.array([segment.feed for segment in toolpath.segments])[owner] * 6e4
+    return toolpath.tips * 1e3, toolpath.axes, kinds, feeds
+
+
+def plain(value: float, digits: int) -> str:
+    """Return a number without exponent or negative zero, with at most this many decimals."""
+    text = f"{value:.{digits}f}".rstrip("0")
+    text = text + "0" if text.endswith(".") else text
+    return "0.0" if text == "-0.0" else text

@@ -1,0 +1,75 @@
+"""NumPy archives: the arrays that `plan.npz` also holds for the toolpath; nothing is lost."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pentapod.errors import InputError, ToolpathError
+from pentapod.files import packed_arrays
+from pentapod.toolpath.formats.reading import check_head
+from pentapod.toolpath.formats.registry import Defaults, Format, register
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+
+_MM, _MM_MIN = 1e3, 6e4
+_NAMES = ("tips_mm", "axes", "pivot_mm", "segment_starts", "segment_kinds", "segment_feeds_mm_min")
+
+
+def toolpath_arrays(toolpath: Toolpath) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a toolpath, workpiece frame; a segment's first waypoint is its start."""
+    values = (
+        toolpath.tips * _MM,
+        toolpath.axes,
+        np.array(toolpath.pivot * _MM),
+        toolpath.starts,
+        np.array([str(s.kind) for s in toolpath.segments]),
+        np.array([s.feed for s in toolpath.segments]) * _MM_MIN,
+    )
+    return {f"toolpath.{name}": value for name, value in zip(_NAMES, values, strict=True)}
+
+
+def _read(file: Path, defaults: Defaults) -> Toolpath:
+    del defaults
+    if not check_head(file).startswith(b"PK"):
+        raise ToolpathError("not a NumPy archive", file=file, expected="an .npz file")
+    arrays: dict[str, NDArray[Any]] = {}
+    try:
+        with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as archive:
+            for name in _NAMES:
+                arrays[name] = np.asarray(archive[f"toolpath.{name}"])
+    except KeyError as error:
+        raise ToolpathError("an array is missing", file=file, key=str(error.args[0])[:80]) from error
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, NotImplementedError, MemoryError) as error:
+        raise ToolpathError("a broken NumPy archive: it may have been cut off", file=file) from error
+    try:
+        return _toolpath(arrays)
+    except InputError as error:
+        raise ToolpathError(error.what, file=file, key=error.key, value=error.value, expected=error.expected) from error
+    except (ValueError, TypeError, IndexError) as error:
+        raise ToolpathError("the arrays do not make a toolpath", file=file, expected=", ".join(_NAMES)) from error
+
+
+def _toolpath(arrays: dict[str, NDArray[Any]]) -> Toolpath:
+    tips, axes = arrays["tips_mm"] / _MM, arrays["axes"]
+    starts = arrays["segment_starts"].astype(np.intp)
+    kinds, feeds = arrays["segment_kinds"], arrays["segment_feeds_mm_min"] / _MM_MIN
+    if len(starts) != len(kinds) + 1 or len(feeds) != len(kinds) or starts[0] != 0 or starts[-1] != len(tips) - 1:
+        raise ToolpathError("the segments do not fit the waypoints", key="toolpath.segment_starts")
+    segments = [
+        Segment(SegmentKind(str(kind)), tips[a : b + 1], axes[a : b + 1], float(feed))
+        for kind, feed, (a, b) in zip(kinds, feeds, pairwise(starts), strict=True)
+    ]
+    return Toolpath(tuple(segments), float(arrays["pivot_mm"].item()) / _MM)
+
+
+def _write(toolpath: Toolpath) -> bytes:
+    return packed_arrays(toolpath_arrays(toolpath))
+
+
+NPZ = register(Format("npz", (".npz",), "NumPy archive", _read, _write))

@@ -1,0 +1,77 @@
+"""What the readers of text share: lines with their numbers, numbers with their words, and guards against non-text."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from pentapod.errors import ToolpathError
+
+MOST_BYTES = 500_000_000
+"""A toolpath of ten million waypoints is smaller."""
+
+_HEAD = 4096
+
+
+def read_lines(file: Path) -> list[str]:
+    """Return the lines of a UTF-8 text file. Raises ToolpathError: missing, empty, too large, not text, cut short.
+
+    The size and the first bytes are looked at before anything else is read. A last line without its end is taken
+    for the sign of a truncated file.
+    """
+    check_head(file)
+    data = file.read_bytes()
+    if not data.strip():
+        raise ToolpathError("the file is empty", file=file, expected="a toolpath")
+    if b"\0" in data:
+        line = data.count(b"\n", 0, data.index(b"\0")) + 1
+        raise ToolpathError("not a text file: it holds zero bytes", file=file, line=line, remedy="save it as UTF-8")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        value = data[error.start : error.start + 1]
+        raise ToolpathError("not UTF-8 text", file=file, line=line, value=value, remedy="save it as UTF-8") from error
+    if not text.endswith("\n"):
+        raise ToolpathError(
+            "the last line has no end: the file was cut off", file=file, line=text.count("\n") + 1,
+            remedy="export it again, or end the last line",
+        )  # fmt: skip
+    return text.splitlines()
+
+
+def check_head(file: Path) -> bytes:
+    """Return the first bytes of a file. Raises ToolpathError: not there, a folder, empty, too large, binary."""
+    try:
+        size = file.stat().st_size
+        with file.open("rb") as stream:
+            head = stream.read(_HEAD)
+    except FileNotFoundError as error:
+        raise ToolpathError("no such file", file=file, expected="a toolpath file") from error
+    except OSError as error:
+        raise ToolpathError(f"cannot be read: {(error.strerror or str(error)).lower()}", file=file) from error
+    if not head.strip():
+        raise ToolpathError("the file is empty", file=file, expected="a toolpath")
+    if size > MOST_BYTES:
+        raise ToolpathError(
+            "the file is too large",
+            file=file,
+            value=f"{size / 1e6:.0f} MB",
+            expected=f"at most {MOST_BYTES / 1e6:.0f} MB",
+        )
+    if b"\0" in head and not head.startswith(b"PK"):
+        wide = head.startswith((b"\xff\xfe", b"\xfe\xff"))
+        what = "not UTF-8 text but UTF-16" if wide else "not a text file: it holds zero bytes"
+        raise ToolpathError(what, file=file, line=1, remedy="save it as UTF-8")
+    return head
+
+
+def number(text: str, file: Path, line: int, word: str) -> float:
+    """Return a finite number. Raises ToolpathError naming the word."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or "_" in text:
+        raise ToolpathError("not a finite number", file=file, line=line, key=word, value=text.strip()[:40])
+    return value

@@ -1,0 +1,84 @@
+"""The formats by name, and reading and writing by a file's suffix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from pentapod.errors import ToolpathError, nearest
+from pentapod.files import atomic_write
+from pentapod.toolpath.toolpath import Toolpath
+
+
+@dataclass(frozen=True)
+class Defaults:
+    """What a reader takes where its format has no place for it: pivot in metres, feed in m/s."""
+
+    pivot: float = 0.0
+    feed: float | None = None
+
+
+@dataclass(frozen=True)
+class Format:
+    """A file format. suffixes: those that mean it, lower case. loses: what a file of it cannot tell.
+
+    read: file → Toolpath, in metres, workpiece frame; raises ToolpathError with file, line and word.
+    write: Toolpath → bytes; the same toolpath gives the same bytes.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    about: str
+    read: Callable[[Path, Defaults], Toolpath]
+    write: Callable[[Toolpath], bytes]
+    loses: frozenset[str] = frozenset()
+
+
+FORMATS: dict[str, Format] = {}
+
+
+def register(new: Format) -> Format:
+    """Add a format to `FORMATS` and return it."""
+    FORMATS[new.name] = new
+    return new
+
+
+def format_of(path: str | Path, name: str | None = None) -> Format:
+    """Return the format of this name, or the one that the file's suffix means. Raises ToolpathError."""
+    file = Path(path)
+    if name is not None:
+        if name not in FORMATS:
+            raise ToolpathError("unknown format", file=file, key="format", value=name, remedy=nearest(name, FORMATS))
+        return FORMATS[name]
+    fitting = [(len(s), f) for f in FORMATS.values() for s in f.suffixes if file.name.lower().endswith(s)]
+    if not fitting:
+        known = ", ".join(s for f in FORMATS.values() for s in f.suffixes)
+        raise ToolpathError("no toolpath format has this suffix", file=file, value=file.suffix, expected=known)
+    return max(fitting, key=lambda pair: pair[0])[1]
+
+
+def read_toolpath(
+    path: str | Path, format_name: str | None = None, *, pivot: float = 0.0, feed: float | None = None
+) -> Toolpath:
+    """Return the toolpath of a file, workpiece frame, metres. The suffix tells the format where no name is given.
+
+    pivot: metres, for formats that do not carry it (see `Toolpath`); feed: m/s, of moves to which the file gives none.
+    Raises ToolpathError, one line with file, line and word, for whatever is not understood: nothing is guessed,
+    and there are no partial results.
+    """
+    file = Path(path)
+    return format_of(file, format_name).read(file, Defaults(pivot, feed))
+
+
+def write_toolpath(toolpath: Toolpath, path: str | Path, format_name: str | None = None) -> Path:
+    """Write a toolpath and return its path. The suffix tells the format where no name is given.
+
+    Same toolpath, same bytes; an interruption leaves no half file. Raises ToolpathError for an unknown format,
+    InputError where the file cannot be written.
+    """
+    file = Path(path)
+    content = format_of(file, format_name).write(toolpath)
+    with atomic_write(file) as temporary:
+        temporary.write_bytes(content)
+    return file
