@@ -1,0 +1,105 @@
+"""Units × scales × kinds of path: no failure, limits kept in every stage, toppra's duration where it has one."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from matrix_cases import MATRIX, Case, arrays, cases
+
+from pentapod.timing.engine import fastest
+from pentapod.timing.stages import Failure
+
+CASES = cases()
+
+
+def duration(s, x):
+    ends = np.sqrt(x[:-1]) + np.sqrt(x[1:])
+    steps = np.diff(s)
+    return float((2.0 * steps[steps > 0.0] / ends[steps > 0.0]).sum())
+
+
+def check(case, *, oracle):
+    """Return whether toppra had an answer; everything about ours is asserted."""
+    s, first, second, ceiling = arrays(case)
+    x = fastest(s, first, second, ceiling)
+    assert not isinstance(x, Failure), f"{case}: {x}"
+    assert np.isfinite(x).all()
+    assert (x >= 0.0).all()
+    assert (x <= ceiling * (1.0 + 1e-12)).all()
+    steps = np.diff(s)
+    moves = steps > 0.0
+    u = np.diff(x)[moves] / (2.0 * steps[moves])
+    for end in (slice(0, -1), slice(1, None)):
+        rows = first[end][moves] * u[:, None] + second[end][moves] * x[end][moves][:, None]
+        scale = np.abs(first[end][moves] * u[:, None]).max() + 1.0
+        assert np.abs(rows).max() <= 1.0 + 1e-9 * scale, str(case)
+    if not oracle or not moves.all():  # toppra does not take a gridpoint twice
+        return False
+    reference = fastest(s, first, second, ceiling, engine="toppra")
+    if isinstance(reference, Failure):
+        return False
+    assert duration(s, x) == pytest.approx(duration(s, reference), rel=1e-5), str(case)
+    return True
+
+
+@pytest.mark.parametrize("case", CASES[:: MATRIX["fast_stride"]], ids=str)
+def test_matrix_reduced(case):
+    check(case, oracle=True)
+
+
+@pytest.mark.slow
+def test_matrix_by_file():
+    assert len(CASES) >= 2000
+    solved = sum(check(case, oracle=True) for case in CASES)
+    assert solved > 0.8 * len(CASES)  # six kinds of seven have an oracle
+
+
+def any_case():
+    return st.builds(
+        Case,
+        st.sampled_from(MATRIX["kinds"]),
+        st.sampled_from(MATRIX["units"]),
+        st.floats(-6.0, 1.0).map(lambda x: 10.0**x),
+        st.integers(0, 2**32 - 1),
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(any_case())
+def test_matrix_by_hypothesis_reduced(case):
+    check(case, oracle=False)
+
+
+@pytest.mark.slow
+@settings(max_examples=2000, deadline=None)
+@given(any_case())
+def test_matrix_by_hypothesis(case):
+    check(case, oracle=True)
+
+
+@pytest.mark.parametrize("unit", MATRIX["units"])
+@pytest.mark.parametrize("scale", MATRIX["scales_m"][::3])
+def test_units_and_scales_do_not_change_what_is_asked(unit, scale):
+    """The same motion in other units lasts as long: in metres and in steps of the grid, to the last digits."""
+    plain, other = (arrays(Case("polyline", name, scale, 3)) for name in ("metre", unit))
+    times = [duration(a[0], fastest(*a)) for a in (plain, other)]
+    assert times[1] == pytest.approx(times[0], rel=1e-11)
+
+
+@pytest.mark.parametrize("spec", MATRIX["refused"], ids=lambda spec: spec["reason"])
+@pytest.mark.parametrize("scale", MATRIX["scales_m"])
+@pytest.mark.parametrize("engine", ["core", "numpy"])
+def test_what_cannot_be_done_says_so(spec, scale, engine):
+    s, first, second, ceiling = arrays(Case(spec["kind"], "metre", scale, 1))
+    result = fastest(
+        s,
+        first,
+        second,
+        ceiling,
+        x_start=spec.get("start_share", 0.0) * ceiling[0],
+        x_end=spec.get("end_share", 0.0) * ceiling[-1],
+        engine=engine,
+    )
+    assert isinstance(result, Failure)
+    assert spec["reason"] in result.reason
+    assert result.gridpoint in (0, len(s) - 1)
