@@ -41,7 +41,7 @@ def little_frame(axes, pentapod: LinearPentapod, cell: int) -> None:
     axes.plot(*np.stack([p, [p[0], p[1], 0.0]]).T, ":", color="tab:blue", linewidth=1.0)
     axes.plot(*p[:, None], "o", color="tab:blue", markersize=4)
     axes.set(xlim=(-1.7, 1.7), ylim=(-1.7, 1.7), zlim=(-1.4, 1.4))
-    axes.set_box_aspect((1, 1, 0.8), zoom=1.5)
+    axes.set_box_aspect((1, 1, 0.8), zoom=1.05)
     axes.view_init(24, -62)
     axes.set_axis_off()
 
@@ -65,7 +65,7 @@ def draw(component: Component, out: str) -> None:
         for column, k in enumerate(cells):
             cell = decomposition.cells[k]
             x, y = 0.04 + 0.95 * (column + 0.5) / len(cells), 0.90 - 0.195 * row
-            axes = figure.add_axes((x - 0.08, y - 0.075, 0.16, 0.15), projection="3d")
+            axes = figure.add_axes((x - 0.1, y - 0.085, 0.2, 0.17), projection="3d")
             axes.patch.set_alpha(0.0)
             little_frame(axes, pentapod, k)
             words = ", ".join(cell.equations) + "\n" + ", ".join(cell.inequalities)

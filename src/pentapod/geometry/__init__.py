@@ -14,6 +14,7 @@ from pentapod.geometry.bernstein import (
     unscaled,
 )
 from pentapod.geometry.directions import angle_between, normalised, tangent_frame
+from pentapod.geometry.level_set import enclosed_volume, zero_surface
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.positivity import lower_bounds
 from pentapod.geometry.rigid import RigidTransform
@@ -25,6 +26,7 @@ __all__ = [
     "convolve",
     "derivative",
     "elevate",
+    "enclosed_volume",
     "evaluate",
     "from_power",
     "hull",
@@ -36,4 +38,5 @@ __all__ = [
     "tangent_frame",
     "to_power",
     "unscaled",
+    "zero_surface",
 ]

@@ -21,6 +21,7 @@ from pentapod.kinematics.general import GeneralPentapod
 from pentapod.kinematics.jacobian import leg_jacobian, pose_jacobian, square_jacobian
 from pentapod.kinematics.mode import MODES, Mode
 from pentapod.kinematics.pentapod import LinearPentapod
+from pentapod.kinematics.reach import ReachField
 from pentapod.kinematics.singularities import (
     architectural_measure,
     orientation_distance,
@@ -31,6 +32,7 @@ from pentapod.kinematics.singularities import (
 from pentapod.kinematics.singularity_polynomial import singularity_cofactors, singularity_polynomial
 from pentapod.kinematics.sphere import SingularityFreeSphere, singularity_free_sphere
 from pentapod.kinematics.stiffness import tip_compliance, tip_stiffness
+from pentapod.kinematics.workspace import Workspace
 
 __all__ = [
     "COMPONENTS",
@@ -49,7 +51,9 @@ __all__ = [
     "Mode",
     "Obstacle",
     "ProvenPoses",
+    "ReachField",
     "SingularityFreeSphere",
+    "Workspace",
     "architectural_distance",
     "architectural_measure",
     "as_built_pose",
