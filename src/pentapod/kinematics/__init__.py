@@ -20,6 +20,7 @@ from pentapod.kinematics.forces import (
 from pentapod.kinematics.general import GeneralPentapod
 from pentapod.kinematics.jacobian import leg_jacobian, pose_jacobian, square_jacobian
 from pentapod.kinematics.mode import MODES, Mode
+from pentapod.kinematics.motion import MotionProof, certify_motion
 from pentapod.kinematics.pentapod import LinearPentapod
 from pentapod.kinematics.reach import ReachField
 from pentapod.kinematics.singularities import (
@@ -49,6 +50,7 @@ __all__ = [
     "GeneralPentapod",
     "LinearPentapod",
     "Mode",
+    "MotionProof",
     "Obstacle",
     "ProvenPoses",
     "ReachField",
@@ -62,6 +64,7 @@ __all__ = [
     "cell_decomposition",
     "cell_of",
     "certify_component",
+    "certify_motion",
     "conic_determinant",
     "forbidden_conic",
     "leg_force_map",

@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.arrays import Floats, as_batch, as_floats, set_frozen
 from pentapod.errors import ArrayError, MachineError
-
-
-class PlanarDesign(Protocol):
-    """What a nominal machine must offer to be built: base attachments (5, 2) and offsets (5,), metres."""
-
-    @property
-    def base(self) -> Floats: ...  # noqa: D102
-    @property
-    def offsets(self) -> Floats: ...  # noqa: D102
+from pentapod.kinematics.five_legs import FiveLegs
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +34,7 @@ class AsBuiltPentapod:
     @classmethod
     def of(
         cls,
-        nominal: PlanarDesign,
+        nominal: FiveLegs,
         *,
         base_errors: ArrayLike = 0.0,
         offset_errors: ArrayLike = 0.0,
@@ -63,6 +54,8 @@ class AsBuiltPentapod:
             array = _given(value, name, shape).copy()
             array.flags.writeable = False
             set_frozen(self, **{name: array})
+        if not self.size > 0.0:
+            raise MachineError("all base joints are in one place", key="base")
         if (self.radii < 0.0).any():
             leg = int(np.argmin(self.radii))
             raise MachineError(
@@ -76,6 +69,11 @@ class AsBuiltPentapod:
     def size(self) -> float:
         """The largest distance of a base joint from their centre, metres."""
         return float(np.linalg.norm(self.base - self.base.mean(axis=0), axis=1).max())
+
+    @property
+    def scale(self) -> float:
+        """The power of two nearest to `size`: metres that count as much as a radian."""
+        return float(2.0 ** np.round(np.log2(self.size)))
 
     def leg_lengths(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return the readings of the legs (..., 5), metres, of positions p and unit directions i (..., 3)."""

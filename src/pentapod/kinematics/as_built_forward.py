@@ -3,28 +3,27 @@
 Let the geometry change linearly from the nominal one (s = 0) to the real one (s = 1) while the leg readings stay. The
 *intended* pose of the real machine is where the nominal pose of the chosen component goes along the way: the end of
 the continuous curve of solutions that starts there and meets no singularity. It is unique where it exists, and
-has nothing to do with any solver. `as_built_pose` finds it by Newton's method and proves it with tubes (`tube`).
+has nothing to do with any solver. `as_built_pose` finds it by Newton's method and proves it with tubes (`carry`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Bools, Floats, as_batch
+from pentapod.arrays import Bools, Floats, Ints, as_batch
 from pentapod.errors import ArrayError
 from pentapod.geometry.balls import Ball
 from pentapod.kinematics.as_built import AsBuiltPentapod
 from pentapod.kinematics.blocks import blocks
-from pentapod.kinematics.leg_equations import Legs, mids
-from pentapod.kinematics.newton import newton
+from pentapod.kinematics.carry import Pose, carry
+from pentapod.kinematics.leg_equations import Legs
 from pentapod.kinematics.pentapod import LinearPentapod
-from pentapod.kinematics.tube import LegFamily, Tube, error_bound, prove_tube
+from pentapod.kinematics.tube import LegFamily, Tube
 
 _SHORTEST = 2.0**-16  # of the way from the nominal geometry: where shorter steps are needed, there is no proof
-_ATTEMPTS = 150
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +42,7 @@ class ProvenPoses:
     direction_error: Floats
 
     def __post_init__(self) -> None:
-        for array in (self.position, self.direction, self.proven, self.position_error, self.direction_error):
+        for array in (getattr(self, field.name) for field in fields(self)):
             array.flags.writeable = False
 
 
@@ -63,12 +62,15 @@ def as_built_pose(
     batch = np.broadcast_shapes(readings.shape[:-1], signs.shape[:-1])
     readings = np.broadcast_to(readings, (*batch, 5)).reshape(-1, 5)
     position, direction = nominal.pose(readings, np.broadcast_to(signs, (*batch, 2)).reshape(-1, 2))
-    way = _Way(machine, nominal)
     out = np.full((len(readings), 8), np.nan)  # position, direction, two errors
     proven = np.zeros(len(readings), dtype=bool)
     with np.errstate(all="ignore"):
         for block in blocks(len(readings), 2048):
-            out[block], proven[block] = way.follow(readings[block].T, position[block].T, direction[block].T)
+            way = _Way(machine, nominal, readings[block].T)
+            start = (position[block].T, direction[block].T)
+            found = carry(way, start, way.scale, admit=way.in_component, shortest=_SHORTEST)
+            errors = [found.error * way.scale, found.error]
+            out[block], proven[block] = np.concatenate([found.position, found.direction, errors]).T, found.proven
     values = out.reshape(*batch, 8)
     return ProvenPoses(
         values[..., 0:3].copy(),
@@ -80,11 +82,11 @@ def as_built_pose(
 
 
 class _Way:
-    """The straight way from a nominal geometry to one as built."""
+    """The straight way from a nominal geometry to one as built, for leg readings (5, N)."""
 
-    def __init__(self, machine: AsBuiltPentapod, nominal: LinearPentapod) -> None:
-        self.nominal = nominal
-        self.scale = float(2.0 ** np.round(np.log2(machine.size)))
+    def __init__(self, machine: AsBuiltPentapod, nominal: LinearPentapod, readings: Floats) -> None:
+        self.nominal, self.readings = nominal, readings
+        self.scale = machine.scale
         self.rings = (machine.radii != 0.0)[:, None]
         x = nominal.base[:, 0]
         flat = np.concatenate([nominal.base.T, np.zeros((1, 5))])[..., None]
@@ -95,66 +97,29 @@ class _Way:
         self.shift = tuple(b - a for a, b in zip(self.start, self.end, strict=True))
         self.zeros = machine.zeros[:, None]
 
-    def follow(self, readings: Floats, position: Floats, direction: Floats) -> tuple[Floats, Bools]:
-        """Return positions, directions, errors (N, 8) and proven (N,) of readings (5, N), nominal poses (3, N).
-
-        Each pose goes at its own pace: an unproven step is halved, after an easy one the next is doubled.
-        """
-        out, proven = np.full((readings.shape[-1], 8), np.nan), np.zeros(readings.shape[-1], dtype=bool)
-        left = np.flatnonzero(np.isfinite(position.sum(axis=0)))
-        here = (position[:, left], direction[:, left])
-        speed = (np.zeros_like(here[0]), np.zeros_like(here[1]))
-        s, h = np.zeros(len(left)), np.ones(len(left))
-        for attempt in range(_ATTEMPTS):
-            if not left.size:
-                break
-            some, to = readings[:, left], s + h
-            end = self._legs(some, to)
-            guess = here[0] + h * speed[0], here[1] + h * speed[1]
-            p, i, settled = newton(*guess, mids(end), self.scale)
-            tube = prove_tube(here, (p, i), self._family(some, s, h, end), self.scale)
-            good = settled & tube.proven
-            first = s == 0.0
-            good[first] &= self._in_component(here, tube)[first]
-            done = good & (to == 1.0)
-            if attempt == 0:  # what comes without proof is what Newton's method alone has to say
-                out[left[settled], :6] = np.concatenate([p, i])[:, settled].T
-            if done.any():
-                error = error_bound(tube, (p, i), end)
-                out[left[done]] = np.concatenate([p, i, [error * self.scale, error]])[:, done].T
-                proven[left[done]] = True
-            speed = tuple(np.where(good, (b - a) / h, v) for a, b, v in zip(here, (p, i), speed, strict=True))
-            here = np.where(good, p, here[0]), np.where(good, i, here[1])
-            s, h = np.where(good, to, s), h * np.where(~good, 0.5, np.where(tube.contraction < 0.4, 2.0, 1.0))
-            h = np.minimum(h, 1.0 - s)
-            keep = ~done & (h >= _SHORTEST)
-            left, s, h = left[keep], s[keep], h[keep]
-            here, speed = (here[0][:, keep], here[1][:, keep]), (speed[0][:, keep], speed[1][:, keep])
-        return out, proven
-
-    def _legs(self, readings: Floats, s: Floats) -> Legs[Ball]:
-        """Return the geometry at s (N,), its exact values enclosed; where all s are 1, it is the given one."""
+    def at(self, which: Ints, s: Floats) -> Legs[Ball]:
+        """Return the geometry at s; where all s are 1, it is the given one."""
         if (s == 1.0).all():
             base, offsets, radii = self.end
         else:
             base, offsets, radii = (a + d * s for a, d in zip(self.start, self.shift, strict=True))
-        return Legs(base, offsets, radii, Ball.exact(readings) - self.zeros * s, self.rings)
+        return Legs(base, offsets, radii, Ball.exact(self.readings[:, which]) - self.zeros * s, self.rings)
 
-    def _family(self, readings: Floats, s: Floats, h: Floats, end: Legs[Ball]) -> LegFamily:
-        """Return the legs from s to s + h, (N,), where they are `end`. All s and h are short binary fractions."""
-        first, middle = self._legs(readings, s), self._legs(readings, s + 0.5 * h)
+    def over(self, which: Ints, s: Floats, h: Floats) -> LegFamily:
+        """Return the legs from s to s + h."""
+        first, middle, last = (self.at(which, s + share * h) for share in (0.0, 0.5, 1.0))
         hull = Legs(
-            Ball.between(first.base, end.base),
-            Ball.between(first.offsets, end.offsets),
-            Ball.between(first.radii, end.radii),
-            Ball.between(first.lengths, end.lengths),
+            Ball.between(first.base, last.base),
+            Ball.between(first.offsets, last.offsets),
+            Ball.between(first.radii, last.radii),
+            Ball.between(first.lengths, last.lengths),
             self.rings,
         )
         base, offsets, radii = (d * h for d in self.shift)
         slope = Legs(base, offsets, radii, Ball.exact(-self.zeros) * h, self.rings)
         return LegFamily(middle, hull, slope, np.zeros((5, 1)))
 
-    def _in_component(self, nominal_pose: tuple[Floats, Floats], tube: Tube) -> Bools:
+    def in_component(self, nominal_pose: Pose, tube: Tube) -> Bools:
         """Return where w and S keep their signs (N,) within the tube's ball around the nominal pose."""
         (x, _, z), (u, _, w) = (
             Ball(centre, np.broadcast_to(tube.radius * size * (1.0 + 2.0**-48), centre.shape))

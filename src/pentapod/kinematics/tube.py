@@ -120,6 +120,20 @@ def error_bound(tube: Tube, pose: tuple[Floats, Floats], legs: Legs[Ball]) -> Fl
         return np.where(tube.proven, off / (1.0 - tube.contraction) * _UP, np.nan)
 
 
+def sensitivity(tube: Tube, family: LegFamily, scale: float) -> Floats:
+    """Return bounds (2, N) of how fast any coordinate of p, and of i, moves within the tube when all legs change.
+
+    Metres, and no unit, for each metre of the leg that changes most. With ∂G_k/∂l_k = −l_k and E = 1 − C ∂G/∂x,
+    ‖E‖ ≤ Z, the pose changes by (1 − E)⁻¹ C l = C l + E (1 − E)⁻¹ C l. Infinite where the tube is not proven.
+    """
+    lengths = (family.hull.lengths.magnitude + family.slack) * _UP
+    moves = (np.abs(tube.inverse[:, :, :5]) @ lengths.T[..., None])[..., 0].T  # (6, N)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rest = tube.contraction / (1.0 - tube.contraction) * moves.max(axis=0)
+    both = np.stack([scale * (moves[:3].max(axis=0) + rest), moves[3:].max(axis=0) + rest]) * _UP
+    return np.where(tube.proven, both, np.inf)
+
+
 def _change(found: Rows[Ball], dp: Ball, di: Ball, i: Ball, family: LegFamily) -> Ball:
     """Return dG_k/ds (5, N) along the line of poses, for all s."""
     hull, slope = family.hull, family.slope

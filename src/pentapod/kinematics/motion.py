@@ -1,0 +1,177 @@
+"""A proof in continuous time, for any geometry near a linear pentapod, that a motion of the legs meets no singularity.
+
+Between two setpoints the legs are polynomials in time. `certify_motion` carries the pose along (`carry`): where it
+succeeds, the motion that the legs prescribe exists, is unique and continuous, and keeps clear of every singularity,
+so it stays in its component. This needs no closed form: general pentapods, base joints off the plane and rings are
+all the same to it. For the quadratic family `certify_component` says the same, faster.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.arrays import Bools, Floats, Ints, as_batch, as_floats
+from pentapod.errors import ArrayError
+from pentapod.geometry.balls import Ball
+from pentapod.kinematics.as_built import AsBuiltPentapod
+from pentapod.kinematics.blocks import blocks
+from pentapod.kinematics.carry import carry
+from pentapod.kinematics.leg_equations import Legs, mids
+from pentapod.kinematics.newton import newton
+from pentapod.kinematics.tube import LegFamily
+
+
+@dataclass(frozen=True, eq=False)
+class MotionProof:
+    """What is proven of N intervals of a motion of the legs.
+
+    proven (N,): from the exact pose next to the interval's first one in `position` and `direction` the motion is
+    defined and continuous throughout, ends at the exact pose next to the second one, and its Jacobian is never
+    singular. Where all are proven, this holds for the whole of them: the motion stays in the component it begins in.
+    position, direction (N + 1, 3): the poses at the intervals' ends, from those given by Newton's method; NaN where it
+    did not settle.
+    reached (N,): the share of each interval up to which the proof goes: 1 where proven. What comes after is undecided:
+    the motion comes near a singularity there, or the pose is lost.
+    stop (N,): where the proof was tried in vain, [reached, stop] of the interval; 1 where proven.
+    position_sensitivity, direction_sensitivity (N,): proven for as far as the proof goes: legs that differ by up to a
+    metre each move no coordinate of p by more metres, and none of i by more, than this. Infinite where nothing is
+    proven.
+    """
+
+    proven: Bools
+    position: Floats
+    direction: Floats
+    reached: Floats
+    stop: Floats
+    position_sensitivity: Floats
+    direction_sensitivity: Floats
+
+    def __post_init__(self) -> None:
+        for array in (getattr(self, field.name) for field in fields(self)):
+            array.flags.writeable = False
+
+    @property
+    def holds(self) -> bool:
+        """Whether every interval is proven."""
+        return bool(self.proven.all())
+
+
+def certify_motion(
+    machine: AsBuiltPentapod,
+    leg_coefficients: ArrayLike,
+    position: ArrayLike,
+    direction: ArrayLike,
+    *,
+    leg_error: float = 0.0,
+    depth: int = 16,
+) -> MotionProof:
+    """Prove, interval by interval, that a motion of the legs meets no singularity.
+
+    leg_coefficients (N, 5, k + 1): Bernstein coefficients in metres of each leg's reading on each interval (for legs
+    linear between setpoints: both setpoints). position, direction (N + 1, 3): the poses at the ends of the intervals,
+    roughly; they only say which of several poses with the same legs are meant. leg_error: metres by which each actual
+    leg may differ from its polynomial at any time: the claim then holds for every such continuous motion. depth: how
+    often an interval may be halved before it is given up.
+
+    Raises ArrayError: wrong shapes, coefficients that are not finite, lengths that are not positive, a negative
+    leg_error or depth, legs that jump between intervals by more than 2 leg_error.
+    """
+    coefficients = as_floats(leg_coefficients, "leg_coefficients", (None, 5, None))
+    p, i = as_batch(position, "position", (None, 3)), as_batch(direction, "direction", (None, 3))
+    _check(machine, coefficients, p, i, leg_error, depth)
+    n = len(coefficients)
+    if n == 0:
+        return MotionProof(np.ones(0, dtype=bool), p.copy(), i.copy(), *(np.ones(0) for _ in range(4)))
+    scale, out = machine.scale, np.full((4, n), np.nan)
+    ends = np.concatenate([coefficients[:, :, 0], coefficients[-1:, :, -1]]).T - machine.zeros[:, None]
+    with np.errstate(all="ignore"):
+        route = _Motion(machine, np.moveaxis(coefficients, 0, -1), leg_error)
+        nodes_p, nodes_i, settled = newton(p.T, i.T, mids(route.legs(Ball.exact(ends))), scale)
+        nodes_p[:, ~settled] = nodes_i[:, ~settled] = np.nan
+        for block in blocks(n, 2048):
+            after = slice(block.start + 1, block.stop + 1)
+            part = _Motion(machine, np.moveaxis(coefficients[block], 0, -1), leg_error)
+            found = carry(
+                part,
+                (nodes_p[:, block], nodes_i[:, block]),
+                scale,
+                end=(nodes_p[:, after], nodes_i[:, after]),
+                shortest=2.0**-depth,
+            )
+            out[:2, block] = found.reached, np.minimum(found.reached + found.step, 1.0)
+            out[2:, block] = np.where(found.reached > 0.0, found.sensitivity, np.inf)
+    return MotionProof(out[0] == 1.0, nodes_p.T.copy(), nodes_i.T.copy(), *out)
+
+
+class _Motion:
+    """The legs of a machine on intervals, from Bernstein coefficients (5, k + 1, N) of their readings."""
+
+    def __init__(self, machine: AsBuiltPentapod, coefficients: Floats, leg_error: float) -> None:
+        self.base = Ball.exact(machine.base.T[..., None])
+        self.offsets, self.radii = Ball.exact(machine.offsets[:, None]), Ball.exact(machine.radii[:, None])
+        self.rings = (machine.radii != 0.0)[:, None]
+        readings = np.moveaxis(coefficients, 1, 0)  # (k + 1, 5, N)
+        self.coefficients = Ball.exact(readings) - machine.zeros[:, None]
+        self.degree = len(readings) - 1
+        self.slack = np.full((5, 1), leg_error)
+
+    def legs(self, lengths: Ball) -> Legs[Ball]:
+        """Return the machine with these lengths (5, N)."""
+        return Legs(self.base, self.offsets, self.radii, lengths, self.rings)
+
+    def at(self, which: Ints, s: Floats) -> Legs[Ball]:
+        """Return the legs at s."""
+        return self.legs(_blossom(self.coefficients[:, :, which], [s] * self.degree))
+
+    def over(self, which: Ints, s: Floats, h: Floats) -> LegFamily:
+        """Return the legs from s to s + h: the polynomials' coefficients there are their blossom's values."""
+        c, k = self.coefficients[:, :, which], self.degree
+        if not (s == 0.0).all() or not (h == 1.0).all():
+            c = _stack([_blossom(c, [s] * (k - j) + [s + h] * j) for j in range(k + 1)])
+        slopes = [(c[j + 1] - c[j]) * float(k) for j in range(k)] or [c[0] * 0.0]
+        zero = Ball.exact(np.zeros((1, 1)))
+        slope = Legs(zero[None] * np.zeros((3, 1, 1)), zero, zero, _hull(_stack(slopes)), self.rings)
+        middle = self.legs(_blossom(c, [np.full(len(s), 0.5)] * k))
+        return LegFamily(middle, self.legs(_hull(c)), slope, self.slack)
+
+
+def _blossom(c: Ball, at: list[Floats]) -> Ball:
+    """Return the blossom (5, N) at arguments (N,) each, short binary fractions, of coefficients (k + 1, 5, N)."""
+    for t in at:
+        c = c[:-1] * (1.0 - t) + c[1:] * t
+    return c[0]
+
+
+def _stack(parts: list[Ball]) -> Ball:
+    return Ball(np.stack([part.mid for part in parts]), np.stack([part.rad for part in parts]))
+
+
+def _hull(c: Ball) -> Ball:
+    """Return the ball (5, N) that contains all coefficients (k + 1, 5, N), and with them the polynomial's values."""
+    return Ball.between(Ball.exact(c.lower.min(axis=0)), Ball.exact(c.upper.max(axis=0)))
+
+
+def _check(machine: AsBuiltPentapod, c: Floats, p: Floats, i: Floats, leg_error: float, depth: int) -> None:
+    if c.ndim != 3 or c.shape[-1] < 1:
+        raise ArrayError(f"leg_coefficients has shape {c.shape}", expected="shape (N, 5, k + 1)")
+    for name, array in (("position", p), ("direction", i)):
+        if array.shape != (len(c) + 1, 3):
+            expected = f"shape ({len(c) + 1}, 3): the poses at the ends of {len(c)} intervals"
+            raise ArrayError(f"{name} has shape {array.shape}", expected=expected)
+    if not (np.isfinite(leg_error) and leg_error >= 0.0 and 0 <= depth <= 40):
+        raise ArrayError("leg_error must not be negative, nor depth beyond 0 to 40", value=(leg_error, depth))
+    if not (c - machine.zeros[:, None] > 0.0).all():
+        raise ArrayError("leg_coefficients must be positive lengths", value=float(c.min()), expected="metres")
+    if len(c) > 1:
+        jumps = np.abs(c[1:, :, 0] - c[:-1, :, -1]).max(axis=1)
+        worst = int(np.argmax(jumps))
+        if jumps[worst] > 2.0 * leg_error:
+            raise ArrayError(
+                f"the legs jump between interval {worst} and the next",
+                value=float(jumps[worst]),
+                expected="intervals that join, to within 2 leg_error",
+                remedy="a leg_error of half the jump covers every continuous motion in between",
+            )
