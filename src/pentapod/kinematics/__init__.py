@@ -4,6 +4,7 @@ from pentapod.kinematics.architecture import ArchitecturalDistance, architectura
 from pentapod.kinematics.as_built import AsBuiltPentapod
 from pentapod.kinematics.as_built_forward import ProvenPoses, as_built_pose
 from pentapod.kinematics.assembly import AssemblyObstacles, Obstacle, assembly_obstacles
+from pentapod.kinematics.calibration import Calibration, calibrate
 from pentapod.kinematics.cell_poses import cell_of, poses_in_cell
 from pentapod.kinematics.cells import Cell, CellDecomposition, cell_decomposition
 from pentapod.kinematics.certificate import ComponentProof, certify_component
@@ -41,6 +42,7 @@ __all__ = [
     "ArchitecturalDistance",
     "AsBuiltPentapod",
     "AssemblyObstacles",
+    "Calibration",
     "Cell",
     "CellDecomposition",
     "Component",
@@ -61,6 +63,7 @@ __all__ = [
     "as_built_pose",
     "assembly_obstacles",
     "attachment_conic",
+    "calibrate",
     "cell_decomposition",
     "cell_of",
     "certify_component",
