@@ -14,7 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.arrays import Floats
-from pentapod.kinematics import Component, LinearPentapod, certify_component
+from pentapod.kinematics import (
+    AsBuiltPentapod,
+    Component,
+    LinearPentapod,
+    as_built_pose,
+    certify_component,
+    certify_motion,
+)
 
 BASE = 0.2 * np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)])
 
@@ -94,6 +101,22 @@ def run(count: int = 200_000) -> list[Row]:
     linear = np.stack([legs[:-1], legs[1:]], axis=-1)
     certificate = best_of(lambda: certify_component(pentapod, linear, component), repeats=3)
 
+    built = AsBuiltPentapod.of(
+        pentapod,
+        base_errors=3e-4 * rng.normal(size=(5, 3)),
+        offset_errors=3e-4 * rng.normal(size=5),
+        radii=3e-4,
+        zeros=3e-4 * rng.normal(size=5),
+    )
+    some = slice(0, count // 10)
+    real_legs = built.leg_lengths(position[some], direction[some])
+    real = as_built_pose(built, pentapod, real_legs, component)
+    if not real.proven.all():
+        raise RuntimeError("the benchmark's poses are meant to be proven")
+    as_built = 10.0 * best_of(lambda: as_built_pose(built, pentapod, real_legs, component), repeats=2)
+    real_linear = np.stack([real_legs[:-1], real_legs[1:]], axis=-1)
+    motion = 10.0 * best_of(lambda: certify_motion(built, real_linear, real.position, real.direction), repeats=2)
+
     def row(name: str, seconds: float, worst: float = 0.0) -> Row:
         return Row(name, seconds / count * 1e9, seconds / closed, worst)
 
@@ -103,6 +126,12 @@ def run(count: int = 200_000) -> list[Row]:
         row("forward kinematics, closed form, all four modes", modes, error(pentapod.assembly_modes(legs)[0][:, 0])),
         row(f"forward kinematics, Newton, {iterations} iterations from within 1 mm", iterative, error(found)),
         row("component certificate, per linear interval", certificate),
+        row(
+            "forward kinematics, as built (0.3 mm off), each pose proven",
+            as_built,
+            float(np.abs(real.position - position[some]).max()),
+        ),
+        row("motion as built free of singularities, per linear interval", motion),
     ]
 
 
