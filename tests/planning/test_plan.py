@@ -7,9 +7,9 @@ from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.planning import PlacedPath, Placement, plan
+from pentapod.planning.formulation import cayley
 from pentapod.planning.margins import Margins
 from pentapod.planning.plan import NEEDED_MARGIN
-from pentapod.planning.problem import cayley
 from pentapod.planning.sampling import best_tilted_margins
 from pentapod.planning.task import Task
 from pentapod.refusal import Refusal

@@ -1,0 +1,61 @@
+"""The optimisation problem, stated once in casadi: margins and cone of one waypoint as functions of the unknowns.
+
+Unknowns: a small placement step (3 translations in metres, a Cayley rotation vector) around a given placement,
+and the lean a (2) of the waypoint within the field's lean plane. Both solvers build on this function: the
+reference hands it to IPOPT, the default takes its Jacobian.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.planning.margins import Margins
+from pentapod.planning.setting import Setting
+
+
+def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, jacobian: bool = False) -> Any:
+    """Return the casadi function (step 6, a 2, pivot 3, nominal 3, R 3×3, t 3) → margins K, cone used (squared).
+
+    kinds: which margins. jacobian: also return ∂ margins / ∂ (step, a), K × 8.
+    """
+    import casadi as ca  # noqa: PLC0415  heavy: only when planning
+
+    step, a = ca.SX.sym("step", 6), ca.SX.sym("a", 2)
+    pivot, nominal = ca.SX.sym("pivot", 3), ca.SX.sym("nominal", 3)
+    rotation, translation = ca.SX.sym("R", 3, 3), ca.SX.sym("t", 3)
+    b = ca.mtimes(ca.DM(setting.domain.lean_plane.T), a)
+    across = b - ca.dot(b, nominal) * nominal
+    square = ca.dot(across, across)
+    turn = ca.mtimes(rotation, _cayley(step[3:]))
+    turned = ca.mtimes(turn, (nominal + across) / ca.sqrt(1.0 + square))
+    tip = ca.mtimes(turn, pivot) + translation + step[:3] - setting.task.pivot * turned
+    values = margins.symbolic(tip, turned)[list(kinds)]
+    used = square / setting.cone**2 if setting.task.tilt > 0.0 else ca.SX(0.0)
+    slopes = [ca.densify(ca.jacobian(values, ca.vertcat(step, a)))] if jacobian else []
+    return ca.Function(
+        "point", [step, a, pivot, nominal, rotation, translation], [values, used, *slopes], {"cse": True}
+    )
+
+
+def stepped(transform: RigidTransform, step: Floats) -> RigidTransform:
+    """Return the placement after a step (6,): translation in metres, Cayley vector of a rotation of the workpiece."""
+    return RigidTransform(transform.rotation @ cayley(step[3:]), transform.translation + step[:3])
+
+
+def cayley(r: Floats) -> Floats:
+    """Return the rotation of Cayley's vector r (3,): tan(angle / 2) times the unit axis."""
+    n = float(r @ r)
+    skew = np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
+    return ((1.0 - n) * np.eye(3) + 2.0 * skew + 2.0 * np.outer(r, r)) / (1.0 + n)
+
+
+def _cayley(r: Any) -> Any:
+    import casadi as ca  # noqa: PLC0415
+
+    n = ca.dot(r, r)
+    return ((1.0 - n) * ca.SX.eye(3) + 2.0 * ca.skew(r) + 2.0 * ca.mtimes(r, r.T)) / (1.0 + n)

@@ -1,0 +1,162 @@
+"""The reference solver: the same problem handed to IPOPT, with constraint generation.
+
+It considers a few waypoints and kinds of margin, and adds those that come out worst until none is worse than what was
+considered. Slower than the default solver by an order of magnitude; it is what the default is measured against.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from pentapod.arrays import Floats, Ints
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.planning.formulation import point_function, stepped
+from pentapod.planning.linear_model import valleys
+from pentapod.planning.setting import Candidate, Setting
+
+Goal = Literal["margin", "calm"]
+
+_POINTS, _ROUNDS = 96, 16
+_NEAR = 0.6
+"""Kinds of margin within this much of the smallest one are considered from the start."""
+_TRANSLATION_STEP_M, _ROTATION_STEP = 0.4, 0.8
+_UNREST_WEIGHT = 1e-6
+"""Of the unrest beside the margin: it only decides where the margin does not."""
+_OPTIONS: dict[str, Any] = {
+    "print_time": False,
+    "error_on_fail": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.max_iter": 200,
+    "ipopt.tol": 1e-6,
+    "ipopt.acceptable_tol": 1e-4,
+    "ipopt.acceptable_iter": 5,
+    "ipopt.mu_strategy": "adaptive",
+    "ipopt.fixed_variable_treatment": "make_parameter",
+}
+
+
+@dataclass(eq=False)
+class IpoptSolver:
+    """Improves candidates of one setting with IPOPT; free: whether the placement may move."""
+
+    setting: Setting
+    free: bool
+    _solvers: dict[Any, Any] = field(default_factory=dict[Any, Any])
+
+    def raise_margin(self, start: Candidate) -> Candidate:
+        """Return a candidate with the largest smallest margin near `start`; never a worse one."""
+        best, (rows, kinds) = start, self._first(start)
+        for _ in range(_ROUNDS):
+            transform, raw = self._solve(best, rows, kinds, "margin", best.smallest)
+            coefficients = self.setting.within_cone(raw)
+            values = self.setting.values(best.margins, transform, coefficients)
+            considered = float(values[np.ix_(rows, kinds)].min())
+            smallest, before = float(values.min()), best.smallest
+            if smallest > before:
+                best = Candidate(best.margins, transform, coefficients, smallest)
+            more = self._with_worst(rows, kinds, values, max(considered, before), raw)
+            if len(more[0]) == len(rows) and len(more[1]) == len(kinds):
+                break
+            rows, kinds = more
+        return best
+
+    def calm(self, start: Candidate, keep: float) -> Candidate:
+        """Return the calmest field at the placement of `start` that keeps the margin `keep`, as `start` does."""
+        rows, kinds = self._first(start)
+        for _ in range(_ROUNDS):
+            transform, raw = self._solve(start, rows, kinds, "calm", keep)
+            coefficients = self.setting.within_cone(raw)
+            values = self.setting.values(start.margins, transform, coefficients)
+            if values.min() >= keep - 1e-4:
+                return Candidate(start.margins, transform, coefficients, float(values.min()))
+            rows, kinds = self._with_worst(rows, kinds, values, keep, raw)
+        return start
+
+    def _first(self, start: Candidate) -> tuple[Ints, Ints]:
+        rows = self.setting.task.representatives(_POINTS)
+        values = self.setting.values(start.margins, start.transform, start.coefficients, rows).min(axis=0)
+        return np.sort(rows), np.flatnonzero(values < values.min() + _NEAR)
+
+    def _with_worst(
+        self, rows: Ints, kinds: Ints, values: Floats, level: float, coefficients: Floats
+    ) -> tuple[Ints, Ints]:
+        worst = valleys(values)
+        worst = worst[values[worst].min(axis=1) < level]
+        steepness = self.setting.steepness(coefficients)
+        steep = valleys(-steepness[:, None])
+        return np.union1d(np.union1d(rows, worst), steep[steepness[steep] > 1.0 + 1e-6]), np.union1d(
+            kinds, np.flatnonzero(values.min(axis=0) < level)
+        )
+
+    def _solve(
+        self, at: Candidate, rows: Ints, kinds: Ints, goal: Goal, margin: float
+    ) -> tuple[RigidTransform, Floats]:
+        """Solve for waypoints `rows`. margin: first guess of the smallest one, or (goal "calm") the one to keep."""
+        setting, task = self.setting, self.setting.task
+        count = 32 * int(np.ceil(len(rows) / 32))  # in buckets, so that few solvers are built
+        rows = np.concatenate([rows, np.full(count - len(rows), rows[0], dtype=np.intp)])
+        basis, c = setting.basis[rows], at.coefficients
+        start = np.concatenate([np.zeros(6), [margin], c.ravel(), (basis @ c).ravel()])
+        reach = np.concatenate([np.full(3, _TRANSLATION_STEP_M), np.full(3, _ROTATION_STEP)]) * float(self.free)
+        if task.tilt == 0.0:
+            start = start[:7]
+        tilt = np.full(len(start) - 7, 3.0 * setting.cone)
+        low, high = (-10.0, 5.0) if goal == "margin" else (margin, margin)
+        solver = self._solver(at, count, tuple(int(k) for k in kinds), goal)
+        equations = 2 * count if task.tilt > 0.0 else 0
+        result = solver(
+            x0=start,
+            p=np.concatenate([
+                np.hstack([task.pivots[rows], task.nominal[rows]]).ravel(),
+                basis.ravel(),
+                at.transform.rotation.T.ravel(),
+                at.transform.translation,
+            ]),
+            lbg=0.0,
+            ubg=np.concatenate([np.zeros(equations), np.full(solver.size1_out("g") - equations, np.inf)]),
+            lbx=np.concatenate([-reach, [low], -tilt]),
+            ubx=np.concatenate([reach, [high], tilt]),
+        )  # fmt: skip
+        x = np.asarray(result["x"], dtype=np.float64).ravel()
+        return (stepped(at.transform, x[:6]) if self.free else at.transform), x[7 : 7 + c.size].reshape(-1, 2)
+
+    def _solver(self, at: Candidate, count: int, kinds: tuple[int, ...], goal: Goal) -> Any:
+        """Return the IPOPT solver for `count` waypoints, built once.
+
+        The leans of the waypoints are unknowns of their own, tied to the field by linear equations: so each margin
+        depends on nine unknowns only, and the derivatives stay sparse.
+        """
+        key = (at.margins.component, count, kinds, goal)
+        if key in self._solvers:
+            return self._solvers[key]
+        import casadi as ca  # noqa: PLC0415  heavy: only when planning
+
+        setting, size = self.setting, self.setting.basis.shape[1]
+        tilts = setting.task.tilt > 0.0
+        step, least = ca.MX.sym("step", 6), ca.MX.sym("m")
+        leans = ca.MX.sym("a", 2, count) if tilts else ca.MX(2, count)
+        coefficients = ca.MX.sym("c", 2, size)
+        points, basis = ca.MX.sym("points", 6, count), ca.MX.sym("basis", size, count)
+        rotation, translation = ca.MX.sym("R", 3, 3), ca.MX.sym("t", 3)
+        margins, used = point_function(setting, at.margins, kinds).map(count)(
+            ca.repmat(step, 1, count), leans, points[:3, :], points[3:, :],
+            ca.repmat(rotation, 1, count), ca.repmat(translation, 1, count),
+        )  # fmt: skip
+        unknowns, constraints, unrest = [step, least], [ca.vec(margins - least)], ca.MX(0.0)
+        if tilts:
+            c = ca.vec(coefficients)
+            unrest = ca.bilin(ca.DM(setting.unrest), c, c)
+            unknowns += [c, ca.vec(leans)]
+            constraints = [ca.vec(leans - ca.mtimes(coefficients, basis)), *constraints, 1.0 - used.T]
+        problem = {
+            "x": ca.vertcat(*unknowns),
+            "p": ca.vertcat(ca.vec(points), ca.vec(basis), ca.vec(rotation), translation),
+            "f": -least + _UNREST_WEIGHT * unrest if goal == "margin" else unrest,
+            "g": ca.vertcat(*constraints),
+        }
+        self._solvers[key] = ca.nlpsol("plan", "ipopt", problem, _OPTIONS)
+        return self._solvers[key]

@@ -1,0 +1,143 @@
+"""LinearModel: margins and leans around a candidate, to first order, and the best step that they promise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pentapod.arrays import Floats, Ints
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.planning.margins import Margins
+from pentapod.planning.setting import Candidate, Setting
+
+REACH = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
+"""The unit of a placement step: metres, and tan(angle / 2). The unit of a coefficient is the cone."""
+
+_NEAR = 0.4
+"""Margins within this much of the level enter the model."""
+_WORST_OF_KIND, _STEEPEST, _STEEP = 12, 60, 0.3
+_TANGENTS = np.radians([-36.0, -22.0, -12.0, -5.0, 0.0, 5.0, 12.0, 22.0, 36.0])
+
+Slopes = Callable[[Margins, RigidTransform, Floats, Ints], Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    """Unknowns x: placement step (6) and change of coefficients (2·size), in units of REACH and the cone.
+
+    Margins ≈ values + matrix @ x, (R,), of the margins that come near the level; leans as shares of the cone ≈
+    steepness + steep_matrix @ x. smallest: the smallest margin here.
+    """
+
+    setting: Setting
+    at: Candidate
+    free: bool
+    values: Floats
+    matrix: Floats
+    steepness: Floats
+    steep_matrix: Floats
+
+    @classmethod
+    def of(
+        cls, setting: Setting, at: Candidate, rows: Ints, level: float, extra: Ints, slopes: Slopes, *, free: bool
+    ) -> LinearModel:
+        """Return the model of what comes near `level` among waypoints `rows`, and of rows[extra] in any case."""
+        values = setting.values(at.margins, at.transform, at.coefficients, rows)
+        chosen = np.union1d(valleys(values, _WORST_OF_KIND), extra)
+        chosen = chosen[values[chosen].min(axis=1) < level + _NEAR]
+        point, kinds = np.nonzero(values[chosen] < level + _NEAR)
+        few = rows[chosen]
+        slope = slopes(at.margins, at.transform, at.coefficients, few)[point, kinds] if len(few) else np.zeros((0, 8))
+        by_field = _by_field(setting.basis[few][point], slope[:, 6:]) * setting.cone
+        share, steep_by_field = _cone_tangents(setting, at, rows, extra)
+        return cls(
+            setting,
+            at,
+            free,
+            values[chosen][point, kinds],
+            np.hstack([slope[:, :6] * REACH * free, by_field]),
+            share,
+            np.hstack([np.zeros((len(share), 6)), steep_by_field]),
+        )
+
+    def best_step(self, reach: float) -> tuple[Floats, Floats, float]:
+        """Return the placement step (6,), the change of coefficients (size, 2), and how much margin they promise."""
+        from scipy.optimize import linprog  # noqa: PLC0415  heavy: only when planning
+
+        count, smallest = self.matrix.shape[1], float(self.values.min())
+        rising = np.column_stack([-self.matrix, np.ones(len(self.matrix))])
+        leaning = np.column_stack([self.steep_matrix, np.zeros(len(self.steep_matrix))])
+        answer = linprog(
+            np.append(np.zeros(count), -1.0),
+            A_ub=np.vstack([rising, leaning]),
+            b_ub=np.concatenate([self.values - smallest, np.maximum(1.0 - self.steepness, 0.0)]),
+            bounds=[(-reach, reach)] * count + [(0.0, None)],
+            method="highs-ds",
+        )
+        x = np.zeros(count + 1) if answer.x is None else np.asarray(answer.x, dtype=np.float64)
+        return x[:6] * REACH * self.free, (x[6:-1] * self.setting.cone).reshape(-1, 2), float(x[-1])
+
+    def calmest(self, keep: float, reach: float) -> tuple[Floats, bool] | None:
+        """Return the change of coefficients (size, 2) to the calmest field that keeps the margin `keep`.
+
+        Also returns whether that lies inside the trust region. None where no change within it keeps the margin.
+        bend (R,): how much the margins are known to differ from the linear model where the step will end.
+        """
+        scale = self.setting.cone
+        x = _quadratic_program(
+            2.0 * self.setting.unrest * scale**2,
+            2.0 * self.setting.unrest @ self.at.coefficients.ravel() * scale,
+            np.vstack([-self.matrix[:, 6:], self.steep_matrix[:, 6:]]),
+            np.concatenate([self.values - keep, np.maximum(1.0 - self.steepness, 0.0)]),
+            reach,
+        )
+        if x is None:
+            return None
+        return (x * scale).reshape(-1, 2), bool(np.abs(x).max(initial=0.0) < 0.999 * reach)
+
+
+def valleys(values: Floats, count: int = _WORST_OF_KIND) -> Ints:
+    """Return the waypoints where a margin of values (N, M) is smaller than beside it, the worst of each kind."""
+    edge = np.full((1, values.shape[1]), np.inf)
+    padded = np.concatenate([edge, values, edge])
+    valley = (values <= padded[:-2]) & (values < padded[2:])
+    depth = np.where(valley, values, np.inf)
+    worst = np.argpartition(depth, min(count, len(values) - 1), axis=0)[:count]
+    return np.unique(worst[np.take_along_axis(valley, worst, axis=0)])
+
+
+def _cone_tangents(setting: Setting, at: Candidate, rows: Ints, extra: Ints) -> tuple[Floats, Floats]:
+    """Return tangents of the cone at the steepest leans: the share used in each tangent's direction, its derivatives.
+
+    Several tangents for each lean, since a lean on the edge may well turn along it.
+    """
+    steepness = setting.steepness(at.coefficients, rows)
+    steep = np.union1d(valleys(-steepness[:, None], _STEEPEST), extra)
+    steep = steep[steepness[steep] > _STEEP]
+    nominal, basis = setting.task.nominal[rows[steep]], setting.basis[rows[steep]]
+    outward = setting.leans(at.coefficients, rows[steep]) / (steepness[steep, None] * setting.cone)
+    aside = np.cross(nominal, outward)
+    shares, derivatives = [np.zeros(0)], [np.zeros((0, 2 * setting.basis.shape[1]))]
+    for turn in _TANGENTS:
+        direction = np.cos(turn) * outward + np.sin(turn) * aside
+        shares.append(np.cos(turn) * steepness[steep])
+        derivatives.append(_by_field(basis, direction @ setting.domain.lean_plane.T))
+    return np.concatenate(shares), np.concatenate(derivatives)
+
+
+def _by_field(basis: Floats, by_lean: Floats) -> Floats:
+    """Return derivatives by the coefficients, (R, 2·size), of basis (R, size) and derivatives by the lean (R, 2)."""
+    return (basis[:, :, None] * by_lean[:, None, :]).reshape(len(basis), 2 * basis.shape[1])
+
+
+def _quadratic_program(hessian: Floats, gradient: Floats, matrix: Floats, upper: Floats, reach: float) -> Floats | None:
+    """Return x that makes xᵀHx/2 + gᵀx smallest under matrix·x ≤ upper and |x| ≤ reach; None where none was found."""
+    import casadi as ca  # noqa: PLC0415
+
+    shape = {"h": ca.Sparsity.dense(*hessian.shape), "a": ca.Sparsity.dense(*matrix.shape)}
+    solver: Any = ca.conic("step", "daqp", shape, {"error_on_fail": False})
+    answer = solver(h=hessian, g=gradient, a=matrix, lba=-np.inf, uba=upper, lbx=-reach, ubx=reach)
+    return np.asarray(answer["x"]).ravel() if solver.stats()["success"] else None

@@ -1,0 +1,133 @@
+"""The default solver: small linear and quadratic programs in sequence, on the waypoints and margins that are smallest.
+
+Raising the smallest margin is sequential linear programming with a trust region (Fletcher, Practical Methods of
+Optimization, ch. 14: minimax); calming the field is a convex cost under the margins to keep, by feasible steps only.
+Every step is judged by the margins themselves, so a poor linear model costs a step, never a limit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pentapod.arrays import Floats, Ints
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.planning.formulation import point_function, stepped
+from pentapod.planning.linear_model import LinearModel, valleys
+from pentapod.planning.margins import Margins
+from pentapod.planning.setting import Candidate, Setting
+
+_CONSIDERED = 4000
+"""Waypoints whose margins are looked at in every step; all are looked at when the steps have ended."""
+_STEPS, _ROUNDS = 60, 6
+_ENOUGH = 1e-4
+"""A step that promises less margin, or less of the cost in proportion, is not taken."""
+_SLACK = 1e-5
+"""How far below the margin to keep a calm field may come: micrometres of a stroke."""
+_NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
+
+
+@dataclass(eq=False)
+class SequentialSolver:
+    """Improves candidates of one setting; free: whether the placement may move."""
+
+    setting: Setting
+    free: bool
+    _functions: dict[Any, Any] = field(default_factory=dict[Any, Any])
+
+    def raise_margin(self, start: Candidate) -> Candidate:
+        """Return a candidate with the largest smallest margin near `start`; never a worse one."""
+        rows, best = self._considered(), start
+        for _ in range(_ROUNDS):
+            found = self._climb(best, rows)
+            values = self.setting.values(found.margins, found.transform, found.coefficients)
+            smallest = float(values.min())
+            if smallest > best.smallest:
+                best = Candidate(found.margins, found.transform, found.coefficients, smallest)
+            if smallest >= found.smallest - _ENOUGH:
+                break
+            rows = np.union1d(rows, np.argsort(values.min(axis=1), kind="stable")[: _CONSIDERED // 8])
+        return best
+
+    def calm(self, start: Candidate, keep: float) -> Candidate:
+        """Return the calmest field at the placement of `start` that keeps the margin `keep`, as `start` does."""
+        setting, rows, best = self.setting, self._considered(), start
+        cost, reach, reserve = setting.unrest_of(start.coefficients), 1.0, 0.0
+        model = self.model(best, rows, keep)
+        for _ in range(_STEPS):
+            step = model.calmest(keep + reserve, reach)
+            if step is None:
+                reach, reserve = 0.4 * reach, 0.0
+                continue
+            change, inside = step
+            trial = setting.within_cone(best.coefficients + change)
+            values = setting.values(best.margins, best.transform, trial)
+            gain, short = cost - setting.unrest_of(trial), keep - float(values.min())
+            if short <= _SLACK and gain >= 0.0:
+                best = Candidate(best.margins, best.transform, trial, float(values.min()))
+                if inside and gain < _ENOUGH * cost:
+                    break
+                cost, reach, reserve = cost - gain, 2.0 * reach, 0.0
+                model = self.model(best, rows, keep)
+            elif reserve == 0.0 and short > 0.0:  # first aim higher by what the margins fell short
+                reserve = 1.5 * short
+            else:
+                reach, reserve = 0.4 * reach, 0.0
+                if reach < _ENOUGH:
+                    break
+        return best
+
+    def _considered(self) -> Ints:
+        count = len(self.setting.task.pivots)
+        return np.unique(np.linspace(0, count - 1, min(count, _CONSIDERED)).astype(np.intp))
+
+    def _climb(self, start: Candidate, rows: Ints) -> Candidate:
+        """Return the candidate that a trust-region method reaches, with its smallest margin over `rows`."""
+        setting, reach, extra = self.setting, 0.5, _NO_ROWS
+        smallest = float(setting.values(start.margins, start.transform, start.coefficients, rows).min())
+        best = Candidate(start.margins, start.transform, start.coefficients, smallest)
+        model = self.model(best, rows, best.smallest)
+        for _ in range(_STEPS):
+            step, change, promise = model.best_step(reach)
+            if promise < _SLACK:
+                break
+            transform = stepped(best.transform, step)
+            coefficients = setting.within_cone(best.coefficients + change)
+            values = setting.values(best.margins, transform, coefficients, rows)
+            gain = float(values.min()) - best.smallest
+            reach *= 2.0 if gain > 0.6 * promise else 1.0 if gain > 0.25 * promise else 0.4
+            if gain > 0.05 * promise:
+                best = Candidate(best.margins, transform, coefficients, float(values.min()))
+                extra = _NO_ROWS
+            elif reach < _SLACK:
+                break
+            else:  # what came out worst may not have been in the model
+                steepness = setting.steepness(best.coefficients + change, rows)
+                extra = np.union1d(extra, np.union1d(valleys(values), valleys(-steepness[:, None])))
+            model = self.model(best, rows, best.smallest, extra)
+        return best
+
+    def model(self, at: Candidate, rows: Ints, level: float, extra: Ints = _NO_ROWS) -> LinearModel:
+        """Return the linear model around a candidate of what comes near a margin of `level` among `rows`.
+
+        extra: indices into rows that enter in any case.
+        """
+        return LinearModel.of(self.setting, at, rows, level, extra, self.slopes, free=self.free)
+
+    def slopes(self, margins: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints) -> Floats:
+        """Return the Jacobian (n, M, 8) of the margins by placement step and lean at waypoints `rows`."""
+        count = 64 * int(np.ceil(len(rows) / 64))  # in buckets, so that few functions are built
+        key = (margins.component, count)
+        if key not in self._functions:
+            point = point_function(self.setting, margins, range(len(margins.limits)), jacobian=True)
+            self._functions[key] = point.map(count)
+        padded = np.concatenate([rows, np.full(count - len(rows), rows[0], dtype=np.intp)])
+        task = self.setting.task
+        leans = (self.setting.basis[padded] @ coefficients).T if task.tilt > 0.0 else np.zeros((2, count))
+        _, _, slopes = self._functions[key](
+            np.zeros((6, count)), leans, task.pivots[padded].T, task.nominal[padded].T,
+            np.tile(transform.rotation, (1, count)), np.tile(transform.translation[:, None], (1, count)),
+        )  # fmt: skip
+        return np.asarray(slopes).reshape(-1, count, 8).transpose(1, 0, 2)[: len(rows)]

@@ -1,0 +1,124 @@
+"""Setting: the task, the machine and the tilt field that both solvers work on; Candidate: what they improve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pentapod.arrays import Floats, Ints
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.machine.machine import Machine
+from pentapod.planning.margins import Margins
+from pentapod.planning.sampling import best_tilted_margins
+from pentapod.planning.task import Task
+from pentapod.planning.tilt import FieldDomain, lean
+
+CONE_SHARE = 0.98
+"""Share of the tilt cone used by the optimisers; the rest absorbs what happens between waypoints."""
+
+_CELLS = 2
+_FITTED = 192
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A placement in a component (the margins') with a tilt field's coefficients, and its smallest margin."""
+
+    margins: Margins
+    transform: RigidTransform
+    coefficients: Floats
+    smallest: float
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """Everything about one planning task that does not change while solvers work on it.
+
+    basis (N, size): the tilt field's spline basis at the waypoints; without a tilt cone it has size 0.
+    """
+
+    task: Task
+    machine: Machine
+    domain: FieldDomain
+    basis: Floats
+
+    @classmethod
+    def of(cls, task: Task, machine: Machine) -> Setting:
+        """Return the setting of a task on a machine."""
+        domain = FieldDomain.around(task.pivots, task.nominal, _CELLS)
+        basis = domain.basis(task.pivots) if task.tilt > 0.0 else np.zeros((len(task.pivots), 0))
+        return cls(task, machine, domain, basis)
+
+    @property
+    def cone(self) -> float:
+        """The longest lean (tangent of the angle) that the optimisers use."""
+        return float(np.tan(self.task.tilt) * CONE_SHARE)
+
+    @property
+    def upright(self) -> Floats:
+        """The coefficients (size, 2) of the nominal axes."""
+        return np.zeros((self.basis.shape[1], 2))
+
+    def leans(self, coefficients: Floats, rows: Ints | slice = slice(None)) -> Floats:
+        """Return the leans (n, 3) across the nominal axes, workpiece frame, at waypoints `rows`."""
+        b = self.basis[rows] @ coefficients @ self.domain.lean_plane
+        nominal = self.task.nominal[rows]
+        return np.asarray(b - (b * nominal).sum(axis=1, keepdims=True) * nominal, dtype=np.float64)
+
+    def axes(self, coefficients: Floats, rows: Ints | slice = slice(None)) -> Floats:
+        """Return the tool axes (n, 3), workpiece frame, at waypoints `rows`."""
+        return lean(self.task.nominal[rows], self.leans(coefficients, rows))
+
+    def values(
+        self, margins: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints | slice = slice(None)
+    ) -> Floats:
+        """Return the margins (n, M) at waypoints `rows`."""
+        return margins(*self.task.machine_poses(transform, self.axes(coefficients, rows), rows))
+
+    def steepness(self, coefficients: Floats, rows: Ints | slice = slice(None)) -> Floats:
+        """Return the share of the cone (n,) that each lean uses: 1 on its edge."""
+        return np.linalg.norm(self.leans(coefficients, rows), axis=1) / max(self.cone, 1e-12)
+
+    def within_cone(self, coefficients: Floats) -> Floats:
+        """Return coefficients scaled down until every waypoint keeps the cone; a lean is linear in them."""
+        return coefficients / max(1.0, float(self.steepness(coefficients).max(initial=0.0)))
+
+    def candidate(self, margins: Margins, transform: RigidTransform, coefficients: Floats) -> Candidate:
+        """Return the candidate with its smallest margin over all waypoints."""
+        smallest = float(self.values(margins, transform, coefficients).min())
+        return Candidate(margins, transform, coefficients, smallest)
+
+    def first_candidate(self, margins: Margins, transform: RigidTransform) -> Candidate:
+        """Return the candidate whose smooth field comes near the tilts that are best for each waypoint by itself."""
+        coefficients = self.upright
+        if self.task.tilt > 0.0:
+            rows = self.task.representatives(_FITTED)
+            _, leans = best_tilted_margins(self.task.at(rows), margins, transform)
+            # Smoothness, lightly weighed, decides where the representatives do not.
+            smooth = np.vstack([0.3 * self.domain.roughness(), 1e-3 * np.eye(self.domain.size)])
+            wanted = np.vstack([leans @ self.domain.lean_plane.T, np.zeros((len(smooth), 2))])
+            fitted = np.linalg.lstsq(np.vstack([self.basis[rows], smooth]), wanted, rcond=None)[0]
+            coefficients = self.within_cone(np.asarray(fitted, dtype=np.float64))
+        return self.candidate(margins, transform, coefficients)
+
+    @cached_property
+    def unrest(self) -> Floats:
+        """The matrix H (2·size, 2·size) of the cost cᵀHc of coefficients c, in the order of `coefficients.ravel()`.
+
+        It sums the second differences of the field, and the mean square of the leans over the waypoints, both as
+        shares of the cone.
+        """
+        size = self.basis.shape[1]
+        bends = self.domain.roughness()
+        across = np.eye(3) - self.task.nominal[:, :, None] * self.task.nominal[:, None, :]
+        plane = self.domain.lean_plane @ across @ self.domain.lean_plane.T  # (N, 2, 2): squared length of the lean
+        mean = np.einsum("na,nij,nb->aibj", self.basis, plane, self.basis, optimize=True) / len(self.basis)
+        field = np.kron((bends.T @ bends + 1e-3 * np.eye(size)) / size, np.eye(2))
+        return np.asarray((field + mean.reshape(2 * size, 2 * size)) / self.cone**2, dtype=np.float64)
+
+    def unrest_of(self, coefficients: Floats) -> float:
+        """Return the cost that a calm field makes small."""
+        c = coefficients.ravel()
+        return float(c @ self.unrest @ c)

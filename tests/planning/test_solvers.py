@@ -1,0 +1,96 @@
+"""The two solvers: the default against IPOPT on the same problem, and its linear model against differences."""
+
+import numpy as np
+import pytest
+
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import COMPONENTS
+from pentapod.planning.formulation import stepped
+from pentapod.planning.ipopt import IpoptSolver
+from pentapod.planning.linear_model import REACH
+from pentapod.planning.margins import Margins
+from pentapod.planning.sampling import first_guesses
+from pentapod.planning.sequential import SequentialSolver
+from pentapod.planning.setting import Setting
+from pentapod.planning.task import Task
+
+TILT = np.radians(15.0)
+
+
+@pytest.fixture(scope="module")
+def setting(desk, cap):
+    return Setting.of(Task.of(cap, TILT), desk)
+
+
+@pytest.fixture(scope="module")
+def start(setting, desk):
+    guess = first_guesses(setting.task, desk, COMPONENTS, 0, samples=2000)[0]
+    return setting.first_candidate(Margins.of(desk, guess.component), guess.transform)
+
+
+@pytest.fixture(scope="module")
+def raised(setting, start):
+    return SequentialSolver(setting, free=True).raise_margin(start)
+
+
+def test_a_first_candidate_keeps_the_cone(setting, start):
+    assert setting.steepness(start.coefficients).max() <= 1.0 + 1e-12
+
+
+def test_raising_the_margin_matches_the_reference(setting, start, raised):
+    """Both end in a local optimum of a problem with kinks; the default may not be the poorer one by much."""
+    reference = IpoptSolver(setting, free=True).raise_margin(start)
+    assert raised.smallest > start.smallest
+    assert raised.smallest >= 0.95 * reference.smallest
+    assert setting.steepness(raised.coefficients).max() <= 1.0 + 1e-12
+
+
+def test_the_result_recomputed_is_what_was_claimed(setting, raised):
+    values = setting.values(raised.margins, raised.transform, raised.coefficients)
+    assert values.min() == pytest.approx(raised.smallest, abs=1e-12)
+
+
+def test_calm_field_matches_the_reference(setting, raised):
+    """A convex cost at a given placement: the same optimum to 0.1 %."""
+    keep = 0.9 * raised.smallest
+    ours = SequentialSolver(setting, free=False).calm(raised, keep)
+    reference = IpoptSolver(setting, free=False).calm(raised, keep)
+    assert ours.smallest >= keep - 1e-4
+    assert setting.unrest_of(ours.coefficients) <= 1.001 * setting.unrest_of(reference.coefficients) + 1e-9
+    assert setting.unrest_of(ours.coefficients) < setting.unrest_of(raised.coefficients)
+    np.testing.assert_array_equal(ours.transform.rotation, raised.transform.rotation)
+
+
+def test_the_linear_model_is_the_derivative(setting, raised):
+    """Against central differences of the margins themselves, along random directions of all unknowns."""
+    rows = np.arange(len(setting.task.pivots))
+    model = SequentialSolver(setting, free=True).model(raised, rows, raised.smallest)
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        x = rng.normal(size=model.matrix.shape[1])
+
+        def all_values(h, x=x):
+            step, change = h * x[:6] * REACH, (h * x[6:] * setting.cone).reshape(-1, 2)
+            transform = stepped(raised.transform, step)
+            return setting.values(raised.margins, transform, raised.coefficients + change)
+
+        slope = (all_values(1e-6) - all_values(-1e-6)) / 2e-6
+        here = all_values(0.0)
+        # The model's rows are found again among all margins by their values.
+        places = [np.unravel_index(np.abs(here - v).argmin(), here.shape) for v in model.values]
+        expected = np.array([slope[p] for p in places])
+        smooth = np.abs(model.matrix @ x - expected) < 1e-4 * (1.0 + np.abs(expected))
+        assert smooth.mean() > 0.98  # gaps between legs have kinks
+
+
+def test_a_fixed_placement_stays(setting, start):
+    held = SequentialSolver(setting, free=False).raise_margin(start)
+    np.testing.assert_array_equal(held.transform.matrix, start.transform.matrix)
+    assert held.smallest >= start.smallest
+
+
+def test_a_step_keeps_the_placement_rigid():
+    rng = np.random.default_rng(0)
+    moved = stepped(RigidTransform(np.eye(3), np.zeros(3)), rng.normal(size=6))
+    np.testing.assert_allclose(moved.rotation @ moved.rotation.T, np.eye(3), atol=1e-14)
+    assert np.linalg.det(moved.rotation) == pytest.approx(1.0)
