@@ -1,0 +1,222 @@
+"""Jerk limits: the fastest law below the TOPP-RA profile whose leg jerks hold, with S-curve starts and stops.
+
+x(s) = ṡ² becomes a cubic spline. A leg's jerk is √x (q‴ x + 1.5 q″ x′ + 0.5 q′ x″); with 1/√x replaced by its tangent at
+the last iterate its limit is linear, and stricter than the true one. So each pass is convex, its answer keeps the true
+limits, and it is a start from which the next pass can only improve: the last iterate is the best.
+
+From rest √x has no derivative. The law leaves rest with constant jerk, x = c s^(4/3), and joins the spline after a small
+part of the ramp, its speed and acceleration those of the ramp there; so it comes to rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pentapod.arrays import Floats, Ints
+from pentapod.timing.jerk_kernels import convex_pass, cubic_basis
+from pentapod.timing.stages import Failure
+
+PASSES = 3
+GRIDPOINTS_PER_KNOT = 4
+
+_KNOTS_PER_RAMP = 4
+_LEAST_KNOTS = 24
+_JOIN = 0.02
+"""Where the spline begins, as a share of the length over which the first ramp would reach another limit."""
+
+_GROWTH = 1.5
+_END_JERK = 0.95
+_ITERATIONS = 60
+_GAP = 1e-5
+_KEPT = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class JerkRows:
+    """What limits a law at gridpoints (N,): |first u + second x − offset| ≤ 1, |jerks (x, x′, x″)| √x ≤ 1, x ≤ ceiling.
+
+    first, second (N, R); offset (N, R) or (1, R); jerks (N, K, 3): q‴, 1.5 q″ and 0.5 q′ over the limit; ceiling (N,).
+    """
+
+    first: Floats
+    second: Floats
+    offset: Floats
+    jerks: Floats
+    ceiling: Floats
+
+
+class RowsAt(Protocol):
+    """Gives the rows at sorted stations (N,)."""
+
+    def __call__(self, s: Floats) -> JerkRows: ...  # noqa: D102
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothProfile:
+    """x = ṡ² (N,) and its slope x′ = 2 s̈ (N,) at stations (N,), both ends at rest; jerk about constant between."""
+
+    s: Floats
+    x: Floats
+    slope: Floats
+
+
+def jerk_limited(s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: int = PASSES) -> SmoothProfile | Failure:
+    """Return the fastest jerk-limited profile below x (N + 1,) at s (N + 1,), which rests at both ends.
+
+    marks: where the path's third derivative has kinks. A Failure where the passes find nothing.
+    """
+    problem = _Problem.of(s, x, rows_at, marks)
+    y = problem.start()
+    around = np.minimum(problem.top, problem.ramps)
+    for number in range(passes):
+        better = problem.improved(y, around, 0.1 if number == 0 else 1e-2)
+        if better is None:
+            if number == 0:
+                return Failure(-1, "no law below the fastest one keeps the jerk limits")
+            break
+        y = better
+        around = np.maximum(problem.values(y)[:, 0], 1e-9 * problem.top)
+    return problem.profile(y)
+
+
+@dataclass(frozen=True, eq=False)
+class _Ramp:
+    """The law next to a rest: x = c d^(4/3) at the distance d, the spline from the distance `join` on."""
+
+    c: float
+    join: float
+
+    @classmethod
+    def of(cls, rows: JerkRows, s: Floats, reach: float) -> _Ramp:
+        """Return the ramp at the rest s[0] of rows at s, at most `reach` long."""
+        jerk = _END_JERK / float(np.abs(2.0 * rows.jerks[0, :, 2]).max())
+        push = 1.0 / max(float(np.abs(rows.first[0]).max()), 1e-300)
+        c = 6.0 ** (4.0 / 3.0) / 4.0 * jerk ** (2.0 / 3.0)
+        # Where the acceleration or the speed that the ramp reaches would be a limit's.
+        length = min(push**3 / (6.0 * jerk**2), reach)
+        within = max(int(np.searchsorted(np.abs(s - s[0]), length)), 1)
+        length = min(length, (0.5 * float(rows.ceiling[:within].min()) / c) ** 0.75)
+        return cls(c, _JOIN * length)
+
+    def __call__(self, distance: Floats) -> Floats:
+        return self.c * np.maximum(distance, self.join) ** (4.0 / 3.0)
+
+    @property
+    def slope(self) -> float:
+        """x′ where the spline begins."""
+        return 4.0 / 3.0 * self.c * self.join ** (1.0 / 3.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Knots, gridpoints and rows of one stretch between two rests."""
+
+    s: Floats
+    knots: Floats
+    basis: Floats
+    first: Ints
+    rows: JerkRows
+    top: Floats
+    ramps: Floats
+    weight: Floats
+    start_ramp: _Ramp
+    end_ramp: _Ramp
+    length: float
+
+    @classmethod
+    def of(cls, s: Floats, x: Floats, rows_at: RowsAt, marks: Floats) -> _Problem:
+        length = float(s[-1])
+        coarse = rows_at(s)
+        start = _Ramp.of(coarse, s, length / 8.0)
+        end = _Ramp.of(
+            JerkRows(
+                coarse.first[::-1],
+                coarse.second[::-1],
+                coarse.offset[::-1],
+                coarse.jerks[::-1],
+                coarse.ceiling[::-1],
+            ),
+            s[::-1],
+            length / 8.0,
+        )
+        inner = _knots(s, x, coarse, marks, start.join, length - end.join)
+        steps = np.diff(inner)[:, None] * (np.arange(GRIDPOINTS_PER_KNOT) / GRIDPOINTS_PER_KNOT)
+        grid = np.append((inner[:-1, None] + steps).ravel(), inner[-1])
+        knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
+        basis, first = np.empty((len(grid), 3, 4)), np.empty(len(grid), dtype=np.int64)
+        cubic_basis(knots, grid, basis, first)
+        rows = rows_at(grid)
+        top = np.minimum(np.interp(grid, s, x), rows.ceiling)
+        weight = np.gradient(grid)
+        weight *= len(grid) / (weight / np.sqrt(top)).sum()
+        ramps = np.minimum(start(grid), end(length - grid))
+        return cls(grid, knots, basis, first, rows, top, ramps, weight, start, end, length)
+
+    def start(self) -> Floats:
+        """Return coefficients to start from; the two at each end are the ramps' and stay."""
+        places = (self.knots[1:-3] + self.knots[2:-2] + self.knots[3:-1]) / 3.0
+        y = 0.5 * np.interp(places, self.s, np.minimum(self.top, self.ramps))
+        for k, ramp, h in ((0, self.start_ramp, self.knots[4] - self.knots[3]),
+                           (-1, self.end_ramp, self.knots[-4] - self.knots[-5])):
+            y[k] = ramp.c * ramp.join ** (4.0 / 3.0)
+            y[1 if k == 0 else -2] = y[k] + ramp.slope * h / 3.0
+        return y
+
+    def improved(self, y: Floats, around: Floats, warm: float) -> Floats | None:
+        """Return the coefficients after one pass with tangents at `around` (N,), None where it found nothing."""
+        y = y.copy()
+        fixed = np.zeros(len(y), dtype=np.int64)
+        fixed[[0, 1, -2, -1]] = 1
+        rows = self.rows
+        done, gap, breach = convex_pass(
+            self.basis, self.first, rows.second, 0.5 * rows.first, rows.offset, int(len(rows.offset) > 1),
+            rows.jerks, around, self.top, self.weight, fixed, warm, _ITERATIONS, _GAP, y,
+        )
+        kept = breach < _KEPT and np.isfinite(gap) and (done >= 0 or gap < 100 * _GAP)
+        return y if kept else None
+
+    def values(self, y: Floats) -> Floats:
+        """Return x, x′, x″ (N, 3) at the gridpoints."""
+        return np.einsum("ndk,nk->nd", self.basis, y[self.first[:, None] + np.arange(4)])
+
+    def profile(self, y: Floats) -> SmoothProfile:
+        """Return the profile with both rests."""
+        v = self.values(y)
+        return SmoothProfile(
+            np.concatenate([[0.0], self.s, [self.length]]),
+            np.concatenate([[0.0], v[:, 0], [0.0]]),
+            np.concatenate([[0.0], v[:, 1], [0.0]]),
+        )
+
+
+def _knots(s: Floats, x: Floats, rows: JerkRows, marks: Floats, begin: float, end: float) -> Floats:
+    """Return inner knots (K,) from begin to end: equal in the time of the law x, at marks, ever closer to the rests."""
+    speed = np.sqrt(x)
+    times = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(s) / (speed[:-1] + speed[1:]))])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ramps = 2.0 * np.abs(rows.jerks[:, :, 2]).max(axis=1) / np.abs(rows.first).max(axis=1)
+    ramp = float(np.median(ramps[np.isfinite(ramps) & (ramps > 0.0)]))
+    count = max(_LEAST_KNOTS, int(np.ceil(times[-1] / ramp * _KNOTS_PER_RAMP)))
+    even = np.interp(np.linspace(0.0, times[-1], count + 1), times, s)
+    gap = np.interp(s, (even[1:] + even[:-1]) / 2.0, np.diff(even))
+    knots = np.sort(np.concatenate([even, marks]))
+    length = end - begin
+    near = begin * _GROWTH ** np.arange(1, 200)
+    far = (s[-1] - end) * _GROWTH ** np.arange(1, 200)
+    near = near[(near * (1.0 - 1.0 / _GROWTH) < np.interp(near, s, gap)) & (near < 0.45 * length)]
+    far = far[(far * (1.0 - 1.0 / _GROWTH) < np.interp(s[-1] - far, s, gap)) & (far < 0.45 * length)]
+    low = near[-1] if len(near) else begin
+    high = s[-1] - (far[-1] if len(far) else s[-1] - end)
+    knots = np.concatenate([[begin], near, knots[(knots > low) & (knots < high)], (s[-1] - far)[::-1], [end]])
+    # Knots much closer than their neighbourhood asks for add rows and no freedom.
+    least = 0.2 * np.minimum(np.interp(knots, s, gap), np.minimum(knots, s[-1] - knots))
+    kept = [begin]
+    for knot, room in zip(knots[1:-1].tolist(), least[1:-1].tolist(), strict=True):
+        if knot - kept[-1] > room:
+            kept.append(knot)
+    while len(kept) > 1 and end - kept[-1] < least[-2]:
+        kept.pop()
+    return np.array([*kept, end])
