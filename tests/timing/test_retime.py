@@ -29,7 +29,8 @@ FINE = 1e-5  # a controller period so short that whole periods do not show
 
 
 def timed(path, m, **options):
-    result = retime(path, m, **options)
+    """The law without jerk limits, for which there are closed forms."""
+    result = retime(path, m, **{"limit_jerk": False, **options})
     assert isinstance(result, Trajectory), str(result)
     return result
 

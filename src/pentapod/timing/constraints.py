@@ -28,13 +28,14 @@ _PAIRS = np.triu_indices(5, 1)
 class Limits:
     """What the plan may use: the machine's limits less the margins.
 
-    velocity (5,) m/s and acceleration (5,) m/s² of the legs; rapid: the tip's speed on rapids, m/s;
+    velocity (5,) m/s, acceleration (5,) m/s² and jerk (5,) m/s³ of the legs; rapid: the tip's speed on rapids, m/s;
     feed_fraction of each feed; guard: seconds by which a slower section's feed reaches into its faster
     neighbours, so that no interval between two setpoints straddles the step too fast.
     """
 
     velocity: Floats
     acceleration: Floats
+    jerk: Floats
     rapid: float
     feed_fraction: float
     guard: float
@@ -45,6 +46,7 @@ class Limits:
         return cls(
             velocity=machine.legs.max_velocity * (1.0 - velocity_margin),
             acceleration=machine.legs.max_acceleration * (1.0 - acceleration_margin),
+            jerk=machine.legs.max_jerk * (1.0 - acceleration_margin),
             rapid=machine.rapid_velocity * (1.0 - velocity_margin),
             feed_fraction=1.0 - velocity_margin,
             guard=guard,

@@ -1,57 +1,37 @@
 """Jerk limits: the fastest law below the TOPP-RA profile whose leg jerks hold, with S-curve starts and stops.
 
-x(s) = ṡ² becomes a cubic spline. A leg's jerk is √x (q‴ x + 1.5 q″ x′ + 0.5 q′ x″); with 1/√x replaced by its tangent at
-the last iterate its limit is linear, and stricter than the true one. So each pass is convex, its answer keeps the true
-limits, and it is a start from which the next pass can only improve: the last iterate is the best.
+x(s) = ṡ² becomes a cubic spline. A leg's jerk is √x (q‴ x + 1.5 q″ x′ + 0.5 q′ x″); with 1/√x replaced by its
+tangent at the last iterate the limit is linear, and stricter than the true one. So each pass is convex, its answer
+keeps the true limits, and the next pass starts from it and can only improve: the last iterate is the best.
 
-From rest √x has no derivative. The law leaves rest with constant jerk, x = c s^(4/3), and joins the spline after a small
-part of the ramp, its speed and acceleration those of the ramp there; so it comes to rest.
+At rest √x has no derivative. The law leaves rest with constant jerk, x = c s^(4/3), and joins the spline after a
+small part of the ramp, with the ramp's speed and acceleration; so it comes to rest.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.timing.jerk_kernels import convex_pass, cubic_basis
+from pentapod.timing.jerk_rows import JerkRows, RowsAt
 from pentapod.timing.stages import Failure
 
 PASSES = 3
 GRIDPOINTS_PER_KNOT = 4
 
-_KNOTS_PER_RAMP = 4
-_LEAST_KNOTS = 24
-_JOIN = 0.02
+_KNOTS_PER_RAMP = 6
+_LEAST_KNOTS = 64
+_JOIN = 0.01
 """Where the spline begins, as a share of the length over which the first ramp would reach another limit."""
 
 _GROWTH = 1.5
-_END_JERK = 0.95
+_END_JERK = 0.98
 _ITERATIONS = 60
 _GAP = 1e-5
 _KEPT = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class JerkRows:
-    """What limits a law at gridpoints (N,): |first u + second x − offset| ≤ 1, |jerks (x, x′, x″)| √x ≤ 1, x ≤ ceiling.
-
-    first, second (N, R); offset (N, R) or (1, R); jerks (N, K, 3): q‴, 1.5 q″ and 0.5 q′ over the limit; ceiling (N,).
-    """
-
-    first: Floats
-    second: Floats
-    offset: Floats
-    jerks: Floats
-    ceiling: Floats
-
-
-class RowsAt(Protocol):
-    """Gives the rows at sorted stations (N,)."""
-
-    def __call__(self, s: Floats) -> JerkRows: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +139,10 @@ class _Problem:
         """Return coefficients to start from; the two at each end are the ramps' and stay."""
         places = (self.knots[1:-3] + self.knots[2:-2] + self.knots[3:-1]) / 3.0
         y = 0.5 * np.interp(places, self.s, np.minimum(self.top, self.ramps))
-        for k, ramp, h in ((0, self.start_ramp, self.knots[4] - self.knots[3]),
-                           (-1, self.end_ramp, self.knots[-4] - self.knots[-5])):
+        for k, ramp, h in (
+            (0, self.start_ramp, self.knots[4] - self.knots[3]),
+            (-1, self.end_ramp, self.knots[-4] - self.knots[-5]),
+        ):
             y[k] = ramp.c * ramp.join ** (4.0 / 3.0)
             y[1 if k == 0 else -2] = y[k] + ramp.slope * h / 3.0
         return y
@@ -172,10 +154,23 @@ class _Problem:
         fixed[[0, 1, -2, -1]] = 1
         rows = self.rows
         done, gap, breach = convex_pass(
-            self.basis, self.first, rows.second, 0.5 * rows.first, rows.offset, int(len(rows.offset) > 1),
-            rows.jerks, around, self.top, self.weight, fixed, warm, _ITERATIONS, _GAP, y,
+            self.basis,
+            self.first,
+            rows.second,
+            0.5 * rows.first,
+            rows.offset,
+            int(len(rows.offset) > 1),
+            rows.jerks,
+            around,
+            self.top,
+            self.weight,
+            fixed,
+            warm,
+            _ITERATIONS,
+            _GAP,
+            y,
         )
-        kept = breach < _KEPT and np.isfinite(gap) and (done >= 0 or gap < 100 * _GAP)
+        kept = breach < _KEPT and np.isfinite(gap) and (done >= 0 or gap < 100.0 * _GAP)
         return y if kept else None
 
     def values(self, y: Floats) -> Floats:

@@ -17,6 +17,8 @@ from pentapod.compiled import kernel
 _FLOOR = 1e-9
 """x is held above this share of its top."""
 
+_BREACH = 1e-7
+
 
 @kernel
 def cubic_basis(knots: Floats, s: Floats, basis: Floats, first: Ints) -> None:
@@ -101,22 +103,230 @@ def _values(basis: Floats, first: Ints, y: Floats, v: Floats) -> None:
 
 
 @kernel
-def row_vectors(a0: Floats, a1: Floats, jerks: Floats, around: Floats, top: Floats, i: int, p: Floats) -> None:
-    """Fill the vectors p (R + K + 1, 3) of gridpoint i: of accelerations, jerks, and x over its top."""
-    rows, more = a0.shape[1], jerks.shape[1]
-    for j in range(rows):
-        p[j, 0], p[j, 1], p[j, 2] = a0[i, j], a1[i, j], 0.0
-    root = np.sqrt(around[i])
-    for j in range(more):
-        for d in range(3):
-            p[rows + j, d] = root * jerks[i, j, d]
-    p[rows + more, 0], p[rows + more, 1], p[rows + more, 2] = 1.0 / top[i], 0.0, 0.0
+def _spread(basis: Floats, i: int, g: Floats, b: int, right: Floats) -> None:
+    """Add gridpoint i's gradient g (3,), by x, x′ and x″, to that by the coefficients."""
+    for k in range(4):
+        right[b + k] += basis[i, 0, k] * g[0] + basis[i, 1, k] * g[1] + basis[i, 2, k] * g[2]
 
 
 @kernel
-def _spread(basis: Floats, i: int, g: Floats, b: int, right: Floats) -> None:
+def _spread_matrix(basis: Floats, i: int, h: Floats, b: int, band: Floats) -> None:
+    """Add gridpoint i's Hessian h (6,): xx, xx′, xx″, x′x′, x′x″, x″x″."""
     for k in range(4):
-        right[b + k] += basis[i, 0, k] * g[0] + basis[i, 1, k] * g[1] + basis[i, 2, k] * g[2]
+        u0, u1, u2 = basis[i, 0, k], basis[i, 1, k], basis[i, 2, k]
+        h0 = h[0] * u0 + h[1] * u1 + h[2] * u2
+        h1 = h[1] * u0 + h[3] * u1 + h[4] * u2
+        h2 = h[2] * u0 + h[4] * u1 + h[5] * u2
+        for m in range(k + 1):
+            band[b + k, k - m] += basis[i, 0, m] * h0 + basis[i, 1, m] * h1 + basis[i, 2, m] * h2
+
+
+@kernel
+def _set_up(
+    a0: Floats,
+    a1: Floats,
+    c: Floats,
+    moves: int,
+    jerks: Floats,
+    around: Floats,
+    top: Floats,
+    p: Floats,
+    lean: Floats,
+    bound: Floats,
+) -> None:
+    """Fill the rows: ±p·v + lean x ≤ bound, p (N, P, 3), lean (N, P), bound (N, P, 2)."""
+    count, rows = a0.shape
+    more = jerks.shape[1]
+    for i in range(count):
+        for j in range(rows):
+            p[i, j, 0], p[i, j, 1], p[i, j, 2], lean[i, j] = a0[i, j], a1[i, j], 0.0, 0.0
+            bound[i, j, 0], bound[i, j, 1] = 1.0 + c[i * moves, j], 1.0 - c[i * moves, j]
+        root = np.sqrt(around[i])
+        for j in range(rows, rows + more):
+            for d in range(3):
+                p[i, j, d] = root * jerks[i, j - rows, d]
+            lean[i, j] = 0.5 / around[i]
+            bound[i, j, 0], bound[i, j, 1] = 1.5, 1.5
+        j = rows + more
+        p[i, j, 0], p[i, j, 1], p[i, j, 2], lean[i, j] = 1.0 / top[i], 0.0, 0.0, 0.0
+        bound[i, j, 0], bound[i, j, 1] = 1.0, -_FLOOR
+
+
+@kernel
+def _begin(p: Floats, lean: Floats, bound: Floats, v: Floats, warm: float, s: Floats, z: Floats) -> None:
+    """Fill slacks s and multipliers z (N, P, 2) to start from."""
+    for i in range(len(v)):
+        for j in range(p.shape[1]):
+            q = p[i, j, 0] * v[i, 0] + p[i, j, 1] * v[i, 1] + p[i, j, 2] * v[i, 2]
+            e = lean[i, j] * v[i, 0]
+            s[i, j, 0] = max(bound[i, j, 0] - q - e, warm)
+            s[i, j, 1] = max(bound[i, j, 1] + q - e, warm)
+            z[i, j, 0], z[i, j, 1] = warm * 0.1 / s[i, j, 0], warm * 0.1 / s[i, j, 1]
+
+
+@kernel
+def _assemble(
+    basis: Floats,
+    first: Ints,
+    p: Floats,
+    lean: Floats,
+    bound: Floats,
+    weight: Floats,
+    top: Floats,
+    v: Floats,
+    s: Floats,
+    z: Floats,
+    off: Floats,
+    band: Floats,
+    right: Floats,
+    down: Floats,
+) -> tuple[float, float, float]:
+    """Fill the Newton matrix, the dual residual `right`, the predictor's `down` and the rows' residuals `off`.
+
+    Returns Σ s z, the objective and the largest residual.
+    """
+    band[:], right[:], down[:] = 0.0, 0.0, 0.0
+    g, g2, h = np.empty(3), np.empty(3), np.empty(6)
+    total, breach, objective = 0.0, 0.0, 0.0
+    for i in range(len(first)):
+        x = max(v[i, 0], 1e-6 * top[i])
+        power = weight[i] / (x * np.sqrt(x))
+        objective += power * x
+        g[0], g[1], g[2] = -0.5 * power, 0.0, 0.0
+        g2[:], h[:] = 0.0, 0.0
+        h[0] = 0.75 * power / x
+        for j in range(p.shape[1]):
+            q = p[i, j, 0] * v[i, 0] + p[i, j, 1] * v[i, 1] + p[i, j, 2] * v[i, 2]
+            e = lean[i, j] * v[i, 0]
+            sign = 1.0
+            for side in range(2):
+                p0, p1, p2 = sign * p[i, j, 0] + lean[i, j], sign * p[i, j, 1], sign * p[i, j, 2]
+                si, zi = s[i, j, side], z[i, j, side]
+                rp = sign * q + e + si - bound[i, j, side]
+                off[i, j, side] = rp
+                breach = max(breach, abs(rp))
+                total += si * zi
+                w = zi / si
+                t = w * rp - zi
+                g[0], g[1], g[2] = g[0] + zi * p0, g[1] + zi * p1, g[2] + zi * p2
+                g2[0], g2[1], g2[2] = g2[0] + t * p0, g2[1] + t * p1, g2[2] + t * p2
+                w0, w1 = w * p0, w * p1
+                h[0] += w0 * p0
+                h[1] += w0 * p1
+                h[2] += w0 * p2
+                h[3] += w1 * p1
+                h[4] += w1 * p2
+                h[5] += w * p2 * p2
+                sign = -1.0
+        _spread(basis, i, g, first[i], right)
+        _spread(basis, i, g2, first[i], down)
+        _spread_matrix(basis, i, h, first[i], band)
+    return total, objective, breach
+
+
+@kernel
+def _hold(band: Floats, fixed: Ints) -> None:
+    """Take the fixed coefficients out of the matrix, and keep its factor from breaking down by rounding."""
+    n = len(fixed)
+    for k in range(n):
+        if fixed[k]:
+            for m in range(4):
+                band[k, m] = 0.0
+                if k + m < n:
+                    band[k + m, m] = 0.0
+            band[k, 0] = 1.0
+        else:
+            band[k, 0] *= 1.0 + 1e-12
+
+
+@kernel
+def _predict(
+    p: Floats, lean: Floats, dv: Floats, s: Floats, z: Floats, off: Floats, product: Floats
+) -> tuple[float, float]:
+    """Fill Δs Δz of the step to the boundary; return Σ s z now and after that step."""
+    primal, dual = 1.0, 1.0
+    sz, szd, sdz, dd = 0.0, 0.0, 0.0, 0.0
+    for i in range(len(dv)):
+        for j in range(p.shape[1]):
+            q = p[i, j, 0] * dv[i, 0] + p[i, j, 1] * dv[i, 1] + p[i, j, 2] * dv[i, 2]
+            e = lean[i, j] * dv[i, 0]
+            for side in range(2):
+                si, zi = s[i, j, side], z[i, j, side]
+                d = -off[i, j, side] - q - e
+                ratio = d / si
+                f = -zi - zi * ratio
+                if ratio * primal < -1.0:
+                    primal = -1.0 / ratio
+                if f < -zi and dual * (1.0 + ratio) > 1.0:
+                    dual = 1.0 / (1.0 + ratio)
+                sz += si * zi
+                szd += zi * d
+                sdz += si * f
+                dd += d * f
+                product[i, j, side] = d * f
+                q = -q
+    return sz, max(sz + primal * szd + dual * sdz + primal * dual * dd, 0.0)
+
+
+@kernel
+def _correct(
+    basis: Floats,
+    first: Ints,
+    p: Floats,
+    lean: Floats,
+    s: Floats,
+    z: Floats,
+    off: Floats,
+    product: Floats,
+    aim: float,
+    down: Floats,
+) -> None:
+    """Fill the corrector's `down`; product becomes the complementarity residual s z − aim + Δs Δz."""
+    down[:] = 0.0
+    g = np.empty(3)
+    for i in range(len(first)):
+        g[:] = 0.0
+        for j in range(p.shape[1]):
+            sign = 1.0
+            for side in range(2):
+                si, zi = s[i, j, side], z[i, j, side]
+                rest = si * zi - aim + product[i, j, side]
+                product[i, j, side] = rest
+                t = (zi * off[i, j, side] - rest) / si
+                g[0] += t * (sign * p[i, j, 0] + lean[i, j])
+                g[1] += t * sign * p[i, j, 1]
+                g[2] += t * sign * p[i, j, 2]
+                sign = -1.0
+        _spread(basis, i, g, first[i], down)
+
+
+@kernel
+def _step(p: Floats, lean: Floats, dv: Floats, s: Floats, z: Floats, off: Floats, rest: Floats) -> tuple[float, float]:
+    """Turn `off` into Δs and `rest` into Δz; return how far each may go."""
+    primal, dual = 1e300, 1e300
+    for i in range(len(dv)):
+        for j in range(p.shape[1]):
+            q = p[i, j, 0] * dv[i, 0] + p[i, j, 1] * dv[i, 1] + p[i, j, 2] * dv[i, 2]
+            e = lean[i, j] * dv[i, 0]
+            for side in range(2):
+                si, zi = s[i, j, side], z[i, j, side]
+                d = -off[i, j, side] - q - e
+                f = (-rest[i, j, side] - zi * d) / si
+                if d < 0.0 and -si > primal * d:
+                    primal = -si / d
+                if f < 0.0 and -zi > dual * f:
+                    dual = -zi / f
+                off[i, j, side], rest[i, j, side] = d, f
+                q = -q
+    return min(1.0, 0.99 * primal), min(1.0, 0.99 * dual)
+
+
+@kernel
+def _newton(band: Floats, right: Floats, down: Floats, fixed: Ints, step: Floats) -> None:
+    """Fill the step of the coefficients from the factored matrix."""
+    for k in range(len(fixed)):
+        step[k] = 0.0 if fixed[k] else -right[k] - down[k]
+    _solve(band, len(fixed), step)
 
 
 @kernel
@@ -137,159 +347,46 @@ def convex_pass(
     tolerance: float,
     y: Floats,
 ) -> tuple[int, float, float]:
-    """Improve the coefficients y (n,) in their place; those in `fixed` (1 or 0) stay.
+    """Improve the coefficients y (n,) in their place; those marked 1 in `fixed` (n,) stay.
 
-    a0, a1 (N, R); c (N, R) or (1, R); jerks (N, K, 3): J₀, J₁, J₂; around, top, weight (N,). warm: slacks and
-    multipliers start on that level. Returns the iterations, −1 − their number where it did not converge, the gap over
-    the objective, and the largest breach of a row.
+    a0, a1 (N, R): A₀ and A₁; c (N, R), or (1, R) where `moves` is 0; jerks (N, K, 3): J₀, J₁, J₂; around (N,): x_k;
+    top, weight (N,). warm: slacks and multipliers start on that level. Returns the iterations, or −1 where `most` did
+    not converge, the gap over the objective, and the largest breach of a row.
     """
     count, n = len(first), len(y)
-    rows, more = a0.shape[1], jerks.shape[1]
-    pairs = rows + more + 1
+    pairs = a0.shape[1] + jerks.shape[1] + 1
+    p, lean, bound = np.empty((count, pairs, 3)), np.empty((count, pairs)), np.empty((count, pairs, 2))
     s, z = np.empty((count, pairs, 2)), np.empty((count, pairs, 2))
-    ds, dz, off = np.empty((count, pairs, 2)), np.empty((count, pairs, 2)), np.empty((count, pairs, 2))
-    v, dv = np.empty((count, 3)), np.empty((count, 3))
-    band, right, down, step = np.empty((n, 4)), np.empty(n), np.empty(n), np.empty(n)
-    p = np.zeros((count, pairs, 3))
-    bound = np.empty((count, pairs, 2))
-    lean = np.zeros((count, pairs))
-    g, g2, hess = np.empty(3), np.empty(3), np.empty(6)
+    off, rest = np.empty((count, pairs, 2)), np.empty((count, pairs, 2))
+    v, dv, band = np.empty((count, 3)), np.empty((count, 3)), np.empty((n, 4))
+    right, down, step = np.empty(n), np.empty(n), np.empty(n)
+    _set_up(a0, a1, c, moves, jerks, around, top, p, lean, bound)
     _values(basis, first, y, v)
-    for i in range(count):
-        row_vectors(a0, a1, jerks, around, top, i, p[i])
-        for j in range(pairs):
-            if j < rows:
-                bound[i, j, 0], bound[i, j, 1] = 1.0 + c[i * moves, j], 1.0 - c[i * moves, j]
-            elif j < rows + more:
-                bound[i, j, 0] = bound[i, j, 1] = 1.5
-                lean[i, j] = 0.5 / around[i]
-            else:
-                bound[i, j, 0], bound[i, j, 1] = 1.0, -_FLOOR
-            q = p[i, j, 0] * v[i, 0] + p[i, j, 1] * v[i, 1] + p[i, j, 2] * v[i, 2]
-            e = lean[i, j] * v[i, 0]
-            s[i, j, 0] = max(bound[i, j, 0] - q - e, warm)
-            s[i, j, 1] = max(bound[i, j, 1] + q - e, warm)
-            z[i, j, 0], z[i, j, 1] = warm * 0.1 / s[i, j, 0], warm * 0.1 / s[i, j, 1]
-    gap, breach, objective = 1.0, 1.0, 1.0
+    _begin(p, lean, bound, v, warm, s, z)
+    gap, breach = np.inf, np.inf
     for attempt in range(most):
-        band[:], right[:], down[:] = 0.0, 0.0, 0.0
-        mu, breach, objective = 0.0, 0.0, 0.0
-        for i in range(count):
-            g[:], g2[:], hess[:] = 0.0, 0.0, 0.0
-            x = max(v[i, 0], 1e-6 * top[i])
-            power = weight[i] / (x * np.sqrt(x))
-            objective += power * x
-            g[0] = -0.5 * power
-            hess[0] = 0.75 * power / x
-            for j in range(pairs):
-                q = p[i, j, 0] * v[i, 0] + p[i, j, 1] * v[i, 1] + p[i, j, 2] * v[i, 2]
-                e = lean[i, j] * v[i, 0]
-                for side in range(2):
-                    sign = 1.0 - 2.0 * side
-                    p0, p1, p2 = sign * p[i, j, 0] + lean[i, j], sign * p[i, j, 1], sign * p[i, j, 2]
-                    si, zi = s[i, j, side], z[i, j, side]
-                    rp = sign * q + e + si - bound[i, j, side]
-                    off[i, j, side] = rp
-                    breach = max(breach, abs(rp))
-                    mu += si * zi
-                    w = zi / si
-                    g[0], g[1], g[2] = g[0] + zi * p0, g[1] + zi * p1, g[2] + zi * p2
-                    t = w * rp - zi
-                    g2[0], g2[1], g2[2] = g2[0] + t * p0, g2[1] + t * p1, g2[2] + t * p2
-                    hess[0] += w * p0 * p0
-                    hess[1] += w * p0 * p1
-                    hess[2] += w * p0 * p2
-                    hess[3] += w * p1 * p1
-                    hess[4] += w * p1 * p2
-                    hess[5] += w * p2 * p2
-            b = first[i]
-            _spread(basis, i, g, b, right)
-            _spread(basis, i, g2, b, down)
-            for k in range(4):
-                u0, u1, u2 = basis[i, 0, k], basis[i, 1, k], basis[i, 2, k]
-                h0 = hess[0] * u0 + hess[1] * u1 + hess[2] * u2
-                h1 = hess[1] * u0 + hess[3] * u1 + hess[4] * u2
-                h2 = hess[2] * u0 + hess[4] * u1 + hess[5] * u2
-                for m in range(k + 1):
-                    band[b + k, k - m] += basis[i, 0, m] * h0 + basis[i, 1, m] * h1 + basis[i, 2, m] * h2
-        gap = mu / objective
-        mu /= 2.0 * count * pairs
-        if gap < tolerance and breach < 1e-7:
+        total, objective, breach = _assemble(basis, first, p, lean, bound, weight, top, v, s, z, off, band, right, down)
+        gap = total / objective
+        if gap < tolerance and breach < _BREACH:
             return attempt, gap, breach
-        for k in range(n):
-            if fixed[k]:
-                for m in range(4):
-                    band[k, m] = 0.0
-                    if k + m < n:
-                        band[k + m, m] = 0.0
-                band[k, 0] = 1.0
-            else:
-                band[k, 0] *= 1.0 + 1e-12
+        if not np.isfinite(gap):
+            break
+        _hold(band, fixed)
         _factor(band, n)
-        for k in range(n):
-            step[k] = 0.0 if fixed[k] else -right[k] - down[k]
-        _solve(band, n, step)
+        _newton(band, right, down, fixed, step)
         _values(basis, first, step, dv)
-        primal, dual = 1.0, 1.0
-        sz, szd, sdz, dd = 0.0, 0.0, 0.0, 0.0
-        for i in range(count):
-            for j in range(pairs):
-                q = p[i, j, 0] * dv[i, 0] + p[i, j, 1] * dv[i, 1] + p[i, j, 2] * dv[i, 2]
-                e = lean[i, j] * dv[i, 0]
-                for side in range(2):
-                    si, zi = s[i, j, side], z[i, j, side]
-                    d = -off[i, j, side] - (1.0 - 2.0 * side) * q - e
-                    f = -zi - zi * d / si
-                    if d < 0.0:
-                        primal = min(primal, -si / d)
-                    if f < 0.0:
-                        dual = min(dual, -zi / f)
-                    sz += si * zi
-                    szd += zi * d
-                    sdz += si * f
-                    dd += d * f
-                    ds[i, j, side] = d * f
-        after = max(sz + primal * szd + dual * sdz + primal * dual * dd, 0.0)
-        aim = mu * (after / sz) ** 3
-        down[:] = 0.0
-        for i in range(count):
-            g2[:] = 0.0
-            for j in range(pairs):
-                for side in range(2):
-                    sign = 1.0 - 2.0 * side
-                    si, zi = s[i, j, side], z[i, j, side]
-                    t = (zi * off[i, j, side] - (si * zi - aim + ds[i, j, side])) / si
-                    g2[0] += t * (sign * p[i, j, 0] + lean[i, j])
-                    g2[1] += t * sign * p[i, j, 1]
-                    g2[2] += t * sign * p[i, j, 2]
-            _spread(basis, i, g2, first[i], down)
-        for k in range(n):
-            step[k] = 0.0 if fixed[k] else -right[k] - down[k]
-        _solve(band, n, step)
+        before, after = _predict(p, lean, dv, s, z, off, rest)
+        aim = total / (2.0 * count * pairs) * (after / before) ** 3
+        _correct(basis, first, p, lean, s, z, off, rest, aim, down)
+        _newton(band, right, down, fixed, step)
         _values(basis, first, step, dv)
-        primal, dual = 1e300, 1e300
-        for i in range(count):
-            for j in range(pairs):
-                q = p[i, j, 0] * dv[i, 0] + p[i, j, 1] * dv[i, 1] + p[i, j, 2] * dv[i, 2]
-                e = lean[i, j] * dv[i, 0]
-                for side in range(2):
-                    si, zi = s[i, j, side], z[i, j, side]
-                    d = -off[i, j, side] - (1.0 - 2.0 * side) * q - e
-                    f = (-(si * zi - aim + ds[i, j, side]) - zi * d) / si
-                    if d < 0.0:
-                        primal = min(primal, -si / d)
-                    if f < 0.0:
-                        dual = min(dual, -zi / f)
-                    ds[i, j, side], dz[i, j, side] = d, f
-        primal, dual = min(1.0, 0.99 * primal), min(1.0, 0.99 * dual)
+        primal, dual = _step(p, lean, dv, s, z, off, rest)
         for i in range(count):
             for j in range(pairs):
                 for side in range(2):
-                    s[i, j, side] += primal * ds[i, j, side]
-                    z[i, j, side] += dual * dz[i, j, side]
+                    s[i, j, side] += primal * off[i, j, side]
+                    z[i, j, side] += dual * rest[i, j, side]
         for k in range(n):
             y[k] += primal * step[k]
         _values(basis, first, y, v)
-        if not np.isfinite(y[0]):
-            break
-    return -1 - most, gap, breach
+    return -1, gap, breach

@@ -41,6 +41,31 @@ class MotionLaw:
         times = np.concatenate([[0.0], np.cumsum(steps)])
         return cls(times, stations, speeds, np.diff(speeds) / steps, np.zeros(len(steps)))
 
+    @classmethod
+    def through(cls, stations: Floats, squared_speeds: Floats, slopes: Floats) -> MotionLaw:
+        """Return the law with ṡ² = `squared_speeds` (K,) and d(ṡ²)/ds = `slopes` (K,) at `stations` (K,).
+
+        Two cubics in each stage, equally long, meet both ends' station, speed and acceleration, so acceleration is
+        continuous. From or to a rest of slope 0 a ramp of constant jerk stays one. At least one end of each stage
+        must move.
+        """
+        v, a, ds = np.sqrt(squared_speeds), 0.5 * slopes, np.diff(stations)
+        gain, total = np.diff(a), v[:-1] + v[1:]
+        half = 2.0 * ds / (total + np.sqrt(np.maximum(total**2 - 4.0 / 3.0 * gain * ds, 0.0)))
+        early = (np.diff(v) - 2.0 * a[:-1] * half) / half**2 - 0.5 * gain / half
+        late = gain / half - early
+        middle_a = a[:-1] + early * half
+        middle_v = v[:-1] + half * (a[:-1] + 0.5 * early * half)
+        middle_s = stations[:-1] + half * (v[:-1] + half * (0.5 * a[:-1] + early * half / 6.0))
+        times = np.concatenate([[0.0], np.cumsum(np.repeat(half, 2))])
+        return cls(
+            times,
+            np.append(np.column_stack([stations[:-1], middle_s]), stations[-1]),
+            np.append(np.column_stack([v[:-1], np.maximum(middle_v, 0.0)]), v[-1]),
+            np.column_stack([a[:-1], middle_a]).ravel(),
+            np.column_stack([early, late]).ravel(),
+        )
+
     @property
     def duration(self) -> float:
         """Seconds."""

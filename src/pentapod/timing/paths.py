@@ -16,7 +16,7 @@ class PieceLike(Protocol):
     is `length`; section_feeds (M,): m/s, infinite on rapids; section_kinds and section_segments (M,): kind
     and index of the toolpath's segment. waypoint_stations, waypoints (W,): s of the toolpath's waypoints, not
     falling, and their indices. `piece(s, order)` gives legs (n, 5) in metres and their
-    derivatives d^order/ds^order, order 0, 1, 2, the second continuous.
+    derivatives d^order/ds^order, order 0 to 3, the second continuous; the third is asked for where jerk is limited.
     """
 
     @property

@@ -8,9 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints
+from pentapod.compiled import kernels_available
 from pentapod.timing.constraints import Limits
 from pentapod.timing.engine import Engine, fastest
 from pentapod.timing.grid import first_grid
+from pentapod.timing.jerk_rows import JerkRows
+from pentapod.timing.law import MotionLaw
 from pentapod.timing.paths import PieceLike
 from pentapod.timing.stages import Failure
 
@@ -26,8 +29,8 @@ _EASINGS = 3
 class PieceProfile:
     """Squared speeds x (N + 1,) in m²/s² at stations s (N + 1,) in metres of a piece, linear in s between.
 
-    ease_acceleration and ease_speed (N + 1,): factors ≤ 1 on the leg acceleration limits and on the speeds
-    at each gridpoint, where a plan at full limits was measured to exceed them.
+    ease_acceleration, ease_speed and ease_jerk (N + 1,): factors ≤ 1 on the limits at each gridpoint, where a plan at
+    full limits was measured to exceed them.
     """
 
     piece: PieceLike
@@ -36,6 +39,7 @@ class PieceProfile:
     x: Floats
     ease_acceleration: Floats
     ease_speed: Floats
+    ease_jerk: Floats
     engine: Engine = "core"
 
     @cached_property
@@ -61,14 +65,39 @@ class PieceProfile:
             return replace(x, station=float(self.s[x.gridpoint])) if x.gridpoint >= 0 else x
         return self.with_(x=x)
 
+    def smooth_law(self) -> MotionLaw | Failure:
+        """Return the fastest law below this profile that keeps the legs' jerk limits too."""
+        if not kernels_available():
+            return Failure(-1, "jerk limits need the compiled kernels")
+        from pentapod.timing.jerk import jerk_limited  # noqa: PLC0415  (compiled: loaded where it is used)
+
+        smooth = jerk_limited(self.s, self.x, self._jerk_rows, self.piece.knots)
+        return smooth if isinstance(smooth, Failure) else MotionLaw.through(smooth.s, smooth.x, smooth.slope)
+
+    def _jerk_rows(self, s: Floats) -> JerkRows:
+        first, second, third = (self.piece(s, order) for order in (1, 2, 3))
+        acceleration, speed, jerk = (
+            np.interp(s, self.s, ease)[:, None] for ease in (self.ease_acceleration, self.ease_speed, self.ease_jerk)
+        )
+        rows, per = 1.0 / (self.limits.acceleration * acceleration), 1.0 / (self.limits.jerk * jerk)
+        return JerkRows(
+            first * rows,
+            second * rows,
+            np.zeros((1, 5)),
+            np.stack([third * per, 1.5 * second * per, 0.5 * first * per], axis=-1),
+            self.limits.ceiling(first, second, self.limits.tip_speed(self.piece, s)[0]) * speed[:, 0] ** 2,
+        )
+
     def ceiling(self) -> Floats:
         """Return the largest x (N + 1,) at each gridpoint that any path acceleration allows, m²/s²."""
         return self.limits.ceiling(self.first, self.second, self.tip_speed[0]) * self.ease_speed**2
 
-    def eased(self, acceleration: Floats, speed: Floats) -> PieceProfile | Failure:
-        """Return the profile solved anew with further factors (N + 1,) on accelerations and speeds."""
+    def eased(self, acceleration: Floats, speed: Floats, jerk: Floats | None = None) -> PieceProfile | Failure:
+        """Return the profile solved anew with further factors (N + 1,) on accelerations, speeds and jerks."""
         return self.with_(
-            ease_acceleration=self.ease_acceleration * acceleration, ease_speed=self.ease_speed * speed
+            ease_acceleration=self.ease_acceleration * acceleration,
+            ease_speed=self.ease_speed * speed,
+            ease_jerk=self.ease_jerk if jerk is None else self.ease_jerk * jerk,
         ).solved()
 
     def with_(self, **changes: Floats) -> PieceProfile:
@@ -88,8 +117,8 @@ class PieceProfile:
         added = [self.s[:-1][switching] + (where * np.diff(self.s))[switching]]
         added += [(self.s[:-1] + between * np.diff(self.s))[exceeding] for between in _BETWEEN]
         s = np.unique(np.concatenate([self.s, *added]))
-        x, acceleration, speed = (np.interp(s, self.s, y) for y in (self.x, self.ease_acceleration, self.ease_speed))
-        return PieceProfile(self.piece, self.limits, s, x, acceleration, speed, self.engine)
+        x, *eases = (np.interp(s, self.s, y) for y in (self.x, self.ease_acceleration, self.ease_speed, self.ease_jerk))
+        return PieceProfile(self.piece, self.limits, s, x, *eases, engine=self.engine)
 
     def path_accelerations(self) -> Floats:
         """Return s̈ (N,) of each stage, m/s²."""
@@ -157,7 +186,7 @@ def time_piece(
     halved, those that still do are eased; what is left after that is run slower as a whole.
     """
     s = first_grid(piece, limits)
-    problem = PieceProfile(piece, limits, s, np.zeros_like(s), np.ones_like(s), np.ones_like(s), engine)
+    problem = PieceProfile(piece, limits, s, np.zeros_like(s), *(np.ones_like(s) for _ in range(3)), engine=engine)
     profile = problem.solved()
     for attempt in range(_REFINEMENTS + _EASINGS):
         if isinstance(profile, Failure):

@@ -9,12 +9,12 @@ from pentapod.machine.machine import Machine
 from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
 from pentapod.timing.constraints import CONSTRAINTS, Limits
-from pentapod.timing.cubic import WINDOW_PERIODS, Unmended, smooth_laws, whole_periods
 from pentapod.timing.engine import Engine
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.paths import LegPathLike
 from pentapod.timing.piece import PieceProfile, time_piece
 from pentapod.timing.refusals import STILL_M, refusal, unfit
+from pentapod.timing.sampled import WINDOW_PERIODS, Unmended, sampled_laws, whole_periods
 from pentapod.timing.stages import Failure
 from pentapod.timing.trajectory import Profile, Trajectory
 
@@ -27,11 +27,12 @@ def retime(
     velocity_margin: float = 0.002,
     acceleration_margin: float = 0.005,
     engine: Engine = "core",
+    limit_jerk: bool = True,
 ) -> Trajectory | Refusal:
-    """Return the time-optimal trajectory along a path, or the named cause why there is none.
+    """Return the fastest trajectory along a path, or the named cause why there is none.
 
-    Leg velocities and accelerations, the feed on cuts and links and the rapid rate on rapids hold at and
-    between the gridpoints, and on the setpoints as the controller joins them (`machine.controller`). Each
+    Leg velocities, accelerations and (limit_jerk) jerks, the feed on cuts and links and the rapid rate on rapids
+    hold at and between the gridpoints, and on the setpoints as the controller joins them (`machine.controller`). Each
     piece goes from rest to rest and lasts a whole number of periods. The margins are fractions of the
     limits that the plan leaves free; the rounding of setpoints and what happens between gridpoints uses part
     of them. Pieces of no length are passed over. Method: TOPP-RA (Pham and Pham 2018), by a compiled core; engine
@@ -64,8 +65,8 @@ def retime(
         profiles.append(profile)
         done += path.pieces[k].length
         progress("timing", done / total, f"piece {len(profiles)} of {len(indices)}")
-    if cubic:
-        smoothed = smooth_laws(profiles, machine)
+    if cubic or limit_jerk:
+        smoothed = sampled_laws(profiles, machine, smooth=limit_jerk)
         if isinstance(smoothed, Unmended):
             return refusal(path, indices[smoothed.index], smoothed.failure)
         profiles, laws = smoothed

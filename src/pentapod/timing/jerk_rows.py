@@ -1,0 +1,28 @@
+"""What limits a law with bounded jerk, at any stations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from pentapod.arrays import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class JerkRows:
+    """What limits a law at gridpoints (N,): |first u + second x − offset| ≤ 1, |jerks (x, x′, x″)| √x ≤ 1, x ≤ ceiling.
+
+    first, second (N, R); offset (N, R) or (1, R); jerks (N, K, 3): q‴, 1.5 q″ and 0.5 q′ over the limit; ceiling (N,).
+    """
+
+    first: Floats
+    second: Floats
+    offset: Floats
+    jerks: Floats
+    ceiling: Floats
+
+
+class RowsAt(Protocol):
+    """Gives the rows at sorted stations (N,)."""
+
+    def __call__(self, s: Floats) -> JerkRows: ...  # noqa: D102

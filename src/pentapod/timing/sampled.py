@@ -1,0 +1,183 @@
+"""Time laws whose limits hold on the sampled program, as the controller joins its setpoints.
+
+A law that keeps the limits at every instant does not yet keep them so: the cubic spline through its setpoints
+overshoots where accelerations jump (by 27 % at a reversal from full acceleration to full braking) or jerks do.
+What the controller will make is measured exactly, and where it exceeds a limit the plan is eased around that
+place and solved again. After a bounded number of rounds the pieces that still exceed are run slower.
+
+Laws limited in jerk are taken as they are. Others, for a cubic controller, are averaged over a few periods first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from pentapod.arrays import Floats
+from pentapod.geometry.interpolant import Interpolant
+from pentapod.machine.machine import Machine
+from pentapod.timing.law import MotionLaw
+from pentapod.timing.piece import PieceProfile
+from pentapod.timing.stages import Failure
+
+WINDOW_PERIODS = 4
+"""Periods over which a law with steps of acceleration is averaged: fewer overshoot, more cost time at each stop."""
+
+JERK_GOAL = 1.04
+"""Share of the jerk limit that a sampled program may use: where jerk steps, the spline through setpoints rings."""
+
+_EASINGS = 8
+_SLOWINGS = 12
+_GOAL = 0.999
+_EXTRA = 0.99
+_EXTRA_PER_ROUND = 0.01
+"""Each easing moves the setpoints against the corners of the path: a place that comes back gets more room."""
+
+
+@dataclass(frozen=True)
+class Unmended:
+    """The index of the profile that could not be mended, and why."""
+
+    index: int
+    failure: Failure
+
+
+@dataclass(frozen=True, eq=False)
+class _Timed:
+    """A piece's profile, by which factor its law is run slower, and whether its jerk is limited."""
+
+    profile: PieceProfile
+    slower: float
+    smooth: bool
+    period: float
+
+    @cached_property
+    def law(self) -> MotionLaw:
+        """The law of the piece, in whole periods.
+
+        Where the passes find no law that keeps the jerk limits, the averaged one is run as slowly as they ask.
+        """
+        law = self.profile.smooth_law() if self.smooth else None
+        if not isinstance(law, MotionLaw):
+            law = MotionLaw.from_profile(self.profile.s, self.profile.x).smoothed(WINDOW_PERIODS * self.period)
+        return law.stretched(whole_periods(law.duration * self.slower, self.period))
+
+
+@dataclass(frozen=True, eq=False)
+class _Use:
+    """Shares (rows,) of the limits around the setpoints of a piece: of rates or feed, of accelerations, of jerks."""
+
+    speed: Floats
+    acceleration: Floats
+    jerk: Floats
+
+    @property
+    def exceeds(self) -> bool:
+        """Whether a share is above what is aimed at."""
+        return max(float(self.speed.max()), float(self.acceleration.max())) > _GOAL or self.jerk.max() > JERK_GOAL
+
+    @property
+    def slowing(self) -> float:
+        """By which factor the piece must be run slower for every share to be 1 at most."""
+        speed, acceleration, jerk = (float(y.max()) for y in (self.speed, self.acceleration, self.jerk))
+        return max(speed, acceleration**0.5, (jerk / JERK_GOAL) ** (1.0 / 3.0))
+
+    def worst(self, other: _Use) -> _Use:
+        """Return the larger shares of two."""
+        return _Use(
+            np.maximum(self.speed, other.speed),
+            np.maximum(self.acceleration, other.acceleration),
+            np.maximum(self.jerk, other.jerk),
+        )
+
+
+def whole_periods(duration: float, period: float) -> float:
+    """Return the duration rounded up to a whole number of periods, at least one."""
+    return max(1.0, float(np.ceil(duration / period - 1e-9))) * period
+
+
+def sampled_laws(
+    profiles: list[PieceProfile], machine: Machine, *, smooth: bool
+) -> tuple[list[PieceProfile], list[MotionLaw]] | Unmended:
+    """Return profiles and laws whose setpoints keep the machine's limits and the feeds, as they are joined.
+
+    smooth: jerks are limited too.
+    """
+    period = machine.controller.period
+    timed = [_Timed(profile, 1.0, smooth, period) for profile in profiles]
+    exceeding: list[int] = []
+    for attempt in range(_EASINGS + _SLOWINGS):
+        uses = _uses(timed, machine, smooth)
+        exceeding = [k for k, use in enumerate(uses) if use.exceeds]
+        if not exceeding:
+            return [piece.profile for piece in timed], [piece.law for piece in timed]
+        if attempt < _EASINGS:
+            # Easing shifts all later setpoints against the path: ease for the rows between as well.
+            uses = [a.worst(b) for a, b in zip(uses, _uses(timed, machine, smooth, 0.5), strict=True)]
+        for k in exceeding:
+            if attempt < _EASINGS:
+                rows = timed[k].law(np.arange(len(uses[k].speed)) * period)
+                eased = _eased(timed[k].profile, rows, uses[k], _EXTRA - attempt * _EXTRA_PER_ROUND)
+                if isinstance(eased, Failure):
+                    return Unmended(k, eased)
+                timed[k] = replace(timed[k], profile=eased)
+            else:
+                timed[k] = replace(timed[k], slower=timed[k].slower * uses[k].slowing / _EXTRA)
+    return Unmended(exceeding[0], Failure(-1, "the sampled program exceeds a limit however slowly it is run"))
+
+
+def _uses(timed: list[_Timed], machine: Machine, smooth: bool, phase: float = 0.0) -> list[_Use]:
+    """Return what each piece uses of the limits. phase: by how many periods the rows come later than the program's."""
+    period = machine.controller.period
+    counts = [round(piece.law.duration / period) for piece in timed]
+    columns: list[Floats] = []
+    speeds: list[Floats] = []
+    start = 0.0
+    for piece, count in zip(timed, counts, strict=True):
+        law = piece.law
+        s = law((np.arange(count + 1) + phase) * period)
+        s[-1] = law.length
+        columns.append(np.column_stack([piece.profile.piece(s, 0), start + s])[1 if columns else 0 :])
+        limits = piece.profile.limits
+        # Against the feeds themselves: the plan's margin is there to be used up.
+        speeds.append(limits.tip_speed(piece.profile.piece, s)[0] / limits.feed_fraction)
+        start += law.length
+    motion = Interpolant.through(np.concatenate(columns), period, machine.controller.interpolation)
+    legs = machine.legs
+    hard = (motion.accelerations[:, :5] / legs.max_acceleration).max(axis=1)
+    fast = (motion.rates[:, :5] / legs.max_velocity).max(axis=1)
+    jolt = (motion.jerks[:, :5] / legs.max_jerk).max(axis=1) * float(smooth)
+    uses: list[_Use] = []
+    row = 0
+    for speed, count in zip(speeds, counts, strict=True):
+        here = slice(row, row + count)
+        feed = motion.rates[here, 5] / np.minimum(speed[:-1], speed[1:])
+        uses.append(_Use(_at_rows(np.maximum(fast[here], feed)), hard[row : row + count + 1], _at_rows(jolt[here])))
+        row += count
+    return uses
+
+
+def _at_rows(shares: Floats) -> Floats:
+    """Return for each row the larger share of the intervals that it ends."""
+    return np.maximum(np.append(shares, 0.0), np.append(0.0, shares))
+
+
+def _eased(profile: PieceProfile, rows: Floats, use: _Use, room: float) -> PieceProfile | Failure:
+    """Return the profile with limits lowered around the rows (stations) where a share exceeds the goal."""
+    speed, acceleration = (_factors(profile.s, rows, share, _GOAL, room) for share in (use.speed, use.acceleration))
+    return profile.eased(acceleration, speed, _factors(profile.s, rows, use.jerk, JERK_GOAL, room * JERK_GOAL))
+
+
+def _factors(s: Floats, rows: Floats, shares: Floats, goal: float, room: float) -> Floats:
+    """Return factors (N + 1,) at gridpoints s from shares at rows (n,), spread over the smoothing window."""
+    near = maximum_filter1d(shares, 2 * (WINDOW_PERIODS // 2 + 1) + 1)
+    # From the rows on both sides of a gridpoint, and from the rows inside the stages that it ends.
+    after = np.clip(np.searchsorted(rows, s), 1, len(rows) - 1)
+    worst = np.maximum(near[after - 1], near[after])
+    stage = np.clip(np.searchsorted(s, rows, side="right") - 1, 0, len(s) - 2)
+    np.maximum.at(worst, stage, near)
+    np.maximum.at(worst, stage + 1, near)
+    return np.where(worst > goal, room / np.maximum(worst, goal), 1.0)
