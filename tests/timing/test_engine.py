@@ -35,7 +35,7 @@ def test_failures_are_values_and_silent(caplog, recwarn):
 
 def test_ceiling_is_the_largest_x_with_a_common_acceleration():
     rng = np.random.default_rng(3)
-    limits = Limits(rng.uniform(0.1, 1, 5), rng.uniform(1, 9, 5), 1.0, 1.0, 0.0)
+    limits = Limits(rng.uniform(0.1, 1, 5), rng.uniform(1, 9, 5), np.ones(5), 1.0, 1.0, 0.0)
     first, second = rng.normal(size=(300, 5)), 10 * rng.normal(size=(300, 5))
     x = limits.ceiling(first, second, np.full(300, 0.7))
 

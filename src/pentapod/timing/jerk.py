@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
-from pentapod.timing.jerk_kernels import convex_pass, cubic_basis
+from pentapod.timing.jerk_kernels import convex_pass
 from pentapod.timing.jerk_rows import JerkRows, RowsAt
+from pentapod.timing.spline_kernels import cubic_basis
 from pentapod.timing.stages import Failure
 
 PASSES = 3
@@ -131,8 +132,8 @@ class _Problem:
         rows = rows_at(grid)
         top = np.minimum(np.interp(grid, s, x), rows.ceiling)
         weight = np.gradient(grid)
-        weight *= len(grid) / (weight / np.sqrt(top)).sum()
         ramps = np.minimum(start(grid), end(length - grid))
+        weight *= len(grid) / (weight / np.sqrt(np.minimum(top, ramps))).sum()
         return cls(grid, knots, basis, first, rows, top, ramps, weight, start, end, length)
 
     def start(self) -> Floats:

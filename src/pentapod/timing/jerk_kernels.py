@@ -1,4 +1,4 @@
-"""One convex pass below a jerk limit, compiled: a banded interior point method, and the spline's basis.
+"""One convex pass below a jerk limit, compiled: a banded interior point method.
 
 x(s) = ṡ² is a cubic B-spline with coefficients y. At each gridpoint all that the rows ask is v = (x, x′, x″), three
 numbers of four coefficients; so a gridpoint's rows are summed into a 3×3 matrix before they meet the basis. Rows:
@@ -13,112 +13,12 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.compiled import kernel
+from pentapod.timing.spline_kernels import factor_banded, solve_banded, spline_values, spread, spread_matrix
 
 _FLOOR = 1e-9
-"""x is held above this share of its top."""
+"""x is held above this share of x_k."""
 
 _BREACH = 1e-7
-
-
-@kernel
-def cubic_basis(knots: Floats, s: Floats, basis: Floats, first: Ints) -> None:
-    """Fill the four cubic B-splines that are not zero at sorted s (N,), and two derivatives: basis (N, 3, 4).
-
-    knots (K + 6,): ends given four times. first (N,): index of the first of the four coefficients.
-    """
-    m, last = 3, len(knots) - 5
-    one, two, slope = np.zeros(2), np.zeros(3), np.zeros(3)
-    for i in range(len(s)):
-        x = s[i]
-        while m < last and knots[m + 1] <= x:
-            m += 1
-        first[i] = m - 3
-        h = knots[m + 1] - knots[m]
-        one[0], one[1] = (knots[m + 1] - x) / h, (x - knots[m]) / h
-        p, q = knots[m + 1] - knots[m - 1], knots[m + 2] - knots[m]
-        two[0] = (knots[m + 1] - x) / p * one[0]
-        two[1] = (x - knots[m - 1]) / p * one[0] + (knots[m + 2] - x) / q * one[1]
-        two[2] = (x - knots[m]) / q * one[1]
-        slope[0] = -2.0 * one[0] / p
-        slope[1] = 2.0 * (one[0] / p - one[1] / q)
-        slope[2] = 2.0 * one[1] / q
-        for k in range(4):
-            value, rate, bend = 0.0, 0.0, 0.0
-            j = m - 3 + k
-            if k > 0:
-                d = knots[j + 3] - knots[j]
-                value += (x - knots[j]) / d * two[k - 1]
-                rate += 3.0 * two[k - 1] / d
-                bend += 3.0 * slope[k - 1] / d
-            if k < 3:
-                d = knots[j + 4] - knots[j + 1]
-                value += (knots[j + 4] - x) / d * two[k]
-                rate -= 3.0 * two[k] / d
-                bend -= 3.0 * slope[k] / d
-            basis[i, 0, k], basis[i, 1, k], basis[i, 2, k] = value, rate, bend
-
-
-@kernel
-def _factor(band: Floats, n: int) -> None:
-    """Cholesky's factor of a symmetric matrix, band[i, k] = A[i, i − k], in its place."""
-    for i in range(n):
-        for k in range(min(3, i), -1, -1):
-            j = i - k
-            value = band[i, k]
-            for m in range(1, 4 - k):
-                if j - m >= 0:
-                    value -= band[i, k + m] * band[j, m]
-            if k == 0:
-                band[i, 0] = np.sqrt(max(value, 1e-300))
-            else:
-                band[i, k] = value / band[j, 0]
-
-
-@kernel
-def _solve(band: Floats, n: int, right: Floats) -> None:
-    for i in range(n):
-        value = right[i]
-        for k in range(1, min(3, i) + 1):
-            value -= band[i, k] * right[i - k]
-        right[i] = value / band[i, 0]
-    for i in range(n - 1, -1, -1):
-        value = right[i]
-        for k in range(1, min(3, n - 1 - i) + 1):
-            value -= band[i + k, k] * right[i + k]
-        right[i] = value / band[i, 0]
-
-
-@kernel
-def _values(basis: Floats, first: Ints, y: Floats, v: Floats) -> None:
-    """Fill v (N, 3): x, x′, x″ of the coefficients y."""
-    for i in range(len(first)):
-        b = first[i]
-        for d in range(3):
-            v[i, d] = (
-                basis[i, d, 0] * y[b]
-                + basis[i, d, 1] * y[b + 1]
-                + basis[i, d, 2] * y[b + 2]
-                + basis[i, d, 3] * y[b + 3]
-            )
-
-
-@kernel
-def _spread(basis: Floats, i: int, g: Floats, b: int, right: Floats) -> None:
-    """Add gridpoint i's gradient g (3,), by x, x′ and x″, to that by the coefficients."""
-    for k in range(4):
-        right[b + k] += basis[i, 0, k] * g[0] + basis[i, 1, k] * g[1] + basis[i, 2, k] * g[2]
-
-
-@kernel
-def _spread_matrix(basis: Floats, i: int, h: Floats, b: int, band: Floats) -> None:
-    """Add gridpoint i's Hessian h (6,): xx, xx′, xx″, x′x′, x′x″, x″x″."""
-    for k in range(4):
-        u0, u1, u2 = basis[i, 0, k], basis[i, 1, k], basis[i, 2, k]
-        h0 = h[0] * u0 + h[1] * u1 + h[2] * u2
-        h1 = h[1] * u0 + h[3] * u1 + h[4] * u2
-        h2 = h[2] * u0 + h[4] * u1 + h[5] * u2
-        for m in range(k + 1):
-            band[b + k, k - m] += basis[i, 0, m] * h0 + basis[i, 1, m] * h1 + basis[i, 2, m] * h2
 
 
 @kernel
@@ -149,7 +49,7 @@ def _set_up(
             bound[i, j, 0], bound[i, j, 1] = 1.5, 1.5
         j = rows + more
         p[i, j, 0], p[i, j, 1], p[i, j, 2], lean[i, j] = 1.0 / top[i], 0.0, 0.0, 0.0
-        bound[i, j, 0], bound[i, j, 1] = 1.0, -_FLOOR
+        bound[i, j, 0], bound[i, j, 1] = 1.0, -_FLOOR * around[i] / top[i]
 
 
 @kernel
@@ -172,7 +72,7 @@ def _assemble(
     lean: Floats,
     bound: Floats,
     weight: Floats,
-    top: Floats,
+    around: Floats,
     v: Floats,
     s: Floats,
     z: Floats,
@@ -189,7 +89,7 @@ def _assemble(
     g, g2, h = np.empty(3), np.empty(3), np.empty(6)
     total, breach, objective = 0.0, 0.0, 0.0
     for i in range(len(first)):
-        x = max(v[i, 0], 1e-6 * top[i])
+        x = max(v[i, 0], 1e-6 * around[i])
         power = weight[i] / (x * np.sqrt(x))
         objective += power * x
         g[0], g[1], g[2] = -0.5 * power, 0.0, 0.0
@@ -218,9 +118,9 @@ def _assemble(
                 h[4] += w1 * p2
                 h[5] += w * p2 * p2
                 sign = -1.0
-        _spread(basis, i, g, first[i], right)
-        _spread(basis, i, g2, first[i], down)
-        _spread_matrix(basis, i, h, first[i], band)
+        spread(basis, i, g, first[i], right)
+        spread(basis, i, g2, first[i], down)
+        spread_matrix(basis, i, h, first[i], band)
     return total, objective, breach
 
 
@@ -297,7 +197,7 @@ def _correct(
                 g[1] += t * sign * p[i, j, 1]
                 g[2] += t * sign * p[i, j, 2]
                 sign = -1.0
-        _spread(basis, i, g, first[i], down)
+        spread(basis, i, g, first[i], down)
 
 
 @kernel
@@ -326,7 +226,7 @@ def _newton(band: Floats, right: Floats, down: Floats, fixed: Ints, step: Floats
     """Fill the step of the coefficients from the factored matrix."""
     for k in range(len(fixed)):
         step[k] = 0.0 if fixed[k] else -right[k] - down[k]
-    _solve(band, len(fixed), step)
+    solve_banded(band, len(fixed), step)
 
 
 @kernel
@@ -361,25 +261,27 @@ def convex_pass(
     v, dv, band = np.empty((count, 3)), np.empty((count, 3)), np.empty((n, 4))
     right, down, step = np.empty(n), np.empty(n), np.empty(n)
     _set_up(a0, a1, c, moves, jerks, around, top, p, lean, bound)
-    _values(basis, first, y, v)
+    spline_values(basis, first, y, v)
     _begin(p, lean, bound, v, warm, s, z)
     gap, breach = np.inf, np.inf
     for attempt in range(most):
-        total, objective, breach = _assemble(basis, first, p, lean, bound, weight, top, v, s, z, off, band, right, down)
+        total, objective, breach = _assemble(
+            basis, first, p, lean, bound, weight, around, v, s, z, off, band, right, down
+        )
         gap = total / objective
         if gap < tolerance and breach < _BREACH:
             return attempt, gap, breach
         if not np.isfinite(gap):
             break
         _hold(band, fixed)
-        _factor(band, n)
+        factor_banded(band, n)
         _newton(band, right, down, fixed, step)
-        _values(basis, first, step, dv)
+        spline_values(basis, first, step, dv)
         before, after = _predict(p, lean, dv, s, z, off, rest)
         aim = total / (2.0 * count * pairs) * (after / before) ** 3
         _correct(basis, first, p, lean, s, z, off, rest, aim, down)
         _newton(band, right, down, fixed, step)
-        _values(basis, first, step, dv)
+        spline_values(basis, first, step, dv)
         primal, dual = _step(p, lean, dv, s, z, off, rest)
         for i in range(count):
             for j in range(pairs):
@@ -388,5 +290,5 @@ def convex_pass(
                     z[i, j, side] += dual * rest[i, j, side]
         for k in range(n):
             y[k] += primal * step[k]
-        _values(basis, first, y, v)
+        spline_values(basis, first, y, v)
     return -1, gap, breach
