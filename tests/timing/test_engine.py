@@ -5,7 +5,6 @@ import pytest
 
 from pentapod.timing.constraints import Limits
 from pentapod.timing.engine import fastest
-from pentapod.timing.interpolant import cubic_extrema
 from pentapod.timing.stages import Failure
 
 
@@ -47,23 +46,3 @@ def test_ceiling_is_the_largest_x_with_a_common_acceleration():
 
     assert room(0.99 * x).all()
     assert not room(1.01 * x).any()
-
-
-def test_cubic_extrema_against_scipy():
-    from scipy.interpolate import CubicSpline
-
-    rng = np.random.default_rng(1)
-    y = np.cumsum(rng.normal(size=(60, 3)), axis=0)
-    rates, accelerations = cubic_extrema(y, 0.1)
-    t = np.arange(60) * 0.1
-    spline = CubicSpline(t, y, bc_type="clamped")
-    assert np.allclose(accelerations, np.abs(spline(t, 2)), rtol=1e-9, atol=1e-9)
-    dense = np.abs(spline(t[:-1, None] + 0.1 * np.linspace(0, 1, 401), 1)).max(axis=1)
-    assert (rates >= dense - 1e-9).all()
-    assert np.allclose(rates, dense, rtol=1e-4)
-
-
-def test_two_rows_are_a_spline_too():
-    rates, accelerations = cubic_extrema(np.array([[0.0], [1.0]]), 1.0)
-    assert rates[0, 0] == pytest.approx(1.5)
-    assert accelerations[:, 0].tolist() == pytest.approx([6.0, 6.0])

@@ -11,6 +11,7 @@ small part of the ramp, with the ramp's speed and acceleration; so it comes to r
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,6 +24,13 @@ from pentapod.timing.stages import Failure
 PASSES = 3
 GRIDPOINTS_PER_KNOT = 4
 
+WINDOW = 256
+"""Coefficients of a window: what it needs stays in a core's own cache."""
+
+LEAD = 64
+"""Coefficients on either side of a seam, beyond which the path has no say in what happens there."""
+
+_COLD, _WARM = 0.1, 0.01
 _KNOTS_PER_RAMP = 6
 _LEAST_KNOTS = 64
 _JOIN = 0.01
@@ -53,7 +61,7 @@ def jerk_limited(s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: i
     y = problem.start()
     around = np.minimum(problem.top, problem.ramps)
     for number in range(passes):
-        better = problem.improved(y, around, 0.1 if number == 0 else 1e-2)
+        better = problem.improved(y, around, number)
         if better is None:
             if number == 0:
                 return Failure(-1, "no law below the fastest one keeps the jerk limits")
@@ -148,31 +156,68 @@ class _Problem:
             y[1 if k == 0 else -2] = y[k] + ramp.slope * h / 3.0
         return y
 
-    def improved(self, y: Floats, around: Floats, warm: float) -> Floats | None:
-        """Return the coefficients after one pass with tangents at `around` (N,), None where it found nothing."""
+    def improved(self, y: Floats, around: Floats, number: int) -> Floats | None:
+        """Return the coefficients after pass `number` with tangents at `around` (N,), None where it found nothing.
+
+        Long stretches go in windows between coefficients that stay. The first pass has found these in windows of
+        their own, about each seam with a lead on both sides; the seams of later passes lie halfway between the last
+        ones, and what stays there is the last pass's, so that every window has an answer.
+        """
+        n = len(y)
+        if n < 2 * WINDOW:
+            return self._solved(y, around, number, 0, n, (2, 2))
         y = y.copy()
-        fixed = np.zeros(len(y), dtype=np.int64)
-        fixed[[0, 1, -2, -1]] = 1
-        rows = self.rows
+        seams = list(range(WINDOW if number % 2 == 0 else WINDOW // 2, n - WINDOW // 2, WINDOW))
+        if number == 0:
+            for seam in seams:
+                low, high = max(seam - LEAD, 0), min(seam + LEAD, n)
+                found = self._solved(y, around, 0, low, high, (2 if low == 0 else 0, 2 if high == n else 0))
+                if found is None:
+                    return self._solved(y, around, 0, 0, n, (2, 2))
+                y[seam - 1 : seam + 2] = found[seam - 1 : seam + 2]
+        better = y.copy()
+        for left, right in pairwise([0, *seams, n]):
+            low, high = max(left - 1, 0), min(right + 2, n)
+            held = (2 if left == 0 else 3, 2 if right == n else 3)
+            found = self._solved(y, around, number, low, high, held)
+            if found is None and number == 0:
+                return self._solved(y, around, 0, 0, n, (2, 2))
+            if found is not None:
+                better[low:high] = found[low:high]
+        return better
+
+    def _solved(
+        self, y: Floats, around: Floats, number: int, low: int, high: int, held: tuple[int, int]
+    ) -> Floats | None:
+        """Return y with the coefficients from low to before high improved; those `held` at either end stay."""
+        here = slice(int(np.searchsorted(self.first, low)), int(np.searchsorted(self.first, high - 4, "right")))
+        fixed = np.zeros(high - low, dtype=np.int64)
+        fixed[: held[0]] = 1
+        fixed[len(fixed) - held[1] :] = 1
+        rows, part = self.rows, y[low:high].copy()
+        moves = int(len(rows.offset) > 1)
         done, gap, breach = convex_pass(
-            self.basis,
-            self.first,
-            rows.second,
-            0.5 * rows.first,
-            rows.offset,
-            int(len(rows.offset) > 1),
-            rows.jerks,
-            around,
-            self.top,
-            self.weight,
+            self.basis[here],
+            self.first[here] - low,
+            rows.second[here],
+            0.5 * rows.first[here],
+            rows.offset[here] if moves else rows.offset,
+            moves,
+            rows.jerks[here],
+            around[here],
+            self.top[here],
+            self.weight[here],
             fixed,
-            warm,
+            _COLD if number == 0 else _WARM,
             _ITERATIONS,
             _GAP,
-            y,
+            part,
         )
-        kept = breach < _KEPT and np.isfinite(gap) and (done >= 0 or gap < 100.0 * _GAP)
-        return y if kept else None
+        if not (breach < _KEPT and np.isfinite(gap) and (done >= 0 or gap < 100.0 * _GAP)):
+            return None
+        y = y.copy() if high - low < len(y) else part
+        y[low:high] = part
+        return y
 
     def values(self, y: Floats) -> Floats:
         """Return x, x′, x″ (N, 3) at the gridpoints."""
