@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test test-all lint bench clean
+.PHONY: demo test test-all lint bench bench-timing clean
 
 demo: $(READY)  ## plan a dome and judge the program
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
@@ -25,6 +25,9 @@ lint: $(READY)
 
 bench: $(READY)  ## stage times, and kinematics against Newton
 	$(BIN)/python benchmarks/pipeline.py
+
+bench-timing: $(READY)  ## time laws against toppra and, where they are installed, others
+	$(BIN)/python benchmarks/timing.py
 
 $(READY): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "pentapod needs Python 3.11 or newer")'

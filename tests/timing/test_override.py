@@ -13,7 +13,7 @@ PERIOD = 1e-3
 
 
 def timed(path, m):
-    trajectory = retime(path, m)
+    trajectory = retime(path, m, limit_jerk=False)
     assert isinstance(trajectory, Trajectory), str(trajectory)
     return trajectory
 
@@ -28,7 +28,7 @@ def two_pieces():
 
 
 def overridden(trajectory, m, time, share):
-    result = override(trajectory, m, time, share)
+    result = override(trajectory, m, time, share, limit_jerk=False)
     assert isinstance(result, Trajectory), str(result)
     return result
 

@@ -18,8 +18,9 @@ CONSTRAINTS = (
     *(f"leg {i} acceleration" for i in range(1, 6)),
     "feed",
     "rapid rate",
+    *(f"leg {i} jerk" for i in range(1, 6)),
 )
-"""Names of the constraints, in the order of the columns that `Limits.shares` returns."""
+"""Names of the constraints: first those of the columns that `Limits.shares` returns."""
 
 _PAIRS = np.triu_indices(5, 1)
 

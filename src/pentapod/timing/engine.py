@@ -38,9 +38,9 @@ def fastest(
         if not 0.0 <= value < np.inf:
             raise InputError("squared speeds are finite and not negative", key=name, value=value)
     stages = Stages.of(s, first, second, ceiling, offset)
-    unfit = ~(np.isfinite(stages.first) & np.isfinite(stages.second)).all(axis=1) | ~(stages.ceiling >= 0.0)
-    if unfit.any():
-        return Failure(int(np.argmax(unfit)), "a limit or a derivative of the path is not a number")
+    fault = stages.fault()
+    if fault is not None:
+        return fault
     if engine == "toppra":
         from pentapod.timing.reference import solve  # noqa: PLC0415  (heavy: imported when asked for)
     elif engine == "core" and kernels_available():

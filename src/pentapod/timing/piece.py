@@ -163,8 +163,13 @@ class PieceProfile:
         where = np.where(near, np.where(u > 0.0, share, 1.0 - share), 0.5)
         return worth, where
 
-    def active(self) -> tuple[Ints, Floats]:
-        """Return the constraint (N + 1,) that holds each gridpoint back most, and its share of the limit."""
+    def active(self, law: MotionLaw | None = None) -> tuple[Ints, Floats]:
+        """Return the constraint (N + 1,) that holds each gridpoint back most, and its share of the limit.
+
+        law: the law limited in jerk below this profile, where there is one; what holds it back is then told.
+        """
+        if law is not None:
+            return self._active_in(law)
         u = self.path_accelerations()
         speed, section = self.tip_speed
         before, after = (
@@ -175,6 +180,19 @@ class PieceProfile:
         column = shares.argmax(axis=1)
         rapid = ~np.isfinite(np.asarray(self.piece.section_feeds, dtype=np.float64))[section]
         return np.where((column == 10) & rapid, 11, column), shares.max(axis=1)
+
+    def _active_in(self, law: MotionLaw) -> tuple[Ints, Floats]:
+        """Return the constraint (N + 1,) of which the law limited in jerk uses most at the gridpoints, and its share."""
+        t = np.interp(self.s, law.stations, law.times)
+        j = law.jerks[np.clip(np.searchsorted(law.times, t, "right") - 1, 0, len(law.jerks) - 1)][:, None]
+        v, a = law(t, 1)[:, None], law(t, 2)[:, None]
+        speed, section = self.tip_speed
+        shares = self.limits.shares(self.first, self.second, v[:, 0] ** 2, a[:, 0], speed)
+        jerks = np.abs(self.first * j + 3.0 * self.second * v * a + self.piece(self.s, 3) * v**3) / self.limits.jerk
+        column = np.concatenate([shares, np.zeros((len(shares), 1)), jerks], axis=1).argmax(axis=1)
+        share = np.maximum(shares.max(axis=1), jerks.max(axis=1))
+        rapid = ~np.isfinite(np.asarray(self.piece.section_feeds, dtype=np.float64))[section]
+        return np.where((column == 10) & rapid, 11, column), share
 
 
 def time_piece(

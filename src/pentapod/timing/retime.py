@@ -73,13 +73,15 @@ def retime(
     else:
         laws = [MotionLaw.from_profile(p.s, p.x) for p in profiles]
         laws = [law.stretched(whole_periods(law.duration, period)) for law in laws]
-    return Trajectory(path, tuple(indices), tuple(laws), _profile(path, indices, profiles, laws))
+    return Trajectory(path, tuple(indices), tuple(laws), _profile(path, indices, profiles, laws, smooth=limit_jerk))
 
 
-def _profile(path: LegPathLike, indices: list[int], profiles: list[PieceProfile], laws: list[MotionLaw]) -> Profile:
+def _profile(
+    path: LegPathLike, indices: list[int], profiles: list[PieceProfile], laws: list[MotionLaw], *, smooth: bool
+) -> Profile:
     starts = np.concatenate([[0.0], np.cumsum([law.duration for law in laws])])
     times = [np.interp(p.s, law.stations, law.times) for p, law in zip(profiles, laws, strict=True)]
-    active = [p.active() for p in profiles]
+    active = [p.active(law if smooth else None) for p, law in zip(profiles, laws, strict=True)]
     return Profile(
         times=np.concatenate([start + t for start, t in zip(starts, times, strict=False)]),
         stations=np.concatenate([float(path.starts[k]) + p.s for k, p in zip(indices, profiles, strict=True)]),

@@ -66,6 +66,13 @@ class Stages:
         plain = {name: np.require(array, np.float64, ["C", "W"]) for name, array in arrays.items()}
         return cls(s=s, offset=np.require(offset, np.float64, ["C", "W"]), **plain)
 
+    def fault(self) -> Failure | None:
+        """Return the first gridpoint whose coefficients are no numbers."""
+        unfit = ~(np.isfinite(self.first) & np.isfinite(self.second)).all(axis=1) | ~(self.ceiling >= 0.0)
+        if not unfit.any():
+            return None
+        return Failure(int(np.argmax(unfit)), "a limit or a derivative of the path is not a number")
+
     def __len__(self) -> int:
         return len(self.s)
 

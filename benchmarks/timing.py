@@ -1,0 +1,230 @@
+"""Time laws against toppra and copp-py in one run, on one core: `make bench-timing`.
+
+Figures are processor time a gridpoint, the best of a few runs, and ratios; peers that are not installed are left out
+(pip install copp-py). Paths: "raster", a 0.1 mm zigzag with 1 mm turns and a pentapod's legs, feed 0.1 m/s (copp-py has
+none and is timed without); "sine", smooth, limited by legs alone. Limits of each leg: 0.5 m/s, 5 m/s², 200 m/s³.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import resource
+import time
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from pentapod.timing.engine import fastest
+from pentapod.timing.jerk import PASSES, jerk_limited
+from pentapod.timing.jerk_rows import JerkRows
+from pentapod.timing.law import MotionLaw
+from pentapod.timing.reference import solve as solve_by_toppra
+from pentapod.timing.stages import Failure, Stages
+
+NO_MARKS = np.empty(0)
+VELOCITY, ACCELERATION, JERK, FEED = 0.5, 5.0, 200.0, 0.1
+
+
+def raster(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Stations (n,) and legs (n, 5) of a zigzag on a wavy surface: rows of 80 mm, turns of 1 mm radius."""
+    row, radius = 0.08, 1e-3
+    period = row + np.pi * radius
+    t = np.arange(n) * 1e-4
+    k, u = np.floor(t / period), t % period
+    turn = np.clip((u - row) / radius, 0.0, None)
+    x = np.minimum(u, row) + radius * np.sin(turn)
+    x = np.where(k % 2 == 1, row - x, x) - row / 2
+    rows = 40
+    folded = np.where(k % (2 * rows) < rows, k % (2 * rows), 2 * rows - k % (2 * rows))
+    up = np.where(k % (2 * rows) < rows, 1.0, -1.0)
+    y = 2 * radius * folded + up * radius * (1 - np.cos(turn)) - 0.04
+    wave = 2 * np.pi * np.array([1 / 0.06, 1 / 0.04])
+    z = 0.005 * np.sin(wave[0] * x) * np.cos(wave[1] * y)
+    slope = 0.005 * np.stack(
+        [wave[0] * np.cos(wave[0] * x) * np.cos(wave[1] * y), -wave[1] * np.sin(wave[0] * x) * np.sin(wave[1] * y)], 1
+    )
+    tip = np.column_stack([x, y, z])
+    axis = np.column_stack([-0.08 * slope, np.ones(n)])
+    axis /= np.linalg.norm(axis, axis=1)[:, None]
+    angle = np.radians([0, 72, 144, 216, 288])
+    base = np.column_stack([0.9 * np.cos(angle), 0.9 * np.sin(angle), [0.9, 1.0, 0.8, 0.95, 0.85]])
+    height = np.array([0.15, 0.25, 0.35, 0.45, 0.55])
+    legs = np.linalg.norm(tip[:, None] + height[:, None] * axis[:, None] - base, axis=2)
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))]), legs
+
+
+def sine(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Stations (n,) and legs (n, 5) of sums of four waves."""
+    rng, s = np.random.default_rng(1), np.arange(n) * 1e-3
+    size = np.array([1, 0.6, 0.3, 0.12])
+    legs = np.empty((n, 5))
+    for j in range(5):
+        wave, phase = np.array([0.13, 0.37, 0.9, 2.1]) * (1 + 0.2 * rng.random(4)), 2 * np.pi * rng.random(4)
+        legs[:, j] = (size[:, None] * np.sin(2 * np.pi * wave[:, None] * s + phase[:, None])).sum(0) / size.sum()
+    return s, 1 + 0.3 * legs
+
+
+class Problem:
+    """A path through waypoints and what limits it."""
+
+    def __init__(self, kind: str, n: int) -> None:
+        """Take the waypoints as gridpoints."""
+        self.kind, self.feed = kind, FEED if kind == "raster" else 1e3
+        self.s, self.legs = (raster if kind == "raster" else sine)(n)
+        self.spline = make_interp_spline(self.s, self.legs, k=5)
+        self.q = [self.spline(self.s, nu=k) for k in range(4)]
+        self.rows = (self.q[1] / ACCELERATION, self.q[2] / ACCELERATION)
+        self.ceiling = self.bound(self.q[1])
+
+    def bound(self, first: np.ndarray) -> np.ndarray:
+        """Return the largest x at gridpoints, by velocities and the feed."""
+        return np.minimum((VELOCITY / np.abs(first)).min(axis=1), self.feed) ** 2
+
+    def jerk_rows(self, s: np.ndarray) -> JerkRows:
+        """Return what the jerk passes ask for."""
+        q1, q2, q3 = (self.spline(s, nu=k) for k in (1, 2, 3))
+        jerks = np.stack([q3, 1.5 * q2, 0.5 * q1], axis=-1) / JERK
+        return JerkRows(q1 / ACCELERATION, q2 / ACCELERATION, np.zeros((1, 5)), jerks, self.bound(q1))
+
+    def solved(self, engine: str) -> np.ndarray:
+        """Return ṡ² by one of our engines."""
+        x = fastest(self.s, *self.rows, self.ceiling, engine=engine)
+        if isinstance(x, Failure):
+            raise SystemExit(f"{engine}: {x}")
+        return x
+
+    def duration(self, x: np.ndarray) -> float:
+        """Return the seconds of a profile linear between gridpoints."""
+        root = np.sqrt(x)
+        return float((2.0 * np.diff(self.s) / (root[1:] + root[:-1])).sum())
+
+
+def best(work: Callable[[], object], runs: int = 5) -> tuple[float, object]:
+    """Return the least processor time of a few runs, in seconds, and the last result."""
+    times, result = [], None
+    for _ in range(runs):
+        start = time.process_time()
+        result = work()
+        times.append(time.process_time() - start)
+    return min(times), result
+
+
+def toppra_solver(p: Problem) -> Callable[[], np.ndarray]:
+    """Return toppra's solve alone, its constraints set up."""
+    stages = Stages.of(p.s, *p.rows, p.ceiling)
+    return lambda: solve_by_toppra(stages, 0.0, 0.0)
+
+
+def copp_robot(p: Problem, jerk: bool):
+    """Return copp-py's robot with the same limits, None where it is not installed."""
+    if find_spec("copp_py") is None:
+        return None
+    import copp_py as copp  # noqa: PLC0415  (may be missing)
+
+    n = len(p.s)
+    robot = copp.Robot(5, capacity=n)
+    robot.append_s(p.s)
+    robot.set_q(*p.q[:3], 0, **({"dddq": p.q[3]} if jerk else {}))
+    one = np.ones(5)
+    robot.add_velocity_limits(VELOCITY * one, -VELOCITY * one, start_idx_s=0, length=n)
+    robot.add_acceleration_limits(ACCELERATION * one, -ACCELERATION * one, start_idx_s=0, length=n)
+    if jerk:
+        robot.add_jerk_limits(JERK * one, -JERK * one, start_idx_s=0, length=n)
+    return copp, robot
+
+
+def core(sizes: list[int]) -> None:
+    """Velocities and accelerations: the core, the NumPy form, toppra and copp-py."""
+    for kind in ("raster", "sine"):
+        for n in sizes:
+            p = Problem(kind, n)
+            p.solved("core")
+            ours, x = best(lambda p=p: p.solved("core"))
+            seconds = p.duration(x)
+            line = f"{kind:7s} {n:8d} gridpoints: core {1e6 * ours / n:6.3f} µs"
+            plain, _ = best(lambda p=p: p.solved("numpy"), 2)
+            line += f", NumPy {1e6 * plain / n:6.2f} µs"
+            if n <= 100_000:
+                theirs, y = best(toppra_solver(p), 2)
+                same = p.duration(y) / seconds - 1.0
+                line += f", toppra {1e6 * theirs / n:6.2f} µs: {theirs / ours:5.0f} times the core, "
+                line += f"{theirs / plain:.1f} times NumPy; durations differ by {same:.1e}"
+            print(line, flush=True)
+            if peer := copp_robot(p, jerk=False):
+                copp, robot = peer
+                task = copp.solver.topp2_ra.Problem(robot.constraints, idx_s_interval=(0, n - 1), a_boundary=(0.0, 0.0))
+                theirs, y = best(lambda c=copp, t=task: c.solver.topp2_ra.solve(t, c.solver.topp2_ra.Options()), 3)
+                same = p.duration(np.asarray(y)) / seconds - 1.0
+                print(f"{'':28s} copp-py {1e6 * theirs / n:.2f} µs: {theirs / ours:.1f} times; durations {same:.1e}")
+
+
+def jerk(n: int) -> None:
+    """Jerk limits: time a pass, and how near two passes come to what they converge to."""
+    for kind in ("raster", "sine"):
+        p = Problem(kind, n)
+        x = p.solved("core")
+        durations, last = [], 0.0
+        jerk_limited(p.s, x, p.jerk_rows, NO_MARKS, 1)
+        for passes in (1, 2, PASSES, 8):
+            used, profile = best(lambda k=passes, p=p, x=x: jerk_limited(p.s, x, p.jerk_rows, NO_MARKS, k), 2)
+            durations.append(MotionLaw.through(profile.s, profile.x, profile.slope).duration)
+            last = used
+            if passes == 1:
+                one = used
+        each = (last - one) / 7.0
+        print(
+            f"{kind:7s} {len(profile.s):8d} gridpoints, jerk: first pass {1e6 * one / len(profile.s):.1f} µs, "
+            f"each further {1e6 * each / len(profile.s):.1f} µs; durations after 1, 2, {PASSES}, 8 passes: "
+            + ", ".join(f"{d:.4f}" for d in durations)
+            + f" s (without jerk limits {p.duration(x):.4f} s)",
+            flush=True,
+        )
+
+
+def million(n: int) -> None:
+    """Time a long path: feed, leg velocities, accelerations and jerks, from the path to a law."""
+    p = Problem("raster", n)
+    x = p.solved("core")
+    s, base = p.s, p.s[-1]
+    start, wall = time.process_time(), time.perf_counter()
+    profile = jerk_limited(s, x, p.jerk_rows, NO_MARKS, 2)
+    MotionLaw.through(profile.s, profile.x, profile.slope)
+    count = len(profile.s)
+    used = time.process_time() - start
+    print(
+        f"long path: {count} gridpoints ({base:.0f} m), two jerk passes and the law: {used:.1f} s "
+        f"({1e6 * used / count:.1f} µs a gridpoint, wall {time.perf_counter() - wall:.1f} s); "
+        f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.2f} GB"
+    )
+
+
+def versions() -> str:
+    """Return what runs here."""
+    names = []
+    for name in ("numpy", "numba", "toppra", "copp-py"):
+        try:
+            names.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            names.append(f"{name} not installed")
+    return f"Python {platform.python_version()} on {platform.machine()}; " + ", ".join(names)
+
+
+def main() -> None:
+    """Run what the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sizes", type=int, nargs="+", default=[10_000, 100_000, 1_000_000])
+    parser.add_argument("--jerk", type=int, default=10_000)
+    parser.add_argument("--long", type=int, default=1_000_000)
+    arguments = parser.parse_args()
+    print(versions())
+    core(arguments.sizes)
+    jerk(arguments.jerk)
+    million(arguments.long)
+
+
+if __name__ == "__main__":
+    main()
