@@ -182,7 +182,7 @@ class PieceProfile:
         return np.where((column == 10) & rapid, 11, column), shares.max(axis=1)
 
     def _active_in(self, law: MotionLaw) -> tuple[Ints, Floats]:
-        """Return the constraint (N + 1,) of which the law limited in jerk uses most at the gridpoints, and its share."""
+        """Return the constraint (N + 1,) of which a law limited in jerk uses most, and its share."""
         t = np.interp(self.s, law.stations, law.times)
         j = law.jerks[np.clip(np.searchsorted(law.times, t, "right") - 1, 0, len(law.jerks) - 1)][:, None]
         v, a = law(t, 1)[:, None], law(t, 2)[:, None]
