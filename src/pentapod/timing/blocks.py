@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -133,7 +133,7 @@ Guess = tuple[Floats, Floats, tuple[float, float]] | None
 
 
 @contextmanager
-def _workers(processes: int) -> Iterator[Callable[..., Iterator[Guess]]]:
+def _workers(processes: int) -> Generator[Callable[..., Iterator[Guess]]]:
     """Yield what maps blocks to guesses: none by one process, which needs none."""
     if processes == 1:
         yield lambda _work, _stored, blocks, _count: iter([None] * len(blocks))
