@@ -166,6 +166,9 @@ class PlacementTable(Table):
     component: Literal["++", "+-", "-+", "--"] | None = Field(
         default=None, description="signs of w and S of the assembly mode; the best one when left out"
     )
+    solver: Literal["sequential", "ipopt"] = Field(
+        default="sequential", description='"sequential" (quick), or "ipopt" (the slow reference)'
+    )
 
     @model_validator(mode="after")
     def _numbers(self) -> PlacementTable:

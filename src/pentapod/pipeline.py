@@ -212,6 +212,7 @@ class _Task:
             tilt=float(np.radians(self.job.axis.tilt_deg)),
             placement=self.placement,
             component=None if wanted is None else Component.parse(wanted),
+            solver=self.job.placement.solver,
             progress=self.clock.progress,
         )
 
