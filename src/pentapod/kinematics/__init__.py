@@ -19,6 +19,8 @@ from pentapod.kinematics.forces import (
     tip_moment_amplification,
 )
 from pentapod.kinematics.general import GeneralPentapod
+from pentapod.kinematics.guide_choice import GuideChoice, choose_slides, conditioning_criterion, stiffness_criterion
+from pentapod.kinematics.guides import ReconfigurablePentapod
 from pentapod.kinematics.jacobian import leg_jacobian, pose_jacobian, square_jacobian
 from pentapod.kinematics.mode import MODES, Mode
 from pentapod.kinematics.motion import MotionProof, certify_motion
@@ -50,12 +52,14 @@ __all__ = [
     "Conic",
     "FiveLegs",
     "GeneralPentapod",
+    "GuideChoice",
     "LinearPentapod",
     "Mode",
     "MotionProof",
     "Obstacle",
     "ProvenPoses",
     "ReachField",
+    "ReconfigurablePentapod",
     "SingularityFreeSphere",
     "Workspace",
     "architectural_distance",
@@ -68,6 +72,8 @@ __all__ = [
     "cell_of",
     "certify_component",
     "certify_motion",
+    "choose_slides",
+    "conditioning_criterion",
     "conic_determinant",
     "forbidden_conic",
     "leg_force_map",
@@ -84,6 +90,7 @@ __all__ = [
     "singularity_polynomial",
     "singularity_values",
     "square_jacobian",
+    "stiffness_criterion",
     "tip_compliance",
     "tip_force_amplification",
     "tip_moment_amplification",
