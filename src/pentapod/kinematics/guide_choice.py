@@ -32,7 +32,7 @@ def conditioning_criterion(length: float) -> Criterion:
 
     def worst(base: Floats, offsets: Floats, positions: Floats, directions: Floats) -> Floats:
         values = np.linalg.svd(_jacobians(base, offsets, positions, directions, 0.0, length), compute_uv=False)
-        return values[..., -1] / values[..., 0]
+        return np.asarray(values[..., -1] / values[..., 0], dtype=np.float64)
 
     return worst
 
@@ -55,7 +55,8 @@ def stiffness_criterion(leg_stiffness: ArrayLike, tool_length: float) -> Criteri
         regular = np.linalg.det(tilt) > 0.0
         safe = np.where(regular[..., None, None], tilt, np.eye(2))
         shift = whole[..., :3, :3] - mixed @ np.linalg.solve(safe, np.swapaxes(mixed, -1, -2))
-        return np.where(regular, np.maximum(np.linalg.eigvalsh(shift)[..., 0], 0.0), 0.0)
+        least = np.asarray(np.linalg.eigvalsh(shift)[..., 0], dtype=np.float64)
+        return np.where(regular, np.maximum(least, 0.0), 0.0)
 
     return softest
 
@@ -87,7 +88,7 @@ def choose_slides(
 
     start (5,): where the guides are, 0 by default. Only slides are considered that they reach by moving evenly without
     F = 0 on the way, and whose `architectural_measure` is least_measure at least. Positions are of p, machine frame.
-    Sobol's points all over the travel, then Nelder and Mead's method from the best four: a good choice, not a proven
+    Points evenly all over the travel, then Nelder and Mead's method from the best four: a good choice, not a proven
     optimum, and never worse than the start. Raises ArrayError where the start is outside the travel or too near to
     architectural singularity.
     """
@@ -114,14 +115,13 @@ def choose_slides(
     start_value = float(values(here[None])[0])
     tried = _spread(low, high, candidates, seed)
     scores = values(tried)
-    best, value, refined = here, start_value, 0
+    best, value = here, start_value
+    starts: list[Floats] = []
     for k in np.argsort(-scores):
-        if refined == 4 or scores[k] <= 0.0:
-            break
-        if not allowed(tried[k]):
-            continue
-        refined += 1
-        slides, score = _refine(tried[k], low, high, values, allowed)
+        if len(starts) < 4 and scores[k] > 0.0 and allowed(tried[k]):
+            starts.append(tried[k])
+    for near in starts:
+        slides, score = _refine(near, low, high, values, allowed)
         if score > value:
             best, value = slides, score
     return GuideChoice(best, value, start_value)
@@ -133,17 +133,19 @@ def _jacobians(
     """Return ∂legs/∂(tip, tilts · length) (D, N, 5, 5) of D designs at N poses."""
     joints = positions[:, None, :] + offsets[:, None, :, None] * directions[:, None, :]
     legs = joints - np.concatenate([base, np.zeros((*base.shape[:-1], 1))], axis=-1)[:, None]
-    unit = legs / np.linalg.norm(legs, axis=-1, keepdims=True)
+    unit = legs / np.asarray(np.linalg.norm(legs, axis=-1, keepdims=True), dtype=np.float64)
     levers = (offsets - tool_length)[:, None, :, None] / length
     return np.concatenate([unit, levers * (unit @ line_tangents(directions))], axis=-1)
 
 
 def _spread(low: Floats, high: Floats, count: int, seed: int) -> Floats:
-    """Return points (count, 5) all over the travel."""
-    from scipy.stats import qmc  # noqa: PLC0415  heavy: only where guides are chosen
-
-    sobol = qmc.Sobol(5, seed=seed).random_base2(max(1, int(np.ceil(np.log2(max(count, 2))))))
-    return low + sobol * (high - low)
+    """Return points (count, 5) evenly all over the travel: an additive recurrence (M. Roberts's R sequence)."""
+    ratio = 1.0
+    for _ in range(60):  # the root of r⁶ = r + 1, the golden ratio of five dimensions
+        ratio = (1.0 + ratio) ** (1.0 / 6.0)
+    shift = np.random.default_rng(seed).random(5)
+    points = (shift + np.arange(count)[:, None] * ratio ** -np.arange(1.0, 6.0)) % 1.0
+    return low + points * (high - low)
 
 
 def _refine(

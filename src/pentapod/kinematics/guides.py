@@ -92,7 +92,7 @@ class ReconfigurablePentapod:
         sizes = np.abs(powers)
         powers[sizes <= 1e-15 * sizes.max(initial=0.0)] = 0.0
         roots = np.roots(np.trim_zeros(powers, "f")) if powers.any() else np.zeros(0)
-        return np.sort(roots[np.isreal(roots)].real)
+        return np.sort(np.asarray(roots[np.isreal(roots)].real, dtype=np.float64))
 
     def stays_regular(self, start: ArrayLike, end: ArrayLike) -> bool:
         """Return whether F keeps its sign while all guides move evenly from start to end (5,).
