@@ -57,9 +57,12 @@ def sweep(
     axes: Floats,
     *,
     threshold: float = 0.0,
+    every: int = 1,
     progress: Progress = silent,
 ) -> Sweep:
     """Return what a tool meets on the N − 1 motions between N poses: tips and unit axes (N, 3).
+
+    every: 2 takes the poses as pairs, a motion each, and leaves the ways between pairs out.
 
     On a motion the pivot goes straight and the axis turns evenly about it. Looked for is what lies deeper than
     `threshold`, metres; a negative one asks for a gap. Every point of every facet and every time between is
@@ -68,7 +71,7 @@ def sweep(
     tips, axes = as_floats(tips, "tips", (None, 3)), as_floats(axes, "axes", (None, 3))
     if len(tips) < 2:
         raise ToolpathError("a motion needs two poses", value=len(tips))
-    return _swept(tree, tool, tips[:-1], axes[:-1], tips[1:], axes[1:], threshold, progress)
+    return _swept(tree, tool, tips[:-1:every], axes[:-1:every], tips[1::every], axes[1::every], threshold, progress)
 
 
 def touch(
