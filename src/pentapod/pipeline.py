@@ -64,7 +64,7 @@ def run(
     clock = _Clock(progress)
     machine = job_machine(job)
     placement = job_placement(job)
-    mesh = clock.time("mesh", lambda: job_mesh(job), says=lambda mesh: str(mesh.diagnosis))
+    mesh = clock.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
     toolpath, _ = clock.time("toolpath", lambda: job_toolpath(job, mesh), says=lambda made: str(made[1]))
     with staged(folder) as staging:
         program = _Task(job, machine, toolpath, placement, clock).program(staging / PROGRAM)
@@ -95,11 +95,11 @@ def job_machine(job: Job) -> Machine:
         raise job.error("tool", "length_mm", error.what) from error
 
 
-def job_mesh(job: Job) -> Mesh:
+def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
     """Return the job's mesh. Raises MeshError, or JobError where unit or tolerances do not go with it."""
     part = job.part
     try:
-        mesh = load_mesh(job.mesh_path, part.unit, scale=part.scale, repair=part.repair)
+        mesh = load_mesh(job.mesh_path, part.unit, scale=part.scale, repair=part.repair, progress=progress)
     except MeshError as error:
         if error.key != "unit":
             raise

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from pentapod.errors import MeshError
 from pentapod.toolpath import Mesh
+from pentapod.toolpath.faults import faults
 
 
 def test_a_sound_ball_has_no_problems():
@@ -139,3 +140,31 @@ def test_meshes_cannot_be_changed():
     for array in (mesh.vertices, mesh.faces, mesh.facet_normals, mesh.corner_normals, mesh.vertex_normals):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
+
+
+def test_slivers_are_counted_and_kept():
+    vertices, faces = surfaces.grid(lambda x, y: 0 * x, cells=4)
+    needle = np.concatenate([vertices, [[0.2, 0, 0], [0.3, 0, 0], [0.25, 5e-5, 0]]])
+    mesh = Mesh.of(needle, np.concatenate([faces, [[25, 26, 27]]]))
+    assert mesh.diagnosis.slivers == 1
+    assert len(mesh.faces) == 33
+    assert "1 sliver" in str(mesh.diagnosis)
+    np.testing.assert_allclose(np.sort(faults(mesh)["sliver"][0, :, 0]), [0.2, 0.3])
+
+
+def test_faults_show_where_they_are():
+    vertices, faces = surfaces.sphere(subdivisions=2)
+    assert faults(Mesh.of(vertices, faces)) == {}
+    turned = faces.copy()
+    turned[7] = turned[7, ::-1]
+    mesh = Mesh.of(vertices, np.delete(turned, 100, axis=0))
+    found = faults(mesh)
+    assert set(found) == {"border", "wound unlike"}
+    corners = {tuple(p) for p in vertices[faces[7]]}
+    assert {tuple(p) for p in found["wound unlike"].reshape(-1, 3)} == corners
+    assert mesh.diagnosis.inconsistent_edges == 3
+    assert {tuple(p) for p in found["border"].reshape(-1, 3)} == {tuple(p) for p in vertices[faces[100]]}
+    third = Mesh.of(
+        np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]) * 0.1, [[0, 1, 2], [1, 0, 3], [0, 1, 4]]
+    )
+    assert faults(third)["more than two facets"].shape == (1, 2, 3)

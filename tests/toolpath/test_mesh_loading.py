@@ -172,3 +172,64 @@ def test_bytes_after_the_last_facet_are_noted(tmp_path, ball):
     path = tmp_path / "ball.stl"
     path.write_bytes(write_stl(ball, "ball") + b"\0\0")
     assert "2 bytes after the last facet ignored" in str(load_mesh(path, "mm").diagnosis)
+
+
+@pytest.mark.parametrize(("unit", "scale", "doubtful"), [("mm", 1.0, False), ("m", 1.0, True), ("mm", 1e-3, True)])
+def test_a_doubtful_unit_is_noted_with_the_likely_one(tmp_path, ball, unit, scale, doubtful):
+    path = tmp_path / "ball.stl"
+    path.write_bytes(write_stl(ball, "ball"))
+    said = str(load_mesh(path, unit, scale=scale).diagnosis)
+    assert ("doubtful unit" in said) == doubtful
+    assert ('unit = "mm" is likely' in said) == doubtful
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ply", "obj"])
+def test_a_gigabyte_of_zeros_is_refused_before_it_is_read(tmp_path, suffix):
+    import tracemalloc
+
+    path = tmp_path / f"zeros.{suffix}"
+    with path.open("wb") as stream:
+        stream.truncate(10**9)
+    tracemalloc.start()
+    with pytest.raises(MeshError, match="zeros"):
+        load_mesh(path, "mm")
+    assert tracemalloc.get_traced_memory()[1] < 5_000_000
+    tracemalloc.stop()
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ply", "obj"])
+def test_other_encodings_are_refused_with_one_line(tmp_path, ball, suffix):
+    import trimesh
+
+    shape = trimesh.Trimesh(*surfaces.sphere(50.0, 1), process=False)
+    text = {
+        "stl": ascii_stl(ball),
+        "ply": trimesh.exchange.ply.export_ply(shape, encoding="ascii").decode(),
+        "obj": trimesh.exchange.obj.export_obj(shape),
+    }[suffix]
+    path = tmp_path / f"wide.{suffix}"
+    path.write_bytes(text.encode("utf-16"))
+    with pytest.raises(MeshError, match=r"wide\.") as caught:
+        load_mesh(path, "mm")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ply", "obj"])
+def test_a_changed_byte_is_read_or_refused_but_never_crashes(tmp_path, suffix):
+    import trimesh
+
+    path = tmp_path / f"ball.{suffix}"
+    trimesh.Trimesh(*surfaces.sphere(50.0, 1), process=False).export(path)
+    data, rng = path.read_bytes(), np.random.default_rng(0)
+    for _ in range(50):
+        changed = bytearray(data)
+        at = int(rng.integers(len(data)))
+        changed[at : at + 1] = bytes(rng.choice([b"?", b"x", b"--", b"\xff", b"1e999", b"\n"]))
+        path.write_bytes(changed)
+        try:
+            load_mesh(path, "mm")
+        except InputError as error:
+            message = str(error)
+        else:
+            continue
+        assert path.name in message

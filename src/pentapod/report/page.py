@@ -111,6 +111,7 @@ def _scene(outcome: Outcome, signals: Signals | None) -> Figure:
     placed = outcome.find(PlacedPath)
     transform = RigidTransform.identity() if placed is None else placed.placement.transform
     traces = [] if mesh is None else [scene.part_trace(mesh, transform, down=placed is not None)]
+    traces += [] if mesh is None else scene.fault_traces(mesh, transform)
     if signals is not None:
         margins = np.interp(signals.times, signals.times[signals.margin_rows], signals.smallest_margins)
         traces += scene.path_traces(signals.tips, signals.axes, signals.cutting.astype(np.intp), margins)

@@ -12,12 +12,14 @@ from pentapod.machine.machine import Machine
 from pentapod.refusal import Refusal
 from pentapod.report.decimate import keep_extremes, thinned_mesh
 from pentapod.report.figure import LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR, Figure, packed
+from pentapod.toolpath.faults import faults
 from pentapod.toolpath.mesh import Mesh
 
 MACHINE_TRACES = 8
 """Traces that move with the pose: five legs, the platform line, the tool, the tip. They come last."""
 
 _MOST_FACETS = 60_000
+_MOST_EDGES = 5_000
 _BUCKETS = 4_000
 _LIFT_M = 0.5e-3  # along the tool axis: a ball's tip runs on and below the surface, which would hide its path
 _MARGIN_COLOURS = [[0.0, "#c8322b"], [0.15, "#ee8f3c"], [0.4, "#e9d35b"], [1.0, "#2f9e6e"]]
@@ -36,6 +38,18 @@ def part_trace(mesh: Mesh, placement: RigidTransform, *, down: bool) -> dict[str
         "lighting": {"ambient": 0.8, "diffuse": 0.35, "specular": 0.05, "roughness": 0.9, "fresnel": 0.1},
         "lightposition": {"x": 30_000, "y": -60_000, "z": -40_000 if down else 40_000},
     }  # fmt: skip
+
+
+def fault_traces(mesh: Mesh, placement: RigidTransform) -> list[dict[str, Any]]:
+    """Return the edges of each fault that the mesh has, thinned for display."""
+    traces: list[dict[str, Any]] = []
+    for k, (name, edges) in enumerate(faults(mesh).items()):
+        shown = placement.apply(edges[:: max(1, len(edges) // _MOST_EDGES)])
+        lines = np.concatenate([shown, np.full((len(shown), 1, 3), np.nan)], axis=1).reshape(-1, 3)
+        trace = _line3d(1e3 * lines, f"mesh: {name} ({len(edges):,})", LEG_COLOURS[k % len(LEG_COLOURS)], 4.0)
+        # An open sheet's border is as it should be: there to look at, not to alarm.
+        traces.append(trace | ({"visible": "legendonly"} if name == "border" else {}))
+    return traces
 
 
 def path_traces(tips: Floats, axes: Floats, cutting: Ints, margins: Floats) -> list[dict[str, Any]]:

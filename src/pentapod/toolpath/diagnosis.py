@@ -10,9 +10,10 @@ class MeshDiagnosis:
     """What was found in a mesh, and what was mended.
 
     facets, vertices: after welding and repairs. watertight: every edge has exactly two facets. consistent:
-    neighbours are wound alike. inverted: a closed surface whose normals point inwards. non_manifold_edges:
-    edges of three facets or more. border_loops: pieces of border. extents: metres. duplicated, degenerate:
-    facets found in the file (they are dropped, see repairs). repairs, notes: sentences.
+    neighbours are wound alike. inverted: a closed surface whose normals point inwards. border_loops: pieces of
+    border, of holes and of an open sheet. non_manifold_edges: edges of three facets or more. inconsistent_edges:
+    between two facets wound unlike. slivers: facets a thousand times as long as high, which are kept. extents:
+    metres. duplicated, degenerate: facets found in the file (they are dropped, see repairs). repairs, notes: sentences.
     """
 
     source: str
@@ -24,6 +25,8 @@ class MeshDiagnosis:
     inverted: bool
     border_loops: int
     non_manifold_edges: int
+    inconsistent_edges: int
+    slivers: int
     duplicated: int
     degenerate: int
     area: float
@@ -32,11 +35,22 @@ class MeshDiagnosis:
     notes: tuple[str, ...] = ()
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is worth knowing and no problem."""
+        found = list(self.notes)
+        if self.slivers:
+            found.append(f"{_count(self.slivers, 'sliver')}, a thousand times as long as high")
+        return tuple(found)
+
+    @property
     def problems(self) -> tuple[str, ...]:
         """What is still wrong after the repairs, with the remedy; empty for a sound surface."""
         found: list[str] = []
         if not self.consistent:
-            found.append("facets are wound inconsistently: some normals point the wrong way; load with repair = true")
+            edges = _count(self.inconsistent_edges, "edge")
+            found.append(
+                f"facets are wound unlike at {edges}: some normals point the wrong way; load with repair = true"
+            )
         if self.inverted:
             found.append("the closed surface is inside out: normals point inwards; load with repair = true")
         if self.non_manifold_edges:
@@ -54,7 +68,7 @@ class MeshDiagnosis:
             + ("; inside out" if self.inverted else ""),
         ]
         lines += [f"  repaired: {text}" for text in self.repairs]
-        lines += [f"  note: {text}" for text in self.notes]
+        lines += [f"  note: {text}" for text in self.remarks]
         lines += [f"  problem: {text}" for text in self.problems]
         return "\n".join(lines)
 

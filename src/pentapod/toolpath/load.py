@@ -11,13 +11,18 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.errors import MeshError, nearest
+from pentapod.progress import Progress, silent
 from pentapod.toolpath.mesh import CREASE_ANGLE, Mesh
-from pentapod.toolpath.stl import read_stl
+from pentapod.toolpath.stl import check_stl_size, read_stl
 
 UNITS: dict[str, float] = {"mm": 1e-3, "cm": 1e-2, "inch": 25.4e-3, "m": 1.0}
 """Metres in each unit that a mesh file's numbers may have."""
 
 FORMATS = (".obj", ".ply", ".stl")
+
+_HEAD = 4096
+_DOUBTFUL_M = (2e-3, 2.0)
+"""Largest extents outside of this are rather a mistaken unit than a part."""
 
 _USUAL_PART_M = 0.15
 """A part that is at home on a desktop machine: what "likely" means when the unit is missing."""
@@ -30,6 +35,7 @@ def load_mesh(
     scale: float = 1.0,
     repair: bool = False,
     crease_angle: float = CREASE_ANGLE,
+    progress: Progress = silent,
 ) -> Mesh:
     """Return the mesh of an STL, PLY or OBJ file, in metres; the suffix names the format.
 
@@ -43,9 +49,11 @@ def load_mesh(
         raise MeshError("unknown unit", file=path, key="unit", value=unit, remedy=nearest(unit, UNITS))
     if not (np.isfinite(scale) and scale > 0.0):
         raise MeshError("the scale must be positive", file=path, key="scale", value=scale)
+    progress("mesh", 0.0, "reading")
     vertices, faces, notes = _read(path)
     if unit is None:
         raise _unit_missing(path, vertices)
+    notes += _unit_doubtful(vertices, unit, scale)
     return Mesh.of(
         vertices * (UNITS[unit] * scale),
         faces,
@@ -53,15 +61,20 @@ def load_mesh(
         source=path.name,
         crease_angle=crease_angle,
         notes=notes,
+        progress=progress,
     )
 
 
 def _read(path: Path) -> tuple[Floats, Ints, tuple[str, ...]]:
     """Return vertices (V, 3) in the file's numbers, facets (F, 3) and notes."""
     suffix = path.suffix.lower()
-    data = _bytes(path)
+    head, size = _head(path)
     if suffix not in FORMATS:
         raise MeshError("not a mesh format I read", file=path, value=suffix, expected=", ".join(FORMATS))
+    _check_head(path, suffix, head, size)
+    data = path.read_bytes()
+    if not data.strip():
+        raise MeshError("the file is empty", file=path)
     notes: tuple[str, ...] = ()
     if suffix == ".stl":
         triangles, notes = read_stl(path, data)
@@ -73,18 +86,33 @@ def _read(path: Path) -> tuple[Floats, Ints, tuple[str, ...]]:
     return vertices, faces, notes
 
 
-def _bytes(path: Path) -> bytes:
+def _head(path: Path) -> tuple[bytes, int]:
+    """Return a file's first bytes and its size."""
     try:
-        data = path.read_bytes()
+        with path.open("rb") as stream:
+            head = stream.read(_HEAD)
+        size = path.stat().st_size
     except FileNotFoundError as error:
         raise MeshError("no such file", file=path, expected="a mesh: " + ", ".join(FORMATS)) from error
     except IsADirectoryError as error:
         raise MeshError("a directory, not a mesh file", file=path) from error
     except OSError as error:
         raise MeshError(f"cannot be read: {error.strerror}", file=path) from error
-    if not data.strip():
+    if not head:
         raise MeshError("the file is empty", file=path)
-    return data
+    return head, size
+
+
+def _check_head(path: Path, suffix: str, head: bytes, size: int) -> None:
+    """Raise MeshError where the first bytes and the size say that this is no such file, before all of it is read."""
+    if suffix == ".stl":
+        check_stl_size(path, head, size)
+    elif suffix == ".ply" and not head.startswith(b"ply"):
+        raise MeshError('cannot be read as PLY: it does not begin with "ply"', file=path, line=1)
+    elif suffix == ".obj" and b"\0" in head:
+        wide = head.startswith((b"\xff\xfe", b"\xfe\xff"))
+        what = "not UTF-8 text but UTF-16" if wide else "it holds zero bytes"
+        raise MeshError(f"cannot be read as OBJ: {what}", file=path, line=1, remedy="save it as UTF-8")
 
 
 def _through_trimesh(path: Path, suffix: str, data: bytes) -> tuple[Floats, Ints]:
@@ -100,6 +128,8 @@ def _through_trimesh(path: Path, suffix: str, data: bytes) -> tuple[Floats, Ints
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         name = suffix[1:].upper()
         raise MeshError(f"cannot be read as {name}: {reason}", file=path, remedy="the file may be truncated") from error
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise MeshError(f"a vertex of this {suffix[1:].upper()} is not three numbers", file=path)
     if suffix == ".ply":
         _check_ply_counts(path, data, len(vertices), len(faces))
     return vertices, faces.astype(np.intp)
@@ -121,11 +151,7 @@ def _check_ply_counts(path: Path, data: bytes, vertices: int, faces: int) -> Non
 
 def _unit_missing(path: Path, vertices: Floats) -> MeshError:
     """Return the error that shows how large the part would be in each unit, and which is likely."""
-    extents = np.ptp(vertices[np.isfinite(vertices).all(axis=1)], axis=0) if len(vertices) else np.zeros(3)
-    sizes = {u: " x ".join(f"{1e3 * factor * e:.4g}" for e in extents) for u, factor in UNITS.items()}
-    largest = max(float(extents.max()), 1e-300)
-    likely = min(UNITS, key=lambda u: abs(np.log(largest * UNITS[u] / _USUAL_PART_M)))
-    shown = ", ".join(f'as "{u}" {size} mm' for u, size in sizes.items())
+    shown, likely = _sizes(_extents(vertices))
     return MeshError(
         f"the unit of the mesh is missing; the part would be {shown}",
         file=path,
@@ -133,3 +159,27 @@ def _unit_missing(path: Path, vertices: Floats) -> MeshError:
         expected="one of " + ", ".join(UNITS),
         remedy=f'unit = "{likely}" is likely',
     )
+
+
+def _unit_doubtful(vertices: Floats, unit: str, scale: float) -> tuple[str, ...]:
+    """Return a note where the part comes out smaller or larger than parts are."""
+    extents = _extents(vertices)
+    low, high = _DOUBTFUL_M
+    if low <= float(extents.max()) * UNITS[unit] * scale <= high or not extents.max() > 0.0:
+        return ()
+    shown, likely = _sizes(extents)
+    return (f'doubtful unit "{unit}": the part would be {shown}; unit = "{likely}" is likely',)
+
+
+def _extents(vertices: Floats) -> Floats:
+    finite = vertices[np.isfinite(vertices).all(axis=1)]
+    return np.ptp(finite, axis=0) if len(finite) else np.zeros(3)
+
+
+def _sizes(extents: Floats) -> tuple[str, str]:
+    """Return how large a part with these numbers is in each unit, and the likely unit."""
+    sizes = {u: " x ".join(f"{1e3 * factor * e:.4g}" for e in extents) for u, factor in UNITS.items()}
+    largest = max(float(extents.max()), 1e-300)
+    likely = min(UNITS, key=lambda u: abs(np.log(largest * UNITS[u] / _USUAL_PART_M)))
+    shown = ", ".join(f'as "{u}" {size} mm' for u, size in sizes.items())
+    return shown, likely

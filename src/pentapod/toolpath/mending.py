@@ -15,6 +15,10 @@ SLIVER = 1e-9
 """A facet is degenerate when its height is below this fraction of its longest side."""
 
 
+NARROW = 1e-3
+"""A facet is a sliver when its height is below this fraction of its longest side."""
+
+
 def weld(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
     """Return vertices at the same place merged, unused ones dropped, and the facets on them.
 
@@ -48,6 +52,13 @@ def degenerate_facets(vertices: Floats, faces: Ints) -> Bools:
     corners = vertices[faces]
     longest = np.square(corners - np.roll(corners, 1, axis=1)).sum(axis=2).max(axis=1)
     return np.linalg.norm(facet_cross(vertices, faces), axis=1) <= SLIVER * longest
+
+
+def slivers(vertices: Floats, faces: Ints) -> Bools:
+    """Return which facets (F,) are lower than a thousandth of their longest side."""
+    corners = vertices[faces]
+    longest = np.square(corners - np.roll(corners, 1, axis=1)).sum(axis=2).max(axis=1)
+    return np.linalg.norm(facet_cross(vertices, faces), axis=1) <= NARROW * longest
 
 
 def duplicated_facets(faces: Ints, vertex_count: int) -> Bools:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from pentapod.arrays import Bools, Floats, Ints, as_batch, frozen, set_frozen
 from pentapod.errors import MeshError
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.progress import Progress, silent
 from pentapod.toolpath import mending, normals
 from pentapod.toolpath.diagnosis import MeshDiagnosis
 from pentapod.toolpath.topology import Topology
@@ -47,6 +48,7 @@ class Mesh:
         source: str = "mesh",
         crease_angle: float = CREASE_ANGLE,
         notes: tuple[str, ...] = (),
+        progress: Progress = silent,
     ) -> Mesh:
         """Return the mesh of vertices (V, 3) in metres and facets (F, 3).
 
@@ -56,6 +58,7 @@ class Mesh:
         indices beyond the vertices, or coordinates that are not finite.
         """
         points, facets = _checked(vertices, faces, source)
+        progress("mesh", 0.3, "welding")
         points, facets = mending.weld(points, facets)
         repairs: list[str] = []
         degenerate = mending.degenerate_facets(points, facets)
@@ -73,6 +76,7 @@ class Mesh:
             repairs.extend(said)
         if repairs:
             points, facets = mending.weld(points, facets)
+        progress("mesh", 0.6, "edges")
         topology = Topology(facets, len(points))
         mended = (int(duplicated.sum()), int(degenerate.sum()))
         diagnosis = _diagnose(points, topology, source=source, mended=mended, repairs=repairs, notes=notes)
@@ -200,6 +204,8 @@ def _diagnose(
         inverted=closed and mending.signed_volume(points, facets) < 0.0,
         border_loops=topology.border_loops,
         non_manifold_edges=int((topology.facets_at_edge > 2).sum()),
+        inconsistent_edges=int((~topology.pair_agrees).sum()),
+        slivers=int(mending.slivers(points, facets).sum()),
         duplicated=mended[0],
         degenerate=mended[1],
         area=float(0.5 * np.linalg.norm(normals.facet_cross(points, facets), axis=1).sum()),

@@ -47,6 +47,22 @@ def read_stl(path: Path, data: bytes) -> tuple[Floats, tuple[str, ...]]:
     return _binary(data, announced), (f"{extra:,} bytes after the last facet ignored",)
 
 
+def check_stl_size(path: Path, head: bytes, size: int) -> None:
+    """Raise MeshError where the head announces another size than the file has, and it is not text either."""
+    if len(head) < _HEADER or _is_text(head) or not head.strip():
+        return
+    announced = int.from_bytes(head[80:84], "little")
+    held = (size - _HEADER) // _FACET.itemsize
+    if held < announced:
+        raise MeshError(
+            f"truncated: the header announces {announced:,} facets, the file holds {held:,}", file=path, remedy=_AGAIN
+        )
+    if held > 2 * announced + 100:
+        raise MeshError(
+            f"the header announces {announced:,} facets, the file has room for {held:,}", file=path, remedy=_AGAIN
+        )
+
+
 def write_stl(triangles: Floats, name: str) -> bytes:
     """Return a binary STL of triangles (F, 3, 3): same numbers, same bytes. name: at most 80 of ASCII."""
     corners = np.asarray(triangles, dtype=np.float64).astype("<f4")
