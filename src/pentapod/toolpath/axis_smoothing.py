@@ -42,7 +42,8 @@ def smoothed(points: Floats, axes: Floats, reach: float, tolerance: float) -> Fl
 def _weights(points: Floats, axes: Floats, reach: float) -> csr_array:
     """Return the matrix (N, N) of normalised Gaussian weights; a standard deviation is half the reach."""
     count = min(_NEIGHBOURS, len(points))
-    distance, index = KDTree(points).query(points, k=count, distance_upper_bound=reach)
+    found = KDTree(points).query(points, k=count, distance_upper_bound=reach)
+    distance, index = np.asarray(found[0]), np.asarray(found[1])
     known = np.isfinite(distance)
     row = np.broadcast_to(np.arange(len(points))[:, None], distance.shape)[known]
     column, d = index[known], distance[known]
