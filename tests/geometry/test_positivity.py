@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from pentapod.geometry import from_power, lower_bounds
+from pentapod.geometry import Positivity, from_power, positivity
 
 
 def true_minimum(powers: np.ndarray) -> float:
@@ -13,9 +13,14 @@ def true_minimum(powers: np.ndarray) -> float:
     return float(min(polynomial(np.r_[0.0, 1.0, inside])))
 
 
-def bounds(powers: np.ndarray, depth: int = 20, error: float = 1e-13) -> np.ndarray:
+def answer(powers: np.ndarray, depth: int = 20, error: float = 1e-13, rounding: float | None = None) -> Positivity:
     n = len(powers)
-    return lower_bounds(from_power(powers), np.full(n, error), np.full(n, 1e-15), depth)
+    own = None if rounding is None else np.full(n, rounding)
+    return positivity(from_power(powers), np.full(n, error), np.full(n, 1e-15), depth, own)
+
+
+def bounds(powers: np.ndarray, depth: int = 20, error: float = 1e-13) -> np.ndarray:
+    return answer(powers, depth, error).low
 
 
 def test_never_above_the_minimum_and_decided_where_there_is_room() -> None:
@@ -37,7 +42,7 @@ def test_a_double_root_is_not_positive_and_subdivision_finds_how_near_is_near() 
         assert low[0] <= max(gap, 0.0)
 
 
-def test_an_end_at_zero_within_the_error_is_refused_at_once() -> None:
+def test_an_end_at_zero_within_the_error_is_not_positive() -> None:
     assert bounds(np.array([[0.0, 1.0]]))[0] == 0.0
     assert bounds(np.array([[1e-14, 1.0]]))[0] == 0.0
     assert bounds(np.array([[1.0, -1.0]]))[0] == 0.0
@@ -48,3 +53,41 @@ def test_what_is_not_finite_proves_nothing_and_does_not_infect_its_neighbours() 
     low = bounds(np.array([[np.nan, 1.0], [2.0, 1.0], [np.inf, -1.0]]))
     np.testing.assert_allclose(low, [0.0, 2.0, 0.0], atol=1e-12)
     assert bounds(np.empty((0, 4))).shape == (0,)
+
+
+def test_three_answers_and_where() -> None:
+    # roots of (t − a)² + gap, of a line, and zero throughout
+    powers = np.array([[1 / 9, -2 / 3, 1.0], [1 / 9 - 1e-6, -2 / 3, 1.0], [1e-15, 0.0, 1.0], [0.0, 0.0, 0.0]])
+    powers = np.concatenate([powers, [[0.25, -1.0, 0.0], [2.0, 0.0, 0.0]]])
+    found = answer(powers)
+    np.testing.assert_array_equal(found.refuted, [False, True, False, False, True, False])
+    np.testing.assert_array_equal(found.low > 0.0, [False] * 5 + [True])
+    np.testing.assert_array_equal(np.isnan(found.doubt).any(axis=1), found.low > 0.0)
+    for k, root in ((0, 1 / 3), (1, 1 / 3), (2, 0.0), (4, 0.25)):
+        assert found.doubt[k, 0] <= root + 1e-3
+        assert found.doubt[k, 1] >= root
+    assert np.ptp(found.doubt[0]) < 1e-4
+    assert np.ptp(found.doubt[2]) < 1e-4
+    np.testing.assert_array_equal(found.doubt[3], [0.0, 1.0])
+
+
+def test_a_wide_error_leaves_undecided_what_rounding_alone_does_not_refute() -> None:
+    powers = np.array([[1e-4, 0.0], [-1e-4, 0.0]])
+    found = answer(powers, error=1e-3, rounding=1e-12)
+    np.testing.assert_array_equal(found.low, 0.0)
+    np.testing.assert_array_equal(found.refuted, [False, True])
+    np.testing.assert_array_equal(answer(powers, error=1e-3).refuted, [False, False])
+
+
+def test_outside_the_doubtful_part_it_is_positive() -> None:
+    rng = np.random.default_rng(7)
+    powers = rng.normal(size=(500, 6))
+    powers[:, 0] += 1.5
+    found = answer(powers, error=1e-2, rounding=1e-12)
+    t = np.linspace(0.0, 1.0, 401)
+    values = Polynomial.__call__
+    for row, doubt, refuted in zip(powers, found.doubt, found.refuted, strict=True):
+        y = values(Polynomial(row), t)
+        assert refuted == (true_minimum(row) < -1e-11)
+        if not refuted:
+            assert (y[~((t >= doubt[0]) & (t <= doubt[1]))] > 0.0).all()

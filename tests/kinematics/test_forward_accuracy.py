@@ -93,8 +93,8 @@ def test_error_within_ten_times_the_condition_number_on_many_poses(
 ) -> None:
     with mp.workdps(DIGITS):
         for k, distance in enumerate(DISTANCES):
-            check(pentapod, surface, distance, 250, 100 + k)
-            check(desk.pentapod, surface, distance, 100, 200 + k)
+            check(pentapod, surface, distance, 100, 100 + k)
+            check(desk.pentapod, surface, distance, 30, 200 + k)
 
 
 @pytest.mark.parametrize("policy", ["never", "always"])

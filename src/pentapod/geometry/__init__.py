@@ -16,10 +16,11 @@ from pentapod.geometry.bernstein import (
 from pentapod.geometry.directions import angle_between, normalised, tangent_frame
 from pentapod.geometry.level_set import enclosed_volume, zero_surface
 from pentapod.geometry.polyline import arc_length
-from pentapod.geometry.positivity import lower_bounds
+from pentapod.geometry.positivity import Positivity, positivity
 from pentapod.geometry.rigid import RigidTransform
 
 __all__ = [
+    "Positivity",
     "RigidTransform",
     "angle_between",
     "arc_length",
@@ -30,9 +31,9 @@ __all__ = [
     "evaluate",
     "from_power",
     "hull",
-    "lower_bounds",
     "multiply",
     "normalised",
+    "positivity",
     "scaled",
     "split",
     "tangent_frame",

@@ -4,7 +4,7 @@ Between two setpoints the legs are polynomials of degree k in time. So are the s
 u, v, and both discriminants, w² = 1 − u² − v² (4k) and S² = R²|n|² − c² (8k). Where both are positive on a
 whole interval, the four assembly modes exist throughout and never meet, and none can turn into another.
 Positivity is read off Bernstein coefficients, with subdivision, and holds in spite of rounding:
-see `_roundings`.
+see `_roundings`. The coefficients themselves come from `discriminants`.
 """
 
 from __future__ import annotations
@@ -16,12 +16,11 @@ from numpy.typing import ArrayLike
 
 from pentapod.arrays import Bools, Floats, as_batch, set_frozen
 from pentapod.errors import ArrayError
-from pentapod.geometry.bernstein import binomials, convolve, scaled, unscaled
-from pentapod.geometry.positivity import lower_bounds
+from pentapod.geometry.positivity import Positivity, positivity
 from pentapod.kinematics.blocks import blocks
 from pentapod.kinematics.component import COMPONENTS, Component
+from pentapod.kinematics.discriminants import Discriminants
 from pentapod.kinematics.pentapod import LinearPentapod
-from pentapod.kinematics.quadratic import LinearPart
 
 _UNIT_ROUNDOFF = 2.0**-53
 _SANE = (1e-40, 1e40)  # metres; within these nothing below can underflow or overflow to harm
@@ -36,20 +35,31 @@ class ComponentProof:
     `component`. Where consecutive intervals join and all are proven, this holds for the whole of them. Legs
     whose setpoints were taken from poses on both sides of a singularity may be proven too: the motion that
     they describe turns back before it. Its forward kinematics in `component` then is not the planned path.
+    refuted (N,): proven not to be so: at some time of the interval the polynomials themselves have w² or S² below
+    zero, so that the legs have no pose there. What is neither is `undecided`: the motion touches a singularity, or
+    comes closer to one than rounding, leg_error and the depth of subdivision can tell.
     w_lower (N,) and s_lower (N,) in metres: proven lower bounds of |w| and |S| over the interval; each is 0
-    where its sign is not proven to last: the interval touches that singularity, leaves the component, loses
-    the pose altogether, or comes closer to one of these than rounding and the depth of subdivision can tell.
+    where its sign is not proven to last.
+    doubt (N, 2): first and last time in [0, 1] of the part of the interval that is not proven, NaN where
+    all of it is; where it is refuted, a part in which w² or S² falls below zero.
     """
 
     component: Component
     w_lower: Floats
     s_lower: Floats
     proven: Bools
+    refuted: Bools
+    doubt: Floats
 
     def __post_init__(self) -> None:
-        for array in (self.w_lower, self.s_lower, self.proven):
+        for array in (self.w_lower, self.s_lower, self.proven, self.refuted, self.doubt):
             array.flags.writeable = False
         set_frozen(self, component=Component(*(int(sign) for sign in self.component)))
+
+    @property
+    def undecided(self) -> Bools:
+        """Which intervals (N,) are neither proven nor refuted."""
+        return ~(self.proven | self.refuted)
 
     @property
     def holds(self) -> bool:
@@ -75,8 +85,8 @@ def certify_component(
 
     The bounds are rigorous for the machine whose base attachments and delta are the given floating-point
     numbers and whose offsets are exactly proportional; the coefficients count as exact. Only the squares of
-    the legs enter: that lengths are positive is for the strokes to say. An interval with NaN in it is not
-    proven.
+    the legs enter: that lengths are positive is for the strokes to say. An interval with NaN in it is
+    undecided.
     Raises ArrayError for a wrong shape, signs other than ±1, a negative leg_error or depth.
     """
     coefficients = as_batch(leg_coefficients, "leg_coefficients", (None, 5, None))
@@ -84,12 +94,24 @@ def certify_component(
         raise ArrayError(f"leg_coefficients has shape {coefficients.shape}", expected="shape (N, 5, k + 1)")
     if not (leg_error >= 0.0 and depth >= 0):
         raise ArrayError("leg_error and depth must not be negative", value=(leg_error, depth))
-    squares = np.zeros((2, len(coefficients)))
+    count = len(coefficients)
+    squares, refuted, doubt = np.zeros((2, count)), np.zeros(count, dtype=np.bool_), np.full((count, 2), np.nan)
     with np.errstate(invalid="ignore", over="ignore", under="ignore"):
-        for block in blocks(len(coefficients), 2048):
-            squares[:, block] = _square_bounds(pentapod, coefficients[block], leg_error, depth)
+        for block in blocks(count, 2048):
+            answers = _answers(Discriminants.of(pentapod, coefficients[block], tops=leg_error > 0.0), leg_error, depth)
+            for row, answer in zip(squares, answers, strict=True):
+                row[block] = answer.low
+            refuted[block], doubt[block] = _joined(*answers)
         roots = np.nextafter(np.sqrt(squares), 0.0)  # rounded to nearest: one step down is below the root
-    return ComponentProof(_named(component), roots[0], roots[1], np.asarray((roots > 0.0).all(axis=0)))
+    return ComponentProof(_named(component), roots[0], roots[1], np.asarray((roots > 0.0).all(axis=0)), refuted, doubt)
+
+
+def _joined(w: Positivity, s: Positivity) -> tuple[Bools, Floats]:
+    """Return where w² or S² is refuted (N,), and the doubtful part (N, 2): the refuted one's, or both together."""
+    low, high = np.fmin(w.doubt[:, 0], s.doubt[:, 0]), np.fmax(w.doubt[:, 1], s.doubt[:, 1])
+    both = np.stack([low, high], axis=1)
+    doubt = np.where(w.refuted[:, None], w.doubt, np.where(s.refuted[:, None], s.doubt, both))
+    return w.refuted | s.refuted, doubt
 
 
 def _named(component: ArrayLike) -> Component:
@@ -129,50 +151,40 @@ def _gamma(roundings: int) -> float:
     return 1.01 * roundings * _UNIT_ROUNDOFF
 
 
-def _square_bounds(pentapod: LinearPentapod, legs: Floats, leg_error: float, depth: int) -> Floats:
-    """Return proven lower bounds (2, N) of w² and S² over intervals (N, 5, k + 1); 0 where there is none."""
-    k, delta, linear = legs.shape[-1] - 1, pentapod.delta, pentapod.linear_part
-    largest = np.abs(legs).max(axis=-1).T  # (5, N)
-    sane = ((largest >= _SANE[0]) & (largest <= _SANE[1])).all(axis=0)
-    q, py, u, v, l3 = _linear_forms(linear, legs)
+def _answers(forms: Discriminants, leg_error: float, depth: int) -> tuple[Positivity, Positivity]:
+    """Return whether w² and S² are positive over each interval."""
+    k, delta, linear, largest = forms.degree, forms.delta, forms.linear, forms.largest
+    sane = np.asarray(((largest >= _SANE[0]) & (largest <= _SANE[1])).all(axis=0))
 
-    one = binomials(4 * k)
-    d1 = one - convolve(u, u)
-    v_squared = convolve(v, v)
-    d1 -= v_squared
-    r_squared = convolve(l3, binomials(2 * k)) - convolve(py, py)
-    n_squared = convolve(binomials(2 * k) - (2.0 * delta) * u, binomials(2 * k))
-    n_squared += (delta * delta) * (one - v_squared)
-    c = convolve(q, binomials(2 * k)) + delta * convolve(v, py)
-    d = convolve(r_squared, n_squared) - convolve(c, c)
-
-    # A of the docstring above. The maxima of the coefficients bound every coefficient of a product.
-    q_abs, py_abs, u_abs, v_abs = np.abs(linear.linear_map) @ largest**2 + np.abs(linear.constant)[:, None]
+    # A of `_roundings`. The maxima of the coefficients bound every coefficient of a product.
+    l3_abs = np.square(largest[2])
+    q_abs, py_abs, u_abs, v_abs = linear.largest(np.square(largest))
     d1_abs = 1.0 + u_abs * u_abs + v_abs * v_abs
     n_abs = 1.0 + 2.0 * abs(delta) * u_abs + delta * delta * (1.0 + v_abs * v_abs)
-    r_abs, c_abs = largest[2] ** 2 + py_abs * py_abs, q_abs + abs(delta) * v_abs * py_abs
+    r_abs, c_abs = l3_abs + py_abs * py_abs, q_abs + abs(delta) * v_abs * py_abs
     d_abs = r_abs * n_abs + c_abs * c_abs
 
     m1, m2 = _roundings(k)
-    d1_error, d_error = _gamma(m1) * d1_abs, _gamma(m2) * d_abs
+    d1_rounding, d_rounding = _gamma(m1) * d1_abs, _gamma(m2) * d_abs
+    d1_error, d_error = d1_rounding, d_rounding
     if leg_error > 0.0:
         # What any leg within leg_error of its polynomial can add; m2 is more than enough for the maxima, too.
-        pairs = ((py, py_abs), (u, u_abs), (v, v_abs), (r_squared, r_abs), (n_squared, n_abs), (c, c_abs))
-        tops = [np.abs(unscaled(form)).max(axis=-1) + _gamma(m2) * bound for form, bound in pairs]
+        bounds = np.stack([py_abs, u_abs, v_abs, r_abs, n_abs, c_abs])
+        tops = forms.tops + _gamma(m2) * bounds
         l_shift = leg_error * (2.0 * largest + leg_error)
-        d1_shift, d_shift = _shifts(abs(delta), np.abs(linear.linear_map) @ l_shift, l_shift[2], tops)
-        d1_error += 1.001 * d1_shift  # 0.001: the rounding of the shifts themselves
-        d_error += 1.001 * d_shift
-    bounds = np.stack(
-        [
-            lower_bounds(unscaled(d1), d1_error, _gamma(4 * k) * d1_abs, depth),
-            lower_bounds(unscaled(d), d_error, _gamma(8 * k) * d_abs, depth),
-        ]
+        d1_shift, d_shift = _shifts(abs(delta), linear.changes(l_shift), l_shift[2], tops)
+        d1_error = d1_rounding + 1.001 * d1_shift  # 0.001: the rounding of the shifts themselves
+        d_error = d_rounding + 1.001 * d_shift
+    w_squared, s_squared = forms.w_squared, forms.s_squared
+    if not sane.all():
+        w_squared = np.where(sane[:, None], w_squared, np.nan)
+    return (
+        positivity(w_squared, d1_error, _gamma(4 * k) * d1_abs, depth, d1_rounding),
+        positivity(s_squared, d_error, _gamma(8 * k) * d_abs, depth, d_rounding),
     )
-    return np.where(sane, bounds, 0.0)
 
 
-def _shifts(delta: float, forms: Floats, l3: Floats, tops: list[Floats]) -> tuple[Floats, Floats]:
+def _shifts(delta: float, forms: Floats, l3: Floats, tops: Floats) -> tuple[Floats, Floats]:
     """Return how far w² and S² move (N,) when q, py, u, v move by `forms` (4, N) and l3² by `l3` (N,).
 
     tops: the largest |py|, |u|, |v|, |R²|, |n|², |c| of each interval. |(a + da)² − a²| ≤ da (2|a| + da).
@@ -184,12 +196,3 @@ def _shifts(delta: float, forms: Floats, l3: Floats, tops: list[Floats]) -> tupl
     n = 2.0 * delta * u + delta * delta * v_squared
     c = q + delta * (v_top * py + py_top * v + v * py)
     return u_squared + v_squared, r_top * n + n_top * r + r * n + c * (2.0 * c_top + c)
-
-
-def _linear_forms(linear: LinearPart, legs: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Return q, py, u, v and l3² in scaled form, each (N, 2k + 1), of legs (N, 5, k + 1)."""
-    coefficients = scaled(np.swapaxes(legs, 0, 1))
-    squared = np.moveaxis(convolve(coefficients, coefficients), -1, 0)  # (2k + 1, 5, N)
-    constant = binomials(len(squared) - 1)[:, None, None] * linear.constant[:, None]
-    forms = np.moveaxis(linear.linear_map @ squared + constant, 0, -1)
-    return forms[0], forms[1], forms[2], forms[3], np.moveaxis(squared[:, 2], 0, -1)

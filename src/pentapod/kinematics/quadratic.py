@@ -57,8 +57,8 @@ class LinearPart:
         size = float(np.hypot(*(base - base[2]).T).max())
         return cls(exact.high[:, :5].copy(), exact.high[:, 5].copy(), exact.low, (NEAR_S * size) ** 2)
 
-    def __call__(self, squared_legs: Floats) -> Floats:
-        """Return (4, ...): q, py, u, v of squared leg lengths (5, ...).
+    def __call__(self, squared_legs: Floats, one: Floats | float = 1.0) -> Floats:
+        """Return (4, ...): q, py, u, v of squared leg lengths (5, ...); one (...) is what the constant is counted in.
 
         Summed leg by leg, not by a matrix product: there the order, and so the last bit, is the library's choice.
         """
@@ -67,8 +67,20 @@ class LinearPart:
         product = np.empty_like(forms)
         for leg in range(1, 5):
             forms += np.multiply(self.linear_map[:, leg][column], squared_legs[leg], out=product)
-        forms += self.constant[column]
+        forms += self.constant[column] * one
         return forms
+
+    def largest(self, squared_legs: Floats) -> Floats:
+        """Return (4, N): bounds of |q|, |py|, |u|, |v| that count every term of theirs as positive."""
+        return self.changes(squared_legs) + np.abs(self.constant)[:, None]
+
+    def changes(self, squared_legs: Floats) -> Floats:
+        """Return (4, N): how far q, py, u, v move at most when squared legs move by up to (5, N) either way."""
+        steepness = np.abs(self.linear_map)
+        change = steepness[:, :1] * squared_legs[0]
+        for leg in range(1, 5):
+            change += steepness[:, leg : leg + 1] * squared_legs[leg]
+        return change
 
     def twofold(self, squared_legs: DoubleDouble) -> list[DoubleDouble]:
         """Return q, py, u, v, each (N,), of squared leg lengths (5, N), all with twice the digits."""
