@@ -58,13 +58,26 @@ def test_a_slow_leg_is_named_where_it_is_slow():
     costs = {c.name: c for c in story.causes}
     assert costs["leg 3 acceleration"].cost > 0.95 * story.gap
     assert costs["feed"].time > 19.9
-    worst = story.places[0]
-    assert worst.cause == "leg 3 acceleration"
-    assert worst.segments == (4, 6)
-    assert str(worst).startswith("leg 3's acceleration costs ")
-    assert "in segments 4–6" in str(worst)
+    told = [place for place in story.places if place.cause == "leg 3 acceleration"]
+    assert sum(place.cost for place in told) > 0.95 * story.gap
+    assert {segment for place in told for segment in place.segments} >= {4, 6}
+    assert all(place.stations[1] <= 0.1 + 1e-3 or place.stations[0] >= 0.12 - 1e-3 for place in told)
+    assert str(told[0]).startswith("leg 3's acceleration costs ")
+    assert "in segment" in str(told[0])
     # By hand: from rest to 0.3 m/s and down to 0.001, twice, each time v²/2a at half the speed.
     assert story.gap == pytest.approx(4 * 0.5 * 0.3 / 0.5, rel=0.03)
+
+
+def test_neighbouring_places_are_one_and_far_ones_are_not():
+    """Turns of a raster: each turn is a place of its own; the segment is the same."""
+    m = machine()
+    trajectory = timed(Path((raster(lines=4, width=0.08, feed=0.3),)), m)
+    story = explain(trajectory, m)
+    turns = [p for p in story.places if p.stations[0] > 0.01 and p.stations[1] < trajectory.path.starts[-1] - 0.01]
+    assert len(turns) >= 3
+    starts = sorted(p.stations[0] for p in turns)
+    assert all(p.stations[1] - p.stations[0] < 0.08 for p in turns)
+    assert starts[-1] - starts[0] > 0.1
 
 
 def test_the_value_is_ready_for_a_report():

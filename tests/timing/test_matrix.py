@@ -18,6 +18,14 @@ def duration(s, x):
     return float((2.0 * steps[steps > 0.0] / ends[steps > 0.0]).sum())
 
 
+def used(s, first, second, x):
+    """Return by how much the pushes exceed 1 at most, and the size of the terms that cancel in them."""
+    moves = np.diff(s) > 0.0
+    u = (np.diff(x)[moves] / (2.0 * np.diff(s)[moves]))[:, None]
+    ends = [(first[k][moves] * u, second[k][moves] * x[k][moves][:, None]) for k in (slice(0, -1), slice(1, None))]
+    return max(np.abs(a + b).max() for a, b in ends) - 1.0, max(np.abs(a).max() for a, _ in ends) + 1.0
+
+
 def check(case, *, oracle):
     """Return whether toppra had an answer; everything about ours is asserted."""
     s, first, second, ceiling = arrays(case)
@@ -26,19 +34,18 @@ def check(case, *, oracle):
     assert np.isfinite(x).all()
     assert (x >= 0.0).all()
     assert (x <= ceiling * (1.0 + 1e-12)).all()
-    steps = np.diff(s)
-    moves = steps > 0.0
-    u = np.diff(x)[moves] / (2.0 * steps[moves])
-    for end in (slice(0, -1), slice(1, None)):
-        rows = first[end][moves] * u[:, None] + second[end][moves] * x[end][moves][:, None]
-        scale = np.abs(first[end][moves] * u[:, None]).max() + 1.0
-        assert np.abs(rows).max() <= 1.0 + 1e-9 * scale, str(case)
+    moves = np.diff(s) > 0.0
+    excess, rounding = used(s, first, second, x)
+    assert excess <= 1e-9 * rounding, str(case)
     if not oracle or not moves.all():  # toppra does not take a gridpoint twice
         return False
     reference = fastest(s, first, second, ceiling, engine="toppra")
     if isinstance(reference, Failure):
         return False
-    assert duration(s, x) == pytest.approx(duration(s, reference), rel=1e-5), str(case)
+    # toppra keeps the limits to some 1e-6. Where x all but vanishes in a corner, that much more push makes it faster
+    # by more than 1e-5: then it is no oracle to that digit.
+    loose = used(s, first, second, reference)[0] > 1e-6
+    assert duration(s, x) == pytest.approx(duration(s, reference), rel=1e-4 if loose else 1e-5), str(case)
     return True
 
 

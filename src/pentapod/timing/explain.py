@@ -17,7 +17,8 @@ MOST_PLACES = 10
 _GAUSS = 0.5 + np.array([-0.5, 0.0, 0.5]) * np.sqrt(0.6)
 _WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 _NEIGHBOURS = 2  # segments between two of the same cause: cuts and links take turns
-_WORTH = 1e-4  # of the gap: what costs less in a segment is not told
+_NEAR = 0.02  # of the path: what is nearer is one place
+_WORTH = 1e-4  # of the gap: what costs less is not told
 
 
 @dataclass(frozen=True)
@@ -34,21 +35,22 @@ class Cause:
 
 @dataclass(frozen=True)
 class CostlyPlace:
-    """A run of segments, both ends included, where one cause costs time.
+    """A stretch of the path where one cause costs time.
 
-    cost in seconds; time (s) and station (global s, m) of the stage that costs most.
+    cost in seconds; segments: first and last of the toolpath; stations: from and to, global s in metres; time: when it
+    costs most, seconds.
     """
 
     cause: str
     cost: float
     segments: tuple[int, int]
+    stations: tuple[float, float]
     time: float
-    station: float
 
     def __str__(self) -> str:
-        a, b = self.segments
+        (a, b), (low, high) = self.segments, (1e3 * s for s in self.stations)
         where = f"segment {a}" if a == b else f"segments {a}–{b}"
-        most = f"most at {self.time:.2f} s, {1e3 * self.station:.1f} mm along the path"
+        most = f"{low:.1f} to {high:.1f} mm along the path, most at {self.time:.2f} s"
         return f"{_possessive(self.cause)} costs {self.cost:.3g} s in {where} ({most})"
 
 
@@ -139,18 +141,19 @@ def _least_times(trajectory: Trajectory, machine: Machine, steps: Floats) -> tup
 def _places(
     cause: str, cost: Floats, segments: Ints, times: Floats, stations: Floats, worth: float
 ) -> list[CostlyPlace]:
-    """Return the runs of neighbouring segments in which a cause costs at least `worth` seconds each."""
-    of_segment = np.bincount(segments, cost)
-    told = np.flatnonzero(of_segment > worth)
-    if not len(told):
+    """Return the runs of stages, near to each other along the path, in which a cause costs at least `worth` s."""
+    rows = np.flatnonzero(cost > 0.0)
+    if not len(rows):
         return []
-    runs = np.split(told, np.flatnonzero(np.diff(told) > _NEIGHBOURS) + 1)
+    far = stations[rows[1:]] - stations[rows[:-1] + 1] > _NEAR * (stations[-1] - stations[0])
+    first = np.concatenate([[0], np.flatnonzero(far | (np.diff(segments[rows]) > _NEIGHBOURS)) + 1])
     places: list[CostlyPlace] = []
-    for run in runs:
-        first, last = int(run[0]), int(run[-1])
-        worst = int(np.argmax(np.where((segments >= first) & (segments <= last), cost, -np.inf)))
-        total = float(of_segment[first : last + 1].sum())
-        places.append(CostlyPlace(cause, total, (first, last), float(times[worst]), float(stations[worst])))
+    for run in np.split(rows, first[1:]):
+        total, worst = float(cost[run].sum()), int(run[np.argmax(cost[run])])
+        if total > worth:
+            reach = (float(stations[run[0]]), float(stations[run[-1] + 1]))
+            within = (int(segments[run[0]]), int(segments[run[-1]]))
+            places.append(CostlyPlace(cause, total, within, reach, float(times[worst])))
     return places
 
 
