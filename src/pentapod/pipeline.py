@@ -22,7 +22,7 @@ from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
 from pentapod.program import Program, Provenance, sample, write_csv
 from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
-from pentapod.timing import Explanation, Trajectory, certify, explain, retime
+from pentapod.timing import Explanation, Trajectory, certify, explain, retime, unheld
 from pentapod.toolpath import (
     BallCutter,
     Mesh,
@@ -201,7 +201,7 @@ class _Task:
         if isinstance(trajectory, Refusal):
             return trajectory
         program = self.clock.time("program", lambda: self._program(placed, trajectory, file))
-        self.clock.time("explain", lambda: self._explanation(trajectory, program), says=str)
+        self.clock.time("explain", lambda: self._explanation(path, trajectory, program), says=str)
         return program
 
     def _placed(self) -> PlacedPath | Refusal:
@@ -231,10 +231,14 @@ class _Task:
         write_csv(program, file)
         return program
 
-    def _explanation(self, trajectory: Trajectory, program: Program) -> Explanation:
+    def _explanation(self, path: LegPath, trajectory: Trajectory, program: Program) -> Explanation:
         position, direction = self.machine.pentapod.pose(program.legs, program.component)
         tips = position + self.machine.tool_length * direction
-        return explain(trajectory, self.machine, certify(trajectory, self.machine, legs=program.legs, tips=tips))
+        # A beam or a spray works at a rate: it wants constant speed on the surface. A cutter only wants no more.
+        beam, period = self.toolpath.pivot < 0.0, self.machine.controller.period
+        slow = unheld(trajectory, period, path.surface_rate) if beam else ()
+        uses = certify(trajectory, self.machine, legs=program.legs, tips=tips)
+        return explain(trajectory, self.machine, uses, slow)
 
 
 def _turned(x: float, y: float, z: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:

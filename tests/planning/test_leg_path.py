@@ -201,6 +201,20 @@ def test_the_way_of_the_tip_alone_is_kept(desk):
     assert way[-1] < piece.length - 1e-4  # the turn on the spot
 
 
+def test_the_pivots_way_is_its_derivative(mixed):
+    placed, path = mixed
+    s = np.linspace(0.001, path.length - 0.001, 400)
+    h = 1e-7
+
+    def pivots(at):
+        tips, axes = path.pose(at)
+        return tips + placed.toolpath.pivot * axes
+
+    inside = np.abs(s[:, None] - path.starts).min(axis=1) > 1e-5
+    fd = np.linalg.norm(pivots(s + h) - pivots(s - h), axis=1) / (2 * h)
+    np.testing.assert_allclose(path.surface_rate(s)[inside], fd[inside], rtol=1e-5)
+
+
 def test_a_sharp_reversal_stops(desk):
     tips, axes = fan([[0, 0, 0], [0.03, 0, 0], [0.0, 0.002, 0]], np.zeros(3))
     toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),))

@@ -65,6 +65,11 @@ class LegPiece:
         """Return how far (n,) in metres the tip itself has moved at stations s (n,)."""
         return self.curve.tip_length(np.asarray(s, dtype=np.float64))
 
+    def surface_rate(self, s: ArrayLike) -> Floats:
+        """Return how far (n,) the pivot (a beam's spot) moves for each metre of s, at stations s (n,)."""
+        tip, axis = self.pose(s, 1)
+        return np.linalg.norm(tip + self.curve.pivot * axis, axis=1)
+
     def __call__(self, s: ArrayLike, order: int = 0) -> Floats:
         """Return leg lengths (n, 5) in metres at stations s (n,), or their derivatives of order 1 to 3 in s."""
         return self.derivatives(s, order)[-1]
@@ -109,6 +114,10 @@ class LegPath:
         """Return tips and tool axes (n, 3), machine frame, at stations s (n,) of the whole path."""
         both = self._each(s, lambda piece, local: np.hstack(piece.pose(local)), 6)
         return both[:, :3], both[:, 3:]
+
+    def surface_rate(self, s: ArrayLike) -> Floats:
+        """Return how far (n,) the pivot (a beam's spot) moves for each metre of s, at stations s (n,)."""
+        return self._each(s, lambda piece, local: piece.surface_rate(local)[:, None], 1)[:, 0]
 
     def piece_at(self, s: ArrayLike) -> Ints:
         """Return the index (n,) of the piece that holds each station s (n,)."""

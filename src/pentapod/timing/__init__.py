@@ -6,6 +6,7 @@ from pentapod.timing.explain import Cause, CostlyPlace, Explanation, explain
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.override import override
 from pentapod.timing.paths import LegPathLike, PieceLike
+from pentapod.timing.process import Unheld, unheld
 from pentapod.timing.retime import retime
 from pentapod.timing.trajectory import Profile, Trajectory
 
@@ -20,8 +21,10 @@ __all__ = [
     "PieceLike",
     "Profile",
     "Trajectory",
+    "Unheld",
     "certify",
     "explain",
     "override",
     "retime",
+    "unheld",
 ]

@@ -10,6 +10,7 @@ import numpy as np
 from pentapod.arrays import Floats, Ints
 from pentapod.machine.machine import Machine
 from pentapod.timing.certificates import LimitUse
+from pentapod.timing.process import Unheld
 from pentapod.timing.trajectory import Trajectory
 
 STANDING = "standing still"
@@ -60,7 +61,8 @@ class Explanation:
 
     duration (s); lower_bound (s): ∫ max(1/feed, max_i |l_i′|/v_i) ds, which no motion along this path can beat; causes:
     most costly first, their times add up to the duration and their costs to the gap; places: the ten
-    that cost most; uses: how much of each limit the sampled program uses.
+    that cost most; uses: how much of each limit the sampled program uses; slow_cuts: where a process that wants
+    constant speed on the surface does not get it.
     """
 
     duration: float
@@ -68,6 +70,7 @@ class Explanation:
     causes: tuple[Cause, ...]
     places: tuple[CostlyPlace, ...]
     uses: tuple[LimitUse, ...] = ()
+    slow_cuts: tuple[Unheld, ...] = ()
 
     @property
     def gap(self) -> float:
@@ -82,6 +85,10 @@ class Explanation:
         lines += [f"  {c.name}: holds the motion for {c.time:.3g} s, costs {c.cost:.3g} s" for c in self.causes]
         lines += [f"  {place}" for place in self.places]
         lines += [f"  {use}" for use in self.uses]
+        if self.slow_cuts:
+            seconds = sum(place.seconds for place in self.slow_cuts)
+            lines.append(f"cutting below the feed for {seconds:.3g} s, at {len(self.slow_cuts)} places")
+            lines += [f"  {place}" for place in self.slow_cuts[:MOST_PLACES]]
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -94,8 +101,16 @@ class Explanation:
         return content
 
 
-def explain(trajectory: Trajectory, machine: Machine, uses: tuple[LimitUse, ...] = ()) -> Explanation:
-    """Return why the trajectory takes as long as it does, from its profile at the gridpoints."""
+def explain(
+    trajectory: Trajectory,
+    machine: Machine,
+    uses: tuple[LimitUse, ...] = (),
+    slow_cuts: tuple[Unheld, ...] = (),
+) -> Explanation:
+    """Return why the trajectory takes as long as it does, from its profile at the gridpoints.
+
+    uses: by `certify`; slow_cuts: by `unheld`; both are only told on.
+    """
     profile = trajectory.profile
     taken, steps = np.diff(profile.times), np.diff(profile.stations)
     least, segments = _least_times(trajectory, machine, steps)
@@ -117,6 +132,7 @@ def explain(trajectory: Trajectory, machine: Machine, uses: tuple[LimitUse, ...]
         tuple(sorted(causes, key=lambda c: -c.cost)),
         tuple(sorted(places, key=lambda p: -p.cost)[:MOST_PLACES]),
         uses,
+        slow_cuts,
     )
 
 
