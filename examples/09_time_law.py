@@ -5,7 +5,7 @@ path under the feed and the legs' own limits, coloured by the limit that holds t
 the legs' limits the setpoints use in time, as the controller joins them. Below: the same motion with the feed override
 turned to 40 %, held, and turned up again.
 
-    python examples/05_time_law.py --out docs/time_law.png
+    python examples/09_time_law.py --out docs/time_law.png
 """
 
 from __future__ import annotations
