@@ -9,7 +9,8 @@ from pentapod.toolpath.toolpath import SegmentKind
 
 
 def timed(sections, m, direction):
-    result = retime(Path((straight(direction, sections[-1][0], sections=sections),)), m)
+    path = Path((straight(direction, sections[-1][0], sections=sections),))
+    result = retime(path, m, limit_jerk=False)  # ramps of plain arithmetic
     assert isinstance(result, Trajectory), str(result)
     return result
 
