@@ -33,3 +33,9 @@ def desk() -> Machine:
 @pytest.fixture(scope="session")
 def cap() -> Toolpath:
     return dome(0.12, 35.0)
+
+
+@pytest.fixture(scope="session")
+def wide() -> Toolpath:
+    """Too wide for the desk machine."""
+    return dome(0.5, 30.0)

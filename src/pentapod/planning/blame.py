@@ -25,17 +25,15 @@ def ranges(mask: Bools) -> tuple[tuple[int, int], ...]:
     return tuple((int(a), int(b) - 1) for a, b in edges.reshape(-1, 2))
 
 
-def refusal(values: Floats, margins: Margins, needed: float, *, fixed: bool, tilt: float) -> Refusal:
-    """Return the refusal of a placement whose best margins are values (N, M)."""
+def refusal(values: Floats, margins: Margins, needed: float, remedies: tuple[str, ...], *, fixed: bool) -> Refusal:
+    """Return the refusal of a placement whose best margins are values (N, M); remedies: phrases for "Try to …"."""
     blames = blame(values, margins, needed)
     short = int((values.min(axis=1) < needed).sum())
     where = "at the given placement" if fixed else "at the best placement found"
-    remedies = ["turn or move the part"] if fixed else ["machine a smaller region, or scale the part down"]
-    if tilt < np.radians(20.0):
-        remedies.append(f"allow more tilt than {np.degrees(tilt):.0f}°")
+    otherwise = "turn or move the part" if fixed else "scale the part down; no wider cone or large region of it fits"
     return Refusal(
         "placement",
         f"the part does not fit the machine {where}: {short} of {len(values)} waypoints are out of limits",
         blames,
-        remedy="Try to " + ", or to ".join(remedies),
+        remedy="Try to " + (", or to ".join(remedies) or otherwise),
     )

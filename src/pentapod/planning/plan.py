@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal, Protocol
 
 from pentapod.kinematics.component import COMPONENTS, Component
@@ -11,6 +12,7 @@ from pentapod.planning.ipopt import IpoptSolver
 from pentapod.planning.margins import Margins
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.planning.placement import Placement
+from pentapod.planning.remedies import remedies
 from pentapod.planning.sampling import best_tilted_margins, first_guesses
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Candidate, Setting
@@ -28,7 +30,10 @@ CALM_SHARE = 0.9
 """Share of the best smallest margin that is kept when the axis is made calm."""
 
 REFINED = 4
-"""How many first guesses are improved; more only while none of them is good enough."""
+"""How many first guesses are improved in any case."""
+
+TRIED = 10
+"""How many are improved at most, while none is good enough."""
 
 
 class Solver(Protocol):
@@ -74,7 +79,7 @@ def plan(
     best: Candidate | None = None
     moving = improves(setting, not fixed)
     for k, (margins, transform) in enumerate(starts):
-        if best is not None and best.smallest >= NEEDED_MARGIN and k >= REFINED:
+        if k >= REFINED and best is not None and (best.smallest >= NEEDED_MARGIN or k >= TRIED):
             break
         found = moving.raise_margin(setting.first_candidate(margins, transform))
         if best is None or found.smallest > best.smallest:
@@ -83,18 +88,24 @@ def plan(
     if best is None:  # COMPONENTS is not empty, and first_guesses returns some for each
         raise RuntimeError("no first guess was made")
     if best.smallest < NEEDED_MARGIN:
-        return _refusal(setting, best, fixed=fixed)
+        progress("placement", 1.0, "it does not fit; looking for what would")
+        return _refusal(setting, best, improves, fixed=fixed)
     if tilt > 0.0:
         progress("tool axis", 0.0, f"smallest margin {best.smallest:.3f}")
-        best = improves(setting, free=False).calm(best, max(CALM_SHARE * best.smallest, NEEDED_MARGIN))
+        best = improves(setting, False).calm(best, max(CALM_SHARE * best.smallest, NEEDED_MARGIN))
     tips, axes = setting.task.machine_poses(best.transform, setting.axes(best.coefficients))
     chosen = placement if placement is not None else Placement(best.transform, "largest smallest margin")
     names = tuple(limit.name for limit in best.margins.limits)
     return PlacedPath(toolpath, chosen, best.margins.component, tips, axes, best.margins(tips, axes), names)
 
 
-def _refusal(setting: Setting, best: Candidate, *, fixed: bool) -> Refusal:
+def _refusal(setting: Setting, best: Candidate, improves: Callable[[Setting, bool], Solver], *, fixed: bool) -> Refusal:
     values, _ = best_tilted_margins(setting.task, best.margins, best.transform)
     if (values.min(axis=1) >= NEEDED_MARGIN).all():  # each waypoint alone would do, not all with one smooth field
         values = setting.values(best.margins, best.transform, best.coefficients)
-    return refusal(values, best.margins, NEEDED_MARGIN, fixed=fixed, tilt=setting.task.tilt)
+
+    def improve(other: Setting, start: Candidate) -> Candidate:
+        return improves(other, True).raise_margin(start)
+
+    found = remedies(setting, best, improve, NEEDED_MARGIN, fixed=fixed)
+    return refusal(values, best.margins, NEEDED_MARGIN, found, fixed=fixed)
