@@ -143,8 +143,9 @@ def test_never_proven_where_the_closed_form_loses_the_path(nominal, n, machines)
         sure = found.proven
         error = np.abs(found.position - pose[0]).max(axis=1)[sure]
         assert (error < 1e-7).all(), "the closed form itself loses half the digits 1 µm from a singularity"
-        assert sure[margin > 0.1].all()
-        proven, lost, clear = proven + sure.sum(), lost + (~connected).sum(), clear + (margin > 0.1).sum()
+        comfortable = margin > 0.1 + 2.0 * np.sqrt(size)  # a fold moves with the root of the error
+        assert sure[comfortable].all()
+        proven, lost, clear = proven + sure.sum(), lost + (~connected).sum(), clear + comfortable.sum()
     assert proven > clear > 0
     assert n / 10 < lost < 0.9 * n
 
@@ -232,6 +233,14 @@ def struts(x, base, offsets, radii):
 def test_where_there_is_no_nominal_pose_there_is_none(nominal):
     machine = with_errors(nominal, 1e-4, seed=8)
     found = as_built_pose(machine, nominal, [[0.1, 5.0, 0.1, 5.0, 0.1], [np.nan] * 5], Component(1, 1))
+    assert np.isnan(found.position).all()
+    assert not found.proven.any()
+
+
+def test_readings_shorter_than_their_zero_are_no_pose(nominal):
+    machine = AsBuiltPentapod.of(nominal, zeros=[0.0, 0.0, 0.0, 2.0, 0.0])
+    p, i = work_poses(5, seed=9)
+    found = as_built_pose(machine, nominal, nominal.leg_lengths(p, i), Component(1, 1))
     assert np.isnan(found.position).all()
     assert not found.proven.any()
 

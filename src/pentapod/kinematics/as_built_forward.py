@@ -30,9 +30,10 @@ _SHORTEST = 2.0**-16  # of the way from the nominal geometry: where shorter step
 class ProvenPoses:
     """Poses of a machine as built, and what is known of them.
 
-    position, direction (..., 3): metres, machine frame; NaN where there is no nominal pose or Newton's method did not
-    settle. proven (...): the exact intended pose exists and is within the two bounds of the one given, in every
-    coordinate. position_error, direction_error (...): these bounds, metres and none; NaN where not proven.
+    position, direction (..., 3): metres, machine frame; NaN where there is no nominal pose, a reading is no longer than
+    its zero, or Newton's method did not settle. proven (...): the exact intended pose exists and is within the two
+    bounds of the one given, in every coordinate. position_error, direction_error (...): these bounds, metres and none;
+    NaN where not proven.
     """
 
     position: Floats
@@ -61,6 +62,7 @@ def as_built_pose(
         raise ArrayError("legs must be finite and positive", expected="metres, NaN where there is no reading")
     batch = np.broadcast_shapes(readings.shape[:-1], signs.shape[:-1])
     readings = np.broadcast_to(readings, (*batch, 5)).reshape(-1, 5)
+    readings = np.where((readings > machine.zeros).all(axis=-1, keepdims=True), readings, np.nan)
     position, direction = nominal.pose(readings, np.broadcast_to(signs, (*batch, 2)).reshape(-1, 2))
     out = np.full((len(readings), 8), np.nan)  # position, direction, two errors
     proven = np.zeros(len(readings), dtype=bool)
