@@ -3,7 +3,7 @@
 from pentapod.kinematics.architecture import ArchitecturalDistance, architectural_distance
 from pentapod.kinematics.as_built import AsBuiltPentapod
 from pentapod.kinematics.as_built_forward import ProvenPoses, as_built_pose
-from pentapod.kinematics.assembly import AssemblyObstacles, Obstacle, assembly_obstacles
+from pentapod.kinematics.assembly import AssemblyObstacles, Obstacle, assembly_obstacles, platform_obstacles
 from pentapod.kinematics.calibration import Calibration, calibrate
 from pentapod.kinematics.cell_poses import cell_of, poses_in_cell
 from pentapod.kinematics.cells import Cell, CellDecomposition, cell_decomposition
@@ -11,6 +11,7 @@ from pentapod.kinematics.certificate import ComponentProof, certify_component
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.conics import Conic, attachment_conic, conic_determinant, forbidden_conic
 from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.kinematics.following import FollowedPath, follow
 from pentapod.kinematics.forces import (
     leg_force_map,
     leg_load_map,
@@ -34,6 +35,7 @@ from pentapod.kinematics.singularities import (
     singularity_values,
 )
 from pentapod.kinematics.singularity_polynomial import singularity_cofactors, singularity_polynomial
+from pentapod.kinematics.six_legs import SixLegPlatform
 from pentapod.kinematics.sphere import SingularityFreeSphere, singularity_free_sphere
 from pentapod.kinematics.stiffness import tip_compliance, tip_stiffness
 from pentapod.kinematics.workspace import Workspace
@@ -51,6 +53,7 @@ __all__ = [
     "ComponentProof",
     "Conic",
     "FiveLegs",
+    "FollowedPath",
     "GeneralPentapod",
     "GuideChoice",
     "LinearPentapod",
@@ -61,6 +64,7 @@ __all__ = [
     "ReachField",
     "ReconfigurablePentapod",
     "SingularityFreeSphere",
+    "SixLegPlatform",
     "Workspace",
     "architectural_distance",
     "architectural_measure",
@@ -75,12 +79,14 @@ __all__ = [
     "choose_slides",
     "conditioning_criterion",
     "conic_determinant",
+    "follow",
     "forbidden_conic",
     "leg_force_map",
     "leg_jacobian",
     "leg_load_map",
     "leg_moment_map",
     "orientation_distance",
+    "platform_obstacles",
     "pose_jacobian",
     "poses_in_cell",
     "position_distance",

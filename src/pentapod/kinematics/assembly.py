@@ -12,6 +12,7 @@ from pentapod.arrays import Bools, Floats, as_batch
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.line_equations import LineEquations
 from pentapod.kinematics.line_roots import interior
+from pentapod.kinematics.six_legs import SixLegPlatform
 from pentapod.kinematics.solution_line import SolutionLine
 
 
@@ -24,6 +25,7 @@ class Obstacle(IntEnum):
     POSITION = 3
     APART = 4
     ANGLE = 5
+    SIXTH_LEG = 6
 
     @property
     def inequality(self) -> str:
@@ -38,6 +40,7 @@ _INEQUALITIES = {
     Obstacle.POSITION: "px² + py² ≤ l_3²: leg 3 is too short for the horizontal position",
     Obstacle.APART: "u² + v² ≤ 1 and px² + py² ≤ l_3² at once: each can hold, but not both together",
     Obstacle.ANGLE: "|t − px u − py v| ≤ |pz w|: leg 3 and the line cannot include the angle",
+    Obstacle.SIXTH_LEG: "|M − r| ≤ √(l_6² − h²) ≤ M + r: the sixth leg does not reach the platform about any line",
 }
 
 
@@ -45,8 +48,9 @@ _INEQUALITIES = {
 class AssemblyObstacles:
     """What keeps legs (..., 5) from being assembled: an `Obstacle` (...) for each, and the shortfall (...).
 
-    The shortfall is by how much the inequality fails where it fails least, relative to its right-hand side, for
-    ANGLE relative to l_3; 0 where a pose exists, NaN for NOT_A_LENGTH. For APART it is taken in the middle of the gap.
+    The shortfall is by how much the inequality fails where it fails least, relative to its right-hand side; for
+    ANGLE relative to l_3, for SIXTH_LEG by how much l_6 must change, relative to itself. 0 where a pose exists, NaN
+    for NOT_A_LENGTH. For APART it is taken in the middle of the gap.
     """
 
     obstacle: NDArray[np.int8]
@@ -80,6 +84,24 @@ def assembly_obstacles(pentapod: FiveLegs, legs: ArrayLike) -> AssemblyObstacles
     line = SolutionLine.of(LineEquations.of(pentapod.base, pentapod.offsets), np.square(flat[known].T))
     obstacle[known], shortfall[known] = _judge(line)
     return AssemblyObstacles(obstacle.reshape(lengths.shape[:-1]), shortfall.reshape(lengths.shape[:-1]))
+
+
+def platform_obstacles(platform: SixLegPlatform, legs: ArrayLike) -> AssemblyObstacles:
+    """Return the same for the leg lengths (..., 6), metres, of a platform with a sixth leg."""
+    lengths = as_batch(legs, "legs", (6,))
+    sixth = lengths[..., 5, None]
+    line = assembly_obstacles(platform.pentapod, lengths[..., :5])
+    shortest, longest = platform.sixth_leg_range(*platform.pentapod.assembly_modes(lengths[..., :5]))
+    missed = np.maximum(np.maximum(shortest - sixth, sixth - longest), 0.0)
+    shortfall = np.where(line.exists, np.where(line.exists[..., None], missed, 0.0).min(axis=-1), np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shortfall = shortfall / lengths[..., 5]
+    bad = ~(np.isfinite(sixth[..., 0]) & (sixth[..., 0] >= 0.0))
+    assembled = np.isfinite(platform.assembly_modes(lengths)[0]).all(axis=-1).any(axis=-1)
+    obstacle = np.where(line.exists & ~assembled, Obstacle.SIXTH_LEG, line.obstacle)
+    obstacle = np.where(bad, Obstacle.NOT_A_LENGTH, obstacle).astype(np.int8)
+    shortfall = np.where(obstacle == Obstacle.SIXTH_LEG, shortfall, line.shortfall)
+    return AssemblyObstacles(obstacle, np.where(bad, np.nan, shortfall))
 
 
 def _judge(line: SolutionLine) -> tuple[NDArray[np.int8], Floats]:
