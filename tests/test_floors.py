@@ -20,7 +20,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
     (("timing",),),
     (("program",),),
     (("verify",),),
-    (("job", "job_tables", "outcome", "plan_arrays", "artefacts", "pipeline"),),
+    (("job", "job_tables", "job_tool", "outcome", "plan_arrays", "artefacts", "pipeline"),),
     (("report",),),
     (("cli",),),
 )

@@ -20,6 +20,7 @@ from pentapod.errors import JobError, nearest
 from pentapod.job_tables import (
     AxisTable,
     FeedTable,
+    GougeTable,
     JobTables,
     MachineTable,
     OutputTable,
@@ -39,13 +40,14 @@ _VARIABLE = re.compile(r"\$\{(\w+)\}")
 class Job:
     """What a job file says. Units are as in the file; `pentapod.pipeline` turns them into SI values.
 
-    path: the job file. mesh_path and machine_file: resolved against the job file's folder.
+    path: the job file. mesh_path, machine_file and toolpath_file: resolved against the job file's folder.
     """
 
     path: Path
     tables: JobTables
     mesh_path: Path
     machine_file: Path | None
+    toolpath_file: Path | None = None
 
     @classmethod
     def load(cls, path: str | Path) -> Job:
@@ -63,9 +65,12 @@ class Job:
             tables = JobTables.model_validate(_tuples(content))
         except ValidationError as error:
             raise _job_error(path, text, error) from error
-        mesh = _resolve(path, text, "mesh", tables.part.mesh)
-        machine = None if tables.machine.file is None else _resolve(path, text, "file", tables.machine.file)
-        return cls(path, tables, mesh, machine)
+        mesh = _resolve(path, text, ("part", "mesh"), tables.part.mesh)
+        machine, toolpath = (
+            None if name is None else _resolve(path, text, (table, "file"), name)
+            for table, name in (("machine", tables.machine.file), ("toolpath", tables.toolpath.file))
+        )
+        return cls(path, tables, mesh, machine, toolpath)
 
     @property
     def part(self) -> PartTable:
@@ -91,6 +96,11 @@ class Job:
     def axis(self) -> AxisTable:
         """The table [axis]."""
         return self.tables.axis
+
+    @property
+    def gouge(self) -> GougeTable:
+        """The table [gouge]."""
+        return self.tables.gouge
 
     @property
     def feed(self) -> FeedTable:
@@ -122,6 +132,8 @@ class Job:
         content["part"]["mesh"] = [self.mesh_path.suffix.lower(), _sha(self.mesh_path)]
         if self.machine_file is not None:
             content["machine"]["file"] = _sha(self.machine_file)
+        if self.toolpath_file is not None:
+            content["toolpath"]["file"] = [self.toolpath_file.suffix.lower(), _sha(self.toolpath_file)]
         canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 
@@ -159,9 +171,9 @@ def _tuples(value: Any) -> Any:
     return value
 
 
-def _resolve(job: Path, text: str, key: str, name: str) -> Path:
+def _resolve(job: Path, text: str, where: tuple[str, str], name: str) -> Path:
     """Return the file that a key names. Raises JobError where a variable is not set or nothing is there."""
-    table = "part" if key == "mesh" else "machine"
+    table, key = where
 
     def wrong(what: str, **details: Any) -> JobError:
         line = _line_of(text, (table, key))

@@ -75,11 +75,23 @@ class MachineTable(Table):
 
 
 class ToolTable(Table):
-    """The tool: a ball cutter that touches the surface, or a beam or spray that keeps its distance."""
+    """The tool: a cutter that touches the surface, or a beam or spray that keeps its distance."""
 
-    type: Literal["ball", "standoff"] = Field(description='"ball" cutter, or "standoff" (laser, spray)')
-    diameter_mm: Positive | None = Field(default=None, le=100.0, description="diameter of the ball")
+    type: Literal["ball", "bull", "flat", "lollipop", "standoff"] = Field(
+        description='"ball", "bull" (nose), "flat" or "lollipop" cutter, or "standoff" (laser, spray, water jet)'
+    )
+    diameter_mm: Positive | None = Field(default=None, le=100.0, description="diameter of the cutter, or of its ball")
+    corner_mm: Positive | None = Field(default=None, le=50.0, description="bull: radius of the rounded corner")
+    neck_mm: Positive | None = Field(default=None, le=100.0, description="lollipop: diameter of the neck")
+    reach_mm: Positive | None = Field(default=None, le=500.0, description="lollipop: from the tip to the neck's end")
+    flute_mm: Positive | None = Field(
+        default=None, le=500.0, description="cutting length from the tip; above it the shank begins"
+    )
     standoff_mm: Positive | None = Field(default=None, le=200.0, description="from the tip to the surface")
+    shank_mm: tuple[Vector, ...] | None = Field(
+        default=None, description="shank or nozzle: [height, lower diameter, upper diameter] of each piece, upwards"
+    )
+    holder_mm: tuple[Vector, ...] | None = Field(default=None, description="holder: pieces as of the shank, above it")
     length_mm: Positive | None = Field(
         default=None,
         le=1000.0,
@@ -88,18 +100,42 @@ class ToolTable(Table):
 
     @model_validator(mode="after")
     def _own_size(self) -> ToolTable:
-        needed, other = ("diameter_mm", "standoff_mm") if self.type == "ball" else ("standoff_mm", "diameter_mm")
-        if getattr(self, needed) is None:
-            _wrong(needed, f'missing for a tool of type "{self.type}"', "a length in mm")
-        if getattr(self, other) is not None:
-            _wrong(other, f'means nothing for a tool of type "{self.type}"', f"{needed} alone")
+        needed, possible = _TOOL_KEYS[self.type]
+        for key in ("diameter_mm", "corner_mm", "neck_mm", "reach_mm", "flute_mm", "standoff_mm"):
+            given = getattr(self, key) is not None
+            if key in needed and not given:
+                _wrong(key, f'missing for a tool of type "{self.type}"', "a length in mm")
+            if given and key not in needed + possible:
+                _wrong(key, f'means nothing for a tool of type "{self.type}"', f"{', '.join(needed)} alone")
+        for key in ("shank_mm", "holder_mm"):
+            for piece in getattr(self, key) or ():
+                if piece[0] <= 0.0 or min(piece) < 0.0 or max(piece[1:]) <= 0.0:
+                    _wrong(key, "an impossible piece", "[height, lower diameter, upper diameter], all positive")
         return self
+
+
+_TOOL_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "ball": (("diameter_mm",), ("flute_mm",)),
+    "bull": (("diameter_mm", "corner_mm"), ("flute_mm",)),
+    "flat": (("diameter_mm",), ("flute_mm",)),
+    "lollipop": (("diameter_mm", "neck_mm", "reach_mm"), ()),
+    "standoff": (("standoff_mm",), ()),
+}
+"""Of each type: the keys that it needs, and those that it may have."""
 
 
 class ToolpathTable(Table):
     """How the surface is covered."""
 
-    strategy: Literal["raster"] = Field(default="raster", description="parallel plane slices")
+    strategy: Literal["raster", "file"] = Field(
+        default="raster", description='"raster" (parallel plane slices), or "file" (a toolpath that is there already)'
+    )
+    file: str | None = Field(
+        default=None, min_length=1, description="file: the toolpath (APT, G-code, CSV, npz), relative to this job file"
+    )
+    format: str | None = Field(
+        default=None, min_length=1, description="file: its format, where the suffix does not tell"
+    )
     direction_deg: float = Field(
         default=0.0, ge=-360.0, le=360.0, description="direction of the passes, from +x towards +y"
     )
@@ -112,6 +148,12 @@ class ToolpathTable(Table):
 
     @model_validator(mode="after")
     def _one_spacing(self) -> ToolpathTable:
+        if (self.strategy == "file") != (self.file is not None):
+            if self.file is None:
+                _wrong("file", "the toolpath file is missing", 'file = "path.apt"')
+            _wrong("file", f'means nothing for the strategy "{self.strategy}"', 'strategy = "file"')
+        if self.strategy == "file":
+            return self
         if self.stepover_mm is not None and self.scallop_mm is not None:
             _wrong("scallop_mm", "stepover_mm and scallop_mm are both given", "one of the two")
         if self.stepover_mm is None and self.scallop_mm is None:
@@ -126,8 +168,59 @@ class AxisTable(Table):
         default=15.0,
         ge=0.0,
         le=60.0,
-        description="largest angle of the tool axis to the surface normal",
+        description="largest angle of the tool axis to the nominal one (the normal, unless it is set below)",
     )
+    mode: Literal["normal", "fixed", "toward", "from", "between"] = Field(
+        default="normal",
+        description='nominal axis: "normal", "fixed", "toward" or "from" a point or line, "between" given directions',
+    )
+    direction: Vector | None = Field(default=None, description="fixed: from the tip to the spindle, mesh frame")
+    point_mm: Vector | None = Field(default=None, description="toward, from: a point, mesh frame")
+    line: Vector | None = Field(default=None, description="toward, from: direction of a line through the point")
+    places_mm: tuple[Vector, ...] | None = Field(default=None, description="between: where the directions hold")
+    directions: tuple[Vector, ...] | None = Field(default=None, description="between: one direction for each place")
+    lead_deg: float = Field(default=0.0, ge=-80.0, le=80.0, description="leaning forwards, along the feed")
+    side_deg: float = Field(default=0.0, ge=-80.0, le=80.0, description="leaning to the left of the feed")
+    smoothing_deg: float = Field(default=0.0, ge=0.0, le=45.0, description="by which smoothing may turn an axis")
+    smoothing_reach_mm: Positive = Field(default=5.0, description="over which it works, along and across the passes")
+    rate_deg_mm: Positive | None = Field(default=None, description="most turning of the axis per mm of a cut")
+
+    @model_validator(mode="after")
+    def _mode_keys(self) -> AxisTable:
+        needed = _MODE_KEYS[self.mode]
+        for key in ("direction", "point_mm", "places_mm", "directions"):
+            given = getattr(self, key) is not None
+            if given != (key in needed):
+                what = "missing for" if not given else "means nothing for"
+                _wrong(key, f'{what} axis mode "{self.mode}"', ", ".join(needed) or "none of these keys")
+        if self.line is not None and self.mode not in ("toward", "from"):
+            _wrong("line", f'means nothing for axis mode "{self.mode}"', 'mode = "toward" or "from"')
+        for key in ("direction", "line"):
+            if getattr(self, key) is not None and not any(getattr(self, key)):
+                _wrong(key, "the direction is zero", "a direction such as [0, 0, 1]")
+        if self.places_mm is not None and len(self.places_mm) != len(self.directions or ()):
+            _wrong("directions", "as many directions as places are needed", f"{len(self.places_mm)} directions")
+        return self
+
+
+_MODE_KEYS: dict[str, tuple[str, ...]] = {
+    "normal": (),
+    "fixed": ("direction",),
+    "toward": ("point_mm",),
+    "from": ("point_mm",),
+    "between": ("places_mm", "directions"),
+}
+
+
+class GougeTable(Table):
+    """What is done where cutter, shank or holder would cut into the part."""
+
+    remedy: tuple[Literal["tilt", "lift", "drop", "report"], ...] = Field(
+        default=("report",), min_length=1, description='tried in this order: "tilt", "lift", "drop"; or "report" alone'
+    )
+    tolerance_mm: Positive = Field(default=0.05, description="depth that counts as none")
+    cone_deg: float = Field(default=30.0, gt=0.0, lt=90.0, description="tilt: most that an axis may turn")
+    highest_mm: Positive = Field(default=20.0, description="lift: most that a waypoint may rise")
 
 
 class FeedTable(Table):
@@ -206,7 +299,14 @@ class JobTables(Table):
     tool: ToolTable
     toolpath: ToolpathTable
     axis: AxisTable = Field(default=AxisTable())
+    gouge: GougeTable = Field(default=GougeTable())
     feed: FeedTable
     tolerance: ToleranceTable = Field(default=ToleranceTable())
     placement: PlacementTable = Field(default=PlacementTable())
     output: OutputTable = Field(default=OutputTable())
+
+    @model_validator(mode="after")
+    def _leaning(self) -> JobTables:
+        if self.tool.type in ("bull", "flat") and self.axis.tilt_deg > 0.0:
+            _wrong("axis.tilt_deg", f'a tool of type "{self.tool.type}" cannot lean without digging in', "tilt_deg = 0")
+        return self

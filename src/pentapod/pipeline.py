@@ -14,6 +14,7 @@ from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, w
 from pentapod.errors import ArrayError, MachineError, MeshError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import Job
+from pentapod.job_tool import FileReport, Reports, finished_as_asked, job_tool
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import ControllerSettings, Machine
 from pentapod.outcome import Outcome, Stage, refusal_verdict
@@ -24,16 +25,15 @@ from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
 from pentapod.timing import Explanation, Trajectory, certify, explain, retime, unheld
 from pentapod.toolpath import (
-    BallCutter,
     Mesh,
     RasterOptions,
-    RasterReport,
     Region,
-    StandOff,
+    Tool,
     Toolpath,
     load_mesh,
     raster_with_report,
 )
+from pentapod.toolpath.formats import read_toolpath
 from pentapod.verify import Verdict, verify
 from pentapod.version import __version__
 
@@ -65,7 +65,7 @@ def run(
     machine = job_machine(job)
     placement = job_placement(job)
     mesh = clock.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
-    toolpath, _ = clock.time("toolpath", lambda: job_toolpath(job, mesh), says=lambda made: str(made[1]))
+    toolpath, _ = clock.time("toolpath", lambda: job_toolpath(job, mesh, progress), says=lambda made: str(made[1]))
     with staged(folder) as staging:
         program = _Task(job, machine, toolpath, placement, clock).program(staging / PROGRAM)
         if isinstance(program, Refusal):
@@ -117,17 +117,26 @@ def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
     return mesh
 
 
-def job_toolpath(job: Job, mesh: Mesh) -> tuple[Toolpath, RasterReport]:
+def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Toolpath, Reports]:
     """Return the job's toolpath, workpiece frame, and what it came to.
 
-    Raises ToolpathError where nothing is there to machine.
+    Raises ToolpathError where nothing is there to machine, or the toolpath file cannot be read.
     """
+    tool = job_tool(job)
+    toolpath, report = _drawn(job, mesh, tool)
+    toolpath, gouges = finished_as_asked(job, mesh, tool, toolpath, progress)
+    return toolpath, Reports((report, gouges))
+
+
+def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
+    """Return the toolpath as a strategy lays it or a file tells it, and what that came to."""
     part, table, feed = job.part, job.toolpath, job.feed
     link = feed.cut_mm_min if feed.link_mm_min is None else feed.link_mm_min
-    if job.tool.diameter_mm is not None:
-        tool = BallCutter(0.5 * job.tool.diameter_mm * _MM)
-    else:
-        tool = StandOff((job.tool.standoff_mm or 0.0) * _MM)
+    if job.toolpath_file is not None:
+        read = read_toolpath(job.toolpath_file, table.format, pivot=tool.pivot, feed=feed.cut_mm_min * _MM_MIN)
+        # Whatever the file says of its tool, this job's is the one that moves.
+        read = Toolpath(read.segments, tool.pivot)
+        return read, FileReport(job.toolpath_file.name, len(read), len(read.segments))
     region = Region(
         direction=part.region_direction,
         angle=float(np.radians(part.region_angle_deg)),

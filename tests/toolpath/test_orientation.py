@@ -137,3 +137,24 @@ def test_a_path_within_the_cap_is_left_alone():
 def test_nonsense_is_refused(bad):
     with pytest.raises(InputError):
         Orientation(**bad)
+
+
+def test_a_finished_toolpath_is_turned_and_stays_whole():
+    from toolpath_surfaces import grid
+
+    from pentapod.toolpath import Mesh, RasterOptions, raster
+    from pentapod.toolpath.orienting import oriented
+    from pentapod.toolpath.tools import BallCutter, StandOff
+
+    mesh = Mesh.of(*grid(lambda x, y: -(x**2 + y**2) / 0.2, width=0.05, cells=20))
+    for tool in (BallCutter(3e-3), StandOff(5e-3)):
+        path = raster(mesh, tool, RasterOptions(stepover=0.01))
+        assert oriented(path, tool, Orientation()) is path
+        turned = oriented(path, tool, Orientation(Fixed((0.1, 0, 1))))
+        np.testing.assert_allclose(turned.axes, np.tile([0.1, 0, 1], (len(path), 1)) / np.hypot(0.1, 1), atol=1e-12)
+        cut = np.concatenate([[s.kind == "cut"] * (len(s.tips) - 1) for s in path.segments] + [[False]])
+        np.testing.assert_allclose(turned.pivots[cut], path.pivots[cut], atol=1e-15)
+        leaned_path = oriented(path, tool, Orientation(lead=np.radians(10)))
+        leads = angle_between(leaned_path.axes, path.axes)[cut]
+        np.testing.assert_allclose(np.sort(leads)[len(leads) // 10 :], np.radians(10), atol=1e-9)
+        assert [s.kind for s in leaned_path.segments] == [s.kind for s in path.segments]

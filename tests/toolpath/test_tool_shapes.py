@@ -96,6 +96,7 @@ def test_shank_and_holder_are_stacked_on_the_cutter():
         ("holder", 0.04, 0.05),
         ("holder", 0.05, pytest.approx(0.08)),
     ]
+    assert BallCutter(3e-3, flute=4e-3, holder=HOLDER).solids[2].low == 4e-3
     assert [s.kind for s in Lollipop(4e-3, 1e-3, 0.02, holder=HOLDER).solids] == ["cutter", "shank", "holder", "holder"]
     assert [s.kind for s in StandOff(5e-3, shank=SHANK).solids] == ["shank"]
 

@@ -59,7 +59,8 @@ class _Mounted:
     def solids(self) -> tuple[Solid, ...]:
         """The convex bodies that make up cutter, shank and holder."""
         own = self._cutter()
-        base = max((solid.top for solid in own), default=0.0)
+        flute = getattr(self, "flute", None)
+        base = max((solid.top for solid in own), default=0.0) if flute is None else float(flute)
         shank = stacked("shank", self.shank, base)
         return (*own, *shank, *stacked("holder", self.holder, max([base, *(s.high for s in shank)])))
 

@@ -1,0 +1,110 @@
+"""From a job's tables to the values of the toolpath floor: the tool, its axes, what is done about gouges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.errors import ToolpathError
+from pentapod.job import Job
+from pentapod.job_tables import Vector
+from pentapod.progress import Progress, silent
+from pentapod.toolpath.axis_modes import AxisMode, Between, Fixed, Normal, Pointed
+from pentapod.toolpath.facet_tree import FacetTree
+from pentapod.toolpath.gouge import GougeOptions, Remedy, checked
+from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.orientation import Orientation
+from pentapod.toolpath.orienting import oriented
+from pentapod.toolpath.solids import Cone
+from pentapod.toolpath.toolpath import Toolpath
+from pentapod.toolpath.tools import BallCutter, BullNose, FlatEnd, Lollipop, StandOff, Tool
+
+_MM = 1e-3
+
+
+@dataclass(frozen=True)
+class Reports:
+    """What the steps to a toolpath came to, one after the other."""
+
+    parts: tuple[object, ...]
+
+    def __str__(self) -> str:
+        return "\n".join(str(part) for part in self.parts)
+
+
+@dataclass(frozen=True)
+class FileReport:
+    """A toolpath that came from a file."""
+
+    name: str
+    waypoints: int
+    segments: int
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.waypoints:,} waypoints in {self.segments:,} segments, read as they are"
+
+
+def job_tool(job: Job) -> Tool:
+    """Return the job's tool. Raises JobError where its lengths make no tool."""
+    table = job.tool
+    mounted = {"shank": _cones(table.shank_mm), "holder": _cones(table.holder_mm)}
+    radius, flute = 0.5 * _MM * (table.diameter_mm or 0.0), None if table.flute_mm is None else _MM * table.flute_mm
+    try:
+        if table.type == "ball":
+            return BallCutter(radius, flute, **mounted)
+        if table.type == "bull":
+            return BullNose(radius, _MM * (table.corner_mm or 0.0), flute, **mounted)
+        if table.type == "flat":
+            return FlatEnd(radius, flute=flute, **mounted)
+        if table.type == "lollipop":
+            return Lollipop(radius, 0.5 * _MM * (table.neck_mm or 0.0), _MM * (table.reach_mm or 0.0), **mounted)
+        return StandOff(_MM * (table.standoff_mm or 0.0), **mounted)
+    except ToolpathError as error:
+        key = {"corner": "corner_mm", "flute": "flute_mm", "neck_radius": "neck_mm", "reach": "reach_mm"}
+        raise job.error("tool", key.get(error.key or "", "type"), error.what, expected=error.expected) from error
+
+
+def job_orientation(job: Job) -> Orientation:
+    """Return how the job wants the tool to stand."""
+    table = job.axis
+    return Orientation(
+        mode=_mode(job),
+        lead=float(np.radians(table.lead_deg)),
+        tilt=float(np.radians(table.side_deg)),
+        smoothing=float(np.radians(table.smoothing_deg)),
+        reach=_MM * table.smoothing_reach_mm,
+        rate=None if table.rate_deg_mm is None else float(np.radians(table.rate_deg_mm)) / _MM,
+    )
+
+
+def finished_as_asked(
+    job: Job, mesh: Mesh, tool: Tool, toolpath: Toolpath, progress: Progress = silent
+) -> tuple[Toolpath, object]:
+    """Return a toolpath with the axes and without the gouges that the job asks for, and what the check found."""
+    if job.toolpath.strategy != "file":
+        toolpath = oriented(toolpath, tool, job_orientation(job))
+    table = job.gouge
+    options = GougeOptions(
+        tuple(Remedy(name) for name in table.remedy),
+        tolerance=_MM * table.tolerance_mm,
+        cone=float(np.radians(table.cone_deg)),
+        highest=_MM * table.highest_mm,
+    )
+    return checked(toolpath, tool, FacetTree.of(mesh), options, progress)
+
+
+def _mode(job: Job) -> AxisMode:
+    table = job.axis
+    if table.mode == "fixed":
+        return Fixed(table.direction or (0.0, 0.0, 1.0))
+    if table.mode in ("toward", "from"):
+        point = _MM * np.array(table.point_mm)
+        return Pointed(point, None if table.line is None else np.array(table.line), toward=table.mode == "toward")
+    if table.mode == "between":
+        return Between(_MM * np.array(table.places_mm), np.array(table.directions))
+    return Normal()
+
+
+def _cones(pieces: tuple[Vector, ...] | None) -> tuple[Cone, ...]:
+    return tuple(Cone(_MM * height, 0.5 * _MM * low, 0.5 * _MM * high) for height, low, high in pieces or ())
