@@ -132,14 +132,13 @@ class _Fit:
             change, cost = np.zeros(30), float(b @ b)
             change[[k for k in free if k not in bound]] = step
             converged = bool(np.abs(change).max(initial=0.0) < 1e-13 * max(1.0, float(np.abs(theta).max())))
-            share = 1.0
-            for _ in range(20):
-                trial = _clamped(theta + share * change)
+            trial, residual_there = theta, residual
+            for halvings in range(20):
+                trial = _clamped(theta + 0.5**halvings * change)
                 residual_there = self._residuals(trial)
                 b = self._whitened_residual(residual_there, weights)
                 if float(b @ b) <= cost * (1.0 + 1e-12) + 1e-300:
                     break
-                share *= 0.5
             theta, residual = trial, residual_there
             if converged or not free:
                 converged = True
@@ -246,7 +245,7 @@ def _bounded_step(a: Floats, b: Floats, theta: Floats, free: list[int]) -> tuple
     bound: list[int] = []
     while True:
         inner = [k for k in free if k not in bound]
-        step = np.linalg.lstsq(a[:, inner], b, rcond=None)[0] if inner else np.zeros(0)
+        step: Floats = np.asarray(np.linalg.lstsq(a[:, inner], b, rcond=None)[0], np.float64) if inner else np.zeros(0)
         out = [k for k, s in zip(inner, step, strict=True) if k % 6 == 4 and theta[k] <= 0.0 and s < 0.0]
         if not out:
             return step, bound
