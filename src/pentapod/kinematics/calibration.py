@@ -129,19 +129,11 @@ class _Fit:
         for _ in range(_ROUNDS):
             a, b = self._whitened(self._jacobian(theta), weights), self._whitened_residual(residual, weights)
             step, bound = _bounded_step(a, b, theta, free)
-            change, cost = np.zeros(30), float(b @ b)
+            change = np.zeros(30)
             change[[k for k in free if k not in bound]] = step
             converged = bool(np.abs(change).max(initial=0.0) < 1e-13 * max(1.0, float(np.abs(theta).max())))
-            trial, residual_there = theta, residual
-            for halvings in range(20):
-                trial = _clamped(theta + 0.5**halvings * change)
-                residual_there = self._residuals(trial)
-                b = self._whitened_residual(residual_there, weights)
-                if float(b @ b) <= cost * (1.0 + 1e-12) + 1e-300:
-                    break
-            theta, residual = trial, residual_there
-            if converged or not free:
-                converged = True
+            theta, residual = self._moved(theta, change, float(b @ b), weights)
+            if converged:
                 break
         a, b = self._whitened(self._jacobian(theta), weights), self._whitened_residual(residual, weights)
         inner = [k for k in free if k not in bound]
@@ -171,6 +163,17 @@ class _Fit:
             freedom=freedom,
             converged=converged,
         )
+
+    def _moved(self, theta: Floats, change: Floats, cost: float, weights: Floats) -> tuple[Floats, Floats]:
+        """Return the parameters after the change, or so much of it as does not raise the cost, and the residuals."""
+        share = 1.0
+        while True:
+            trial = _clamped(theta + share * change)
+            residual = self._residuals(trial)
+            b = self._whitened_residual(residual, weights)
+            if float(b @ b) <= cost * (1.0 + 1e-12) + 1e-300 or share < 1e-6:
+                return trial, residual
+            share *= 0.5
 
     def _residuals(self, theta: Floats) -> Floats:
         return self.readings - _machine(theta).leg_lengths(self.p, self.i)
@@ -245,7 +248,7 @@ def _bounded_step(a: Floats, b: Floats, theta: Floats, free: list[int]) -> tuple
     bound: list[int] = []
     while True:
         inner = [k for k in free if k not in bound]
-        step: Floats = np.asarray(np.linalg.lstsq(a[:, inner], b, rcond=None)[0], np.float64) if inner else np.zeros(0)
+        step: Floats = np.asarray(np.linalg.lstsq(a[:, inner], b, rcond=None)[0] if inner else (), dtype=np.float64)
         out = [k for k, s in zip(inner, step, strict=True) if k % 6 == 4 and theta[k] <= 0.0 and s < 0.0]
         if not out:
             return step, bound
