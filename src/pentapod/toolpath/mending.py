@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints
-from pentapod.toolpath.normals import facet_cross
+from pentapod.toolpath.normals import CHUNK, facet_cross
 from pentapod.toolpath.topology import Topology
 
 WELD = 1e-8
@@ -49,16 +49,23 @@ def _distinct(keys: Ints) -> tuple[Ints, Ints]:
 
 def degenerate_facets(vertices: Floats, faces: Ints) -> Bools:
     """Return which facets (F,) have no area to speak of: corners that coincide or lie on a line."""
-    corners = vertices[faces]
-    longest = np.square(corners - np.roll(corners, 1, axis=1)).sum(axis=2).max(axis=1)
-    return np.linalg.norm(facet_cross(vertices, faces), axis=1) <= SLIVER * longest
+    return _lower_than(SLIVER, vertices, faces)
 
 
 def slivers(vertices: Floats, faces: Ints) -> Bools:
     """Return which facets (F,) are lower than a thousandth of their longest side."""
-    corners = vertices[faces]
-    longest = np.square(corners - np.roll(corners, 1, axis=1)).sum(axis=2).max(axis=1)
-    return np.linalg.norm(facet_cross(vertices, faces), axis=1) <= NARROW * longest
+    return _lower_than(NARROW, vertices, faces)
+
+
+def _lower_than(share: float, vertices: Floats, faces: Ints) -> Bools:
+    """Return which facets (F,) have a height of at most `share` of their longest side."""
+    low = np.empty(len(faces), dtype=np.bool_)
+    for first in range(0, len(faces), CHUNK):
+        part = faces[first : first + CHUNK]
+        corners = vertices[part]
+        longest = np.square(corners - np.roll(corners, 1, axis=1)).sum(axis=2).max(axis=1)
+        low[first : first + CHUNK] = np.linalg.norm(facet_cross(vertices, part), axis=1) <= share * longest
+    return low
 
 
 def duplicated_facets(faces: Ints, vertex_count: int) -> Bools:

@@ -14,6 +14,9 @@ import numpy as np
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.toolpath.topology import Topology, components
 
+CHUNK = 500_000
+"""Facets that are worked on at once where a step needs much room for each."""
+
 
 def facet_cross(vertices: Floats, faces: Ints) -> Floats:
     """Return twice the area vector (F, 3) of each facet, square metres, right-handed with its winding."""
@@ -29,9 +32,14 @@ def unit_or_zero(vectors: Floats) -> Floats:
 
 def corner_angles(vertices: Floats, faces: Ints) -> Floats:
     """Return the angle (F, 3) in radians of each facet at each of its corners."""
-    sides = unit_or_zero(vertices[np.roll(faces, -1, axis=1)] - vertices[faces])
-    back = -np.roll(sides, 1, axis=1)
-    return 2.0 * np.arctan2(np.linalg.norm(sides - back, axis=-1), np.linalg.norm(sides + back, axis=-1))
+    angles = np.empty((len(faces), 3))
+    for first in range(0, len(faces), CHUNK):
+        part = faces[first : first + CHUNK]
+        sides = unit_or_zero(vertices[np.roll(part, -1, axis=1)] - vertices[part])
+        back = -np.roll(sides, 1, axis=1)
+        apart, together = (np.linalg.norm(v, axis=-1) for v in (sides - back, sides + back))
+        angles[first : first + CHUNK] = 2.0 * np.arctan2(apart, together)
+    return angles
 
 
 def smooth_pairs(topology: Topology, facet_normals: Floats, crease_angle: float) -> Bools:
