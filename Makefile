@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test test-all lint bench bench-timing bench-gouge clean
+.PHONY: demo test test-all lint bench bench-timing bench-gouge bench-planning clean
 
 demo: $(READY)  ## plan a dome and judge the program
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
@@ -28,6 +28,9 @@ bench: $(READY)  ## stage times, and kinematics against Newton
 
 bench-timing: $(READY)  ## time laws against toppra and, where they are installed, others
 	$(BIN)/python benchmarks/timing.py
+
+bench-planning: $(READY)  ## the planner's solver against IPOPT
+	$(BIN)/python benchmarks/planning.py
 
 bench-gouge: $(READY)  ## contact points and gouge check against another library's drop cutter
 	$(BIN)/python benchmarks/gouge.py
