@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pentapod.arrays import Floats, Ints
+from pentapod.arrays import Bools, Floats, Ints
 from pentapod.timing.jerk_kernels import convex_pass
 from pentapod.timing.jerk_rows import JerkRows, RowsAt
 from pentapod.timing.spline_kernels import cubic_basis
@@ -36,6 +36,10 @@ _LEAST_KNOTS = 64
 _JOIN = 0.01
 """Where the spline begins, as a share of the length over which the first ramp would reach another limit."""
 
+_CALM_MARGIN, _CALM_GROWTH, _CALM_MOST = 3.0, 0.3, 12.0
+"""Knots become fewer from so many ramps on inside a stretch of constant speed, how fast with the time, and how few."""
+
+_CALM_SHARE = 0.5
 _GROWTH = 1.5
 _END_JERK = 0.98
 _ITERATIONS = 60
@@ -234,14 +238,22 @@ class _Problem:
 
 
 def _knots(s: Floats, x: Floats, rows: JerkRows, marks: Floats, begin: float, end: float) -> Floats:
-    """Return inner knots (K,) from begin to end: equal in the time of the law x, at marks, ever closer to the rests."""
+    """Return inner knots (K,) from begin to end: even in the time of the law x, at marks, ever closer to the rests.
+
+    Where that law keeps its speed and no other limit is near there is little to find: knots are few.
+    """
     speed = np.sqrt(x)
-    times = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(s) / (speed[:-1] + speed[1:]))])
+    steps = 2.0 * np.diff(s) / (speed[:-1] + speed[1:])
     with np.errstate(divide="ignore", invalid="ignore"):
         ramps = 2.0 * np.abs(rows.jerks[:, :, 2]).max(axis=1) / np.abs(rows.first).max(axis=1)
     ramp = float(np.median(ramps[np.isfinite(ramps) & (ramps > 0.0)]))
-    count = max(_LEAST_KNOTS, int(np.ceil(times[-1] / ramp * _KNOTS_PER_RAMP)))
-    even = np.interp(np.linspace(0.0, times[-1], count + 1), times, s)
+    calm = _calm(x, rows)
+    room = _seconds_to_others(steps, calm) - _CALM_MARGIN * ramp
+    every = min(ramp / _KNOTS_PER_RAMP, float(steps.sum()) / _LEAST_KNOTS)
+    wide = every * np.clip(1.0 + _CALM_GROWTH * room / every, 1.0, _CALM_MOST)
+    number = np.concatenate([[0.0], np.cumsum(2.0 * steps / (wide[:-1] + wide[1:]))])
+    even = np.interp(np.linspace(0.0, number[-1], int(np.ceil(number[-1])) + 1), number, s)
+    marks = marks[np.interp(marks, s, wide) < _CALM_MOST * every]
     gap = np.interp(s, (even[1:] + even[:-1]) / 2.0, np.diff(even))
     knots = np.sort(np.concatenate([even, marks]))
     length = end - begin
@@ -261,3 +273,21 @@ def _knots(s: Floats, x: Floats, rows: JerkRows, marks: Floats, begin: float, en
     while len(kept) > 1 and end - kept[-1] < least[-2]:
         kept.pop()
     return np.array([*kept, end])
+
+
+def _calm(x: Floats, rows: JerkRows) -> Bools:
+    """Return at which gridpoints (N + 1,) the law x keeps its speed, far from the limits of acceleration and jerk."""
+    steady = np.abs(np.diff(x)) <= 1e-6 * x[:-1]
+    use = np.maximum(
+        np.abs(rows.second * x[:, None] - rows.offset).max(axis=1),
+        np.abs(rows.jerks[:, :, 0]).max(axis=1) * x**1.5,
+    )
+    return np.append(steady, False) & np.append(False, steady) & (use < _CALM_SHARE)
+
+
+def _seconds_to_others(steps: Floats, calm: Bools) -> Floats:
+    """Return how far (N + 1,) in seconds each gridpoint is from the nearest that is not calm; steps (N,) in seconds."""
+    times = np.concatenate([[0.0], np.cumsum(steps)])
+    since = times - np.maximum.accumulate(np.where(calm, 0.0, times))
+    until = np.minimum.accumulate(np.where(calm, times[-1], times)[::-1])[::-1] - times
+    return np.minimum(since, until)

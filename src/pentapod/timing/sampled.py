@@ -33,6 +33,9 @@ _EASINGS = 8
 _SLOWINGS = 12
 _GOAL = 0.999
 _EXTRA = 0.99
+_EDGE = 32
+"""Rows beyond which the spline through all rows has forgotten a row: 0.27 of its say is left from each to the next."""
+
 _EXTRA_PER_ROUND = 0.01
 """Each easing moves the setpoints against the corners of the path: a place that comes back gets more room."""
 
@@ -64,6 +67,18 @@ class _Timed:
         if not isinstance(law, MotionLaw):
             law = MotionLaw.from_profile(self.profile.s, self.profile.x).smoothed(WINDOW_PERIODS * self.period)
         return law.stretched(whole_periods(law.duration * self.slower, self.period))
+
+    @cached_property
+    def whole_rows(self) -> Floats:
+        """Legs and station (rows, 6) of the piece's setpoints, metres."""
+        return self.rows(0.0)
+
+    def rows(self, phase: float) -> Floats:
+        """Return the rows as if they came later by `phase` periods, the last one at the end."""
+        law = self.law
+        s = law((np.arange(round(law.duration / self.period) + 1) + phase) * self.period)
+        s[-1] = law.length
+        return np.column_stack([self.profile.piece(s, 0), s])
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,56 +123,88 @@ def sampled_laws(
     """
     period = machine.controller.period
     timed = [_Timed(profile, 1.0, smooth, period) for profile in profiles]
+    uses: list[_Use | None] = [None] * len(timed)
     exceeding: list[int] = []
     for attempt in range(_EASINGS + _SLOWINGS):
-        uses = _uses(timed, machine, smooth)
-        exceeding = [k for k, use in enumerate(uses) if use.exceeds]
+        measured = _uses(timed, machine, smooth, uses)
+        exceeding = [k for k, use in enumerate(measured) if use.exceeds]
         if not exceeding:
             return [piece.profile for piece in timed], [piece.law for piece in timed]
-        if attempt < _EASINGS:
-            # Easing shifts all later setpoints against the path: ease for the rows between as well.
-            uses = [a.worst(b) for a, b in zip(uses, _uses(timed, machine, smooth, 0.5), strict=True)]
+        uses = _untouched(timed, measured, exceeding)
         for k in exceeding:
+            use = measured[k]
             if attempt < _EASINGS:
-                rows = timed[k].law(np.arange(len(uses[k].speed)) * period)
-                eased = _eased(timed[k].profile, rows, uses[k], _EXTRA - attempt * _EXTRA_PER_ROUND)
+                # Easing shifts all later setpoints against the path: ease for the rows between as well.
+                use = use.worst(_use(timed[k], timed[k].rows(0.5), machine, smooth))
+                rows = timed[k].law(np.arange(len(use.speed)) * period)
+                eased = _eased(timed[k].profile, rows, use, _EXTRA - attempt * _EXTRA_PER_ROUND)
                 if isinstance(eased, Failure):
                     return Unmended(k, eased)
                 timed[k] = replace(timed[k], profile=eased)
             else:
-                timed[k] = replace(timed[k], slower=timed[k].slower * uses[k].slowing / _EXTRA)
+                timed[k] = replace(timed[k], slower=timed[k].slower * use.slowing / _EXTRA)
     return Unmended(exceeding[0], Failure(-1, "the sampled program exceeds a limit however slowly it is run"))
 
 
-def _uses(timed: list[_Timed], machine: Machine, smooth: bool, phase: float = 0.0) -> list[_Use]:
-    """Return what each piece uses of the limits. phase: by how many periods the rows come later than the program's."""
-    period = machine.controller.period
-    counts = [round(piece.law.duration / period) for piece in timed]
-    columns: list[Floats] = []
-    speeds: list[Floats] = []
-    start = 0.0
-    for piece, count in zip(timed, counts, strict=True):
-        law = piece.law
-        s = law((np.arange(count + 1) + phase) * period)
-        s[-1] = law.length
-        columns.append(np.column_stack([piece.profile.piece(s, 0), start + s])[1 if columns else 0 :])
-        limits = piece.profile.limits
-        # Against the feeds themselves: the plan's margin is there to be used up.
-        speeds.append(limits.tip_speed(piece.profile.piece, s)[0] / limits.feed_fraction)
-        start += law.length
-    motion = Interpolant.through(np.concatenate(columns), period, machine.controller.interpolation)
-    legs = machine.legs
-    hard = (motion.accelerations[:, :5] / legs.max_acceleration).max(axis=1)
-    fast = (motion.rates[:, :5] / legs.max_velocity).max(axis=1)
-    jolt = (motion.jerks[:, :5] / legs.max_jerk).max(axis=1) * float(smooth)
+def _uses(timed: list[_Timed], machine: Machine, smooth: bool, known: list[_Use | None]) -> list[_Use]:
+    """Return what each piece uses of the limits; what is known is not measured again."""
     uses: list[_Use] = []
-    row = 0
-    for speed, count in zip(speeds, counts, strict=True):
-        here = slice(row, row + count)
-        feed = motion.rates[here, 5] / np.minimum(speed[:-1], speed[1:])
-        uses.append(_Use(_at_rows(np.maximum(fast[here], feed)), hard[row : row + count + 1], _at_rows(jolt[here])))
-        row += count
+    for k, (piece, same) in enumerate(zip(timed, known, strict=True)):
+        if same is not None:
+            uses.append(same)
+        else:
+            before, after = _last_rows(timed[:k]), _first_rows(timed[k + 1 :])
+            before[:, 5] -= before[-1, 5] if len(before) else 0.0
+            after[:, 5] += piece.law.length
+            rows = np.concatenate([before[:-1], piece.whole_rows, after[1:]])
+            uses.append(_use(piece, rows, machine, smooth, max(len(before) - 1, 0)))
     return uses
+
+
+def _use(piece: _Timed, rows: Floats, machine: Machine, smooth: bool, first: int = 0) -> _Use:
+    """Return what a piece uses of the limits where it has the rows (n, 6) from `first` on."""
+    count = len(piece.whole_rows) - 1
+    motion = Interpolant.through(rows, machine.controller.period, machine.controller.interpolation)
+    here, legs, limits = slice(first, first + count), machine.legs, piece.profile.limits
+    hard = (motion.accelerations[first : first + count + 1, :5] / legs.max_acceleration).max(axis=1)
+    fast = (motion.rates[here, :5] / legs.max_velocity).max(axis=1)
+    jolt = (motion.jerks[here, :5] / legs.max_jerk).max(axis=1) * float(smooth)
+    # Against the feeds themselves: the plan's margin is there to be used up.
+    speed = limits.tip_speed(piece.profile.piece, rows[first : first + count + 1, 5])[0] / limits.feed_fraction
+    feed = motion.rates[here, 5] / np.minimum(speed[:-1], speed[1:])
+    return _Use(_at_rows(np.maximum(fast, feed)), hard, _at_rows(jolt))
+
+
+def _last_rows(timed: list[_Timed]) -> Floats:
+    """Return the last _EDGE + 1 rows (n, 6) of pieces that follow each other, all where there are fewer."""
+    rows = np.empty((0, 6))
+    for piece in reversed(timed):
+        if len(rows) > _EDGE:
+            break
+        rows[:, 5] += piece.law.length
+        rows = np.concatenate([piece.whole_rows, rows[1:]])
+    return rows[-_EDGE - 1 :].copy()
+
+
+def _first_rows(timed: list[_Timed]) -> Floats:
+    """Return the first _EDGE + 1 rows (n, 6) of pieces that follow each other, all where there are fewer."""
+    rows, length = np.empty((0, 6)), 0.0
+    for piece in timed:
+        if len(rows) > _EDGE:
+            break
+        rows = np.concatenate([rows[:-1], piece.whole_rows + np.array([0.0] * 5 + [length])])
+        length += piece.law.length
+    return rows[: _EDGE + 1].copy()
+
+
+def _untouched(timed: list[_Timed], uses: list[_Use], changed: list[int]) -> list[_Use | None]:
+    """Return the uses of the pieces that are not changed and from which no changed one is within _EDGE rows."""
+    ends = np.cumsum([len(piece.whole_rows) - 1 for piece in timed])
+    begins = np.concatenate([[0], ends[:-1]])
+    near = np.zeros(len(timed), dtype=bool)
+    for k in changed:
+        near |= (begins <= ends[k] + _EDGE) & (ends >= begins[k] - _EDGE)
+    return [None if touched else use for touched, use in zip(near.tolist(), uses, strict=True)]
 
 
 def _at_rows(shares: Floats) -> Floats:
