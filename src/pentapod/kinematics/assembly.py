@@ -66,7 +66,7 @@ class AssemblyObstacles:
         obstacle, shortfall = Obstacle(int(self.obstacle[index])), float(self.shortfall[index])
         if obstacle is Obstacle.NONE:
             return "a pose exists"
-        amount = "" if np.isnan(shortfall) else f" (missed by {shortfall:.3g} of the right-hand side)"
+        amount = "" if np.isnan(shortfall) else f" (missed by a relative {shortfall:.3g})"
         return f"no assembly: violates {obstacle.inequality}{amount}"
 
 
