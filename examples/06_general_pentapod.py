@@ -1,7 +1,8 @@
 """A general linear pentapod and the platform that a sixth leg makes of it: all poses of given leg lengths.
 
 The offsets of this machine along its line are not proportional to the base joints' x: forward kinematics is a
-quartic. Still no leg lengths have more than four real poses, named by a mode: which root, and which of two mirror images.
+quartic. Still no leg lengths have more than four real poses, named by a mode: which root, and which of two mirror
+images.
 
     python examples/06_general_pentapod.py
 
