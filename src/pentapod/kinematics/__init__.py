@@ -38,6 +38,7 @@ from pentapod.kinematics.singularity_polynomial import singularity_cofactors, si
 from pentapod.kinematics.six_legs import SixLegPlatform
 from pentapod.kinematics.sphere import SingularityFreeSphere, singularity_free_sphere
 from pentapod.kinematics.stiffness import tip_compliance, tip_stiffness
+from pentapod.kinematics.tip_tube import TipTube, prove_tip_tube
 from pentapod.kinematics.workspace import Workspace
 
 __all__ = [
@@ -65,6 +66,7 @@ __all__ = [
     "ReconfigurablePentapod",
     "SingularityFreeSphere",
     "SixLegPlatform",
+    "TipTube",
     "Workspace",
     "architectural_distance",
     "architectural_measure",
@@ -90,6 +92,7 @@ __all__ = [
     "pose_jacobian",
     "poses_in_cell",
     "position_distance",
+    "prove_tip_tube",
     "singular_plane",
     "singularity_cofactors",
     "singularity_free_sphere",

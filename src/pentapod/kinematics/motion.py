@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.arrays import Bools, Floats, Ints, as_batch, as_floats
 from pentapod.errors import ArrayError
+from pentapod.geometry.ball_bernstein import blossom, hull, restricted, stack
 from pentapod.geometry.balls import Ball
 from pentapod.kinematics.as_built import AsBuiltPentapod
 from pentapod.kinematics.blocks import blocks
@@ -124,34 +125,18 @@ class _Motion:
 
     def at(self, which: Ints, s: Floats) -> Legs[Ball]:
         """Return the legs at s."""
-        return self.legs(_blossom(self.coefficients[:, :, which], [s] * self.degree))
+        return self.legs(blossom(self.coefficients[:, :, which], [s] * self.degree))
 
     def over(self, which: Ints, s: Floats, h: Floats) -> LegFamily:
         """Return the legs from s to s + h: the polynomials' coefficients there are their blossom's values."""
         c, k = self.coefficients[:, :, which], self.degree
         if not (s == 0.0).all() or not (h == 1.0).all():
-            c = _stack([_blossom(c, [s] * (k - j) + [s + h] * j) for j in range(k + 1)])
+            c = restricted(c, s, h)
         slopes = [(c[j + 1] - c[j]) * float(k) for j in range(k)] or [c[0] * 0.0]
         zero = Ball.exact(np.zeros((1, 1)))
-        slope = Legs(zero[None] * np.zeros((3, 1, 1)), zero, zero, _hull(_stack(slopes)), self.rings)
-        middle = self.legs(_blossom(c, [np.full(len(s), 0.5)] * k))
-        return LegFamily(middle, self.legs(_hull(c)), slope, self.slack)
-
-
-def _blossom(c: Ball, at: list[Floats]) -> Ball:
-    """Return the blossom (5, N) at arguments (N,) each, short binary fractions, of coefficients (k + 1, 5, N)."""
-    for t in at:
-        c = c[:-1] * (1.0 - t) + c[1:] * t
-    return c[0]
-
-
-def _stack(parts: list[Ball]) -> Ball:
-    return Ball(np.stack([part.mid for part in parts]), np.stack([part.rad for part in parts]))
-
-
-def _hull(c: Ball) -> Ball:
-    """Return the ball (5, N) that contains all coefficients (k + 1, 5, N), and with them the polynomial's values."""
-    return Ball.between(Ball.exact(c.lower.min(axis=0)), Ball.exact(c.upper.max(axis=0)))
+        slope = Legs(zero[None] * np.zeros((3, 1, 1)), zero, zero, hull(stack(slopes)), self.rings)
+        middle = self.legs(blossom(c, [np.full(len(s), 0.5)] * k))
+        return LegFamily(middle, self.legs(hull(c)), slope, self.slack)
 
 
 def _check(machine: AsBuiltPentapod, c: Floats, p: Floats, i: Floats, leg_error: float, depth: int) -> None:
