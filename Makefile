@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test test-all lint bench bench-timing bench-gouge bench-planning clean
+.PHONY: demo test test-all lint bench bench-kinematics bench-timing bench-gouge bench-planning clean
 
 demo: $(READY)  ## plan a dome and judge the program
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
@@ -25,6 +25,9 @@ lint: $(READY)
 
 bench: $(READY)  ## stage times, and kinematics against Newton
 	$(BIN)/python benchmarks/pipeline.py
+
+bench-kinematics: $(READY)  ## kinematics and proofs against copying arrays and against Newton
+	$(BIN)/python benchmarks/kinematics.py
 
 bench-timing: $(READY)  ## time laws against toppra and, where they are installed, others
 	$(BIN)/python benchmarks/timing.py
