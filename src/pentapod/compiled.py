@@ -2,7 +2,7 @@
 
 Files named `*_kernels.py` hold them, each function marked with `kernel`; they are imported where they are first used,
 so that `import pentapod` stays light. The machine code is cached on disk, beside the file or in the user's
-cache folder: only the first run on a machine compiles.
+cache folder: only the first run on a machine compiles, and says so to the log `pentapod`.
 
 Loading numba takes about as long as NumPy needs for ten million poses. So work that NumPy can do as well, to the
 last bit, asks `kernels_pay` before it loads kernels: like a skier who rents until the rents add up to a pair of skis,
@@ -12,6 +12,7 @@ told from the result.
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 from collections.abc import Callable, Generator
@@ -20,6 +21,8 @@ from contextvars import ContextVar
 from functools import cache
 from importlib.util import find_spec
 from typing import Literal, TypeVar, cast
+
+_log = logging.getLogger("pentapod")
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 _Policy = Literal["when they pay", "always", "never"]
@@ -58,4 +61,26 @@ def kernel(function: _Function) -> _Function:
     """Compile a function on its first call; division by zero gives infinity, as in NumPy, and sums keep their order."""
     from numba import njit  # noqa: PLC0415  heavy: only where kernels are used
 
+    _announce_compiling()
     return cast("_Function", njit(cache=True, error_model="numpy", fastmath=False)(function))
+
+
+@cache
+def _announce_compiling() -> None:
+    """See to it that the log says once when this process begins to compile: it takes long and shows nothing else."""
+    from numba.core import event  # noqa: PLC0415
+
+    class Told(event.Listener):
+        """Says it at the first compilation; what comes from the cache is none."""
+
+        said = False
+
+        def on_start(self, event: object) -> None:
+            if not self.said:
+                self.said = True
+                _log.info("compiling the fast kernels: once on this machine, for half a minute or so")
+
+        def on_end(self, event: object) -> None:
+            """Nothing to say."""
+
+    event.register("numba:compile", Told())

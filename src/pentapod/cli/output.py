@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import sys
 from collections.abc import Callable, Generator
@@ -47,13 +48,17 @@ def _finite(value: Any) -> Any:
 
 @contextmanager
 def progress_bar(*, quiet: bool) -> Generator[Progress]:
-    """Yield a Progress that draws bars on stderr, one for each stage; silent when stderr is no terminal."""
+    """Yield a Progress that draws bars on stderr, one for each stage; silent when stderr is no terminal.
+
+    What the log `pentapod` has to say (that kernels are compiled) stands above the bars.
+    """
     from pentapod.progress import silent
 
     if quiet or not sys.stderr.isatty():
         yield silent
         return
     from rich.console import Console
+    from rich.logging import RichHandler
     from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bars
 
@@ -71,7 +76,18 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
                 tasks[stage] = bars.add_task(stage, total=1.0, note=note)
             bars.update(tasks[stage], completed=fraction, note=note)
 
-        yield show
+        log = logging.getLogger("pentapod")
+        handler, level = (
+            RichHandler(console=bars.console, show_time=False, show_level=False, show_path=False),
+            log.level,
+        )
+        log.addHandler(handler)
+        log.setLevel(logging.INFO)
+        try:
+            yield show
+        finally:
+            log.removeHandler(handler)
+            log.setLevel(level)
 
 
 def verdict_text(verdict: Verdict) -> str:
