@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from timing_paths import Path, Piece, by_tip, line, machine, nodding, raster, straight
 
@@ -114,6 +114,8 @@ KNOB = st.just(0.0) | st.floats(0.1, 1.5)
 
 @settings(max_examples=6, deadline=None)
 @given(st.floats(0.0, 1.2), KNOB, KNOB, st.sampled_from(["linear", "cubic"]))
+@example(0.0, 0.0, 0.5, "linear")
+@example(0.0, 0.0, 0.5, "cubic")
 def test_any_two_turns_at_any_time(when, one, two, interpolation):
     m = machine(interpolation=interpolation)
     trajectory = timed(Path((nod(),)), m)

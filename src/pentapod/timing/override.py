@@ -60,10 +60,14 @@ def override(
     k = int(np.searchsorted(starts, start + 0.5 * period, side="right")) - 1
     local = start - float(starts[k])
     if local < 0.5 * period:  # at an exact stop: the new plan starts from rest, too
-        return _ended(trajectory, k) if share == 0.0 else _continued(trajectory, machine, k, 0.0, share, 0.0, options)
+        return (
+            _ended(trajectory, k, period)
+            if share == 0.0
+            else _continued(trajectory, machine, k, 0.0, share, 0.0, options)
+        )
     if share == 0.0:
         turn = stop(trajectory, machine, k, local)
-        return _ended(trajectory, k + 1) if turn is None else _turned(trajectory, None, k, turn)
+        return _ended(trajectory, k + 1, period) if turn is None else _turned(trajectory, None, k, turn)
     rest = _rest(trajectory.path, trajectory.indices[k], machine, 0.0, share, options)
     if isinstance(rest, Refusal):
         return rest
@@ -123,12 +127,20 @@ def _continued(
     return _assembled(trajectory, rest, k, following, first, [_clip(trajectory.profile, 0.0, stopped, 0.0, 0.0), later])
 
 
-def _ended(trajectory: Trajectory, k: int) -> Trajectory:
+def _ended(trajectory: Trajectory, k: int, period: float) -> Trajectory:
     """Return the first k laws: at rest at an exact stop."""
-    if k == 0:  # not started: standing at the beginning is a motion of no length
+    if k == 0:  # not started: standing at the beginning is a motion of no length, of one period
         begin = trajectory.indices[0]
-        still = joined([Nodes.resting(1e-9, 0.0)])
-        profile = _clip(trajectory.profile, 0.0, 0.0, 0.0, 0.0)
+        still = joined([Nodes.resting(period, 0.0)])
+        first = _clip(trajectory.profile, 0.0, 0.0, 0.0, 0.0)
+        profile = replace(
+            first,
+            times=np.array([0.0, period]),
+            stations=first.stations[[0, 0]],
+            speeds=first.speeds[[0, 0]],
+            active=first.active[[0, 0]],
+            shares=first.shares[[0, 0]],
+        )
         return Trajectory(trajectory.path, (begin,), (still,), profile)
     profile = _clip(trajectory.profile, 0.0, float(trajectory.starts[k]), 0.0, 0.0)
     return Trajectory(trajectory.path, trajectory.indices[:k], trajectory.laws[:k], profile)
