@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -25,16 +26,14 @@ def write_csv(program: Program, path: str | Path) -> Path:
     Lengths that are not at the file's resolution (1e-8 mm; `sample` makes only such) are rounded to it.
     Raises InputError where the file cannot be written.
     """
-    decimals = _time_decimals(program.period)
-    row = f"%.{decimals}f" + f",%.{MM_DECIMALS}f" * 5 + "\n"
     with atomic_write(path) as temporary, temporary.open("wb") as out:
-        out.write((header_text(program) + COLUMNS + "\n").encode())
-        for start in range(0, len(program.legs), _CHUNK):
-            legs = to_millimetres(program.legs[start : start + _CHUNK])
-            times = np.arange(start, start + len(legs)) * program.period
-            table = np.column_stack([times, legs])
-            out.write(((row * len(table)) % tuple(table.ravel().tolist())).encode())
+        out.writelines(_pieces(program))
     return Path(path)
+
+
+def csv_bytes(program: Program) -> bytes:
+    """Return what `write_csv` writes."""
+    return b"".join(_pieces(program))
 
 
 def read_csv(path: str | Path) -> Program:
@@ -57,6 +56,18 @@ def read_csv(path: str | Path) -> Program:
         placement=header.placement,
         provenance=header.provenance,
     )
+
+
+def _pieces(program: Program) -> Iterator[bytes]:
+    """Yield the file in pieces, so that a long program is never in memory as text as a whole."""
+    decimals = _time_decimals(program.period)
+    row = f"%.{decimals}f" + f",%.{MM_DECIMALS}f" * 5 + "\n"
+    yield (header_text(program) + COLUMNS + "\n").encode()
+    for start in range(0, len(program.legs), _CHUNK):
+        legs = to_millimetres(program.legs[start : start + _CHUNK])
+        times = np.arange(start, start + len(legs)) * program.period
+        table = np.column_stack([times, legs])
+        yield ((row * len(table)) % tuple(table.ravel().tolist())).encode()
 
 
 def _time_decimals(period: float) -> int:

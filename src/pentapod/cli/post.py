@@ -1,0 +1,88 @@
+"""pentapod post: a program as a controller takes it."""
+
+# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from pentapod.cli.output import echo_json, json_option, quiet_option
+
+if TYPE_CHECKING:
+    from pentapod.machine import Machine
+    from pentapod.program import Program
+
+
+def _print_formats(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    if value:
+        from pentapod.program.posts import find_post, post_names
+
+        width = max(len(name) for name in post_names())
+        for name in post_names():
+            click.echo(f"{name:<{width}}  {find_post(name).about}")
+        ctx.exit()
+
+
+@click.command()
+@click.argument("program", type=click.Path(path_type=Path))
+@click.option("--to", "name", required=True, help="Format; --formats lists them.")
+@click.option("-o", "--out", required=True, type=click.Path(path_type=Path), help="Folder for the files.")
+@click.option("--job", type=click.Path(path_type=Path), help="The job it was made from: tells the machine.")
+@click.option("--machine", help="The machine's name or file, where there is no job.")
+@click.option("--plan", type=click.Path(path_type=Path),
+              help="The run's plan.npz, for formats that hold the toolpath  [default: beside PROGRAM]")  # fmt: skip
+@click.option("--formats", is_flag=True, expose_value=False, is_eager=True, callback=_print_formats,
+              help="List the formats and exit.")  # fmt: skip
+@json_option
+@quiet_option
+def post(
+    program: Path,
+    name: str,
+    out: Path,
+    job: Path | None,
+    machine: str | None,
+    plan: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Write PROGRAM.csv in another format.
+
+    A machine that pentapod ships is found by the name in the program; another one, or a shipped one with another
+    tool or period, by --job or --machine. Formats of your own are found by entry points of the group
+    pentapod.posts.
+    """
+    from pentapod.program import read_csv
+    from pentapod.program.posts import PostInput, find_post, placed_toolpath, write_post
+
+    find_post(name)  # an unknown one is said at once
+    read = read_csv(program)
+    beside = program.with_name("plan.npz")
+    plan = beside if plan is None and beside.exists() else plan
+    toolpath = None if plan is None else placed_toolpath(plan, read)
+    files = write_post(PostInput(read, _machine(read, job, machine), toolpath), name, out)
+    if as_json:
+        echo_json({"format": name, "files": [str(file) for file in files]})
+    elif not quiet:
+        for file in files:
+            click.echo(str(file))
+    return 0
+
+
+def _machine(program: Program, job: Path | None, machine: str | None) -> Machine | None:
+    """Return the machine that was named, or the shipped one of the program's name; None where there is none."""
+    from pentapod.errors import MachineError
+    from pentapod.job import Job
+    from pentapod.machine import Machine
+    from pentapod.pipeline import job_machine
+
+    if job is not None:
+        return job_machine(Job.load(job))
+    if machine is not None:
+        return Machine.load(machine)
+    try:
+        return Machine.load(program.provenance.machine)
+    except MachineError:
+        return None

@@ -1,0 +1,31 @@
+"""LinuxCNC: a folder that runs as it is, in simulation at once, in three ways; its README says how."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pentapod.program.posts.drives import HALSTREAMER
+from pentapod.program.posts.linuxcnc import pentakins, stream, trivkins
+from pentapod.program.posts.linuxcnc.config import packaged
+from pentapod.program.posts.registry import Post, PostInput, register
+from pentapod.program.program import Program
+from pentapod.toolpath.toolpath import Toolpath
+
+__all__ = ["LINUXCNC", "pentakins", "stream", "trivkins"]
+
+
+def _write(given: PostInput) -> dict[str, bytes]:
+    folders = {"stream": stream.stream_files(given), "trivkins": trivkins.trivkins_files(given)}
+    if given.toolpath is not None:
+        folders["pentakins"] = pentakins.pentakins_files(given)
+    files = {f"{folder}/{name}": content for folder, files in folders.items() for name, content in files.items()}
+    return {"README.md": packaged("README.md"), **files}
+
+
+def _read(folder: Path) -> Program | Toolpath:
+    return HALSTREAMER.read(folder / "stream")
+
+
+LINUXCNC = register(
+    Post("linuxcnc", "LinuxCNC: setpoints with HAL, G-code of the legs, tool path for pentakins", _write, _read)
+)

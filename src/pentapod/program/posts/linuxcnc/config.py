@@ -1,0 +1,146 @@
+"""What the ini and HAL files of both LinuxCNC configurations have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.errors import InputError
+
+Words = Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """An [AXIS_…] of the ini: millimetres or degrees, per second and per second²."""
+
+    letter: str
+    home: float
+    low: float
+    high: float
+    velocity: float
+    acceleration: float
+
+
+def servo_period_ns(period: float) -> int:
+    """Return a period in nanoseconds. Raises InputError where LinuxCNC has no such period."""
+    nanoseconds = round(period * 1e9)
+    if not 25_000 <= nanoseconds <= 1_000_000_000:
+        raise InputError(
+            "LinuxCNC has no such servo period", key="period_s", value=period, expected="25 µs to 1 s",
+            remedy="set period_ms of the machine or the job",
+        )  # fmt: skip
+    return nanoseconds
+
+
+def ini_text(
+    name: str, kinematics: str, program: str, axes: Sequence[Axis], joints: Sequence[Words], traj: Words, period_ns: int
+) -> str:
+    """Return the ini of a simulation that runs as it is."""
+    tables: list[tuple[str, Words]] = [
+        ("EMC", {"VERSION": "1.1", "MACHINE": name, "DEBUG": 0}),
+        ("DISPLAY", {"DISPLAY": "axis", "OPEN_FILE": program, "PROGRAM_PREFIX": ".", "MAX_FEED_OVERRIDE": 1.0}),
+        ("TASK", {"TASK": "milltask", "CYCLE_TIME": 0.001}),
+        ("RS274NGC", {"PARAMETER_FILE": "linuxcnc.var"}),
+        ("EMCMOT", {"EMCMOT": "motmod", "COMM_TIMEOUT": 4.0, "BASE_PERIOD": 0, "SERVO_PERIOD": period_ns}),
+        ("EMCIO", {"EMCIO": "io", "CYCLE_TIME": 0.1, "TOOL_TABLE": "tool.tbl"}),
+        ("HAL", {"HALFILE": "pentapod.hal", "# HALFILE": "record.hal"}),
+        ("TRAJ", {"COORDINATES": " ".join(a.letter for a in axes), "LINEAR_UNITS": "mm", "ANGULAR_UNITS": "degree",
+                  "NO_FORCE_HOMING": 1, "ARC_BLEND_ENABLE": 1, **traj}),
+        ("KINS", {"KINEMATICS": kinematics, "JOINTS": 5}),
+    ]  # fmt: skip
+    tables += [
+        (
+            f"AXIS_{axis.letter}",
+            {
+                "HOME": number(axis.home),
+                "MIN_LIMIT": number(axis.low),
+                "MAX_LIMIT": number(axis.high),
+                "MAX_VELOCITY": number(axis.velocity),
+                "MAX_ACCELERATION": number(axis.acceleration),
+            },
+        )
+        for axis in axes
+    ]
+    tables += [(f"JOINT_{k}", joint) for k, joint in enumerate(joints)]
+    lines: list[str] = []
+    for title, words in tables:
+        lines += [f"[{title}]", *(f"{key} = {value}" for key, value in words.items()), ""]
+    return "\n".join(lines)
+
+
+def joint_words(home: Floats, low: Floats, high: Floats, velocity: Floats, acceleration: Floats) -> list[Words]:
+    """Return the [JOINT_…] tables of five legs, arrays (5,) in mm, mm/s and mm/s²; homing finds them where they are."""
+    return [
+        {
+            "TYPE": "LINEAR",
+            "HOME": number(home[k]),
+            "HOME_OFFSET": number(home[k]),
+            "HOME_SEARCH_VEL": 0,
+            "HOME_LATCH_VEL": 0,
+            "HOME_SEQUENCE": 0,
+            "MIN_LIMIT": number(low[k]),
+            "MAX_LIMIT": number(high[k]),
+            "MAX_VELOCITY": number(velocity[k]),
+            "MAX_ACCELERATION": number(acceleration[k]),
+            "FERROR": 1000,
+            "MIN_FERROR": 1000,
+        }
+        for k in range(5)
+    ]
+
+
+def hal_text(parameters: Mapping[str, float] | None = None) -> str:
+    """Return the HAL of a simulation: a command is its own feedback. parameters: name → value, set at the end."""
+    lines = [
+        "loadrt [KINS]KINEMATICS",
+        "loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS",
+        "addf motion-command-handler servo-thread",
+        "addf motion-controller servo-thread",
+        "net estop-loop iocontrol.0.user-enable-out iocontrol.0.emc-enable-in",
+        "net tool-prep-loop iocontrol.0.tool-prepare iocontrol.0.tool-prepared",
+        "net tool-change-loop iocontrol.0.tool-change iocontrol.0.tool-changed",
+        *(f"net leg{k + 1} joint.{k}.motor-pos-cmd => joint.{k}.motor-pos-fb" for k in range(5)),
+        *(f"setp {name} {number(value)}" for name, value in (parameters or {}).items()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def record_text() -> str:
+    """Return the HAL that records each joint's command, and the kind of motion."""
+    lines = [
+        "loadrt sampler depth=16000 cfg=fffffs",
+        "addf sampler.0 servo-thread",
+        *(f"net command{k + 1} joint.{k}.pos-cmd => sampler.0.pin.{k}" for k in range(5)),
+        "net kind-of-motion motion.motion-type => sampler.0.pin.5",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def files_of(ini: str, hal: str, program: str, code: bytes) -> dict[str, bytes]:
+    """Return the files of a configuration's folder; program: the name of the G-code file."""
+    return {
+        program: code,
+        "pentapod.ini": ini.encode(),
+        "pentapod.hal": hal.encode(),
+        "record.hal": record_text().encode(),
+        "tool.tbl": b"T1 P1 Z0 D0 ;\n",
+        "linuxcnc.var": b"",
+        "headless": packaged("headless"),
+        "play.sh": packaged("play_config.sh"),
+    }
+
+
+def packaged(name: str) -> bytes:
+    """Return a file that comes with pentapod as it is."""
+    return resources.files("pentapod.program.posts.linuxcnc").joinpath("files", name).read_bytes()
+
+
+def number(value: float | np.floating[Any]) -> str:
+    """Return a number without exponent, to nine decimals."""
+    return f"{float(value):.9f}".rstrip("0").rstrip(".")

@@ -1,0 +1,34 @@
+#!/bin/sh
+# Plays legs.halstream in simulation; writes played.txt: number, five lengths streamed, five after the limits.
+set -eu
+cd "$(dirname "$0")"
+if [ "${1:-}" != inside ]; then
+  # Its own shared memory and no network: other LinuxCNCs on this host are not disturbed.
+  if unshare --net --ipc true 2>/dev/null; then exec unshare --net --ipc sh play.sh inside; fi
+  exec unshare --map-root-user --net --ipc sh play.sh inside
+fi
+scratch=$(mktemp -d)
+chmod 1777 "$scratch"
+trap 'halrun -U >/dev/null 2>&1 || true; rm -rf "$scratch"' EXIT
+export RTAPI_UID=65534 RTAPI_FIFO_PATH="$scratch/fifo" HOME="$scratch"
+rows=$(grep -vc '^#' legs.halstream)
+halcmd -f stream.hal
+# The legs stand at the first row: it passes without limits, then the limits hold.
+for leg in 1 2 3 4 5; do halcmd setp leg$leg.load 1; done
+grep -v '^#' legs.halstream | head -n 1 | halstreamer
+halcmd setp streamer.0.enable 1
+halcmd start
+while [ "$(halcmd getp streamer.0.curr-depth)" != 0 ]; do sleep 0.02; done
+sleep 0.05
+halcmd setp streamer.0.enable 0
+for leg in 1 2 3 4 5; do halcmd setp leg$leg.load 0; done
+grep -v '^#' legs.halstream | halstreamer &
+feeder=$!
+sleep 0.5
+halcmd setp sampler.0.enable 1
+halsampler -t -n $((rows + 400)) > played.txt &
+sampler=$!
+halcmd setp streamer.0.enable 1
+wait $feeder
+wait $sampler
+halcmd stop

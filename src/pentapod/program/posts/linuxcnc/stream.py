@@ -1,0 +1,43 @@
+"""LinuxCNC's HAL: setpoints at servo rate through `limit3`, one for each leg. No planner takes part."""
+
+from __future__ import annotations
+
+from pentapod.machine.machine import Machine
+from pentapod.program.posts.drives import HALSTREAMER
+from pentapod.program.posts.linuxcnc.config import number, packaged, servo_period_ns
+from pentapod.program.posts.registry import PostInput
+
+_ROUNDING = 1e-9
+
+
+def stream_files(given: PostInput) -> dict[str, bytes]:
+    """Return the setpoints, the HAL that plays them, and the script that does so. Raises InputError."""
+    hal = _hal(given.the_machine(), servo_period_ns(given.program.period))
+    return {**HALSTREAMER.write(given), "stream.hal": hal.encode(), "play.sh": packaged("play_stream.sh")}
+
+
+def _hal(machine: Machine, period_ns: int) -> str:
+    lines = [
+        f"loadrt threads name1=servo-thread period1={period_ns}",
+        "loadrt streamer depth=16000 cfg=fffff",
+        "loadrt limit3 names=leg1,leg2,leg3,leg4,leg5",
+        "loadrt sampler depth=16000 cfg=ffffffffff",
+        "setp streamer.0.enable 0",
+        "setp sampler.0.enable 0",
+        "addf streamer.0 servo-thread",
+        *(f"addf leg{leg} servo-thread" for leg in range(1, 6)),
+        "addf sampler.0 servo-thread",
+    ]
+    # The limits are met to the last digit by good programs: what rounding adds must not be clipped.
+    limits = machine.legs
+    for k in range(5):
+        leg = f"leg{k + 1}"
+        lines += [
+            f"net setpoint{k + 1} streamer.0.pin.{k} => {leg}.in sampler.0.pin.{k}",
+            f"net limited{k + 1} {leg}.out => sampler.0.pin.{k + 5}",
+            f"setp {leg}.min {number(1e3 * limits.min_length[k])}",
+            f"setp {leg}.max {number(1e3 * limits.max_length[k])}",
+            f"setp {leg}.maxv {number(1e3 * limits.max_velocity[k] * (1.0 + _ROUNDING))}",
+            f"setp {leg}.maxa {number(1e3 * limits.max_acceleration[k] * (1.0 + _ROUNDING))}",
+        ]
+    return "\n".join(lines) + "\n"

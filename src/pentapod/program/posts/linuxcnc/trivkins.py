@@ -1,0 +1,100 @@
+"""LinuxCNC with the legs as axes X Y Z U V: G-code in inverse time, with its ini and HAL.
+
+LinuxCNC's planner looks one segment ahead and so never goes faster than √(ds·a/2), ds the way of one segment. A
+program is played in its own time only where a ≥ 2·v/dt, and where dt is at least ten servo periods.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.errors import ProgramError
+from pentapod.program.posts.linuxcnc.config import (
+    Axis,
+    files_of,
+    hal_text,
+    ini_text,
+    joint_words,
+    number,
+    servo_period_ns,
+)
+from pentapod.program.posts.motion import lengths_at
+from pentapod.program.posts.registry import PostInput, read_file
+from pentapod.program.program import Program
+from pentapod.program.resolution import quantised
+
+LETTERS = "XYZUV"
+FILE = "program.ngc"
+_LEAST_DT = 0.01
+_SERVO_PERIODS = 10
+_HEADROOM = 1.25
+_BLOCK = re.compile("G1" + "".join(rf" {letter}([0-9.]+)" for letter in LETTERS) + r" F([0-9.]+)")
+
+
+def trivkins_files(given: PostInput) -> dict[str, bytes]:
+    """Return G-code, ini, HAL and script. Raises InputError."""
+    program, machine = given.program, given.the_machine()
+    times = knots(program)
+    legs = 1e3 * lengths_at(program, times)
+    dt = float(times[1])
+    limits = machine.legs
+    low, high = 1e3 * limits.min_length, 1e3 * limits.max_length
+    velocity = 1e3 * limits.max_velocity
+    acceleration = np.maximum(1e3 * limits.max_acceleration, _HEADROOM * 2.0 * velocity.max() / dt)
+    # The speed of a block is that of X, Y and Z together: never the path, always the axes limit it.
+    fastest = 5.0 * float(velocity.max())
+    axes = [Axis(letter, legs[0, k], low[k], high[k], velocity[k], acceleration[k]) for k, letter in enumerate(LETTERS)]
+    ini = ini_text(
+        f"{machine.name} (trivkins)",
+        f"trivkins coordinates={LETTERS} kinstype=BOTH",
+        FILE,
+        axes,
+        joint_words(legs[0], low, high, velocity, acceleration),
+        {
+            "DEFAULT_LINEAR_VELOCITY": number(velocity.min()),
+            "MAX_LINEAR_VELOCITY": number(fastest),
+            "MAX_LINEAR_ACCELERATION": number(5.0 * acceleration.max()),
+        },
+        servo_period_ns(program.period),
+    )
+    return files_of(ini, hal_text(), FILE, gcode(legs, dt))
+
+
+def knots(program: Program) -> Floats:
+    """Return the times (M,), equally spaced, of the G-code's points: as dense as LinuxCNC's planner bears."""
+    count = max(1, math.floor(program.duration / max(_LEAST_DT, _SERVO_PERIODS * program.period) + 1e-9))
+    return np.linspace(0.0, program.duration, count + 1)
+
+
+def gcode(legs_mm: Floats, dt: float) -> bytes:
+    """Return G-code through leg lengths (M, 5) in mm, dt seconds apart. It starts where the legs stand."""
+    words = " ".join(f"{letter}%.8f" for letter in LETTERS)
+    lines = ["G21 G90 G40 G49", "G64", "G93"]
+    block = f"G1 {words} F{60.0 / dt:.9f}"
+    lines += [block % tuple(row) for row in legs_mm.tolist()]
+    return ("\n".join([*lines, "G94", "M2"]) + "\n").encode()
+
+
+def read_gcode(file: Path) -> tuple[Floats, Floats]:
+    """Return times (M,) in seconds and leg lengths (M, 5) in metres of such G-code. Raises ProgramError."""
+    lines = read_file(file).decode(errors="replace").splitlines()
+    if not lines or lines[-1] != "M2":
+        raise ProgramError("M2 is missing: the file was cut off", file=file, line=max(len(lines), 1))
+    rows: list[list[float]] = []
+    for line, text in enumerate(lines, start=1):
+        if not text.startswith("G1 "):
+            continue
+        match = _BLOCK.fullmatch(text)
+        if match is None:
+            raise ProgramError("not a move of all five legs", file=file, line=line, value=text[:80])
+        rows.append([float(value) for value in match.groups()])
+    if len(rows) < 2:
+        raise ProgramError("there are no moves", file=file, expected="at least two")
+    table = np.array(rows)
+    times = np.concatenate([[0.0], np.cumsum(60.0 / table[1:, 5])])
+    return times, quantised(table[:, :5] / 1e3)

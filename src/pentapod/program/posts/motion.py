@@ -1,0 +1,41 @@
+"""How the legs move between a program's rows: velocities and accelerations of the spline through them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.arrays import Floats
+from pentapod.geometry.interpolant import Interpolant
+from pentapod.program.program import Program
+
+
+def velocities(program: Program) -> Floats:
+    """Return leg velocities (N, 5) in m/s at the rows: of the C2 cubic spline through them, from rest to rest.
+
+    Drives that join positions and velocities by cubics follow that spline. Where the controller of the
+    machine joins the rows by straight lines there is no velocity at a row; the spline is the smooth curve nearest by.
+    """
+    steps = _spline(program).steps
+    return np.concatenate([steps[..., 0], steps[-1:, :, -1]])
+
+
+def accelerations(program: Program) -> Floats:
+    """Return leg accelerations (N, 5) in m/s² at the rows, of the same spline."""
+    return _spline(program).second
+
+
+def lengths_at(program: Program, times: ArrayLike) -> Floats:
+    """Return leg lengths (M, 5) in metres at any times (M,) in seconds, joined as the program says."""
+    joined = Interpolant.through(program.legs, program.period, program.interpolation)
+    exact = np.asarray(times, dtype=np.float64) / program.period
+    k = np.clip(np.floor(exact).astype(np.intp), 0, len(program.legs) - 2)
+    values, t = joined.bernstein[k], np.clip(exact - k, 0.0, 1.0)[:, None]
+    # De Casteljau: stable, and the ends are met exactly.
+    while values.shape[-1] > 1:
+        values = values[..., :-1] + t[..., None] * np.diff(values, axis=-1)
+    return values[..., 0]
+
+
+def _spline(program: Program) -> Interpolant:
+    return Interpolant.through(program.legs, program.period, "cubic")

@@ -1,0 +1,139 @@
+"""The posts by name, those of other packages too; writing a folder and reading it back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import cast
+
+from pentapod.errors import InputError, ProgramError, nearest
+from pentapod.files import atomic_write
+from pentapod.machine.machine import Machine
+from pentapod.program.program import Program
+from pentapod.toolpath.toolpath import Toolpath
+
+GROUP = "pentapod.posts"
+"""Entry points of this group name a `Post`, or a function without arguments that returns one."""
+
+
+@dataclass(frozen=True, eq=False)
+class PostInput:
+    """What there is to write. machine: as the program was made for it. toolpath: as placed, machine frame."""
+
+    program: Program
+    machine: Machine | None = None
+    toolpath: Toolpath | None = None
+
+    def the_machine(self) -> Machine:
+        """Return the machine. Raises InputError where there is none, or not that of the program."""
+        if self.machine is None:
+            raise InputError("this post needs the machine", key="machine", remedy="name it with --machine or --job")
+        if self.machine.digest != self.program.provenance.machine_digest:
+            raise InputError(
+                "this is not the machine that the program was made for",
+                key="machine_digest",
+                value=self.machine.digest,
+                expected=self.program.provenance.machine_digest,
+                remedy="give the job with --job: it may change the tool or the controller's period",
+            )
+        return self.machine
+
+    def the_toolpath(self) -> Toolpath:
+        """Return the toolpath as placed. Raises InputError where there is none."""
+        if self.toolpath is None:
+            raise InputError("this post needs the toolpath", key="plan", remedy="give the run's plan.npz with --plan")
+        return self.toolpath
+
+
+@dataclass(frozen=True)
+class Post:
+    """A format that a controller or another program takes.
+
+    write: what there is → contents by file name, "folder/name" for files in folders; same input, same bytes. A
+    content that starts with "#!" becomes an executable file.
+    read: the folder → the program, or the toolpath where it is that what the post writes. Raises ProgramError
+    or ToolpathError with file and line.
+    loses: what cannot be read back, in words.
+    """
+
+    name: str
+    about: str
+    write: Callable[[PostInput], dict[str, bytes]]
+    read: Callable[[Path], Program | Toolpath]
+    loses: frozenset[str] = field(default=frozenset())
+
+
+POSTS: dict[str, Post] = {}
+"""The posts that pentapod brings; `post_names` knows those of other packages as well."""
+
+
+def register(post: Post) -> Post:
+    """Add a post to `POSTS` and return it."""
+    POSTS[post.name] = post
+    return post
+
+
+def post_names() -> list[str]:
+    """Return the names of all posts, those of other packages last."""
+    return [*POSTS, *(name for name in _others() if name not in POSTS)]
+
+
+def find_post(name: str) -> Post:
+    """Return the post of this name. Raises InputError: unknown, or another package's that cannot be loaded."""
+    if name in POSTS:
+        return POSTS[name]
+    others = _others()
+    if name not in others:
+        raise InputError("unknown post", key="to", value=name, remedy=nearest(name, [*POSTS, *others]))
+    entry = others[name]
+    try:
+        loaded: object = entry.load()
+        post = loaded if isinstance(loaded, Post) else cast(Callable[[], object], loaded)()
+    except Exception as error:
+        raise InputError(
+            f"this post cannot be loaded: {type(error).__name__}: {error}", key=name, value=entry.value
+        ) from error
+    if not isinstance(post, Post):
+        raise InputError("the entry point names no post", key=name, value=entry.value, expected="a pentapod Post")
+    return post
+
+
+def write_post(given: PostInput, name: str, folder: str | Path) -> list[Path]:
+    """Write the files of a post into a folder, made where it is missing, and return their paths.
+
+    Nothing is written unless everything could be made. Raises InputError: an unknown post, a machine or
+    toolpath that is missing, a folder that cannot be written.
+    """
+    contents, made = find_post(name).write(given), []
+    for relative, content in contents.items():
+        path = Path(folder) / relative
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            raise InputError(f"the folder cannot be made: {reason}", file=path.parent) from error
+        with atomic_write(path) as temporary:
+            temporary.write_bytes(content)
+            if content.startswith(b"#!"):
+                temporary.chmod(temporary.stat().st_mode | 0o111)
+        made.append(path)
+    return made
+
+
+def read_post(folder: str | Path, name: str) -> Program | Toolpath:
+    """Return what a post's folder holds. Raises InputError with file and line."""
+    return find_post(name).read(Path(folder))
+
+
+def read_file(path: Path) -> bytes:
+    """Return the bytes of a file. Raises ProgramError where it cannot be read."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ProgramError(f"cannot be read: {(error.strerror or str(error)).lower()}", file=path) from error
+
+
+def _others() -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=GROUP)}

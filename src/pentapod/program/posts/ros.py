@@ -1,0 +1,105 @@
+"""ROS 2: a trajectory_msgs/JointTrajectory as JSON or YAML; metres and seconds, as ROS has it.
+
+With cubic interpolation each point has velocity and acceleration too: the quintics by which ROS controllers join
+such points are then the program's own cubics. With linear interpolation it has positions alone.
+The YAML is in flow style behind comments that hold the header; the JSON has its header in a file beside.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.errors import ProgramError
+from pentapod.program.header import Header, header_text
+from pentapod.program.posts.motion import accelerations, velocities
+from pentapod.program.posts.registry import Post, PostInput, read_file, register
+from pentapod.program.posts.rows import check_legs, check_rows, header_of, made_of
+from pentapod.program.posts.tables import SIDECAR
+from pentapod.program.program import Program
+
+Style = Literal["json", "yaml"]
+_STEM = "joint_trajectory"
+_LEGS = [f"leg{leg}" for leg in range(1, 6)]
+_NANO = 1_000_000_000
+
+
+def _write(given: PostInput, style: Style) -> dict[str, bytes]:
+    program = given.program
+    header, body = header_text(program), _message(program)
+    if style == "yaml":
+        return {f"{_STEM}.yaml": (header + body).encode()}
+    return {f"{_STEM}.json": body.encode(), SIDECAR: header.encode()}
+
+
+def _message(program: Program) -> str:
+    """Return the message as JSON, one point a line."""
+    columns = {"positions": (program.legs, 11)}
+    if program.interpolation == "cubic":
+        columns |= {"velocities": (velocities(program), 12), "accelerations": (accelerations(program), 9)}
+    texts = {name: _lists(values, digits) for name, (values, digits) in columns.items()}
+    points: list[str] = []
+    for k in range(len(program.legs)):
+        seconds, nanoseconds = divmod(round(k * program.period * _NANO), _NANO)
+        fields = "".join(f'"{name}": {rows[k]}, ' for name, rows in texts.items())
+        points.append(f'{{{fields}"time_from_start": {{"sec": {seconds}, "nanosec": {nanoseconds}}}}}')
+    head = '"header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}'
+    return "{" + head + ',\n"joint_names": ' + json.dumps(_LEGS) + ',\n"points": [\n' + ",\n".join(points) + "\n]}\n"
+
+
+def _lists(values: Floats, digits: int) -> list[str]:
+    row = "[" + ", ".join([f"%.{digits}f"] * values.shape[1]) + "]"
+    return [row % tuple(numbers) for numbers in (np.round(values, digits) + 0.0).tolist()]
+
+
+def _read(folder: Path, style: Style) -> Program:
+    file = folder / f"{_STEM}.{style}"
+    text = read_file(file).decode(errors="replace")
+    if style == "yaml":
+        lines = text.splitlines()
+        header = header_of([line for line in lines if line.startswith("#")], file)
+        text = "\n".join("" if line.startswith("#") else line for line in lines)
+    else:
+        sidecar = folder / SIDECAR
+        header = header_of(read_file(sidecar).decode(errors="replace").splitlines(), sidecar)
+    try:
+        return _program(json.loads(text), header, file)
+    except json.JSONDecodeError as error:
+        raise ProgramError("this is not JSON", file=file, line=error.lineno, column=error.colno) from error
+    except (KeyError, TypeError, ValueError) as error:
+        if isinstance(error, ProgramError):
+            raise
+        raise ProgramError("not a JointTrajectory", file=file, value=str(error)[:80]) from error
+
+
+def _program(message: Any, header: Header, file: Path) -> Program:
+    if message["joint_names"] != _LEGS:
+        raise ProgramError("wrong joints", file=file, key="joint_names", expected=", ".join(_LEGS))
+    points = message["points"]
+    check_rows(len(points), header, file)
+    stamps = [point["time_from_start"] for point in points]
+    times = np.array([stamp["sec"] * _NANO + stamp["nanosec"] for stamp in stamps])
+    wrong = np.abs(times - np.arange(len(points)) * header.period * _NANO) > 0.51
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise ProgramError(
+            f"the time is not a multiple of the period (point {row + 1})", file=file, key="time_from_start",
+            value=times[row] / _NANO,
+        )  # fmt: skip
+    legs = np.array([point["positions"] for point in points], dtype=np.float64)
+    if legs.shape != (len(points), 5):
+        raise ProgramError("not five positions a point", file=file, key="positions", value=legs.shape)
+    return made_of(header, check_legs(legs, file))
+
+
+JSON = register(
+    Post("ros2-json", "ROS 2 JointTrajectory as JSON", partial(_write, style="json"), partial(_read, style="json"))
+)
+YAML = register(
+    Post("ros2-yaml", "ROS 2 JointTrajectory as YAML", partial(_write, style="yaml"), partial(_read, style="yaml"))
+)

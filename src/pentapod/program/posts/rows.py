@@ -1,0 +1,58 @@
+"""What every reader of a post checks: the header, the number of rows, lengths that a machine can have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.errors import ProgramError
+from pentapod.program.header import Header, parse_header
+from pentapod.program.program import Program
+from pentapod.program.resolution import LARGEST_M, quantised
+
+
+def header_of(lines: list[str], file: Path) -> Header:
+    """Return the header in lines that begin with "#". Raises ProgramError with file and line, also for no lines."""
+    if not lines:
+        raise ProgramError("there is no header", file=file, line=1, remedy="write the program anew")
+    return parse_header(lines, file)
+
+
+def check_rows(rows: int, header: Header, file: Path) -> None:
+    """Raise ProgramError where the number of rows is not that of the header."""
+    if rows != header.rows:
+        raise ProgramError(
+            "the number of rows is not that of the header: the file was cut off or rows were added",
+            file=file,
+            value=rows,
+            expected=str(header.rows),
+        )
+
+
+def check_legs(legs: Floats, file: Path) -> Floats:
+    """Return leg lengths (N, 5), metres, at the resolution of programs. Raises ProgramError: no machine has one so."""
+    wrong = ~((legs > 0.0) & (legs <= LARGEST_M))
+    if wrong.any():
+        row, leg = (int(k) for k in np.argwhere(wrong)[0])
+        raise ProgramError(
+            f"a leg length that no machine has (row {row + 1})",
+            file=file,
+            key=f"leg {leg + 1}",
+            value=float(legs[row, leg]),
+            expected="between 0 and 10 km",
+        )
+    return quantised(legs)
+
+
+def made_of(header: Header, legs: Floats) -> Program:
+    """Return the program of a header and its rows (N, 5), metres."""
+    return Program(
+        period=header.period,
+        legs=legs,
+        interpolation=header.interpolation,
+        component=header.component,
+        placement=header.placement,
+        provenance=header.provenance,
+    )

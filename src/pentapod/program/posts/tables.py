@@ -1,0 +1,221 @@
+"""Posts described by data: text tables, one row for each setpoint; columns, units and number format are given.
+
+Another controller's table takes a few lines in a file of one's own, named by an entry point of the group
+"pentapod.posts":
+
+    POST = table_post("mine", "the drives of my machine", Table({
+        "legs.txt": (Column("t", "time", "ms", 3), *leg_columns("L{leg}", "length", "um", 5)),
+    }, separator=";"))
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.errors import InputError, ProgramError
+from pentapod.program.header import Header, header_text
+from pentapod.program.posts.motion import velocities
+from pentapod.program.posts.registry import Post, PostInput, read_file
+from pentapod.program.posts.rows import check_legs, check_rows, header_of, made_of
+from pentapod.program.program import Program
+from pentapod.program.resolution import QUANTA_PER_M
+
+Kind = Literal["time", "length", "velocity"]
+
+UNITS: dict[Kind, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e3, "us": 1e6},
+    "length": {"m": 1.0, "mm": 1e3, "um": 1e6, "inch": 1.0 / 0.0254},
+    "velocity": {"m/s": 1.0, "mm/s": 1e3, "mm/min": 6e4, "um/s": 1e6},
+}
+"""How many of a unit make one of SI."""
+
+SIDECAR = "program.header"
+"""Holds the header where a table has no place for comments."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: title, kind, unit, decimals; leg 1 to 5 for lengths and velocities.
+
+    Raises InputError for a unit that the kind does not have, or a leg missing or too much.
+    """
+
+    title: str
+    kind: Kind
+    unit: str
+    decimals: int
+    leg: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.unit not in UNITS.get(self.kind, {}):
+            raise InputError("unknown unit", key=self.title, value=self.unit, expected=", ".join(UNITS[self.kind]))
+        if (self.leg is None) != (self.kind == "time") or self.leg not in (None, 1, 2, 3, 4, 5):
+            raise InputError("which leg?", key=self.title, value=self.leg, expected="1 to 5, none for time")
+
+    @property
+    def factor(self) -> float:
+        """How many of the unit make one of SI."""
+        return UNITS[self.kind][self.unit]
+
+    @property
+    def exact(self) -> bool:
+        """Whether a leg length at a program's resolution is written digit for digit."""
+        quantum = self.factor / QUANTA_PER_M
+        return quantum >= 0.999 * 10.0**-self.decimals and self.unit != "inch"
+
+    def values(self, program: Program) -> Floats:
+        """Return the column (N,), in its unit."""
+        if self.leg is None:
+            return program.times * self.factor
+        if self.kind == "velocity":
+            return velocities(program)[:, self.leg - 1] * self.factor
+        # Counts of the resolution first: then the digits are those of the program, not of a product's rounding.
+        return np.rint(program.legs[:, self.leg - 1] * QUANTA_PER_M) / (QUANTA_PER_M / self.factor)
+
+
+@dataclass(frozen=True)
+class Table:
+    """What the files of a post look like: columns by file name, and how rows are written.
+
+    comment: begins a line that the controller skips; there the header goes, without it into a file beside.
+    titles: whether a row of titles comes before the numbers. Every leg's length must be in one of the files.
+    Raises InputError where it is not.
+    """
+
+    files: Mapping[str, tuple[Column, ...]]
+    separator: str = ","
+    comment: str | None = "#"
+    titles: bool = True
+
+    def __post_init__(self) -> None:
+        legs = {c.leg for columns in self.files.values() for c in columns if c.kind == "length"}
+        if legs != {1, 2, 3, 4, 5}:
+            raise InputError("a leg's length is in none of the files", value=sorted(x for x in legs if x))
+
+
+def leg_columns(title: str, kind: Kind, unit: str, decimals: int) -> tuple[Column, ...]:
+    """Return five columns; "{leg}" in the title becomes the leg's number."""
+    return tuple(Column(title.format(leg=leg), kind, unit, decimals, leg) for leg in range(1, 6))
+
+
+def table_post(name: str, about: str, table: Table) -> Post:
+    """Return the post that a table describes."""
+    rounded = any(c.kind == "length" and not c.exact for columns in table.files.values() for c in columns)
+    loses = frozenset({"digits"} if rounded else ())
+    return Post(name, about, partial(_write, table=table), partial(_read, table=table), loses)
+
+
+def _write(given: PostInput, table: Table) -> dict[str, bytes]:
+    header = header_text(given.program)
+    files: dict[str, bytes] = {}
+    if table.comment is None:
+        files[SIDECAR] = header.encode()
+    for name, columns in table.files.items():
+        text = "" if table.comment is None else _marked(header, table.comment)
+        if table.titles:
+            text += table.separator.join(column.title for column in columns) + "\n"
+        row = table.separator.join(f"%.{column.decimals}f" for column in columns) + "\n"
+        # Rounded first, so that no "-0.000" comes out.
+        values = [np.round(c.values(given.program), c.decimals) + 0.0 for c in columns]
+        numbers = np.column_stack(values)
+        files[name] = (text + (row * len(numbers)) % tuple(numbers.ravel().tolist())).encode()
+    return files
+
+
+def _read(folder: Path, table: Table) -> Program:
+    header: Header | None = None
+    if table.comment is None:
+        sidecar = folder / SIDECAR
+        header = header_of(read_file(sidecar).decode(errors="replace").splitlines(), sidecar)
+    legs: dict[int, Floats] = {}
+    rates: list[tuple[Path, Column, Floats]] = []
+    for name, columns in table.files.items():
+        file = folder / name
+        lines = read_file(file).decode(errors="replace").splitlines()
+        count = 0
+        if table.comment is not None:
+            count = next((k for k, text in enumerate(lines) if not text.startswith(table.comment)), len(lines))
+            header = header_of(["#" + line.removeprefix(table.comment) for line in lines[:count]], file)
+        if header is None:
+            raise ProgramError("there is no header", file=file)
+        numbers = _numbers(lines[count:], columns, table, file, count + 1)
+        check_rows(len(numbers), header, file)
+        for column, values in zip(columns, numbers.T, strict=True):
+            if column.leg is None:
+                _check_times(values, column, header, file)
+            elif column.kind == "length":
+                legs[column.leg] = values / column.factor
+            else:
+                rates.append((file, column, values))
+    if header is None:
+        raise ProgramError("there is no header", file=folder)
+    program = made_of(header, check_legs(np.column_stack([legs[leg] for leg in range(1, 6)]), folder))
+    for file, column, values in rates:
+        _check_rates(values, column, program, file)
+    return program
+
+
+def _marked(header: str, comment: str) -> str:
+    return "".join(comment + line.removeprefix("#") + "\n" for line in header.splitlines())
+
+
+def _numbers(lines: list[str], columns: tuple[Column, ...], table: Table, file: Path, first: int) -> Floats:
+    """Return the numbers (N, columns) below the header; first: the line that they begin with."""
+    if table.titles:
+        titles = table.separator.join(column.title for column in columns)
+        if not lines or lines[0] != titles:
+            raise ProgramError("wrong titles", file=file, line=first, value="".join(lines[:1])[:80], expected=titles)
+        lines, first = lines[1:], first + 1
+    text = "\n".join(lines)
+    try:
+        numbers: Any = np.loadtxt(io.StringIO(text), delimiter=table.separator, comments=None, ndmin=2)
+        good = numbers.shape == (len(lines), len(columns)) and bool(np.isfinite(numbers).all())
+    except ValueError:
+        numbers, good = None, False
+    if good:
+        return np.asarray(numbers, dtype=np.float64)
+    for line, row in enumerate(lines, start=first):
+        cells = row.split(table.separator)
+        if len(cells) != len(columns):
+            raise ProgramError(
+                "wrong number of columns", file=file, line=line, value=len(cells), expected=str(len(columns))
+            )
+        for column, cell in zip(columns, cells, strict=True):
+            if not _finite(cell):
+                raise ProgramError("not a finite number", file=file, line=line, key=column.title, value=cell[:40])
+    raise ProgramError("there are no rows", file=file, line=first)
+
+
+def _finite(text: str) -> bool:
+    try:
+        return bool(np.isfinite(float(text)))
+    except ValueError:
+        return False
+
+
+def _check_times(values: Floats, column: Column, header: Header, file: Path) -> None:
+    expected = header.period * column.factor * np.arange(len(values), dtype=np.float64)
+    _check_close(values, expected, column, file, "the time is not a multiple of the period")
+
+
+def _check_rates(values: Floats, column: Column, program: Program, file: Path) -> None:
+    _check_close(values, column.values(program), column, file, "not the velocity of the spline through the rows")
+
+
+def _check_close(values: Floats, expected: Floats, column: Column, file: Path, what: str) -> None:
+    """Raise ProgramError at the first value that is not the expected one to half a unit of the last digit."""
+    wrong = np.abs(values - expected) > 0.51 * 10.0**-column.decimals + 1e-9 * np.abs(expected)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise ProgramError(
+            f"{what} (row {row + 1})", file=file, key=column.title, value=float(values[row]),
+            expected=f"{expected[row]:.9g} {column.unit}",
+        )  # fmt: skip

@@ -1,0 +1,57 @@
+"""The toolpath as placed, machine frame, with the axes that were chosen: APT and RoboDK's CSV."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from pentapod.errors import InputError, ProgramError
+from pentapod.program.posts.registry import Post, PostInput, read_file, register
+from pentapod.program.program import Program
+from pentapod.toolpath.formats import FORMATS, read_toolpath
+from pentapod.toolpath.toolpath import Segment, Toolpath
+
+_SAME_M = 1e-11
+
+
+def placed_toolpath(plan: str | Path, program: Program) -> Toolpath:
+    """Return the toolpath as placed from a run's plan.npz: machine frame, chosen axes.
+
+    Raises InputError: not such a file, or of another run than the program.
+    """
+    file = Path(plan)
+    read_file(file)
+    given = read_toolpath(file, "npz")
+    try:
+        with np.load(file, allow_pickle=False) as archive:
+            tips, axes = archive["placed.tips_mm"] / 1e3, archive["placed.axes"]
+            legs = archive["program.legs_mm"] / 1e3
+    except KeyError as error:
+        raise InputError("an array is missing", file=file, key=str(error.args[0])[:80]) from error
+    if legs.shape != program.legs.shape or np.abs(legs - program.legs).max() > _SAME_M:
+        raise ProgramError(
+            "the program is not that of this plan", file=file, key="program.legs_mm",
+            remedy="give the plan.npz that was written with it",
+        )  # fmt: skip
+    bounds = zip(given.segments, given.starts[:-1], given.starts[1:], strict=True)
+    return Toolpath(tuple(Segment(s.kind, tips[a : b + 1], axes[a : b + 1], s.feed) for s, a, b in bounds), given.pivot)
+
+
+def _write(given: PostInput, form: str, file: str) -> dict[str, bytes]:
+    return {file: FORMATS[form].write(given.the_toolpath())}
+
+
+def _read(folder: Path, form: str, file: str) -> Toolpath:
+    read_file(folder / file)
+    return read_toolpath(folder / file, form)
+
+
+def _post(form: str, file: str, about: str) -> Post:
+    write, read = partial(_write, form=form, file=file), partial(_read, form=form, file=file)
+    return register(Post(form, about, write, read, FORMATS[form].loses))
+
+
+APT = _post("apt", "placed.apt", "APT, the toolpath as placed, machine frame")
+ROBODK = _post("robodk", "placed.robodk.csv", "RoboDK's CSV, the toolpath as placed, machine frame")

@@ -1,0 +1,77 @@
+"""A short motion of the shipped machine, within its limits, made without the planner; and the round trip of posts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import COMPONENTS
+from pentapod.machine import Machine
+from pentapod.program import Program, Provenance, quantised
+from pentapod.program.posts import PostInput, find_post, write_post
+from pentapod.toolpath import Segment, SegmentKind, Toolpath
+
+
+def rise(u):
+    """From 0 to 1, with no velocity, acceleration or jerk at either end."""
+    return u**4 * (35 - 84 * u + 70 * u**2 - 20 * u**3)
+
+
+def poses(u):
+    """Tips (N, 3), metres, and directions (N, 3) of the platform, u in [0, 1]: a leaning loop in the work volume."""
+    machine = Machine.load("desk")
+    turn, s = 2.0 * np.pi * rise(u), rise(u)
+    tips = machine.work.centre + np.c_[0.03 * np.sin(turn), 0.02 * (1 - np.cos(turn)), 0.02 * s]
+    lean = np.radians(8.0)
+    i = np.c_[np.sin(lean) * np.sin(turn), np.sin(0.6 * lean) * s, np.ones_like(s)]
+    return tips, i / np.linalg.norm(i, axis=1, keepdims=True)
+
+
+def motion(duration=1.2, interpolation="cubic", component=COMPONENTS[0]):
+    """A program at the machine's period, and the machine."""
+    machine = Machine.load("desk")
+    period = machine.controller.period
+    count = round(duration / period)
+    tips, i = poses(np.arange(count + 1) / count)
+    legs = machine.pentapod.leg_lengths(tips - machine.tool_length * i, i)
+    placement = RigidTransform(np.diag([1.0, -1.0, -1.0]), np.array([0.085, -0.017, 0.1 + 1 / 3]))
+    source = Provenance("desk", machine.digest, "job µ", "0.1.0")
+    return Program(period, quantised(legs), interpolation, component, placement, source), machine
+
+
+def placed():
+    """The same way of the tool as a toolpath as placed: a rapid, then a cut."""
+    tips, i = poses(np.linspace(0.0, 1.0, 41))
+    rapid = Segment(SegmentKind.RAPID, tips[:11], -i[:11], np.inf)
+    return Toolpath((rapid, Segment(SegmentKind.CUT, tips[10:], -i[10:], 0.05)), 0.0)
+
+
+def given(**changes):
+    program, machine = motion(**changes)
+    return PostInput(program, machine, placed())
+
+
+def round_trip(what: PostInput, name: str, folder: Path):
+    """Write, read back, compare as far as the post keeps things; a program written again gives the same bytes."""
+    post = find_post(name)
+    files = write_post(what, name, folder)
+    contents = {file: file.read_bytes() for file in files}
+    back = post.read(folder)
+    if isinstance(back, Toolpath):
+        assert np.abs(back.tips - what.toolpath.tips).max() < 1e-10
+        assert np.abs(back.axes - what.toolpath.axes).max() < 1e-10
+        assert [s.kind for s in back.segments] == [s.kind for s in what.toolpath.segments]
+        assert np.allclose([s.feed for s in back.segments], [s.feed for s in what.toolpath.segments], rtol=1e-9)
+        return back
+    for field in ("interpolation", "component", "provenance"):
+        assert getattr(back, field) == getattr(what.program, field)
+    assert back.placement.matrix.tobytes() == what.program.placement.matrix.tobytes()
+    assert abs(back.duration - what.program.duration) < 1e-9
+    if not post.loses:
+        assert back.legs.tobytes() == what.program.legs.tobytes()
+        assert back.period == what.program.period
+        write_post(PostInput(back, what.machine, what.toolpath), name, folder)
+        assert {file: file.read_bytes() for file in files} == contents
+    return back
