@@ -130,7 +130,8 @@ def test_pentakins_leads_the_tool_along_the_toolpath(tmp_path):
     s = np.linspace(0.0, 40.0, 40_001)
     dense = np.column_stack([np.interp(s, np.arange(41), column) for column in what.toolpath.tips.T])
     away, _ = cKDTree(dense).query(tips[start:])
-    assert away.max() < 0.0101e-3  # G64 P0.01
+    # G64 P0.01: so much for merging blocks, and as much again for blending them.
+    assert away.max() < 0.02e-3
 
 
 @real
