@@ -34,7 +34,7 @@ AT_THE_LIMIT_S = 0.842
 def missing() -> str:
     if shutil.which("linuxcnc") is None or shutil.which("halrun") is None:
         return "linuxcnc-uspace is not installed"
-    for words in (["unshare", "--net", "--ipc"], ["unshare", "--map-root-user", "--net", "--ipc"]):
+    for words in (["unshare", "--net", "--ipc"], ["unshare", "--map-current-user", "--keep-caps", "--net", "--ipc"]):
         if subprocess.run([*words, "true"], capture_output=True, check=False).returncode == 0:
             return ""
     return "LinuxCNC is only run without a network, and unshare is not allowed here"

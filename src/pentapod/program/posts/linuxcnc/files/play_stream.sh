@@ -5,11 +5,12 @@ cd "$(dirname "$0")"
 if [ "${1:-}" != inside ]; then
   # Its own shared memory and no network: other LinuxCNCs on this host are not disturbed.
   if unshare --net --ipc true 2>/dev/null; then exec unshare --net --ipc sh play.sh inside; fi
-  exec unshare --map-root-user --net --ipc sh play.sh inside
+  exec unshare --map-current-user --keep-caps --net --ipc sh play.sh inside
 fi
 scratch=$(mktemp -d)
 chmod 1777 "$scratch"
 trap 'halrun -U >/dev/null 2>&1 || true; rm -rf "$scratch"' EXIT
+# Root may not run real-time parts as itself; for anyone else RTAPI_UID has no meaning.
 export RTAPI_UID=65534 RTAPI_FIFO_PATH="$scratch/fifo" HOME="$scratch"
 rows=$(grep -vc '^#' legs.halstream)
 halcmd -f stream.hal
