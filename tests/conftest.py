@@ -8,9 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from pentapod.cli.new import dome_stl
 from pentapod.machine import Machine
+
+# A busy machine is no failure. Every run looks at the same examples, so that a run can be repeated;
+# HYPOTHESIS_PROFILE=search looks for new ones.
+settings.register_profile("same", deadline=None, derandomize=True)
+settings.register_profile("search", deadline=None, print_blob=True)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 JOB = """\
 [part]

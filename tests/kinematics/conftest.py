@@ -2,12 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import settings
 
 from pentapod.kinematics import LinearPentapod
-
-settings.register_profile("pentapod", deadline=None)  # a busy machine is no failure
-settings.load_profile("pentapod")
 
 PAPER = np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)])
 
