@@ -246,7 +246,8 @@ class _Task:
         # A beam or a spray works at a rate: it wants constant speed on the surface. A cutter only wants no more.
         beam, period = self.toolpath.pivot < 0.0, self.machine.controller.period
         slow = unheld(trajectory, period, path.surface_rate) if beam else ()
-        uses = certify(trajectory, self.machine, legs=program.legs, tips=tips)
+        spots = tips - self.toolpath.pivot * direction if beam else None
+        uses = certify(trajectory, self.machine, legs=program.legs, tips=tips, spots=spots)
         return explain(trajectory, self.machine, uses, slow)
 
 

@@ -72,7 +72,7 @@ def unpacked(array: dict[str, str]) -> np.ndarray:
 def test_report_of_a_passed_job(make_job, tmp_path):
     outcome = run(Job.load(make_job()), tmp_path / "out")
     text, page = page_of(outcome, tmp_path)
-    assert page.text.index("All 23 claims") < page.text.index("Verdict") < page.text.index("Worst places")
+    assert page.text.index("All 24 claims") < page.text.index("Verdict") < page.text.index("Worst places")
     for certificate in outcome.verdict.certificates:
         assert certificate.claim in page.text
     for stage in outcome.stages:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from timing_paths import Path, machine, straight
 
-from pentapod.timing import Trajectory, explain, retime, unheld
+from pentapod.timing import Trajectory, certify, explain, retime, unheld
 from pentapod.toolpath.toolpath import SegmentKind
 
 
@@ -62,3 +62,51 @@ def test_the_spot_on_the_surface_is_what_counts():
     (slow,) = unheld(trajectory, PERIOD, lambda s: np.full(len(s), 0.6))
     assert slow.share == pytest.approx(0.6, rel=0.01)
     assert slow.seconds == pytest.approx(1.0, rel=0.15)
+
+
+def wavy(s):
+    """How far the spot moves for each metre of s: 0.7 to 1.3."""
+    return 1.0 + 0.3 * np.sin(np.asarray(s) / 0.004)
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+@pytest.mark.parametrize("limit_jerk", [False, True])
+def test_the_feed_is_the_speed_of_the_spot(interpolation, limit_jerk):
+    """Never above, and held where no leg is in the way, though the tip is slower here and faster there."""
+    m = machine(interpolation=interpolation)
+    piece = straight([0.2, 0.1, 0.3, 0, 0], 0.12, 0.05, rate=wavy)
+    trajectory = retime(Path((piece,)), m, limit_jerk=limit_jerk)
+    assert isinstance(trajectory, Trajectory), str(trajectory)
+    t = np.linspace(0.0, trajectory.duration, 40_001)
+    s, tip = trajectory.station(t), trajectory.station(t, 1)
+    spot = tip * wavy(s)
+    assert spot.max() <= 0.05 * (1.0 + 1e-3)
+    middle = (s > 0.01) & (s < 0.11)
+    assert spot[middle].min() > 0.97 * 0.05
+    assert spot[middle].mean() > 0.98 * 0.05
+    assert tip.max() > 1.35 * 0.05
+    # The mean over any period, too: how far the spot itself has come.
+    way = s - 0.3 * 0.004 * (np.cos(s / 0.004) - 1.0)
+    rows = np.interp(np.arange(0.0, trajectory.duration, PERIOD), t, way)
+    assert np.diff(rows).max() / PERIOD <= 0.05 * (1.0 + 1e-3)
+    assert all(place.constraint != "feed" for place in unheld(trajectory, PERIOD, wavy, held=0.97))
+    uses = {use.quantity: use.share for use in certify(trajectory, m)}
+    assert 0.98 < uses["feed"] < 1.01
+    story = explain(trajectory, m)
+    assert story.lower_bound == pytest.approx(way[-1] / 0.05, rel=1e-3)
+    assert story.duration > story.lower_bound
+
+
+def test_a_spot_that_stands_leaves_the_tip_the_rapid_rate():
+    """Turning about the spot costs no feed, but the tip keeps the rapid rate, and it is named."""
+    trajectory = timed_piece(straight([0.2, 0.1, 0.3, 0, 0], 0.2, 0.05, rate=np.zeros_like), machine(rapid=0.1))
+    t = np.linspace(0.0, trajectory.duration, 20_001)
+    assert 0.099 < trajectory.station(t, 1).max() <= 0.1 * (1.0 + 1e-9)
+    assert explain(trajectory, machine(rapid=0.1)).causes[0].name in {"rapid rate", "leg 3 acceleration"}
+    assert "feed" not in {cause.name for cause in explain(trajectory, machine(rapid=0.1)).causes}
+
+
+def timed_piece(piece, m):
+    result = retime(Path((piece,)), m, limit_jerk=False)
+    assert isinstance(result, Trajectory), str(result)
+    return result

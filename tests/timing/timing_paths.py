@@ -29,6 +29,7 @@ class Piece:
     feed: float = np.inf
     sections: list = field(default_factory=list)
     inner_knots: tuple = ()
+    rate: object = np.ones_like
 
     def __post_init__(self):
         sections = self.sections or [
@@ -40,6 +41,9 @@ class Piece:
         self.section_segments = np.array([s[3] for s in sections])
         self.knots = np.array([0.0, *self.inner_knots, self.length])
         self.waypoint_stations, self.waypoints = self.knots, np.arange(len(self.knots))
+
+    def feed_rate(self, s):
+        return np.broadcast_to(self.rate(np.asarray(s, float)), np.shape(s))
 
     def __call__(self, s, order=0):
         s = np.asarray(s, float)

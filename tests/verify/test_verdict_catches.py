@@ -92,7 +92,7 @@ def test_two_rows_swapped(good):
 
 def test_row_lost(good):
     legs = np.delete(good.program.legs, middle_of_first_cut(good), axis=0)
-    assert failed(judge(with_legs(good, legs))) == {"leg accelerations", "feed on cuts"}
+    assert failed(judge(with_legs(good, legs))) == {"leg accelerations", "leg jerks", "feed on cuts"}
 
 
 @pytest.mark.parametrize("name", ["-+", "+-", "--"])
@@ -271,7 +271,7 @@ def test_not_at_rest_at_the_end(good):
     assert len(tips) < len(legs)
     names = failed(judge(with_poses(good, tips, axes)))
     # The spline overshoots where it is stopped that hard; the rows themselves are not too fast.
-    assert names - {"rapid rate"} == {"ends at rest", "leg accelerations"}
+    assert names - {"rapid rate"} == {"ends at rest", "leg accelerations", "leg jerks"}
 
 
 def test_not_at_rest_at_the_start(good):
@@ -283,7 +283,22 @@ def test_not_at_rest_at_the_start(good):
 def test_spike_of_3_micrometres_in_one_row(good):
     legs = good.program.legs.copy()
     legs[rows_of(good, good.toolpath.starts[2]) + 5, 3] += 3e-6
-    assert failed(judge(with_legs(good, legs))) == {"leg accelerations"}
+    assert failed(judge(with_legs(good, legs))) == {"leg accelerations", "leg jerks"}
+
+
+def test_hum_of_3_micrometres_in_a_dwell(good):
+    """150 Hz, growing and fading: 3 of 5 m/s², slow, within tolerance; only the jerk, near 2.7e6 mm/s³, tells."""
+    stop = rows_of(good, good.toolpath.starts[4])
+    legs = good.program.legs
+    t = np.arange(300) * good.program.period
+    humming = np.repeat(legs[stop : stop + 1], 300, axis=0)
+    humming[:, 2] += 3.4e-6 * np.sin(np.pi * np.arange(300) / 299) ** 4 * np.sin(2 * np.pi * 150.0 * t)
+    verdict = judge(with_legs(good, np.concatenate([legs[: stop + 1], humming, legs[stop + 1 :]])))
+    assert failed(verdict) == {"leg jerks"}
+    (found,) = (c for c in verdict.certificates if not c.passed)
+    assert found.value == pytest.approx(1e3 * 3.4e-6 * (2 * np.pi * 150.0) ** 3, rel=0.15)
+    assert found.where.row == pytest.approx(stop + 150, abs=10)
+    assert found.method.startswith("leg 3")
 
 
 def test_bulge_off_the_path(good):
@@ -306,15 +321,19 @@ def extremes(case):
         ("legs not too short", "min_length", 1, 1e-6, "legs"),
         ("leg rates", "max_velocity", -1, 2e-3, "legs"),
         ("leg accelerations", "max_acceleration", -1, 2e-3, "legs"),
+        ("leg jerks", "max_jerk", -1, 2e-3, "legs"),
         ("base joint cones", "base_cone", -1, 1e-5, "joints"),
     ],
 )
 def test_limit_of_the_machine_exceeded(good, claim, name, sign, slack, part):
-    """With the limit just beyond what the program needs it passes; just before, that claim fails alone."""
-    scale = {"mm": 1e-3, "mm/s": 1e-3, "mm/s²": 1e-3, "deg": np.pi / 180}
+    """With the limit just beyond what the program needs it passes; just before, that claim fails alone.
+
+    Of a jerk 5 % are allowed, so that the limit needed is that much smaller.
+    """
+    scale = {"mm": 1e-3, "mm/s": 1e-3, "mm/s²": 1e-3, "mm/s³": 1e-3 / 1.05, "deg": np.pi / 180}
     found = extremes(good)[claim]
     needed = found.value * scale[found.unit]
-    relative = slack if name in {"max_velocity", "max_acceleration"} else slack / needed
+    relative = slack if name in {"max_velocity", "max_acceleration", "max_jerk"} else slack / needed
     for wide, expected in ((1 - sign * relative, set()), (1 + sign * relative, {claim})):
         limits = replace(getattr(good.machine, part), **{name: np.full(5, needed * wide)})
         tight = on_machine(good, **{part: limits})

@@ -70,6 +70,15 @@ class LegPiece:
         tip, axis = self.pose(s, 1)
         return np.linalg.norm(tip + self.curve.pivot * axis, axis=1)
 
+    def feed_rate(self, s: ArrayLike) -> Floats:
+        """Return how far (n,) the point whose speed the feed is moves for each metre of s, at stations s (n,).
+
+        With a stand-off (a beam, a spray) it is the spot on the surface. Otherwise, and on rapids, it is the tip, taken
+        as s itself: it is never faster.
+        """
+        spot = self.curve.pivot < 0.0 and bool(np.isfinite(self.section_feeds).all())
+        return self.surface_rate(s) if spot else np.ones(np.shape(s))
+
     def __call__(self, s: ArrayLike, order: int = 0) -> Floats:
         """Return leg lengths (n, 5) in metres at stations s (n,), or their derivatives of order 1 to 3 in s."""
         return self.derivatives(s, order)[-1]

@@ -18,14 +18,14 @@ _TITLES = (
     "leg lengths, mm",
     "leg rates, mm/s",
     "leg accelerations, mm/s²",
-    "tip speed, mm/min",
+    "speed, mm/min",
     "margins, 0 at a limit",
 )
 _MARGIN_COLOURS = ("#c2417c", "#2a78d6", "#e08a00", "#1baa7a", "#7a5cd6", "#5f7d8c")
 
 
 def time_figure(signals: Signals, machine: Machine) -> Figure:
-    """Return the figure of lengths, rates, accelerations, tip speed and margins against time."""
+    """Return the figure of lengths, rates, accelerations, speed and margins against time."""
     limits, traces = machine.legs, list[dict[str, Any]]()
     quantities = (
         (signals.legs, limits.min_length, limits.max_length, "mm"),
@@ -83,8 +83,8 @@ def _speed_lines(signals: Signals) -> list[dict[str, Any]]:
     )  # fmt: skip
     wanted["line"] = wanted["line"] | {"dash": "dash", "width": 1.1, "shape": "hv"}
     speed = _line(
-        signals.times, 6e4 * signals.speeds, 4, "tip speed", "#5f7d8c", showlegend=False,
-        hovertemplate="tip: %{y:.5g} mm/min<extra></extra>",
+        signals.times, 6e4 * signals.speeds, 4, "speed", "#5f7d8c", showlegend=False,
+        hovertemplate="moves: %{y:.5g} mm/min<extra></extra>",
     )  # fmt: skip
     return [wanted, speed]
 

@@ -24,8 +24,9 @@ class Signals:
     """At the rows of a program (N): SI units, machine frame.
 
     times (N,) s; legs, rates, accelerations (N, 5) m, m/s, m/s², as the controller moves between rows;
-    tips, axes (N, 3); speeds (N,) of the tip, m/s; speed_limits (N,): the feed that is asked for, or the
-    rapid rate; segments (N,) of the toolpath; cutting (N,). margins (K, M) at rows `margin_rows` (K,).
+    tips, axes (N, 3); speeds (N,), m/s: of the tip, or, with a stand-off and off rapids, of the spot on the
+    surface; speed_limits (N,): the feed that is asked for, or the rapid rate; segments (N,) of the toolpath; cutting
+    (N,). margins (K, M) at rows `margin_rows` (K,).
     """
 
     times: Floats
@@ -48,8 +49,12 @@ class Signals:
         times = program.times
         rates, accelerations = _derivatives(program)
         tips, axes = _poses(program, machine)
-        speeds = np.linalg.norm(np.gradient(tips, program.period, axis=0), axis=1)
         segments = trajectory.segment(np.minimum(times, trajectory.duration))
+        speeds = np.linalg.norm(np.gradient(tips, program.period, axis=0), axis=1)
+        if toolpath.pivot < 0.0:
+            spots = tips + toolpath.pivot * axes
+            rapid = np.array([s.kind == SegmentKind.RAPID for s in toolpath.segments])[segments]
+            speeds = np.where(rapid, speeds, np.linalg.norm(np.gradient(spots, program.period, axis=0), axis=1))
         feeds = np.array([min(s.feed, machine.rapid_velocity) for s in toolpath.segments])
         kinds = np.array([s.kind == SegmentKind.CUT for s in toolpath.segments])
         margins = Margins.of(machine, program.component)

@@ -48,13 +48,15 @@ def certify(
     *,
     legs: Floats | None = None,
     tips: Floats | None = None,
+    spots: Floats | None = None,
     tip_acceleration: float | None = None,
 ) -> tuple[LimitUse, ...]:
     """Return the largest share of leg velocity, acceleration and jerk, feed, and tip acceleration where it is limited.
 
     Of the setpoints as the controller joins them: every polynomial's exact extrema, no samples between. legs (N, 5) m
     and tips (N, 3) m: the program's rows, at the controller's period; without them the trajectory is sampled, and its
-    station stands for the tip, which is never faster. tip_acceleration: limit in m/s². Jerk counts the step
+    station stands for the tip, which is never faster. spots (N, 3) m: where a tool with a stand-off meets the surface,
+    whose speed the feed is; rapids are judged by the tip. tip_acceleration: limit in m/s². Jerk counts the step
     of acceleration at either end over one period. An interval that two sections share is judged by the slower feed.
     """
     period, interpolation = machine.controller.period, machine.controller.interpolation
@@ -78,7 +80,15 @@ def certify(
         of_legs("leg jerk", "m/s³", motion.jerks, machine.legs.max_jerk),
     ]
     feeds = _slower(trajectory.feeds(times), machine.rapid_velocity)
-    share, row = largest_length(tip.steps / feeds[:, None, None])
+    steps = tip.steps
+    if tips is None:
+        rates = trajectory.feed_rates(times)
+        steps = steps * np.maximum(rates[:-1], rates[1:])[:, None, None]
+    elif spots is not None:
+        on_feed = np.isfinite(trajectory.feeds(times))
+        spot = Interpolant.through(spots, period, interpolation)
+        steps = np.where((on_feed[:-1] | on_feed[1:])[:, None, None], spot.steps, steps)
+    share, row = largest_length(steps / feeds[:, None, None])
     uses.append(use("feed", "m/s", share * float(feeds[row]), float(feeds[row]), row))
     if tip_acceleration is not None:
         pushes = np.linalg.norm(tip.second, axis=1)

@@ -54,28 +54,33 @@ class Limits:
         )
 
     def section_speeds(self, piece: PieceLike) -> Floats:
-        """Return the largest speed (M,) of the tip in each section, m/s."""
-        feeds = np.asarray(piece.section_feeds, dtype=np.float64)
-        return np.where(np.isfinite(feeds), feeds * self.feed_fraction, self.rapid)
+        """Return the feed (M,) of each section, m/s, infinite where the rapid rate alone holds."""
+        return np.asarray(piece.section_feeds, dtype=np.float64) * self.feed_fraction
 
     def guarded_sections(self, piece: PieceLike) -> tuple[Floats, Floats, Floats]:
-        """Return where each section's feed holds, from and to (M,) in metres, and its speed (M,)."""
-        speeds = self.section_speeds(piece)
+        """Return where each section's feed holds, from and to (M,) in metres, and how fast s grows by it (M,)."""
+        feeds = self.section_speeds(piece)
         ends = np.asarray(piece.section_ends, dtype=np.float64)
         begins = np.concatenate([[0.0], ends[:-1]])
-        reach = self.guard * speeds
-        return np.maximum(begins - reach, 0.0), np.minimum(ends + reach, piece.length), speeds
+        before, after = (self._by_feed(feeds, piece.feed_rate(s)) for s in (begins, ends))
+        low, high = np.maximum(begins - self.guard * before, 0.0), np.minimum(ends + self.guard * after, piece.length)
+        return low, high, np.minimum(before, after)
+
+    def _by_feed(self, feeds: Floats, rates: Floats) -> Floats:
+        """Return how fast s may grow (n,), m/s, by feeds (n,) of a point that moves by rates (n,) for each metre."""
+        with np.errstate(divide="ignore"):
+            return np.minimum(feeds / rates, self.rapid)
 
     def tip_speed(self, piece: PieceLike, s: Floats) -> tuple[Floats, Ints]:
-        """Return the tip's largest speed (n,), m/s, at sorted stations s, and the section it comes from."""
+        """Return the largest ṡ (n,), m/s, that feed and rapid rate allow at sorted stations s, and by which section."""
         speed, section = np.full(len(s), np.inf), np.zeros(len(s), dtype=np.intp)
-        begins, ends, speeds = self.guarded_sections(piece)
+        (begins, ends, _), speeds = self.guarded_sections(piece), self.section_speeds(piece)
         first, last = np.searchsorted(s, begins, "left"), np.searchsorted(s, ends, "right")
         for m in range(len(speeds)):  # sections are few, and overlap their neighbours
             here = slice(int(first[m]), int(last[m]))
             section[here] = np.where(speeds[m] < speed[here], m, section[here])
             speed[here] = np.minimum(speed[here], speeds[m])
-        return speed, section
+        return self._by_feed(speed, piece.feed_rate(s)), section
 
     def ceiling(self, first: Floats, second: Floats, speed: Floats) -> Floats:
         """Return the largest x (n,) that some u allows: from q′, q″ (n, 5) and the tip's largest speed (n,).

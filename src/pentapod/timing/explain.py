@@ -147,7 +147,7 @@ def _least_times(trajectory: Trajectory, machine: Machine, steps: Floats) -> tup
         s = (stations[:-1][rows, None] + _GAUSS * steps[rows, None]).ravel() - starts[k]
         section = np.minimum(np.searchsorted(piece.section_ends, s, side="left"), len(piece.section_ends) - 1)
         feeds = np.asarray(piece.section_feeds, dtype=np.float64)[section]
-        by_feed = 1.0 / np.where(np.isfinite(feeds), feeds, machine.rapid_velocity)
+        by_feed = np.maximum(piece.feed_rate(s) / feeds, 1.0 / machine.rapid_velocity)
         by_legs = (np.abs(piece(s, 1)) / machine.legs.max_velocity).max(axis=1)
         slowness[rows] = np.maximum(by_feed, by_legs).reshape(-1, len(_GAUSS))
         segments[rows] = np.asarray(piece.section_segments)[section.reshape(-1, len(_GAUSS))[:, 1]]

@@ -20,7 +20,7 @@ def first_grid(piece: PieceLike, limits: Limits) -> Floats:
 
     Holds the knots, the section ends and where their feeds begin to hold; stages are halved until, at the
     largest speed and path acceleration that the limits leave there, the leg accelerations and rates in
-    the middle of a stage exceed those at its ends by less than 1 %.
+    the middle of a stage exceed those at its ends by less than 1 %, and the square of the feed's rate is off by less.
     """
     s = _base_grid(piece, limits)
     for _ in range(_ROUNDS):
@@ -85,4 +85,7 @@ def _rough(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
     low, high = np.minimum(ceiling[a], ceiling[b])[:, None], np.maximum(ceiling[a], ceiling[b])[:, None]
     rate = np.abs(first[m]) * np.sqrt(np.minimum(low + gain, high) / 2.0 + low / 2.0)
     rough = (bulge > _TOLERANCE * limits.acceleration) | (rate > (1.0 + 0.1 * _TOLERANCE) * limits.velocity)
-    return np.asarray(rough.any(axis=1))
+    # What a feed allows is its square by that of the rate: 1 for cutters, curved for a spot on the surface.
+    square = np.square(piece.feed_rate(points))
+    bow = np.abs(square[m] - (square[a] + square[b]) / 2.0)
+    return np.asarray(rough.any(axis=1) | (bow > _TOLERANCE * np.maximum(square[a], square[b])))

@@ -17,6 +17,8 @@ class PieceLike(Protocol):
     and index of the toolpath's segment. waypoint_stations, waypoints (W,): s of the toolpath's waypoints, not
     falling, and their indices. `piece(s, order)` gives legs (n, 5) in metres and their
     derivatives d^order/ds^order, order 0 to 3, the second continuous; the third is asked for where jerk is limited.
+    `feed_rate(s)` tells how far (n,) the point whose speed the feed is moves for each metre of s: 1 for cutters, whose
+    tip is never faster; less or more for the spot on the surface that a beam or a spray meets from a stand-off.
     """
 
     @property
@@ -35,6 +37,7 @@ class PieceLike(Protocol):
     def waypoint_stations(self) -> Floats: ...  # noqa: D102
     @property
     def waypoints(self) -> Ints: ...  # noqa: D102
+    def feed_rate(self, s: Floats) -> Floats: ...  # noqa: D102
     def __call__(self, s: Floats, order: int = 0) -> Floats: ...  # noqa: D102
 
 

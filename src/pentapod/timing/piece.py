@@ -125,15 +125,15 @@ class PieceProfile:
         return np.diff(self.x) / (2.0 * np.diff(self.s))
 
     def shares_between(self) -> tuple[Floats, Floats]:
-        """Return the largest shares (N,) of leg velocities and of leg accelerations inside each stage."""
+        """Return the largest shares (N,) of velocities and feed, and of leg accelerations inside each stage."""
         ds, dx, u = np.diff(self.s), np.diff(self.x), self.path_accelerations()
         s = (self.s[:-1, None] + _BETWEEN * ds[:, None]).ravel()
         x = (self.x[:-1, None] + _BETWEEN * dx[:, None]).ravel()
         shares = self.limits.shares(
-            self.piece(s, 1), self.piece(s, 2), x, np.repeat(u, len(_BETWEEN)), np.full(len(s), np.inf)
+            self.piece(s, 1), self.piece(s, 2), x, np.repeat(u, len(_BETWEEN)), self.limits.tip_speed(self.piece, s)[0]
         ).reshape(len(ds), len(_BETWEEN), 11)
         worst = shares.max(axis=1)
-        return worst[:, :5].max(axis=1), worst[:, 5:10].max(axis=1)
+        return np.maximum(worst[:, :5].max(axis=1), worst[:, 10]), worst[:, 5:10].max(axis=1)
 
     def switching(self) -> tuple[Bools, Floats]:
         """Return the stages (N,) within which the law should switch, and at which fraction (N,).
@@ -178,8 +178,7 @@ class PieceProfile:
         )
         shares = np.maximum(before, after)
         column = shares.argmax(axis=1)
-        rapid = ~np.isfinite(np.asarray(self.piece.section_feeds, dtype=np.float64))[section]
-        return np.where((column == 10) & rapid, 11, column), shares.max(axis=1)
+        return self._named(column, speed, section), shares.max(axis=1)
 
     def _active_in(self, law: MotionLaw) -> tuple[Ints, Floats]:
         """Return the constraint (N + 1,) of which a law limited in jerk uses most, and its share."""
@@ -191,8 +190,13 @@ class PieceProfile:
         jerks = np.abs(self.first * j + 3.0 * self.second * v * a + self.piece(self.s, 3) * v**3) / self.limits.jerk
         column = np.concatenate([shares, np.zeros((len(shares), 1)), jerks], axis=1).argmax(axis=1)
         share = np.maximum(shares.max(axis=1), jerks.max(axis=1))
-        rapid = ~np.isfinite(np.asarray(self.piece.section_feeds, dtype=np.float64))[section]
-        return np.where((column == 10) & rapid, 11, column), share
+        return self._named(column, speed, section), share
+
+    def _named(self, column: Ints, speed: Floats, section: Ints) -> Ints:
+        """Return the constraints (n,) of the columns: feed becomes rapid rate where that is what holds."""
+        feeds = self.limits.section_speeds(self.piece)[section]
+        rapid = (speed == self.limits.rapid) & (feeds != speed)
+        return np.where((column == 10) & rapid, 11, column)
 
 
 def time_piece(

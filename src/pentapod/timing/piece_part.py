@@ -79,6 +79,10 @@ class PiecePart:
         ends = np.asarray(self.piece.section_ends)
         return min(int(np.searchsorted(ends, self.start, side="right")), len(ends) - 1)
 
+    def feed_rate(self, s: Floats) -> Floats:
+        """Return how far (n,) the feed's point moves for each metre of s, at stations (n,) from the part's start."""
+        return self.piece.feed_rate(np.minimum(np.asarray(s, dtype=np.float64) + self.start, self.piece.length))
+
     def __call__(self, s: Floats, order: int = 0) -> Floats:
         """Return legs (n, 5) or their derivatives at stations s (n,) from the part's own start."""
         return self.piece(np.minimum(np.asarray(s, dtype=np.float64) + self.start, self.piece.length), order)

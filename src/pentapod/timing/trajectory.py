@@ -89,6 +89,10 @@ class Trajectory:
         """Return the feed (n,) in m/s of the segment at each time, infinite on rapids."""
         return self._of_section(t, "section_feeds")
 
+    def feed_rates(self, t: ArrayLike) -> Floats:
+        """Return how far (n,) the point whose speed the feed is moves for each metre of s, at each time."""
+        return self._piecewise(t, lambda piece, law, time: piece.feed_rate(law(time)), ())
+
     def _of_section(self, t: ArrayLike, name: str) -> Floats:
         def values(piece: PieceLike, law: MotionLaw, time: Floats) -> Floats:
             section = np.searchsorted(piece.section_ends, law(time), side="left")

@@ -1,14 +1,22 @@
-"""Claims about each leg: length, rate, acceleration. Exact on the interpolant."""
+"""Claims about each leg: length, rate, acceleration, jerk. Exact on the interpolant."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pentapod.arrays import Floats
+from pentapod.program.resolution import QUANTA_PER_M
 from pentapod.verify.claim import ALLOWANCE, Claim, Finding
 from pentapod.verify.replay import Replay
 
 _EXACT = "exact extrema of the controller's polynomials, rows and between"
+
+JERK_ALLOWANCE = 0.05
+"""Relative allowance on leg jerks: where the jerk of the motion steps, the spline through its setpoints overshoots."""
+
+# What rounding each row by half a quantum can do to third differences, 8 / 2, and to the spline's third derivative,
+# 24 / 2 (rows rounded up and down in turn), in quanta by the period cubed.
+_ROUNDED = {1: 4.0, 3: 12.0}
 
 
 def shortest(replay: Replay) -> Finding:
@@ -43,6 +51,25 @@ def acceleration(replay: Replay) -> Finding:
     return _below(replay, replay.motion.accelerations, limit, "mm/s²", method)
 
 
+def jerk(replay: Replay) -> Finding:
+    """Judge the jerk of every leg, with rest before the first row and after the last."""
+    motion, limit = replay.motion, replay.machine.legs.max_jerk
+    rounding = _ROUNDED[motion.degree] / QUANTA_PER_M / motion.period**3
+    interval, leg = np.unravel_index(int(np.argmax(motion.jerks / limit)), motion.jerks.shape)
+    value, bound = float(motion.jerks[interval, leg]), float(limit[leg])
+    method = (
+        "third difference of the rows by the period cubed, in place of the impulses that lines between rows have; "
+        if motion.degree == 1
+        else "third derivative of the spline, constant between the rows: exact; "
+    )
+    method += (
+        "a step of acceleration at either end counts over one period; "
+        f"{JERK_ALLOWANCE:.0%} allowed, and {1e3 * rounding:.3g} mm/s³ for the rounding of the rows"
+    )
+    passed = value <= bound * (1.0 + JERK_ALLOWANCE) + rounding
+    return _finding(replay, passed, (value, bound, "mm/s³"), (2 * int(interval), int(leg)), method)
+
+
 def _below(replay: Replay, values: Floats, limit: Floats, unit: str, method: str) -> Finding:
     """Judge values (N or N − 1, 5) against limits (5,), both SI."""
     row, leg = np.unravel_index(int(np.argmax(values / limit)), values.shape)
@@ -66,4 +93,5 @@ CLAIMS = (
     Claim("legs not too long", longest, needs_pose=False),
     Claim("leg rates", rate, needs_pose=False),
     Claim("leg accelerations", acceleration, needs_pose=False),
+    Claim("leg jerks", jerk, needs_pose=False),
 )

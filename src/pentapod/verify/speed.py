@@ -15,19 +15,29 @@ _MM_MIN = 60e3  # mm/min in 1 m/s
 
 
 def feed(replay: Replay, kind: SegmentKind) -> Finding | None:
-    """Judge the tip's speed on the segments of one kind; None where the program has no such motion."""
+    """Judge the speed on the segments of one kind; None where the program has no such motion.
+
+    A cutter's feed is the speed of its tip. What works from a stand-off meets the surface at the pivot: there the
+    feed is the speed of that spot, while the tip may go as fast as on rapids, and has to keep to that everywhere.
+    """
     limit, governing = _limits(replay)
+    standoff, rapid = replay.toolpath.pivot < 0.0, kind == SegmentKind.RAPID
     kinds = np.array([segment.kind == kind for segment in replay.toolpath.segments])
     chords = np.flatnonzero(kinds[governing])
+    if standoff and rapid:
+        chords, limit = np.arange(len(governing)), np.full(len(governing), replay.machine.rapid_velocity)
     if not len(chords):
         return None
-    speed = np.linalg.norm(np.diff(replay.tips, axis=0), axis=1)[chords] / (0.5 * replay.program.period)
+    spot = standoff and not rapid
+    points = replay.pivots if spot else replay.tips
+    speed = np.linalg.norm(np.diff(points, axis=0), axis=1)[chords] / (0.5 * replay.program.period)
     worst = int(np.argmax(speed / limit[chords]))
     value, bound = float(speed[worst]), float(limit[chords[worst]])
+    whose = "the spot that the program's tool meets on the surface" if spot else "the program's own tip"
+    where = "on every segment" if standoff and rapid else f"where the matched place is on a {kind}"
     method = (
-        "speed of the program's own tip, mean over each half period, where the matched place is on a "
-        f"{kind}; within the path tolerance of a segment's end the faster of both feeds counts; "
-        f"{ALLOWANCE:.1%} allowed"
+        f"speed of {whose}, mean over each half period, {where}; within the path tolerance of a segment's end "
+        f"the faster of both feeds counts; {ALLOWANCE:.1%} allowed"
     )
     passed = value <= bound * (1.0 + ALLOWANCE)
     return Finding(passed, _MM_MIN * value, _MM_MIN * bound, "mm/min", replay.place(int(chords[worst])), method)
