@@ -31,7 +31,7 @@ from pentapod.toolpath import (
     Tool,
     Toolpath,
     load_mesh,
-    raster_with_report,
+    toolpath_with_report,
 )
 from pentapod.toolpath.formats import read_toolpath
 from pentapod.verify import Verdict, verify
@@ -155,7 +155,7 @@ def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
         feed=feed.cut_mm_min * _MM_MIN,
         link_feed=link * _MM_MIN,
     )
-    return raster_with_report(mesh, tool, options)
+    return toolpath_with_report(mesh, tool, options)
 
 
 def job_placement(job: Job) -> Placement | None:
