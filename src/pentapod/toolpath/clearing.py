@@ -44,23 +44,18 @@ class Clearing:
     def clear(self, tips: Floats, axes: Floats, tool: Tool, margin: float) -> bool:
         """Return whether a tool that moves along tips (N, 3) with axes (N, 3) is proven `margin` off the part."""
         heights, radii = balls(tool)
-        for height, radius in zip(heights, radii, strict=True):
-            if not self._ball_clear(tips + height * axes, radius + margin):
-                return False
-        return True
-
-    def _ball_clear(self, centres: Floats, radius: float) -> bool:
-        starts, ends = centres[:-1], centres[1:]
+        centres = tips + heights[:, None, None] * axes
+        starts, ends = centres[:, :-1].reshape(-1, 3), centres[:, 1:].reshape(-1, 3)
+        radius = np.repeat(radii + margin, len(tips) - 1)
         for _ in range(_MOST_HALVINGS):
             # What passes above the highest point of the part needs no search.
             low = np.minimum(starts @ self.view, ends @ self.view) <= self.top + radius
-            starts, ends = starts[low], ends[low]
+            starts, ends, radius = starts[low], ends[low], radius[low]
             if not len(starts):
                 return True
             tree, cover = self._points
-            half = 0.5 * np.linalg.norm(ends - starts, axis=1)
             middle = 0.5 * (starts + ends)
-            enough = radius + cover + half
+            enough = radius + cover + 0.5 * np.linalg.norm(ends - starts, axis=1)
             gap = np.asarray(tree.query(middle, distance_upper_bound=float(enough.max()))[0])
             if (gap < radius).any():
                 return False
@@ -68,6 +63,7 @@ class Clearing:
             starts, middle, ends = starts[unsure], middle[unsure], ends[unsure]
             if not len(starts):
                 return True
+            radius = np.tile(radius[unsure], 2)
             starts, ends = np.concatenate([starts, middle]), np.concatenate([middle, ends])
         return False
 
@@ -99,8 +95,8 @@ def balls(tool: Tool) -> tuple[Floats, Floats]:
     radius = max(tool.pivot, 0.0)
     if radius <= 0.0:
         return np.zeros(1), np.zeros(1)
-    # Balls half a radius apart, a little wider than the shank, hold all of it.
-    heights = np.arange(radius, BODY_M, 0.5 * radius)
-    radii = np.full(len(heights), np.hypot(radius, 0.25 * radius))
+    # Balls a radius apart, a little wider than the shank, hold all of it.
+    heights = np.arange(radius, BODY_M, radius)
+    radii = np.full(len(heights), np.hypot(radius, 0.5 * radius))
     radii[0] = radius
     return heights, radii

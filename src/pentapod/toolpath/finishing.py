@@ -8,8 +8,9 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.errors import ToolpathError
-from pentapod.geometry.directions import normalised
+from pentapod.geometry.directions import normalised, tangent_frame
 from pentapod.toolpath import ordering
+from pentapod.toolpath.covering import aligned
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.heightfield import HeightField
 from pentapod.toolpath.joining import Run, joined
@@ -90,13 +91,15 @@ class _Laid:
 def _laid(drawing: Drawing, field: HeightField, options: PathOptions, sunk: bool) -> _Laid:
     """Return the waypoints along a drawing, without what the part itself hides."""
     passes, hidden = drawing.passes, 0
+    if drawing.order is Order.ZIGZAG:
+        passes = aligned(passes, tangent_frame(options.up)[0])
     depth = np.broadcast_to(np.asarray(drawing.depth, dtype=np.float64), (len(passes.points),))
     number = np.arange(len(passes))
     if sunk:
         # What is below the surface is hidden by it: looked up before the tool sinks in.
+        keep = drawing.visible | ~field.hides(passes.points, _HIDDEN_SLACK_M)
         passes = Passes(passes.points - depth[:, None] * normalised(passes.normals), *_rest(passes))
-        if not drawing.visible:
-            keep = ~field.hides(drawing.passes.points, _HIDDEN_SLACK_M)
+        if not keep.all():
             hidden = int((~keep).sum())
             number = _owners(passes, keep, number) if hidden else number
             passes = passes.split(keep) if hidden else passes

@@ -45,7 +45,7 @@ class PathOptions:
     spacing: float = 2e-3
     axis_step: float = float(np.radians(3.0))
     closest: float = 10e-6
-    shortest: float = 1e-3
+    shortest: float = 0.5e-3
     clearance: float = 10e-3
     approach: float = 3e-3
     entry: Entry | str = Entry.AXIS
@@ -78,11 +78,13 @@ class CoverOptions(PathOptions):
     """What strategies are told that cover a surface by passes side by side.
 
     stepover: most distance between passes, along the surface; or scallop: height of the ridge that is left
-    between them, with the surface's curvature and the cutter taken into account (one of the two).
+    between them, with the surface's curvature and the cutter taken into account (one of the two). fill: whether
+    what passes at regular places leave uncovered (where the region narrows or ends) gets lines of its own.
     """
 
     stepover: float | None = None
     scallop: float | None = None
+    fill: bool = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -146,6 +146,18 @@ class Patch:
 
         return self if (values >= 0.0).all() else self._kept(values, root)
 
+    def above(self, values: Floats, bound: float) -> tuple[Patch, Floats]:
+        """Return the part where a quantity (V,) is at least `bound`, and the quantity at its vertices."""
+        at = values[self.faces] - bound
+
+        def root(facet: Ints, a: Ints, b: Ints) -> Floats:
+            return at[facet, a] / (at[facet, a] - at[facet, b])
+
+        # The quantity comes along as a fourth coordinate.
+        points = np.concatenate([self.vertices, values[:, None]], axis=1)
+        vertices, faces, normals = halves(points, self.faces, self.normals, at, root)
+        return Patch(vertices[:, :3].copy(), faces, normals), vertices[:, 3].copy()
+
     def _box_side(self, axis: int, bound: float, side: float) -> Patch:
         """Return the part with side · (x_axis − bound) ≥ 0."""
         values = side * (self.vertices[:, axis] - bound)

@@ -11,8 +11,10 @@ import numpy as np
 from pentapod.arrays import Floats, set_frozen
 from pentapod.errors import ToolpathError
 from pentapod.geometry.directions import tangent_frame
+from pentapod.toolpath.covering import edge_for, gap_lines
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.finishing import nothing_left
+from pentapod.toolpath.geodesic import seeds_along
 from pentapod.toolpath.levels import spread
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.options import CoverOptions, chosen, finite
@@ -95,4 +97,15 @@ def plane_lines(patch: Patch, tool: Tool, options: CoverOptions, across: Floats)
             expected=f"at most {MOST_CROSSINGS:,} crossings of passes with facets",
             remedy="check the unit of the mesh and the stepover",
         )
-    return level_set.lines(), float(steps.max())
+    passes = level_set.lines()
+    if options.fill:
+        gaps = _gaps(patch.refined(edge_for(steps)), tool, options, across, levels)
+        passes = Passes.joined([passes, gaps]) if len(gaps) else passes
+    return passes, float(steps.max())
+
+
+def _gaps(patch: Patch, tool: Tool, options: CoverOptions, across: Floats, levels: Floats) -> Passes:
+    """Return lines around what planes at levels leave more than half a step from all of them, on small facets."""
+    ways = np.broadcast_to(across, patch.facet_normals.shape)
+    slowness = 1.0 / surface_steps(patch, tool, ways, options.stepover, options.scallop)
+    return gap_lines(patch, seeds_along(LevelSet(patch, patch.vertices @ across, levels), slowness), slowness)

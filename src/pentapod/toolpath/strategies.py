@@ -11,9 +11,11 @@ from pentapod.toolpath.cross_hatch import CrossHatchOptions, draw_cross_hatch
 from pentapod.toolpath.drawing import Drawing
 from pentapod.toolpath.finishing import finished
 from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.offset import OffsetOptions, draw_offset
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.path_report import PathReport
 from pentapod.toolpath.raster import RasterOptions, draw_raster
+from pentapod.toolpath.spiral import SpiralOptions, draw_spiral
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.toolpath.tools import Tool
 from pentapod.toolpath.waterline import WaterlineOptions, draw_waterline
@@ -34,6 +36,8 @@ STRATEGIES: dict[str, Strategy] = {
         Strategy("raster", RasterOptions, draw_raster),
         Strategy("cross-hatch", CrossHatchOptions, draw_cross_hatch),
         Strategy("waterline", WaterlineOptions, draw_waterline),
+        Strategy("offset", OffsetOptions, draw_offset),
+        Strategy("spiral", SpiralOptions, draw_spiral),
     )
 }
 
