@@ -50,11 +50,14 @@ def aligned(passes: Passes, towards: Floats) -> Passes:
     return Passes(passes.points[index], passes.normals[index], passes.starts, passes.levels)
 
 
-def gap_lines(patch: Patch, seeds: Floats, slowness: Floats) -> Passes:
+def gap_lines(
+    patch: Patch, seeds: Floats, slowness: Floats, *, where: Bools | None = None, area: float | None = None
+) -> Passes:
     """Return lines half a step from where seeds (V,) are, around what is further away than that.
 
     What no seed reaches gets a line midway between its borders, and others a step from it. Gaps that together are less
-    than half a thousandth of the area are left alone.
+    than half a thousandth of the area are left alone. where (V,): the only vertices that may lie in a gap; area: of
+    the whole region, square metres, where the patch is but a part of it.
     """
     away = distances(patch, seeds, slowness)
     parts: list[Passes] = []
@@ -62,11 +65,12 @@ def gap_lines(patch: Patch, seeds: Floats, slowness: Floats) -> Passes:
         ridge = _ridges(patch, away, slowness)
         parts.append(ridge.lines())
         away = distances(patch, np.minimum(away, seeds_along(ridge, slowness)), slowness)
-    away = np.where(np.isfinite(away), away, 0.0)
+    away = np.where(np.isfinite(away) & (True if where is None else where), away, 0.0)
     levels: Floats = np.arange(0.5, float(away.max(initial=0.0)), 1.0)
     if len(levels):
         lines = LevelSet(patch, away, levels).lines()
-        parts.append(lines.where(_worth_while(patch, away, lines)))
+        crumbs = CRUMBS * (float(patch.areas.sum()) if area is None else area)
+        parts.append(lines.where(_worth_while(patch, away, lines, crumbs)))
     return Passes.joined([part for part in parts if len(part)])
 
 
@@ -81,7 +85,7 @@ def _ridges(patch: Patch, away: Floats, slowness: Floats) -> LevelSet:
     return LevelSet(patch, share, np.array([0.5]))
 
 
-def _worth_while(patch: Patch, away: Floats, lines: Passes) -> Bools:
+def _worth_while(patch: Patch, away: Floats, lines: Passes, crumbs: float) -> Bools:
     """Return which lines (P,) to keep: all but those around the smallest gaps, as long as these are next to nothing."""
     area = np.zeros(len(patch.vertices))
     np.add.at(area, patch.faces.ravel(), np.repeat(patch.areas / 3.0, 3))
@@ -92,5 +96,5 @@ def _worth_while(patch: Patch, away: Floats, lines: Passes) -> Bools:
     served = np.bincount(lines.pass_of_point[nearest], weights=area[beyond], minlength=len(lines))
     order = np.argsort(served, kind="stable")
     worth = np.empty(len(lines), dtype=np.bool_)
-    worth[order] = np.cumsum(served[order]) > CRUMBS * float(area.sum())
+    worth[order] = np.cumsum(served[order]) > crumbs
     return worth

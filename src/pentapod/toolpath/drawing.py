@@ -25,12 +25,12 @@ class Order(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """Lines on a surface, each point of them exactly on it, and how they are to be cut.
+    """Lines on a surface, each point of them exactly on it or below it, and how they are to be cut.
 
     passes: the lines, as fine as the mesh. stepover: metres between neighbours along the surface at most; 0 where
-    they do not cover it. order: see `Order`. both_ways: whether a pass may be cut backwards. depth: by how much
-    the tool sinks in along the normal, metres, for all points or (N,) each. power (P,): share of full
-    power on each pass, 0 to 1, or None for full. visible: the lines lie on top as seen along the view.
+    they do not cover it. order: see `Order`. both_ways: whether a pass may be cut backwards. sink: by how much lines
+    lie below the surface at most, along the normal, metres. power (P,): share of full power on each pass, 0 to
+    1, or None for full. visible: the lines lie on top as seen along the view.
     notes: sentences for the report.
     """
 
@@ -38,7 +38,7 @@ class Drawing:
     stepover: float = 0.0
     order: Order = Order.SHORTEST
     both_ways: bool = True
-    depth: float | Floats = 0.0
+    sink: float = 0.0
     power: Floats | None = None
     visible: bool = False
     notes: tuple[str, ...] = ()

@@ -25,6 +25,7 @@ from pentapod.toolpath.tour import travel, travel_bound
 
 REACH_STEPOVERS = 3.0
 _HIDDEN_SLACK_M = 1e-6
+_STEEPEST = 0.05
 
 
 def finished(
@@ -36,8 +37,7 @@ def finished(
     ToolpathError where no pass is left.
     """
     field = HeightField(mesh, options.up)
-    sunk = bool(np.any(np.asarray(drawing.depth)))
-    laid = _laid(drawing, field, options, sunk)
+    laid = _laid(drawing, field, options)
     long = laid.passes.lengths >= options.shortest
     dropped, dropped_length = int((~long).sum()), float(laid.passes.lengths[~long].sum())
     passes, power = laid.passes.where(long), laid.power[long]
@@ -54,7 +54,7 @@ def finished(
             begin = ordering.rotated_to_meet(points, runs[-1].contacts[-1] if runs else None, closed=True)
             rows = np.concatenate([rows[begin:-1], rows[: begin + 1]])
         rows = rows[::-1] if turn.backwards else rows
-        stay = 0.0 if sunk or not turn.near else reach
+        stay = 0.0 if drawing.sink > 0.0 or not turn.near else reach
         runs.append(Run(passes.points[rows], passes.normals[rows], float(power[turn.index]), stay))
     toolpath, counts = joined(mesh, tool, options, runs=runs, field=field, stepover=drawing.stepover or options.spacing)
     firsts, lasts = np.stack([r.contacts[0] for r in runs]), np.stack([r.contacts[-1] for r in runs])
@@ -88,21 +88,12 @@ class _Laid:
     hidden: int
 
 
-def _laid(drawing: Drawing, field: HeightField, options: PathOptions, sunk: bool) -> _Laid:
+def _laid(drawing: Drawing, field: HeightField, options: PathOptions) -> _Laid:
     """Return the waypoints along a drawing, without what the part itself hides."""
     passes, hidden = drawing.passes, 0
     if drawing.order is Order.ZIGZAG:
         passes = aligned(passes, tangent_frame(options.up)[0])
-    depth = np.broadcast_to(np.asarray(drawing.depth, dtype=np.float64), (len(passes.points),))
     number = np.arange(len(passes))
-    if sunk:
-        # What is below the surface is hidden by it: looked up before the tool sinks in.
-        keep = drawing.visible | ~field.hides(passes.points, _HIDDEN_SLACK_M)
-        passes = Passes(passes.points - depth[:, None] * normalised(passes.normals), *_rest(passes))
-        if not keep.all():
-            hidden = int((~keep).sum())
-            number = _owners(passes, keep, number) if hidden else number
-            passes = passes.split(keep) if hidden else passes
     # Passes keep their numbers through the resampling as levels.
     levels = passes.levels
     passes = resample(
@@ -114,17 +105,15 @@ def _laid(drawing: Drawing, field: HeightField, options: PathOptions, sunk: bool
     )
     number, levels = number[passes.levels], levels[passes.levels]
     passes = Passes(passes.points, passes.normals, passes.starts, levels)
-    if not sunk and not drawing.visible:
-        keep = ~field.hides(passes.points, _HIDDEN_SLACK_M)
+    if not drawing.visible:
+        # A line below the surface is hidden by it; what hides more than that counts.
+        slack = _HIDDEN_SLACK_M + drawing.sink / max(np.cos(options.region.angle), _STEEPEST)
+        keep = ~field.hides(passes.points, slack)
         hidden = int((~keep).sum())
         number = _owners(passes, keep, number) if hidden else number
         passes = passes.split(keep) if hidden else passes
     power = np.ones(len(passes)) if drawing.power is None else drawing.power[number]
     return _Laid(passes, power, hidden)
-
-
-def _rest(passes: Passes) -> tuple[Floats, np.ndarray, np.ndarray]:
-    return passes.normals, passes.starts, passes.levels
 
 
 def _owners(passes: Passes, keep: np.ndarray, number: np.ndarray) -> np.ndarray:

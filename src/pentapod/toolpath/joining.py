@@ -77,7 +77,7 @@ class _Joiner:
             Entry(options.entry),
             min(options.axis_step, links.RAPID_AXIS_STEP),
         )
-        self.clearing = Clearing(mesh, view, options.approach / 3.0)
+        self.clearing = Clearing(mesh, tool, view)
         self.margin = 0.2 * options.approach
         self.down = self._surface_links(stepover)
 
@@ -93,7 +93,7 @@ class _Joiner:
 
     def _way_to(self, k: int) -> list[Segment]:
         """Return the segments from the end of the run before to the start of run k."""
-        down = self.approach(k)
+        down = self._approach(k)
         if k == 0:
             return [self._proven(links.entry(down.tips[0], down.axes[0], self.style)), down]
         gap = float(np.linalg.norm(self.tips[k][0] - self.tips[k - 1][-1]))
@@ -115,7 +115,7 @@ class _Joiner:
                 return [up, hop, down]
         return [up, self._proven(links.rapid(*ends, self.style)), down]
 
-    def approach(self, k: int) -> Segment:
+    def _approach(self, k: int) -> Segment:
         tips, axes = self.tips[k], self.runs[k].normals
         down = links.approach(tips[0], axes[0], tips[1] - tips[0], self.style)
         if self.style.entry is Entry.AXIS or self._clear(down, 0.0):
@@ -151,7 +151,7 @@ class _Joiner:
         return rapid
 
     def _clear(self, segment: Segment, margin: float) -> bool:
-        return self.clearing.clear(segment.tips, segment.axes, self.tool, margin)
+        return self.clearing.clear(segment.tips, segment.axes, margin)
 
     def _surface_links(self, stepover: float) -> dict[int, tuple[Floats, Floats]]:
         """Return by run the contacts and normals of links to it that stay on the surface."""
@@ -173,7 +173,7 @@ class _Joiner:
             chordal=self.options.chordal,
             spacing=self.options.spacing,
             axis_step=self.options.axis_step,
-            closest=1e-9,
+            closest=min([self.options.closest, *(0.25 * float(np.linalg.norm(c[-1] - c[0])) for _, (c, _) in good)]),
         )
         result: dict[int, tuple[Floats, Floats]] = {}
         for place, level in enumerate(fine.levels):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.errors import ToolpathError
@@ -109,6 +110,25 @@ class Patch:
                 )
             patch = patch._halved(long)
         return patch
+
+    def rim(self, width: float, longest: float) -> tuple[Patch, Bools]:
+        """Return the facets around borders and creases, with edges up to `longest`, and which vertices (V,) are near.
+
+        Near is within `width` metres; beyond that as much again is there too.
+        """
+        coarse = self.refined(max(width, longest))
+        ends = coarse.vertices[coarse.topology.edges[~coarse.joins]]
+        if not len(ends):
+            return Patch(coarse.vertices[:0], coarse.faces[:0], coarse.normals[:0]), np.zeros(0, dtype=np.bool_)
+        tree = KDTree(np.concatenate([ends[:, 0], ends[:, 1], ends.mean(axis=1)]))
+        centres = coarse.vertices[coarse.faces].mean(axis=1)
+        # No point of an edge is further than half its length from these, nor of a facet from its centre than a side.
+        near = np.asarray(tree.query(centres)[0]) < 3.0 * width
+        used = np.zeros(len(coarse.vertices), dtype=np.bool_)
+        used[coarse.faces[near]] = True
+        faces = (np.cumsum(used) - 1)[coarse.faces[near]]
+        fine = Patch(coarse.vertices[used], faces, coarse.normals[near]).refined(longest)
+        return fine, np.asarray(tree.query(fine.vertices)[0]) < width
 
     def _halved(self, long: Bools) -> Patch:
         """Return the patch with the sides (F, 3) in `long` cut in the middle; neighbours agree on which."""

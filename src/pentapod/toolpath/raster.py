@@ -99,13 +99,18 @@ def plane_lines(patch: Patch, tool: Tool, options: CoverOptions, across: Floats)
         )
     passes = level_set.lines()
     if options.fill:
-        gaps = _gaps(patch.refined(edge_for(steps)), tool, options, across, levels)
+        # Between planes that go on, no gap can be: only near borders.
+        gaps = _gaps(patch, steps, tool, options, across, levels)
         passes = Passes.joined([passes, gaps]) if len(gaps) else passes
     return passes, float(steps.max())
 
 
-def _gaps(patch: Patch, tool: Tool, options: CoverOptions, across: Floats, levels: Floats) -> Passes:
-    """Return lines around what planes at levels leave more than half a step from all of them, on small facets."""
+def _gaps(whole: Patch, steps: Floats, tool: Tool, options: CoverOptions, across: Floats, levels: Floats) -> Passes:
+    """Return lines around what planes at levels leave more than half a step from all of them, near borders."""
+    patch, near = whole.rim(2.0 * float(steps.max()), edge_for(steps))
+    if not len(patch.faces):
+        return Passes.of([])
     ways = np.broadcast_to(across, patch.facet_normals.shape)
     slowness = 1.0 / surface_steps(patch, tool, ways, options.stepover, options.scallop)
-    return gap_lines(patch, seeds_along(LevelSet(patch, patch.vertices @ across, levels), slowness), slowness)
+    seeds = seeds_along(LevelSet(patch, patch.vertices @ across, levels), slowness)
+    return gap_lines(patch, seeds, slowness, where=near, area=float(whole.areas.sum()))

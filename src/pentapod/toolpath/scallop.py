@@ -18,7 +18,7 @@ from pentapod.arrays import Floats, as_floats
 from pentapod.errors import ToolpathError
 from pentapod.toolpath.levels import gradients
 from pentapod.toolpath.patch import Patch
-from pentapod.toolpath.tools import BallCutter, Tool
+from pentapod.toolpath.tools import Tool
 
 _TIGHTEST = -0.9
 
@@ -38,7 +38,7 @@ def stepover_for(scallop: float, radius: float, curvature: ArrayLike = 0.0) -> F
 
 def cutting_radius(tool: Tool, scallop: float) -> float:
     """Return the radius that leaves the scallop. Raises ToolpathError for a tool without, or a scallop too high."""
-    radius = tool.radius if isinstance(tool, BallCutter) else getattr(tool, "scallop_radius", None)
+    radius = tool.scallop_radius
     if radius is None:
         raise ToolpathError("this tool leaves no scallop", key="scallop", value=scallop, remedy="give the stepover")
     if scallop >= radius:

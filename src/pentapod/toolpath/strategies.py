@@ -8,12 +8,16 @@ from typing import Any
 
 from pentapod.errors import ToolpathError, nearest
 from pentapod.toolpath.cross_hatch import CrossHatchOptions, draw_cross_hatch
+from pentapod.toolpath.curves import CurveOptions, draw_curves
 from pentapod.toolpath.drawing import Drawing
+from pentapod.toolpath.edges import EdgeOptions, draw_edges
 from pentapod.toolpath.finishing import finished
+from pentapod.toolpath.image import ImageOptions, draw_image
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.offset import OffsetOptions, draw_offset
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.path_report import PathReport
+from pentapod.toolpath.polyline import PolylineOptions, draw_polyline
 from pentapod.toolpath.raster import RasterOptions, draw_raster
 from pentapod.toolpath.spiral import SpiralOptions, draw_spiral
 from pentapod.toolpath.toolpath import Toolpath
@@ -38,6 +42,10 @@ STRATEGIES: dict[str, Strategy] = {
         Strategy("waterline", WaterlineOptions, draw_waterline),
         Strategy("offset", OffsetOptions, draw_offset),
         Strategy("spiral", SpiralOptions, draw_spiral),
+        Strategy("edges", EdgeOptions, draw_edges),
+        Strategy("curves", CurveOptions, draw_curves),
+        Strategy("polyline", PolylineOptions, draw_polyline),
+        Strategy("image", ImageOptions, draw_image),
     )
 }
 
