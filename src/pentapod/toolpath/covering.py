@@ -17,7 +17,7 @@ from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.slicing import LevelSet
 from pentapod.toolpath.topology import components
 
-FACETS_PER_STEP = 4.0
+FACETS_PER_STEP = 3.5
 _SLACK = 1.04
 CRUMBS = 5e-4
 """Share of the area that gaps may have together without lines of their own."""

@@ -118,7 +118,7 @@ def projection(mesh: Mesh, options: CurveOptions) -> Landing:
 
     def land(plane: Floats) -> tuple[Floats, Floats, Bools]:
         points, normals, _ = field.topmost(start + plane[:, :1] * x + plane[:, 1:] * y)
-        landed = np.isfinite(points).all(axis=1)
+        landed = np.asarray(np.isfinite(points).all(axis=1))
         points, normals = np.where(landed[:, None], points, 0.0), np.where(landed[:, None], normals, options.up)
         landed &= options.region.faces(normals) >= 0.0
         landed &= ((points >= low - 1e-12) & (points <= high + 1e-12)).all(axis=1)

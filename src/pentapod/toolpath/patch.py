@@ -116,19 +116,29 @@ class Patch:
 
         Near is within `width` metres; beyond that as much again is there too.
         """
-        coarse = self.refined(max(width, longest))
-        ends = coarse.vertices[coarse.topology.edges[~coarse.joins]]
-        if not len(ends):
-            return Patch(coarse.vertices[:0], coarse.faces[:0], coarse.normals[:0]), np.zeros(0, dtype=np.bool_)
-        tree = KDTree(np.concatenate([ends[:, 0], ends[:, 1], ends.mean(axis=1)]))
-        centres = coarse.vertices[coarse.faces].mean(axis=1)
-        # No point of an edge is further than half its length from these, nor of a facet from its centre than a side.
-        near = np.asarray(tree.query(centres)[0]) < 3.0 * width
-        used = np.zeros(len(coarse.vertices), dtype=np.bool_)
-        used[coarse.faces[near]] = True
-        faces = (np.cumsum(used) - 1)[coarse.faces[near]]
-        fine = Patch(coarse.vertices[used], faces, coarse.normals[near]).refined(longest)
-        return fine, np.asarray(tree.query(fine.vertices)[0]) < width
+        border = self.topology.edges[~self.joins]
+        if not len(border):
+            return Patch(self.vertices[:0], self.faces[:0], self.normals[:0]), np.zeros(0, dtype=np.bool_)
+        start, way = self.vertices[border[:, 0]], self.vertices[border[:, 1]] - self.vertices[border[:, 0]]
+        counts = np.ceil(np.linalg.norm(way, axis=1) / longest).astype(np.intp) + 1
+        edge = np.repeat(np.arange(len(border)), counts)
+        number = np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
+        tree = KDTree(start[edge] + (number / np.maximum(counts - 1, 1)[edge])[:, None] * way[edge])
+        # Halve what is long and drop what is far, in turns: what is far need not become small.
+        patch, size = self, float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+        while True:
+            size = max(0.5 * size, longest)
+            patch = patch.refined(size)
+            centres = patch.vertices[patch.faces].mean(axis=1)
+            bound = 2.0 * width + size
+            close = np.isfinite(np.asarray(tree.query(centres, distance_upper_bound=bound)[0]))
+            used = np.zeros(len(patch.vertices), dtype=np.bool_)
+            used[patch.faces[close]] = True
+            faces = (np.cumsum(used) - 1)[patch.faces[close]]
+            patch = Patch(patch.vertices[used], faces, patch.normals[close])
+            if size <= longest:
+                break
+        return patch, np.asarray(tree.query(patch.vertices)[0]) < width
 
     def _halved(self, long: Bools) -> Patch:
         """Return the patch with the sides (F, 3) in `long` cut in the middle; neighbours agree on which."""

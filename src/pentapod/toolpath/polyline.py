@@ -60,7 +60,7 @@ def draw_polyline(mesh: Mesh, tool: Tool, options: PolylineOptions) -> Drawing:
             facets, found, weights = closest(patch, points)
             return found, normals_at(patch, facets, weights), np.ones(len(points), dtype=np.bool_)
         found, normals, _ = field.topmost(points)
-        landed = np.isfinite(found).all(axis=1)
+        landed = np.asarray(np.isfinite(found).all(axis=1))
         found, normals = np.where(landed[:, None], found, 0.0), np.where(landed[:, None], normals, options.up)
         landed &= (options.region.faces(normals) >= 0.0) & ((found >= low) & (found <= high)).all(axis=1)
         return found, normals, landed

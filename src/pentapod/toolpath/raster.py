@@ -107,7 +107,7 @@ def plane_lines(patch: Patch, tool: Tool, options: CoverOptions, across: Floats)
 
 def _gaps(whole: Patch, steps: Floats, tool: Tool, options: CoverOptions, across: Floats, levels: Floats) -> Passes:
     """Return lines around what planes at levels leave more than half a step from all of them, near borders."""
-    patch, near = whole.rim(2.0 * float(steps.max()), edge_for(steps))
+    patch, near = whole.rim(1.25 * float(steps.max()), edge_for(steps))
     if not len(patch.faces):
         return Passes.of([])
     ways = np.broadcast_to(across, patch.facet_normals.shape)

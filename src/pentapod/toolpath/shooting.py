@@ -74,11 +74,11 @@ def shoot(patch: Patch, beside: Ints, start: Shots, lengths: Floats) -> Shots:
         w = np.maximum(w + advance[:, None] * rate, 0.0)
         weights[going] = w / w.sum(axis=1, keepdims=True)
         left[going] -= advance
-        going, side, f, corners = going[~ends], side[~ends], f[~ends], corners[~ends]
+        going, side, f = going[~ends], side[~ends], f[~ends]
         following = beside[f, side]
         lost = following < 0
         landed[going[lost]] = False
-        going, side, f, corners, following = (x[~lost] for x in (going, side, f, corners, following))
+        going, side, f, following = going[~lost], side[~lost], f[~lost], following[~lost]
         _cross(patch, (facets, weights, directions, from_side), going, f, side, following)
     return Shots(facets, weights, directions, landed)
 
