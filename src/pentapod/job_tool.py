@@ -8,8 +8,8 @@ import numpy as np
 
 from pentapod.errors import ToolpathError
 from pentapod.job import Job
-from pentapod.job_tables import Vector
 from pentapod.progress import Progress, silent
+from pentapod.table import Vector
 from pentapod.toolpath.axis_modes import AxisMode, Between, Fixed, Normal, Pointed
 from pentapod.toolpath.facet_tree import FacetTree
 from pentapod.toolpath.gouge import GougeOptions, Remedy, checked

@@ -213,7 +213,7 @@ def test_scallops_on_a_slope_are_as_high_as_asked_for(slope_deg):
     """Ridge between two balls on an inclined plane, found by brute force across the passes."""
     slope, radius, scallop = np.radians(slope_deg), 3e-3, 2e-5
     mesh = Mesh.of(*surfaces.grid(lambda x, y: np.tan(slope) * y, cells=4))
-    toolpath, report = toolpath_with_report(mesh, BallCutter(radius), RasterOptions(scallop=scallop))
+    toolpath, report = toolpath_with_report(mesh, BallCutter(radius), RasterOptions(scallop=scallop, fill=False))
     assert report.stepover == pytest.approx(stepover_for(scallop, radius), rel=2e-3)
     heights = sorted({round(float(s.tips[0, 1]), 12) for s in toolpath.segments if s.kind is SegmentKind.CUT})
     y0, y1 = heights[3:5]
@@ -242,7 +242,7 @@ def test_short_passes_are_dropped_and_reported():
     island = vertices[faces[:2]] * 0.01 + [0.0, 0.06, 0.0]
     loose = np.concatenate([vertices[faces], island]).reshape(-1, 3)
     mesh = Mesh.of(loose, np.arange(len(loose)).reshape(-1, 3))
-    report = toolpath_with_report(mesh, BALL, RasterOptions(stepover=5e-5, spacing=0.05, shortest=1e-4))[1]
+    report = toolpath_with_report(mesh, BALL, RasterOptions(stepover=5e-5, spacing=0.05, shortest=1e-4, fill=False))[1]
     assert report.dropped > 0
     assert 0 < report.dropped_length < 1e-4 * report.dropped
     assert "short passes dropped" in str(report)

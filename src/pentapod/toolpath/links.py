@@ -21,7 +21,7 @@ from pentapod.toolpath.toolpath import Segment, SegmentKind
 RAPID_SPACING_M = 5e-3
 RAPID_AXIS_STEP = np.radians(3.0)
 _ROUNDING_M = 5e-3
-_SAME_CORNER_M = 1e-6
+_SAME_CORNER_M = 1e-4
 _ARC_STEP = np.radians(6.0)
 
 

@@ -57,7 +57,7 @@ def tour(first: Floats, last: Floats, turnable: Bools) -> tuple[Ints, Bools]:
     tails = np.where(backwards[:, None], first[order], last[order])
     free = bool(turnable.all())
     for _ in range(MOST_SWEEPS):
-        if len(order) < 3 or len(order) ** 2 * MOST_SWEEPS > 100 * _MOST_WORK:
+        if len(order) < 2 or len(order) ** 2 * MOST_SWEEPS > 100 * _MOST_WORK:
             break
         improved = _two_opt(order, backwards, heads, tails) if free else False
         improved = _or_opt(order, backwards, heads, tails) or improved
@@ -90,8 +90,8 @@ def _distance(a: Floats, b: Floats) -> Floats:
 def _two_opt(order: Ints, backwards: Bools, heads: Floats, tails: Floats) -> bool:
     """Turn runs i to j round while that shortens the travel, in place; return whether one was."""
     count, improved = len(order), False
-    for i in range(count - 1):
-        j = np.arange(i + 1, count)
+    for i in range(count):
+        j = np.arange(i, count)
         after = np.minimum(j + 1, count - 1)
         leaving = np.where(j < count - 1, _distance(heads[i], heads[after]) - _distance(tails[j], heads[after]), 0.0)
         entering = _distance(tails[i - 1], tails[j]) - _distance(tails[i - 1], heads[i]) if i else 0.0
