@@ -198,5 +198,13 @@ TABLES: dict[str, type[Table]] = {
 }
 """The model of each strategy."""
 
+
+def sunk_mm(table: ToolpathTable) -> float:
+    """Return by how much a strategy goes below the surface on purpose."""
+    if isinstance(table, ImageTable) and table.effect == "power":
+        return 0.0
+    return table.depth_mm if isinstance(table, (LaidTable, PolylineTable, ImageTable)) else 0.0
+
+
 FILE_KEYS = ("file", "curve")
 """Keys that name a file."""
