@@ -20,7 +20,20 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
     (("timing",),),
     (("program",),),
     (("verify",),),
-    (("job", "job_tables", "job_tool", "outcome", "plan_arrays", "artefacts", "pipeline"),),
+    (
+        (
+            "table",
+            "strategy_tables",
+            "job_tables",
+            "job",
+            "job_strategy",
+            "job_tool",
+            "outcome",
+            "plan_arrays",
+            "artefacts",
+            "pipeline",
+        ),
+    ),
     (("report",),),
     (("cli",),),
 )

@@ -7,12 +7,23 @@ import pytest
 from pentapod.errors import JobError
 from pentapod.job import Job
 from pentapod.job_tables import JobTables
+from pentapod.strategy_tables import TABLES
 
 FEED = "cut_mm_min = 3000"
 STEP = "stepover_mm = 15"
 
 MISTAKES = {  # what is replaced, and the pieces that the message must hold
     "unknown key": ((STEP, "stepovr_mm = 15"), ("toolpath.stepovr_mm", "unknown key", 'did you mean "stepover_mm"')),
+    "unknown strategy": ((STEP, f'{STEP}\nstrategy = "rastr"'), ("toolpath.strategy", "got 'rastr'", '"raster"')),
+    "a key of another strategy": (
+        (STEP, f'{STEP}\nstrategy = "waterline"\npattern = "zigzag"'),
+        ("job.toml:15", "toolpath.pattern", "unknown key"),
+    ),
+    "no text": ((STEP, 'strategy = "text"'), ("toolpath.text", "missing", "what is written")),
+    "no such drawing": (
+        (STEP, 'strategy = "drawing"\nfile = "none.svg"'),
+        ("job.toml:14", "toolpath.file", "none.svg", "no such file"),
+    ),
     "unknown table": (("[feed]", "[feeds]"), ("feeds", "unknown table", 'did you mean "feed"')),
     "negative stepover": (
         (STEP, "stepover_mm = -2"),
@@ -111,11 +122,13 @@ def test_every_key_is_described_and_has_its_unit():
     unitless = {
         "mesh", "unit", "scale", "repair", "region_direction", "name", "file", "type", "strategy", "pattern", "mode",
         "matrix", "component", "interpolation", "solver", "format", "direction", "line", "directions", "remedy",
+        "entry", "fill", "upright", "curve", "form", "which", "laying", "centred", "text", "letter_spacing", "align",
+        "towards", "effect", "levels", "threshold",
     }  # fmt: skip
     units = ("_mm", "_deg", "_mm_min", "_ms")
-    for table in JobTables.model_fields.values():
-        assert table.annotation is not None
-        assert table.annotation.__doc__
-        for key, field in table.annotation.model_fields.items():
+    models = [field.annotation for name, field in JobTables.model_fields.items() if name != "toolpath"]
+    for model in [*models, *TABLES.values()]:
+        assert model.__doc__
+        for key, field in model.model_fields.items():
             assert field.description, key
             assert key in unitless or key.endswith(units), key

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from pentapod.toolpath import StandOff as StandOff
     from pentapod.toolpath import Toolpath as Toolpath
     from pentapod.toolpath import load_mesh as load_mesh
-    from pentapod.toolpath import raster as raster
+    from pentapod.toolpath import make_toolpath as make_toolpath
     from pentapod.verify import Certificate as Certificate
     from pentapod.verify import Verdict as Verdict
     from pentapod.version import __version__ as __version__
@@ -54,7 +54,7 @@ _HOMES = {
     "BallCutter": "toolpath",
     "StandOff": "toolpath",
     "RasterOptions": "toolpath",
-    "raster": "toolpath",
+    "make_toolpath": "toolpath",
     "Toolpath": "toolpath",
     "plan": "planning",
     "Placement": "planning",
@@ -88,7 +88,7 @@ __all__ = [  # noqa: RUF022 - in the order of the flow
     "BallCutter",
     "StandOff",
     "RasterOptions",
-    "raster",
+    "make_toolpath",
     "Toolpath",
     "plan",
     "Placement",

@@ -8,7 +8,7 @@ import os
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
@@ -27,9 +27,9 @@ from pentapod.job_tables import (
     PartTable,
     PlacementTable,
     ToleranceTable,
-    ToolpathTable,
     ToolTable,
 )
+from pentapod.strategy_tables import FILE_KEYS, TABLES, ToolpathTable
 
 _PLACE = re.compile(r"\(at line (\d+), column (\d+)\)")
 _START = '"pentapod new DIR" writes one to start from'
@@ -40,14 +40,15 @@ _VARIABLE = re.compile(r"\$\{(\w+)\}")
 class Job:
     """What a job file says. Units are as in the file; `pentapod.pipeline` turns them into SI values.
 
-    path: the job file. mesh_path, machine_file and toolpath_file: resolved against the job file's folder.
+    path: the job file. mesh_path, machine_file and files, by their keys in [toolpath]: resolved against the job
+    file's folder.
     """
 
     path: Path
     tables: JobTables
     mesh_path: Path
     machine_file: Path | None
-    toolpath_file: Path | None = None
+    files: dict[str, Path] = field(default_factory=dict[str, Path])
 
     @classmethod
     def load(cls, path: str | Path) -> Job:
@@ -66,11 +67,11 @@ class Job:
         except ValidationError as error:
             raise _job_error(path, text, error) from error
         mesh = _resolve(path, text, ("part", "mesh"), tables.part.mesh)
-        machine, toolpath = (
-            None if name is None else _resolve(path, text, (table, "file"), name)
-            for table, name in (("machine", tables.machine.file), ("toolpath", tables.toolpath.file))
-        )
-        return cls(path, tables, mesh, machine, toolpath)
+        named = tables.machine.file
+        machine = None if named is None else _resolve(path, text, ("machine", "file"), named)
+        names = {key: getattr(tables.toolpath, key, None) for key in FILE_KEYS}
+        files = {key: _resolve(path, text, ("toolpath", key), name) for key, name in names.items() if name is not None}
+        return cls(path, tables, mesh, machine, files)
 
     @property
     def part(self) -> PartTable:
@@ -91,6 +92,10 @@ class Job:
     def toolpath(self) -> ToolpathTable:
         """The table [toolpath]."""
         return self.tables.toolpath
+
+    def file(self, key: str) -> Path:
+        """Return the file that a key of [toolpath] names."""
+        return self.files[key]
 
     @property
     def axis(self) -> AxisTable:
@@ -132,8 +137,8 @@ class Job:
         content["part"]["mesh"] = [self.mesh_path.suffix.lower(), _sha(self.mesh_path)]
         if self.machine_file is not None:
             content["machine"]["file"] = _sha(self.machine_file)
-        if self.toolpath_file is not None:
-            content["toolpath"]["file"] = [self.toolpath_file.suffix.lower(), _sha(self.toolpath_file)]
+        for key, file in self.files.items():
+            content["toolpath"][key] = [file.suffix.lower(), _sha(file)]
         canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 
@@ -193,47 +198,55 @@ def _job_error(path: Path, text: str, error: ValidationError) -> JobError:
     """Return the one JobError to show: an unknown key first, since a misspelling is also a missing key."""
     errors = error.errors(include_url=False)
     first = min(errors, key=lambda e: e["type"] != "extra_forbidden")
-    where = tuple(str(part) for part in first["loc"])
-    details = _details(first, where)
+    place = tuple(str(part) for part in first["loc"])
+    # A place within [toolpath] is told with the strategy whose table it is; the file does not nest so.
+    strategy = place[1] if len(place) > 1 and place[0] == "toolpath" and place[1] in TABLES else "raster"
+    where = (place[0], *place[2:]) if len(place) > 1 and place[:2] == ("toolpath", strategy) else place
+    details = _details(first, where, strategy)
     where = (*where, details.pop("key")) if "key" in details else where
     key = ".".join(where[:2]) + "".join(f"[{index}]" for index in where[2:])
     return JobError(file=path, line=_line_of(text, where), key=key, **details)
 
 
-def _details(error: ErrorDetails, where: tuple[str, ...]) -> dict[str, Any]:
+def _details(error: ErrorDetails, where: tuple[str, ...], strategy: str) -> dict[str, Any]:
     """Return what, value, expected and remedy of one error of pydantic."""
     context = error.get("ctx", {})
     if error["type"] == "extra_forbidden":
-        owner = _model(where[:-1])
+        owner = _model(where[:-1], strategy)
         kind = "table" if len(where) == 1 else "key"
         known = list(owner.model_fields) if owner is not None else []
         return {"what": f"unknown {kind}", "remedy": nearest(where[-1], known)}
     if error["type"] == "rule":
         return {"what": context["what"], "expected": context["expected"], "key": context["key"]}
+    if error["type"] == "union_tag_invalid":
+        tag = str(context["tag"])
+        return {"what": "unknown strategy", "value": tag, "remedy": nearest(tag, TABLES), "key": "strategy"}
     if error["type"] == "missing" and len(where) > 2:
-        return {"what": "too few numbers", "expected": _description(where)}
+        return {"what": "too few numbers", "expected": _description(where, strategy)}
     if error["type"] == "missing":
         kind = "table" if len(where) == 1 else "key"
         return {
             "what": f"the {kind} is missing",
-            "expected": _description(where),
+            "expected": _description(where, strategy),
         }
     message = error["msg"].removeprefix("Input should be ").removeprefix("a ").removeprefix("valid ")
     what = "out of range" if set(context) & {"gt", "ge", "lt", "le"} else "wrong value"
-    return {"what": what, "value": error["input"], "expected": f"{message} ({_description(where)})"}
+    return {"what": what, "value": error["input"], "expected": f"{message} ({_description(where, strategy)})"}
 
 
-def _model(where: tuple[str, ...]) -> type[BaseModel] | None:
+def _model(where: tuple[str, ...], strategy: str) -> type[BaseModel] | None:
     """Return the table that a place in the file belongs to."""
     if not where:
         return JobTables
+    if where[0] == "toolpath":
+        return TABLES[strategy]
     field = JobTables.model_fields.get(where[0])
     return cast("type[BaseModel] | None", field.annotation if field else None)
 
 
-def _description(where: tuple[str, ...]) -> str:
+def _description(where: tuple[str, ...], strategy: str) -> str:
     """Return what the schema says of a key, or of a table what keys it must have."""
-    model = _model(where[:1])
+    model = _model(where[:1], strategy)
     if model is None:
         return "see the README"
     if len(where) == 1:

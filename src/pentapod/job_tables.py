@@ -6,25 +6,12 @@ defaults. Units are in the names; values are as in the file (mm, degrees, mm/min
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, NoReturn
+from typing import Any, Literal, cast
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field, model_validator
 
-Vector = tuple[float, float, float]
-Row = tuple[float, float, float, float]
-Positive = Annotated[float, Field(gt=0.0)]
-
-
-def _wrong(key: str, what: str, expected: str) -> NoReturn:
-    """Raise the error of a rule that spans several keys; `key` is the one to name."""
-    raise PydanticCustomError("rule", "{what}", {"key": key, "what": what, "expected": expected})
-
-
-class Table(BaseModel):
-    """A table of the job file: unknown keys, wrong types, NaN and infinity are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+from pentapod.strategy_tables import ToolpathTable
+from pentapod.table import Positive, Row, Table, Vector, wrong
 
 
 class PartTable(Table):
@@ -55,9 +42,9 @@ class PartTable(Table):
         if self.region_box_mm is not None:
             low, high = self.region_box_mm
             if any(a == b for a, b in zip(low, high, strict=True)):
-                _wrong("region_box_mm", "the box is flat", "corners that differ in x, y and z")
+                wrong("region_box_mm", "the box is flat", "corners that differ in x, y and z")
         if not any(self.region_direction):
-            _wrong("region_direction", "the direction is zero", "a direction such as [0, 0, 1]")
+            wrong("region_direction", "the direction is zero", "a direction such as [0, 0, 1]")
         return self
 
 
@@ -70,7 +57,7 @@ class MachineTable(Table):
     @model_validator(mode="after")
     def _one(self) -> MachineTable:
         if (self.name is None) == (self.file is None):
-            _wrong("name", "name the machine once", 'either name = "desk" or file = "machine.toml"')
+            wrong("name", "name the machine once", 'either name = "desk" or file = "machine.toml"')
         return self
 
 
@@ -104,13 +91,13 @@ class ToolTable(Table):
         for key in ("diameter_mm", "corner_mm", "neck_mm", "reach_mm", "flute_mm", "standoff_mm"):
             given = getattr(self, key) is not None
             if key in needed and not given:
-                _wrong(key, f'missing for a tool of type "{self.type}"', "a length in mm")
+                wrong(key, f'missing for a tool of type "{self.type}"', "a length in mm")
             if given and key not in needed + possible:
-                _wrong(key, f'means nothing for a tool of type "{self.type}"', f"{', '.join(needed)} alone")
+                wrong(key, f'means nothing for a tool of type "{self.type}"', f"{', '.join(needed)} alone")
         for key in ("shank_mm", "holder_mm"):
             for piece in getattr(self, key) or ():
                 if piece[0] <= 0.0 or min(piece) < 0.0 or max(piece[1:]) <= 0.0:
-                    _wrong(key, "an impossible piece", "[height, lower diameter, upper diameter], all positive")
+                    wrong(key, "an impossible piece", "[height, lower diameter, upper diameter], all positive")
         return self
 
 
@@ -122,43 +109,6 @@ _TOOL_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "standoff": (("standoff_mm",), ()),
 }
 """Of each type: the keys that it needs, and those that it may have."""
-
-
-class ToolpathTable(Table):
-    """How the surface is covered."""
-
-    strategy: Literal["raster", "file"] = Field(
-        default="raster", description='"raster" (parallel plane slices), or "file" (a toolpath that is there already)'
-    )
-    file: str | None = Field(
-        default=None, min_length=1, description="file: the toolpath (APT, G-code, CSV, npz), relative to this job file"
-    )
-    format: str | None = Field(
-        default=None, min_length=1, description="file: its format, where the suffix does not tell"
-    )
-    direction_deg: float = Field(
-        default=0.0, ge=-360.0, le=360.0, description="direction of the passes, from +x towards +y"
-    )
-    pattern: Literal["zigzag", "one-way"] = Field(default="zigzag", description="cut both ways or one way")
-    stepover_mm: Positive | None = Field(default=None, description="between passes; or scallop_mm")
-    scallop_mm: Positive | None = Field(default=None, description="height of the ridge left between passes")
-    clearance_mm: Positive = Field(default=10.0, description="height of rapids above the part")
-    approach_mm: Positive = Field(default=3.0, description="stretch along the axis, on feed, to and from a cut")
-    spacing_mm: Positive = Field(default=2.0, description="largest distance between waypoints on the surface")
-
-    @model_validator(mode="after")
-    def _one_spacing(self) -> ToolpathTable:
-        if (self.strategy == "file") != (self.file is not None):
-            if self.file is None:
-                _wrong("file", "the toolpath file is missing", 'file = "path.apt"')
-            _wrong("file", f'means nothing for the strategy "{self.strategy}"', 'strategy = "file"')
-        if self.strategy == "file":
-            return self
-        if self.stepover_mm is not None and self.scallop_mm is not None:
-            _wrong("scallop_mm", "stepover_mm and scallop_mm are both given", "one of the two")
-        if self.stepover_mm is None and self.scallop_mm is None:
-            _wrong("stepover_mm", "the distance between passes is missing", "stepover_mm or scallop_mm")
-        return self
 
 
 class AxisTable(Table):
@@ -192,14 +142,14 @@ class AxisTable(Table):
             given = getattr(self, key) is not None
             if given != (key in needed):
                 what = "missing for" if not given else "means nothing for"
-                _wrong(key, f'{what} axis mode "{self.mode}"', ", ".join(needed) or "none of these keys")
+                wrong(key, f'{what} axis mode "{self.mode}"', ", ".join(needed) or "none of these keys")
         if self.line is not None and self.mode not in ("toward", "from"):
-            _wrong("line", f'means nothing for axis mode "{self.mode}"', 'mode = "toward" or "from"')
+            wrong("line", f'means nothing for axis mode "{self.mode}"', 'mode = "toward" or "from"')
         for key in ("direction", "line"):
             if getattr(self, key) is not None and not any(getattr(self, key)):
-                _wrong(key, "the direction is zero", "a direction such as [0, 0, 1]")
+                wrong(key, "the direction is zero", "a direction such as [0, 0, 1]")
         if self.places_mm is not None and len(self.places_mm) != len(self.directions or ()):
-            _wrong("directions", "as many directions as places are needed", f"{len(self.places_mm)} directions")
+            wrong("directions", "as many directions as places are needed", f"{len(self.places_mm)} directions")
         return self
 
 
@@ -268,17 +218,17 @@ class PlacementTable(Table):
         numbers: dict[str, Any] = {k: getattr(self, k) for k in ("position_mm", "rotation_deg", "matrix")}
         given = [key for key, value in numbers.items() if value is not None]
         if self.mode == "free" and given:
-            _wrong(given[0], 'means nothing when mode = "free"', 'mode = "fixed", or no numbers')
+            wrong(given[0], 'means nothing when mode = "free"', 'mode = "fixed", or no numbers')
         if self.mode == "fixed" and not given:
-            _wrong(
+            wrong(
                 "position_mm",
                 "a fixed placement needs its numbers",
                 "position_mm and rotation_deg, or matrix",
             )
         if self.matrix is not None and len(given) > 1:
-            _wrong("matrix", "the placement is given twice", "matrix, or position_mm and rotation_deg")
+            wrong("matrix", "the placement is given twice", "matrix, or position_mm and rotation_deg")
         if self.mode == "fixed" and self.matrix is None and self.position_mm is None:
-            _wrong("position_mm", "a fixed placement needs a position", "[x, y, z] in mm")
+            wrong("position_mm", "a fixed placement needs a position", "[x, y, z] in mm")
         return self
 
 
@@ -305,8 +255,16 @@ class JobTables(Table):
     placement: PlacementTable = Field(default=PlacementTable())
     output: OutputTable = Field(default=OutputTable())
 
+    @model_validator(mode="before")
+    @classmethod
+    def _raster_unless_said(cls, content: Any) -> Any:
+        """Take a toolpath without a strategy for a raster."""
+        if isinstance(content, dict) and isinstance(table := cast(dict[str, Any], content).get("toolpath"), dict):
+            return {**content, "toolpath": {"strategy": "raster", **cast(dict[str, Any], table)}}
+        return content
+
     @model_validator(mode="after")
     def _leaning(self) -> JobTables:
         if self.tool.type in ("bull", "flat") and self.axis.tilt_deg > 0.0:
-            _wrong("axis.tilt_deg", f'a tool of type "{self.tool.type}" cannot lean without digging in', "tilt_deg = 0")
+            wrong("axis.tilt_deg", f'a tool of type "{self.tool.type}" cannot lean without digging in', "tilt_deg = 0")
         return self

@@ -8,8 +8,9 @@ import numpy as np
 
 from pentapod.errors import ToolpathError
 from pentapod.job import Job
-from pentapod.job_tables import Vector
 from pentapod.progress import Progress, silent
+from pentapod.strategy_tables import sunk_mm
+from pentapod.table import Vector
 from pentapod.toolpath.axis_modes import AxisMode, Between, Fixed, Normal, Pointed
 from pentapod.toolpath.facet_tree import FacetTree
 from pentapod.toolpath.gouge import GougeOptions, Remedy, checked
@@ -87,7 +88,8 @@ def finished_as_asked(
     table = job.gouge
     options = GougeOptions(
         tuple(Remedy(name) for name in table.remedy),
-        tolerance=_MM * table.tolerance_mm,
+        # What is engraved is meant to be below the surface.
+        tolerance=_MM * (table.tolerance_mm + sunk_mm(job.toolpath)),
         cone=float(np.radians(table.cone_deg)),
         highest=_MM * table.highest_mm,
     )

@@ -14,6 +14,7 @@ from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, w
 from pentapod.errors import ArrayError, MachineError, MeshError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import Job
+from pentapod.job_strategy import job_options
 from pentapod.job_tool import FileReport, Reports, finished_as_asked, job_tool
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import ControllerSettings, Machine
@@ -23,15 +24,14 @@ from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
 from pentapod.program import Program, Provenance, sample, write_csv
 from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
+from pentapod.strategy_tables import FileTable
 from pentapod.timing import Explanation, Trajectory, certify, explain, retime, unheld
 from pentapod.toolpath import (
     Mesh,
-    RasterOptions,
-    Region,
     Tool,
     Toolpath,
     load_mesh,
-    raster_with_report,
+    toolpath_with_report,
 )
 from pentapod.toolpath.formats import read_toolpath
 from pentapod.verify import Verdict, verify
@@ -130,32 +130,13 @@ def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Too
 
 def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
     """Return the toolpath as a strategy lays it or a file tells it, and what that came to."""
-    part, table, feed = job.part, job.toolpath, job.feed
-    link = feed.cut_mm_min if feed.link_mm_min is None else feed.link_mm_min
-    if job.toolpath_file is not None:
-        read = read_toolpath(job.toolpath_file, table.format, pivot=tool.pivot, feed=feed.cut_mm_min * _MM_MIN)
+    if isinstance(job.toolpath, FileTable):
+        file = job.file("file")
+        read = read_toolpath(file, job.toolpath.format, pivot=tool.pivot, feed=job.feed.cut_mm_min * _MM_MIN)
         # Whatever the file says of its tool, this job's is the one that moves.
         read = Toolpath(read.segments, tool.pivot)
-        return read, FileReport(job.toolpath_file.name, len(read), len(read.segments))
-    region = Region(
-        direction=part.region_direction,
-        angle=float(np.radians(part.region_angle_deg)),
-        box=None if part.region_box_mm is None else np.array(part.region_box_mm) * _MM,
-    )
-    options = RasterOptions(
-        direction=float(np.radians(table.direction_deg)),
-        pattern=table.pattern,
-        stepover=None if table.stepover_mm is None else table.stepover_mm * _MM,
-        scallop=None if table.scallop_mm is None else table.scallop_mm * _MM,
-        region=region,
-        chordal=job.tolerance.chordal_mm * _MM,
-        spacing=table.spacing_mm * _MM,
-        clearance=table.clearance_mm * _MM,
-        approach=table.approach_mm * _MM,
-        feed=feed.cut_mm_min * _MM_MIN,
-        link_feed=link * _MM_MIN,
-    )
-    return raster_with_report(mesh, tool, options)
+        return read, FileReport(file.name, len(read), len(read.segments))
+    return toolpath_with_report(mesh, tool, job_options(job))
 
 
 def job_placement(job: Job) -> Placement | None:

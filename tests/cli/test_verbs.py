@@ -220,11 +220,12 @@ def test_new_gives_a_job_that_plans(tmp_path, capsys):
     assert "pentapod plan" in capsys.readouterr().out
     text = (folder / "job.toml").read_text()
     from pentapod.job_tables import JobTables
+    from pentapod.strategy_tables import RasterTable
 
     for table, field in JobTables.model_fields.items():
         assert f"[{table}]" in text
-        assert field.annotation is not None
-        for key in field.annotation.model_fields:
+        model = RasterTable if table == "toolpath" else field.annotation
+        for key in model.model_fields:
             assert f"{key} = " in text
     # Quick form: the same job, fewer passes.
     (folder / "job.toml").write_text(text.replace("stepover_mm = 6.0", "stepover_mm = 20.0"))

@@ -56,3 +56,40 @@ def surface_distance(mesh: Mesh, points):
 
     shape = trimesh.Trimesh(1e3 * mesh.vertices, mesh.faces, process=False)
     return 1e-3 * np.asarray(trimesh.proximity.closest_point(shape, 1e3 * points)[1])
+
+
+def random_points(mesh: Mesh, count, region, seed=7):
+    """Points (N, 3) spread evenly over the area of a mesh, those in a region, and smooth normals there."""
+    random = np.random.default_rng(seed)
+    facet = random.choice(len(mesh.faces), count, p=mesh.facet_areas / mesh.facet_areas.sum())
+    weights = random.dirichlet([1, 1, 1], count)[:, :, None]
+    points = (mesh.vertices[mesh.faces[facet]] * weights).sum(axis=1)
+    normals = (mesh.corner_normals[facet] * weights).sum(axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    low, high = region.bounds
+    inside = (normals @ region.direction >= np.cos(region.angle)) & ((points >= low) & (points <= high)).all(axis=1)
+    return points[inside], normals[inside]
+
+
+def distance_to_lines(points, normals, lines, line_normals, step=1e-4):
+    """Distance (N,) along the surface from points to polylines (lists of (n, 3)) on it, for distances of a few steps.
+
+    Straight distance to the line sampled every `step`, lengthened as an arc between both normals would be; what faces
+    another way by more than a right angle is another side of the part. An upper bound but for the sampling.
+    """
+    from scipy.spatial import cKDTree
+
+    dense, facing = [], []
+    for line, normal in zip(lines, line_normals, strict=True):
+        count = np.maximum(np.ceil(np.linalg.norm(np.diff(line, axis=0), axis=1) / step).astype(int), 1)
+        leg = np.repeat(np.arange(len(count)), count)
+        t = ((np.arange(len(leg)) - np.repeat(np.cumsum(count) - count, count)) / count[leg])[:, None]
+        dense += [line[leg] * (1 - t) + line[leg + 1] * t, line[-1:]]
+        facing += [normal[leg] * (1 - t) + normal[leg + 1] * t, normal[-1:]]
+    dense, facing = np.concatenate(dense), np.concatenate(facing)
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    near, which = cKDTree(dense).query(points, k=8)
+    cosine = np.clip((facing[which] * normals[:, None]).sum(axis=2), -1, 1)
+    half = 0.5 * np.arccos(cosine)
+    along = near * np.where(half > 1e-6, half / np.maximum(np.sin(half), 1e-9), 1.0)
+    return np.where(cosine > 0, along, np.inf).min(axis=1)

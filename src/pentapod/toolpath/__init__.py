@@ -1,37 +1,66 @@
 """The workpiece as mathematics: meshes, strategies, tools, links. No robot in it."""
 
+from pentapod.toolpath.cross_hatch import CrossHatchOptions
+from pentapod.toolpath.curves import CurveOptions
 from pentapod.toolpath.diagnosis import MeshDiagnosis
+from pentapod.toolpath.drawings_in import read_lines
+from pentapod.toolpath.edges import EdgeOptions
 from pentapod.toolpath.heightfield import HeightField
+from pentapod.toolpath.image import ImageOptions
+from pentapod.toolpath.lettering import lettering
 from pentapod.toolpath.load import UNITS, load_mesh
 from pentapod.toolpath.mesh import Mesh
-from pentapod.toolpath.options import Pattern, RasterOptions
-from pentapod.toolpath.raster import RasterReport, raster, raster_with_report, stepover_for
+from pentapod.toolpath.offset import OffsetOptions
+from pentapod.toolpath.options import CoverOptions, Entry, PathOptions
+from pentapod.toolpath.path_report import PathReport
+from pentapod.toolpath.pictures_in import read_darkness
+from pentapod.toolpath.points_in import read_points
+from pentapod.toolpath.polyline import PolylineOptions
+from pentapod.toolpath.raster import Pattern, RasterOptions
 from pentapod.toolpath.region import Region
+from pentapod.toolpath.scallop import stepover_for
+from pentapod.toolpath.spiral import SpiralOptions
 from pentapod.toolpath.stl import write_stl
-from pentapod.toolpath.strategies import STRATEGIES, Strategy
+from pentapod.toolpath.strategies import STRATEGIES, Strategy, make_toolpath, toolpath_with_report
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.toolpath.tools import BallCutter, StandOff, Tool
+from pentapod.toolpath.waterline import WaterlineOptions
 
 __all__ = [
     "STRATEGIES",
     "UNITS",
     "BallCutter",
+    "CoverOptions",
+    "CrossHatchOptions",
+    "CurveOptions",
+    "EdgeOptions",
+    "Entry",
     "HeightField",
+    "ImageOptions",
     "Mesh",
     "MeshDiagnosis",
+    "OffsetOptions",
+    "PathOptions",
+    "PathReport",
     "Pattern",
+    "PolylineOptions",
     "RasterOptions",
-    "RasterReport",
     "Region",
     "Segment",
     "SegmentKind",
+    "SpiralOptions",
     "StandOff",
     "Strategy",
     "Tool",
     "Toolpath",
+    "WaterlineOptions",
+    "lettering",
     "load_mesh",
-    "raster",
-    "raster_with_report",
+    "make_toolpath",
+    "read_darkness",
+    "read_lines",
+    "read_points",
     "stepover_for",
+    "toolpath_with_report",
     "write_stl",
 ]

@@ -15,23 +15,23 @@ class Passes:
     """P polylines: pass k holds the points starts[k] to starts[k + 1] − 1, at least two.
 
     points (N, 3): metres, on the surface. normals (N, 3): such that linear interpolation between points
-    gives the surface's normal up to its length (not unit). starts (P + 1,). planes (P,): the slicing plane
-    of each.
+    gives the surface's normal up to its length (not unit). starts (P + 1,). levels (P,): which line of the
+    strategy each belongs to, such as the slicing plane.
     """
 
     points: Floats
     normals: Floats
     starts: Ints
-    planes: Ints
+    levels: Ints
 
     def __post_init__(self) -> None:
-        for name in ("points", "normals", "starts", "planes"):
+        for name in ("points", "normals", "starts", "levels"):
             array = np.asarray(getattr(self, name)).copy()
             array.flags.writeable = False
             set_frozen(self, **{name: array})
 
     def __len__(self) -> int:
-        return len(self.planes)
+        return len(self.levels)
 
     @cached_property
     def pass_of_point(self) -> Ints:
@@ -54,12 +54,18 @@ class Passes:
         sums = np.concatenate([[0.0], np.cumsum(self.steps)])
         return sums[self.starts[1:] - 1] - sums[self.starts[:-1]] if len(self) else np.zeros(0)
 
+    @cached_property
+    def closed(self) -> Bools:
+        """Whether (P,) each pass ends where it begins."""
+        ends = self.points[self.starts[1:] - 1] - self.points[self.starts[:-1]]
+        return (ends == 0.0).all(axis=1) & (np.diff(self.starts) > 3)
+
     def where(self, keep: Bools) -> Passes:
         """Return the passes (P,) marked in `keep`."""
         points = keep[self.pass_of_point]
         counts = np.diff(self.starts)[keep]
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
-        return Passes(self.points[points], self.normals[points], starts, self.planes[keep])
+        return Passes(self.points[points], self.normals[points], starts, self.levels[keep])
 
     def split(self, keep: Bools) -> Passes:
         """Return the runs of two or more consecutive points (N,) marked in `keep`, as passes of their own."""
@@ -70,5 +76,38 @@ class Passes:
         points = keep.copy()
         points[keep] = long[run[keep]]
         starts = np.concatenate([[0], np.cumsum(counts[long])]).astype(np.intp)
-        planes = self.planes[self.pass_of_point[begins]][long]
-        return Passes(self.points[points], self.normals[points], starts, planes)
+        levels = self.levels[self.pass_of_point[begins]][long]
+        return Passes(self.points[points], self.normals[points], starts, levels)
+
+    def rows(self, k: int) -> slice:
+        """Return where the points of pass k are."""
+        return slice(int(self.starts[k]), int(self.starts[k + 1]))
+
+    @classmethod
+    def of(cls, lines: list[tuple[Floats, Floats]], levels: Ints | None = None) -> Passes:
+        """Return the passes of lines, each points and normals (n, 3), n ≥ 2; by default each its own level."""
+        starts = np.concatenate([[0], np.cumsum([len(points) for points, _ in lines])]).astype(np.intp)
+        points, normals = (np.concatenate([line[k] for line in lines] or [np.zeros((0, 3))]) for k in range(2))
+        return cls(points, normals, starts, np.arange(len(lines)) if levels is None else levels)
+
+    @classmethod
+    def joined(cls, parts: list[Passes]) -> Passes:
+        """Return the passes of all parts, the levels of each numbered after those before."""
+        if not parts:
+            return cls.of([])
+        points, normals = (np.concatenate([getattr(p, name) for p in parts]) for name in ("points", "normals"))
+        counts = np.concatenate([np.diff(p.starts) for p in parts])
+        first, levels = 0, []
+        for part in parts:
+            levels.append(part.levels + first)
+            first += int(part.levels.max(initial=-1)) + 1
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+        return cls(points, normals, starts, np.concatenate(levels))
+
+    def slices(self, begins: Ints, ends: Ints) -> Passes:
+        """Return runs of points begins[k] to ends[k], both included, as passes; runs may share their ends."""
+        counts = ends - begins + 1
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+        index = np.repeat(begins - starts[:-1], counts) + np.arange(int(counts.sum()))
+        levels = self.levels[self.pass_of_point[begins]]
+        return Passes(self.points[index], self.normals[index], starts, levels)

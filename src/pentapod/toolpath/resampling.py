@@ -66,7 +66,7 @@ def without_duplicates(passes: Passes, closest: float) -> Passes:
             break
         counts = np.bincount(passes.pass_of_point[~drop], minlength=len(passes))
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
-        passes = Passes(passes.points[~drop], passes.normals[~drop], starts, passes.planes)
+        passes = Passes(passes.points[~drop], passes.normals[~drop], starts, passes.levels)
     return passes
 
 
@@ -74,7 +74,7 @@ def _evenly(passes: Passes, place: Floats, chordal: float, spacing: float, axis_
     """Return places of waypoints spread evenly over the density that the tolerances ask for."""
     turn = np.where(passes.within, angle_between(passes.normals[1:], passes.normals[:-1]), 0.0)
     needed = np.maximum(
-        np.maximum(passes.steps / spacing, turn / axis_step), np.sqrt(passes.steps * turn / (8.0 * chordal))
+        np.maximum(passes.steps / spacing, _turning(passes) / axis_step), np.sqrt(passes.steps * turn / (8.0 * chordal))
     )
     quantity = np.concatenate([[0.0], np.cumsum(np.where(passes.within, needed, 1.0))])
     first, last = passes.starts[:-1], passes.starts[1:] - 1
@@ -87,6 +87,18 @@ def _evenly(passes: Passes, place: Floats, chordal: float, spacing: float, axis_
     samples = np.interp(wanted, quantity, place)
     samples = np.where(number == 0, place[first][owner], samples)
     return np.where(number == intervals[owner], place[last][owner], samples)
+
+
+def _turning(passes: Passes) -> Floats:
+    """Return an upper bound (N − 1,) on how fast the axis turns within each step, radians per step.
+
+    Between normals that are interpolated linearly the axis turns fastest where they are shortest.
+    """
+    start, step = passes.normals[:-1], np.diff(passes.normals, axis=0)
+    square = np.maximum((step * step).sum(axis=1), 1e-300)
+    t = np.clip(-(start * step).sum(axis=1) / square, 0.0, 1.0)[:, None]
+    shortest = np.linalg.norm(start + t * step, axis=1)
+    return np.where(passes.within, np.sqrt(square) / np.maximum(shortest, 1e-3), 0.0)
 
 
 def _worst_corners(
@@ -115,7 +127,7 @@ def _at(passes: Passes, place: Floats, samples: Floats) -> Passes:
     first = place[passes.starts[:-1]]
     starts = np.concatenate([np.searchsorted(samples, first), [len(samples)]]).astype(np.intp)
     points = _interpolated(passes.points, place, samples)
-    return Passes(points, _interpolated(passes.normals, place, samples), starts, passes.planes)
+    return Passes(points, _interpolated(passes.normals, place, samples), starts, passes.levels)
 
 
 def _interpolated(values: Floats, place: Floats, samples: Floats) -> Floats:

@@ -7,7 +7,7 @@ import numpy as np
 from pentapod.arrays import Floats
 from pentapod.geometry.directions import angle_between, normalised
 from pentapod.toolpath.heightfield import HeightField
-from pentapod.toolpath.options import RasterOptions
+from pentapod.toolpath.options import PathOptions
 
 MOST_TURN = np.radians(30.0)
 STEEPEST_RISE = np.tan(np.radians(80.0))
@@ -18,7 +18,7 @@ LinkEnds = tuple[Floats, Floats, Floats, Floats]
 
 
 def surface_links(
-    field: HeightField, options: RasterOptions, stepover: float, ends: list[LinkEnds]
+    field: HeightField, options: PathOptions, stepover: float, ends: list[LinkEnds]
 ) -> list[tuple[Floats, Floats] | None]:
     """Return for each pair of passes contacts and normals (n, 3) of a link on the surface, or None.
 
@@ -55,7 +55,7 @@ def surface_links(
 
 def _checked(
     field: HeightField,
-    options: RasterOptions,
+    options: PathOptions,
     stepover: float,
     *,
     t: Floats,

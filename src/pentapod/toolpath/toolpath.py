@@ -28,14 +28,16 @@ class Segment:
     """A run of tool poses of one kind.
 
     tips (N, 3): tool tips, metres, workpiece frame. axes (N, 3): unit, tip → spindle. feed: speed of the
-    tip in m/s that the process wants; infinite on rapids (the machine's rapid rate holds there). N ≥ 2.
-    Raises ToolpathError for an empty segment, a bad feed, or an axis that is not of unit length.
+    tip in m/s that the process wants; infinite on rapids (the machine's rapid rate holds there). power: share of
+    full laser (or spindle) power while cutting, 0 to 1. N ≥ 2. Raises ToolpathError for an empty
+    segment, a bad feed or power, or an axis that is not of unit length.
     """
 
     kind: SegmentKind
     tips: Floats
     axes: Floats
     feed: float
+    power: float = 1.0
 
     def __post_init__(self) -> None:
         tips, axes = frozen(self.tips, "tips", (None, 3)), frozen(self.axes, "axes", (None, 3))
@@ -46,6 +48,8 @@ class Segment:
             raise ToolpathError("tool axes must have unit length")
         if not self.feed > 0.0:
             raise ToolpathError("feed must be positive", value=self.feed)
+        if not 0.0 <= self.power <= 1.0:
+            raise ToolpathError("power must be a share of full power", value=self.power, expected="0 to 1")
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +109,9 @@ class Toolpath:
     def transformed(self, transform: RigidTransform) -> Toolpath:
         """Return the same motion seen after a rigid transform."""
         return Toolpath(
-            tuple(Segment(s.kind, transform.apply(s.tips), transform.rotate(s.axes), s.feed) for s in self.segments),
+            tuple(
+                Segment(s.kind, transform.apply(s.tips), transform.rotate(s.axes), s.feed, s.power)
+                for s in self.segments
+            ),
             self.pivot,
         )

@@ -1,0 +1,75 @@
+"""Polyline: lines given point by point, taken to the surface straight down or to its nearest point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from pentapod.arrays import Bools, Floats, frozen, set_frozen
+from pentapod.errors import ToolpathError
+from pentapod.toolpath.closest import closest, normals_at
+from pentapod.toolpath.draping import draped, sunk
+from pentapod.toolpath.drawing import Drawing, Order
+from pentapod.toolpath.finishing import nothing_left
+from pentapod.toolpath.heightfield import HeightField
+from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.options import PathOptions, chosen, not_negative
+from pentapod.toolpath.patch import Patch
+from pentapod.toolpath.tools import Tool
+
+
+class Towards(StrEnum):
+    """view: along the view, onto what is on top. nearest: to the nearest point of the region."""
+
+    VIEW = "view"
+    NEAREST = "nearest"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PolylineOptions(PathOptions):
+    """Lines that are given. lines: each (n, 3), metres, workpiece frame. towards: see `Towards`. depth: metres."""
+
+    lines: Sequence[Floats] = ()
+    towards: Towards | str = Towards.VIEW
+    depth: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        set_frozen(self, towards=chosen("towards", self.towards, Towards))
+        lines = tuple(frozen(line, f"lines[{k}]", (None, 3)) for k, line in enumerate(self.lines))
+        if not any(len(line) > 1 for line in lines):
+            raise ToolpathError("there is no line to follow", key="lines")
+        set_frozen(self, lines=lines)
+        not_negative("depth", self.depth)
+
+
+def draw_polyline(mesh: Mesh, tool: Tool, options: PolylineOptions) -> Drawing:
+    """Return the given lines on the surface, in their order. Raises ToolpathError where none meets the region."""
+    del tool
+    field = HeightField(mesh, options.up)
+    patch = Patch.of(mesh, options.region)
+    if not len(patch.faces):
+        raise nothing_left(mesh, options, 0)
+    low, high = options.region.bounds
+
+    def land(points: Floats) -> tuple[Floats, Floats, Bools]:
+        if options.towards is Towards.NEAREST:
+            facets, found, weights = closest(patch, points)
+            return found, normals_at(patch, facets, weights), np.ones(len(points), dtype=np.bool_)
+        found, normals, _ = field.topmost(points)
+        landed = np.asarray(np.isfinite(found).all(axis=1))
+        found, normals = np.where(landed[:, None], found, 0.0), np.where(landed[:, None], normals, options.up)
+        landed &= (options.region.faces(normals) >= 0.0) & ((found >= low) & (found <= high)).all(axis=1)
+        return found, normals, landed
+
+    lines = [np.asarray(line) for line in options.lines if len(line) > 1]
+    landing = sunk(land, lambda points: np.full(len(points), options.depth))
+    passes, lost = draped(lines, landing, spacing=options.spacing, chordal=options.chordal)
+    if not len(passes):
+        raise ToolpathError("no line meets the surface", key="lines", remedy="check the unit and the view")
+    notes = (f"{100.0 * lost:.2g} % of the lines lie beside the region and are left out",) if lost > 1e-6 else ()
+    visible = options.towards is Towards.VIEW
+    return Drawing(passes, 0.0, Order.GIVEN, sink=options.depth, visible=visible, notes=notes)
