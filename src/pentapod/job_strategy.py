@@ -70,18 +70,16 @@ def job_options(job: Job) -> PathOptions:
     if isinstance(table, PolylineTable):
         lines = read_points(job.file("file"))
         return PolylineOptions(**common, lines=lines, towards=table.towards, depth=table.depth_mm * _MM)
-    if isinstance(table, ImageTable):
-        return ImageOptions(
-            **common,
-            **_laid(table),
-            darkness=read_darkness(job.file("file")),
-            width=table.width_mm * _MM,
-            stepover=table.stepover_mm * _MM,
-            effect=table.effect,
-            levels=table.levels,
-            threshold=table.threshold,
-        )
-    raise TypeError(f"no options for {type(table).__name__}")
+    return ImageOptions(
+        **common,
+        **_laid(table),
+        darkness=read_darkness(job.file("file")),
+        width=table.width_mm * _MM,
+        stepover=table.stepover_mm * _MM,
+        effect=table.effect,
+        levels=table.levels,
+        threshold=table.threshold,
+    )
 
 
 def _covering(job: Job, table: CoverTable, common: dict[str, Any]) -> PathOptions:
@@ -93,7 +91,7 @@ def _covering(job: Job, table: CoverTable, common: dict[str, Any]) -> PathOption
         "fill": table.fill,
     }
     if isinstance(table, CrossHatchTable):
-        way = {"direction": _rad(table.direction_deg), "pattern": table.pattern}
+        way: dict[str, Any] = {"direction": _rad(table.direction_deg), "pattern": table.pattern}
         return CrossHatchOptions(**common, **way, angle=_rad(table.angle_deg))
     if isinstance(table, RasterTable):
         return RasterOptions(**common, direction=_rad(table.direction_deg), pattern=table.pattern)
