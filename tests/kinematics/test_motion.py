@@ -164,14 +164,13 @@ def grazing_intervals(nominal: LinearPentapod, n: int, seed: int):
     return np.stack([ends[:-1], 2.0 * vertex - 0.5 * (ends[:-1] + ends[1:]), ends[1:]], axis=-1), p[turns], i[turns]
 
 
-@pytest.mark.parametrize("n", [150, pytest.param(10000, marks=pytest.mark.slow)])
-def test_never_falsely_proven_in_exact_arithmetic(nominal, n):
+@pytest.mark.parametrize(("n", "each"), [(150, 25), pytest.param(10000, 250, marks=pytest.mark.slow)])
+def test_never_falsely_proven_in_exact_arithmetic(nominal, n, each):
     machine = AsBuiltPentapod.of(nominal)
     singular = proven = 0
-    for seed in range(n // 25):
-        coefficients, p, i = grazing_intervals(nominal, 25, seed)
-        if coefficients.min() <= 0.0:
-            continue  # not lengths
+    for seed in range(n // each):
+        coefficients, p, i = grazing_intervals(nominal, each, seed)
+        coefficients = np.maximum(coefficients, 1e-3)  # where the way out would ask for legs that are none
         found = certify_motion(machine, coefficients, p, i)
         for row, sure in zip(coefficients, found.proven, strict=True):
             bad = any(lost(d) for d in discriminants(*row.T))
