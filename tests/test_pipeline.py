@@ -16,6 +16,8 @@ from pentapod.pipeline import job_mesh, job_placement, job_toolpath, run
 from pentapod.planning import PlacedPath
 from pentapod.program import read_csv
 from pentapod.refusal import Refusal
+from pentapod.strategy_tables import TABLES
+from pentapod.toolpath import SegmentKind
 
 TOOLPATHS = Path(__file__).parents[1] / "toolpaths"
 SHIPPED = sorted(path.stem for path in TOOLPATHS.glob("*.toml"))
@@ -31,11 +33,24 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def test_jobs_are_shipped():
-    assert SHIPPED == ["dome", "laser", "oversize", "saddle", "wavy"]
+QUICK = {"dome", "flower", "oversize", "seam"}
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+def test_the_shipped_jobs_show_every_strategy():
+    assert len(SHIPPED) >= 12
+    shown = {Job.load(TOOLPATHS / f"{name}.toml").toolpath.strategy for name in SHIPPED}
+    assert shown | {"file"} == set(TABLES)
+
+
+@pytest.mark.parametrize("name", sorted(set(SHIPPED) - QUICK))
+def test_toolpaths_of_shipped_jobs(name):
+    job = Job.load(TOOLPATHS / f"{name}.toml")
+    toolpath, report = job_toolpath(job, job_mesh(job))
+    assert any(segment.kind is SegmentKind.CUT for segment in toolpath.segments)
+    assert "problem" not in str(report)
+
+
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in SHIPPED])
 def test_shipped_jobs(name, tmp_path):
     outcome = run(Job.load(TOOLPATHS / f"{name}.toml"), tmp_path)
     assert outcome.passed is (name != "oversize"), outcome.refusal or [

@@ -142,13 +142,13 @@ def test_nonsense_is_refused(bad):
 def test_a_finished_toolpath_is_turned_and_stays_whole():
     from toolpath_surfaces import grid
 
-    from pentapod.toolpath import Mesh, RasterOptions, raster
+    from pentapod.toolpath import Mesh, RasterOptions, make_toolpath
     from pentapod.toolpath.orienting import oriented
     from pentapod.toolpath.tools import BallCutter, StandOff
 
     mesh = Mesh.of(*grid(lambda x, y: -(x**2 + y**2) / 0.2, width=0.05, cells=20))
     for tool in (BallCutter(3e-3), StandOff(5e-3)):
-        path = raster(mesh, tool, RasterOptions(stepover=0.01))
+        path = make_toolpath(mesh, tool, RasterOptions(stepover=0.01))
         assert oriented(path, tool, Orientation()) is path
         turned = oriented(path, tool, Orientation(Fixed((0.1, 0, 1))))
         np.testing.assert_allclose(turned.axes, np.tile([0.1, 0, 1], (len(path), 1)) / np.hypot(0.1, 1), atol=1e-12)

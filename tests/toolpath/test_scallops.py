@@ -74,8 +74,17 @@ def ridges(kind, mesh, toolpath):
     return low
 
 
-@pytest.mark.parametrize("kind", SHAPES)
-@pytest.mark.parametrize("options", [RasterOptions, OffsetOptions, SpiralOptions])
+QUICK = {("torus", RasterOptions), ("cylinder", RasterOptions), ("sphere", OffsetOptions), ("sphere", SpiralOptions)}
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [
+        pytest.param(kind, options, marks=() if (kind, options) in QUICK else pytest.mark.slow)
+        for kind in SHAPES
+        for options in (RasterOptions, OffsetOptions, SpiralOptions)
+    ],
+)
 def test_scallops_are_as_high_as_asked_for(kind, options):
     """The highest ridge within a tenth below and a twentieth above; facets sag by less than a hundredth of that."""
     mesh = Mesh.of(*SHAPES[kind]())

@@ -132,6 +132,9 @@ def generated():
 NOTHING_THERE = {("edges", "ball"), ("edges", "torus"), ("waterline", "box")}
 """Where a strategy finds nothing to do: round parts have no edges, what the box shows from above is flat."""
 
+IN_THE_HOLE = {("curves", "torus"), ("image", "torus")}
+"""What is laid in the middle of a torus meets nothing; on its ring it does."""
+
 
 @pytest.mark.parametrize("part", ["waves", "ball", "torus", "box", "bumps"])
 @pytest.mark.parametrize("name", STRATEGIES)
@@ -141,12 +144,16 @@ def test_every_strategy_on_every_generated_part(generated, name, part):
         with pytest.raises(ToolpathError):
             toolpath_with_report(mesh, tool, options)
         return
+    if (name, part) in IN_THE_HOLE:
+        with pytest.raises(ToolpathError, match="meet"):
+            toolpath_with_report(mesh, tool, options)
+        options = replace(options, position=(0.04, 0.0, 0.015))
     toolpath, report = toolpath_with_report(mesh, tool, options)
     cuts = check_laws(mesh, tool, options, toolpath)
     assert report.strategy == name
     assert report.travel >= report.travel_bound - 1e-9
     if isinstance(options, CoverOptions):
-        assert coverage(mesh, options, cuts) >= 0.999
+        assert coverage(mesh, options, cuts, count=30_000) >= 0.999
 
 
 REAL = [

@@ -17,9 +17,9 @@ from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.slicing import LevelSet
 from pentapod.toolpath.topology import components
 
-FACETS_PER_STEP = 3.5
+FACETS_PER_STEP = 5.0
 _SLACK = 1.04
-CRUMBS = 5e-4
+CRUMBS = 1e-4
 """Share of the area that gaps may have together without lines of their own."""
 
 
@@ -56,7 +56,7 @@ def gap_lines(
     """Return lines half a step from where seeds (V,) are, around what is further away than that.
 
     What no seed reaches gets a line midway between its borders, and others a step from it. Gaps that together are less
-    than half a thousandth of the area are left alone. where (V,): the only vertices that may lie in a gap; area: of
+    than a ten-thousandth of the area are left alone. where (V,): the only vertices that may lie in a gap; area: of
     the whole region, square metres, where the patch is but a part of it.
     """
     away = distances(patch, seeds, slowness)

@@ -16,7 +16,8 @@ Landing = Callable[[Floats], tuple[Floats, Floats, Bools]]
 
 _MOST_ROUNDS = 14
 _TORN = 4.0
-_ROUGH = 2.0
+_ROUGH = 0.1
+_FINE = 0.02
 _NOT_QUITE_HALF = 0.47
 """Where chords are tested: a symmetric bend would hide in the middle."""
 
@@ -24,16 +25,17 @@ _NOT_QUITE_HALF = 0.47
 def draped(lines: list[Floats], landing: Landing, *, spacing: float, chordal: float) -> tuple[Passes, float]:
     """Return flat lines (n, 2) on a surface, and which share of their length did not land.
 
-    Points are added between those that were given until the middle of every chord is within half of `chordal` metres
-    of the surface's own line, and none are further apart than `spacing`. A line is broken where it leaves the
-    surface, and where neighbours land so far apart that the surface between them must be torn.
+    Points are added between those that were given until the middle of every chord is within a fiftieth of `chordal`
+    metres of the surface's own line, and none are further apart than `spacing`. A line is broken where it leaves the
+    surface, and where neighbours land so far apart that the surface between them must be torn; what is torn by less
+    than a tenth of the spacing (straightest lines part at a mesh's corners) is bridged.
     """
     fine = [spaced(line, spacing) for line in lines]
     owner = np.repeat(np.arange(len(fine)), [len(line) for line in fine])
     plane, owner, points, normals, landed = _refined(np.concatenate(fine), owner, landing, chordal)
     steps = np.where(owner[1:] == owner[:-1], np.linalg.norm(np.diff(plane, axis=0), axis=1), 0.0)
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    whole = (owner[1:] == owner[:-1]) & landed[1:] & landed[:-1] & (gaps <= _TORN * steps + _ROUGH * chordal)
+    whole = (owner[1:] == owner[:-1]) & landed[1:] & landed[:-1] & (gaps <= _TORN * steps + _ROUGH * spacing)
     runs = _runs(whole)
     passes = Passes.of([(points[a : b + 1], normals[a : b + 1]) for a, b in runs], owner[[a for a, _ in runs]])
     length = float(steps.sum())
@@ -67,7 +69,7 @@ def _refined(
         off = np.where(all_landed, np.linalg.norm(new_points - chord, axis=1), 0.0)
         rim = (landed[rows] != new_landed) | (landed[rows + 1] != new_landed)
         length = np.linalg.norm(plane[rows + 1] - plane[rows], axis=1)
-        split = (off > 0.5 * chordal) | (rim & (length > chordal))
+        split = (off > _FINE * chordal) | (rim & (length > chordal))
         at = rows[split] + 1
         plane, points, normals = (
             np.insert(old, at, new[split], axis=0)

@@ -20,7 +20,10 @@ from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.tools import Tool
 
 _CORNER = np.radians(40.0)
-_INSIDE_M = 1e-6
+_INSIDE = 1e-7
+"""Share of the part's size within which a point lies on an edge."""
+
+_MOST_PLACES = 1000
 
 
 class Which(StrEnum):
@@ -55,12 +58,18 @@ def draw_edges(mesh: Mesh, tool: Tool, options: EdgeOptions) -> Drawing:
     patch = Patch.of(mesh, options.region)
     if not len(patch.faces):
         raise nothing_left(mesh, options, 0)
-    topology = patch.topology
+    topology, whole = patch.topology, Patch.whole(mesh)
+    wanted = np.zeros(len(whole.topology.edges), dtype=np.bool_)
     chosen_edges = np.zeros(len(topology.edges), dtype=np.bool_)
     if options.which is not Which.SHARP:
-        chosen_edges |= (topology.facets_at_edge == 1) & _on_mesh_border(mesh, patch)
+        wanted |= whole.topology.facets_at_edge == 1
     if options.which is not Which.BORDER:
+        wanted |= _sharp(whole, options.sharpest)
         chosen_edges |= _sharp(patch, options.sharpest)
+    # Where the region ends, an edge counts if it is one of the whole mesh: the other side may face away.
+    rim = np.flatnonzero(topology.facets_at_edge == 1)
+    lies_on = _lying_on(patch.vertices[topology.edges[rim]].mean(axis=1), mesh, np.flatnonzero(wanted))
+    chosen_edges[rim[lies_on >= 0]] = True
     if not chosen_edges.any():
         raise ToolpathError(
             "the region has no such edge",
@@ -69,27 +78,34 @@ def draw_edges(mesh: Mesh, tool: Tool, options: EdgeOptions) -> Drawing:
             remedy="lower the angle from which edges count",
         )
     normals = _edge_normals(patch)
+    normals[rim[lies_on >= 0]] = _edge_normals(whole)[lies_on[lies_on >= 0]]
     lines = [_line(patch, normals, walk) for walk in _walks(patch, topology.edges, chosen_edges)]
     return Drawing(Passes.of(lines), 0.0, Order.SHORTEST)
 
 
-def _on_mesh_border(mesh: Mesh, patch: Patch) -> Bools:
-    """Return which edges (E,) of the patch lie on the border of the mesh, not only on the region's."""
-    border = mesh.topology.edges[mesh.topology.facets_at_edge == 1]
-    if not len(border):
-        return np.zeros(len(patch.topology.edges), dtype=np.bool_)
-    # A trimmed edge keeps its direction: its middle lies on a border edge of the mesh.
+def _lying_on(points: Floats, mesh: Mesh, edges: Ints) -> Ints:
+    """Return which of some edges of the mesh each point (N, 3) lies on, or −1."""
+    if not (len(edges) and len(points)):
+        return np.full(len(points), -1, dtype=np.intp)
     from scipy.spatial import KDTree  # noqa: PLC0415
 
-    ends = mesh.vertices[border]
-    middles = patch.vertices[patch.topology.edges].mean(axis=1)
-    candidates = np.asarray(KDTree(ends.mean(axis=1)).query(middles, k=min(8, len(border)))[1]).reshape(
-        len(middles), -1
-    )
+    # A trimmed edge keeps its direction. Long edges are found by places along them.
+    ends = mesh.vertices[mesh.topology.edges[edges]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    counts = np.minimum(np.ceil(length / max(float(np.median(length)), 1e-300)), _MOST_PLACES).astype(np.intp) + 1
+    owner = np.repeat(np.arange(len(edges)), counts)
+    share = (np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)) / (counts - 1)[owner]
+    places = ends[owner, 0] + share[:, None] * (ends[owner, 1] - ends[owner, 0])
+    near = np.asarray(KDTree(places).query(points, k=min(8, len(owner)))[1]).reshape(len(points), -1)
+    candidates = owner[near]
     start, step = ends[candidates, 0], ends[candidates, 1] - ends[candidates, 0]
-    offset = middles[:, None] - start
+    offset = points[:, None] - start
     t = np.clip((offset * step).sum(-1) / np.maximum((step * step).sum(-1), 1e-300), 0.0, 1.0)
-    return (np.linalg.norm(offset - t[..., None] * step, axis=2) < _INSIDE_M).any(axis=1)
+    apart = np.linalg.norm(offset - t[..., None] * step, axis=2)
+    best = apart.argmin(axis=1)
+    rows = np.arange(len(points))
+    size = float(np.ptp(mesh.bounds, axis=0).max())
+    return np.where(apart[rows, best] < _INSIDE * size, edges[candidates[rows, best]], -1)
 
 
 def _sharp(patch: Patch, angle: float) -> Bools:

@@ -19,6 +19,8 @@ from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.toolpath.tools import Tool
 
 _TOUCH_M = 1e-9
+_TINY_M = 1e-7
+_STRAIGHT_SPACINGS = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +103,14 @@ class _Joiner:
         if gap < _TOUCH_M and turn < _TOUCH_M:
             self.counts.stay_downs += 1
             return []
+        if gap <= _STRAIGHT_SPACINGS * self.options.spacing and turn <= self.options.axis_step:
+            # So near that going up and down again would be a needle; where they meet, the tool turns on the spot.
+            self.counts.stay_downs += 1
+            if gap < _TINY_M:
+                self.tips[k][0] = self.tips[k - 1][-1]
+            tips = np.stack([self.tips[k - 1][-1], self.tips[k][0]])
+            axes = np.stack([self.runs[k - 1].normals[-1], self.runs[k].normals[0]])
+            return [Segment(SegmentKind.LINK, tips, axes, self.options.link_feed)]
         link = self.down.get(k)
         if link is not None:
             self.counts.stay_downs += 1
