@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -11,13 +12,34 @@ from pentapod.errors import ToolpathError
 from pentapod.geometry.directions import angle_between, tangent_frame
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.facet_tree import FacetTree
-from pentapod.toolpath.solids import KINDS
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.solids import KINDS, Solid
 
 RESOLUTION_M = 5e-7
 """Depths are exact to this and one per cent."""
 
 _CHUNK = 5_000
+
+
+class Body(Protocol):
+    """What is swept: a tool, or part of one. pivot: metres from the tip to the point that moves straight."""
+
+    @property
+    def pivot(self) -> float:
+        """Distance in metres from the tip along the axis to the point about which the body turns."""
+        ...
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        """The convex bodies that make it up."""
+        ...
+
+
+@dataclass(frozen=True)
+class TouchingBody:
+    """Solids alone, standing: their pivot does not matter."""
+
+    solids: tuple[Solid, ...]
+    pivot: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +74,7 @@ class Sweep:
 
 def sweep(
     tree: FacetTree,
-    tool: Tool,
+    tool: Body,
     tips: Floats,
     axes: Floats,
     *,
@@ -76,7 +98,7 @@ def sweep(
 
 def touch(
     tree: FacetTree,
-    tool: Tool,
+    tool: Body,
     tips: Floats,
     axes: Floats,
     *,
@@ -90,7 +112,7 @@ def touch(
 
 def _swept(
     tree: FacetTree,
-    tool: Tool,
+    tool: Body,
     tips0: Floats,
     axes0: Floats,
     tips1: Floats,
