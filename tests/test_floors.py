@@ -20,6 +20,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
     (("timing",),),
     (("program",),),
     (("verify",),),
+    (("simulate",),),
     (("job", "job_tables", "job_tool", "outcome", "plan_arrays", "artefacts", "pipeline"),),
     (("report",),),
     (("cli",),),
