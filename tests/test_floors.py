@@ -21,7 +21,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
     (("program",),),
     (("verify",),),
     (("simulate",),),
-    (("job", "job_tables", "job_tool", "outcome", "plan_arrays", "artefacts", "pipeline"),),
+    (("job", "job_placement", "job_tables", "job_tool", "outcome", "plan_arrays", "artefacts", "pipeline"),),
     (("report",),),
     (("cli",),),
 )
