@@ -20,12 +20,14 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
     (("timing",),),
     (("program",),),
     (("verify",),),
+    (("simulate",),),
     (
         (
             "table",
             "strategy_tables",
             "job_tables",
             "job",
+            "job_placement",
             "job_strategy",
             "job_tool",
             "outcome",

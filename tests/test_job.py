@@ -121,7 +121,7 @@ def test_digest_follows_the_meaning(make_job, tmp_path):
 def test_every_key_is_described_and_has_its_unit():
     unitless = {
         "mesh", "unit", "scale", "repair", "region_direction", "name", "file", "type", "strategy", "pattern", "mode",
-        "matrix", "component", "interpolation", "solver", "format", "direction", "line", "directions", "remedy",
+        "matrix", "component", "interpolation", "solver", "format", "direction", "line", "directions", "remedy", "up",
         "entry", "fill", "upright", "curve", "form", "which", "laying", "centred", "text", "letter_spacing", "align",
         "towards", "effect", "levels", "threshold",
     }  # fmt: skip

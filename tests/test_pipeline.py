@@ -11,8 +11,10 @@ import pytest
 from pentapod import pipeline
 from pentapod.artefacts import check_folder
 from pentapod.errors import InputError, JobError, MeshError, ToolpathError
+from pentapod.geometry import RigidTransform
 from pentapod.job import Job
-from pentapod.pipeline import job_mesh, job_placement, job_toolpath, run
+from pentapod.job_placement import job_freedom
+from pentapod.pipeline import job_machine, job_mesh, job_toolpath, run
 from pentapod.planning import PlacedPath
 from pentapod.program import read_csv
 from pentapod.refusal import Refusal
@@ -212,29 +214,30 @@ def test_nothing_to_machine_is_bad_input(make_job):
         job_toolpath(job, job_mesh(job))
 
 
+def placement_of(job: Path) -> RigidTransform:
+    loaded = Job.load(job)
+    (pose,) = job_freedom(loaded, job_machine(loaded), job_mesh(loaded)).poses
+    return pose
+
+
 def test_placements_in_both_spellings_are_one(make_job):
-    angles = job_placement(Job.load(make_job(("[180, 0, 0]", "[170, 20, 30]"))))
-    assert angles is not None
-    rows = angles.transform.matrix.copy()
+    angles = placement_of(make_job(("[180, 0, 0]", "[170, 20, 30]")))
+    rows = angles.matrix.copy()
     rows[:3, 3] *= 1e3
     text = make_job().read_text()
     position = next(line for line in text.splitlines() if line.startswith("position_mm"))
-    matrix = job_placement(
-        Job.load(make_job((position, f"matrix = {rows.tolist()}"), ("rotation_deg = [180, 0, 0]\n", "")))
-    )
-    assert matrix is not None
-    assert np.allclose(matrix.transform.matrix, angles.transform.matrix, atol=1e-15)
+    matrix = placement_of(make_job((position, f"matrix = {rows.tolist()}"), ("rotation_deg = [180, 0, 0]\n", "")))
+    assert np.allclose(matrix.matrix, angles.matrix, atol=1e-15)
     rows[0, 0] += 0.1
     with pytest.raises(JobError, match=r"placement\.matrix"):
-        job_placement(Job.load(make_job((position, f"matrix = {rows.tolist()}"), ("rotation_deg = [180, 0, 0]\n", ""))))
+        placement_of(make_job((position, f"matrix = {rows.tolist()}"), ("rotation_deg = [180, 0, 0]\n", "")))
 
 
 def test_rotation_turns_about_fixed_axes_x_first(make_job):
-    placement = job_placement(Job.load(make_job(("[180, 0, 0]", "[90, 0, 90]"))))
-    assert placement is not None
+    placement = placement_of(make_job(("[180, 0, 0]", "[90, 0, 90]")))
     # y turns about x to z, which a turn about z leaves; x turns about z to y.
-    assert np.allclose(placement.transform.rotate([0, 1, 0]), [0, 0, 1])
-    assert np.allclose(placement.transform.rotate([1, 0, 0]), [0, 1, 0])
+    assert np.allclose(placement.rotate([0, 1, 0]), [0, 0, 1])
+    assert np.allclose(placement.rotate([1, 0, 0]), [0, 1, 0])
 
 
 @pytest.mark.parametrize(("period", "interpolation"), [(2, "cubic"), (1, "linear")])

@@ -58,7 +58,12 @@ def kernels_used(policy: _Policy) -> Generator[None]:
 
 
 def kernel(function: _Function) -> _Function:
-    """Compile a function on its first call; division by zero gives infinity, as in NumPy, and sums keep their order."""
+    """Compile a function on its first call; division by zero gives infinity, as in NumPy, and sums keep their order.
+
+    Where numba cannot be had the function stays as it is: right, and slow.
+    """
+    if not kernels_available():
+        return function
     from numba import njit  # noqa: PLC0415  heavy: only where kernels are used
 
     _announce_compiling()

@@ -11,16 +11,16 @@ from typing import TypeVar
 import numpy as np
 
 from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, write_arrays, write_json
-from pentapod.errors import ArrayError, MachineError, MeshError
-from pentapod.geometry.rigid import RigidTransform
+from pentapod.errors import MachineError, MeshError
 from pentapod.job import Job
+from pentapod.job_placement import job_freedom
 from pentapod.job_strategy import job_options
 from pentapod.job_tool import FileReport, Reports, finished_as_asked, job_tool
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import ControllerSettings, Machine
 from pentapod.outcome import Outcome, Stage, refusal_verdict
 from pentapod.plan_arrays import arrays_of
-from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
+from pentapod.planning import Freedom, LegPath, PlacedPath, leg_path, plan
 from pentapod.program import Program, Provenance, sample, write_csv
 from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
@@ -63,11 +63,11 @@ def run(
     check_folder(folder)
     clock = _Clock(progress)
     machine = job_machine(job)
-    placement = job_placement(job)
     mesh = clock.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
+    freedom = job_freedom(job, machine, mesh)
     toolpath, _ = clock.time("toolpath", lambda: job_toolpath(job, mesh, progress), says=lambda made: str(made[1]))
     with staged(folder) as staging:
-        program = _Task(job, machine, toolpath, placement, clock).program(staging / PROGRAM)
+        program = _Task(job, machine, toolpath, freedom, clock).program(staging / PROGRAM)
         if isinstance(program, Refusal):
             verdict = refusal_verdict(program)
         else:
@@ -139,22 +139,6 @@ def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
     return toolpath_with_report(mesh, tool, job_options(job))
 
 
-def job_placement(job: Job) -> Placement | None:
-    """Return the placement that the job gives, or None where the planner chooses. Raises JobError."""
-    table = job.placement
-    if table.mode == "free":
-        return None
-    if table.matrix is not None:
-        matrix = np.array(table.matrix)
-        matrix[:3, 3] *= _MM
-        try:
-            return Placement(RigidTransform.from_matrix(matrix), "job")
-        except ArrayError as error:
-            raise job.error("placement", "matrix", error.what, expected=error.expected) from error
-    rotation = _turned(*np.radians(table.rotation_deg or (0.0, 0.0, 0.0)))
-    return Placement(RigidTransform(rotation, np.array(table.position_mm) * _MM), "job")
-
-
 def judge(job: Job, machine: Machine, toolpath: Toolpath, program: Path, progress: Progress = silent) -> Verdict:
     """Return the verdict on a program file, by what the job asks. Raises ProgramError if there is none."""
     return verify(
@@ -176,7 +160,7 @@ class _Task:
     job: Job
     machine: Machine
     toolpath: Toolpath
-    placement: Placement | None
+    freedom: Freedom
     clock: _Clock
 
     def program(self, file: Path) -> Program | Refusal:
@@ -200,7 +184,7 @@ class _Task:
             self.toolpath,
             self.machine,
             tilt=float(np.radians(self.job.axis.tilt_deg)),
-            placement=self.placement,
+            freedom=self.freedom,
             component=None if wanted is None else Component.parse(wanted),
             solver=self.job.placement.solver,
             progress=self.clock.progress,
@@ -230,15 +214,6 @@ class _Task:
         spots = tips - self.toolpath.pivot * direction if beam else None
         uses = certify(trajectory, self.machine, legs=program.legs, tips=tips, spots=spots)
         return explain(trajectory, self.machine, uses, slow)
-
-
-def _turned(x: float, y: float, z: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """Return the rotation about the fixed x, then y, then z axis, radians."""
-    cx, sx, cy, sy, cz, sz = np.cos(x), np.sin(x), np.cos(y), np.sin(y), np.cos(z), np.sin(z)
-    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
-    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    return about_z @ about_y @ about_x
 
 
 class _Clock:

@@ -8,7 +8,7 @@ import pytest
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
-from pentapod.planning import PlacedPath, Placement, plan
+from pentapod.planning import Freedom, PlacedPath, plan
 from pentapod.planning.formulation import cayley
 from pentapod.planning.margins import Margins
 from pentapod.planning.plan import NEEDED_MARGIN
@@ -87,17 +87,18 @@ def test_same_task_same_plan(desk, cap, placed):
 
 
 def test_given_placement_and_component_are_honoured(desk, cap, placed):
-    given = Placement(placed.placement.transform, "job")
-    answer = plan(cap, desk, tilt=TILT, placement=given, component=placed.component)
+    given = Freedom.fixture([placed.placement.transform])
+    answer = plan(cap, desk, tilt=TILT, freedom=given, component=placed.component)
     assert isinstance(answer, PlacedPath)
-    assert answer.placement is given
+    assert answer.placement.transform is placed.placement.transform
+    assert answer.placement.chosen_by == "job"
     assert answer.component == placed.component
     assert answer.smallest_margin >= NEEDED_MARGIN - 1e-3
 
 
 def test_wrong_component_is_refused(desk, cap, placed):
-    given = Placement(placed.placement.transform, "job")
-    answer = plan(cap, desk, tilt=TILT, placement=given, component=Component(1, -1))
+    given = Freedom.fixture([placed.placement.transform])
+    answer = plan(cap, desk, tilt=TILT, freedom=given, component=Component(1, -1))
     assert isinstance(answer, Refusal)
     assert any("S = 0" in blame.constraint for blame in answer.blames)
 
@@ -105,10 +106,10 @@ def test_wrong_component_is_refused(desk, cap, placed):
 def test_placement_out_of_reach_is_refused_with_the_true_shortfall(desk, cap, placed):
     """Pushed away along the base normal until legs are too short: the millimetres named are those missing."""
     t = placed.placement.transform
-    far = Placement(RigidTransform(t.rotation, t.translation + np.array([0.0, 0.0, 0.3])), "job")
-    answer = plan(cap, desk, placement=far, component=placed.component)
+    far = RigidTransform(t.rotation, t.translation + np.array([0.0, 0.0, 0.3]))
+    answer = plan(cap, desk, freedom=Freedom.fixture([far]), component=placed.component)
     assert isinstance(answer, Refusal)
-    tips, axes = far.transform.apply(cap.tips), far.transform.rotate(cap.axes)
+    tips, axes = far.apply(cap.tips), far.rotate(cap.axes)
     legs = desk.pentapod.leg_lengths(tips + desk.tool_length * axes, -axes)
     for blame in answer.blames:
         if "too long" in blame.constraint:
@@ -152,7 +153,7 @@ def test_the_region_that_a_refusal_names_fits(desk, wide):
 
 def test_a_fixed_part_is_told_where_to_move(desk, cap, placed):
     t = placed.placement.transform
-    off = Placement(RigidTransform(t.rotation, t.translation + np.array([0.12, 0.0, 0.0])), "job")
-    answer = plan(cap, desk, tilt=TILT, placement=off, component=placed.component)
+    off = RigidTransform(t.rotation, t.translation + np.array([0.12, 0.0, 0.0]))
+    answer = plan(cap, desk, tilt=TILT, freedom=Freedom.fixture([off]), component=placed.component)
     assert isinstance(answer, Refusal)
     assert "move the part by (" in answer.remedy

@@ -18,6 +18,7 @@ EXIT_FAILED, EXIT_INPUT, EXIT_BUG, EXIT_INTERRUPTED = 1, 2, 3, 130
 VERBS = {
     "plan": "pentapod.cli.plan:plan",
     "verify": "pentapod.cli.verify:verify",
+    "simulate": "pentapod.cli.simulate:simulate",
     "post": "pentapod.cli.post:post",
     "toolpath": "pentapod.cli.toolpath:toolpath",
     "machine": "pentapod.cli.machine:machine",

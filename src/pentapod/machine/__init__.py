@@ -2,6 +2,7 @@
 
 from pentapod.machine.check import AMPLIFICATION_LIMIT, Finding, MachineReport, check
 from pentapod.machine.clearance import clearances, pair_names
+from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.explain import explain
 from pentapod.machine.machine import (
     ARCHITECTURAL_LIMIT,
@@ -21,11 +22,13 @@ __all__ = [
     "ARCHITECTURAL_LIMIT",
     "Bodies",
     "ControllerSettings",
+    "Drives",
     "Finding",
     "JointLimits",
     "LegLimits",
     "Machine",
     "MachineReport",
+    "Masses",
     "WorkVolume",
     "check",
     "clearances",

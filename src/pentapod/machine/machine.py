@@ -16,32 +16,13 @@ from pentapod.errors import MachineError
 from pentapod.kinematics.pentapod import LinearPentapod
 from pentapod.kinematics.singularities import architectural_measure
 from pentapod.machine.digest import digest_of
+from pentapod.machine.drives import Drives, Masses
+from pentapod.machine.fields import per_leg, positive
 
 Interpolation = Literal["linear", "cubic"]
 
 ARCHITECTURAL_LIMIT = 0.005
 """Least `architectural_measure` of a machine: below it, leg lengths say almost nothing about some motion."""
-
-
-def _per_leg(owner: object, *names: str) -> None:
-    """Replace scalars or five numbers by read-only arrays (5,). Raises MachineError naming the field."""
-    for name in names:
-        value = np.asarray(getattr(owner, name), dtype=np.float64)
-        if value.shape not in {(), (1,), (5,)}:
-            raise MachineError(
-                "wrong count", key=name, value=value.shape, expected="one number, or one for each of 5 legs"
-            )
-        if not np.isfinite(value).all():
-            raise MachineError("not finite", key=name, value=value.tolist())
-        set_frozen(owner, **{name: frozen(np.broadcast_to(value, (5,)), name, (5,))})
-
-
-def _positive(owner: object, *names: str) -> None:
-    """Raise MachineError where a field is not finite and positive."""
-    for name in names:
-        value = getattr(owner, name)
-        if not (np.isfinite(value).all() and np.min(value) > 0.0):
-            raise MachineError("must be positive", key=name, value=np.asarray(value).tolist())
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +39,8 @@ class LegLimits:
     max_jerk: Floats
 
     def __post_init__(self) -> None:
-        _per_leg(self, *self.__dataclass_fields__)
-        _positive(self, *self.__dataclass_fields__)
+        per_leg(self, *self.__dataclass_fields__)
+        positive(self, *self.__dataclass_fields__)
         if (self.min_length >= self.max_length).any():
             leg = int(np.argmax(self.min_length >= self.max_length))
             raise MachineError(
@@ -92,8 +73,8 @@ class JointLimits:
     platform_range: Floats
 
     def __post_init__(self) -> None:
-        _per_leg(self, "base_cone")
-        _positive(self, "base_cone")
+        per_leg(self, "base_cone")
+        positive(self, "base_cone")
         axes = frozen(np.broadcast_to(self.base_axes, (5, 3)), "base_axes", (5, 3))
         norms = np.linalg.norm(axes, axis=1, keepdims=True)
         if (np.abs(norms - 1.0) > 1e-3).any():
@@ -124,7 +105,7 @@ class Bodies:
     joint_radius: float
 
     def __post_init__(self) -> None:
-        _positive(self, *self.__dataclass_fields__)
+        positive(self, *self.__dataclass_fields__)
 
 
 @dataclass(frozen=True)
@@ -135,7 +116,7 @@ class ControllerSettings:
     interpolation: Interpolation
 
     def __post_init__(self) -> None:
-        _positive(self, "period")
+        positive(self, "period")
         if self.interpolation not in get_args(Interpolation):
             raise MachineError(
                 "unknown interpolation",
@@ -160,7 +141,7 @@ class WorkVolume:
 
     def __post_init__(self) -> None:
         set_frozen(self, centre=frozen(self.centre, "centre", (3,)))
-        _positive(self, "diameter", "height")
+        positive(self, "diameter", "height")
         if not 0.0 <= self.tilt < 0.5 * np.pi:
             raise MachineError(
                 "out of range", key="tilt", value=float(np.degrees(self.tilt)), expected="0 to 90 degrees"
@@ -172,7 +153,8 @@ class Machine:
     """A robot that was built.
 
     tool_length: metres from p (the platform line's origin, where offset = 0) along i to the tool tip.
-    rapid_velocity: largest tip speed in m/s on rapids.
+    rapid_velocity: largest tip speed in m/s on rapids. drives, masses: for simulation alone; a program does not
+    depend on them.
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
     spindle's nose would be above the lowest platform joint.
@@ -187,10 +169,12 @@ class Machine:
     rapid_velocity: float
     controller: ControllerSettings
     work: WorkVolume
+    drives: Drives = field(default_factory=Drives)
+    masses: Masses = field(default_factory=Masses)
     architecture: float = field(init=False)
 
     def __post_init__(self) -> None:
-        _positive(self, "tool_length", "rapid_velocity")
+        positive(self, "tool_length", "rapid_velocity")
         measure = architectural_measure(self.pentapod)
         set_frozen(self, architecture=measure)
         if measure < ARCHITECTURAL_LIMIT:
@@ -219,7 +203,10 @@ class Machine:
 
     @cached_property
     def digest(self) -> str:
-        """16 hexadecimal digits over all numbers (not the name): equal machines have equal digests."""
+        """16 hexadecimal digits over all numbers that programs depend on: equal machines have equal digests.
+
+        Name, drives and masses do not count.
+        """
         return digest_of(dict(_numbers(self)))
 
     def with_tool(self, tool_length: float) -> Machine:

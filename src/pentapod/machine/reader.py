@@ -16,8 +16,9 @@ from pydantic_core import ErrorDetails
 from pentapod.arrays import Floats
 from pentapod.errors import InputError, MachineError, nearest
 from pentapod.kinematics.pentapod import LinearPentapod
+from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.machine import Bodies, ControllerSettings, JointLimits, LegLimits, Machine, WorkVolume
-from pentapod.machine.tables import GeometryTable, MachineTables
+from pentapod.machine.tables import DrivesTable, GeometryTable, MachineTables, MassesTable
 
 OFFSET_TOLERANCE_M = 1e-6  # offsets in a file are rounded; beyond a micrometre they mean another machine
 
@@ -37,6 +38,11 @@ _FILE_KEYS = {
     "offsets": "geometry.platform_mm",
     "tool_length": "tool.length_mm",
     "tilt": "work.tilt_deg",
+    "position_gain": "drives.position_gain_per_s",
+    "velocity_gain": "drives.velocity_gain_per_s",
+    "moving_mass": "drives.moving_mass_kg",
+    "ripple_force": "drives.ripple_n",
+    "ripple_pitch": "drives.ripple_pitch_mm",
 }
 
 
@@ -139,6 +145,34 @@ def _build(tables: MachineTables) -> Machine:
             height=work.height_mm / 1000.0,
             tilt=float(np.radians(work.tilt_deg)),
         ),
+        drives=_drives(tables.drives),
+        masses=_masses(tables.masses),
+    )
+
+
+def _drives(table: DrivesTable) -> Drives:
+    return Drives(
+        position_gain=np.asarray(table.position_gain_per_s),
+        velocity_gain=np.asarray(table.velocity_gain_per_s),
+        moving_mass=np.asarray(table.moving_mass_kg),
+        ripple_force=np.asarray(table.ripple_n),
+        ripple_pitch=_si(table.ripple_pitch_mm),
+        velocity_feedforward=table.velocity_feedforward,
+        acceleration_feedforward=table.acceleration_feedforward,
+        encoder_step=table.encoder_step_mm / 1000.0,
+        dead_time=table.dead_time_ms / 1000.0,
+        period=table.period_ms / 1000.0,
+        contour_gain=table.contour_gain,
+        contour_rate=table.contour_rate_per_s,
+    )
+
+
+def _masses(table: MassesTable) -> Masses:
+    return Masses(
+        cylinder=table.cylinder_kg,
+        rod=table.rod_kg,
+        platform=table.platform_kg,
+        gravity=np.asarray(table.gravity_m_s2),
     )
 
 

@@ -11,6 +11,9 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
+from pentapod.arrays import Floats
+from pentapod.machine.drives import Drives, Masses
+
 
 def _numbers(value: object) -> bool:
     items = cast(list[Any], value) if isinstance(value, list) else [value]
@@ -62,6 +65,17 @@ FiveNumbers = Annotated[list[float], BeforeValidator(_five)]
 FivePairs = Annotated[list[list[float]], BeforeValidator(_pairs)]
 FiveAxes = Annotated[list[list[float]], BeforeValidator(_axes)]
 Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Share = Annotated[float, Field(ge=0.0, le=2.0)]
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+# Their defaults stand in one place, in SI units.
+_DRIVES, _MASSES = Drives(), Masses()
+
+
+def _five_of(values: Floats, factor: float = 1.0) -> list[float]:
+    """Return a default for each leg, in the unit of the file."""
+    return [round(factor * value, 12) for value in values.tolist()]
 
 
 class Table(BaseModel):
@@ -122,10 +136,58 @@ class ControllerTable(Table):
     interpolation: Literal["linear", "cubic"] = Field(description="how it moves between them")
 
 
+class DrivesTable(Table):
+    """What moves the legs: for `pentapod simulate`; programs do not depend on it. One number for all legs, or five."""
+
+    position_gain_per_s: PerLeg = Field(
+        default=_five_of(_DRIVES.position_gain), description="gain of the position loop (Kv)"
+    )
+    velocity_gain_per_s: PerLeg = Field(
+        default=_five_of(_DRIVES.velocity_gain), description="gain of the velocity loop, its bandwidth in rad/s"
+    )
+    moving_mass_kg: PerLeg = Field(
+        default=_five_of(_DRIVES.moving_mass), description="what a drive feels, motor and screw included"
+    )
+    ripple_n: PerLeg = Field(default=_five_of(_DRIVES.ripple_force), description="amplitude of the force ripple")
+    ripple_pitch_mm: PerLeg = Field(
+        default=_five_of(_DRIVES.ripple_pitch, 1e3), description="travel of one period of the ripple"
+    )
+    velocity_feedforward: Share = Field(
+        default=_DRIVES.velocity_feedforward, description="share of the wanted velocity given to the velocity loop"
+    )
+    acceleration_feedforward: Share = Field(
+        default=_DRIVES.acceleration_feedforward, description="share of the wanted acceleration given as a force"
+    )
+    encoder_step_mm: NotNegative = Field(
+        default=round(1e3 * _DRIVES.encoder_step, 12), description="resolution of the leg scales; 0: continuous"
+    )
+    dead_time_ms: NotNegative = Field(
+        default=1e3 * _DRIVES.dead_time, description="from reading the scale to the force"
+    )
+    period_ms: Positive = Field(default=1e3 * _DRIVES.period, description="of the drive's own loop")
+    contour_gain: NotNegative = Field(
+        default=_DRIVES.contour_gain, description="proportional share of the correction by pose"
+    )
+    contour_rate_per_s: NotNegative = Field(
+        default=_DRIVES.contour_rate, description="integral share of the correction by pose"
+    )
+
+
+class MassesTable(Table):
+    """What the drives move: for `pentapod simulate --engine mujoco`."""
+
+    cylinder_kg: Positive = Field(default=_MASSES.cylinder, description="fixed part of each leg")
+    rod_kg: Positive = Field(default=_MASSES.rod, description="moving part of each leg")
+    platform_kg: Positive = Field(default=_MASSES.platform, description="spindle and tool")
+    gravity_m_s2: Vector = Field(
+        default=_MASSES.gravity.tolist(), description="machine frame; +z points from the base to the work"
+    )
+
+
 class WorkTable(Table):
     """What the machine is advertised for: `pentapod machine check` samples it."""
 
-    centre_mm: Annotated[list[float], Field(min_length=3, max_length=3)] = Field(description="centre of the cylinder")
+    centre_mm: Vector = Field(description="centre of the cylinder")
     diameter_mm: Positive = Field(description="of the cylinder of tip positions")
     height_mm: Positive = Field(description="of the cylinder, along z")
     tilt_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = Field(description="largest angle between tool axis and −z")
@@ -143,3 +205,5 @@ class MachineTables(Table):
     tool: ToolTable
     controller: ControllerTable
     work: WorkTable
+    drives: DrivesTable = Field(default_factory=DrivesTable, description="what moves the legs, for simulation")
+    masses: MassesTable = Field(default_factory=MassesTable, description="what the drives move, for simulation")

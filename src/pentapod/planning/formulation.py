@@ -1,8 +1,8 @@
 """The optimisation problem, stated once in casadi: margins and cone of one waypoint as functions of the unknowns.
 
-Unknowns: a small placement step (3 translations in metres, a Cayley rotation vector) around a given placement,
-and the lean a (2) of the waypoint within the field's lean plane. Both solvers build on this function: the
-reference hands it to IPOPT, the default takes its Jacobian.
+Unknowns: a small placement step (3 translations in metres, a Cayley rotation vector) around a given placement, in so
+far as the placement is free, and the lean a (2) of the waypoint within the field's lean plane. Both solvers build on
+this function: the reference hands it to IPOPT, the default takes its Jacobian.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.planning.freedom import Freedom
 from pentapod.planning.margins import Margins
 from pentapod.planning.setting import Setting
 
@@ -40,6 +41,18 @@ def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, 
     return ca.Function(
         "point", [step, a, pivot, nominal, rotation, translation], [values, used, *slopes], {"cse": True}
     )
+
+
+def room_function(freedom: Freedom) -> Any:
+    """Return the casadi function (step 6, R 3×3, t 3) → room L of the stepped placement, ∂ room / ∂ step, L × 6.
+
+    The room within the allowed placements must not become negative.
+    """
+    import casadi as ca  # noqa: PLC0415
+
+    step, rotation, translation = ca.SX.sym("step", 6), ca.SX.sym("R", 3, 3), ca.SX.sym("t", 3)
+    room = ca.vertcat(*freedom.room(ca.mtimes(rotation, _cayley(step[3:])), translation + step[:3]))
+    return ca.Function("room", [step, rotation, translation], [room, ca.densify(ca.jacobian(room, step))])
 
 
 def stepped(transform: RigidTransform, step: Floats) -> RigidTransform:

@@ -13,7 +13,7 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.planning.formulation import point_function, stepped
+from pentapod.planning.formulation import point_function, room_function, stepped
 from pentapod.planning.linear_model import valleys
 from pentapod.planning.setting import Candidate, Setting
 
@@ -100,11 +100,13 @@ class IpoptSolver:
         count = 32 * int(np.ceil(len(rows) / 32))  # in buckets, so that few solvers are built
         rows = np.concatenate([rows, np.full(count - len(rows), rows[0], dtype=np.intp)])
         basis, c = setting.basis[rows], at.coefficients
-        start = np.concatenate([np.zeros(6), [margin], c.ravel(), (basis @ c).ravel()])
-        reach = np.concatenate([np.full(3, _TRANSLATION_STEP_M), np.full(3, _ROTATION_STEP)]) * float(self.free)
+        motion = self._motion
+        shifts = np.abs(motion[:3]).sum(axis=0) > 0.0
+        reach, moving = np.where(shifts, _TRANSLATION_STEP_M, _ROTATION_STEP), motion.shape[1]
+        start = np.concatenate([np.zeros(moving), [margin], c.ravel(), (basis @ c).ravel()])
         if task.tilt == 0.0:
-            start = start[:7]
-        tilt = np.full(len(start) - 7, 3.0 * setting.cone)
+            start = start[: moving + 1]
+        tilt = np.full(len(start) - moving - 1, 3.0 * setting.cone)
         low, high = (-10.0, 5.0) if goal == "margin" else (margin, margin)
         solver = self._solver(at, count, tuple(int(k) for k in kinds), goal)
         equations = 2 * count if task.tilt > 0.0 else 0
@@ -122,7 +124,15 @@ class IpoptSolver:
             ubx=np.concatenate([reach, [high], tilt]),
         )  # fmt: skip
         x = np.asarray(result["x"], dtype=np.float64).ravel()
-        return (stepped(at.transform, x[:6]) if self.free else at.transform), x[7 : 7 + c.size].reshape(-1, 2)
+        coefficients = x[moving + 1 : moving + 1 + c.size].reshape(-1, 2)
+        if moving == 0:
+            return at.transform, coefficients
+        return setting.freedom.nearest_to(stepped(at.transform, motion @ x[:moving])), coefficients
+
+    @property
+    def _motion(self) -> Floats:
+        motion = self.setting.freedom.motion
+        return motion if self.free else motion[:, :0]
 
     def _solver(self, at: Candidate, count: int, kinds: tuple[int, ...], goal: Goal) -> Any:
         """Return the IPOPT solver for `count` waypoints, built once.
@@ -137,7 +147,8 @@ class IpoptSolver:
 
         setting, size = self.setting, self.setting.basis.shape[1]
         tilts = setting.task.tilt > 0.0
-        step, least = ca.MX.sym("step", 6), ca.MX.sym("m")
+        moves, least = ca.MX.sym("moves", self._motion.shape[1]), ca.MX.sym("m")
+        step = ca.mtimes(ca.DM(self._motion), moves)
         leans = ca.MX.sym("a", 2, count) if tilts else ca.MX(2, count)
         coefficients = ca.MX.sym("c", 2, size)
         points, basis = ca.MX.sym("points", 6, count), ca.MX.sym("basis", size, count)
@@ -146,7 +157,9 @@ class IpoptSolver:
             ca.repmat(step, 1, count), leans, points[:3, :], points[3:, :],
             ca.repmat(rotation, 1, count), ca.repmat(translation, 1, count),
         )  # fmt: skip
-        unknowns, constraints, unrest = [step, least], [ca.vec(margins - least)], ca.MX(0.0)
+        unknowns, constraints, unrest = [moves, least], [ca.vec(margins - least)], ca.MX(0.0)
+        if self.free and setting.freedom.is_bounded:
+            constraints.append(room_function(setting.freedom)(step, rotation, translation)[0])
         if tilts:
             c = ca.vec(coefficients)
             unrest = ca.bilin(ca.DM(setting.unrest), c, c)

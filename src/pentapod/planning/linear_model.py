@@ -26,25 +26,38 @@ Slopes = Callable[[Margins, RigidTransform, Floats, Ints], Floats]
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """Unknowns x: placement step (6) and change of coefficients (2·size), in units of REACH and the cone.
+    """Unknowns x: placement step along motion (6, k), and change of coefficients (2·size); units: REACH and the cone.
 
     Margins ≈ values + matrix @ x, (R,), of the margins that come near the level; leans as shares of the cone ≈
-    steepness + steep_matrix @ x. smallest: the smallest margin here.
+    steepness + steep_matrix @ x; the room of the placement (L,) ≈ room + room_matrix @ x.
     """
 
     setting: Setting
     at: Candidate
-    free: bool
+    motion: Floats
     values: Floats
     matrix: Floats
     steepness: Floats
     steep_matrix: Floats
+    room: Floats
+    room_matrix: Floats
 
     @classmethod
     def of(
-        cls, setting: Setting, at: Candidate, rows: Ints, level: float, extra: Ints, slopes: Slopes, *, free: bool
+        cls,
+        setting: Setting,
+        at: Candidate,
+        rows: Ints,
+        level: float,
+        extra: Ints,
+        slopes: Slopes,
+        room: tuple[Floats, Floats],
+        motion: Floats,
     ) -> LinearModel:
-        """Return the model of what comes near `level` among waypoints `rows`, and of rows[extra] in any case."""
+        """Return the model of what comes near `level` among waypoints `rows`, and of rows[extra] in any case.
+
+        room: of the placement, (L,), with its derivatives (L, 6) by the step. motion (6, k): how it may step.
+        """
         values = setting.values(at.margins, at.transform, at.coefficients, rows)
         chosen = np.union1d(valleys(values, _WORST_OF_KIND), extra)
         chosen = chosen[values[chosen].min(axis=1) < level + _NEAR]
@@ -56,11 +69,13 @@ class LinearModel:
         return cls(
             setting,
             at,
-            free,
+            motion,
             values[chosen][point, kinds],
-            np.hstack([slope[:, :6] * REACH * free, by_field]),
+            np.hstack([slope[:, :6] * REACH @ motion, by_field]),
             share,
-            np.hstack([np.zeros((len(share), 6)), steep_by_field]),
+            np.hstack([np.zeros((len(share), motion.shape[1])), steep_by_field]),
+            room[0],
+            np.hstack([room[1] * REACH @ motion, np.zeros((len(room[0]), by_field.shape[1]))]),
         )
 
     def best_step(self, reach: float) -> tuple[Floats, Floats, float]:
@@ -69,16 +84,19 @@ class LinearModel:
 
         count, smallest = self.matrix.shape[1], float(self.values.min())
         rising = np.column_stack([-self.matrix, np.ones(len(self.matrix))])
-        leaning = np.column_stack([self.steep_matrix, np.zeros(len(self.steep_matrix))])
+        kept = np.vstack([self.steep_matrix, -self.room_matrix])
+        kept = np.column_stack([kept, np.zeros(len(kept))])
         answer = linprog(
             np.append(np.zeros(count), -1.0),
-            A_ub=np.vstack([rising, leaning]),
-            b_ub=np.concatenate([self.values - smallest, np.maximum(1.0 - self.steepness, 0.0)]),
+            A_ub=np.vstack([rising, kept]),
+            b_ub=np.concatenate([self.values - smallest, np.maximum(np.append(1.0 - self.steepness, self.room), 0.0)]),
             bounds=[(-reach, reach)] * count + [(0.0, None)],
             method="highs-ds",
         )
         x = np.zeros(count + 1) if answer.x is None else np.asarray(answer.x, dtype=np.float64)
-        return x[:6] * REACH * self.free, (x[6:-1] * self.setting.cone).reshape(-1, 2), float(x[-1])
+        moving = self.motion.shape[1]
+        step, change = REACH * (self.motion @ x[:moving]), x[moving:-1] * self.setting.cone
+        return step, change.reshape(-1, 2), float(x[-1])
 
     def calmest(self, keep: float, reach: float) -> tuple[Floats, bool] | None:
         """Return the change of coefficients (size, 2) to the calmest field that keeps the margin `keep`.
@@ -86,11 +104,11 @@ class LinearModel:
         Also returns whether that lies inside the trust region. None where no change within it keeps the margin.
         bend (R,): how much the margins are known to differ from the linear model where the step will end.
         """
-        scale = self.setting.cone
+        scale, moving = self.setting.cone, self.motion.shape[1]
         x = _quadratic_program(
             2.0 * self.setting.unrest * scale**2,
             2.0 * self.setting.unrest @ self.at.coefficients.ravel() * scale,
-            np.vstack([-self.matrix[:, 6:], self.steep_matrix[:, 6:]]),
+            np.vstack([-self.matrix[:, moving:], self.steep_matrix[:, moving:]]),
             np.concatenate([self.values - keep, np.maximum(1.0 - self.steepness, 0.0)]),
             reach,
         )

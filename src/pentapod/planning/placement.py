@@ -9,7 +9,7 @@ from pentapod.geometry.rigid import RigidTransform
 
 @dataclass(frozen=True)
 class Placement:
-    """Rigid transform workpiece → machine, and what it was chosen by ("job", "max-margin", ...)."""
+    """Rigid transform workpiece → machine, and what it was chosen by ("job", "largest smallest margin", ...)."""
 
     transform: RigidTransform
     chosen_by: str

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal, Protocol
 
+from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.machine.machine import Machine
 from pentapod.planning.blame import refusal
+from pentapod.planning.freedom import FREE, Freedom
 from pentapod.planning.ipopt import IpoptSolver
 from pentapod.planning.margins import Margins
 from pentapod.planning.placed_path import PlacedPath
@@ -53,7 +55,7 @@ def plan(
     machine: Machine,
     *,
     tilt: float = 0.0,
-    placement: Placement | None = None,
+    freedom: Freedom = FREE,
     component: Component | None = None,
     seed: int = 0,
     solver: SolverName = "sequential",
@@ -62,24 +64,23 @@ def plan(
     """Choose placement, component and tool axes that keep the path well inside the machine's limits.
 
     tilt: half angle in radians of the cone around the nominal axis within which the tool may lean.
-    placement, component: honoured where given; where not, all components and many placements are tried and
-    the one with the largest smallest margin is kept. Deterministic for a seed. Returns a Refusal that names
-    limits, waypoints and shortfalls where the part does not fit.
+    freedom: the allowed placements; of them, and of all components where none is given, the one with the largest
+    smallest margin is kept. Deterministic for a seed. Returns a Refusal that names limits, waypoints and shortfalls
+    where the part does not fit.
     """
-    setting = Setting.of(Task.of(toolpath, tilt), machine)
+    setting = Setting.of(Task.of(toolpath, tilt), machine, freedom)
     improves = SequentialSolver if solver == "sequential" else IpoptSolver
     components = COMPONENTS if component is None else (component,)
-    fixed = placement is not None
-    if placement is None:
+    if freedom.moves:
         progress("placement", 0.0, "sampling")
-        guesses = first_guesses(setting.task, machine, components, seed)
+        guesses = first_guesses(setting.task, machine, components, seed, freedom=freedom)
         starts = [(Margins.of(machine, g.component), g.transform) for g in guesses]
     else:
-        starts = [(Margins.of(machine, c), placement.transform) for c in components]
+        starts = [(Margins.of(machine, c), pose) for pose in freedom.poses for c in components]
     best: Candidate | None = None
-    moving = improves(setting, not fixed)
+    moving = improves(setting, freedom.moves)
     for k, (margins, transform) in enumerate(starts):
-        if k >= REFINED and best is not None and (best.smallest >= NEEDED_MARGIN or k >= TRIED):
+        if freedom.moves and k >= REFINED and best is not None and (best.smallest >= NEEDED_MARGIN or k >= TRIED):
             break
         found = moving.raise_margin(setting.first_candidate(margins, transform))
         if best is None or found.smallest > best.smallest:
@@ -89,17 +90,26 @@ def plan(
         raise RuntimeError("no first guess was made")
     if best.smallest < NEEDED_MARGIN:
         progress("placement", 1.0, "it does not fit; looking for what would")
-        return _refusal(setting, best, improves, fixed=fixed)
+        return _refusal(setting, best, improves)
     if tilt > 0.0:
         progress("tool axis", 0.0, f"smallest margin {best.smallest:.3f}")
         best = improves(setting, False).calm(best, max(CALM_SHARE * best.smallest, NEEDED_MARGIN))
     tips, axes = setting.task.machine_poses(best.transform, setting.axes(best.coefficients))
-    chosen = placement if placement is not None else Placement(best.transform, "largest smallest margin")
+    chosen = Placement(best.transform, _choice(freedom, best.transform))
     names = tuple(limit.name for limit in best.margins.limits)
     return PlacedPath(toolpath, chosen, best.margins.component, tips, axes, best.margins(tips, axes), names)
 
 
-def _refusal(setting: Setting, best: Candidate, improves: Callable[[Setting, bool], Solver], *, fixed: bool) -> Refusal:
+def _choice(freedom: Freedom, chosen: RigidTransform) -> str:
+    """Return what a placement was chosen by."""
+    if freedom.moves:
+        return "largest smallest margin"
+    if len(freedom.poses) == 1:
+        return "job"
+    return f"pose {1 + freedom.poses.index(chosen)} of {len(freedom.poses)} of the fixture: largest smallest margin"
+
+
+def _refusal(setting: Setting, best: Candidate, improves: Callable[[Setting, bool], Solver]) -> Refusal:
     values, _ = best_tilted_margins(setting.task, best.margins, best.transform)
     if (values.min(axis=1) >= NEEDED_MARGIN).all():  # each waypoint alone would do, not all with one smooth field
         values = setting.values(best.margins, best.transform, best.coefficients)
@@ -107,5 +117,5 @@ def _refusal(setting: Setting, best: Candidate, improves: Callable[[Setting, boo
     def improve(other: Setting, start: Candidate) -> Candidate:
         return improves(other, True).raise_margin(start)
 
-    found = remedies(setting, best, improve, NEEDED_MARGIN, fixed=fixed)
-    return refusal(values, best.margins, NEEDED_MARGIN, found, fixed=fixed)
+    found = remedies(setting, best, improve, NEEDED_MARGIN)
+    return refusal(values, best.margins, NEEDED_MARGIN, found, fixed=not setting.freedom.moves)

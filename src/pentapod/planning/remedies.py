@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pentapod.planning.freedom import FREE
 from pentapod.planning.setting import Candidate, Setting
 from pentapod.planning.task import Task
 
@@ -17,16 +18,18 @@ _WIDEST = np.radians(45.0)
 _SMALLEST_SHARE, _HALVINGS = 0.25, 4
 
 
-def remedies(setting: Setting, best: Candidate, improve: Raise, needed: float, *, fixed: bool) -> tuple[str, ...]:
+def remedies(setting: Setting, best: Candidate, improve: Raise, needed: float) -> tuple[str, ...]:
     """Return what was tried near the best candidate and would do, each a phrase for "Try to …"; maybe nothing."""
-    if fixed:
-        moved = improve(setting, best)
-        return (_move(best, moved),) if moved.smallest >= needed else ()
-    phrases = (_cone(setting, best, improve, needed), _region(setting, best, improve, needed))
+    phrases = [_move(setting, best, improve, needed)] if setting.freedom is not FREE else []
+    if setting.freedom.moves:
+        phrases += [_cone(setting, best, improve, needed), _region(setting, best, improve, needed)]
     return tuple(phrase for phrase in phrases if phrase)
 
 
-def _move(best: Candidate, moved: Candidate) -> str:
+def _move(setting: Setting, best: Candidate, improve: Raise, needed: float) -> str:
+    moved = improve(Setting.of(setting.task, setting.machine), best)
+    if moved.smallest < needed:
+        return ""
     shift = (moved.transform.translation - best.transform.translation) * 1e3
     cosine = 0.5 * (np.trace(best.transform.rotation.T @ moved.transform.rotation) - 1.0)
     angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
@@ -39,7 +42,7 @@ def _cone(setting: Setting, best: Candidate, improve: Raise, needed: float) -> s
     for tilt in task.tilt + _WIDER:
         if tilt > _WIDEST:
             break
-        wider = Setting.of(Task(task.pivots, task.nominal, task.pivot, float(tilt)), setting.machine)
+        wider = Setting.of(Task(task.pivots, task.nominal, task.pivot, float(tilt)), setting.machine, setting.freedom)
         if improve(wider, wider.first_candidate(best.margins, best.transform)).smallest >= needed:
             return f"allow a tilt of {np.degrees(tilt):.0f}°, which is enough"
     return ""
@@ -55,7 +58,7 @@ def _region(setting: Setting, best: Candidate, improve: Raise, needed: float) ->
         inside = np.flatnonzero((np.abs(setting.task.pivots - middle) <= share * half + 1e-9).all(axis=1))
         found = None
         if len(inside) > 0:
-            part = Setting.of(setting.task.at(inside), setting.machine)
+            part = Setting.of(setting.task.at(inside), setting.machine, setting.freedom)
             found = improve(part, part.first_candidate(start.margins, start.transform))
         if found is not None and found.smallest >= needed:
             fits, start = share, found

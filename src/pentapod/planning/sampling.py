@@ -11,6 +11,7 @@ from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import Machine
+from pentapod.planning.freedom import FREE, Freedom
 from pentapod.planning.margins import Margins
 from pentapod.planning.task import Task
 from pentapod.planning.tilt import lean
@@ -35,9 +36,14 @@ class Guess:
 
 
 def first_guesses(
-    task: Task, machine: Machine, components: tuple[Component, ...], seed: int, samples: int = SAMPLES
+    task: Task,
+    machine: Machine,
+    components: tuple[Component, ...],
+    seed: int,
+    samples: int = SAMPLES,
+    freedom: Freedom = FREE,
 ) -> list[Guess]:
-    """Return the best few placements for each component, best first; deterministic for a seed.
+    """Return the best few of the allowed placements for each component, best first; deterministic for a seed.
 
     Each placement is judged on a dozen representatives with their nominal axes, the best again with a cone of tilts.
     """
@@ -49,19 +55,25 @@ def first_guesses(
     for component in components:
         margins = Margins.of(machine, component)
         rotations, places = _rotations(mean_axis, -float(component.w), samples, rng), _places(machine, samples, rng)
+        if freedom.is_bounded:
+            rotations, origins = freedom.within(rotations, places - rotations @ centre, rng)
+            places = origins + rotations @ centre
         for spread in (0.08, 0.03):  # twice closer around the best
             best = _best(_score(task, margins, rotations, places - rotations @ centre, rows))
             repeat = samples // 3 // len(best)
             turned, near = rotations[best].repeat(repeat, axis=0), places[best].repeat(repeat, axis=0)
             rotations = np.concatenate([rotations[best], _turned(turned, spread, rng)])
             places = np.concatenate([places[best], near + rng.normal(scale=spread, size=near.shape)])
+            if freedom.is_bounded:
+                rotations, origins = freedom.nearest(rotations, places - rotations @ centre)
+                places = origins + rotations @ centre
         translations = places - rotations @ centre
         score = _score(task, margins, rotations, translations, rows)
         best = _best(score)
         found = [
             Guess(t, component, float(_smallest(task, margins, t, rows) if task.tilt > 0.0 else score[k]))
             for k in best
-            for t in (RigidTransform(_orthonormal(rotations[k]), translations[k]),)
+            for t in (freedom.nearest_to(RigidTransform(_orthonormal(rotations[k]), translations[k])),)
         ]
         guesses += _different(sorted(found, key=lambda g: -g.margin), centre)
     return sorted(guesses, key=lambda g: -g.margin)

@@ -14,7 +14,7 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.planning.formulation import point_function, stepped
+from pentapod.planning.formulation import point_function, room_function, stepped
 from pentapod.planning.linear_model import LinearModel, valleys
 from pentapod.planning.margins import Margins
 from pentapod.planning.setting import Candidate, Setting
@@ -93,7 +93,7 @@ class SequentialSolver:
             step, change, promise = model.best_step(reach)
             if promise < _SLACK:
                 break
-            transform = stepped(best.transform, step)
+            transform = setting.freedom.nearest_to(stepped(best.transform, step)) if self.free else best.transform
             coefficients = setting.within_cone(best.coefficients + change)
             values = setting.values(best.margins, transform, coefficients, rows)
             gain = float(values.min()) - best.smallest
@@ -114,7 +114,21 @@ class SequentialSolver:
 
         extra: indices into rows that enter in any case.
         """
-        return LinearModel.of(self.setting, at, rows, level, extra, self.slopes, free=self.free)
+        return LinearModel.of(self.setting, at, rows, level, extra, self.slopes, self._room(at.transform), self._motion)
+
+    @property
+    def _motion(self) -> Floats:
+        motion = self.setting.freedom.motion
+        return motion if self.free else motion[:, :0]
+
+    def _room(self, transform: RigidTransform) -> tuple[Floats, Floats]:
+        """Return the room (L,) of a placement, and its derivatives (L, 6) by a step."""
+        if not self.setting.freedom.is_bounded or not self.free:
+            return np.zeros(0), np.zeros((0, 6))
+        if "room" not in self._functions:
+            self._functions["room"] = room_function(self.setting.freedom)
+        room, slopes = self._functions["room"](np.zeros(6), transform.rotation, transform.translation)
+        return np.asarray(room).ravel(), np.asarray(slopes)
 
     def slopes(self, margins: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints) -> Floats:
         """Return the Jacobian (n, M, 8) of the margins by placement step and lean at waypoints `rows`."""

@@ -10,6 +10,7 @@ import numpy as np
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.machine import Machine
+from pentapod.planning.freedom import FREE, Freedom
 from pentapod.planning.margins import Margins
 from pentapod.planning.sampling import best_tilted_margins
 from pentapod.planning.task import Task
@@ -43,13 +44,14 @@ class Setting:
     machine: Machine
     domain: FieldDomain
     basis: Floats
+    freedom: Freedom
 
     @classmethod
-    def of(cls, task: Task, machine: Machine) -> Setting:
-        """Return the setting of a task on a machine."""
+    def of(cls, task: Task, machine: Machine, freedom: Freedom = FREE) -> Setting:
+        """Return the setting of a task on a machine, with the placements that are allowed."""
         domain = FieldDomain.around(task.pivots, task.nominal, _CELLS)
         basis = domain.basis(task.pivots) if task.tilt > 0.0 else np.zeros((len(task.pivots), 0))
-        return cls(task, machine, domain, basis)
+        return cls(task, machine, domain, basis, freedom)
 
     @property
     def cone(self) -> float:

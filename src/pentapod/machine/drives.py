@@ -1,0 +1,70 @@
+"""What moves the legs, and what they move: numbers for simulation, on which no program depends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pentapod.arrays import Floats, frozen, set_frozen
+from pentapod.errors import MachineError
+from pentapod.machine.fields import not_negative, per_leg, positive
+
+
+@dataclass(frozen=True, eq=False)
+class Drives:
+    """Five servo drives: a position loop around a velocity loop, both proportional, with feed-forward.
+
+        acceleration = velocity_gain · (position_gain · (wanted − x) + velocity_feedforward · rate wanted − rate)
+                       + acceleration_feedforward · acceleration wanted
+
+    Arrays (5,), scalars hold for all legs: position_gain and velocity_gain in 1/s; moving_mass in kg: what a drive
+    feels, the inertia of motor and screw included; ripple_force in N: amplitude of a force that goes up and down once
+    in ripple_pitch metres of travel. The others hold for all legs. velocity_feedforward and
+    acceleration_feedforward: shares, 1 is full. encoder_step: metres, 0 for none. dead_time: seconds from reading the
+    encoder to the force. period: seconds of the drive's own loop. contour_gain and contour_rate (1/s): proportional
+    and integral share of the correction by pose, where it is asked for.
+
+    Raises MachineError: numbers that are negative or not finite, gains, masses, pitch or period that are 0.
+    """
+
+    position_gain: Floats = field(default_factory=lambda: np.full(5, 80.0))
+    velocity_gain: Floats = field(default_factory=lambda: np.full(5, 600.0))
+    moving_mass: Floats = field(default_factory=lambda: np.full(5, 100.0))
+    ripple_force: Floats = field(default_factory=lambda: np.full(5, 20.0))
+    ripple_pitch: Floats = field(default_factory=lambda: np.full(5, 5e-3))
+    velocity_feedforward: float = 1.0
+    acceleration_feedforward: float = 1.0
+    encoder_step: float = 1e-7
+    dead_time: float = 2.5e-4
+    period: float = 1.25e-4
+    contour_gain: float = 2.0
+    contour_rate: float = 200.0
+
+    def __post_init__(self) -> None:
+        gains = ("position_gain", "velocity_gain", "moving_mass", "ripple_pitch")
+        per_leg(self, *gains, "ripple_force")
+        positive(self, *gains, "period")
+        shares = ("velocity_feedforward", "acceleration_feedforward")
+        not_negative(self, "ripple_force", *shares, "encoder_step", "dead_time", "contour_gain", "contour_rate")
+
+
+@dataclass(frozen=True, eq=False)
+class Masses:
+    """Masses for the rigid-body simulation.
+
+    cylinder, rod: of the fixed and of the moving part of each leg, kg; platform: of the spindle with all that it
+    carries, kg, spread along the platform line. gravity (3,): m/s², machine frame. Raises MachineError.
+    """
+
+    cylinder: float = 1.5
+    rod: float = 0.7
+    platform: float = 3.0
+    gravity: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 9.81]))
+
+    def __post_init__(self) -> None:
+        positive(self, "cylinder", "rod", "platform")
+        try:
+            set_frozen(self, gravity=frozen(self.gravity, "gravity", (3,)))
+        except ValueError as error:
+            raise MachineError("not three numbers", key="gravity", value=np.asarray(self.gravity).tolist()) from error

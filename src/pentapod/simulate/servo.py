@@ -1,0 +1,82 @@
+"""Servo simulation: each leg a mass under a position loop around a velocity loop, sampled as real drives are.
+
+The tool is where the closed-form forward kinematics puts it. With the correction by pose the controller does the same
+in the loop, from what the encoders see: the shortest way from tool back to path becomes, through the Jacobian, a
+correction of the leg commands (contouring control: errors along the path, being late, are left alone).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.errors import InputError
+from pentapod.kinematics.quadratic import NEAR_W_SQUARED
+from pentapod.refusal import Refusal
+from pentapod.simulate.played import Played
+from pentapod.simulate.reference import Reference
+
+_REST_S = 0.25  # before the start the drives stand still and settle, as on a machine that is switched on
+_LARGEST = 100.0  # legs that are off by a hundred metres are beyond control
+
+
+def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False) -> Played | Refusal:
+    """Return how five servo drives play a program; the same for the same seed, which gives the ripple's phases.
+
+    correct: correct the leg commands by the pose. A Refusal says that the loops are unstable, or that the legs come to
+    lengths without a pose. Raises InputError for a negative seed.
+    """
+    from pentapod.simulate.servo_kernels import drive  # noqa: PLC0415  kernels are loaded where they are used
+
+    if seed < 0:
+        raise InputError("must not be negative", key="seed", value=seed)
+    program, machine = reference.program, reference.machine
+    drives, robot = machine.drives, machine.pentapod
+    parts = max(1, round(program.period / drives.period))
+    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 5)
+    rest = int(np.ceil(_REST_S / program.period))
+    lengths, accelerations = _after_rest(reference.lengths, rest), _after_rest(reference.accelerations, rest)
+    lengths[:rest, :, 0], lengths[:rest, :, 1:], accelerations[:rest] = program.legs[0], 0.0, 0.0
+    legs, efforts = np.empty((2, len(lengths) + 1, 5))
+    limits = np.array([NEAR_W_SQUARED, robot.linear_part.near_s_squared])
+    origin = np.append(robot.base[2], robot.offsets[2])
+    with np.errstate(all="ignore"):  # legs that run away, told below
+        drive(
+            lengths,
+            accelerations,
+            program.period,
+            parts,
+            round(drives.dead_time * parts / program.period),
+            np.stack([drives.position_gain, drives.velocity_gain]),
+            np.array([drives.velocity_feedforward, drives.acceleration_feedforward]),
+            drives.encoder_step,
+            np.stack([drives.ripple_force / drives.moving_mass, drives.ripple_pitch, phases]),
+            np.array([drives.contour_gain, drives.contour_rate]) * float(correct),
+            robot.linear_part.linear_map,
+            robot.linear_part.constant,
+            np.concatenate([[robot.delta], origin, limits, [machine.tool_length]]),
+            np.array([program.component], dtype=np.float64),
+            robot.base,
+            robot.offsets,
+            _after_rest(reference.tips[::2], rest),
+            _after_rest(reference.directions[::2], rest),
+            legs,
+            efforts,
+        )
+    legs, efforts = legs[rest:], efforts[rest:]
+    wild = np.logical_not(np.abs(legs - program.legs).max(axis=1) < _LARGEST)
+    position, direction = robot.pose(np.where(wild[:, None], np.nan, legs), program.component)
+    lost = wild | ~np.isfinite(position).all(axis=1)
+    if lost.any():
+        row = int(np.argmax(lost))
+        return Refusal(
+            "simulation",
+            f"the legs run away from the program until they have no pose, at {row * program.period:.3f} s",
+            remedy="lower the gains or the dead time in [drives]; near a singularity a little error is enough",
+        )
+    return Played(legs, position + machine.tool_length * direction, direction, efforts * drives.moving_mass)
+
+
+def _after_rest(values: Floats, rest: int) -> Floats:
+    """Return values (N, ...) with the first one `rest` more times before it."""
+    return np.concatenate([np.broadcast_to(values[:1], (rest, *values.shape[1:])), values])

@@ -1,0 +1,94 @@
+"""pentapod simulate on a small job, as a user or a script meets it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+from pentapod.cli.main import run
+from pentapod.program import read_csv
+
+sys.path.append(str(Path(__file__).parents[1] / "simulate"))
+from program_files import write_job
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory):
+    """A job and a program of four seconds, below 6300 mm/min."""
+    return write_job(tmp_path_factory.mktemp("simulate"), 4.0)
+
+
+def simulate(planned, *options):
+    job, program = planned
+    return run(["simulate", program, "--job", job, *options])
+
+
+def test_servo_as_text_and_json(planned, capsys):
+    assert simulate(planned) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert said.out.startswith("servo: ")
+    assert "contour error: " in said.out
+    assert simulate(planned, "--json") == 0
+    plain = json.loads(capsys.readouterr().out)
+    assert simulate(planned, "--json", "--correct") == 0
+    corrected = json.loads(capsys.readouterr().out)
+    assert plain["rows"] == len(read_csv(planned[1]).legs)
+    assert plain["passed"] is True
+    assert 0.0 < plain["contour_error_mm"]["largest_on_cuts"] <= plain["contour_error_mm"]["largest"] < 0.1
+    assert corrected["contour_error_mm"]["rms"] < plain["contour_error_mm"]["rms"]
+    assert simulate(planned, "--json", "--seed", "1") == 0
+    assert json.loads(capsys.readouterr().out)["contour_error_mm"] != plain["contour_error_mm"]
+
+
+def test_a_bound_makes_it_a_check(planned, capsys):
+    assert simulate(planned, "--within", "1", "-q") == 0
+    assert capsys.readouterr() == ("", "")
+    assert simulate(planned, "--within", "0.0001", "-q") == 1
+    assert capsys.readouterr().err == "the contour error exceeds 0.0001 mm\n"
+
+
+def test_drives_come_from_the_machine_file(planned, tmp_path, capsys):
+    job, program = (Path(name) for name in planned)
+    desk = (resources.files("pentapod.machine") / "library" / "desk.toml").read_text(encoding="utf-8")
+    (job.parent / "mine.toml").write_text(desk + "\n[drives]\ndead_time_ms = 20\n", encoding="utf-8")
+    (job.parent / "mine_job.toml").write_text(job.read_text().replace('name = "desk"', 'file = "mine.toml"'))
+    assert run(["simulate", str(program), "--job", str(job.parent / "mine_job.toml")]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("refused: simulation: the legs run away")
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [(["--engine", "magic"], "magic"), (["--seed", "-1"], "seed"), (["--within", "0"], "within")],
+)
+def test_bad_options(planned, options, words, capsys):
+    assert simulate(planned, *options) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+
+
+def test_bad_files(planned, tmp_path, capsys):
+    job, program = planned
+    assert run(["simulate", str(tmp_path / "none.csv"), "--job", job]) == 2
+    assert run(["simulate", program, "--job", str(tmp_path / "none.toml")]) == 2
+    (tmp_path / "other.toml").write_text(Path(job).read_text().replace("[toolpath]", "length_mm = 205\n[toolpath]"))
+    for name in ("part.stl", "path.npz"):
+        (tmp_path / name).write_bytes((Path(job).parent / name).read_bytes())
+    assert run(["simulate", program, "--job", str(tmp_path / "other.toml")]) == 2
+    text = Path(program).read_text(encoding="utf-8").splitlines(keepends=True)
+    row = text[60].split(",")
+    row[3] = f"{float(row[3]) * 3.0:.6f}"
+    (tmp_path / "broken.csv").write_text("".join([*text[:60], ",".join(row), *text[61:]]), encoding="utf-8")
+    assert run(["simulate", str(tmp_path / "broken.csv"), "--job", job]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 4
+    assert all(line.startswith("error: ") for line in lines)
+    assert "not the machine that the program was made for" in lines[2]
+    assert "no pose on this machine" in lines[3]
