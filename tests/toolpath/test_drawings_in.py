@@ -72,11 +72,11 @@ def test_pictures_are_dark_where_they_are_black(tmp_path):
 
 BAD = {
     "empty.svg": (b"", "empty"),
-    "words.svg": (b"a letter, not a drawing", "cannot be read as SVG|no line"),
-    "cut.svg": (SVG.format("<circle r='3'/>").encode()[:-9], "cannot be read as SVG|no line"),
+    "words.svg": (b"a letter, not a drawing", "not a whole SVG"),
+    "cut.svg": (SVG.format("<circle r='3'/>").encode()[:-9], "not a whole SVG"),
     "nothing.svg": (SVG.format("").encode(), "no line"),
     "utf16.svg": (SVG.format("<circle r='3'/>").encode("utf-16"), "UTF-8|cannot be read"),
-    "words.dxf": (b"a letter, not a drawing", "cannot be read as DXF|no line|unit"),
+    "words.dxf": (b"a letter, not a drawing", "EOF is missing"),
     "part.dwg": (b"AC1032", "unknown kind of drawing"),
     "empty.csv": (b"\n \n", "empty"),
     "no_unit.csv": (CSV.replace("x_mm", "x").encode(), "no_unit.csv:1.*unknown column.*did you mean"),
@@ -104,33 +104,78 @@ def test_bad_files_get_one_clear_line(tmp_path, name):
     assert name in str(caught.value)
 
 
-@pytest.mark.parametrize("suffix", ["svg", "dxf", "csv", "pgm"])
-def test_no_truncation_ends_in_a_raw_traceback(tmp_path, suffix):
-    """Every cut of a file is read, or refused with an InputError that names it."""
-    whole = {
-        "svg": SVG.format('<circle r="3"/><path d="M 0 0 C 1 2 3 4 5 6"/>').encode(),
-        "dxf": dxf(),
-        "csv": CSV.encode(),
-        "pgm": b"P2\n3 2\n255\n0 255 51\n255 0 102\n",
-    }[suffix]
-    read = {"csv": read_points, "pgm": read_darkness}.get(suffix, lambda p: read_lines(p, 1e-5))
-    path = tmp_path / f"cut.{suffix}"
+def picture():
+    from PIL import Image
+
+    data = io.BytesIO()
+    grey = np.random.default_rng(0).integers(0, 255, (12, 9)).astype(np.uint8)
+    Image.fromarray(grey).save(data, "png")
+    return data.getvalue()
+
+
+WHOLE = {
+    "svg": lambda: SVG.format('<circle r="3"/><path d="M 0 0 C 1 2 3 4 5 6"/>').encode(),
+    "dxf": dxf,
+    "csv": CSV.encode,
+    "png": picture,
+}
+POINTS = {"csv": read_points, "png": read_darkness}
+READ = {**POINTS, **dict.fromkeys(["svg", "dxf"], lambda path: read_lines(path, 1e-5))}
+
+
+def refused(path):
+    """Whether reading is refused with one line about this file; any other exception fails the test."""
+    message = ""
+    try:
+        READ[path.suffix[1:]](path)
+    except InputError as error:
+        message = str(error)
+    assert not message or (path.name in message and "\n" not in message)
+    return bool(message)
+
+
+@pytest.mark.parametrize("suffix", WHOLE)
+def test_files_cut_off_anywhere_are_refused(tmp_path, suffix):
+    """But for what ends a file and says nothing; rows of points are whole after every line."""
+    whole, path = WHOLE[suffix](), tmp_path / f"cut.{suffix}"
+    path.write_bytes(whole)
+    assert not refused(path)
     for length in np.unique(np.linspace(0, len(whole) - 1, 50).astype(int)):
         path.write_bytes(whole[:length])
-        said = path.name
-        try:
-            read(path)
-        except InputError as error:
-            said = str(error)
-        assert path.name in said
+        whole_rows = suffix == "csv" and whole[:length].count(b"\n") > 2 and whole[:length].endswith(b"\n")
+        end = suffix == "png" and length >= len(whole) - 20  # checksums and the end mark: all points are there
+        assert refused(path) or whole_rows or end or not whole[length:].strip(), length
 
 
-def test_large_files_are_refused_before_they_are_read(tmp_path):
-    path = tmp_path / "large.svg"
+@pytest.mark.parametrize("suffix", WHOLE)
+def test_a_changed_word_is_refused_or_read_but_never_crashes(tmp_path, suffix):
+    whole, path, count = bytearray(WHOLE[suffix]()), tmp_path / f"changed.{suffix}", 0
+    random = np.random.default_rng(1)
+    for _ in range(50):
+        changed = whole.copy()
+        at = int(random.integers(len(whole)))
+        changed[at : at + 1] = bytes(random.choice([b"?", b"x", b"<", b"\xff", b"1e999", b"\n"]))
+        path.write_bytes(changed)
+        count += refused(path)
+    assert count > 0
+
+
+@pytest.mark.parametrize("suffix", WHOLE)
+def test_other_encodings_and_a_gigabyte_of_zeros(tmp_path, suffix):
+    import tracemalloc
+
+    path = tmp_path / f"bad.{suffix}"
+    text = WHOLE["csv" if suffix == "png" else suffix]().decode("latin-1")
+    for data in (b"", b" \n", text.encode("utf-16"), text.encode("utf-32"), bytes(5000)):
+        path.write_bytes(data)
+        assert refused(path)
     with path.open("wb") as file:
         file.truncate(10**9)
+    tracemalloc.start()
     with pytest.raises(ToolpathError, match="too large"):
-        read_lines(path, 1e-5)
+        READ[suffix](path)
+    assert tracemalloc.get_traced_memory()[1] < 1_000_000
+    tracemalloc.stop()
 
 
 def test_a_missing_package_names_the_extra(tmp_path, monkeypatch):

@@ -25,10 +25,11 @@ def some_toolpath(seed=0, pivot=3e-3):
     cuts = [0, 5, 8, 20, 26, 30, 40]
     kinds = ["rapid", "link", "cut", "cut", "link", "rapid"]
     feeds = [np.inf, 0.05, 0.025, 1 / 60, 0.05, np.inf]
+    powers = [1.0, 1.0, 0.25, 0.6, 1.0, 1.0]
     return Toolpath(
         tuple(
-            Segment(SegmentKind(kind), tips[a : b + 1], axes[a : b + 1], feed)
-            for kind, feed, a, b in zip(kinds, feeds, cuts, cuts[1:], strict=False)
+            Segment(SegmentKind(kind), tips[a : b + 1], axes[a : b + 1], feed, power)
+            for kind, feed, power, a, b in zip(kinds, feeds, powers, cuts, cuts[1:], strict=False)
         ),
         pivot,
     )
@@ -49,6 +50,8 @@ def round_trip(format_name: str, toolpath: Toolpath, folder: Path) -> Toolpath:
         kinds = [np.where(k == "link", "cut", k) for k in kinds]
     assert (kinds[0] == kinds[1]).all()
     np.testing.assert_allclose(feeds[1], feeds[0], rtol=2e-6)
+    powers = [[path.segments[k].power for k in o] for path, o in zip((toolpath, again), owners, strict=True)]
+    np.testing.assert_allclose(powers[1], 1.0 if "power" in form.loses else powers[0], atol=1e-9)
     assert form.write(toolpath) == file.read_bytes()
     return again
 
@@ -184,6 +187,7 @@ BAD = {
         ("x,y,z,i,j,k\n0,0,0,0,0,1\n", r"a.csv:1: the columns x, y, z have no unit"),
         (PLAIN + "1,0,0,0,0,1,glide,5\n", r"a.csv:3: kind: unknown"),
         (PLAIN + "1,0,0,0,0,1,cut,\n", r"a.csv:3: feed_mm_min"),
+        (PLAIN.replace("min\n", "min,power\n").replace("rt,", "rt,,1") + "1,0,0,0,0,1,cut,9,2\n", r"csv:3: power"),
         ("x_mm,y_mm,z_mm,i,j,k\n0,0,0,0,0\n", r"a.csv:2: wrong number of columns"),
         ("# waypoints = 3\n" + PLAIN + "1,0,0,0,0,1,cut,9\n", r"the file was cut"),
     ],

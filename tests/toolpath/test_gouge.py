@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -110,6 +111,37 @@ def test_what_cannot_be_lifted_clear_is_dropped_and_the_path_stays_whole():
     assert cut_depth(found, BALL, tree) <= options.tolerance
     cut = sum(len(s.tips) - 1 for s in found.segments if s.kind is SegmentKind.CUT)
     assert cut == 30 - report.dropped
+    # The wall is higher than the lift: it is in the way of what stands for the cut too, and that is told.
+    assert report.unclear > 0
+    assert "meet the part" in str(report)
+
+
+@pytest.mark.parametrize("bad", [slice(14, 16), slice(10, 20)])
+def test_the_link_over_a_dropped_cut_is_clear(bad):
+    """A flat end pressed 3 mm into the floor: one waypoint, or ten; the cuts on either side stay as they are."""
+    path, tree, tool = along_floor(1e-3), plane_with_wall(), FlatEnd(3e-3, flute=0.02)
+    tips = path.segments[1].tips.copy()
+    tips[bad, 2] -= 3e-3
+    sunk = Toolpath((path.segments[0], replace(path.segments[1], tips=tips), path.segments[2]))
+    found, report = checked(sunk, tool, tree, GougeOptions((Remedy.DROP,)))
+    assert report.dropped == bad.stop - bad.start + 1
+    assert (report.left, report.unclear) == (0, 0)
+    cuts = [s for s in found.segments if s.kind is SegmentKind.CUT]
+    links = [s for s in found.segments if s.kind is SegmentKind.LINK]
+    np.testing.assert_array_equal(cuts[0].tips[-1], tips[bad.start - 1])
+    np.testing.assert_array_equal(cuts[1].tips[0], tips[bad.stop])
+    assert max(sweep(tree, tool, s.tips, s.axes).deepest.max() for s in links) <= 20e-6
+
+
+def test_links_and_rapids_that_meet_the_part_are_told():
+    path, tree = along_floor(1e-3), plane_with_wall()
+    down = path.segments[0].tips[0] - [0.0, 0.0, 0.1]
+    up = path.segments[0].axes[:1].repeat(2, axis=0)
+    dive = Segment(SegmentKind.RAPID, np.stack([down, path.segments[0].tips[0]]), up, np.inf)
+    _, report = checked(Toolpath((dive, *path.segments), path.pivot), BALL, tree, GougeOptions())
+    assert report.unclear == 1
+    assert report.unclear_places == (0,)
+    assert "rapids meet the part" in str(report)
 
 
 @pytest.mark.parametrize("remedies", [(Remedy.TILT,), (Remedy.LIFT,), (Remedy.TILT, Remedy.LIFT, Remedy.DROP)])

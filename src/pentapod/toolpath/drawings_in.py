@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -16,6 +18,7 @@ from pentapod.errors import InputError, ToolpathError
 _MOST_BYTES = 64 * 1024 * 1024
 _PX_M = 25.4e-3 / 96.0
 _DXF_UNITS = {1: 25.4e-3, 2: 304.8e-3, 4: 1e-3, 5: 1e-2, 6: 1.0, 14: 0.1}
+_LINE = re.compile(r"line (\d+)")
 _LEAST_CHORDS, _MOST_CHORDS = 8, 4096
 
 
@@ -66,10 +69,15 @@ def _svg(path: Path, data: bytes, tolerance: float) -> list[Floats]:
     svg = extra("svgelements", "svgelements", path)
     try:
         text = data.decode("utf-8")
+        # The parser below takes what it gets of a file that was cut off.
+        ElementTree.fromstring(text)
         shapes = [e for e in svg.SVG.parse(io.StringIO(text), reify=True).elements() if isinstance(e, svg.Shape)]
         lines = [line for shape in shapes for line in _svg_lines(svg, shape, tolerance / _PX_M)]
     except UnicodeDecodeError as error:
         raise ToolpathError("not a text file in UTF-8", file=path, expected="an SVG file") from error
+    except ElementTree.ParseError as error:
+        what = f"not a whole SVG file: {error}".split(": line")[0]
+        raise ToolpathError(what, file=path, line=error.position[0]) from error
     except Exception as error:
         line = getattr(error, "position", (None, None))[0]
         raise ToolpathError(f"cannot be read as SVG: {error}".splitlines()[0], file=path, line=line) from error
@@ -113,11 +121,19 @@ def chords(curve: Callable[[Floats], Floats], tolerance: float) -> int:
 
 def _dxf(path: Path, data: bytes, tolerance: float) -> list[Floats]:
     """Return the lines of a DXF's model space, whose header must say its unit."""
-    ezdxf = extra("ezdxf", "ezdxf", path)
+    if not data.rstrip(b" \t\r\n\0").endswith(b"EOF"):
+        raise ToolpathError(
+            "EOF is missing: the file was cut off, or is no DXF",
+            file=path,
+            line=data.count(b"\n") + 1,
+            remedy="export it again",
+        )
     paths = extra("ezdxf.path", "ezdxf", path)
     recover = extra("ezdxf.recover", "ezdxf", path)
     try:
-        document, _ = recover.read(io.BytesIO(data))
+        document, audit = recover.read(io.BytesIO(data))
+        if audit.has_errors:
+            raise ToolpathError(f"broken DXF: {audit.errors[0].message}".splitlines()[0], file=path)
         unit = _DXF_UNITS.get(int(document.header.get("$INSUNITS", 0)))
         if unit is None:
             raise ToolpathError(
@@ -135,8 +151,10 @@ def _dxf(path: Path, data: bytes, tolerance: float) -> list[Floats]:
                 lines.append(unit * _distinct(points.reshape(-1, 2)))
     except ToolpathError:
         raise
-    except (ezdxf.DXFError, OSError, ValueError, KeyError, IndexError, AttributeError) as error:
-        raise ToolpathError(f"cannot be read as DXF: {error}".splitlines()[0], file=path) from error
+    except Exception as error:  # of whatever kind: what is in the file decides how the parser stumbles
+        place = _LINE.search(str(error))
+        what = f"cannot be read as DXF: {error}".splitlines()[0]
+        raise ToolpathError(what, file=path, line=int(place[1]) if place else None) from error
     return lines
 
 

@@ -1,4 +1,4 @@
-"""Gouges: every cut checked against the part, and what gouges tilted clear, lifted, dropped, or only reported."""
+"""Gouges: every motion checked against the part; cuts that gouge tilted clear, lifted, dropped, or only reported."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ from pentapod.errors import ToolpathError
 from pentapod.geometry.directions import tangent_frame
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.facet_tree import FacetTree
+from pentapod.toolpath.links import RAPID_SPACING_M, spaced
 from pentapod.toolpath.solids import KINDS
-from pentapod.toolpath.sweep import Sweep, sweep, touch
+from pentapod.toolpath.sweep import RESOLUTION_M, Sweep, sweep, touch
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.toolpath.tools import Tool
 
 _RINGS, _SPOKES = 4, 16
 _LIFTS = 40
 _ROUNDS = 3
+_RISES = (0.05, 0.1, 0.25, 0.5, 1.0)
+"""Of the most that lifting may lift: how high a link is tried that stands for a dropped cut."""
 
 
 class Remedy(StrEnum):
@@ -59,6 +62,7 @@ class GougeReport:
     gouging: of them too deep at first; depths: the deepest of cutter, shank and holder at first, metres, −inf for none.
     tilted, lifted: waypoints changed; dropped: motions taken out of the cut; most_lifted: metres.
     left: motions still too deep, left_depth how deep, metres; places: the first waypoint of each run of those.
+    unclear: links deeper than the tolerance and rapids that touch, unclear_places likewise.
     """
 
     motions: int
@@ -71,11 +75,13 @@ class GougeReport:
     left: int = 0
     left_depth: float = 0.0
     places: tuple[int, ...] = ()
+    unclear: int = 0
+    unclear_places: tuple[int, ...] = ()
 
     def __str__(self) -> str:
         text = f"gouge check: {self.motions:,} motions"
         if not self.gouging:
-            return text + ", none gouges"
+            return text + ", none gouges" + self._unclear()
         deep = ", ".join(f"{k} {1e3 * d:.3g} mm" for k, d in zip(KINDS, self.depths, strict=True) if d > 0.0)
         text += f", {self.gouging:,} gouged: {deep} deep"
         if self.tilted:
@@ -85,10 +91,20 @@ class GougeReport:
         if self.dropped:
             text += f"\n  note: {self.dropped:,} motions dropped: material is left there"
         if self.left:
-            where = ", ".join(str(place) for place in self.places[:5]) + (", ..." if len(self.places) > 5 else "")
             worst = 1e3 * self.left_depth
-            text += f"\n  problem: {self.left:,} motions gouge by up to {worst:.3g} mm, from waypoints {where}"
-        return text
+            text += f"\n  problem: {self.left:,} motions gouge by up to {worst:.3g} mm, from waypoints "
+            text += _some(self.places)
+        return text + self._unclear()
+
+    def _unclear(self) -> str:
+        if not self.unclear:
+            return ""
+        where = _some(self.unclear_places)
+        return f"\n  problem: {self.unclear:,} motions of links and rapids meet the part, from waypoints {where}"
+
+
+def _some(places: tuple[int, ...]) -> str:
+    return ", ".join(str(place) for place in places[:5]) + (", ..." if len(places) > 5 else "")
 
 
 def checked(
@@ -96,21 +112,21 @@ def checked(
 ) -> tuple[Toolpath, GougeReport]:
     """Return the toolpath with its gouges remedied as the options say, and what was found and done.
 
-    Cuts alone are looked at; a cut that begins or ends elsewhere than before takes its neighbours' ends along.
-    Dropped motions become links on feed, raised along the axis until they are clear, so that the path stays whole.
-    What no remedy cures is left and reported.
+    Cuts alone are changed; a cut that begins or ends elsewhere than before takes its neighbours' ends along. Dropped
+    motions become links on feed, up along the axis, over what was dropped and down again, as low as is clear. In the
+    end every motion of the result is checked: what no remedy cures, and links and rapids that meet the part, are told.
     """
     cut = np.array([toolpath.segments[k].kind is SegmentKind.CUT for k in toolpath.segment_of_interval])
     work = _Work(toolpath, tool, tree, options, cut, progress)
     first = work.found()
+    bad = work.bad(first)
     report = GougeReport(
         motions=int(cut.sum()),
-        gouging=int(work.bad(first).sum()),
+        gouging=int(bad.sum()),
         depths=tuple(float(d) for d in first.depths.max(axis=0, initial=-np.inf)),  # type: ignore[arg-type]
     )
     if not report.gouging:
-        return toolpath, report
-    bad = work.bad(first)
+        return toolpath, _proven(report, toolpath, work)
     for remedy in options.remedies:
         if not bad.any():
             break
@@ -122,13 +138,32 @@ def checked(
         elif remedy is Remedy.DROP:
             report = replace(report, dropped=work.drop(bad))
         bad = work.bad(work.found())
-    if bad.any():
-        left = work.found()
-        runs = np.flatnonzero(bad & ~np.concatenate([[False], bad[:-1]]))
-        report = replace(
-            report, left=int(bad.sum()), left_depth=float(left.deepest.max()), places=tuple(int(k) for k in runs)
-        )
-    return work.toolpath(), report
+    result = work.toolpath()
+    return result, _proven(report, result, work)
+
+
+def _proven(report: GougeReport, path: Toolpath, work: _Work) -> GougeReport:
+    """Return the report with what is still, or was all along, in the way of any motion of the path."""
+    kinds = np.array([path.segments[k].kind for k in path.segment_of_interval])
+    depths = np.full(len(kinds), -np.inf)
+    for kind in SegmentKind:
+        rows = np.flatnonzero(kinds == kind)
+        threshold = RESOLUTION_M if kind is SegmentKind.RAPID else work.options.tolerance
+        depths[rows] = _met(work, path.tips, path.axes, rows, threshold).deepest
+    left, unclear = (depths > -np.inf) & (kinds == SegmentKind.CUT), (depths > -np.inf) & (kinds != SegmentKind.CUT)
+    return replace(
+        report,
+        left=int(left.sum()),
+        left_depth=float(depths[left].max(initial=0.0)),
+        places=_begins(left),
+        unclear=int(unclear.sum()),
+        unclear_places=_begins(unclear),
+    )
+
+
+def _begins(marked: Bools) -> tuple[int, ...]:
+    """Return where each run of marked motions (N − 1,) begins."""
+    return tuple(int(k) for k in np.flatnonzero(marked & ~np.concatenate([[False], marked[:-1]])))
 
 
 class _Work:
@@ -145,7 +180,7 @@ class _Work:
     def found(self) -> Sweep:
         """Return what the motions meet; those that do not cut count as clear."""
         rows = np.flatnonzero(self.cut & ~self.dropped)
-        met = _motions(self, rows)
+        met = _met(self, self.tips, self.axes, rows, self.options.tolerance)
         depths = np.full((len(self.cut), 3), -np.inf)
         depths[rows] = met.depths
         times, facets = np.full((len(self.cut), 3), np.nan), np.full((len(self.cut), 3), -1, dtype=np.intp)
@@ -194,7 +229,7 @@ class _Work:
         """Raise gouging waypoints along their axes until their motions are clear; return how many, and the most."""
         lift, start = np.zeros(len(self.tips)), self.tips.copy()
         for _ in range(_LIFTS):
-            met = _motions(self, np.flatnonzero(bad))
+            met = _met(self, self.tips, self.axes, np.flatnonzero(bad), self.options.tolerance)
             depth = np.zeros(len(bad))
             depth[bad] = np.maximum(met.deepest, 0.0)
             bad = depth > self.options.tolerance
@@ -217,12 +252,39 @@ class _Work:
     def drop(self, bad: Bools) -> int:
         """Turn gouging motions into links above the part; return how many."""
         self.dropped |= bad
-        inner = _ends(bad)
-        # Where a cut goes on, its end stays; what lies between is raised.
-        keeps = _ends(self.cut & ~self.dropped)
-        high = inner & ~keeps
+        # Where a cut goes on, its end stays; where a link comes to one that is dropped, it ends above.
+        high = _ends(bad) & ~self._kept()
         self.tips = np.where(high[:, None], self.tips + self.options.highest * self.axes, self.tips)
         return int(bad.sum())
+
+    def _kept(self) -> Bools:
+        """Return which waypoints (N,) belong to a cut that is not dropped."""
+        return _ends(self.cut & ~self.dropped)
+
+    def _bridge(self, first: int, last: int) -> dict[str, Floats]:
+        """Return tips and axes of the link from waypoint `first` to `last`: the lowest that is clear, else the highest.
+
+        From a kept end up along its axis, above the waypoints between, and down; raised ends are there already.
+        """
+        kept = self._kept()
+        over = slice(first + (not kept[first]), last + int(kept[last]))
+        way: dict[str, Floats] = {}
+        for rise in _RISES:
+            middle = self.path.tips[over] + rise * self.options.highest * self.axes[over]
+            tips, axes = [self.tips[first : first + 1]], [self.axes[first : first + 1]]
+            if kept[first]:
+                up = spaced(np.stack([self.tips[first], middle[0]]), RAPID_SPACING_M)[1:-1]
+                tips, axes = [*tips, up], [*axes, np.tile(self.axes[first], (len(up), 1))]
+            tips, axes = [*tips, middle], [*axes, self.axes[over]]
+            if kept[last]:
+                down = spaced(np.stack([middle[-1], self.tips[last]]), RAPID_SPACING_M)[1:-1]
+                tips, axes = [*tips, down], [*axes, np.tile(self.axes[last], (len(down), 1))]
+            tips, axes = [*tips, self.tips[last : last + 1]], [*axes, self.axes[last : last + 1]]
+            way = {"tips": np.concatenate(tips), "axes": np.concatenate(axes)}
+            rows = np.arange(len(way["tips"]) - 1)
+            if (_met(self, way["tips"], way["axes"], rows, self.options.tolerance).deepest == -np.inf).all():
+                break
+        return way
 
     def toolpath(self) -> Toolpath:
         """Return the toolpath of the waypoints as they are now."""
@@ -232,22 +294,23 @@ class _Work:
             a, b = int(self.path.starts[k]), int(self.path.starts[k + 1])
             breaks = [a, *(a + 1 + np.flatnonzero(np.diff(self.dropped[a:b].astype(np.int8)))).tolist(), b]
             for p, q in pairwise(breaks):
-                fields = {"tips": self.tips[p : q + 1], "axes": self.axes[p : q + 1]}
                 if self.dropped[p]:
-                    fields |= {"kind": SegmentKind.LINK, "feed": link_feeds[0] if link_feeds else old.feed}
-                segments.append(replace(old, **fields))
+                    feed = link_feeds[0] if link_feeds else old.feed
+                    segments.append(Segment(SegmentKind.LINK, **self._bridge(p, q), feed=feed))
+                else:
+                    segments.append(replace(old, tips=self.tips[p : q + 1], axes=self.axes[p : q + 1]))
         return Toolpath(tuple(segments), self.path.pivot)
 
 
-def _motions(work: _Work, rows: Ints) -> Sweep:
-    """Return what the motions `rows` meet beyond the tolerance."""
+def _met(work: _Work, tips: Floats, axes: Floats, rows: Ints, threshold: float) -> Sweep:
+    """Return what the motions `rows` between poses (N, 3), (N, 3) meet beyond a threshold, metres."""
     if not len(rows):
         empty = np.zeros((0, 3))
         return Sweep(empty, empty, np.zeros((0, 3, 3)), empty.astype(np.intp))
     # Runs of neighbours share their poses; cutting them apart costs nothing.
-    tips = np.stack([work.tips[rows], work.tips[rows + 1]], axis=1).reshape(-1, 3)
-    axes = np.stack([work.axes[rows], work.axes[rows + 1]], axis=1).reshape(-1, 3)
-    return sweep(work.tree, work.tool, tips, axes, threshold=work.options.tolerance, progress=work.progress, every=2)
+    tips = np.stack([tips[rows], tips[rows + 1]], axis=1).reshape(-1, 3)
+    axes = np.stack([axes[rows], axes[rows + 1]], axis=1).reshape(-1, 3)
+    return sweep(work.tree, work.tool, tips, axes, threshold=threshold, progress=work.progress, every=2)
 
 
 def _ends(motions: Bools) -> Bools:

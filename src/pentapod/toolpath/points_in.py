@@ -28,6 +28,10 @@ def read_points(path: str | Path) -> list[Floats]:
         raise ToolpathError("not a text file in UTF-8", file=path, expected="a CSV file") from error
     if "\0" in text:
         raise ToolpathError("not a text file", file=path, expected="a CSV file")
+    if not text.endswith("\n"):
+        what = "the last line has no end: the file was cut off"
+        remedy = "export it again, or end the last line"
+        raise ToolpathError(what, file=path, line=text.count("\n") + 1, remedy=remedy)
     columns: dict[str, tuple[int, float]] | None = None
     lines: list[list[list[float]]] = [[]]
     name = ""

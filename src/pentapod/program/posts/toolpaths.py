@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from pentapod.errors import InputError, ProgramError
 from pentapod.program.posts.registry import Post, PostInput, read_file, register
 from pentapod.program.program import Program
 from pentapod.toolpath.formats import FORMATS, read_toolpath
-from pentapod.toolpath.toolpath import Segment, Toolpath
+from pentapod.toolpath.toolpath import Toolpath
 
 _SAME_M = 1e-11
 
@@ -36,7 +37,7 @@ def placed_toolpath(plan: str | Path, program: Program) -> Toolpath:
             remedy="give the plan.npz that was written with it",
         )  # fmt: skip
     bounds = zip(given.segments, given.starts[:-1], given.starts[1:], strict=True)
-    return Toolpath(tuple(Segment(s.kind, tips[a : b + 1], axes[a : b + 1], s.feed) for s, a, b in bounds), given.pivot)
+    return Toolpath(tuple(replace(s, tips=tips[a : b + 1], axes=axes[a : b + 1]) for s, a, b in bounds), given.pivot)
 
 
 def _write(given: PostInput, form: str, file: str) -> dict[str, bytes]:

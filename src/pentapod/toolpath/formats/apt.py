@@ -193,4 +193,13 @@ def _write(toolpath: Toolpath) -> bytes:
     return ("\n".join([*lines, "FINI"]) + "\n").encode()
 
 
-APT = register(Format("apt", (".apt", ".cls", ".cl", ".cldata"), "APT / CLDATA cutter locations", _read, _write))
+APT = register(
+    Format(
+        "apt",
+        (".apt", ".cls", ".cl", ".cldata"),
+        "APT / CLDATA cutter locations",
+        _read,
+        _write,
+        loses=frozenset({"power"}),
+    )
+)

@@ -12,7 +12,7 @@ from pentapod.toolpath.formats.registry import Defaults, Format, register
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 _MAGIC = "pentapod_toolpath"
-_COLUMNS = "x_mm,y_mm,z_mm,i,j,k,kind,feed_mm_min"
+_COLUMNS = "x_mm,y_mm,z_mm,i,j,k,kind,feed_mm_min,power"
 _MM = {"mm": 1.0, "m": 1e3, "inch": 25.4}
 _HEADER = re.compile(r"#\s*(\w+)\s*=\s*(\S+)\s*$")
 _START = "start"
@@ -38,8 +38,11 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
                 "wrong number of columns", file=file, line=line, value=len(cells), expected=str(len(names))
             )
         values = [number(cell, file, line, name) for cell, name in zip(cells[:6], names[:6], strict=True)]
-        kind, feed = _how(file, line, cells[6:], defaults, first=not moves.tips)
-        moves.add([v * scale for v in values[:3]], values[3:], kind, feed, line, "i,j,k")
+        kind, feed = _how(file, line, cells[6:8], defaults, first=not moves.tips)
+        power = number(cells[8], file, line, "power") if len(cells) > 8 else 1.0
+        if not 0.0 <= power <= 1.0:
+            raise ToolpathError("not a share", file=file, line=line, key="power", value=cells[8], expected="0 to 1")
+        moves.add([v * scale for v in values[:3]], values[3:], kind, feed, line, "i,j,k", power)
     if "waypoints" in header:
         text, line = header["waypoints"]
         if number(text, file, line, "waypoints") != len(moves.tips):
@@ -57,7 +60,7 @@ def _unit(file: Path, line: int, names: str) -> float:
     """Return millimetres in the unit of the first three columns. Raises ToolpathError for other columns."""
     for unit, scale in _MM.items():
         known = _COLUMNS.replace("x_mm,y_mm,z_mm", f"x_{unit},y_{unit},z_{unit}")
-        if names in (known, known.removesuffix(",kind,feed_mm_min")):
+        if names in (known, known.removesuffix(",power"), known.removesuffix(",kind,feed_mm_min,power")):
             return scale
     bare = names.split(",")[:3] == ["x", "y", "z"]
     what = "the columns x, y, z have no unit" if bare else "wrong column names"
@@ -84,12 +87,14 @@ def _how(file: Path, line: int, cells: list[str], defaults: Defaults, *, first: 
 
 def _write(toolpath: Toolpath) -> bytes:
     tips, axes, kinds, feeds = poses(toolpath)
+    powers = [toolpath.segments[k].power for k in toolpath.segment_of_interval]
     lines = [f"# {_MAGIC} = 1", f"# pivot_mm = {1e3 * toolpath.pivot!r}", f"# waypoints = {len(tips)}", _COLUMNS]
     for k in range(len(tips)):
         cells = [*(plain(v, 7) for v in tips[k]), *(plain(v, 12) for v in axes[k])]
         kind = str(kinds[k - 1]) if k else _START
         feed = plain(float(feeds[k - 1]), 6) if k and kinds[k - 1] != SegmentKind.RAPID else ""
-        lines.append(",".join([*cells, kind, feed]))
+        power = plain(powers[k - 1], 9) if k else "1.0"
+        lines.append(",".join([*cells, kind, feed, power]))
     return ("\n".join(lines) + "\n").encode()
 
 

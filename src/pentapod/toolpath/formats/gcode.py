@@ -220,7 +220,14 @@ def _write(toolpath: Toolpath, rotary: Rotary, *, needs_tcp: bool, inverse_time:
 def _variant(name: str, suffixes: tuple[str, ...], about: str, rotary: Rotary, *, tcp: bool, inverse: bool) -> Format:
     read = partial(_read, rotary=rotary, needs_tcp=tcp)
     return register(
-        Format(name, suffixes, about, read, partial(_write, rotary=rotary, needs_tcp=tcp, inverse_time=inverse))
+        Format(
+            name,
+            suffixes,
+            about,
+            read,
+            partial(_write, rotary=rotary, needs_tcp=tcp, inverse_time=inverse),
+            loses=frozenset({"power"}),
+        )
     )
 
 

@@ -23,7 +23,7 @@ _SAME_FEED = 1e-6
 class Moves:
     """Poses in the order of a file, gathered by a reader. Millimetres, mm/min; a rapid's feed is infinite.
 
-    Each pose has the kind and feed of the move that leads to it; those of the first are of no account.
+    Each pose has the kind, feed and power of the move that leads to it; those of the first are of no account.
     """
 
     file: Path
@@ -31,9 +31,17 @@ class Moves:
     axes: list[tuple[float, float, float]] = field(default_factory=list)
     kinds: list[SegmentKind] = field(default_factory=list)
     feeds: list[float] = field(default_factory=list)
+    powers: list[float] = field(default_factory=list)
 
     def add(
-        self, tip: Sequence[float], axis: Sequence[float], kind: SegmentKind, feed: float, line: int, word: str
+        self,
+        tip: Sequence[float],
+        axis: Sequence[float],
+        kind: SegmentKind,
+        feed: float,
+        line: int,
+        word: str,
+        power: float = 1.0,
     ) -> None:
         """Add a pose. Raises ToolpathError where the axis has not unit length."""
         length = float(np.linalg.norm(axis))
@@ -46,9 +54,10 @@ class Moves:
         self.axes.append((axis[0] / length, axis[1] / length, axis[2] / length))
         self.kinds.append(kind)
         self.feeds.append(feed)
+        self.powers.append(power)
 
     def toolpath(self, pivot: float) -> Toolpath:
-        """Return the toolpath: neighbours of one kind and feed make a segment; poses that repeat are left out.
+        """Return the toolpath: neighbours of one kind, feed and power make a segment; poses that repeat are left out.
 
         pivot: metres. Raises ToolpathError for fewer than two poses.
         """
@@ -58,15 +67,15 @@ class Moves:
         rows = np.flatnonzero(moved)
         if len(rows) < 2:
             raise ToolpathError("the file holds no motion", file=self.file, expected="at least two different poses")
-        feeds = np.array(self.feeds)[rows]
+        feeds, powers = np.array(self.feeds)[rows], np.array(self.powers)[rows]
         kinds = [self.kinds[row] for row in rows]
         breaks = [1]
         for k in range(2, len(rows)):
             same_feed = feeds[k] == feeds[k - 1] or abs(feeds[k] - feeds[k - 1]) <= _SAME_FEED * feeds[k - 1]
-            if kinds[k] != kinds[k - 1] or not same_feed:
+            if kinds[k] != kinds[k - 1] or not same_feed or powers[k] != powers[k - 1]:
                 breaks.append(k)
         segments = [
-            Segment(kinds[a], tips[rows[a - 1 : b]], axes[rows[a - 1 : b]], feeds[a] / 6e4)
+            Segment(kinds[a], tips[rows[a - 1 : b]], axes[rows[a - 1 : b]], feeds[a] / 6e4, float(powers[a]))
             for a, b in pairwise([*breaks, len(rows)])
         ]
         return Toolpath(tuple(segments), pivot)

@@ -18,7 +18,7 @@ from pentapod.toolpath.formats.registry import Defaults, Format, register
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 _MM, _MM_MIN = 1e3, 6e4
-_NAMES = ("tips_mm", "axes", "pivot_mm", "segment_starts", "segment_kinds", "segment_feeds_mm_min")
+_NAMES = ("tips_mm", "axes", "pivot_mm", "segment_starts", "segment_kinds", "segment_feeds_mm_min", "segment_powers")
 
 
 def toolpath_arrays(toolpath: Toolpath) -> dict[str, NDArray[Any]]:
@@ -30,6 +30,7 @@ def toolpath_arrays(toolpath: Toolpath) -> dict[str, NDArray[Any]]:
         toolpath.starts,
         np.array([str(s.kind) for s in toolpath.segments]),
         np.array([s.feed for s in toolpath.segments]) * _MM_MIN,
+        np.array([s.power for s in toolpath.segments]),
     )
     return {f"toolpath.{name}": value for name, value in zip(_NAMES, values, strict=True)}
 
@@ -58,12 +59,13 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
 def _toolpath(arrays: dict[str, NDArray[Any]]) -> Toolpath:
     tips, axes = arrays["tips_mm"] / _MM, arrays["axes"]
     starts = arrays["segment_starts"].astype(np.intp)
-    kinds, feeds = arrays["segment_kinds"], arrays["segment_feeds_mm_min"] / _MM_MIN
-    if len(starts) != len(kinds) + 1 or len(feeds) != len(kinds) or starts[0] != 0 or starts[-1] != len(tips) - 1:
+    kinds, feeds, powers = arrays["segment_kinds"], arrays["segment_feeds_mm_min"] / _MM_MIN, arrays["segment_powers"]
+    fits = len(starts) - 1 == len(kinds) == len(feeds) == len(powers)
+    if not fits or starts[0] != 0 or starts[-1] != len(tips) - 1:
         raise ToolpathError("the segments do not fit the waypoints", key="toolpath.segment_starts")
     segments = [
-        Segment(SegmentKind(str(kind)), tips[a : b + 1], axes[a : b + 1], float(feed))
-        for kind, feed, (a, b) in zip(kinds, feeds, pairwise(starts), strict=True)
+        Segment(SegmentKind(str(kind)), tips[a : b + 1], axes[a : b + 1], float(feed), float(power))
+        for kind, feed, power, (a, b) in zip(kinds, feeds, powers, pairwise(starts), strict=True)
     ]
     return Toolpath(tuple(segments), float(arrays["pivot_mm"].item()) / _MM)
 

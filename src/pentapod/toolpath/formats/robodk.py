@@ -56,6 +56,11 @@ def _write(toolpath: Toolpath) -> bytes:
 
 ROBODK = register(
     Format(
-        "robodk", (".robodk.csv",), "RoboDK: X,Y,Z,NX,NY,NZ,speed", _read, _write, frozenset({"links", "pivot", "end"})
+        "robodk",
+        (".robodk.csv",),
+        "RoboDK: X,Y,Z,NX,NY,NZ,speed",
+        _read,
+        _write,
+        loses=frozenset({"links", "pivot", "end", "power"}),
     )
 )
