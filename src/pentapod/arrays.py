@@ -30,9 +30,12 @@ def as_floats(value: ArrayLike, name: str, shape: tuple[int | None, ...] | None 
 def as_batch(value: ArrayLike, name: str, shape: tuple[int | None, ...] | None = None) -> Floats:
     """As `as_floats`, but NaN passes: for batches where NaN marks an element that has no answer."""
     try:
-        array = np.asarray(value, dtype=np.float64)
+        array = np.asarray(value)
+        array = array if np.iscomplexobj(array) else np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise ArrayError(f"{name} is not an array of numbers", expected=_words(shape)) from error
+    if np.iscomplexobj(array):
+        raise ArrayError(f"{name} is complex", expected="real numbers")
     if shape is not None:
         tail = array.shape[len(array.shape) - len(shape) :] if len(shape) else ()
         if array.ndim < len(shape) or any(w is not None and w != n for w, n in zip(shape, tail, strict=True)):

@@ -282,7 +282,7 @@ def test_leg_errors_and_sensitivity(nominal):
     assert exact.direction_sensitivity.max() < 100.0
 
 
-def test_a_crossing_is_undecided_where_it_is(nominal):
+def test_a_crossing_is_refuted_where_it_is(nominal):
     tilt = np.linspace(-0.2, 0.2, 42)
     i = np.c_[np.cos(tilt), 0 * tilt, np.sin(tilt)]
     p = np.tile([0.0, 0.05, 0.6], (42, 1))
@@ -290,7 +290,9 @@ def test_a_crossing_is_undecided_where_it_is(nominal):
     found = certify_motion(machine, linear(machine.leg_lengths(p, i)), p, i)
     assert not found.holds
     assert set(np.flatnonzero(~found.proven)) <= {19, 20, 21}
-    assert not found.proven[20], "w changes its sign in the middle of interval 20"
+    assert np.flatnonzero(found.refuted).tolist() == [20], "w changes its sign in the middle of interval 20"
+    assert (found.undecided == ~(found.proven | found.refuted)).all()
+    assert not found.proven[20]
     assert (found.stop[found.proven] == 1.0).all()
     w, s = singularity_values(nominal, p, i)
     assert w[20] < 0.0 < w[21]

@@ -111,6 +111,22 @@ def test_axis_deviation_is_the_lean(found):
     assert found["axis deviation"].value == pytest.approx(np.degrees(0.5 * cases.TILT), abs=0.02)
 
 
+def test_fastest_moment_by_finite_differences(good, found):
+    """The proven speeds are no less than any momentary speed, and little more than the largest."""
+    replay = Replay(good.program, good.machine, good.toolpath, *cases.TOLERANCES.values())
+    bounds = replay.survey.speeds[:, 0]
+    spline, step = interpolant(good.program), 1e-6
+    moments = (np.arange(len(bounds)) + np.linspace(0.01, 0.99, 7)[:, None]) * 0.5 * good.program.period
+    tips = []
+    for shift in (-0.5 * step, 0.5 * step):
+        position, direction = good.machine.pentapod.pose(spline(moments.ravel() + shift), good.program.component)
+        tips.append(position + good.machine.tool_length * direction)
+    speeds = (np.linalg.norm(tips[1] - tips[0], axis=1) / step).reshape(7, -1).max(axis=0)
+    assert (bounds >= speeds - 2e-6).all()  # what rounding does to the differences
+    assert (bounds <= speeds + 2e-3 * cases.RAPID).all()
+    assert found["rapid rate"].value <= 6e4 * speeds.max() * 1.001
+
+
 @pytest.mark.parametrize("kind", ["cut", "link", "rapid"])
 def test_feeds_are_those_of_the_time_law(good, found, kind):
     claim = {"cut": "feed on cuts", "link": "feed on links", "rapid": "rapid rate"}[kind]

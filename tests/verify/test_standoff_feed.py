@@ -50,8 +50,8 @@ def good(request):
 def test_the_spot_keeps_the_feed_whatever_the_tip_does(good, nod, share):
     found = judged(good, nod, share)
     assert failed(found) == ({"feed on cuts"} if share > 1.0 else set())
-    # Legs that run linearly between rows carry the spot a little slower in one half of a period, faster in the other.
-    rel = 2e-3 if good.program.interpolation == "cubic" else 5e-3
+    # Legs that run linearly carry the spot slowest just before some row and fastest just after it: the verdict's value.
+    rel = 2e-3 if good.program.interpolation == "cubic" else 7e-3
     assert found["feed on cuts"].value == pytest.approx(6e4 * share * cases.FEED, rel=rel)
     assert "spot" in found["feed on cuts"].method
 
@@ -62,4 +62,5 @@ def test_the_tip_keeps_the_rapid_rate_on_cuts_too(good):
     assert failed(judged(good, 0.4, 0.98, rapid=1.01 * fastest)) == set()
     found = judged(good, 0.4, 0.98, rapid=0.99 * fastest)
     assert failed(found) == {"rapid rate"}
-    assert found["rapid rate"].value == pytest.approx(6e4 * fastest, rel=3e-3)
+    rel = 3e-3 if good.program.interpolation == "cubic" else 7e-3
+    assert found["rapid rate"].value == pytest.approx(6e4 * fastest, rel=rel)

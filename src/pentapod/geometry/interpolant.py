@@ -29,10 +29,15 @@ class Interpolant:
     @classmethod
     def through(cls, rows: Floats, period: float, interpolation: Literal["linear", "cubic"]) -> Interpolant:
         """Return what joins rows (N, d): straight lines, or the C2 cubic spline with zero end velocities."""
-        if interpolation == "linear":
+        return cls.along(rows, clamped_slopes(rows) if interpolation == "cubic" else None, period)
+
+    @classmethod
+    def along(cls, rows: Floats, slopes: Floats | None, period: float) -> Interpolant:
+        """Return what joins rows (N, d) with these slopes (N, d), per row: cubics; lines where they are None."""
+        if slopes is None:
             return cls(np.stack([rows[:-1], rows[1:]], axis=-1), period)
         # In units of the period, so that knots are integers and the slopes have the size of the steps.
-        third = _clamped_slopes(rows) / 3.0
+        third = slopes / 3.0
         inner = (rows[:-1], rows[:-1] + third[:-1], rows[1:] - third[1:], rows[1:])
         return cls(np.stack(inner, axis=-1), period)
 
@@ -142,7 +147,7 @@ def largest_length(vectors: Floats) -> tuple[float, int]:
     return float(np.sqrt(best)), where
 
 
-def _clamped_slopes(rows: Floats) -> Floats:
+def clamped_slopes(rows: Floats) -> Floats:
     """Return slopes (N, d), per row, of the C2 cubic spline through rows (N, d) from rest to rest."""
     # scipy takes a while to import; programs for linear controllers never need it.
     from scipy.linalg import solve_banded  # noqa: PLC0415

@@ -8,6 +8,7 @@ from pentapod.kinematics.calibration import Calibration, calibrate
 from pentapod.kinematics.cell_poses import cell_of, poses_in_cell
 from pentapod.kinematics.cells import Cell, CellDecomposition, cell_decomposition
 from pentapod.kinematics.certificate import ComponentProof, certify_component
+from pentapod.kinematics.chords import Chords, prove_chords
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.conics import Conic, attachment_conic, conic_determinant, forbidden_conic
 from pentapod.kinematics.five_legs import FiveLegs
@@ -50,6 +51,7 @@ __all__ = [
     "Calibration",
     "Cell",
     "CellDecomposition",
+    "Chords",
     "Component",
     "ComponentProof",
     "Conic",
@@ -92,6 +94,7 @@ __all__ = [
     "pose_jacobian",
     "poses_in_cell",
     "position_distance",
+    "prove_chords",
     "prove_tip_tube",
     "singular_plane",
     "singularity_cofactors",

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_batch, as_floats, set_frozen
+from pentapod.arrays import Floats, as_floats, set_frozen
 from pentapod.errors import ArrayError, MachineError
+from pentapod.kinematics.batches import as_poses
 from pentapod.kinematics.five_legs import FiveLegs
 
 
@@ -77,7 +78,7 @@ class AsBuiltPentapod:
 
     def leg_lengths(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return the readings of the legs (..., 5), metres, of positions p and unit directions i (..., 3)."""
-        p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
+        p, i = as_poses(position, direction)
         t, _, normal = self._in_tool_frame(p, i)
         return np.hypot(t - self.offsets, np.linalg.norm(normal, axis=-1) - self.radii) + self.zeros
 
@@ -87,7 +88,7 @@ class AsBuiltPentapod:
         i counts as a free vector of R³; a change of a unit direction is perpendicular to it, and for such a change the
         result is exact. NaN where the base joint of a ring is on the line: there its leg may point anywhere.
         """
-        p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
+        p, i = as_poses(position, direction)
         t, ratio, normal = self._in_tool_frame(p, i)
         along, across, i = (t - self.offsets)[..., None], (1.0 - ratio)[..., None] * normal, i[..., None, :]
         by_position = -along * i - across  # from the base joint to the ring

@@ -17,6 +17,7 @@ from pentapod.arrays import Bools, Floats, Ints, as_batch
 from pentapod.errors import ArrayError
 from pentapod.geometry.balls import Ball
 from pentapod.kinematics.as_built import AsBuiltPentapod
+from pentapod.kinematics.batches import broadcast
 from pentapod.kinematics.blocks import blocks
 from pentapod.kinematics.carry import Pose, carry
 from pentapod.kinematics.leg_equations import Legs
@@ -60,10 +61,10 @@ def as_built_pose(
     readings, signs = as_batch(legs, "legs", (5,)), as_batch(component, "component", (2,))
     if not (np.isnan(readings) | ((readings > 0.0) & np.isfinite(readings))).all():
         raise ArrayError("legs must be finite and positive", expected="metres, NaN where there is no reading")
-    batch = np.broadcast_shapes(readings.shape[:-1], signs.shape[:-1])
-    readings = np.broadcast_to(readings, (*batch, 5)).reshape(-1, 5)
+    readings, signs = broadcast(readings, signs, ("legs", "component"))
+    batch, readings, signs = readings.shape[:-1], readings.reshape(-1, 5), signs.reshape(-1, 2)
     readings = np.where((readings > machine.zeros).all(axis=-1, keepdims=True), readings, np.nan)
-    position, direction = nominal.pose(readings, np.broadcast_to(signs, (*batch, 2)).reshape(-1, 2))
+    position, direction = nominal.pose(readings, signs)
     out = np.full((len(readings), 8), np.nan)  # position, direction, two errors
     proven = np.zeros(len(readings), dtype=bool)
     with np.errstate(all="ignore"):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, Ints, as_batch
+from pentapod.arrays import Floats, Ints
 from pentapod.errors import ArrayError
+from pentapod.kinematics.batches import joined_poses
 from pentapod.kinematics.cells import cell_decomposition
-from pentapod.kinematics.five_legs import broadcast
 from pentapod.kinematics.pentapod import LinearPentapod
 
 
@@ -19,7 +19,7 @@ def cell_of(pentapod: LinearPentapod, position: ArrayLike, direction: ArrayLike,
     S = 0 when a shift by `tolerance` times its distance from leg 3's base joint (or the size of the base) takes it
     there.
     """
-    p, i = broadcast(as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,)))
+    p, i = joined_poses(position, direction)
     reduced = p + pentapod.offsets[2] * i
     reduced[..., :2] -= pentapod.base[2]
     u, w = i[..., 0], i[..., 2]

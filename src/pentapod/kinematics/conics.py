@@ -81,6 +81,8 @@ def forbidden_conic(base: ArrayLike, leg: int) -> Conic:
     All zero where the other four are collinear with each other: then the design is singular wherever this one is.
     """
     xy = _one_base(base)
+    if leg not in range(5):
+        raise ArrayError("there is no such leg", value=leg, expected="0 … 4, legs 1 to 5")
     others = np.delete(np.arange(5), leg)
     origin = xy[others].mean(axis=0)
     x, y = (xy[others] - origin).T

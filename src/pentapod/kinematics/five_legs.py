@@ -7,9 +7,10 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_batch, as_floats
+from pentapod.arrays import Floats, as_floats
 from pentapod.compiled import kernels_pay
 from pentapod.errors import ArrayError, MachineError
+from pentapod.kinematics.batches import as_poses, joined_poses
 from pentapod.kinematics.blocks import blocks
 
 SAVED_BY_KERNELS = 30e-9
@@ -24,17 +25,21 @@ class FiveLegs:
 
     def leg_vectors(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return b_i − a_i (..., 5, 3) in metres for positions p and unit directions i (..., 3)."""
-        p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
+        p, i = as_poses(position, direction)
         legs = p[..., None, :] + self.offsets[:, None] * i[..., None, :]
         legs[..., :2] -= self.base
         return legs
+
+    def levers(self, tool_length: float) -> Floats:
+        """Return z_i − h (5,): the platform joints from the tip, along the line; metres. Raises ArrayError."""
+        return self.offsets - as_floats(tool_length, "tool_length")
 
     def leg_lengths(self, position: ArrayLike, direction: ArrayLike, *, out: Floats | None = None) -> Floats:
         """Return leg lengths (..., 5), metres, of positions p and unit directions i (..., 3).
 
         out: a contiguous array (..., 5) to write them to, for large batches again and again. Raises ArrayError.
         """
-        p, i = broadcast(as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,)))
+        p, i = joined_poses(position, direction)
         batch = p.shape[:-1]
         p, i = p.reshape(-1, 3), i.reshape(-1, 3)
         (legs,) = outputs(None if out is None else (out,), batch, (5,))
@@ -63,12 +68,6 @@ def outputs(out: tuple[Floats, ...] | None, batch: tuple[int, ...], *tails: tupl
                 f"out has shape {array.shape} of {array.dtype}", expected=f"contiguous float64 of shape {batch + tail}"
             )
     return tuple(array.reshape(-1, *tail) for array, tail in zip(out, tails, strict=True))
-
-
-def broadcast(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Return both with the same leading axes."""
-    batch = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
-    return np.broadcast_to(a, batch + a.shape[-1:]), np.broadcast_to(b, batch + b.shape[-1:])
 
 
 def given(value: ArrayLike, key: str, shape: tuple[int, ...]) -> Floats:

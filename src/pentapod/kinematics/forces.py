@@ -36,7 +36,7 @@ def leg_load_map(pentapod: FiveLegs, position: ArrayLike, direction: ArrayLike, 
     unit = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
     # Moments about the tip: there the lever of leg i along the line is z_i − h, and a force has none.
     # The line's own axis carries no moment, so two tangents suffice. Virtual work: Jᵀ f = −load.
-    levers = pentapod.offsets[:, None] - tool_length
+    levers = pentapod.levers(tool_length)[:, None]
     tangents = line_tangents(i)
     inverse = invert(np.concatenate([unit, levers * (unit @ tangents)], axis=-1), np.inf)
     forces = -np.swapaxes(inverse, -1, -2)

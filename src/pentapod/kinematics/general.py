@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pentapod.arrays import Bools, Floats, as_batch, frozen, set_frozen
 from pentapod.errors import MachineError
+from pentapod.kinematics.batches import as_poses, broadcast, joined_poses
 from pentapod.kinematics.blocks import blocks
-from pentapod.kinematics.five_legs import FiveLegs, broadcast, given
+from pentapod.kinematics.five_legs import FiveLegs, given
 from pentapod.kinematics.line_equations import LineEquations, line_condition
 from pentapod.kinematics.line_roots import interior, root
 from pentapod.kinematics.mode import MODES, as_labels
@@ -72,10 +73,10 @@ class GeneralPentapod(FiveLegs):
         """Return positions and directions (..., 3) in a mode: a `Mode`, or labels (..., 2).
 
         legs (..., 5) metres; the labels, each ±1, broadcast against their batch. NaN where no pose has these
-        leg lengths, and where a label is 0 or NaN. Raises ArrayError for other labels.
+        leg lengths, and where a label is 0 or NaN. Raises ArrayError for other labels and other shapes.
         """
         labels = as_labels(as_batch(mode, "mode", (2,)), "mode", "for the order and for the image")
-        lengths, labels = broadcast(as_batch(legs, "legs", (5,)), labels)
+        lengths, labels = broadcast(as_batch(legs, "legs", (5,)), labels, ("legs", "mode"))
         batch, lengths, labels = lengths.shape[:-1], lengths.reshape(-1, 5), labels.reshape(-1, 2)
         named = (np.abs(labels) == 1.0).all(axis=-1)
         position, direction = self._solve(np.where(named[:, None], lengths, np.nan), labels[:, 0])
@@ -87,7 +88,7 @@ class GeneralPentapod(FiveLegs):
 
     def mode(self, position: ArrayLike, direction: ArrayLike) -> NDArray[np.int8]:
         """Return the labels (..., 2) of the mode of each pose (..., 3): order and image; 0 where singular or NaN."""
-        p, i = broadcast(as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,)))
+        p, i = joined_poses(position, direction)
         pz, w = p[..., 2] + self.offsets[2] * i[..., 2], i[..., 2]
         labels = np.stack([self.order_value(p, i), np.where(w == 0.0, pz, w)], axis=-1)
         known = np.isfinite(p.sum(axis=-1) + i.sum(axis=-1))
@@ -99,7 +100,7 @@ class GeneralPentapod(FiveLegs):
         It is −½ of the quartic's slope at the pose's root: negative on the first root, positive on the second, zero on
         a singularity. Its sign is the mode's order.
         """
-        p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
+        p, i = as_poses(position, direction)
         return polynomial_terms(self, p, i)[..., :5] @ (self.equations.null_vector * (1.0, -1.0, -1.0, -1.0, -1.0))
 
     def mirror(self, position: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pentapod.arrays import Floats, as_floats, frozen, set_frozen
 from pentapod.errors import ArrayError
 from pentapod.geometry.directions import normalised
-from pentapod.kinematics.five_legs import broadcast
+from pentapod.kinematics.batches import broadcast
 from pentapod.kinematics.guides import ReconfigurablePentapod
 from pentapod.kinematics.jacobian import line_tangents
 from pentapod.kinematics.quadratic import reciprocal_condition
@@ -92,8 +92,10 @@ def choose_slides(
     optimum, and never worse than the start. Raises ArrayError where the start is outside the travel or too near to
     architectural singularity.
     """
-    p, i = broadcast(as_floats(position, "position", (3,)), normalised(direction))
+    p, i = broadcast(as_floats(position, "position", (3,)), normalised(direction), ("position", "direction"))
     p, i = p.reshape(-1, 3), i.reshape(-1, 3)
+    if not (len(p) and candidates > 0):
+        raise ArrayError("there is nothing to choose from", value=(len(p), candidates), expected="poses and candidates")
     low, high = robot.travel.T
     here = np.zeros(5) if start is None else as_floats(start, "start", (5,))
     if ((here < low) | (here > high)).any():

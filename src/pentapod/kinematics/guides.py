@@ -76,9 +76,7 @@ class ReconfigurablePentapod:
         whether within the travel or not. A guide along y meets it once at most. Empty too for a fixed joint, or where F
         is 0 all along the guide: `determinant` tells which.
         """
-        here = as_floats(slides, "slides", (5,)).copy()
-        here[leg] = 0.0
-        conic = forbidden_conic(self.base_at(here), leg)
+        conic = forbidden_conic(self.base_at(slides), leg)
         x, y = self.pentapod.base[leg] - conic.origin
         gx, gy = self.guides[leg]
         a, b, _, d, e, g = conic.coefficients

@@ -34,6 +34,7 @@ MODES = (Mode(-1, 1), Mode(-1, -1), Mode(1, 1), Mode(1, -1))
 def as_labels(value: ArrayLike, name: str, meaning: str) -> Floats:
     """Return labels (..., n) whose entries are +1, −1, or 0 and NaN for "no pose". Raises ArrayError for others."""
     labels = as_batch(value, name, ())
-    if not (np.isnan(labels) | (np.abs(labels) == 1.0) | (labels == 0.0)).all():
-        raise ArrayError(f"{name} is out of range", value=np.asarray(value).tolist(), expected=f"+1 or −1 {meaning}")
+    known = np.isnan(labels) | (np.abs(labels) == 1.0) | (labels == 0.0)
+    if not known.all():
+        raise ArrayError(f"{name} is out of range", value=float(labels[~known][0]), expected=f"+1 or −1 {meaning}")
     return labels

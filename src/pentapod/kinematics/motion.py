@@ -2,8 +2,10 @@
 
 Between two setpoints the legs are polynomials in time. `certify_motion` carries the pose along (`carry`): where it
 succeeds, the motion that the legs prescribe exists, is unique and continuous, and keeps clear of every singularity,
-so it stays in its component. This needs no closed form: general pentapods, base joints off the plane and rings are
-all the same to it. For the quadratic family `certify_component` says the same, faster.
+so it stays in its component. Where the poses at the two ends are proven to be on different sides of the singularities
+(`sides`), no motion leads from one to the other without meeting one. This needs no closed form: general pentapods,
+base joints off the plane and rings are all the same to it. For the quadratic family `certify_component` is faster,
+and bounds |w| and |S|; here there are no such functions, and what is bounded is how far leg errors move the pose.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from pentapod.kinematics.blocks import blocks
 from pentapod.kinematics.carry import carry
 from pentapod.kinematics.leg_equations import Legs, mids
 from pentapod.kinematics.newton import newton
+from pentapod.kinematics.sides import proven_sides
 from pentapod.kinematics.tube import LegFamily
 
 
@@ -32,9 +35,12 @@ class MotionProof:
     proven (N,): from the exact pose next to the interval's first one in `position` and `direction` the motion is
     defined and continuous throughout, ends at the exact pose next to the second one, and its Jacobian is never
     singular. Where all are proven, this holds for the whole of them: the motion stays in the component it begins in.
+    refuted (N,): proven not to be so: the Jacobian's determinant has opposite signs at these two poses, so that every
+    continuous motion from one to the other, whatever its legs do on the way, meets a singularity (or a pose in which
+    the base joint of a ring lies on the line). What is neither is `undecided`.
     position, direction (N + 1, 3): the poses at the intervals' ends, from those given by Newton's method; NaN where it
     did not settle.
-    reached (N,): the share of each interval up to which the proof goes: 1 where proven. What comes after is undecided:
+    reached (N,): the share of each interval up to which the proof goes: 1 where proven. What comes after is not proven:
     the motion comes near a singularity there, or the pose is lost.
     stop (N,): where the proof was tried in vain, [reached, stop] of the interval; 1 where proven.
     position_sensitivity, direction_sensitivity (N,): proven for as far as the proof goes: legs that differ by up to a
@@ -43,6 +49,7 @@ class MotionProof:
     """
 
     proven: Bools
+    refuted: Bools
     position: Floats
     direction: Floats
     reached: Floats
@@ -53,6 +60,11 @@ class MotionProof:
     def __post_init__(self) -> None:
         for array in (getattr(self, field.name) for field in fields(self)):
             array.flags.writeable = False
+
+    @property
+    def undecided(self) -> Bools:
+        """Which intervals (N,) are neither proven nor refuted."""
+        return ~(self.proven | self.refuted)
 
     @property
     def holds(self) -> bool:
@@ -69,7 +81,7 @@ def certify_motion(
     leg_error: float = 0.0,
     depth: int = 16,
 ) -> MotionProof:
-    """Prove, interval by interval, that a motion of the legs meets no singularity.
+    """Prove, interval by interval, that a motion of the legs meets no singularity; or that it does.
 
     leg_coefficients (N, 5, k + 1): Bernstein coefficients in metres of each leg's reading on each interval (for legs
     linear between setpoints: both setpoints). position, direction (N + 1, 3): the poses at the ends of the intervals,
@@ -85,7 +97,8 @@ def certify_motion(
     _check(machine, coefficients, p, i, leg_error, depth)
     n = len(coefficients)
     if n == 0:
-        return MotionProof(np.ones(0, dtype=bool), p.copy(), i.copy(), *(np.ones(0) for _ in range(4)))
+        nothing = np.zeros(0, dtype=bool)
+        return MotionProof(nothing, nothing, p.copy(), i.copy(), *(np.ones(0) for _ in range(4)))
     scale, out = machine.scale, np.full((4, n), np.nan)
     ends = np.concatenate([coefficients[:, :, 0], coefficients[-1:, :, -1]]).T - machine.zeros[:, None]
     with np.errstate(all="ignore"):
@@ -104,7 +117,16 @@ def certify_motion(
             )
             out[:2, block] = found.reached, np.minimum(found.reached + found.step, 1.0)
             out[2:, block] = np.where(found.reached > 0.0, found.sensitivity, np.inf)
-    return MotionProof(out[0] == 1.0, nodes_p.T.copy(), nodes_i.T.copy(), *out)
+        refuted = np.zeros(n, dtype=bool)
+        doubt = np.flatnonzero(out[0] < 1.0)
+        for block in blocks(len(doubt), 2048):
+            some = doubt[block]
+            before, after = (
+                proven_sides((nodes_p[:, k], nodes_i[:, k]), route.legs(legs[:, some]), route.slack, scale)
+                for k, legs in ((some, route.coefficients[0]), (some + 1, route.coefficients[-1]))
+            )
+            refuted[some] = before * after < 0
+    return MotionProof(out[0] == 1.0, refuted, nodes_p.T.copy(), nodes_i.T.copy(), *out)
 
 
 class _Motion:

@@ -9,10 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from pentapod.arrays import Floats, Ints, as_batch, frozen, set_frozen
 from pentapod.compiled import kernels_pay
-from pentapod.errors import ArrayError, MachineError
+from pentapod.errors import MachineError
+from pentapod.kinematics.batches import as_poses, broadcast
 from pentapod.kinematics.blocks import blocks
 from pentapod.kinematics.component import COMPONENTS
-from pentapod.kinematics.five_legs import SAVED_BY_KERNELS, FiveLegs, broadcast, given, outputs
+from pentapod.kinematics.five_legs import SAVED_BY_KERNELS, FiveLegs, given, outputs
+from pentapod.kinematics.mode import as_labels
 from pentapod.kinematics.offsets import check_offsets, fit_delta
 from pentapod.kinematics.quadratic import NEAR_W_SQUARED, LinearPart, Reduced, reciprocal_condition, solve, w_and_s
 from pentapod.kinematics.quadratic_near import solve_near
@@ -98,11 +100,10 @@ class LinearPentapod(FiveLegs):
         lengths, signs = as_batch(legs, "legs", (5,)), as_batch(component, "component", (2,))
         named = (np.abs(signs) == 1.0).all(axis=-1)
         if not named.all():
-            if not (np.isnan(signs) | (np.abs(signs) == 1.0) | (signs == 0.0)).all():
-                raise ArrayError("component must hold signs", expected="+1 or −1 for w and for S")
+            as_labels(signs, "component", "for w and for S")
             lengths = np.where(named[..., None], lengths, np.nan)
         if signs.ndim > 1:
-            lengths, signs = broadcast(lengths, signs)
+            lengths, signs = broadcast(lengths, signs, ("legs", "component"))
         batch = lengths.shape[:-1]
         position, direction = outputs(out, batch, (3,), (3,))
         self._solve(lengths.reshape(-1, 5), signs.reshape(-1, 2), position, direction)
@@ -113,7 +114,7 @@ class LinearPentapod(FiveLegs):
 
         position and direction (..., 3), machine frame. Compare with a `Component`, or hand it to `pose`.
         """
-        p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
+        p, i = as_poses(position, direction)
         w, s = w_and_s(p, i, self.delta, self.lever)
         signs = np.sign(np.stack(np.broadcast_arrays(w, s), axis=-1))
         known = np.isfinite(p.sum(axis=-1) + i.sum(axis=-1))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.arrays import Floats, as_batch
+from pentapod.kinematics.batches import as_poses
 from pentapod.kinematics.pentapod import LinearPentapod
 from pentapod.kinematics.quadratic import reciprocal_condition, w_and_s
 
@@ -18,7 +19,7 @@ def singularity_values(pentapod: LinearPentapod, position: ArrayLike, direction:
 
     w is the z component of the direction; S = δ w px − (δu − 1) pz. Their signs name the component.
     """
-    p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
+    p, i = as_poses(position, direction)
     w, s = np.broadcast_arrays(*w_and_s(p, i, pentapod.delta, pentapod.lever))
     return w.copy(), s.copy()
 
@@ -63,7 +64,7 @@ def orientation_distance(
     N = (−δ fz, 0, δ fx + lever − about), which exists where |fz| ≤ |N|. Angles are taken by the arc tangent,
     which keeps its digits everywhere.
     """
-    p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
+    p, i = as_poses(position, direction)
     u, v, w = np.moveaxis(i, -1, 0)
     fixed = p + about * i
     fx, fz = fixed[..., 0], fixed[..., 2]

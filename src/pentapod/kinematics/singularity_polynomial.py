@@ -12,7 +12,8 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_batch
+from pentapod.arrays import Floats
+from pentapod.kinematics.batches import as_poses
 from pentapod.kinematics.exact import determinant
 from pentapod.kinematics.five_legs import FiveLegs
 
@@ -31,7 +32,7 @@ def singularity_polynomial(pentapod: FiveLegs, position: ArrayLike, direction: A
 
     It is evaluated relative to leg 3, which changes no value and keeps the digits of a machine far from the origin.
     """
-    p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
+    p, i = as_poses(position, direction)
     cofactors = np.array([float(c) for c in exact_cofactors(*reduced(pentapod.base, pentapod.offsets))])
     return polynomial_terms(pentapod, p, i) @ cofactors
 

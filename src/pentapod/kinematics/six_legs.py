@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pentapod.arrays import Floats, as_batch, frozen, set_frozen
 from pentapod.errors import MachineError
+from pentapod.kinematics.batches import as_poses, broadcast, common_batch
 from pentapod.kinematics.component import COMPONENTS
-from pentapod.kinematics.five_legs import broadcast, given
+from pentapod.kinematics.five_legs import given
 from pentapod.kinematics.general import GeneralPentapod
 from pentapod.kinematics.mode import MODES, as_labels
 from pentapod.kinematics.pentapod import LinearPentapod
@@ -103,7 +104,7 @@ class SixLegPlatform:
         has these leg lengths (`platform_obstacles` says why), and where a sign is 0 or NaN. Raises ArrayError.
         """
         signs = as_labels(as_batch(label, "label", (3,)), "label", "for the line's two signs and the twist's")
-        lengths, signs = broadcast(as_batch(legs, "legs", (6,)), signs)
+        lengths, signs = broadcast(as_batch(legs, "legs", (6,)), signs, ("legs", "label"))
         p, i = self.pentapod.pose(lengths[..., :5], signs[..., :2])
         seen = p + self.sixth_joint[2] * i - self.sixth_base
         arm = dihedral(seen, i, float(np.hypot(*self.sixth_joint[:2])), lengths[..., 5], signs[..., 2])
@@ -119,7 +120,7 @@ class SixLegPlatform:
 
     def sixth_leg_range(self, position: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:
         """Return the shortest and longest sixth leg (...), metres, as the platform turns about a line (..., 3)."""
-        p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
+        p, i = as_poses(position, direction)
         seen = p + self.sixth_joint[2] * i - self.sixth_base
         height, distance = np.einsum("...k,...k->...", seen, i), np.linalg.norm(np.cross(seen, i), axis=-1)
         radius = float(np.hypot(*self.sixth_joint[:2]))
@@ -129,5 +130,5 @@ class SixLegPlatform:
 def _pose(position: ArrayLike, rotation: ArrayLike) -> tuple[Floats, Floats]:
     """Return positions (..., 3) and rotations (..., 3, 3) of one batch. Raises ArrayError for other shapes."""
     p, r = as_batch(position, "position", (3,)), as_batch(rotation, "rotation", (3, 3))
-    batch = np.broadcast_shapes(p.shape[:-1], r.shape[:-2])
+    batch = common_batch(p, r, ("position", "rotation"), tail=2)
     return np.broadcast_to(p, (*batch, 3)), np.broadcast_to(r, (*batch, 3, 3))

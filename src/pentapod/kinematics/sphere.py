@@ -22,7 +22,8 @@ import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, Ints, as_batch
+from pentapod.arrays import Floats, Ints
+from pentapod.kinematics.batches import joined_poses
 from pentapod.kinematics.blocks import blocks
 from pentapod.kinematics.pentapod import LinearPentapod
 
@@ -57,7 +58,7 @@ def singularity_free_sphere(
     pose in its component. Machine frame, metres; direction is unit. The radius is accurate to 1e-12 of the distance
     of the pose from the base. Source: see the head of this file.
     """
-    p, i = np.broadcast_arrays(as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,)))
+    p, i = joined_poses(position, direction)
     batch = p.shape[:-1]
     p, i = p.reshape(-1, 3), i.reshape(-1, 3)
     mean, spread = float(pentapod.offsets.mean()), float(pentapod.offsets.std())

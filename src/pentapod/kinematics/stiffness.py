@@ -24,7 +24,7 @@ def tip_stiffness(
     """
     vectors = pentapod.leg_vectors(position, direction)
     unit = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    levers = (pentapod.offsets[:, None] - tool_length) * as_batch(direction, "direction", (3,))[..., None, :]
+    levers = pentapod.levers(tool_length)[:, None] * as_batch(direction, "direction", (3,))[..., None, :]
     wrenches = np.concatenate([unit, np.asarray(np.cross(levers, unit), dtype=np.float64)], axis=-1)
     return np.swapaxes(wrenches, -1, -2) @ (_stiffness(leg_stiffness)[..., None] * wrenches)
 

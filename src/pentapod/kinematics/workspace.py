@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_batch, frozen, set_frozen
+from pentapod.arrays import Floats, as_batch, as_floats, frozen, set_frozen
 from pentapod.errors import ArrayError
 from pentapod.geometry.directions import normalised
 from pentapod.kinematics.component import COMPONENTS, Component
@@ -45,6 +45,7 @@ class Workspace:
             direction=frozen(normalised(self.direction), "direction", (3,)),
             shortest=frozen(self.shortest, "shortest", (5,)),
             longest=frozen(self.longest, "longest", (5,)),
+            tool_length=float(as_floats(self.tool_length, "tool_length")),
         )
         if not ((self.shortest >= 0.0) & (self.shortest < self.longest)).all():
             raise ArrayError("leg limits exclude each other", expected="0 ≤ shortest < longest for each leg")
@@ -62,7 +63,7 @@ class Workspace:
         −∞ everywhere when the cone of directions crosses w = 0.
         """
         t = as_batch(tips, "tips", (3,))
-        robot, delta, reach = self.pentapod, self.pentapod.delta, self.pentapod.offsets - self.tool_length
+        robot, delta, reach = self.pentapod, self.pentapod.delta, self.pentapod.levers(self.tool_length)
         flat = np.zeros((5, 3))
         flat[:, :2] = robot.base
         to_tip = t[..., None, :] - flat
@@ -85,7 +86,7 @@ class Workspace:
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Return the lowest and the highest corner (3,) of a box that holds all tips that can be reached."""
-        reach = self.longest + np.abs(self.pentapod.offsets - self.tool_length)
+        reach = self.longest + np.abs(self.pentapod.levers(self.tool_length))
         flat = np.zeros((5, 3))
         flat[:, :2] = self.pentapod.base
         return (flat - reach[:, None]).max(axis=0), (flat + reach[:, None]).min(axis=0)

@@ -31,12 +31,17 @@ class Claim:
     """name as a user reads it; judge returns None where the claim does not apply.
 
     needs_pose: the claim means something only where the leg lengths have a pose at every sample; it fails
-    without being judged where they have none.
+    without being judged where they have none. needs_proof: its value is a bound for all times, which exists only where
+    the motion between the samples is proven; else it is undecided, and fails. idle: why it does not apply where
+    judge returns None; owed: it should have applied, so that a strict verdict counts it as failed.
     """
 
     name: str
     judge: Callable[[Replay], Finding | None]
     needs_pose: bool = True
+    needs_proof: bool = False
+    idle: str = ""
+    owed: bool = False
 
     def __call__(self, replay: Replay) -> Certificate | None:
         """Return the certificate of this claim, or None where it does not apply."""
@@ -44,11 +49,19 @@ class Claim:
             first = int(replay.unposed[0])
             method = f"not judged: the leg lengths have no pose at {len(replay.unposed)} of the samples"
             return Certificate(self.name, False, None, None, "", replay.place(first), method)
+        if self.needs_proof and len(unproven := replay.survey.unproven):
+            first, count = int(unproven[0]), len(unproven)
+            method = f"undecided: too near a singularity to prove where the motion goes on {count} half periods"
+            return Certificate(self.name, False, None, None, "", replay.place(first), method)
         found = self.judge(replay)
         if found is None:
             return None
         value, bound = _plain(found.value), _plain(found.bound)
         return Certificate(self.name, bool(found.passed), value, bound, found.unit, found.where, found.method)
+
+    def unjudged(self) -> Certificate:
+        """Return the certificate that stands in a strict verdict where the claim does not apply."""
+        return Certificate(self.name, not self.owed, None, None, "", Place(), f"does not apply: {self.idle}")
 
 
 def _plain(number: float | None) -> float | None:

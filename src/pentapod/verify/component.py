@@ -2,42 +2,49 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from pentapod.arrays import Floats
-from pentapod.kinematics.certificate import ComponentProof
 from pentapod.verify.claim import Claim, Finding
 from pentapod.verify.replay import Replay
 
 _METHOD = (
-    "component {component}; proven for all times: {what} by Bernstein coefficients of the discriminants of the "
+    "{answer}; component {component}: {what} for all times, by Bernstein coefficients of the discriminants of the "
     "forward kinematics, rounded outwards, even if each leg is off by {error:g} mm at any time"
 )
 
 
 def axis_upright(replay: Replay) -> Finding:
     """Judge that w keeps the sign of the component: the platform line never falls into the base plane."""
-    proof = replay.proof
-    angles = np.degrees(np.arcsin(np.minimum(proof.w_lower, 1.0)))
-    return _finding(replay, angles, proof, "deg", "least angle between platform line and base plane,")
+    found = replay.survey.component.upright
+    least = math.degrees(math.asin(min(-float(found.values[0]), 1.0)))
+    what = "least angle between platform line and base plane,"
+    return _finding(replay, least, int(found.at[0]), "deg", what)
 
 
 def off_singular_plane(replay: Replay) -> Finding:
     """Judge that S keeps the sign of the component: no configuration with det J = 0 because of S = 0."""
-    proof = replay.proof
+    found = replay.survey.component.away
     # |S| / √(δ²w² + (1 − δu)²) is the distance to S = 0 at fixed orientation; the root is ≤ 1 + |δ|.
-    distances = 1e3 * proof.s_lower / (1.0 + abs(replay.machine.pentapod.delta))
-    return _finding(replay, distances, proof, "mm", "lower bound of the position's distance to S = 0,")
+    least = -1e3 * float(found.values[0]) / (1.0 + abs(replay.machine.pentapod.delta))
+    what = "lower bound of the position's distance to S = 0,"
+    return _finding(replay, least, int(found.at[0]), "mm", what)
 
 
-def _finding(replay: Replay, values: Floats, proof: ComponentProof, unit: str, what: str) -> Finding:
-    worst = int(np.argmin(values))
-    passed = bool((values > 0.0).all())
-    where = replay.place(2 * worst)
-    method = _METHOD.format(component=proof.component, what=what, error=1e3 * replay.path_tolerance)
+def _finding(replay: Replay, least: float, interval: int, unit: str, what: str) -> Finding:
+    found, passed = replay.survey.component, least > 0.0
+    answer = "held"
     if not passed:
-        method += f"; not proven on {int((values <= 0.0).sum())} of {len(values)} intervals"
-    return Finding(passed, float(values[worst]), 0.0, unit, where, method)
+        doubtful = found.first_refuted or found.first_undecided
+        answer = "refuted: the legs have no pose" if found.first_refuted else "undecided: too near a singularity"
+        if doubtful is not None:
+            interval, start, stop = doubtful
+            period = replay.program.period
+            answer += f", first from {(interval + start) * period:.6f} to {(interval + stop) * period:.6f} s"
+            answer += f"; {found.refuted} intervals refuted, {found.undecided} undecided"
+    method = _METHOD.format(
+        answer=answer, component=replay.program.component, what=what, error=1e3 * replay.path_tolerance
+    )
+    return Finding(passed, least, 0.0, unit, replay.place(2 * interval), method)
 
 
 CLAIMS = (

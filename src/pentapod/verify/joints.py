@@ -1,4 +1,4 @@
-"""Claims about the joints' angles."""
+"""Claims about the joints' angles: proven for all times."""
 
 from __future__ import annotations
 
@@ -6,58 +6,49 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.verify.claim import Claim, Finding
-from pentapod.verify.replay import Replay, excursion
+from pentapod.verify.replay import Replay
+from pentapod.verify.survey import Extreme
 
 _METHOD = (
-    "joint of leg {leg}; at the rows and halfway between, plus a margin for the rest of the time "
-    "(a quarter of the second difference): sampled, not proven"
+    "joint of leg {leg} is closest to its limit; proven bound for all times, rows and between: the cosine as a "
+    "quotient of polynomials, with what the motion strays from the chord between two samples (Krawczyk's operator)"
 )
 
 
 def base_cones(replay: Replay) -> Finding:
     """Judge the angle between each leg and the axis of its base joint's cone."""
-    legs = replay.machine.pentapod.leg_vectors(*replay.pose)
-    return _finding(replay, _angles(legs, replay.machine.joints.base_axes), replay.machine.joints.base_cone, sign=1)
+    widest = replay.survey.base_widest
+    return _finding(replay, widest, _angles(-widest.values), replay.machine.joints.base_cone, sign=1)
 
 
 def platform_least(replay: Replay) -> Finding:
     """Judge that no leg folds too close to the tool axis."""
-    return _finding(replay, _platform_angles(replay), replay.machine.joints.platform_range[:, 0], sign=-1)
+    closed = replay.survey.platform_closed
+    return _finding(replay, closed, _angles(closed.values), replay.machine.joints.platform_range[:, 0], sign=-1)
 
 
 def platform_most(replay: Replay) -> Finding:
     """Judge that no leg opens too far from the tool axis."""
-    return _finding(replay, _platform_angles(replay), replay.machine.joints.platform_range[:, 1], sign=1)
+    widest = replay.survey.platform_open
+    return _finding(replay, widest, _angles(-widest.values), replay.machine.joints.platform_range[:, 1], sign=1)
 
 
-def _platform_angles(replay: Replay) -> Floats:
-    """Return the angles (M, 5) between leg, platform → base joint, and tool axis, tip → spindle: radians."""
-    # Both vectors are the negatives of those that kinematics uses: the angle is the same.
-    position, direction = replay.pose
-    return _angles(replay.machine.pentapod.leg_vectors(position, direction), direction[:, None, :])
-
-
-def _finding(replay: Replay, angles: Floats, limit: Floats, *, sign: int) -> Finding:
-    """Judge angles (M, 5) against limits (5,), the largest (sign 1) or the least ones (sign −1)."""
-    high = sign * angles
-    between = np.maximum(np.maximum(high[:-1:2], high[1::2]), high[2::2]) + excursion(angles)
-    interval, leg = np.unravel_index(int(np.argmax(between - sign * limit)), between.shape)
-    value, bound = sign * float(between[interval, leg]), float(limit[leg])
-    sample = 2 * int(interval) + int(np.argmax(high[2 * interval : 2 * interval + 3, leg]))
-    method = _METHOD.format(leg=int(leg) + 1)
+def _finding(replay: Replay, where: Extreme, angles: Floats, limit: Floats, *, sign: int) -> Finding:
+    """Judge the extreme angles (5,) against limits (5,), the largest (sign 1) or the least ones (sign −1)."""
+    leg = int(np.argmax(sign * (angles - limit)))
+    value, bound = float(angles[leg]), float(limit[leg])
     passed = sign * value <= sign * bound
-    return Finding(passed, np.degrees(value), np.degrees(bound), "deg", replay.place(sample), method)
+    method = _METHOD.format(leg=leg + 1)
+    return Finding(passed, np.degrees(value), np.degrees(bound), "deg", replay.place(int(where.at[leg])), method)
 
 
-def _angles(vectors: Floats, units: Floats) -> Floats:
-    """Return the angles (...) in radians between vectors and unit vectors (..., 3)."""
-    along = np.einsum("...i,...i->...", vectors, units)
-    across = np.sqrt(np.maximum(np.einsum("...i,...i->...", vectors, vectors) - along * along, 0.0))
-    return np.arctan2(across, along)
+def _angles(cosines: Floats) -> Floats:
+    """Return the angles (5,) in radians that have these cosines, which bounds may push beyond ±1."""
+    return np.arccos(np.clip(cosines, -1.0, 1.0))
 
 
 CLAIMS = (
-    Claim("base joint cones", base_cones),
-    Claim("platform joints not too closed", platform_least),
-    Claim("platform joints not too open", platform_most),
+    Claim("base joint cones", base_cones, needs_proof=True),
+    Claim("platform joints not too closed", platform_least, needs_proof=True),
+    Claim("platform joints not too open", platform_most, needs_proof=True),
 )

@@ -16,7 +16,7 @@ from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify import bodies, component, joints, legs, origin, speed, tracking
 from pentapod.verify.claim import Claim
-from pentapod.verify.replay import Replay
+from pentapod.verify.replay import SURVEY_SHARE, Replay
 from pentapod.verify.verdict import Certificate, Place, Verdict
 
 READABLE = "readable"
@@ -70,9 +70,10 @@ def verify(
             return Verdict((Certificate(READABLE, False, None, None, "", Place(), str(error)),))
         method = f"{len(program.legs)} rows, {program.duration:.6g} s, {program.interpolation} between rows"
         read = [Certificate(READABLE, True, None, None, "", Place(), method)]
-    replay = Replay(program, machine, toolpath, tilt, path_tolerance, axis_tolerance, job_digest)
+    replay = Replay(program, machine, toolpath, tilt, path_tolerance, axis_tolerance, job_digest, progress)
+    _ = replay.survey
     for k, claim in enumerate(CLAIMS):
-        progress("verify", k / len(CLAIMS), claim.name)
+        progress("verify", SURVEY_SHARE + (1.0 - SURVEY_SHARE) * k / len(CLAIMS), claim.name)
         certificate = claim(replay)
         if certificate is not None:
             read.append(certificate)

@@ -33,6 +33,7 @@ class Match:
     times (n,): when each waypoint is visited, in samples. missed (n,): not passed in order, at any search
     radius tried. places (M,): the place of each sample, in waypoints (2.25 is a quarter of the way from
     waypoint 2 to 3), non-decreasing. arcs (M,): the same as arc length of the pivot's polyline, metres.
+    turned (M,): how far the path's axis has turned up to there in all, radians.
     distances (M,), waypoint_distances (n,) in metres and angles (M,), waypoint_angles (n,) in radians:
     between the matched pivots and axes.
     """
@@ -41,6 +42,7 @@ class Match:
     missed: Bools
     places: Floats
     arcs: Floats
+    turned: Floats
     distances: Floats
     waypoint_distances: Floats
     angles: Floats
@@ -104,11 +106,14 @@ def _measure(motion: Course, path: Course, visits: Visits, places: Floats) -> Ma
     at = (times - chord)[:, None]
     visited = motion.points[chord] * (1.0 - at) + motion.points[chord + 1] * at
     pointed = motion.axes[chord] * (1.0 - at) + motion.axes[chord + 1] * at
+    turns = np.concatenate([[0.0], np.cumsum(angle_between(path.axes[:-1], path.axes[1:]))])
+    waypoints = np.arange(len(path.points))
     return Match(
         times=times,
         missed=visits.missed,
         places=places,
-        arcs=np.interp(places, np.arange(len(path.points)), arc_length(path.points)),
+        arcs=np.interp(places, waypoints, arc_length(path.points)),
+        turned=np.interp(places, waypoints, turns),
         distances=np.linalg.norm(motion.points - points, axis=1),
         waypoint_distances=np.linalg.norm(visited - path.points, axis=1),
         angles=angle_between(motion.axes, axes),

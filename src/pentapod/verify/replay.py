@@ -8,14 +8,17 @@ from functools import cached_property
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
-from pentapod.geometry.interpolant import Interpolant
-from pentapod.kinematics.certificate import ComponentProof, certify_component
 from pentapod.machine.machine import Machine
 from pentapod.program.program import Program
+from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify.matching import Match, match
+from pentapod.verify.survey import Survey, survey
 from pentapod.verify.verdict import Place
 from pentapod.verify.visits import Course
+
+SURVEY_SHARE = 0.6
+"""Of the time that a verdict takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +27,7 @@ class Replay:
 
     tilt and axis_tolerance in radians, path_tolerance in metres. job_digest: of the job that the program
     should belong to, None where that is not asked. *Samples* are the rows and the moments halfway between
-    them: M = 2N − 1, sample 2k is row k.
+    them: M = 2N − 1, sample 2k is row k. *Chords* are the M − 1 stretches of time between them.
     """
 
     program: Program
@@ -34,55 +37,47 @@ class Replay:
     path_tolerance: float
     axis_tolerance: float
     job_digest: str | None = None
+    progress: Progress = silent
 
     @cached_property
-    def motion(self) -> Interpolant:
-        """The polynomials that the legs follow between the rows, metres."""
-        return Interpolant.through(self.program.legs, self.program.period, self.program.interpolation)
+    def survey(self) -> Survey:
+        """What the walk along the controller's polynomials measures and proves."""
 
-    @cached_property
-    def proof(self) -> ComponentProof:
-        """What is proven about the component on each interval between rows.
+        def told(share: float) -> None:
+            self.progress("verify", SURVEY_SHARE * share, "between the rows")
 
-        For the program and for every motion whose legs stay within the path tolerance of it: legs that pass
-        through a singularity look like legs that turn back just before it.
-        """
-        return certify_component(
-            self.machine.pentapod,
-            self.motion.bernstein,
-            self.program.component,
-            leg_error=self.path_tolerance,
-        )
+        return survey(self.program, self.machine, self.toolpath.pivot, self.path_tolerance, told)
 
-    @cached_property
+    @property
     def pose(self) -> tuple[Floats, Floats]:
         """Positions and directions (M, 3) at the samples, machine frame, in the component of the header.
 
         By the closed-form forward kinematics; NaN where these leg lengths have no pose.
         """
-        return self.machine.pentapod.pose(self.motion.halves, self.program.component)
+        return self.survey.position, self.survey.direction
 
     @cached_property
     def unposed(self) -> Ints:
         """The samples where the leg lengths have no pose."""
         position, direction = self.pose
-        return np.flatnonzero(~np.isfinite(position).all(axis=1) | ~np.isfinite(direction).all(axis=1))
-
-    @cached_property
-    def tips(self) -> Floats:
-        """Tool tips (M, 3) at the samples, metres, workpiece frame by the header's placement."""
-        position, direction = self.pose
-        return self.program.placement.inverse().apply(position + self.machine.tool_length * direction)
+        return np.flatnonzero(~np.isfinite(position.sum(axis=1) + direction.sum(axis=1)))
 
     @cached_property
     def axes(self) -> Floats:
-        """Tool axes (M, 3) at the samples, tip → spindle, workpiece frame."""
+        """Tool axes (M, 3) at the samples, tip → spindle, workpiece frame by the header's placement."""
         return self.program.placement.inverse().rotate(-self.pose[1])
 
     @cached_property
     def pivots(self) -> Floats:
         """The points (M, 3) about which the tool may tilt, workpiece frame, metres."""
-        return self.tips + self.toolpath.pivot * self.axes
+        position, direction = self.pose
+        along = self.machine.tool_length - self.toolpath.pivot
+        return self.program.placement.inverse().apply(position + along * direction)
+
+    @property
+    def chord_arcs(self) -> Floats:
+        """By how much (M − 1,) the toolpath's axis turns at most on each chord, in all, radians."""
+        return np.diff(self.match.turned)
 
     @cached_property
     def match(self) -> Match:
@@ -98,24 +93,3 @@ class Replay:
         else:
             segment = None
         return Place(round(float(sample) * 0.5 * self.program.period, 9), int(sample) // 2, segment)
-
-
-def excursion(values: Floats) -> Floats:
-    """Return how far (N − 1, ...) a quantity may stray between the samples from straight lines through them.
-
-    values (2N − 1, ...) at the samples. Over half an interval a function strays from its chord by at most an
-    eighth of (largest second derivative · time²); the second difference over the interval estimates that
-    product, and is doubled for how the second derivative may vary within one interval. An estimate with a
-    margin, not a proof. It stays within intervals, since linear interpolation has corners at the rows.
-    """
-    return np.abs(values[:-1:2] - 2.0 * values[1::2] + values[2::2]) / 4.0
-
-
-def at_samples(between: Floats) -> Floats:
-    """Return for each sample (2N − 1,) the larger value of the intervals (N − 1,) it belongs to."""
-    rows = np.zeros(len(between) + 1)
-    rows[:-1] = between
-    rows[1:] = np.maximum(rows[1:], between)
-    samples = np.empty(2 * len(between) + 1)
-    samples[::2], samples[1::2] = rows, between
-    return samples
