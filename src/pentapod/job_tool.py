@@ -13,7 +13,8 @@ from pentapod.strategy_tables import sunk_mm
 from pentapod.table import Vector
 from pentapod.toolpath.axis_modes import AxisMode, Between, Fixed, Normal, Pointed
 from pentapod.toolpath.facet_tree import FacetTree
-from pentapod.toolpath.gouge import GougeOptions, Remedy, checked
+from pentapod.toolpath.gouge import checked
+from pentapod.toolpath.gouge_report import GougeOptions, Remedy
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.orientation import Orientation
 from pentapod.toolpath.orienting import oriented

@@ -13,7 +13,8 @@ from pentapod.errors import ToolpathError
 from pentapod.geometry import angle_between
 from pentapod.toolpath import Mesh, Segment, SegmentKind, Toolpath
 from pentapod.toolpath.facet_tree import FacetTree
-from pentapod.toolpath.gouge import GougeOptions, Remedy, checked
+from pentapod.toolpath.gouge import checked
+from pentapod.toolpath.gouge_report import GougeOptions, Remedy
 from pentapod.toolpath.solids import Cone
 from pentapod.toolpath.sweep import sweep
 from pentapod.toolpath.tools import BallCutter, FlatEnd

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from enum import StrEnum
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints
-from pentapod.errors import ToolpathError
 from pentapod.geometry.directions import tangent_frame
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.facet_tree import FacetTree
+from pentapod.toolpath.gouge_report import GougeOptions, GougeReport, Remedy
 from pentapod.toolpath.links import RAPID_SPACING_M, spaced
-from pentapod.toolpath.solids import KINDS
 from pentapod.toolpath.sweep import RESOLUTION_M, Sweep, sweep, touch
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.toolpath.tools import Tool
@@ -24,87 +22,6 @@ _LIFTS = 40
 _ROUNDS = 3
 _RISES = (0.05, 0.1, 0.25, 0.5, 1.0)
 """Of the most that lifting may lift: how high a link is tried that stands for a dropped cut."""
-
-
-class Remedy(StrEnum):
-    """What is done about a gouge: tilt the tool clear within a cone, lift it along its axis, drop the cut, nothing."""
-
-    TILT = "tilt"
-    LIFT = "lift"
-    DROP = "drop"
-    REPORT = "report"
-
-
-@dataclass(frozen=True)
-class GougeOptions:
-    """remedies: tried in this order on what still gouges. tolerance: depth that counts as none, metres.
-
-    cone: half angle in radians within which tilting may turn the axis. highest: most that lifting may lift, metres.
-    Raises ToolpathError for values that make no sense.
-    """
-
-    remedies: tuple[Remedy, ...] = (Remedy.REPORT,)
-    tolerance: float = 20e-6
-    cone: float = float(np.radians(30.0))
-    highest: float = 20e-3
-
-    def __post_init__(self) -> None:
-        if not (self.tolerance > 0.0 and 0.0 < self.cone < 0.5 * np.pi and self.highest > 0.0):
-            raise ToolpathError(
-                "impossible limits", key="gouge", value=(self.tolerance, self.cone, self.highest), expected="positive"
-            )
-
-
-@dataclass(frozen=True)
-class GougeReport:
-    """What the check found. motions: cuts' motions between waypoints that were checked.
-
-    gouging: of them too deep at first; depths: the deepest of cutter, shank and holder at first, metres, −inf for none.
-    tilted, lifted: waypoints changed; dropped: motions taken out of the cut; most_lifted: metres.
-    left: motions still too deep, left_depth how deep, metres; places: the first waypoint of each run of those.
-    unclear: links deeper than the tolerance and rapids that touch, unclear_places likewise.
-    """
-
-    motions: int
-    gouging: int
-    depths: tuple[float, float, float]
-    tilted: int = 0
-    lifted: int = 0
-    most_lifted: float = 0.0
-    dropped: int = 0
-    left: int = 0
-    left_depth: float = 0.0
-    places: tuple[int, ...] = ()
-    unclear: int = 0
-    unclear_places: tuple[int, ...] = ()
-
-    def __str__(self) -> str:
-        text = f"gouge check: {self.motions:,} motions"
-        if not self.gouging:
-            return text + ", none gouges" + self._unclear()
-        deep = ", ".join(f"{k} {1e3 * d:.3g} mm" for k, d in zip(KINDS, self.depths, strict=True) if d > 0.0)
-        text += f", {self.gouging:,} gouged: {deep} deep"
-        if self.tilted:
-            text += f"\n  note: {self.tilted:,} waypoints tilted clear"
-        if self.lifted:
-            text += f"\n  note: {self.lifted:,} waypoints lifted, by up to {1e3 * self.most_lifted:.3g} mm"
-        if self.dropped:
-            text += f"\n  note: {self.dropped:,} motions dropped: material is left there"
-        if self.left:
-            worst = 1e3 * self.left_depth
-            text += f"\n  problem: {self.left:,} motions gouge by up to {worst:.3g} mm, from waypoints "
-            text += _some(self.places)
-        return text + self._unclear()
-
-    def _unclear(self) -> str:
-        if not self.unclear:
-            return ""
-        where = _some(self.unclear_places)
-        return f"\n  problem: {self.unclear:,} motions of links and rapids meet the part, from waypoints {where}"
-
-
-def _some(places: tuple[int, ...]) -> str:
-    return ", ".join(str(place) for place in places[:5]) + (", ..." if len(places) > 5 else "")
 
 
 def checked(
@@ -261,14 +178,14 @@ class _Work:
         """Return which waypoints (N,) belong to a cut that is not dropped."""
         return _ends(self.cut & ~self.dropped)
 
-    def _bridge(self, first: int, last: int) -> dict[str, Floats]:
+    def _bridge(self, first: int, last: int) -> tuple[Floats, Floats]:
         """Return tips and axes of the link from waypoint `first` to `last`: the lowest that is clear, else the highest.
 
         From a kept end up along its axis, above the waypoints between, and down; raised ends are there already.
         """
         kept = self._kept()
         over = slice(first + (not kept[first]), last + int(kept[last]))
-        way: dict[str, Floats] = {}
+        way = self.tips[first : last + 1], self.axes[first : last + 1]
         for rise in _RISES:
             middle = self.path.tips[over] + rise * self.options.highest * self.axes[over]
             tips, axes = [self.tips[first : first + 1]], [self.axes[first : first + 1]]
@@ -280,9 +197,9 @@ class _Work:
                 down = spaced(np.stack([middle[-1], self.tips[last]]), RAPID_SPACING_M)[1:-1]
                 tips, axes = [*tips, down], [*axes, np.tile(self.axes[last], (len(down), 1))]
             tips, axes = [*tips, self.tips[last : last + 1]], [*axes, self.axes[last : last + 1]]
-            way = {"tips": np.concatenate(tips), "axes": np.concatenate(axes)}
-            rows = np.arange(len(way["tips"]) - 1)
-            if (_met(self, way["tips"], way["axes"], rows, self.options.tolerance).deepest == -np.inf).all():
+            way = np.concatenate(tips), np.concatenate(axes)
+            rows = np.arange(len(way[0]) - 1)
+            if (_met(self, *way, rows, self.options.tolerance).deepest == -np.inf).all():
                 break
         return way
 
@@ -296,7 +213,7 @@ class _Work:
             for p, q in pairwise(breaks):
                 if self.dropped[p]:
                     feed = link_feeds[0] if link_feeds else old.feed
-                    segments.append(Segment(SegmentKind.LINK, **self._bridge(p, q), feed=feed))
+                    segments.append(Segment(SegmentKind.LINK, *self._bridge(p, q), feed))
                 else:
                     segments.append(replace(old, tips=self.tips[p : q + 1], axes=self.axes[p : q + 1]))
         return Toolpath(tuple(segments), self.path.pivot)
