@@ -35,8 +35,9 @@ bench-timing: $(READY)  ## time laws against toppra and, where they are installe
 bench-planning: $(READY)  ## the planner's solver against IPOPT
 	$(BIN)/python benchmarks/planning.py
 
-bench-gouge: $(READY)  ## contact points and gouge check against another library's drop cutter
+bench-gouge: $(READY)  ## contact points and gouge check against another library's drop cutter, rasters against bare sections
 	$(BIN)/python benchmarks/gouge.py
+	$(BIN)/python benchmarks/raster.py
 
 $(READY): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "pentapod needs Python 3.11 or newer")'

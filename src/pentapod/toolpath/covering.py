@@ -17,15 +17,18 @@ from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.slicing import LevelSet
 from pentapod.toolpath.topology import components
 
-FACETS_PER_STEP = 5.0
+FACETS_PER_STEP = 3.5
+FACETS_PER_FRONT = 5.0
+"""Lines that are a distance apart themselves turn sharp corners: finer facets keep these sharp."""
+
 _SLACK = 1.04
-CRUMBS = 1e-4
-"""Share of the area that gaps may have together without lines of their own."""
+CRUMBS, CRUMBS_OF_FRONTS = 5e-4, 2e-4
+"""Share of the area that gaps may have together without lines of their own; less where corners leave more."""
 
 
-def edge_for(steps: Floats) -> float:
+def edge_for(steps: Floats, facets_per_step: float = FACETS_PER_STEP) -> float:
     """Return how long edges may be, metres, for distances that are good to a few percent of the least step (F,)."""
-    return float(steps.min()) / FACETS_PER_STEP
+    return float(steps.min()) / facets_per_step
 
 
 def rest_covered(patch: Patch, steps: Floats, seeds: Floats, parts: list[Passes]) -> Passes:
@@ -34,7 +37,7 @@ def rest_covered(patch: Patch, steps: Floats, seeds: Floats, parts: list[Passes]
     steps (F,): how far apart lines may be on each facet, metres; the facets must be small against them. seeds (V,):
     how many steps vertices near the lines are from them.
     """
-    gaps = gap_lines(patch, seeds, 1.0 / steps)
+    gaps = gap_lines(patch, seeds, 1.0 / steps, crumbs=CRUMBS_OF_FRONTS)
     return Passes.joined([part for part in (*parts, gaps) if len(part)])
 
 
@@ -51,12 +54,18 @@ def aligned(passes: Passes, towards: Floats) -> Passes:
 
 
 def gap_lines(
-    patch: Patch, seeds: Floats, slowness: Floats, *, where: Bools | None = None, area: float | None = None
+    patch: Patch,
+    seeds: Floats,
+    slowness: Floats,
+    *,
+    where: Bools | None = None,
+    area: float | None = None,
+    crumbs: float = CRUMBS,
 ) -> Passes:
     """Return lines half a step from where seeds (V,) are, around what is further away than that.
 
     What no seed reaches gets a line midway between its borders, and others a step from it. Gaps that together are less
-    than a ten-thousandth of the area are left alone. where (V,): the only vertices that may lie in a gap; area: of
+    than `crumbs` of the area are left alone. where (V,): the only vertices that may lie in a gap; area: of
     the whole region, square metres, where the patch is but a part of it.
     """
     away = distances(patch, seeds, slowness)
@@ -69,8 +78,8 @@ def gap_lines(
     levels: Floats = np.arange(0.5, float(away.max(initial=0.0)), 1.0)
     if len(levels):
         lines = LevelSet(patch, away, levels).lines()
-        crumbs = CRUMBS * (float(patch.areas.sum()) if area is None else area)
-        parts.append(lines.where(_worth_while(patch, away, lines, crumbs)))
+        least = crumbs * (float(patch.areas.sum()) if area is None else area)
+        parts.append(lines.where(_worth_while(patch, away, lines, least)))
     return Passes.joined([part for part in parts if len(part)])
 
 

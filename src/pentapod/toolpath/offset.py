@@ -9,7 +9,7 @@ import numpy as np
 from pentapod.arrays import Floats, frozen, set_frozen
 from pentapod.errors import ToolpathError
 from pentapod.toolpath.closest import closest
-from pentapod.toolpath.covering import edge_for, rest_covered
+from pentapod.toolpath.covering import FACETS_PER_FRONT, edge_for, rest_covered
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.finishing import nothing_left
 from pentapod.toolpath.geodesic import border_vertices, distances, seeds_along, seeds_at
@@ -88,7 +88,7 @@ def contours_of(mesh: Mesh, tool: Tool, options: CoverOptions, curve: Floats | N
         raise nothing_left(mesh, options, 0)
     rough = surface_steps(whole, tool, whole.vertices[whole.faces[:, 1]] - whole.vertices[whole.faces[:, 0]],
                           options.stepover, options.scallop)  # fmt: skip
-    patch = whole.refined(edge_for(rough))
+    patch = whole.refined(edge_for(rough, FACETS_PER_FRONT))
     ones = np.ones(len(patch.faces))
     facets, points = np.zeros(0, dtype=np.intp), np.zeros((0, 3))
     if curve is None:
@@ -99,7 +99,7 @@ def contours_of(mesh: Mesh, tool: Tool, options: CoverOptions, curve: Floats | N
             )
         seeds = np.where(border, 0.0, np.inf)
     else:
-        fine = spaced(curve, edge_for(rough) / _CURVE_POINTS_PER_EDGE)
+        fine = spaced(curve, edge_for(rough, FACETS_PER_FRONT) / _CURVE_POINTS_PER_EDGE)
         facets, points, _ = closest(patch, fine)
         seeds = seeds_at(patch, facets, points, ones)
     metres = distances(patch, seeds, ones)

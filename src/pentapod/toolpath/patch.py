@@ -124,10 +124,10 @@ class Patch:
         edge = np.repeat(np.arange(len(border)), counts)
         number = np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
         tree = KDTree(start[edge] + (number / np.maximum(counts - 1, 1)[edge])[:, None] * way[edge])
-        # Halve what is long and drop what is far, in turns: what is far need not become small.
-        patch, size = self, float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+        # Drop what is far and halve what is long, in turns: what is far need not become small.
+        sides = self.vertices[np.roll(self.faces, -1, axis=1)] - self.vertices[self.faces]
+        patch, size = self, max(float(np.linalg.norm(sides, axis=2).max()), longest)
         while True:
-            size = max(0.5 * size, longest)
             patch = patch.refined(size)
             centres = patch.vertices[patch.faces].mean(axis=1)
             bound = 2.0 * width + size
@@ -138,6 +138,7 @@ class Patch:
             patch = Patch(patch.vertices[used], faces, patch.normals[close])
             if size <= longest:
                 break
+            size = max(0.5 * size, longest)
         return patch, np.asarray(tree.query(patch.vertices)[0]) < width
 
     def _halved(self, long: Bools) -> Patch:

@@ -10,7 +10,7 @@ import numpy as np
 from pentapod.arrays import Bools, Floats, Ints, frozen, set_frozen
 from pentapod.errors import ToolpathError
 from pentapod.geometry.directions import tangent_frame
-from pentapod.toolpath.covering import edge_for, rest_covered
+from pentapod.toolpath.covering import FACETS_PER_FRONT, edge_for, rest_covered
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.finishing import nothing_left
 from pentapod.toolpath.geodesic import seeds_along
@@ -87,7 +87,9 @@ def _planar(mesh: Mesh, tool: Tool, options: SpiralOptions) -> Drawing:
     if not len(whole.faces):
         raise nothing_left(mesh, options, 0)
     across = whole.vertices[whole.faces[:, 1]] - whole.vertices[whole.faces[:, 0]]
-    patch = whole.refined(edge_for(surface_steps(whole, tool, across, options.stepover, options.scallop)))
+    patch = whole.refined(
+        edge_for(surface_steps(whole, tool, across, options.stepover, options.scallop), FACETS_PER_FRONT)
+    )
     corners = whole.vertices[whole.faces].reshape(-1, 3)
     centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0)) if options.centre is None else np.asarray(options.centre)
     flat = patch.vertices - centre

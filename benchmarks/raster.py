@@ -1,0 +1,86 @@
+"""Rasters: seconds against trimesh's bare `mesh_multiplane` on the same planes, and how they grow with the facets.
+
+Run ``make bench-gouge``. The surface is one wavy sheet, 300 mm wide, in more and more facets. Seconds are those of the
+processor, one thread; the lines are drawn (cut, joined, with normals), and finished (waypoints within the tolerance, in
+order, with links that are proven clear).
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+
+from pentapod.toolpath import BallCutter, Mesh, RasterOptions, toolpath_with_report
+from pentapod.toolpath.facet_tree import FacetTree
+from pentapod.toolpath.raster import draw_raster
+from pentapod.toolpath.sweep import touch
+
+WIDTH, STEPOVER = 0.3, 1.5e-3
+TOOL = BallCutter(3e-3)
+Value = TypeVar("Value")
+
+
+def wavy_sheet(cells: int) -> Mesh:
+    """Return a sheet of 2 · cells² facets, waves 4 mm high and 50 mm long."""
+    line = np.linspace(-0.5 * WIDTH, 0.5 * WIDTH, cells + 1)
+    x, y = np.meshgrid(line, line)
+    z = 4e-3 * np.sin(x / 8e-3) * np.cos(y / 9e-3)
+    n = cells + 1
+    first = np.arange(cells * n).reshape(cells, n)[:, :-1].ravel()
+    faces = np.concatenate(
+        [np.stack([first, first + 1, first + n + 1], 1), np.stack([first, first + n + 1, first + n], 1)]
+    )
+    return Mesh.of(np.stack([x, y, z], -1).reshape(-1, 3), faces)
+
+
+def timed(action: Callable[[], Value]) -> tuple[Value, float]:
+    """Return what an action gives, and its seconds of the processor."""
+    start = time.process_time()
+    value = action()
+    return value, time.process_time() - start
+
+
+def planes_of(mesh: Mesh) -> float:
+    """Return the seconds of trimesh's sections by as many planes as the raster has lines."""
+    import trimesh  # noqa: PLC0415
+
+    shape = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    heights = np.arange(-0.5 * WIDTH + 0.5 * STEPOVER, 0.5 * WIDTH, STEPOVER)
+    section = trimesh.intersections.mesh_multiplane
+    return timed(lambda: section(shape, np.zeros(3), np.array([0.0, 1.0, 0.0]), heights))[1]
+
+
+def main() -> None:
+    """Measure and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--facets", type=int, nargs="+", default=[50_000, 200_000, 1_000_000, 5_000_000])
+    parser.add_argument("--finish-up-to", type=int, default=1_000_000)
+    options = parser.parse_args()
+    told = RasterOptions(stepover=STEPOVER, spacing=2e-3, chordal=10e-6)
+    draw_raster(wavy_sheet(10), TOOL, told)
+    touch(FacetTree.of(wavy_sheet(10)), TOOL, np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
+    print(f"NumPy {np.__version__}, Python {platform.python_version()}, {platform.machine()}, one thread")
+    columns = ("facets", "mesh s", "planes s", "lines s", "ratio", "finished s", "tree s", "lines / n log n")
+    print("  ".join(f"{name:>15}" for name in columns))
+    for facets in options.facets:
+        mesh, loading = timed(lambda count=facets: wavy_sheet(round((count / 2) ** 0.5)))
+        _ = mesh.corner_normals
+        planes = planes_of(mesh)
+        lines = timed(lambda part=mesh: draw_raster(part, TOOL, told))[1]
+        tree = timed(lambda part=mesh: FacetTree.of(part))[1]
+        count = len(mesh.faces)
+        finished = float("nan")
+        if count <= options.finish_up_to:
+            finished = timed(lambda part=mesh: toolpath_with_report(part, TOOL, told))[1]
+        growth = 1e9 * lines / (count * np.log2(count))
+        numbers = (loading, planes, lines, lines / planes, finished, tree, growth)
+        print("  ".join([f"{count:>15,}", *(f"{number:15.3g}" for number in numbers)]), flush=True)
+
+
+if __name__ == "__main__":
+    main()
