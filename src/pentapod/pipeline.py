@@ -139,8 +139,16 @@ def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
     return toolpath_with_report(mesh, tool, job_options(job))
 
 
-def judge(job: Job, machine: Machine, toolpath: Toolpath, program: Path, progress: Progress = silent) -> Verdict:
-    """Return the verdict on a program file, by what the job asks. Raises ProgramError if there is none."""
+def judge(
+    job: Job,
+    machine: Machine,
+    toolpath: Toolpath,
+    program: Path,
+    progress: Progress = silent,
+    *,
+    strict: bool = False,
+) -> Verdict:
+    """Return the verdict on a program file, by what the job asks; strict as in `verify`. Raises ProgramError."""
     return verify(
         program,
         machine,
@@ -149,6 +157,7 @@ def judge(job: Job, machine: Machine, toolpath: Toolpath, program: Path, progres
         path_tolerance=job.tolerance.path_mm * _MM,
         axis_tolerance=float(np.radians(job.tolerance.axis_deg)),
         job_digest=job.digest,
+        strict=strict,
         progress=progress,
     )
 
