@@ -14,7 +14,7 @@ from pentapod.program.csv import read_csv, read_header
 from pentapod.program.program import Program
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.verify import bodies, component, joints, legs, origin, speed, tracking
+from pentapod.verify import bodies, component, joints, legs, origin, speed, tool, tracking
 from pentapod.verify.claim import Claim
 from pentapod.verify.replay import SURVEY_SHARE, Replay
 from pentapod.verify.verdict import Certificate, Place, Verdict
@@ -28,6 +28,7 @@ CLAIMS: tuple[Claim, ...] = (
     *bodies.CLAIMS,
     *tracking.CLAIMS,
     *speed.CLAIMS,
+    *tool.CLAIMS,
 )
 """Every claim that a verdict makes, in its order; "readable" comes before them where a file is judged.
 
