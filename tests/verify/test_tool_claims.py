@@ -1,4 +1,4 @@
-"""Limits of the tool's own motion, judged from the program's rows: closed forms for a quintic straight cut that nods."""
+"""Limits of the tool's own motion, judged from the program's rows: closed forms for a quintic cut that nods."""
 
 from dataclasses import replace
 
