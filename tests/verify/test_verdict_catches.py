@@ -61,7 +61,7 @@ def good(request):
 def test_good_program_passes_every_claim(good):
     verdict = judge(good)
     assert failed(verdict) == set()
-    of_the_tool = {claim.name for claim in tool.CLAIMS}  # this machine limits none of it
+    of_the_tool = {"tip acceleration", "tip jerk", "axis velocity", "axis acceleration"}  # this machine limits none
     assert {c.claim for c in verdict.certificates} == {claim.name for claim in CLAIMS} - of_the_tool
     assert all(c.method for c in verdict.certificates)
 
