@@ -39,10 +39,14 @@ _OPTIONS: dict[str, Any] = {
 
 @dataclass(eq=False)
 class IpoptSolver:
-    """Improves candidates of one setting with IPOPT; free: whether the placement may move."""
+    """Improves candidates of one setting with IPOPT; free: whether the placement may move.
+
+    whole: all waypoints and all kinds of margin at once, with no constraint generation: plain, and very slow.
+    """
 
     setting: Setting
     free: bool
+    whole: bool = False
     _solvers: dict[Any, Any] = field(default_factory=dict[Any, Any])
 
     def raise_margin(self, start: Candidate) -> Candidate:
@@ -72,8 +76,8 @@ class IpoptSolver:
 
         setting, task, course = self.setting, self.setting.task, self.setting.course
         count, first = len(task.pivots), course.fitted(setting.leans(start.coefficients))
-        near = setting.values_of(start.margins, start.transform, course.leans(first)).min(axis=0) < keep + _NEAR
-        kinds = [int(k) for k in np.flatnonzero(near)]
+        margins = setting.values_of(start.margins, start.transform, course.leans(first))
+        kinds = [int(k) for k in np.flatnonzero((margins.min(axis=0) < keep + _NEAR) | self.whole)]
         c = ca.MX.sym("c", 2, len(first))
         margins, _ = point_function(setting, start.margins, kinds).map(count)(
             ca.DM.zeros(6, count), course.cone * ca.mtimes(c, ca.DM(course.basis.T)), task.pivots.T, task.nominal.T,
@@ -94,6 +98,8 @@ class IpoptSolver:
         return found if values.min() >= keep - 1e-4 else None
 
     def _first(self, start: Candidate) -> tuple[Ints, Ints]:
+        if self.whole:
+            return np.arange(len(self.setting.task.pivots)), np.arange(len(start.margins.limits))
         rows = self.setting.task.representatives(_POINTS)
         values = self.setting.values(start.margins, start.transform, start.coefficients, rows).min(axis=0)
         return np.sort(rows), np.flatnonzero(values < values.min() + _NEAR)
