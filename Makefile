@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test test-all lint bench bench-kinematics bench-timing bench-gouge bench-planning clean
+.PHONY: demo test test-all lint bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify clean
 
 demo: $(READY)  ## plan a dome and judge the program
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
@@ -38,6 +38,9 @@ bench-planning: $(READY)  ## the planner's solver against IPOPT
 bench-gouge: $(READY)  ## contact points and gouge check against another library's drop cutter, rasters against bare sections
 	$(BIN)/python benchmarks/gouge.py
 	$(BIN)/python benchmarks/raster.py
+
+bench-verify: $(READY)  ## the verdict on a million rows: seconds, memory, against numpy.loadtxt and ball arithmetic
+	$(BIN)/python benchmarks/verify.py
 
 $(READY): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "pentapod needs Python 3.11 or newer")'

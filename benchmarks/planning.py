@@ -1,19 +1,21 @@
 """The planner's own solver against IPOPT on the same problems, in the same run. Run ``make bench-planning``.
 
-For random tasks on the shipped machine: the smallest margin reached and the time taken to raise it from the same
-start, then the cost and the time of the calmest field at the same placement. Then how much the tilt gains over strict
-normals, and how the time grows with the number of waypoints.
+Smallest margin and time of both from the same start; the cost and the time of the calmest axes at the same placement;
+the same against plain IPOPT, on all waypoints and all margins at once. Then what a tilt cone gains over strict
+normals, how fast the axes turn beside strict normals, and how time and memory grow with the number of waypoints.
 """
 
 from __future__ import annotations
 
 import argparse
 import platform
+import resource
 import sys
 import time
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,14 +25,22 @@ from planning_instances import Instance, instances
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine.machine import Machine
 from pentapod.planning.ipopt import IpoptSolver
+from pentapod.planning.leg_path import leg_path
 from pentapod.planning.margins import Margins
+from pentapod.planning.placed_path import PlacedPath
+from pentapod.planning.placement import Placement
 from pentapod.planning.sampling import first_guesses
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Candidate, Setting
 from pentapod.planning.task import Task
+from pentapod.planning.tilt import lean
+from pentapod.refusal import Refusal
+
+CALM_SHARE = 0.9
+Value = TypeVar("Value")
 
 
-def timed(action: Callable[[], Candidate]) -> tuple[Candidate, float]:
+def timed(action: Callable[[], Value]) -> tuple[Value, float]:
     """Return what an action gives and its processor seconds."""
     start = time.process_time()
     return action(), time.process_time() - start
@@ -54,14 +64,39 @@ def against_ipopt(tasks: list[Instance], machine: Machine) -> None:
         line = f"{task.name:58s} {ours.smallest:8.4f} {theirs.smallest:8.4f} {their_seconds / seconds:6.1f}x"
         ratios.append((ours.smallest - theirs.smallest, their_seconds / seconds))
         if task.tilt > 0.0 and ours.smallest > 0.0:
-            keep = 0.9 * ours.smallest
-            calm, calm_seconds = timed(lambda s=setting, c=ours, k=keep: SequentialSolver(s, False).calm(c, k))
-            other, other_seconds = timed(lambda s=setting, c=ours, k=keep: IpoptSolver(s, False).calm(c, k))
-            costs = [setting.unrest_of(c.coefficients) for c in (calm, other)]
-            line += f" {costs[0]:9.4f} {costs[1]:9.4f} {other_seconds / calm_seconds:6.1f}x"
+            line += calm_against(setting, ours, whole=False)
         print(line, flush=True)
     gain, faster = np.median(np.array(ratios), axis=0)
     print(f"median: margin {gain:+.4f} against IPOPT's, {faster:.1f}x as fast\n")
+
+
+def calm_against(setting: Setting, at: Candidate, *, whole: bool) -> str:
+    """Return the columns that compare the calmest axes of both solvers."""
+    keep = CALM_SHARE * at.smallest
+    ours, seconds = timed(lambda: SequentialSolver(setting, False).calm(at, keep))
+    theirs, their_seconds = timed(lambda: IpoptSolver(setting, False, whole).calm(at, keep))
+    costs = [f"{'none':>9s}" if c is None else f"{setting.course.cost_of(c):9.6f}" for c in (ours, theirs)]
+    return f" {' '.join(costs)} {their_seconds / seconds:6.1f}x"
+
+
+def against_plain_ipopt(tasks: list[Instance], machine: Machine) -> None:
+    """Print both solvers where IPOPT gets all waypoints and margins: 10,000 for the placement, 1,000 for the axes."""
+    print("plain IPOPT: all waypoints and margins at once")
+    for task in tasks[:2]:
+        setting = Setting.of(visited(task, 10_000, 0.0), machine)
+        start = start_of(setting)
+        ours, seconds = timed(lambda s=setting, c=start: SequentialSolver(s, True).raise_margin(c))
+        theirs, their_seconds = timed(lambda s=setting, c=start: IpoptSolver(s, True, True).raise_margin(c))
+        print(
+            f"{task.name:58s} placement, 10,000 waypoints: {ours.smallest:.4f} {theirs.smallest:.4f} "
+            f"{seconds:.2f} s, {their_seconds / seconds:.0f}x as fast",
+            flush=True,
+        )
+    for task in tasks[:4]:
+        setting = Setting.of(visited(task, 1_000, max(task.tilt, np.radians(5.0))), machine)
+        raised = SequentialSolver(setting, True).raise_margin(start_of(setting))
+        print(f"{task.name:58s} axes, 1,000 waypoints: {calm_against(setting, raised, whole=True)}", flush=True)
+    print()
 
 
 def tilt_gain(tasks: list[Instance], machine: Machine) -> None:
@@ -74,26 +109,103 @@ def tilt_gain(tasks: list[Instance], machine: Machine) -> None:
             found.append(SequentialSolver(setting, True).raise_margin(start_of(setting)).smallest)
         if found[0] > 0.0:
             gains.append(found[1] / found[0])
-    print(f"smallest margin with a cone of 15°: {np.median(gains):.2f}x that of strict normals, median of {len(gains)}")
+    print(
+        f"smallest margin with a cone of 15°: {np.median(gains):.2f}x that of strict normals, median of {len(gains)}\n"
+    )
+
+
+def rates(tasks: list[Instance], machine: Machine) -> None:
+    """Print axis rates and leg accelerations along the path beside those of strict normals at the same placement."""
+    print(f"{'beside strict normals':58s} {'axis rate':>22s} {'leg acceleration':>22s}")
+    print(f"{'':58s} {'median':>7s} {'peak':>6s} {'above':>7s} {'median':>7s} {'peak':>6s} {'above':>7s}")
+    columns: list[list[float]] = []
+    for task in [t for t in tasks if t.tilt > 0.0]:
+        setting = Setting.of(Task.of(task.toolpath, task.tilt), machine)
+        at = SequentialSolver(setting, True).raise_margin(start_of(setting))
+        calm = SequentialSolver(setting, False).calm(at, CALM_SHARE * at.smallest) if at.smallest > 0.0 else None
+        if calm is None:
+            continue
+        found = [along_path(task, setting, at, axes) for axes in (setting.task.nominal, calm_axes(setting, calm))]
+        row: list[float] = []
+        for strict, turned in zip(*found, strict=True):
+            above = (turned > 1.1 * strict + 0.01 * strict.max()).mean()
+            row += [float(np.median(turned) / np.median(strict)), float(turned.max() / strict.max()), float(above)]
+        columns.append(row)
+        cells = [f"{v:6.2f}x" if k % 3 < 2 else f"{100.0 * v:6.1f}%" for k, v in enumerate(row)]
+        print(f"{task.name:58s} {' '.join(cells)}", flush=True)
+    middle = np.median(np.array(columns), axis=0)
+    print(
+        f"{'median':58s} " + " ".join(f"{v:6.2f}x" if k % 3 < 2 else f"{100.0 * v:6.1f}%" for k, v in enumerate(middle))
+    )
+    print("above: share of the path where it is over the strict normal's by 10 % and by 1 % of its peak\n")
+
+
+def calm_axes(setting: Setting, calm: np.ndarray) -> np.ndarray:
+    """Return the axes (N, 3) of a course, workpiece frame."""
+    return lean(setting.task.nominal, setting.course.leans(calm))
+
+
+def along_path(task: Instance, setting: Setting, at: Candidate, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return axis rates and second derivatives of the legs along the path, at one density, for axes (N, 3)."""
+    tips, turned = setting.task.machine_poses(at.transform, axes)
+    component = at.margins.component
+    values, names = at.margins(tips, turned), tuple(limit.name for limit in at.margins.limits)
+    placed = PlacedPath(task.toolpath, Placement(at.transform, "benchmark"), component, tips, turned, values, names)
+    path = leg_path(placed, setting.machine, path_tolerance=20e-6, axis_tolerance=np.radians(0.5))
+    if isinstance(path, Refusal):
+        raise SystemExit(f"no leg path for {task.name}: {path}")
+    moved = np.linalg.norm(np.diff(setting.task.pivots, axis=0), axis=1)
+    rate = np.linalg.norm(np.diff(axes, axis=0), axis=1) / np.maximum(moved, 1e-9)
+    parameter = np.linspace(0.0, path.length, 20_000)
+    tip, axis = path.pose(parameter)
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip + setting.task.pivot * axis, axis=0), axis=1))])
+    even = np.linspace(0.0, way[-1], 4_000)
+    legs = np.stack([np.interp(even, way, leg) for leg in path(parameter).T], axis=1)
+    return rate, np.abs(np.diff(legs, 2, axis=0)).max(axis=1) / even[1] ** 2
+
+
+def visited(task: Instance, count: int, tilt: float) -> Task:
+    """Return a task visited at `count` waypoints, evenly along the same path."""
+    path = task.toolpath
+    at = np.linspace(0.0, len(path) - 1.0, count)
+    low = np.minimum(at.astype(np.intp), len(path) - 2)
+    share = (at - low)[:, None]
+    axes = (1.0 - share) * path.axes[low] + share * path.axes[low + 1]
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    pivots = (1.0 - share) * path.pivots[low] + share * path.pivots[low + 1]
+    return Task(pivots, axes, path.pivot, tilt)
+
+
+def dense_dome(count: int) -> Task:
+    """Return a dome of 120 mm under a zigzag of `count` waypoints, 0.2 mm apart."""
+    half, radius = 0.06, 0.06 / np.sin(np.radians(35.0))
+    rows = max(6, int(count * 0.2e-3 / (2.0 * half)))
+    passes: list[np.ndarray] = []
+    for k, y in enumerate(np.linspace(-0.97 * half, 0.97 * half, rows)):
+        x = np.linspace(-1.0, 1.0, count // rows) * np.sqrt(half**2 - y**2) * (-1.0) ** k
+        passes.append(np.column_stack([x, np.full_like(x, y)]))
+    xy = np.concatenate(passes)
+    z = np.sqrt(radius**2 - np.square(xy).sum(axis=1))
+    axes = np.column_stack([xy, z]) / radius
+    return Task(np.column_stack([xy, z - radius]) + 0.003 * axes, axes, 0.003, np.radians(15.0))
 
 
 def growth(machine: Machine) -> None:
-    """Print seconds by the number of waypoints, of one part visited ever more densely."""
-    base = instances(1)[0].toolpath
-    print("\nwaypoints   raise, s   calm, s   µs a waypoint")
-    for count in (1_000, 10_000, 100_000, 1_000_000):
-        at = np.linspace(0.0, len(base) - 1.0, count)
-        low = np.minimum(at.astype(np.intp), len(base) - 2)
-        share = (at - low)[:, None]
-        axes = (1.0 - share) * base.axes[low] + share * base.axes[low + 1]
-        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-        task = Task((1.0 - share) * base.pivots[low] + share * base.pivots[low + 1], axes, base.pivot, np.radians(10.0))
-        setting = Setting.of(task, machine)
-        start = start_of(setting)
-        raised, up = timed(lambda s=setting, c=start: SequentialSolver(s, True).raise_margin(c))
-        keep = 0.9 * raised.smallest
+    """Print seconds and memory by the number of waypoints, of one part under ever more passes."""
+    print("waypoints   raise, s   calm, s   waypoints a second of calm   peak memory, kB a waypoint")
+    seconds: list[tuple[int, float]] = []
+    for count in (1_000, 10_000, 50_000, 100_000, 1_000_000):
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        setting = Setting.of(dense_dome(count), machine)
+        raised, up = timed(lambda s=setting: SequentialSolver(s, True).raise_margin(start_of(s)))
+        keep = CALM_SHARE * raised.smallest
         _, down = timed(lambda s=setting, c=raised, k=keep: SequentialSolver(s, False).calm(c, k))
-        print(f"{count:9,d} {up:10.2f} {down:9.2f} {1e6 * (up + down) / count:12.1f}", flush=True)
+        memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / count
+        seconds.append((count, up + down))
+        print(f"{count:9,d} {up:10.2f} {down:9.2f} {count / down:16,.0f} {memory:28.2f}", flush=True)
+    (small, short), (large, long) = seconds[1], seconds[-1]
+    slope = np.log(long / short) / np.log(large / small)
+    print(f"slope of the time from {small:,d} to {large:,d} waypoints, log-log: {slope:.2f}")
 
 
 def main() -> None:
@@ -104,7 +216,9 @@ def main() -> None:
     machine, tasks = Machine.load("desk"), instances(count)
     print(f"casadi {version('casadi')}, SciPy {version('scipy')}, Python {platform.python_version()}, one core\n")
     against_ipopt(tasks, machine)
+    against_plain_ipopt(tasks, machine)
     tilt_gain(tasks, machine)
+    rates(tasks, machine)
     growth(machine)
 
 

@@ -19,6 +19,7 @@ from pentapod.planning import PlacedPath
 from pentapod.program import read_csv
 from pentapod.refusal import Refusal
 from pentapod.strategy_tables import TABLES
+from pentapod.timing import Explanation
 from pentapod.toolpath import SegmentKind
 
 TOOLPATHS = Path(__file__).parents[1] / "toolpaths"
@@ -247,3 +248,16 @@ def test_output_settings_reach_the_program(period, interpolation, make_job, tmp_
     assert outcome.passed, [c for c in outcome.verdict.certificates if not c.passed]
     program = read_csv(tmp_path / "out" / "program.csv")
     assert (program.period, program.interpolation) == (period * 1e-3, interpolation)
+
+
+def test_a_job_may_limit_the_tool(make_job, tmp_path):
+    keys = "cut_mm_min = 3000\nmax_tip_acceleration_mm_s2 = 800\nmax_tip_jerk_mm_s3 = 60000\n"
+    keys += "max_axis_acceleration_deg_s2 = 600"
+    outcome = run(Job.load(make_job(("cut_mm_min = 3000", keys))), tmp_path / "out")
+    found = {c.claim: c for c in outcome.verdict.certificates}
+    assert outcome.passed, [c for c in found.values() if not c.passed]
+    assert found["tip acceleration"].bound == 800.0
+    assert 0.9 * 800.0 < found["tip acceleration"].value <= 800.0
+    assert {"tip jerk", "axis acceleration"} <= set(found)
+    assert "axis velocity" not in found
+    assert "tip acceleration" in str(outcome.find(Explanation))

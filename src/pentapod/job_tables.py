@@ -177,12 +177,18 @@ class GougeTable(Table):
 
 
 class FeedTable(Table):
-    """Speeds of the tool tip."""
+    """Speeds of the tool tip, and what this job asks of tip and axis beyond the machine's own limits."""
 
     cut_mm_min: Positive = Field(le=100_000.0, description="feed while cutting")
     link_mm_min: Positive | None = Field(
         default=None, le=100_000.0, description="feed of approaches and links; the cutting feed when left out"
     )
+    max_tip_acceleration_mm_s2: Positive | None = Field(default=None, description="of the tip; the machine's if less")
+    max_tip_jerk_mm_s3: Positive | None = Field(default=None, description="of the tip; the machine's if less")
+    max_axis_velocity_deg_s: Positive | None = Field(
+        default=None, description="of the tool axis; the machine's if less"
+    )
+    max_axis_acceleration_deg_s2: Positive | None = Field(default=None, description="of the tool axis, likewise")
 
 
 class ToleranceTable(Table):

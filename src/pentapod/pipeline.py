@@ -18,6 +18,7 @@ from pentapod.job_strategy import job_options
 from pentapod.job_tool import FileReport, Reports, finished_as_asked, job_tool
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import ControllerSettings, Machine
+from pentapod.machine.tool_limits import ToolLimits
 from pentapod.outcome import Outcome, Stage, refusal_verdict
 from pentapod.plan_arrays import arrays_of
 from pentapod.planning import Freedom, LegPath, PlacedPath, leg_path, plan
@@ -82,15 +83,16 @@ def run(
 
 
 def job_machine(job: Job) -> Machine:
-    """Return the job's machine, with the job's tool length and controller settings. Raises MachineError."""
+    """Return the job's machine, with its tool length, controller settings and tool limits. Raises MachineError."""
     machine = Machine.load(job.machine_file or str(job.machine.name))
     controller = ControllerSettings(
         period=machine.controller.period if job.output.period_ms is None else job.output.period_ms * 1e-3,
         interpolation=job.output.interpolation or machine.controller.interpolation,
     )
     length = machine.tool_length if job.tool.length_mm is None else job.tool.length_mm * _MM
+    limits = machine.tool_limits.and_(ToolLimits.of(job.feed))
     try:
-        return dataclasses.replace(machine, controller=controller, tool_length=length)
+        return dataclasses.replace(machine, controller=controller, tool_length=length, tool_limits=limits)
     except MachineError as error:
         raise job.error("tool", "length_mm", error.what) from error
 
@@ -139,8 +141,16 @@ def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
     return toolpath_with_report(mesh, tool, job_options(job))
 
 
-def judge(job: Job, machine: Machine, toolpath: Toolpath, program: Path, progress: Progress = silent) -> Verdict:
-    """Return the verdict on a program file, by what the job asks. Raises ProgramError if there is none."""
+def judge(
+    job: Job,
+    machine: Machine,
+    toolpath: Toolpath,
+    program: Path,
+    progress: Progress = silent,
+    *,
+    strict: bool = False,
+) -> Verdict:
+    """Return the verdict on a program file, by what the job asks; strict as in `verify`. Raises ProgramError."""
     return verify(
         program,
         machine,
@@ -149,6 +159,7 @@ def judge(job: Job, machine: Machine, toolpath: Toolpath, program: Path, progres
         path_tolerance=job.tolerance.path_mm * _MM,
         axis_tolerance=float(np.radians(job.tolerance.axis_deg)),
         job_digest=job.digest,
+        strict=strict,
         progress=progress,
     )
 
@@ -212,7 +223,7 @@ class _Task:
         beam, period = self.toolpath.pivot < 0.0, self.machine.controller.period
         slow = unheld(trajectory, period, path.surface_rate) if beam else ()
         spots = tips - self.toolpath.pivot * direction if beam else None
-        uses = certify(trajectory, self.machine, legs=program.legs, tips=tips, spots=spots)
+        uses = certify(trajectory, self.machine, legs=program.legs, tips=tips, axes=-direction, spots=spots)
         return explain(trajectory, self.machine, uses, slow)
 
 

@@ -49,6 +49,15 @@ def test_units_become_si():
         m.legs.min_length[0] = 0.1
 
 
+def test_limits_of_the_tool_are_optional_and_part_of_the_digest():
+    plain = read_machine(DESK, "desk.toml")
+    assert plain.tool_limits.given() == {}
+    more = "max_tip_acceleration_mm_s2 = 1500\nmax_axis_velocity_deg_s = 90\n\n[controller]"
+    m = read_machine(DESK.replace("[controller]", more), "desk.toml")
+    assert m.tool_limits.given() == pytest.approx({"max_tip_acceleration": 1.5, "max_axis_velocity": np.pi / 2})
+    assert m.digest != plain.digest
+
+
 def test_loads_by_name_and_by_path(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(DESK, encoding="utf-8")

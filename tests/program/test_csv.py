@@ -9,6 +9,7 @@ from pentapod.errors import InputError, ProgramError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.program import Program, Provenance, quantised, read_csv, write_csv
+from pentapod.program.csv import read_header
 
 SOURCE = Provenance("desk", "m123", "j456", "0.1.0")
 
@@ -254,6 +255,31 @@ def test_no_damaged_byte_makes_a_traceback(tmp_path_factory, place, byte, how):
     except ProgramError as error:
         rows, file = 30, error.file
     assert (rows, file) == (30, path)
+
+
+@pytest.mark.parametrize("name", [name for name in BAD if name != "nul bytes"])
+def test_blocks_shorter_than_a_row_find_the_same(tmp_path, monkeypatch, name):
+    """Where the file is cut into blocks cannot be told from what is read, nor from what is refused."""
+    monkeypatch.setattr("pentapod.program.csv_rows._BLOCK", 37)
+    good = program(placement=RigidTransform(np.eye(3), [0.1, 0.2, 0.3]))
+    path = write_csv(good, tmp_path / "program.csv")
+    same(good, read_csv(path))
+    test_corrupt_files_are_refused_by_name_and_place(tmp_path, name)
+
+
+def test_unknown_keys_of_the_header_are_named(tmp_path):
+    path = write_csv(program(), tmp_path / "program.csv")
+    assert read_header(path).unknown == ()
+    path.write_bytes(path.read_bytes().replace(b"# rows", b"# spindle = 3\n# rows", 1))
+    assert read_header(path).unknown == ("spindle",)
+    assert len(read_csv(path).legs) == 50
+
+
+def test_a_header_that_promises_too_much_takes_no_memory(tmp_path):
+    path = write_csv(program(), tmp_path / "program.csv")
+    path.write_bytes(path.read_bytes().replace(b"rows = 50", b"rows = 50000000000000", 1))
+    with pytest.raises(ProgramError, match="number of rows"):
+        read_csv(path)
 
 
 def test_missing_file_and_unwritable_folder(tmp_path):

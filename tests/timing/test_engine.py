@@ -3,7 +3,9 @@ import logging
 import numpy as np
 import pytest
 
+from pentapod.machine.tool_limits import ToolLimits
 from pentapod.timing.constraints import Limits
+from pentapod.timing.course import Course
 from pentapod.timing.engine import fastest
 from pentapod.timing.stages import Failure
 
@@ -34,9 +36,9 @@ def test_failures_are_values_and_silent(caplog, recwarn):
 
 def test_ceiling_is_the_largest_x_with_a_common_acceleration():
     rng = np.random.default_rng(3)
-    limits = Limits(rng.uniform(0.1, 1, 5), rng.uniform(1, 9, 5), np.ones(5), 1.0, 1.0, 0.0)
+    limits = Limits(rng.uniform(0.1, 1, 5), rng.uniform(1, 9, 5), np.ones(5), ToolLimits(), 1.0, 1.0, 0.0)
     first, second = rng.normal(size=(300, 5)), 10 * rng.normal(size=(300, 5))
-    x = limits.ceiling(first, second, np.full(300, 0.7))
+    x = limits.ceiling(Course((first, second), (), (), np.full(300, 0.7), np.zeros(300, int)))
 
     def room(x):  # by brute force over u
         u = np.linspace(-60, 60, 20_001)

@@ -395,7 +395,7 @@ def test_margin_leaves_room():
 
 
 def test_namespace_machine_is_enough():
-    """Timing asks a machine for its leg limits, its rapid rate and its controller, and nothing else."""
+    """Timing asks a machine for the limits of legs and tool, its rapid rate and its controller, and nothing else."""
     m = machine()
     assert isinstance(m, SimpleNamespace)
-    assert set(vars(m)) == {"legs", "rapid_velocity", "controller"}
+    assert set(vars(m)) == {"legs", "rapid_velocity", "controller", "tool_limits"}

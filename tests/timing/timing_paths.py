@@ -9,15 +9,17 @@ from types import SimpleNamespace
 import numpy as np
 
 from pentapod.machine.machine import ControllerSettings, LegLimits
+from pentapod.machine.tool_limits import ToolLimits
 from pentapod.toolpath.toolpath import SegmentKind
 
 BASE = np.array([[-0.5, -0.1], [-0.1, 0.45], [0.05, -0.5], [0.3, 0.3], [0.5, -0.2]])
 OFFSETS = 0.4 * BASE[:, 0]
 
 
-def machine(v=0.5, a=5.0, rapid=0.3, period=1e-3, interpolation="linear"):
+def machine(v=0.5, a=5.0, rapid=0.3, period=1e-3, interpolation="linear", **tool):
     legs = LegLimits(*(np.broadcast_to(np.asarray(x, float), (5,)) for x in (0.1, 2.0, v, a, 200.0)))
-    return SimpleNamespace(legs=legs, rapid_velocity=rapid, controller=ControllerSettings(period, interpolation))
+    controller = ControllerSettings(period, interpolation)
+    return SimpleNamespace(legs=legs, rapid_velocity=rapid, controller=controller, tool_limits=ToolLimits(**tool))
 
 
 @dataclass
@@ -46,14 +48,19 @@ class Piece:
         return np.broadcast_to(self.rate(np.asarray(s, float)), np.shape(s))
 
     def __call__(self, s, order=0):
-        s = np.asarray(s, float)
+        return self.derivative(self.legs, np.asarray(s, float), order)
+
+    def pose(self, s, order=0):
+        return tuple(self.derivative(function, np.asarray(s, float), order) for function in self.legs.tool)
+
+    def derivative(self, function, s, order):
         if order < 3:
-            return self.legs(s)[order]
+            return function(s)[order]
         # The third derivative by differences of the exact second, well inside the interval between knots.
         k = np.clip(np.searchsorted(self.knots, s, side="right") - 1, 0, len(self.knots) - 2)
         h = 1e-4 * (self.knots[k + 1] - self.knots[k])
         middle = np.clip(s, self.knots[k] + h, self.knots[k + 1] - h)
-        return (self.legs(middle + h)[2] - self.legs(middle - h)[2]) / (2 * h)[:, None]
+        return (function(middle + h)[2] - function(middle - h)[2]) / (2 * h)[:, None]
 
 
 @dataclass
@@ -92,6 +99,7 @@ def by_tip(tip, axis=None, tool=0.2):
         q1 = (d0 * d1).sum(2) / q
         return q, q1, ((d1 * d1).sum(2) + (d0 * d2).sum(2) - q1**2) / q
 
+    legs.tool = tip, axis or upright
     return legs
 
 

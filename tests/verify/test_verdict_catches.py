@@ -61,7 +61,8 @@ def good(request):
 def test_good_program_passes_every_claim(good):
     verdict = judge(good)
     assert failed(verdict) == set()
-    assert {c.claim for c in verdict.certificates} == {claim.name for claim in CLAIMS}
+    of_the_tool = {"tip acceleration", "tip jerk", "axis velocity", "axis acceleration"}  # this machine limits none
+    assert {c.claim for c in verdict.certificates} == {claim.name for claim in CLAIMS} - of_the_tool
     assert all(c.method for c in verdict.certificates)
 
 
@@ -399,6 +400,36 @@ def test_malformed_file_is_a_verdict(linear, tmp_path, name):
     verdict = verify(path, linear.machine, linear.toolpath, **cases.TOLERANCES)
     assert failed(verdict) == {"readable"}
     assert "program.csv" in verdict.certificates[0].method
+
+
+def test_strict_verdict_refuses_unknown_keys(linear, tmp_path):
+    path = write_csv(linear.program, tmp_path / "program.csv")
+
+    def strict(**changes):
+        given = {**cases.TOLERANCES, "job_digest": "job-1", **changes}
+        return verify(path, linear.machine, linear.toolpath, strict=True, **given)
+
+    assert strict().passed
+    assert [c.claim for c in strict().certificates][:2] == ["readable", "no unknown keys in the header"]
+    assert failed(strict(job_digest=None)) == {"job"}
+    path.write_bytes(path.read_bytes().replace(b"# rows", b"# spindle_rpm = 3\n# coolant = true\n# rows", 1))
+    assert verify(path, linear.machine, linear.toolpath, **cases.TOLERANCES).passed
+    verdict = strict()
+    assert failed(verdict) == {"no unknown keys in the header"}
+    assert verdict.certificates[1].method == "unknown: spindle_rpm, coolant"
+
+
+def test_strict_verdict_says_what_does_not_apply(good):
+    """Three passes without links: the claim about links is there, and says so."""
+    lift, forth, back = spark_out()
+    case = replace(good, toolpath=cases.toolpath_of([lift, forth, back, forth]))
+    case = with_poses(case, *cases.timed([lift, forth, back, forth]))
+    assert "feed on links" not in {c.claim for c in judge(case).certificates}
+    verdict = judge(case, strict=True)
+    assert [c.claim for c in verdict.certificates] == [claim.name for claim in CLAIMS]
+    (links,) = (c for c in verdict.certificates if c.claim == "feed on links")
+    assert links.passed
+    assert links.method == "does not apply: no moment belongs to a link"
 
 
 def test_binary_file_is_a_verdict(linear, tmp_path):

@@ -14,9 +14,12 @@ from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_opti
 @click.command()
 @click.argument("program", type=click.Path(path_type=Path))
 @click.option("--job", required=True, type=click.Path(path_type=Path), help="The job it was made from.")
+@click.option(
+    "--strict", is_flag=True, help="Refuse what is unknown: keys of the header, claims that cannot be judged."
+)
 @json_option
 @quiet_option
-def verify(program: Path, job: Path, as_json: bool, quiet: bool) -> int:
+def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -> int:
     """Judge PROGRAM.csv against its job, from the file alone.
 
     Nothing of the planner is used: the rows are replayed through the closed-form forward kinematics and
@@ -28,7 +31,7 @@ def verify(program: Path, job: Path, as_json: bool, quiet: bool) -> int:
     loaded = Job.load(job)
     machine = job_machine(loaded)
     with progress_bar(quiet=quiet or as_json) as progress:
-        verdict = judge(loaded, machine, job_toolpath(loaded, job_mesh(loaded))[0], program, progress)
+        verdict = judge(loaded, machine, job_toolpath(loaded, job_mesh(loaded))[0], program, progress, strict=strict)
     if as_json:
         echo_json(verdict.to_dict())
     elif not quiet:

@@ -117,11 +117,26 @@ class Interpolant:
         return jerk / self.period
 
     @cached_property
+    def jerk_lengths(self) -> Floats:
+        """Length (N − 1,) of the jerk of a point with d coordinates on each interval, as `jerks` says, per s³."""
+        a = self.second
+        jerk = np.linalg.norm(np.diff(a, axis=0), axis=1)
+        ends = np.linalg.norm(a[[0, -1]], axis=1)
+        jerk[0], jerk[-1] = max(jerk[0], ends[0]), max(jerk[-1], ends[1])
+        return jerk / self.period
+
+    @cached_property
+    def turn_accelerations(self) -> Floats:
+        """Angular acceleration (N,) at each row, rad/s², of a direction whose unit vectors the rows (N, 3) are."""
+        axes = np.concatenate([self.bernstein[..., 0], self.bernstein[-1:, :, -1]])
+        return np.linalg.norm(np.cross(axes, self.second), axis=1)
+
+    @cached_property
     def steps(self) -> Floats:
         """Bernstein coefficients (N − 1, d, k) of the rates, per second."""
         return self._steps / self.period
 
-    @property
+    @cached_property
     def _steps(self) -> Floats:
         return self.degree * np.diff(self.bernstein, axis=-1)
 

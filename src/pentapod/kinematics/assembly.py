@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pentapod.arrays import Bools, Floats, as_batch
+from pentapod.kinematics.blocks import blocks
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.line_equations import LineEquations
 from pentapod.kinematics.line_roots import interior
@@ -81,8 +82,10 @@ def assembly_obstacles(pentapod: FiveLegs, legs: ArrayLike) -> AssemblyObstacles
     obstacle = np.full(len(flat), Obstacle.NOT_A_LENGTH, dtype=np.int8)
     shortfall = np.full(len(flat), np.nan)
     known = np.flatnonzero(np.isfinite(flat).all(axis=-1) & (flat >= 0.0).all(axis=-1))
-    line = SolutionLine.of(LineEquations.of(pentapod.base, pentapod.offsets), np.square(flat[known].T))
-    obstacle[known], shortfall[known] = _judge(line)
+    equations = LineEquations.of(pentapod.base, pentapod.offsets)
+    for block in blocks(len(known)):
+        some = known[block]
+        obstacle[some], shortfall[some] = _judge(SolutionLine.of(equations, np.square(flat[some].T)))
     return AssemblyObstacles(obstacle.reshape(lengths.shape[:-1]), shortfall.reshape(lengths.shape[:-1]))
 
 

@@ -21,6 +21,14 @@ def joined_poses(position: ArrayLike, direction: ArrayLike) -> tuple[Floats, Flo
     return broadcast(*as_poses(position, direction), ("position", "direction"))
 
 
+def as_motion(leg_coefficients: Floats, least: int = 0) -> Floats:
+    """Return Bernstein coefficients (N, 5, k + 1), k ≥ least, of five legs on N intervals. Raises ArrayError."""
+    shape = leg_coefficients.shape
+    if len(shape) != 3 or shape[1] != 5 or shape[2] < least + 1:
+        raise ArrayError(f"leg_coefficients has shape {shape}", expected=f"shape (N, 5, k + 1), k ≥ {least}")
+    return leg_coefficients
+
+
 def broadcast(a: Floats, b: Floats, names: tuple[str, str]) -> tuple[Floats, Floats]:
     """Return both with the same leading axes; their last axes may differ. Raises ArrayError that names both shapes."""
     batch = common_batch(a, b, names)

@@ -17,8 +17,10 @@ from numpy.typing import ArrayLike
 from pentapod.arrays import Bools, Floats, as_batch, set_frozen
 from pentapod.errors import ArrayError
 from pentapod.geometry.positivity import Positivity, positivity
+from pentapod.kinematics.answers import Answers
+from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.blocks import blocks
-from pentapod.kinematics.component import COMPONENTS, Component
+from pentapod.kinematics.component import Component, as_component
 from pentapod.kinematics.discriminants import Discriminants
 from pentapod.kinematics.pentapod import LinearPentapod
 
@@ -27,7 +29,7 @@ _SANE = (1e-40, 1e40)  # metres; within these nothing below can underflow or ove
 
 
 @dataclass(frozen=True, eq=False)
-class ComponentProof:
+class ComponentProof(Answers):
     """What is proven of N intervals, each of a motion of the legs given by polynomials.
 
     proven (N,): from the pose of `component` at the start of the interval (and from no other: lengths alone
@@ -56,16 +58,6 @@ class ComponentProof:
             array.flags.writeable = False
         set_frozen(self, component=Component(*(int(sign) for sign in self.component)))
 
-    @property
-    def undecided(self) -> Bools:
-        """Which intervals (N,) are neither proven nor refuted."""
-        return ~(self.proven | self.refuted)
-
-    @property
-    def holds(self) -> bool:
-        """Whether every interval is proven."""
-        return bool(self.proven.all())
-
 
 def certify_component(
     pentapod: LinearPentapod,
@@ -89,9 +81,7 @@ def certify_component(
     undecided.
     Raises ArrayError for a wrong shape, signs other than ±1, a negative leg_error or depth.
     """
-    coefficients = as_batch(leg_coefficients, "leg_coefficients", (None, 5, None))
-    if coefficients.ndim != 3 or coefficients.shape[-1] < 1:
-        raise ArrayError(f"leg_coefficients has shape {coefficients.shape}", expected="shape (N, 5, k + 1)")
+    coefficients, named = as_motion(as_batch(leg_coefficients, "leg_coefficients")), as_component(component)
     if not (leg_error >= 0.0 and depth >= 0):
         raise ArrayError("leg_error and depth must not be negative", value=(leg_error, depth))
     count = len(coefficients)
@@ -103,7 +93,7 @@ def certify_component(
                 row[block] = answer.low
             refuted[block], doubt[block] = _joined(*answers)
         roots = np.nextafter(np.sqrt(squares), 0.0)  # rounded to nearest: one step down is below the root
-    return ComponentProof(_named(component), roots[0], roots[1], np.asarray((roots > 0.0).all(axis=0)), refuted, doubt)
+    return ComponentProof(named, roots[0], roots[1], np.asarray((roots > 0.0).all(axis=0)), refuted, doubt)
 
 
 def _joined(w: Positivity, s: Positivity) -> tuple[Bools, Floats]:
@@ -112,14 +102,6 @@ def _joined(w: Positivity, s: Positivity) -> tuple[Bools, Floats]:
     both = np.stack([low, high], axis=1)
     doubt = np.where(w.refuted[:, None], w.doubt, np.where(s.refuted[:, None], s.doubt, both))
     return w.refuted | s.refuted, doubt
-
-
-def _named(component: ArrayLike) -> Component:
-    signs = as_batch(component, "component", (2,))
-    for candidate in COMPONENTS:
-        if signs.shape == (2,) and tuple(signs) == candidate:
-            return candidate
-    raise ArrayError("component must be one pair of signs", value=signs.tolist(), expected="+1 or −1 for w and for S")
 
 
 def _roundings(k: int) -> tuple[int, int]:

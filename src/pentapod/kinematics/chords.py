@@ -19,6 +19,8 @@ from numpy.typing import ArrayLike
 from pentapod.arrays import Bools, Floats, as_batch, as_floats
 from pentapod.errors import ArrayError
 from pentapod.geometry.bernstein import elevate, multiply, split
+from pentapod.kinematics.batches import as_motion
+from pentapod.kinematics.component import as_component
 from pentapod.kinematics.pentapod import LinearPentapod
 
 Pose = tuple[Floats, Floats]
@@ -64,12 +66,8 @@ def prove_chords(
     angles of the legs are asked. depth: how often a chord may be halved.
     Raises ArrayError for a wrong shape, numbers that are not finite, signs other than ±1, a negative depth.
     """
-    legs = as_floats(leg_coefficients, "leg_coefficients", (None, 5, None))
-    signs = as_batch(component, "component", (2,))
-    if legs.ndim != 3 or legs.shape[-1] < 2:
-        raise ArrayError(f"leg_coefficients has shape {legs.shape}", expected="shape (H, 5, k + 1), k ≥ 1")
-    if signs.shape != (2,) or not (np.abs(signs) == 1.0).all():
-        raise ArrayError("component must be one pair of signs", value=signs.tolist(), expected="+1 or −1 for w and S")
+    legs = as_motion(as_floats(leg_coefficients, "leg_coefficients"), least=1)
+    signs = np.array(as_component(component), dtype=np.float64)
     points = as_floats(arms, "arms", (None,))
     if points.ndim != 1:
         raise ArrayError(f"arms has shape {points.shape}", expected="shape (A,)")

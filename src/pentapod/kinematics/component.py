@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from numpy.typing import ArrayLike
+
+from pentapod.arrays import as_batch
 from pentapod.errors import ArrayError
 
 
@@ -27,3 +30,12 @@ class Component(NamedTuple):
 
 COMPONENTS = (Component(1, 1), Component(1, -1), Component(-1, 1), Component(-1, -1))
 """In the order of the assembly modes that `LinearPentapod.assembly_modes` returns."""
+
+
+def as_component(value: ArrayLike) -> Component:
+    """Return the component that one pair of signs (2,) names. Raises ArrayError."""
+    signs = as_batch(value, "component", (2,))
+    for component in COMPONENTS:
+        if signs.shape == (2,) and tuple(signs) == component:
+            return component
+    raise ArrayError("component must be one pair of signs", value=signs.tolist(), expected="+1 or −1 for w and for S")

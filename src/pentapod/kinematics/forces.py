@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.arrays import Floats, as_batch
+from pentapod.kinematics.batches import joined_poses
+from pentapod.kinematics.blocks import in_blocks
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.jacobian import invert, line_tangents
 
@@ -56,7 +58,8 @@ def tip_force_amplification(
 
     It is the spectral norm of `leg_force_map`; see there. Infinite on a singularity.
     """
-    return _largest(leg_force_map(pentapod, position, direction, tool_length))
+    poses = joined_poses(position, direction)
+    return in_blocks(lambda p, i: _largest(leg_force_map(pentapod, p, i, tool_length)), *poses)
 
 
 def tip_moment_amplification(
@@ -66,7 +69,8 @@ def tip_moment_amplification(
 
     It is the spectral norm of `leg_moment_map`; see there. Infinite on a singularity.
     """
-    return _largest(leg_moment_map(pentapod, position, direction, tool_length))
+    poses = joined_poses(position, direction)
+    return in_blocks(lambda p, i: _largest(leg_moment_map(pentapod, p, i, tool_length)), *poses)
 
 
 def _largest(forces: Floats) -> Floats:

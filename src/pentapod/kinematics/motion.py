@@ -19,7 +19,9 @@ from pentapod.arrays import Bools, Floats, Ints, as_batch, as_floats
 from pentapod.errors import ArrayError
 from pentapod.geometry.ball_bernstein import blossom, hull, restricted, stack
 from pentapod.geometry.balls import Ball
+from pentapod.kinematics.answers import Answers
 from pentapod.kinematics.as_built import AsBuiltPentapod
+from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.blocks import blocks
 from pentapod.kinematics.carry import carry
 from pentapod.kinematics.leg_equations import Legs, mids
@@ -29,7 +31,7 @@ from pentapod.kinematics.tube import LegFamily
 
 
 @dataclass(frozen=True, eq=False)
-class MotionProof:
+class MotionProof(Answers):
     """What is proven of N intervals of a motion of the legs.
 
     proven (N,): from the exact pose next to the interval's first one in `position` and `direction` the motion is
@@ -61,16 +63,6 @@ class MotionProof:
         for array in (getattr(self, field.name) for field in fields(self)):
             array.flags.writeable = False
 
-    @property
-    def undecided(self) -> Bools:
-        """Which intervals (N,) are neither proven nor refuted."""
-        return ~(self.proven | self.refuted)
-
-    @property
-    def holds(self) -> bool:
-        """Whether every interval is proven."""
-        return bool(self.proven.all())
-
 
 def certify_motion(
     machine: AsBuiltPentapod,
@@ -92,7 +84,7 @@ def certify_motion(
     Raises ArrayError: wrong shapes, coefficients that are not finite, lengths that are not positive, a negative
     leg_error or depth, legs that jump between intervals by more than 2 leg_error.
     """
-    coefficients = as_floats(leg_coefficients, "leg_coefficients", (None, 5, None))
+    coefficients = as_motion(as_floats(leg_coefficients, "leg_coefficients"))
     p, i = as_batch(position, "position", (None, 3)), as_batch(direction, "direction", (None, 3))
     _check(machine, coefficients, p, i, leg_error, depth)
     n = len(coefficients)
@@ -162,8 +154,6 @@ class _Motion:
 
 
 def _check(machine: AsBuiltPentapod, c: Floats, p: Floats, i: Floats, leg_error: float, depth: int) -> None:
-    if c.ndim != 3 or c.shape[-1] < 1:
-        raise ArrayError(f"leg_coefficients has shape {c.shape}", expected="shape (N, 5, k + 1)")
     for name, array in (("position", p), ("direction", i)):
         if array.shape != (len(c) + 1, 3):
             expected = f"shape ({len(c) + 1}, 3): the poses at the ends of {len(c)} intervals"

@@ -20,11 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Bools, Floats, Ints, as_batch, as_floats
+from pentapod.arrays import Bools, Floats, Ints, as_floats
 from pentapod.errors import ArrayError
 from pentapod.geometry.ball_bernstein import blossom, elevate, hull, multiply, restricted
 from pentapod.geometry.balls import Ball
+from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.blocks import blocks
+from pentapod.kinematics.component import as_component
 from pentapod.kinematics.jacobian import invert
 from pentapod.kinematics.pentapod import LinearPentapod
 from pentapod.kinematics.tip_deviation import angle_bound, distance_bound
@@ -101,12 +103,8 @@ def prove_tip_tube(
     time: the tube then holds every such motion. depth: how often an interval may be halved.
     Raises ArrayError for a wrong shape, numbers that are not finite, a negative leg_error or depth.
     """
-    legs = as_floats(leg_coefficients, "leg_coefficients", (None, 5, None))
-    signs = as_batch(component, "component", (2,))
-    if legs.ndim != 3 or legs.shape[-1] < 1:
-        raise ArrayError(f"leg_coefficients has shape {legs.shape}", expected="shape (N, 5, k + 1)")
-    if signs.shape != (2,) or not (np.abs(signs) == 1.0).all():
-        raise ArrayError("component must be one pair of signs", value=signs.tolist(), expected="+1 or −1 for w and S")
+    legs = as_motion(as_floats(leg_coefficients, "leg_coefficients"))
+    signs = np.array(as_component(component), dtype=np.float64)
     if not (0.0 <= leg_error < np.inf and depth >= 0):
         raise ArrayError("leg_error and depth must not be negative", value=(leg_error, depth))
     done: list[tuple[Ints, Floats, Floats, tuple[Floats, ...]]] = []

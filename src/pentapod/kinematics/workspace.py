@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from pentapod.arrays import Floats, as_batch, as_floats, frozen, set_frozen
 from pentapod.errors import ArrayError
 from pentapod.geometry.directions import normalised
-from pentapod.kinematics.component import COMPONENTS, Component
+from pentapod.kinematics.component import Component, as_component
 from pentapod.kinematics.pentapod import LinearPentapod
 
 
@@ -45,14 +45,13 @@ class Workspace:
             direction=frozen(normalised(self.direction), "direction", (3,)),
             shortest=frozen(self.shortest, "shortest", (5,)),
             longest=frozen(self.longest, "longest", (5,)),
+            component=as_component(self.component),
             tool_length=float(as_floats(self.tool_length, "tool_length")),
         )
         if not ((self.shortest >= 0.0) & (self.shortest < self.longest)).all():
             raise ArrayError("leg limits exclude each other", expected="0 ≤ shortest < longest for each leg")
         if not 0.0 <= self.half_angle < 0.5 * np.pi:
             raise ArrayError("half_angle is out of range", value=self.half_angle, expected="radians in [0, π/2)")
-        if tuple(self.component) not in COMPONENTS:
-            raise ArrayError("component must be a pair of signs", value=tuple(self.component), expected="+1 or −1")
 
     def slack(self, tips: ArrayLike) -> Floats:
         """Return by how much (..., metres) tips (..., 3) are inside: 0 on the boundary, negative outside.

@@ -15,6 +15,7 @@ from pentapod.machine.machine import (
 )
 from pentapod.machine.reader import load_machine, read_machine, shipped_machines
 from pentapod.machine.segments import segment_distance
+from pentapod.machine.tool_limits import ToolLimits
 from pentapod.machine.work_volume import sample_work_volume
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "Machine",
     "MachineReport",
     "Masses",
+    "ToolLimits",
     "WorkVolume",
     "check",
     "clearances",

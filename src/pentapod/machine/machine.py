@@ -18,6 +18,7 @@ from pentapod.kinematics.singularities import architectural_measure
 from pentapod.machine.digest import digest_of
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.fields import per_leg, positive
+from pentapod.machine.tool_limits import ToolLimits
 
 Interpolation = Literal["linear", "cubic"]
 
@@ -154,7 +155,7 @@ class Machine:
 
     tool_length: metres from p (the platform line's origin, where offset = 0) along i to the tool tip.
     rapid_velocity: largest tip speed in m/s on rapids. drives, masses: for simulation alone; a program does not
-    depend on them.
+    depend on them. tool_limits: of the motion of tip and axis, none unless set.
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
     spindle's nose would be above the lowest platform joint.
@@ -171,6 +172,7 @@ class Machine:
     work: WorkVolume
     drives: Drives = field(default_factory=Drives)
     masses: Masses = field(default_factory=Masses)
+    tool_limits: ToolLimits = field(default_factory=ToolLimits)
     architecture: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -221,3 +223,4 @@ def _numbers(machine: Machine) -> Iterator[tuple[str, object]]:
         for item in dataclasses.fields(part):
             yield f"{type(part).__name__}.{item.name}", getattr(part, item.name)
     yield from (("tool_length", machine.tool_length), ("rapid_velocity", machine.rapid_velocity))
+    yield from machine.tool_limits.given().items()

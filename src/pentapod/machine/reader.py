@@ -19,6 +19,7 @@ from pentapod.kinematics.pentapod import LinearPentapod
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.machine import Bodies, ControllerSettings, JointLimits, LegLimits, Machine, WorkVolume
 from pentapod.machine.tables import DrivesTable, GeometryTable, MachineTables, MassesTable
+from pentapod.machine.tool_limits import ToolLimits
 
 OFFSET_TOLERANCE_M = 1e-6  # offsets in a file are rounded; beyond a micrometre they mean another machine
 
@@ -147,6 +148,7 @@ def _build(tables: MachineTables) -> Machine:
         ),
         drives=_drives(tables.drives),
         masses=_masses(tables.masses),
+        tool_limits=ToolLimits.of(tables.tool),
     )
 
 

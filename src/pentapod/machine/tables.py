@@ -127,6 +127,18 @@ class ToolTable(Table):
 
     length_mm: Positive = Field(description="from the platform line's origin (offset 0) to the tip")
     rapid_mm_min: Positive = Field(description="largest tip speed on rapids")
+    max_tip_acceleration_mm_s2: Positive | None = Field(
+        default=None, description="largest acceleration of the tip; no limit when left out"
+    )
+    max_tip_jerk_mm_s3: Positive | None = Field(
+        default=None, description="largest jerk of the tip; no limit when left out"
+    )
+    max_axis_velocity_deg_s: Positive | None = Field(
+        default=None, description="largest angular velocity of the tool axis; no limit when left out"
+    )
+    max_axis_acceleration_deg_s2: Positive | None = Field(
+        default=None, description="largest angular acceleration of the tool axis; no limit when left out"
+    )
 
 
 class ControllerTable(Table):

@@ -1,35 +1,43 @@
 """The optimisation problem, stated once in casadi: margins and cone of one waypoint as functions of the unknowns.
 
 Unknowns: a small placement step (3 translations in metres, a Cayley rotation vector) around a given placement, in so
-far as the placement is free, and the lean a (2) of the waypoint within the field's lean plane. Both solvers build on
+far as the placement is free, and the lean a (2) of the waypoint, told in a pair of directions. Both solvers build on
 this function: the reference hands it to IPOPT, the default takes its Jacobian.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.freedom import Freedom
 from pentapod.planning.margins import Margins
 from pentapod.planning.setting import Setting
+from pentapod.planning.vectorised import Vectorised
+
+Slopes = Callable[[Floats, Floats, Ints], Floats]
 
 
-def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, jacobian: bool = False) -> Any:
-    """Return the casadi function (step 6, a 2, pivot 3, nominal 3, R 3×3, t 3) → margins K, cone used (squared).
+By = Literal["nothing", "lean", "step and lean"]
 
-    kinds: which margins. jacobian: also return ∂ margins / ∂ (step, a), K × 8.
+
+def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, by: By = "nothing") -> Any:
+    """Return the casadi function of one waypoint: margins K, and the square of the share of the cone that is used.
+
+    Of step 6, lean a 2, pivot 3, nominal 3, pair 3×2, R 3×3, t 3. kinds: which margins. pair: columns, the directions
+    of the lean's two numbers; what of them lies along the nominal axis does not count.
+    by: also return the margins' derivatives by a, K × 2, or by (step, a), K × 8.
     """
     import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
     step, a = ca.SX.sym("step", 6), ca.SX.sym("a", 2)
     pivot, nominal = ca.SX.sym("pivot", 3), ca.SX.sym("nominal", 3)
-    rotation, translation = ca.SX.sym("R", 3, 3), ca.SX.sym("t", 3)
-    b = ca.mtimes(ca.DM(setting.domain.lean_plane.T), a)
+    pair, rotation, translation = ca.SX.sym("pair", 3, 2), ca.SX.sym("R", 3, 3), ca.SX.sym("t", 3)
+    b = ca.mtimes(pair, a)
     across = b - ca.dot(b, nominal) * nominal
     square = ca.dot(across, across)
     turn = ca.mtimes(rotation, _cayley(step[3:]))
@@ -37,9 +45,10 @@ def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, 
     tip = ca.mtimes(turn, pivot) + translation + step[:3] - setting.task.pivot * turned
     values = margins.symbolic(tip, turned)[list(kinds)]
     used = square / setting.cone**2 if setting.task.tilt > 0.0 else ca.SX(0.0)
-    slopes = [ca.densify(ca.jacobian(values, ca.vertcat(step, a)))] if jacobian else []
+    unknowns = {"nothing": [], "lean": [a], "step and lean": [ca.vertcat(step, a)]}[by]
+    slopes = [ca.densify(ca.jacobian(values, x)) for x in unknowns]
     return ca.Function(
-        "point", [step, a, pivot, nominal, rotation, translation], [values, used, *slopes], {"cse": True}
+        "point", [step, a, pivot, nominal, pair, rotation, translation], [values, used, *slopes], {"cse": True}
     )
 
 
@@ -53,6 +62,27 @@ def room_function(freedom: Freedom) -> Any:
     step, rotation, translation = ca.SX.sym("step", 6), ca.SX.sym("R", 3, 3), ca.SX.sym("t", 3)
     room = ca.vertcat(*freedom.room(ca.mtimes(rotation, _cayley(step[3:])), translation + step[:3]))
     return ca.Function("room", [step, rotation, translation], [room, ca.densify(ca.jacobian(room, step))])
+
+
+def lean_slopes(setting: Setting, margins: Margins, transform: RigidTransform, kinds: Sequence[int]) -> Slopes:
+    """Return the function (frames (n, 2, 3), leans in them (n, 2), waypoints (n,)) → margins' derivatives (n, K, 2)."""
+    point = Vectorised(point_function(setting, margins, kinds, by="lean"))
+    rotation, translation = transform.rotation.T.reshape(-1, 1), transform.translation[:, None]
+    task = setting.task
+
+    def slopes(frames: Floats, leans: Floats, rows: Ints) -> Floats:
+        _, _, found = point(
+            np.zeros((6, 1)),
+            leans.T,
+            task.pivots[rows].T,
+            task.nominal[rows].T,
+            frames.reshape(-1, 6).T,
+            rotation,
+            translation,
+        )
+        return found.reshape(2, len(kinds), len(rows)).transpose(2, 1, 0)
+
+    return slopes
 
 
 def stepped(transform: RigidTransform, step: Floats) -> RigidTransform:

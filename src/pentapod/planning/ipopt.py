@@ -7,7 +7,7 @@ considered. Slower than the default solver by an order of magnitude; it is what 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -17,14 +17,12 @@ from pentapod.planning.formulation import point_function, room_function, stepped
 from pentapod.planning.linear_model import valleys
 from pentapod.planning.setting import Candidate, Setting
 
-Goal = Literal["margin", "calm"]
-
 _POINTS, _ROUNDS = 96, 16
 _NEAR = 0.6
 """Kinds of margin within this much of the smallest one are considered from the start."""
 _TRANSLATION_STEP_M, _ROTATION_STEP = 0.4, 0.8
-_UNREST_WEIGHT = 1e-6
-"""Of the unrest beside the margin: it only decides where the margin does not."""
+_UPRIGHT_WEIGHT = 1e-6
+"""Of the field's coefficients beside the margin: they only decide where the margin does not."""
 _OPTIONS: dict[str, Any] = {
     "print_time": False,
     "error_on_fail": False,
@@ -41,17 +39,21 @@ _OPTIONS: dict[str, Any] = {
 
 @dataclass(eq=False)
 class IpoptSolver:
-    """Improves candidates of one setting with IPOPT; free: whether the placement may move."""
+    """Improves candidates of one setting with IPOPT; free: whether the placement may move.
+
+    whole: all waypoints and all kinds of margin at once, with no constraint generation: plain, and very slow.
+    """
 
     setting: Setting
     free: bool
+    whole: bool = False
     _solvers: dict[Any, Any] = field(default_factory=dict[Any, Any])
 
     def raise_margin(self, start: Candidate) -> Candidate:
         """Return a candidate with the largest smallest margin near `start`; never a worse one."""
         best, (rows, kinds) = start, self._first(start)
         for _ in range(_ROUNDS):
-            transform, raw = self._solve(best, rows, kinds, "margin", best.smallest)
+            transform, raw = self._solve(best, rows, kinds)
             coefficients = self.setting.within_cone(raw)
             values = self.setting.values(best.margins, transform, coefficients)
             considered = float(values[np.ix_(rows, kinds)].min())
@@ -64,19 +66,40 @@ class IpoptSolver:
             rows, kinds = more
         return best
 
-    def calm(self, start: Candidate, keep: float) -> Candidate:
-        """Return the calmest field at the placement of `start` that keeps the margin `keep`, as `start` does."""
-        rows, kinds = self._first(start)
-        for _ in range(_ROUNDS):
-            transform, raw = self._solve(start, rows, kinds, "calm", keep)
-            coefficients = self.setting.within_cone(raw)
-            values = self.setting.values(start.margins, transform, coefficients)
-            if values.min() >= keep - 1e-4:
-                return Candidate(start.margins, transform, coefficients, float(values.min()))
-            rows, kinds = self._with_worst(rows, kinds, values, keep, raw)
-        return start
+    def calm(self, start: Candidate, keep: float) -> Floats | None:
+        """Return coefficients (K, 2) of the calmest course at the placement of `start` that keeps the margin `keep`.
+
+        All waypoints at once, and all kinds of margin that come near at the start. None where IPOPT found no such
+        course.
+        """
+        import casadi as ca  # noqa: PLC0415  heavy: only when planning
+
+        setting, task, course = self.setting, self.setting.task, self.setting.course
+        count, first = len(task.pivots), course.fitted(setting.leans(start.coefficients))
+        margins = setting.values_of(start.margins, start.transform, course.leans(first))
+        kinds = [int(k) for k in np.flatnonzero((margins.min(axis=0) < keep + _NEAR) | self.whole)]
+        c = ca.MX.sym("c", 2, len(first))
+        margins, _ = point_function(setting, start.margins, kinds).map(count)(
+            ca.DM.zeros(6, count), course.cone * ca.mtimes(c, ca.DM(course.basis.T)), task.pivots.T, task.nominal.T,
+            course.frames.transpose(2, 0, 1).reshape(3, -1), np.tile(start.transform.rotation, (1, count)),
+            np.tile(start.transform.translation[:, None], (1, count)),
+        )  # fmt: skip
+        x, scale = ca.vec(c), max(course.cost_of(first), 1e-9)
+        problem = {
+            "x": x,
+            "f": (0.5 * ca.bilin(ca.DM(course.whole_hessian()), x, x) + ca.dot(ca.DM(course.gradient), x)) / scale,
+            "g": ca.vertcat(ca.vec(margins), 1.0 - ca.sum1(c * c).T),
+        }
+        lower = np.concatenate([np.full(len(kinds) * count, keep), np.zeros(len(first))])
+        solver = ca.nlpsol("calm", "ipopt", problem, _OPTIONS)
+        found = np.asarray(solver(x0=first.ravel(), lbg=lower, ubg=np.inf)["x"], dtype=np.float64).reshape(-1, 2)
+        found = found / np.maximum(1.0, np.linalg.norm(found, axis=1, keepdims=True))
+        values = setting.values_of(start.margins, start.transform, course.leans(found))
+        return found if values.min() >= keep - 1e-4 else None
 
     def _first(self, start: Candidate) -> tuple[Ints, Ints]:
+        if self.whole:
+            return np.arange(len(self.setting.task.pivots)), np.arange(len(start.margins.limits))
         rows = self.setting.task.representatives(_POINTS)
         values = self.setting.values(start.margins, start.transform, start.coefficients, rows).min(axis=0)
         return np.sort(rows), np.flatnonzero(values < values.min() + _NEAR)
@@ -92,10 +115,8 @@ class IpoptSolver:
             kinds, np.flatnonzero(values.min(axis=0) < level)
         )
 
-    def _solve(
-        self, at: Candidate, rows: Ints, kinds: Ints, goal: Goal, margin: float
-    ) -> tuple[RigidTransform, Floats]:
-        """Solve for waypoints `rows`. margin: first guess of the smallest one, or (goal "calm") the one to keep."""
+    def _solve(self, at: Candidate, rows: Ints, kinds: Ints) -> tuple[RigidTransform, Floats]:
+        """Return placement and coefficients with the largest smallest margin over waypoints `rows`."""
         setting, task = self.setting, self.setting.task
         count = 32 * int(np.ceil(len(rows) / 32))  # in buckets, so that few solvers are built
         rows = np.concatenate([rows, np.full(count - len(rows), rows[0], dtype=np.intp)])
@@ -103,12 +124,11 @@ class IpoptSolver:
         motion = self._motion
         shifts = np.abs(motion[:3]).sum(axis=0) > 0.0
         reach, moving = np.where(shifts, _TRANSLATION_STEP_M, _ROTATION_STEP), motion.shape[1]
-        start = np.concatenate([np.zeros(moving), [margin], c.ravel(), (basis @ c).ravel()])
+        start = np.concatenate([np.zeros(moving), [at.smallest], c.ravel(), (basis @ c).ravel()])
         if task.tilt == 0.0:
             start = start[: moving + 1]
         tilt = np.full(len(start) - moving - 1, 3.0 * setting.cone)
-        low, high = (-10.0, 5.0) if goal == "margin" else (margin, margin)
-        solver = self._solver(at, count, tuple(int(k) for k in kinds), goal)
+        solver = self._solver(at, count, tuple(int(k) for k in kinds))
         equations = 2 * count if task.tilt > 0.0 else 0
         result = solver(
             x0=start,
@@ -120,8 +140,8 @@ class IpoptSolver:
             ]),
             lbg=0.0,
             ubg=np.concatenate([np.zeros(equations), np.full(solver.size1_out("g") - equations, np.inf)]),
-            lbx=np.concatenate([-reach, [low], -tilt]),
-            ubx=np.concatenate([reach, [high], tilt]),
+            lbx=np.concatenate([-reach, [-10.0], -tilt]),
+            ubx=np.concatenate([reach, [5.0], tilt]),
         )  # fmt: skip
         x = np.asarray(result["x"], dtype=np.float64).ravel()
         coefficients = x[moving + 1 : moving + 1 + c.size].reshape(-1, 2)
@@ -134,13 +154,13 @@ class IpoptSolver:
         motion = self.setting.freedom.motion
         return motion if self.free else motion[:, :0]
 
-    def _solver(self, at: Candidate, count: int, kinds: tuple[int, ...], goal: Goal) -> Any:
+    def _solver(self, at: Candidate, count: int, kinds: tuple[int, ...]) -> Any:
         """Return the IPOPT solver for `count` waypoints, built once.
 
         The leans of the waypoints are unknowns of their own, tied to the field by linear equations: so each margin
         depends on nine unknowns only, and the derivatives stay sparse.
         """
-        key = (at.margins.component, count, kinds, goal)
+        key = (at.margins.component, count, kinds)
         if key in self._solvers:
             return self._solvers[key]
         import casadi as ca  # noqa: PLC0415  heavy: only when planning
@@ -155,20 +175,21 @@ class IpoptSolver:
         rotation, translation = ca.MX.sym("R", 3, 3), ca.MX.sym("t", 3)
         margins, used = point_function(setting, at.margins, kinds).map(count)(
             ca.repmat(step, 1, count), leans, points[:3, :], points[3:, :],
+            np.tile(setting.domain.lean_plane.T, (1, count)),
             ca.repmat(rotation, 1, count), ca.repmat(translation, 1, count),
         )  # fmt: skip
-        unknowns, constraints, unrest = [moves, least], [ca.vec(margins - least)], ca.MX(0.0)
+        unknowns, constraints, lean = [moves, least], [ca.vec(margins - least)], ca.MX(0.0)
         if self.free and setting.freedom.is_bounded:
             constraints.append(room_function(setting.freedom)(step, rotation, translation)[0])
         if tilts:
             c = ca.vec(coefficients)
-            unrest = ca.bilin(ca.DM(setting.unrest), c, c)
+            lean = ca.sumsqr(c) / setting.cone**2
             unknowns += [c, ca.vec(leans)]
             constraints = [ca.vec(leans - ca.mtimes(coefficients, basis)), *constraints, 1.0 - used.T]
         problem = {
             "x": ca.vertcat(*unknowns),
             "p": ca.vertcat(ca.vec(points), ca.vec(basis), ca.vec(rotation), translation),
-            "f": -least + _UNREST_WEIGHT * unrest if goal == "margin" else unrest,
+            "f": -least + _UPRIGHT_WEIGHT * lean,
             "g": ca.vertcat(*constraints),
         }
         self._solvers[key] = ca.nlpsol("plan", "ipopt", problem, _OPTIONS)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -98,24 +97,6 @@ class LinearModel:
         step, change = REACH * (self.motion @ x[:moving]), x[moving:-1] * self.setting.cone
         return step, change.reshape(-1, 2), float(x[-1])
 
-    def calmest(self, keep: float, reach: float) -> tuple[Floats, bool] | None:
-        """Return the change of coefficients (size, 2) to the calmest field that keeps the margin `keep`.
-
-        Also returns whether that lies inside the trust region. None where no change within it keeps the margin.
-        bend (R,): how much the margins are known to differ from the linear model where the step will end.
-        """
-        scale, moving = self.setting.cone, self.motion.shape[1]
-        x = _quadratic_program(
-            2.0 * self.setting.unrest * scale**2,
-            2.0 * self.setting.unrest @ self.at.coefficients.ravel() * scale,
-            np.vstack([-self.matrix[:, moving:], self.steep_matrix[:, moving:]]),
-            np.concatenate([self.values - keep, np.maximum(1.0 - self.steepness, 0.0)]),
-            reach,
-        )
-        if x is None:
-            return None
-        return (x * scale).reshape(-1, 2), bool(np.abs(x).max(initial=0.0) < 0.999 * reach)
-
 
 def valleys(values: Floats, count: int = _WORST_OF_KIND) -> Ints:
     """Return the waypoints where a margin of values (N, M) is smaller than beside it, the worst of each kind."""
@@ -149,13 +130,3 @@ def _cone_tangents(setting: Setting, at: Candidate, rows: Ints, extra: Ints) -> 
 def _by_field(basis: Floats, by_lean: Floats) -> Floats:
     """Return derivatives by the coefficients, (R, 2·size), of basis (R, size) and derivatives by the lean (R, 2)."""
     return (basis[:, :, None] * by_lean[:, None, :]).reshape(len(basis), 2 * basis.shape[1])
-
-
-def _quadratic_program(hessian: Floats, gradient: Floats, matrix: Floats, upper: Floats, reach: float) -> Floats | None:
-    """Return x that makes xᵀHx/2 + gᵀx smallest under matrix·x ≤ upper and |x| ≤ reach; None where none was found."""
-    import casadi as ca  # noqa: PLC0415
-
-    shape = {"h": ca.Sparsity.dense(*hessian.shape), "a": ca.Sparsity.dense(*matrix.shape)}
-    solver: Any = ca.conic("step", "daqp", shape, {"error_on_fail": False})
-    answer = solver(h=hessian, g=gradient, a=matrix, lba=-np.inf, uba=upper, lbx=-reach, ubx=reach)
-    return np.asarray(answer["x"]).ravel() if solver.stats()["success"] else None

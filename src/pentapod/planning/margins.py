@@ -26,6 +26,9 @@ S_COMFORTABLE_FRACTION = 0.25
 CLEARANCE_COMFORTABLE_M = 0.05
 """Gap between two legs that counts as margin 1."""
 
+_BLOCK = 16_384
+"""Poses at a time: a hundred intermediate values of each need not be held for a million."""
+
 _PAIRS = tuple(combinations(range(5), 2))
 
 
@@ -58,6 +61,9 @@ class Margins:
 
     def __call__(self, tips: Floats, axes: Floats) -> Floats:
         """Return margins (..., M) of tool tips and axes (tip → spindle), both (..., 3), machine frame."""
+        if tips.ndim == 2 and len(tips) > _BLOCK:
+            blocks = range(0, len(tips), _BLOCK)
+            return np.concatenate([self(tips[k : k + _BLOCK], axes[k : k + _BLOCK]) for k in blocks])
         tip, axis = list(np.moveaxis(tips, -1, 0)), list(np.moveaxis(axes, -1, 0))
         rows = self.rows(tip, axis, np.sqrt, np.minimum, np.maximum, np.where)
         return np.stack(np.broadcast_arrays(*rows), axis=-1)

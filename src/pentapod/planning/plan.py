@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal, Protocol
 
+from pentapod.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.machine.machine import Machine
@@ -19,6 +20,7 @@ from pentapod.planning.sampling import best_tilted_margins, first_guesses
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Candidate, Setting
 from pentapod.planning.task import Task
+from pentapod.planning.tilt import lean
 from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
 from pentapod.toolpath.toolpath import Toolpath
@@ -45,8 +47,11 @@ class Solver(Protocol):
         """Return a candidate near `start` with the largest smallest margin; never a worse one."""
         ...
 
-    def calm(self, start: Candidate, keep: float) -> Candidate:
-        """Return the calmest tilt field at the placement of `start` that keeps the margin `keep`, as `start` does."""
+    def calm(self, start: Candidate, keep: float) -> Floats | None:
+        """Return coefficients of the setting's course: the calmest one that keeps the margin `keep`.
+
+        At the placement of `start`, and from its leans on. None where no such course was found.
+        """
         ...
 
 
@@ -91,10 +96,12 @@ def plan(
     if best.smallest < NEEDED_MARGIN:
         progress("placement", 1.0, "it does not fit; looking for what would")
         return _refusal(setting, best, improves)
+    leans = setting.leans(best.coefficients)
     if tilt > 0.0:
         progress("tool axis", 0.0, f"smallest margin {best.smallest:.3f}")
-        best = improves(setting, False).calm(best, max(CALM_SHARE * best.smallest, NEEDED_MARGIN))
-    tips, axes = setting.task.machine_poses(best.transform, setting.axes(best.coefficients))
+        calm = improves(setting, False).calm(best, max(CALM_SHARE * best.smallest, NEEDED_MARGIN))
+        leans = leans if calm is None else setting.course.leans(calm)
+    tips, axes = setting.task.machine_poses(best.transform, lean(setting.task.nominal, leans))
     chosen = Placement(best.transform, _choice(freedom, best.transform))
     names = tuple(limit.name for limit in best.margins.limits)
     return PlacedPath(toolpath, chosen, best.margins.component, tips, axes, best.margins(tips, axes), names)

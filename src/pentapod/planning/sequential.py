@@ -14,18 +14,20 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.planning.calming import calmed
 from pentapod.planning.formulation import point_function, room_function, stepped
 from pentapod.planning.linear_model import LinearModel, valleys
 from pentapod.planning.margins import Margins
 from pentapod.planning.setting import Candidate, Setting
+from pentapod.planning.vectorised import Vectorised
 
 _CONSIDERED = 4000
 """Waypoints whose margins are looked at in every step; all are looked at when the steps have ended."""
 _STEPS, _ROUNDS = 60, 6
 _ENOUGH = 1e-4
-"""A step that promises less margin, or less of the cost in proportion, is not taken."""
-_SLACK = 1e-5
-"""How far below the margin to keep a calm field may come: micrometres of a stroke."""
+"""A smallest margin over all waypoints that is lower by more than this calls for another round."""
+_LEAST = 1e-5
+"""A promise of less margin, or a trust region smaller than this, ends the climb."""
 _NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
 
 
@@ -51,33 +53,9 @@ class SequentialSolver:
             rows = np.union1d(rows, np.argsort(values.min(axis=1), kind="stable")[: _CONSIDERED // 8])
         return best
 
-    def calm(self, start: Candidate, keep: float) -> Candidate:
-        """Return the calmest field at the placement of `start` that keeps the margin `keep`, as `start` does."""
-        setting, rows, best = self.setting, self._considered(), start
-        cost, reach, reserve = setting.unrest_of(start.coefficients), 1.0, 0.0
-        model = self.model(best, rows, keep)
-        for _ in range(_STEPS):
-            step = model.calmest(keep + reserve, reach)
-            if step is None:
-                reach, reserve = 0.4 * reach, 0.0
-                continue
-            change, inside = step
-            trial = setting.within_cone(best.coefficients + change)
-            values = setting.values(best.margins, best.transform, trial)
-            gain, short = cost - setting.unrest_of(trial), keep - float(values.min())
-            if short <= _SLACK and gain >= 0.0:
-                best = Candidate(best.margins, best.transform, trial, float(values.min()))
-                if inside and gain < _ENOUGH * cost:
-                    break
-                cost, reach, reserve = cost - gain, 2.0 * reach, 0.0
-                model = self.model(best, rows, keep)
-            elif reserve == 0.0 and short > 0.0:  # first aim higher by what the margins fell short
-                reserve = 1.5 * short
-            else:
-                reach, reserve = 0.4 * reach, 0.0
-                if reach < _ENOUGH:
-                    break
-        return best
+    def calm(self, start: Candidate, keep: float) -> Floats | None:
+        """Return coefficients (K, 2) of the calmest course at the placement of `start` that keeps the margin `keep`."""
+        return calmed(self.setting, start, keep)
 
     def _considered(self) -> Ints:
         count = len(self.setting.task.pivots)
@@ -91,7 +69,7 @@ class SequentialSolver:
         model = self.model(best, rows, best.smallest)
         for _ in range(_STEPS):
             step, change, promise = model.best_step(reach)
-            if promise < _SLACK:
+            if promise < _LEAST:
                 break
             transform = setting.freedom.nearest_to(stepped(best.transform, step)) if self.free else best.transform
             coefficients = setting.within_cone(best.coefficients + change)
@@ -101,7 +79,7 @@ class SequentialSolver:
             if gain > 0.05 * promise:
                 best = Candidate(best.margins, transform, coefficients, float(values.min()))
                 extra = _NO_ROWS
-            elif reach < _SLACK:
+            elif reach < _LEAST:
                 break
             else:  # what came out worst may not have been in the model
                 steepness = setting.steepness(best.coefficients + change, rows)
@@ -132,16 +110,15 @@ class SequentialSolver:
 
     def slopes(self, margins: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints) -> Floats:
         """Return the Jacobian (n, M, 8) of the margins by placement step and lean at waypoints `rows`."""
-        count = 64 * int(np.ceil(len(rows) / 64))  # in buckets, so that few functions are built
-        key = (margins.component, count)
+        key = margins.component
         if key not in self._functions:
-            point = point_function(self.setting, margins, range(len(margins.limits)), jacobian=True)
-            self._functions[key] = point.map(count)
-        padded = np.concatenate([rows, np.full(count - len(rows), rows[0], dtype=np.intp)])
+            kinds = range(len(margins.limits))
+            self._functions[key] = Vectorised(point_function(self.setting, margins, kinds, by="step and lean"))
         task = self.setting.task
-        leans = (self.setting.basis[padded] @ coefficients).T if task.tilt > 0.0 else np.zeros((2, count))
+        leans = (self.setting.basis[rows] @ coefficients).T if task.tilt > 0.0 else np.zeros((2, 1))
         _, _, slopes = self._functions[key](
-            np.zeros((6, count)), leans, task.pivots[padded].T, task.nominal[padded].T,
-            np.tile(transform.rotation, (1, count)), np.tile(transform.translation[:, None], (1, count)),
+            np.zeros((6, 1)), leans, task.pivots[rows].T, task.nominal[rows].T,
+            self.setting.domain.lean_plane.reshape(-1, 1),
+            transform.rotation.T.reshape(-1, 1), transform.translation[:, None],
         )  # fmt: skip
-        return np.asarray(slopes).reshape(-1, count, 8).transpose(1, 0, 2)[: len(rows)]
+        return slopes.reshape(8, len(margins.limits), len(rows)).transpose(2, 1, 0)

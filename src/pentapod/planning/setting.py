@@ -10,6 +10,7 @@ import numpy as np
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.machine import Machine
+from pentapod.planning.axis_course import AxisCourse
 from pentapod.planning.freedom import FREE, Freedom
 from pentapod.planning.margins import Margins
 from pentapod.planning.sampling import best_tilted_margins
@@ -79,6 +80,11 @@ class Setting:
         """Return the margins (n, M) at waypoints `rows`."""
         return margins(*self.task.machine_poses(transform, self.axes(coefficients, rows), rows))
 
+    def values_of(self, margins: Margins, transform: RigidTransform, leans: Floats) -> Floats:
+        """Return the margins (N, M) at all waypoints for leans (N, 3), workpiece frame."""
+        axes = lean(self.task.nominal, leans)
+        return margins(*self.task.machine_poses(transform, axes))
+
     def steepness(self, coefficients: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """Return the share of the cone (n,) that each lean uses: 1 on its edge."""
         return np.linalg.norm(self.leans(coefficients, rows), axis=1) / max(self.cone, 1e-12)
@@ -106,21 +112,6 @@ class Setting:
         return self.candidate(margins, transform, coefficients)
 
     @cached_property
-    def unrest(self) -> Floats:
-        """The matrix H (2·size, 2·size) of the cost cᵀHc of coefficients c, in the order of `coefficients.ravel()`.
-
-        It sums the second differences of the field, and the mean square of the leans over the waypoints, both as
-        shares of the cone.
-        """
-        size = self.basis.shape[1]
-        bends = self.domain.roughness()
-        across = np.eye(3) - self.task.nominal[:, :, None] * self.task.nominal[:, None, :]
-        plane = self.domain.lean_plane @ across @ self.domain.lean_plane.T  # (N, 2, 2): squared length of the lean
-        mean = np.einsum("na,nij,nb->aibj", self.basis, plane, self.basis, optimize=True) / len(self.basis)
-        field = np.kron((bends.T @ bends + 1e-3 * np.eye(size)) / size, np.eye(2))
-        return np.asarray((field + mean.reshape(2 * size, 2 * size)) / self.cone**2, dtype=np.float64)
-
-    def unrest_of(self, coefficients: Floats) -> float:
-        """Return the cost that a calm field makes small."""
-        c = coefficients.ravel()
-        return float(c @ self.unrest @ c)
+    def course(self) -> AxisCourse:
+        """The leans along the path as a spline: what calming works on."""
+        return AxisCourse.of(self.task, self.cone)

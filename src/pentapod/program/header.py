@@ -35,7 +35,7 @@ KEYS = (
 
 @dataclass(frozen=True)
 class Header:
-    """What stands in front of the rows."""
+    """What stands in front of the rows. unknown: keys that this version of the format has no meaning for."""
 
     period: float
     interpolation: Any
@@ -43,6 +43,7 @@ class Header:
     placement: RigidTransform
     provenance: Provenance
     rows: int
+    unknown: tuple[str, ...] = ()
 
 
 def header_text(program: Program) -> str:
@@ -123,6 +124,7 @@ class _Reader:
                 pentapod_version=self._text("pentapod_version"),
             ),
             rows=self._rows(),
+            unknown=tuple(key for key in self.values if key not in KEYS),
         )
 
     def _wrong(self, key: str, expected: str) -> ProgramError:

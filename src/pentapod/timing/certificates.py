@@ -8,7 +8,7 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.geometry.interpolant import Interpolant, largest_length
-from pentapod.machine.machine import Machine
+from pentapod.machine.machine import Interpolation, Machine
 from pentapod.timing.trajectory import Trajectory
 
 
@@ -48,16 +48,16 @@ def certify(
     *,
     legs: Floats | None = None,
     tips: Floats | None = None,
+    axes: Floats | None = None,
     spots: Floats | None = None,
-    tip_acceleration: float | None = None,
 ) -> tuple[LimitUse, ...]:
-    """Return the largest share of leg velocity, acceleration and jerk, feed, and tip acceleration where it is limited.
+    """Return the largest share of leg velocity, acceleration and jerk, of feed, and of the tool's limits where set.
 
-    Of the setpoints as the controller joins them: every polynomial's exact extrema, no samples between. legs (N, 5) m
-    and tips (N, 3) m: the program's rows, at the controller's period; without them the trajectory is sampled, and its
-    station stands for the tip, which is never faster. spots (N, 3) m: where a tool with a stand-off meets the surface,
-    whose speed the feed is; rapids are judged by the tip. tip_acceleration: limit in m/s². Jerk counts the step
-    of acceleration at either end over one period. An interval that two sections share is judged by the slower feed.
+    Of the setpoints as the controller joins them: every polynomial's exact extrema, no samples between. legs (N, 5) m,
+    tips (N, 3) m and axes (N, 3): the program's rows, at the controller's period; without them the trajectory is
+    sampled, and for the feed its station stands for the tip, which is never faster. spots (N, 3) m: where a tool with a
+    stand-off meets the surface, whose speed the feed is; rapids are judged by the tip. Jerk counts the step of
+    acceleration at either end over one period. An interval that two sections share is judged by the slower feed.
     """
     period, interpolation = machine.controller.period, machine.controller.interpolation
     count = max(1, round(trajectory.duration / period)) if legs is None else len(legs) - 1
@@ -90,10 +90,13 @@ def certify(
         steps = np.where((on_feed[:-1] | on_feed[1:])[:, None, None], spot.steps, steps)
     share, row = largest_length(steps / feeds[:, None, None])
     uses.append(use("feed", "m/s", share * float(feeds[row]), float(feeds[row]), row))
-    if tip_acceleration is not None:
-        pushes = np.linalg.norm(tip.second, axis=1)
-        row = int(np.argmax(pushes))
-        uses.append(use("tip acceleration", "m/s²", float(pushes[row]), tip_acceleration, row))
+    limits = machine.tool_limits.given()
+    if limits:
+        posed = trajectory.pose(times) if tips is None or axes is None else (tips, axes)
+        for name, unit, values in _of_tool(*posed, period, interpolation):
+            if name in limits:
+                row = int(np.argmax(values))
+                uses.append(use(_TOOL[name], unit, float(values[row]), limits[name], row))
     return tuple(uses)
 
 
@@ -101,3 +104,27 @@ def _slower(feeds: Floats, rapid: float) -> Floats:
     """Return for each interval (N − 1,) the slower of the feeds (N,) at its ends; infinite ones are rapids."""
     speeds = np.where(np.isfinite(feeds), feeds, rapid)
     return np.minimum(speeds[:-1], speeds[1:])
+
+
+_TOOL = {
+    "max_tip_acceleration": "tip acceleration",
+    "max_tip_jerk": "tip jerk",
+    "max_axis_velocity": "axis velocity",
+    "max_axis_acceleration": "axis acceleration",
+}
+
+
+def _of_tool(
+    tips: Floats, axes: Floats, period: float, interpolation: Interpolation
+) -> tuple[tuple[str, str, Floats], ...]:
+    """Return name, unit and values (N or N − 1,) of what may be limited in the motion of tips and axes (N, 3)."""
+    tip, axis = (Interpolant.through(rows, period, interpolation) for rows in (tips, axes))
+    fastest, row = largest_length(axis.steps)
+    speeds = np.zeros(len(axis.steps))
+    speeds[row] = fastest
+    return (
+        ("max_tip_acceleration", "m/s²", np.linalg.norm(tip.second, axis=1)),
+        ("max_tip_jerk", "m/s³", tip.jerk_lengths),
+        ("max_axis_velocity", "rad/s", speeds),
+        ("max_axis_acceleration", "rad/s²", axis.turn_accelerations),
+    )

@@ -1,6 +1,6 @@
-"""The limits of one piece as functions of its arc length: leg rates and accelerations, feed, rapid rate.
+"""The limits of one piece as functions of its arc length: legs, feed, rapid rate, and the tool's own motion.
 
-With x = ṡ² and u = s̈, leg i moves at q_i′ √x and accelerates with q_i′ u + q_i″ x; the tip moves at √x.
+With x = ṡ² and u = s̈, leg i moves at q_i′ √x and accelerates with q_i′ u + q_i″ x; the tip moves at √x at most.
 """
 
 from __future__ import annotations
@@ -11,16 +11,28 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.machine.machine import Machine
+from pentapod.machine.tool_limits import ToolLimits
+from pentapod.timing.course import Course, legs_along, tip_along, turn_along
 from pentapod.timing.paths import PieceLike
+from pentapod.timing.polytopes import DIRECTIONS, across_path, polygon, polyhedron
 
 CONSTRAINTS = (
     *(f"leg {i} velocity" for i in range(1, 6)),
     *(f"leg {i} acceleration" for i in range(1, 6)),
+    "tip acceleration",
+    "axis acceleration",
+    "axis velocity",
     "feed",
     "rapid rate",
     *(f"leg {i} jerk" for i in range(1, 6)),
+    "tip jerk",
 )
-"""Names of the constraints: first those of the columns that `Limits.shares` returns."""
+"""Names of the constraints: first those of the columns that `Limits.shares` returns, last those of `jerk_shares`."""
+
+FEED = CONSTRAINTS.index("feed")
+RAPID = CONSTRAINTS.index("rapid rate")
+PUSHES = slice(5, 12)
+"""Columns of the accelerations; the others are speeds."""
 
 _PAIRS = np.triu_indices(5, 1)
 
@@ -29,14 +41,15 @@ _PAIRS = np.triu_indices(5, 1)
 class Limits:
     """What the plan may use: the machine's limits less the margins.
 
-    velocity (5,) m/s, acceleration (5,) m/s² and jerk (5,) m/s³ of the legs; rapid: the tip's speed on rapids, m/s;
-    feed_fraction of each feed; guard: seconds by which a slower section's feed reaches into its faster
-    neighbours, so that no interval between two setpoints straddles the step too fast.
+    velocity (5,) m/s, acceleration (5,) m/s² and jerk (5,) m/s³ of the legs; tool: of the tip and the axis; rapid: the
+    tip's speed on rapids, m/s; feed_fraction of each feed; guard: seconds by which a slower section's feed reaches
+    into its faster neighbours, so that no interval between two setpoints straddles the step too fast.
     """
 
     velocity: Floats
     acceleration: Floats
     jerk: Floats
+    tool: ToolLimits
     rapid: float
     feed_fraction: float
     guard: float
@@ -44,13 +57,38 @@ class Limits:
     @classmethod
     def of(cls, machine: Machine, velocity_margin: float, acceleration_margin: float, guard: float) -> Limits:
         """Return the machine's limits less the margins (fractions)."""
+        slower, softer = 1.0 - velocity_margin, 1.0 - acceleration_margin
+        tool = machine.tool_limits
         return cls(
-            velocity=machine.legs.max_velocity * (1.0 - velocity_margin),
-            acceleration=machine.legs.max_acceleration * (1.0 - acceleration_margin),
-            jerk=machine.legs.max_jerk * (1.0 - acceleration_margin),
-            rapid=machine.rapid_velocity * (1.0 - velocity_margin),
-            feed_fraction=1.0 - velocity_margin,
+            velocity=machine.legs.max_velocity * slower,
+            acceleration=machine.legs.max_acceleration * softer,
+            jerk=machine.legs.max_jerk * softer,
+            tool=ToolLimits(
+                tool.max_tip_acceleration * softer,
+                tool.max_tip_jerk * softer,
+                tool.max_axis_velocity * slower,
+                tool.max_axis_acceleration * softer,
+            ),
+            rapid=machine.rapid_velocity * slower,
+            feed_fraction=slower,
             guard=guard,
+        )
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Which constraint each row of `rows` belongs to."""
+        tip = ("tip acceleration",) * (DIRECTIONS if self.tool.limits_tip_acceleration else 0)
+        axis = ("axis acceleration",) * (DIRECTIONS if self.tool.limits_axis_acceleration else 0)
+        return (*CONSTRAINTS[5:10], *tip, *axis)
+
+    def course(self, piece: PieceLike, s: Floats, order: int = 2) -> Course:
+        """Return what the limits need to know of a piece at sorted stations s (n,), legs and tip up to `order`."""
+        tip = self.tool.limits_tip_acceleration or (order > 2 and self.tool.limits_tip_jerk)
+        return Course(
+            legs_along(piece, s, order),
+            tip_along(piece, s, order) if tip else (),
+            turn_along(piece, s) if self.tool.limits_axis else (),
+            *self.tip_speed(piece, s),
         )
 
     def section_speeds(self, piece: PieceLike) -> Floats:
@@ -82,30 +120,77 @@ class Limits:
             speed[here] = np.minimum(speed[here], speeds[m])
         return self._by_feed(speed, piece.feed_rate(s)), section
 
-    def ceiling(self, first: Floats, second: Floats, speed: Floats) -> Floats:
-        """Return the largest x (n,) that some u allows: from q′, q″ (n, 5) and the tip's largest speed (n,).
+    def rows(self, course: Course) -> tuple[Floats, Floats]:
+        """Return the accelerations' rows (n, R), |first u + second x| ≤ 1: five of the legs, polygons of the tool."""
+        first, second = [course.legs[0] / self.acceleration], [course.legs[1] / self.acceleration]
+        if self.tool.limits_tip_acceleration:
+            parts = polygon(course.tip[0], course.tip[1], self.tool.max_tip_acceleration)
+            first, second = [*first, parts[0]], [*second, parts[1]]
+        if self.tool.limits_axis_acceleration:
+            parts = polygon(course.turn[0], course.turn[1], self.tool.max_axis_acceleration)
+            first, second = [*first, parts[0]], [*second, parts[1]]
+        return np.concatenate(first, axis=1), np.concatenate(second, axis=1)
+
+    def jerk_rows(self, course: Course) -> Floats:
+        """Return the jerks' rows (n, K, 3) of x, x′, x″, by √x: five of the legs, a polyhedron around the tip's."""
+        one, two, three = (y / self.jerk for y in course.legs)
+        legs = np.stack([three, 1.5 * two, 0.5 * one], axis=-1)
+        if not self.tool.limits_tip_jerk:
+            return legs
+        return np.concatenate(
+            [legs, polyhedron(course.tip[0], course.tip[1], course.tip[2], self.tool.max_tip_jerk)], axis=1
+        )
+
+    def ceiling(self, course: Course) -> Floats:
+        """Return a bound of x (n,): what speeds allow, and accelerations at their best u.
 
         Leg accelerations are strips in the (u, x) plane. For one x each strip leaves an interval of u, and
         intervals have a point in common when each two of them have: hence the minimum over pairs of legs of
-        (a_i |q_j′| + a_j |q_i′|) / |q_i″ q_j′ − q_j″ q_i′|.
+        (a_i |q_j′| + a_j |q_i′|) / |q_i″ q_j′ − q_j″ q_i′|. Of the tool each limit counts alone.
         """
         a, (i, j) = self.acceleration, _PAIRS
-        one, two = np.abs(first), second
+        one, two = np.abs(course.legs[0]), course.legs[1]
         above = a[i] * one[:, j] + a[j] * one[:, i]
-        below = np.abs(two[:, i] * first[:, j] - two[:, j] * first[:, i])
+        below = np.abs(two[:, i] * course.legs[0][:, j] - two[:, j] * course.legs[0][:, i])
         with np.errstate(divide="ignore", invalid="ignore"):
-            pairs = np.where(below > 0.0, above / below, np.inf).min(axis=1)
-            rates = np.square(self.velocity / one).min(axis=1)  # the limit over 0 is infinite, as it should be
-        return np.minimum(np.minimum(pairs, rates), speed**2)
+            bounds = [
+                np.where(below > 0.0, above / below, np.inf).min(axis=1),
+                np.square(self.velocity / one).min(axis=1),  # the limit over 0 is infinite, as it should be
+                np.square(course.speed),
+            ]
+            if self.tool.limits_tip_acceleration:
+                bounds.append(self.tool.max_tip_acceleration / across_path(course.tip[0], course.tip[1]))
+            if self.tool.limits_axis:
+                bounds.append(np.square(self.tool.max_axis_velocity / np.linalg.norm(course.turn[0], axis=1)))
+                bounds.append(self.tool.max_axis_acceleration / across_path(course.turn[0], course.turn[1]))
+        return np.min(bounds, axis=0)
 
-    def shares(self, first: Floats, second: Floats, x: Floats, u: Floats, speed: Floats) -> Floats:
-        """Return how much of each limit is used (n, 11): five velocities, five accelerations, tip speed."""
-        root = np.sqrt(x)[:, None]
-        return np.concatenate(
-            [
-                np.abs(first) * root / self.velocity,
-                np.abs(first * u[:, None] + second * x[:, None]) / self.acceleration,
-                root / speed[:, None],
-            ],
-            axis=1,
-        )
+    def shares(self, course: Course, x: Floats, u: Floats) -> Floats:
+        """Return how much of each limit is used (n, 14), in the order of `CONSTRAINTS`; nothing of those not set."""
+        root, x, u = np.sqrt(x)[:, None], x[:, None], u[:, None]
+        shares = np.zeros((len(x), FEED + 1))
+        shares[:, :5] = np.abs(course.legs[0]) * root / self.velocity
+        shares[:, 5:10] = np.abs(course.legs[0] * u + course.legs[1] * x) / self.acceleration
+        tool = self.tool
+        if tool.limits_tip_acceleration:
+            pushes = course.tip[0] * u + course.tip[1] * x
+            shares[:, 10] = np.linalg.norm(pushes, axis=1) / tool.max_tip_acceleration
+        if tool.limits_axis:
+            pushes = course.turn[0] * u + course.turn[1] * x
+            shares[:, 11] = np.linalg.norm(pushes, axis=1) / tool.max_axis_acceleration
+            shares[:, 12] = np.linalg.norm(course.turn[0], axis=1) * root[:, 0] / tool.max_axis_velocity
+        shares[:, FEED] = root[:, 0] / course.speed
+        return shares
+
+    def jerk_shares(self, course: Course, v: Floats, a: Floats, j: Floats) -> Floats:
+        """Return how much of each jerk limit is used (n, 6) at ṡ, s̈ and s⃛ (n,): legs, tip."""
+        v, a, j = v[:, None], a[:, None], j[:, None]
+
+        def jerk(one: Floats, two: Floats, three: Floats) -> Floats:
+            return one * j + 3.0 * two * v * a + three * v**3
+
+        shares = np.zeros((len(v), 6))
+        shares[:, :5] = np.abs(jerk(*course.legs)) / self.jerk
+        if self.tool.limits_tip_jerk:
+            shares[:, 5] = np.linalg.norm(jerk(*course.tip), axis=1) / self.tool.max_tip_jerk
+        return shares

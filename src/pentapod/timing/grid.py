@@ -6,12 +6,15 @@ import numpy as np
 
 from pentapod.arrays import Bools, Floats
 from pentapod.timing.constraints import Limits
+from pentapod.timing.course import Course
 from pentapod.timing.paths import PieceLike
 
 LEAST_STAGES = 24
 """Stages of a piece at least."""
 
 _TOLERANCE = 0.01
+_DRIFT = 0.1
+"""Share of an acceleration limit by which the speed gained in a stage may change what the curve itself takes."""
 _ROUNDS = 7
 
 
@@ -20,7 +23,8 @@ def first_grid(piece: PieceLike, limits: Limits) -> Floats:
 
     Holds the knots, the section ends and where their feeds begin to hold; stages are halved until, at the
     largest speed and path acceleration that the limits leave there, the leg accelerations and rates in
-    the middle of a stage exceed those at its ends by less than 1 %, and the square of the feed's rate is off by less.
+    the middle of a stage exceed those at its ends by less than 1 %, and the square of the feed's rate is off by less;
+    and until a stage gains so little speed that one path acceleration suits both of its ends.
     """
     s = _base_grid(piece, limits)
     for _ in range(_ROUNDS):
@@ -54,10 +58,8 @@ def _ramps(piece: PieceLike, limits: Limits) -> Floats:
     """
     begins, ends, speeds = limits.guarded_sections(piece)
     before, after = np.append(0.0, speeds), np.append(speeds, 0.0)
-    slope = np.abs(piece(np.append(0.0, piece.section_ends), 1))
-    with np.errstate(divide="ignore"):
-        push = (limits.acceleration / slope).min(axis=1)
-    reach = np.abs(after**2 - before**2) / (2.0 * push)
+    slope = limits.rows(limits.course(piece, np.append(0.0, piece.section_ends)))[0]
+    reach = 0.5 * np.abs(after**2 - before**2) * np.abs(slope).max(axis=1)
     up, down = np.append(0.0, ends) + reach, np.append(begins, piece.length) - reach
     return np.where(after > before, up, down)
 
@@ -66,11 +68,11 @@ def _rough(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
     """Return which stages (N,) are too long, by what the constraints' coefficients do at their middle."""
     points = np.empty(2 * len(s) - 1)
     points[0::2], points[1::2] = s, (s[:-1] + s[1:]) / 2.0
-    first, second = piece(points, 1), piece(points, 2)
-    speed, _ = limits.tip_speed(piece, points)
-    ceiling = limits.ceiling(first, second, speed)
+    course = limits.course(piece, points)
+    first, second = limits.rows(course)
+    ceiling = limits.ceiling(course)
     with np.errstate(divide="ignore"):
-        pushes = ((limits.acceleration + np.abs(second) * ceiling[:, None]) / np.abs(first)).min(axis=1)
+        pushes = ((1.0 + np.abs(second) * ceiling[:, None]) / np.abs(first)).min(axis=1)
     a, m, b = slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2)
     x = np.maximum(np.maximum(ceiling[a], ceiling[b]), ceiling[m])[:, None]
     # No stage can gain more than the whole of x over its length.
@@ -82,10 +84,22 @@ def _rough(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
         + np.abs(second[b] - second[a]) * gain / 4.0
     )
     # x is linear within the stage, its ceiling v²/q′² is not: the chord between two ceilings lies above.
-    low, high = np.minimum(ceiling[a], ceiling[b])[:, None], np.maximum(ceiling[a], ceiling[b])[:, None]
-    rate = np.abs(first[m]) * np.sqrt(np.minimum(low + gain, high) / 2.0 + low / 2.0)
-    rough = (bulge > _TOLERANCE * limits.acceleration) | (rate > (1.0 + 0.1 * _TOLERANCE) * limits.velocity)
+    low, high = np.minimum(ceiling[a], ceiling[b]), np.maximum(ceiling[a], ceiling[b])
+    fast = _slowness(course, limits)[m] * np.sqrt(np.minimum(low + gain[:, 0], high) / 2.0 + low / 2.0)
     # What a feed allows is its square by that of the rate: 1 for cutters, curved for a spot on the surface.
     square = np.square(piece.feed_rate(points))
     bow = np.abs(square[m] - (square[a] + square[b]) / 2.0)
-    return np.asarray(rough.any(axis=1) | (bow > _TOLERANCE * np.maximum(square[a], square[b])))
+    return np.asarray(
+        (bulge > _TOLERANCE).any(axis=1)
+        | (np.abs(second[m]) * gain > _DRIFT).any(axis=1)
+        | (fast > 1.0 + 0.1 * _TOLERANCE)
+        | (bow > _TOLERANCE * np.maximum(square[a], square[b]))
+    )
+
+
+def _slowness(course: Course, limits: Limits) -> Floats:
+    """Return 1/ṡ (n,) where the first of legs and axis is at its largest velocity, s/m."""
+    slowness = (np.abs(course.legs[0]) / limits.velocity).max(axis=1)
+    if course.turn:
+        slowness = np.maximum(slowness, np.linalg.norm(course.turn[0], axis=1) / limits.tool.max_axis_velocity)
+    return slowness

@@ -19,6 +19,8 @@ class PieceLike(Protocol):
     derivatives d^order/ds^order, order 0 to 3, the second continuous; the third is asked for where jerk is limited.
     `feed_rate(s)` tells how far (n,) the point whose speed the feed is moves for each metre of s: 1 for cutters, whose
     tip is never faster; less or more for the spot on the surface that a beam or a spray meets from a stand-off.
+    `pose(s, order)` gives tips and tool axes (n, 3) or their derivatives, order 0 to 3; it is asked for only where the
+    motion of the tip or the axis is limited.
     """
 
     @property
@@ -38,6 +40,7 @@ class PieceLike(Protocol):
     @property
     def waypoints(self) -> Ints: ...  # noqa: D102
     def feed_rate(self, s: Floats) -> Floats: ...  # noqa: D102
+    def pose(self, s: Floats, order: int = 0) -> tuple[Floats, Floats]: ...  # noqa: D102
     def __call__(self, s: Floats, order: int = 0) -> Floats: ...  # noqa: D102
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.compiled import kernels_available
-from pentapod.timing.constraints import Limits
+from pentapod.timing.constraints import FEED, PUSHES, RAPID, Limits
+from pentapod.timing.course import Course
 from pentapod.timing.engine import Engine, fastest
 from pentapod.timing.grid import first_grid
 from pentapod.timing.jerk_rows import JerkRows
@@ -43,27 +44,23 @@ class PieceProfile:
     engine: Engine = "core"
 
     @cached_property
-    def first(self) -> Floats:
-        """Leg derivatives q′ (N + 1, 5) at the gridpoints."""
-        return self.piece(self.s, 1)
+    def course(self) -> Course:
+        """How the piece moves at the gridpoints."""
+        return self.limits.course(self.piece, self.s)
 
-    @cached_property
-    def second(self) -> Floats:
-        """Leg derivatives q″ (N + 1, 5) at the gridpoints, 1/m."""
-        return self.piece(self.s, 2)
-
-    @cached_property
-    def tip_speed(self) -> tuple[Floats, Ints]:
-        """Largest speed of the tip (N + 1,) at the gridpoints, and the section from which it comes."""
-        return self.limits.tip_speed(self.piece, self.s)
+    def rows(self) -> tuple[Floats, Floats]:
+        """Return the accelerations' rows (N + 1, R) at the gridpoints, eased."""
+        first, second = self.limits.rows(self.course)
+        return first / self.ease_acceleration[:, None], second / self.ease_acceleration[:, None]
 
     def solved(self) -> PieceProfile | Failure:
         """Return the fastest profile on this grid with these easings."""
-        rows = 1.0 / (self.limits.acceleration * self.ease_acceleration[:, None])
-        x = fastest(self.s, self.first * rows, self.second * rows, self.ceiling(), engine=self.engine)
-        if isinstance(x, Failure):
-            return replace(x, station=float(self.s[x.gridpoint])) if x.gridpoint >= 0 else x
-        return self.with_(x=x)
+        x = fastest(self.s, *self.rows(), self.ceiling(), engine=self.engine)
+        if not isinstance(x, Failure):
+            return self.with_(x=x)
+        names = self.limits.row_names
+        limits = tuple(dict.fromkeys(names[row] for row in x.conflict))
+        return replace(x, limits=limits, station=float(self.s[x.gridpoint]) if x.gridpoint >= 0 else None)
 
     def smooth_law(self) -> MotionLaw | Failure:
         """Return the fastest law below this profile that keeps the legs' jerk limits too."""
@@ -75,22 +72,22 @@ class PieceProfile:
         return smooth if isinstance(smooth, Failure) else MotionLaw.through(smooth.s, smooth.x, smooth.slope)
 
     def _jerk_rows(self, s: Floats) -> JerkRows:
-        first, second, third = (self.piece(s, order) for order in (1, 2, 3))
+        course = self.limits.course(self.piece, s, 3)
         acceleration, speed, jerk = (
             np.interp(s, self.s, ease)[:, None] for ease in (self.ease_acceleration, self.ease_speed, self.ease_jerk)
         )
-        rows, per = 1.0 / (self.limits.acceleration * acceleration), 1.0 / (self.limits.jerk * jerk)
+        first, second = self.limits.rows(course)
         return JerkRows(
-            first * rows,
-            second * rows,
-            np.zeros((1, 5)),
-            np.stack([third * per, 1.5 * second * per, 0.5 * first * per], axis=-1),
-            self.limits.ceiling(first, second, self.limits.tip_speed(self.piece, s)[0]) * speed[:, 0] ** 2,
+            first / acceleration,
+            second / acceleration,
+            np.zeros((1, first.shape[1])),
+            self.limits.jerk_rows(course) / jerk[:, :, None],
+            self.limits.ceiling(course) * speed[:, 0] ** 2,
         )
 
     def ceiling(self) -> Floats:
         """Return the largest x (N + 1,) at each gridpoint that any path acceleration allows, m²/s²."""
-        return self.limits.ceiling(self.first, self.second, self.tip_speed[0]) * self.ease_speed**2
+        return self.limits.ceiling(self.course) * self.ease_speed**2
 
     def eased(self, acceleration: Floats, speed: Floats, jerk: Floats | None = None) -> PieceProfile | Failure:
         """Return the profile solved anew with further factors (N + 1,) on accelerations, speeds and jerks."""
@@ -103,9 +100,8 @@ class PieceProfile:
     def with_(self, **changes: Floats) -> PieceProfile:
         """Return a copy on the same grid, which keeps the path's derivatives."""
         copy = replace(self, **changes)
-        for name in ("first", "second", "tip_speed"):
-            if name in self.__dict__:
-                copy.__dict__[name] = self.__dict__[name]
+        if "course" in self.__dict__:
+            copy.__dict__["course"] = self.course
         return copy
 
     def refined(self, exceeding: Bools, switching: Bools, where: Floats) -> PieceProfile:
@@ -125,15 +121,13 @@ class PieceProfile:
         return np.diff(self.x) / (2.0 * np.diff(self.s))
 
     def shares_between(self) -> tuple[Floats, Floats]:
-        """Return the largest shares (N,) of velocities and feed, and of leg accelerations inside each stage."""
+        """Return the largest shares (N,) of velocities and feed, and of accelerations inside each stage."""
         ds, dx, u = np.diff(self.s), np.diff(self.x), self.path_accelerations()
         s = (self.s[:-1, None] + _BETWEEN * ds[:, None]).ravel()
         x = (self.x[:-1, None] + _BETWEEN * dx[:, None]).ravel()
-        shares = self.limits.shares(
-            self.piece(s, 1), self.piece(s, 2), x, np.repeat(u, len(_BETWEEN)), self.limits.tip_speed(self.piece, s)[0]
-        ).reshape(len(ds), len(_BETWEEN), 11)
-        worst = shares.max(axis=1)
-        return np.maximum(worst[:, :5].max(axis=1), worst[:, 10]), worst[:, 5:10].max(axis=1)
+        shares = self.limits.shares(self.limits.course(self.piece, s), x, np.repeat(u, len(_BETWEEN)))
+        worst = shares.reshape(len(ds), len(_BETWEEN), -1).max(axis=1)
+        return np.delete(worst, PUSHES, axis=1).max(axis=1), worst[:, PUSHES].max(axis=1)
 
     def switching(self) -> tuple[Bools, Floats]:
         """Return the stages (N,) within which the law should switch, and at which fraction (N,).
@@ -144,11 +138,8 @@ class PieceProfile:
         share r of the acceleration limit could get there within about the fraction r of its length.
         """
         u, ds = self.path_accelerations(), np.diff(self.s)
-        rows = 1.0 / (self.limits.acceleration * self.ease_acceleration[:, None])
-        ends = [
-            np.abs(self.first[k] * u[:, None] + self.second[k] * self.x[k][:, None]) * rows[k]
-            for k in (slice(0, -1), slice(1, None))
-        ]
+        first, second = self.rows()
+        ends = [np.abs(first[k] * u[:, None] + second[k] * self.x[k][:, None]) for k in (slice(0, -1), slice(1, None))]
         capped = self.x > 0.99 * self.ceiling()
         share = np.maximum(*ends).max(axis=1)
         idle = (share < 0.98) & ~(capped[:-1] & capped[1:])
@@ -171,32 +162,27 @@ class PieceProfile:
         if law is not None:
             return self._active_in(law)
         u = self.path_accelerations()
-        speed, section = self.tip_speed
         before, after = (
-            self.limits.shares(self.first, self.second, self.x, pushes, speed)
-            for pushes in (np.append(u[0], u), np.append(u, u[-1]))
+            self.limits.shares(self.course, self.x, pushes) for pushes in (np.append(u[0], u), np.append(u, u[-1]))
         )
         shares = np.maximum(before, after)
-        column = shares.argmax(axis=1)
-        return self._named(column, speed, section), shares.max(axis=1)
+        return self._named(shares.argmax(axis=1)), shares.max(axis=1)
 
     def _active_in(self, law: MotionLaw) -> tuple[Ints, Floats]:
         """Return the constraint (N + 1,) of which a law limited in jerk uses most, and its share."""
         t = np.interp(self.s, law.stations, law.times)
-        j = law.jerks[np.clip(np.searchsorted(law.times, t, "right") - 1, 0, len(law.jerks) - 1)][:, None]
-        v, a = law(t, 1)[:, None], law(t, 2)[:, None]
-        speed, section = self.tip_speed
-        shares = self.limits.shares(self.first, self.second, v[:, 0] ** 2, a[:, 0], speed)
-        jerks = np.abs(self.first * j + 3.0 * self.second * v * a + self.piece(self.s, 3) * v**3) / self.limits.jerk
+        j = law.jerks[np.clip(np.searchsorted(law.times, t, "right") - 1, 0, len(law.jerks) - 1)]
+        v, a = law(t, 1), law(t, 2)
+        course = self.limits.course(self.piece, self.s, 3)
+        shares, jerks = self.limits.shares(course, v**2, a), self.limits.jerk_shares(course, v, a, j)
         column = np.concatenate([shares, np.zeros((len(shares), 1)), jerks], axis=1).argmax(axis=1)
-        share = np.maximum(shares.max(axis=1), jerks.max(axis=1))
-        return self._named(column, speed, section), share
+        return self._named(column), np.maximum(shares.max(axis=1), jerks.max(axis=1))
 
-    def _named(self, column: Ints, speed: Floats, section: Ints) -> Ints:
+    def _named(self, column: Ints) -> Ints:
         """Return the constraints (n,) of the columns: feed becomes rapid rate where that is what holds."""
-        feeds = self.limits.section_speeds(self.piece)[section]
+        speed, feeds = self.course.speed, self.limits.section_speeds(self.piece)[self.course.section]
         rapid = (speed == self.limits.rapid) & (feeds != speed)
-        return np.where((column == 10) & rapid, 11, column)
+        return np.where((column == FEED) & rapid, RAPID, column)
 
 
 def time_piece(

@@ -83,6 +83,10 @@ class PiecePart:
         """Return how far (n,) the feed's point moves for each metre of s, at stations (n,) from the part's start."""
         return self.piece.feed_rate(np.minimum(np.asarray(s, dtype=np.float64) + self.start, self.piece.length))
 
+    def pose(self, s: Floats, order: int = 0) -> tuple[Floats, Floats]:
+        """Return tips and tool axes (n, 3) or their derivatives at stations s (n,) from the part's own start."""
+        return self.piece.pose(np.minimum(np.asarray(s, dtype=np.float64) + self.start, self.piece.length), order)
+
     def __call__(self, s: Floats, order: int = 0) -> Floats:
         """Return legs (n, 5) or their derivatives at stations s (n,) from the part's own start."""
         return self.piece(np.minimum(np.asarray(s, dtype=np.float64) + self.start, self.piece.length), order)

@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from pentapod.refusal import Blame, Refusal
-from pentapod.timing.constraints import CONSTRAINTS
 from pentapod.timing.paths import LegPathLike, PieceLike
 from pentapod.timing.stages import Failure
 
@@ -15,8 +14,6 @@ STILL_M = 1e-12
 """A piece shorter than this does not move."""
 
 _JOIN_M = 1e-9
-_ROWS = CONSTRAINTS[5:10]
-"""What the rows of the passes are: the legs' accelerations."""
 
 
 def unfit(path: LegPathLike) -> Refusal | None:
@@ -55,13 +52,12 @@ def refusal(path: LegPathLike, k: int, failure: Failure, short: tuple[str, float
     if s is None:
         return Refusal("timing", cause)
     cause += f", {1e3 * (float(path.starts[k]) + s):.6g} mm along the path, segment {_segment(piece, s)}"
-    names = [_ROWS[row] for row in failure.conflict if row < len(_ROWS)]
-    if names:
-        cause += f"; in conflict: {' and '.join(names)}"
+    if failure.limits:
+        cause += f"; in conflict: {' and '.join(failure.limits)}"
     tangent = piece(np.array([s]), 1)[0]
     if np.isfinite(tangent).all():
         cause += f"; legs move by ({', '.join(f'{rate:.3g}' for rate in tangent)}) m for each metre there"
-    limits = [short] if short else [(name, 0.0, "") for name in names or ["time law"]]
+    limits = [short] if short else [(name, 0.0, "") for name in failure.limits or ["time law"]]
     waypoints = (_waypoints(piece, s),)
     return Refusal("timing", cause, tuple(Blame(name, waypoints, amount, unit) for name, amount, unit in limits))
 

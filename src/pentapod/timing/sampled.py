@@ -70,15 +70,16 @@ class _Timed:
 
     @cached_property
     def whole_rows(self) -> Floats:
-        """Legs and station (rows, 6) of the piece's setpoints, metres."""
+        """Legs and station (rows, 6) of the piece's setpoints, metres, and where they count tip and axis (rows, 12)."""
         return self.rows(0.0)
 
     def rows(self, phase: float) -> Floats:
         """Return the rows as if they came later by `phase` periods, the last one at the end."""
-        law = self.law
+        law, piece = self.law, self.profile.piece
         s = law((np.arange(round(law.duration / self.period) + 1) + phase) * self.period)
         s[-1] = law.length
-        return np.column_stack([self.profile.piece(s, 0), s])
+        tool = piece.pose(s) if self.profile.limits.tool.given() else ()
+        return np.column_stack([piece(s, 0), s, *tool])
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,9 +155,11 @@ def _uses(timed: list[_Timed], machine: Machine, smooth: bool, known: list[_Use 
             uses.append(same)
         else:
             before, after = _last_rows(timed[:k]), _first_rows(timed[k + 1 :])
-            before[:, 5] -= before[-1, 5] if len(before) else 0.0
-            after[:, 5] += piece.law.length
-            rows = np.concatenate([before[:-1], piece.whole_rows, after[1:]])
+            if len(before):
+                before[:, 5] -= before[-1, 5]
+            if len(after):
+                after[:, 5] += piece.law.length
+            rows = np.concatenate([r for r in (before[:-1], piece.whole_rows, after[1:]) if len(r)])
             uses.append(_use(piece, rows, machine, smooth, max(len(before) - 1, 0)))
     return uses
 
@@ -164,35 +167,47 @@ def _uses(timed: list[_Timed], machine: Machine, smooth: bool, known: list[_Use 
 def _use(piece: _Timed, rows: Floats, machine: Machine, smooth: bool, first: int = 0) -> _Use:
     """Return what a piece uses of the limits where it has the rows (n, 6) from `first` on."""
     count = len(piece.whole_rows) - 1
-    motion = Interpolant.through(rows, machine.controller.period, machine.controller.interpolation)
+    interpolation = machine.controller.interpolation
+    motion = Interpolant.through(rows[:, :6], machine.controller.period, interpolation)
     here, legs, limits = slice(first, first + count), machine.legs, piece.profile.limits
     hard = (motion.accelerations[first : first + count + 1, :5] / legs.max_acceleration).max(axis=1)
     fast = (motion.rates[here, :5] / legs.max_velocity).max(axis=1)
     jolt = (motion.jerks[here, :5] / legs.max_jerk).max(axis=1) * float(smooth)
     # Against the feeds themselves: the plan's margin is there to be used up.
     speed = limits.tip_speed(piece.profile.piece, rows[first : first + count + 1, 5])[0] / limits.feed_fraction
-    feed = motion.rates[here, 5] / np.minimum(speed[:-1], speed[1:])
-    return _Use(_at_rows(np.maximum(fast, feed)), hard, _at_rows(jolt))
+    fast = np.maximum(fast, motion.rates[here, 5] / np.minimum(speed[:-1], speed[1:]))
+    if limits.tool.given():
+        tool = machine.tool_limits
+        tip, axis = (Interpolant.through(rows[:, k : k + 3], motion.period, interpolation) for k in (6, 9))
+        pushes = np.linalg.norm(tip.second, axis=1) / tool.max_tip_acceleration
+        pushes = np.maximum(pushes, axis.turn_accelerations / tool.max_axis_acceleration)
+        hard = np.maximum(hard, pushes[first : first + count + 1])
+        # A bound, by the hull of the coefficients.
+        fast = np.maximum(fast, np.linalg.norm(axis.steps, axis=1).max(axis=1)[here] / tool.max_axis_velocity)
+        jolt = np.maximum(jolt, tip.jerk_lengths[here] / tool.max_tip_jerk * float(smooth))
+    return _Use(_at_rows(fast), hard, _at_rows(jolt))
 
 
 def _last_rows(timed: list[_Timed]) -> Floats:
-    """Return the last _EDGE + 1 rows (n, 6) of pieces that follow each other, all where there are fewer."""
+    """Return the last _EDGE + 1 rows (n, 6 or 12) of pieces that follow each other, all where there are fewer."""
     rows = np.empty((0, 6))
     for piece in reversed(timed):
         if len(rows) > _EDGE:
             break
         rows[:, 5] += piece.law.length
-        rows = np.concatenate([piece.whole_rows, rows[1:]])
+        rows = np.concatenate([piece.whole_rows, rows[1:]]) if len(rows) else piece.whole_rows.copy()
     return rows[-_EDGE - 1 :].copy()
 
 
 def _first_rows(timed: list[_Timed]) -> Floats:
-    """Return the first _EDGE + 1 rows (n, 6) of pieces that follow each other, all where there are fewer."""
+    """Return the first _EDGE + 1 rows (n, 6 or 12) of pieces that follow each other, all where there are fewer."""
     rows, length = np.empty((0, 6)), 0.0
     for piece in timed:
         if len(rows) > _EDGE:
             break
-        rows = np.concatenate([rows[:-1], piece.whole_rows + np.array([0.0] * 5 + [length])])
+        following = piece.whole_rows[: _EDGE + 1].copy()
+        following[:, 5] += length
+        rows = np.concatenate([rows[:-1], following]) if len(rows) else following
         length += piece.law.length
     return rows[: _EDGE + 1].copy()
 

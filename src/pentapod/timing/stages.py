@@ -20,13 +20,15 @@ TOO_SLOW = "the start is slower than every speed from which the end can be reach
 class Failure:
     """Why there is no law: the gridpoint where the solver stopped, and its reason.
 
-    conflict: the rows that leave no acceleration there, where they are known; station: s there in metres, likewise.
+    conflict: the rows that leave no acceleration there, where they are known, limits: the names of their limits;
+    station: s there in metres, likewise.
     """
 
     gridpoint: int
     reason: str
     conflict: tuple[int, ...] = ()
     station: float | None = None
+    limits: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

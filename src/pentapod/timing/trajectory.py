@@ -72,6 +72,11 @@ class Trajectory:
 
         return self._piecewise(t, legs, (5,))
 
+    def pose(self, t: ArrayLike) -> tuple[Floats, Floats]:
+        """Return tips and tool axes (n, 3), machine frame, at times (n,) in seconds."""
+        both = self._piecewise(t, lambda piece, law, time: np.hstack(piece.pose(law(time))), (6,))
+        return both[:, :3], both[:, 3:]
+
     def station(self, t: ArrayLike, order: int = 0) -> Floats:
         """Return the tip's global arc length s (n,) in metres or its derivative in time, order 0, 1, 2."""
         starts = np.asarray(self.path.starts)[list(self.indices)]

@@ -51,7 +51,7 @@ class Turn:
 
 def stop(trajectory: Trajectory, machine: Machine, k: int, local: float) -> Turn | None:
     """Return the quickest stop on the path, by a clock that slows down; None: the piece's end comes first."""
-    law, period, jerk = trajectory.laws[k], machine.controller.period, _largest_jerk(trajectory, machine)
+    law, period, jerk = trajectory.laws[k], machine.controller.period, _largest_jerks(trajectory, machine)
     for delay, length in _tries():
         leave, seconds = local + delay * period, length * period
         if leave + seconds > law.duration:
@@ -69,7 +69,7 @@ def stop(trajectory: Trajectory, machine: Machine, k: int, local: float) -> Turn
 
 def passage(trajectory: Trajectory, rest: Trajectory, machine: Machine, k: int, local: float) -> Turn | None:
     """Return the quickest passage from the old plan to the new one; None: the piece's end comes first."""
-    old, period, jerk = trajectory.laws[k], machine.controller.period, _largest_jerk(trajectory, machine)
+    old, period, jerk = trajectory.laws[k], machine.controller.period, _largest_jerks(trajectory, machine)
     for delay, length in _tries():
         leave, seconds = local + delay * period, length * period
         if leave + seconds > old.duration - _EDGE * period:
@@ -135,32 +135,43 @@ def _between(old: MotionLaw, new: MotionLaw, leave: float, seconds: float, perio
     return Nodes.through(np.concatenate([[0.0], np.cumsum(steps)]), old(clock), speeds(clock)[1])
 
 
-def _keeps(trajectory: Trajectory, machine: Machine, k: int, turn: Turn, jerk: Floats) -> bool:
-    """Return whether the setpoints around a transition keep the legs' limits, as the controller joins them.
+def _keeps(trajectory: Trajectory, machine: Machine, k: int, turn: Turn, jerk: tuple[Floats, float]) -> bool:
+    """Return whether the setpoints around a transition keep the limits of legs and tool, as the controller joins them.
 
-    jerk (5,): m/s³.
+    jerk: m/s³, of the legs (5,) and of the tip.
     """
-    period = machine.controller.period
+    period, interpolation = machine.controller.period, machine.controller.interpolation
     law = joined([Nodes.of(trajectory.laws[k], 0.0, turn.leave), *turn.parts])
     piece = trajectory.path.pieces[trajectory.indices[k]]
     first, last = round(turn.leave / period) - 2 * _EDGE, int(np.ceil(turn.arrival / period)) + 2 * _EDGE
     # The law stands before its start and after its end, as the machine does.
-    rows = piece(law(np.arange(first, last + 1) * period))
+    stations = law(np.arange(first, last + 1) * period)
+    rows = piece(stations)
     if not np.isfinite(rows).all():
         return False
-    motion = Interpolant.through(rows, period, machine.controller.interpolation)
-    inner = slice(_EDGE, -_EDGE)
-    return bool(
+    motion = Interpolant.through(rows, period, interpolation)
+    inner, tool = slice(_EDGE, -_EDGE), machine.tool_limits
+    kept = bool(
         (motion.rates[inner] <= machine.legs.max_velocity).all()
         and (motion.accelerations[inner] <= machine.legs.max_acceleration).all()
-        and (motion.jerks[inner] <= jerk).all()
+        and (motion.jerks[inner] <= jerk[0]).all()
+    )
+    if not (kept and tool.given()):
+        return kept
+    tip, axis = (Interpolant.through(rows, period, interpolation) for rows in piece.pose(stations))
+    return bool(
+        (np.linalg.norm(tip.second[inner], axis=1) <= tool.max_tip_acceleration).all()
+        and (tip.jerk_lengths[inner] <= jerk[1]).all()
+        and (np.linalg.norm(axis.steps[inner], axis=1) <= tool.max_axis_velocity).all()
+        and (axis.turn_accelerations[inner] <= tool.max_axis_acceleration).all()
     )
 
 
-def _largest_jerk(trajectory: Trajectory, machine: Machine) -> Floats:
-    """Return the legs' jerk limits (5,), or as many times as much as the trajectory itself takes."""
-    share = max(use.share for use in certify(trajectory, machine) if use.quantity == "leg jerk")
-    return machine.legs.max_jerk * max(1.0, share)
+def _largest_jerks(trajectory: Trajectory, machine: Machine) -> tuple[Floats, float]:
+    """Return the jerk limits of legs (5,) and tip, or as many times as much as the trajectory itself takes."""
+    shares = {use.quantity: max(1.0, use.share) for use in certify(trajectory, machine)}
+    tip = machine.tool_limits.max_tip_jerk * shares.get("tip jerk", 1.0)
+    return machine.legs.max_jerk * shares["leg jerk"], tip
 
 
 def _tries() -> Iterator[tuple[int, int]]:

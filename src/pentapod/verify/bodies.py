@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.arrays import Floats
+from pentapod.kinematics.blocks import blocks
 from pentapod.machine.clearance import clearances, pair_names
 from pentapod.verify.claim import Claim, Finding
 from pentapod.verify.replay import Replay
@@ -22,8 +23,11 @@ def clearance(replay: Replay) -> Finding:
     """
     machine, (position, direction) = replay.machine, replay.pose
     reach = np.array([machine.pentapod.offsets.min(), max(machine.pentapod.offsets.max(), machine.tool_length)])
-    ends = position[:, None, :] + reach[:, None] * direction[:, None, :]
-    chords = _SLACK * np.linalg.norm(np.diff(ends, axis=0), axis=2).max(axis=1)
+    chords = np.empty(len(position) - 1)
+    for part in blocks(len(chords)):
+        both = slice(part.start, part.stop + 1)
+        ends = position[both, None, :] + reach[:, None] * direction[both, None, :]
+        chords[part] = _SLACK * np.linalg.norm(np.diff(ends, axis=0), axis=2).max(axis=1)
     way = np.concatenate([[0.0], np.cumsum(chords)])
 
     middles = np.minimum(np.arange(_BLOCK // 2, len(way) + _BLOCK // 2, _BLOCK), len(way) - 1)

@@ -10,16 +10,16 @@ import numpy as np
 from pentapod.errors import ArrayError, InputError, ProgramError
 from pentapod.files import atomic_write
 from pentapod.machine.machine import Machine
-from pentapod.program.csv import read_csv
+from pentapod.program.csv import read_csv, read_header
 from pentapod.program.program import Program
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.verify import bodies, component, joints, legs, origin, speed, tracking
+from pentapod.verify import bodies, component, joints, legs, origin, speed, tool, tracking
 from pentapod.verify.claim import Claim
 from pentapod.verify.replay import SURVEY_SHARE, Replay
 from pentapod.verify.verdict import Certificate, Place, Verdict
 
-READABLE = "readable"
+READABLE, HEADER = "readable", "no unknown keys in the header"
 CLAIMS: tuple[Claim, ...] = (
     *origin.CLAIMS,
     *component.CLAIMS,
@@ -28,8 +28,11 @@ CLAIMS: tuple[Claim, ...] = (
     *bodies.CLAIMS,
     *tracking.CLAIMS,
     *speed.CLAIMS,
+    *tool.CLAIMS,
 )
-"""Every claim that a verdict makes, in its order; "readable" comes before them where a file is judged."""
+"""Every claim that a verdict makes, in its order; "readable" comes before them where a file is judged.
+
+A file of its own for each subject, with its claims in CLAIMS: a new one is added here and nowhere else."""
 
 
 def verify(
@@ -41,13 +44,16 @@ def verify(
     path_tolerance: float,
     axis_tolerance: float,
     job_digest: str | None = None,
+    strict: bool = False,
     progress: Progress = silent,
 ) -> Verdict:
     """Return the verdict on a program, or on a program file, from its rows alone.
 
     toolpath: in the workpiece frame, as the job asks for it. tilt: half angle in radians of the cone about
     the nominal axis in which the tool may stand; axis_tolerance: radians beyond that; path_tolerance: metres.
-    job_digest: of the job that the header must name, None to leave that out.
+    job_digest: of the job that the header must name, None to leave that out. strict: every claim stands in the
+    verdict, also those that do not apply, with the reason; it fails where a claim could not be judged for want of
+    something, and where the header has keys that nobody here knows the meaning of.
     A malformed file gives a failed verdict with the one claim "readable". Raises ProgramError where there is
     no such file, ArrayError where a tolerance is not a sensible number.
     """
@@ -70,6 +76,8 @@ def verify(
             return Verdict((Certificate(READABLE, False, None, None, "", Place(), str(error)),))
         method = f"{len(program.legs)} rows, {program.duration:.6g} s, {program.interpolation} between rows"
         read = [Certificate(READABLE, True, None, None, "", Place(), method)]
+        if strict:
+            read.append(_known(read_header(path).unknown))
     replay = Replay(program, machine, toolpath, tilt, path_tolerance, axis_tolerance, job_digest, progress)
     _ = replay.survey
     for k, claim in enumerate(CLAIMS):
@@ -77,8 +85,15 @@ def verify(
         certificate = claim(replay)
         if certificate is not None:
             read.append(certificate)
+        elif strict:
+            read.append(claim.unjudged())
     progress("verify", 1.0)
     return Verdict(tuple(read))
+
+
+def _known(unknown: tuple[str, ...]) -> Certificate:
+    method = f"unknown: {', '.join(unknown)}" if unknown else "every key has a meaning in this version of the format"
+    return Certificate(HEADER, not unknown, None, None, "", Place(), method)
 
 
 def write_verdict(verdict: Verdict, path: str | Path) -> Path:

@@ -17,7 +17,10 @@ import numpy as np
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length
+from pentapod.kinematics.blocks import blocks
 from pentapod.verify.visits import Course, Visits, find_visits
+
+_BLOCK = 1 << 15  # samples that are measured at once
 
 # Where the path turns on the spot, an axis this far off counts as much as a pivot off by the tolerance.
 _AXIS_SCALE_RAD = 0.05
@@ -78,7 +81,10 @@ def _places(motion: Course, path: Course, turning: Bools, tolerance: float, time
     """Return the place (M,) of each sample, from the visits (n,) of the waypoints."""
     interval = np.searchsorted(times, np.arange(len(motion.points)), side="right") - 1
     interval = np.clip(interval, 0, len(times) - 2)
-    places = interval + _fractions(motion, path, turning, tolerance, interval)
+    places = np.empty(len(interval))
+    for part in blocks(len(interval), _BLOCK):
+        own = Course(motion.points[part], motion.axes[part])
+        places[part] = interval[part] + _fractions(own, path, turning, tolerance, interval[part])
     # The matching begins and ends with both curves, and never turns back.
     places[0], places[-1] = 0.0, len(times) - 1.0
     late, early = np.maximum.accumulate(places), np.minimum.accumulate(places[::-1])[::-1]
@@ -101,22 +107,26 @@ def _by_arc_length(samples: Floats, arc: Floats) -> Floats:
 def _measure(motion: Course, path: Course, visits: Visits, places: Floats) -> Match:
     """Return the matching that has these visits (n,) and places (M,), measured."""
     times = visits.times
-    points, axes = _at(path, places)
+    turns = angle_between(path.axes[:-1], path.axes[1:])
+    distances, angles = np.empty(len(places)), np.empty(len(places))
+    for part in blocks(len(places), _BLOCK):
+        points, axes = _at(path, turns, places[part])
+        distances[part] = np.linalg.norm(motion.points[part] - points, axis=1)
+        angles[part] = angle_between(motion.axes[part], axes)
     chord = np.minimum(times.astype(np.intp), len(motion.points) - 2)
     at = (times - chord)[:, None]
     visited = motion.points[chord] * (1.0 - at) + motion.points[chord + 1] * at
     pointed = motion.axes[chord] * (1.0 - at) + motion.axes[chord + 1] * at
-    turns = np.concatenate([[0.0], np.cumsum(angle_between(path.axes[:-1], path.axes[1:]))])
     waypoints = np.arange(len(path.points))
     return Match(
         times=times,
         missed=visits.missed,
         places=places,
         arcs=np.interp(places, waypoints, arc_length(path.points)),
-        turned=np.interp(places, waypoints, turns),
-        distances=np.linalg.norm(motion.points - points, axis=1),
+        turned=np.interp(places, waypoints, np.concatenate([[0.0], np.cumsum(turns)])),
+        distances=distances,
         waypoint_distances=np.linalg.norm(visited - path.points, axis=1),
-        angles=angle_between(motion.axes, axes),
+        angles=angles,
         waypoint_angles=angle_between(pointed, path.axes),
     )
 
@@ -147,12 +157,15 @@ def _arc_fraction(axes: Floats, first: Floats, second: Floats) -> tuple[Floats, 
     return np.clip(turned / angle, 0.0, 1.0), angle
 
 
-def _at(path: Course, places: Floats) -> tuple[Floats, Floats]:
-    """Return points (M, 3), linear, and axes (M, 3), along great arcs, of the path at these places."""
+def _at(path: Course, turns: Floats, places: Floats) -> tuple[Floats, Floats]:
+    """Return points (M, 3), linear, and axes (M, 3), along great arcs, of the path at these places.
+
+    turns (n − 1,): the angles of those arcs.
+    """
     k = np.minimum(places.astype(np.intp), len(path.points) - 2)
     f = places - k
     points = path.points[k] * (1.0 - f)[:, None] + path.points[k + 1] * f[:, None]
-    angle = angle_between(path.axes[:-1], path.axes[1:])[k]
+    angle = turns[k]
     sine = np.sin(angle)
     arc = sine > 1e-6
     safe = np.where(arc, sine, 1.0)

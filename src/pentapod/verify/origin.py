@@ -26,4 +26,7 @@ def job(replay: Replay) -> Finding | None:
     return Finding(made_from == replay.job_digest, None, None, "", Place(), method)
 
 
-CLAIMS = (Claim("machine", machine, needs_pose=False), Claim("job", job, needs_pose=False))
+CLAIMS = (
+    Claim("machine", machine, needs_pose=False),
+    Claim("job", job, needs_pose=False, idle="no job is given to compare with", owed=True),
+)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.blocks import blocks
 from pentapod.machine.machine import Machine
 from pentapod.program.program import Program
 from pentapod.progress import Progress, silent
@@ -16,6 +19,8 @@ from pentapod.verify.matching import Match, match
 from pentapod.verify.survey import Survey, survey
 from pentapod.verify.verdict import Place
 from pentapod.verify.visits import Course
+
+_BLOCK = 1 << 15  # samples
 
 SURVEY_SHARE = 0.6
 """Of the time that a verdict takes."""
@@ -60,19 +65,26 @@ class Replay:
     def unposed(self) -> Ints:
         """The samples where the leg lengths have no pose."""
         position, direction = self.pose
-        return np.flatnonzero(~np.isfinite(position.sum(axis=1) + direction.sum(axis=1)))
+        return np.flatnonzero(~np.isfinite(position[:, 0] + direction[:, 0]))
 
     @cached_property
     def axes(self) -> Floats:
         """Tool axes (M, 3) at the samples, tip → spindle, workpiece frame by the header's placement."""
-        return self.program.placement.inverse().rotate(-self.pose[1])
+        return self._in_work(lambda inverse, _, direction: inverse.rotate(-direction))
 
     @cached_property
     def pivots(self) -> Floats:
         """The points (M, 3) about which the tool may tilt, workpiece frame, metres."""
-        position, direction = self.pose
         along = self.machine.tool_length - self.toolpath.pivot
-        return self.program.placement.inverse().apply(position + along * direction)
+        return self._in_work(lambda inverse, position, direction: inverse.apply(position + along * direction))
+
+    def _in_work(self, of: Callable[[RigidTransform, Floats, Floats], Floats]) -> Floats:
+        """Return what `of` makes (M, 3) of the transform into the workpiece frame and the poses, in blocks."""
+        (position, direction), inverse = self.pose, self.program.placement.inverse()
+        made = np.empty_like(position)
+        for part in blocks(len(made), _BLOCK):
+            made[part] = of(inverse, position[part], direction[part])
+        return made
 
     @property
     def chord_arcs(self) -> Floats:

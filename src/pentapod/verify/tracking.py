@@ -13,8 +13,11 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.geometry.directions import angle_between
+from pentapod.kinematics.blocks import blocks
 from pentapod.verify.claim import ALLOWANCE, Claim, Finding
 from pentapod.verify.replay import Replay
+
+_BLOCK = 1 << 15  # samples
 
 
 def tip_deviation(replay: Replay) -> Finding:
@@ -58,7 +61,9 @@ def coverage(replay: Replay) -> Finding:
 def axis_deviation(replay: Replay) -> Finding:
     """Judge the angle between the tool and the nominal axis of the toolpath."""
     match, axes = replay.match, replay.axes
-    own = angle_between(axes[:-1], axes[1:])
+    own = np.empty(len(axes) - 1)
+    for part in blocks(len(own), _BLOCK):
+        own[part] = angle_between(axes[part], axes[part.start + 1 : part.stop + 1])
     # Vectors that go straight from end to end are farthest apart at an end, and as far off the arc of unit vectors as
     # it is high: an eighth of the angle squared. At a waypoint's visit the motion's own is off the arc already.
     # Along the arc they lag behind by less than a sixtieth of the angle cubed.
