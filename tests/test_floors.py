@@ -29,6 +29,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
             "job",
             "job_placement",
             "job_strategy",
+            "job_surroundings",
             "job_tool",
             "outcome",
             "plan_arrays",

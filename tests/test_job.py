@@ -49,6 +49,11 @@ MISTAKES = {  # what is replaced, and the pieces that the message must hold
     "fixed without a position": (("position_mm = ", "# "), ("placement.position_mm", "needs a position")),
     "free with numbers": (('mode = "fixed"', 'mode = "free"'), ("placement.position_mm", "means nothing")),
     "two numbers of three": (("[180, 0, 0]", "[180, 0]"), ("placement.rotation_deg[2]", "too few numbers")),
+    "no such fixture": (
+        ("[feed]", '[fixture]\nmesh = "vise.stl"\nunit = "mm"\n[feed]'),
+        ("fixture.mesh", "no such file"),
+    ),
+    "fixture without unit": (("[feed]", '[fixture]\nmesh = "part.stl"\n[feed]'), ("fixture.unit", "missing")),
     "unknown component": (('"++"', '"+"'), ("placement.component", "'--'")),
     "tolerance of zero": (("path_mm = 0.05", "path_mm = 0"), ("tolerance.path_mm", "greater than 0")),
     "flat region": (('unit = "mm"', 'unit = "mm"\nregion_box_mm = [[0,0,0],[1,1,0]]'), ("part.region_box_mm", "flat")),
@@ -109,6 +114,8 @@ def test_digest_follows_the_meaning(make_job, tmp_path):
         (STEP, "stepover_mm = 15.1"),
         ('"++"', '"+-"'),
         ("path_mm = 0.05", "path_mm = 0.06"),
+        ("[feed]", '[fixture]\nmesh = "part.stl"\nunit = "mm"\n[feed]'),
+        ("[feed]", '[fixture]\nmesh = "part.stl"\nunit = "cm"\n[feed]'),
     ]
     assert len({Job.load(make_job(change)).digest for change in others} | {digest}) == 1 + len(others)
     (tmp_path / "copy.stl").write_bytes((tmp_path / "part.stl").read_bytes())
@@ -123,7 +130,7 @@ def test_every_key_is_described_and_has_its_unit():
         "mesh", "unit", "scale", "repair", "region_direction", "name", "file", "type", "strategy", "pattern", "mode",
         "matrix", "component", "interpolation", "solver", "format", "direction", "line", "directions", "remedy", "up",
         "entry", "fill", "upright", "curve", "form", "which", "laying", "centred", "text", "letter_spacing", "align",
-        "towards", "effect", "levels", "threshold",
+        "towards", "effect", "levels", "threshold", "frame",
     }  # fmt: skip
     units = ("_mm", "_deg", "_mm_min", "_ms", "_mm_s2", "_mm_s3", "_deg_s", "_deg_s2")
     models = [field.annotation for name, field in JobTables.model_fields.items() if name != "toolpath"]

@@ -20,6 +20,7 @@ from pentapod.errors import JobError, nearest
 from pentapod.job_tables import (
     AxisTable,
     FeedTable,
+    FixtureTable,
     GougeTable,
     JobTables,
     MachineTable,
@@ -40,8 +41,8 @@ _VARIABLE = re.compile(r"\$\{(\w+)\}")
 class Job:
     """What a job file says. Units are as in the file; `pentapod.pipeline` turns them into SI values.
 
-    path: the job file. mesh_path, machine_file and files, by their keys in [toolpath]: resolved against the job
-    file's folder.
+    path: the job file. mesh_path, fixture_mesh, machine_file and files, by their keys in [toolpath]: resolved against
+    the job file's folder.
     """
 
     path: Path
@@ -49,6 +50,7 @@ class Job:
     mesh_path: Path
     machine_file: Path | None
     files: dict[str, Path] = field(default_factory=dict[str, Path])
+    fixture_mesh: Path | None = None
 
     @classmethod
     def load(cls, path: str | Path) -> Job:
@@ -71,7 +73,9 @@ class Job:
         machine = None if named is None else _resolve(path, text, ("machine", "file"), named)
         names = {key: getattr(tables.toolpath, key, None) for key in FILE_KEYS}
         files = {key: _resolve(path, text, ("toolpath", key), name) for key, name in names.items() if name is not None}
-        return cls(path, tables, mesh, machine, files)
+        held = tables.fixture.mesh
+        fixture = None if held is None else _resolve(path, text, ("fixture", "mesh"), held)
+        return cls(path, tables, mesh, machine, files, fixture)
 
     @property
     def part(self) -> PartTable:
@@ -123,6 +127,11 @@ class Job:
         return self.tables.placement
 
     @property
+    def fixture(self) -> FixtureTable:
+        """The table [fixture]."""
+        return self.tables.fixture
+
+    @property
     def output(self) -> OutputTable:
         """The table [output]."""
         return self.tables.output
@@ -137,6 +146,10 @@ class Job:
         content["part"]["mesh"] = [self.mesh_path.suffix.lower(), _sha(self.mesh_path)]
         if self.machine_file is not None:
             content["machine"]["file"] = _sha(self.machine_file)
+        if self.fixture_mesh is None:
+            del content["fixture"]
+        else:
+            content["fixture"]["mesh"] = [self.fixture_mesh.suffix.lower(), _sha(self.fixture_mesh)]
         for key, file in self.files.items():
             content["toolpath"][key] = [file.suffix.lower(), _sha(file)]
         canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)

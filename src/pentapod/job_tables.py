@@ -278,6 +278,27 @@ _PLACEMENT_KEYS: dict[str, tuple[str, ...]] = {
 """Of each mode: the keys that mean something in it."""
 
 
+class FixtureTable(Table):
+    """What else legs, spindle and tool must not touch: what holds the part, or what stands in the machine."""
+
+    mesh: str | None = Field(
+        default=None, min_length=1, description="mesh file of a vise, clamps, a table; relative to this job file"
+    )
+    unit: Literal["mm", "cm", "m", "inch"] | None = Field(
+        default=None, description="unit of the numbers in its mesh file: compulsory with mesh"
+    )
+    scale: Positive = Field(default=1.0, description="factor applied to it after its unit")
+    frame: Literal["part", "machine"] = Field(
+        default="part", description='frame of its mesh: "part" (it moves with the part) or "machine" (it stays)'
+    )
+
+    @model_validator(mode="after")
+    def _known_unit(self) -> FixtureTable:
+        if self.mesh is not None and self.unit is None:
+            wrong("unit", "the unit of the fixture's mesh is missing", "mm, cm, inch or m")
+        return self
+
+
 class OutputTable(Table):
     """The program's rows; the machine's own controller settings when left out."""
 
@@ -299,6 +320,7 @@ class JobTables(Table):
     feed: FeedTable
     tolerance: ToleranceTable = Field(default=ToleranceTable())
     placement: PlacementTable = Field(default=PlacementTable())
+    fixture: FixtureTable = Field(default=FixtureTable())
     output: OutputTable = Field(default=OutputTable())
 
     @model_validator(mode="before")

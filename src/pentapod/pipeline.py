@@ -15,6 +15,7 @@ from pentapod.errors import MachineError, MeshError
 from pentapod.job import Job
 from pentapod.job_placement import job_freedom
 from pentapod.job_strategy import job_options
+from pentapod.job_surroundings import job_surroundings
 from pentapod.job_tool import FileReport, Reports, finished_as_asked, job_tool
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import ControllerSettings, Machine
@@ -72,7 +73,7 @@ def run(
         if isinstance(program, Refusal):
             verdict = refusal_verdict(program)
         else:
-            verdict = clock.time("verify", lambda: judge(job, machine, toolpath, staging / PROGRAM, progress))
+            verdict = clock.time("verify", lambda: judge(job, machine, mesh, toolpath, staging / PROGRAM, progress))
         outcome = Outcome(job, machine, tuple(clock.stages), verdict)
         write_arrays(arrays_of(outcome), staging / ARRAYS)
         for name, write in (writers or {}).items():
@@ -144,6 +145,7 @@ def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
 def judge(
     job: Job,
     machine: Machine,
+    mesh: Mesh,
     toolpath: Toolpath,
     program: Path,
     progress: Progress = silent,
@@ -159,6 +161,7 @@ def judge(
         path_tolerance=job.tolerance.path_mm * _MM,
         axis_tolerance=float(np.radians(job.tolerance.axis_deg)),
         job_digest=job.digest,
+        surroundings=job_surroundings(job, machine, mesh),
         strict=strict,
         progress=progress,
     )

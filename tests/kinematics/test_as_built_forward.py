@@ -7,6 +7,7 @@ the closed form knows (floating point and fifty digits); and pentakins' struts, 
 import mpmath
 import numpy as np
 import pytest
+from built_machines import with_errors
 from scipy.optimize import fsolve
 
 from pentapod.errors import ArrayError
@@ -26,17 +27,6 @@ def work_poses(n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     p = rng.uniform((-0.2, -0.2, 0.4), (0.2, 0.2, 0.8), (n, 3))
     i = np.c_[rng.uniform(-0.5, 0.5, (n, 2)), np.ones(n)]
     return p, i / np.linalg.norm(i, axis=1)[:, None]
-
-
-def with_errors(nominal: LinearPentapod, size: float, seed: int) -> AsBuiltPentapod:
-    rng = np.random.default_rng(seed)
-    return AsBuiltPentapod.of(
-        nominal,
-        base_errors=rng.normal(size=(5, 3)) * size,
-        offset_errors=rng.normal(size=5) * size,
-        radii=np.abs(rng.normal(size=5)) * size,
-        zeros=rng.normal(size=5) * size,
-    )
 
 
 @pytest.mark.parametrize(("size", "share"), [(0.0, 1.0), (1e-5, 1.0), (3e-4, 1.0), (2e-3, 0.99), (1e-2, 0.8)])

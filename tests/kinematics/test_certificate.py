@@ -1,163 +1,15 @@
-"""The component certificate against exact rational arithmetic: never a false proof.
-
-The oracle uses the quartic of general pentapods (kinematics notes, section 5), not the formulas of the
-certificate: with t the parameter along the solutions of the linear equations, its discriminant is 4 w² S².
-"""
+"""The component certificate against exact rational arithmetic: never a false proof."""
 
 from fractions import Fraction
-from itertools import pairwise
-from math import comb, gcd, lcm
 
 import numpy as np
 import pytest
+from leg_motions import Exact, grazing, segments
+from rational_polynomials import add, at, divided, positive_on_unit_interval, power_form, times
 
 from pentapod.errors import ArrayError
 from pentapod.geometry import elevate, split
 from pentapod.kinematics import COMPONENTS, LinearPentapod, certify_component, singularity_values
-
-# ---- exact polynomials in t: lists of Fractions, lowest power first
-
-
-def add(a: list, b: list, factor: Fraction | int = 1) -> list:
-    n = max(len(a), len(b))
-    a, b = [*a, *[Fraction(0)] * (n - len(a))], [*b, *[Fraction(0)] * (n - len(b))]
-    return [x + factor * y for x, y in zip(a, b, strict=True)]
-
-
-def times(a: list, b: list) -> list:
-    out = [Fraction(0)] * (len(a) + len(b) - 1)
-    for i, x in enumerate(a):
-        for j, y in enumerate(b):
-            out[i + j] += x * y
-    return out
-
-
-def at(a: list, t: Fraction) -> Fraction:
-    value = Fraction(0)
-    for c in reversed(a):
-        value = value * t + c
-    return value
-
-
-def power_form(coefficients: np.ndarray) -> list:
-    """The exact powers of one Bernstein polynomial (k + 1,)."""
-    c = [Fraction(float(x)) for x in coefficients]
-    k = len(c) - 1
-    return [
-        sum((comb(k, i) * comb(i, j) * (-1) ** (i - j) * c[j] for j in range(i + 1)), Fraction(0)) for i in range(k + 1)
-    ]
-
-
-def divided(a: list, b: list) -> list:
-    """a / b, which must leave no remainder."""
-    rest, quotient = list(a), [Fraction(0)] * (len(a) - len(b) + 1)
-    for j in reversed(range(len(quotient))):
-        quotient[j] = rest[j + len(b) - 1] / b[-1]
-        for m, c in enumerate(b):
-            rest[j + m] -= quotient[j] * c
-    assert not any(rest)
-    return quotient
-
-
-def primitive(a: list) -> list[int]:
-    """A positive multiple with integer coefficients without a common factor, leading zeros removed."""
-    common = lcm(*[c.denominator for c in a])
-    whole = [int(c * common) for c in a]
-    factor = gcd(*whole) or 1
-    while whole and whole[-1] == 0:
-        whole.pop()
-    return [c // factor for c in whole]
-
-
-def positive_on_unit_interval(polynomial: list) -> bool:
-    """Whether a polynomial is > 0 on all of [0, 1], by Sturm's theorem in integers."""
-    chain = [primitive(polynomial)]
-    if chain[0][0] <= 0 or sum(chain[0]) <= 0:
-        return False
-    chain.append(primitive([Fraction(j * c) for j, c in enumerate(chain[0])][1:]))
-    while len(chain[-1]) > 1:
-        rest, divisor = list(chain[-2]), chain[-1]
-        while len(rest) >= len(divisor):
-            shift, lead = len(rest) - len(divisor), rest[-1]
-            rest = [abs(divisor[-1]) * c for c in rest]
-            for m, c in enumerate(divisor):
-                rest[shift + m] -= (lead if divisor[-1] > 0 else -lead) * c
-            rest.pop()
-        rest = primitive([Fraction(-c) for c in rest])
-        if not rest:
-            break  # a multiple root; the chain still counts distinct roots
-        chain.append(rest)
-
-    def changes(values: list[int]) -> int:
-        signs = [value > 0 for value in values if value]
-        return sum(x != y for x, y in pairwise(signs))
-
-    return changes([p[0] for p in chain if p]) == changes([sum(p) for p in chain if p])
-
-
-class Exact:
-    """Exact w²(t) and 4 w² S²(t) of one machine."""
-
-    def __init__(self, pentapod: LinearPentapod) -> None:
-        base = [[Fraction(float(c)) for c in a] for a in pentapod.base]
-        self.delta = Fraction(pentapod.delta)
-        self.rows, self.k = [], []
-        for leg in (0, 1, 3, 4):
-            x, y = base[leg][0] - base[2][0], base[leg][1] - base[2][1]
-            z = self.delta * x
-            self.rows.append([x, y, x * z, y * z])
-            self.k.append(x * x + y * y + z * z)
-        self.inverse = self._invert(self.rows)
-
-    @staticmethod
-    def _invert(m: list) -> list:
-        def minor(a: list, i: int, j: int) -> list:
-            return [[*row[:j], *row[j + 1 :]] for r, row in enumerate(a) if r != i]
-
-        def det(a: list) -> Fraction:
-            if len(a) == 1:
-                return a[0][0]
-            return sum(((-1) ** j * a[0][j] * det(minor(a, 0, j)) for j in range(len(a))), Fraction(0))
-
-        whole = det(m)
-        return [[(-1) ** (i + j) * det(minor(m, j, i)) / whole for j in range(4)] for i in range(4)]
-
-    def __call__(self, legs: list) -> tuple[list, list]:
-        """(w², 4 w² S²) as polynomials, of five leg polynomials."""
-        squares = [times(leg, leg) for leg in legs]
-        rhs = []
-        for k, leg in zip(self.k, (0, 1, 3, 4), strict=True):
-            rhs.append([c / -2 for c in add(add(squares[leg], squares[2], -1), [k], -1)])
-        forms = []
-        for row in self.inverse:
-            total: list = [Fraction(0)]
-            for entry, r in zip(row, rhs, strict=True):
-                total = add(total, [entry * c for c in r])
-            forms.append(total)
-        q, py, u, v = forms
-        # t = τ, px = q + δ τ:  f(τ) = (1 − u² − v²)(l3² − px² − py²) − (τ − px u − py v)² = a τ² + b τ + c
-        d, d1 = self.delta, add(add([Fraction(1)], times(u, u), -1), times(v, v), -1)
-        slope = add([Fraction(1)], [d * x for x in u], -1)
-        offset = add(times(q, u), times(py, v))
-        a = add([-d * d * x for x in d1], times(slope, slope), -1)
-        b = add([-2 * d * x for x in times(d1, q)], [2 * x for x in times(slope, offset)])
-        c = add(times(d1, add(add(squares[2], times(q, q), -1), times(py, py), -1)), times(offset, offset), -1)
-        return d1, add(times(b, b), [4 * x for x in times(a, c)], -1)
-
-    def interval(self, coefficients: np.ndarray) -> tuple[list, list]:
-        return self([power_form(c) for c in coefficients])
-
-
-def segments(pentapod: LinearPentapod, n: int, k: int, seed: int, reach: float, height=2.0) -> np.ndarray:
-    """Bernstein coefficients (n, 5, k + 1) of leg motions around random poses, `reach` times the machine's size."""
-    rng = np.random.default_rng(seed)
-    size = np.abs(pentapod.base - pentapod.base[2]).max()
-    p = rng.uniform(-1.0, 1.0, size=(n, 1, 3)) * size + (0.0, 0.0, height * size)
-    i = rng.normal(size=(n, 1, 3)) * 0.5 + (0.0, 0.0, 1.0)
-    p = p + rng.normal(size=(n, k + 1, 3)) * reach * size
-    i = i + rng.normal(size=(n, k + 1, 3)) * reach
-    i /= np.linalg.norm(i, axis=-1, keepdims=True)
-    return np.moveaxis(pentapod.leg_lengths(p, i), 1, 2)
 
 
 @pytest.mark.parametrize("k", [1, 3])
@@ -195,48 +47,6 @@ def test_small_intervals_have_tight_bounds(pentapod: LinearPentapod) -> None:
     assert (proof.s_lower <= abs(s[clear])).all()
     np.testing.assert_allclose(proof.w_lower, w[clear], rtol=1e-6)
     np.testing.assert_allclose(proof.s_lower, abs(s[clear]), rtol=1e-6)
-
-
-def float_minima(pentapod: LinearPentapod, ends: np.ndarray, which: int) -> np.ndarray:
-    """Minima (n,) of w² (which = 0) or S² (1) over linear intervals (n, 5, 2), by ever finer sampling."""
-    centre, width = np.full((len(ends), 1), 0.5), 0.5
-    for _ in range(5):
-        t = np.clip(centre + width * np.linspace(-1.0, 1.0, 41), 0.0, 1.0)
-        squared = ((1 - t)[:, None] * ends[..., :1] + t[:, None] * ends[..., 1:]) ** 2  # (n, 5, 41)
-        q, py, u, v = pentapod.linear_part(np.moveaxis(squared, 1, 0).reshape(5, -1)).reshape(4, *t.shape)
-        values = 1 - u * u - v * v
-        if which == 1:
-            c = q + pentapod.delta * v * py
-            values = (squared[:, 2] - py * py) * ((1 - pentapod.delta * u) ** 2 + pentapod.delta**2 * values) - c * c
-        centre, width = np.take_along_axis(t, values.argmin(axis=1)[:, None], axis=1), width / 20
-    return values.min(axis=1)
-
-
-def grazing(pentapod: LinearPentapod, which: int, n: int) -> np.ndarray:
-    """Linear intervals (n, 5, 2) whose w² (which = 0) or S² (1) nearly touches 0 inside, from both sides."""
-    rng = np.random.default_rng(11 + which)
-    size = np.abs(pentapod.base - pentapod.base[2]).max()
-    many = (800, 3500)[which]
-    # S = 0 is met in low poses; a strong push there ends at w = 0 more often
-    start = segments(pentapod, many, 1, 21 + which, 0.25, (2.0, 0.3)[which])
-    push = rng.normal(size=(many, 5, 1)) * (0.3, 0.15)[which] * size
-    low, high = np.zeros((many, 1, 1)), np.ones((many, 1, 1))
-    use = (float_minima(pentapod, start, which) > 0.005) & (float_minima(pentapod, start + push, which) < 0)
-    start, push, low, high = start[use], push[use], low[use], high[use]
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        outside = (float_minima(pentapod, start + middle * push, which) <= 0)[:, None, None]
-        low, high = np.where(outside, low, middle), np.where(outside, middle, high)
-    ends = start + low * push
-    w_squared, s_squared = (
-        np.minimum(*(float_minima(pentapod, ends[..., [k, k]], form) for k in (0, 1))) for form in (0, 1)
-    )
-    other = float_minima(pentapod, ends, 1 - which)
-    inside = ((w_squared, s_squared)[which] > 1e-3) & (other > 1e-3)
-    shifts = np.array([1e-9, 1e-12, 1e-14, 1e-15, 0.0, -1e-15, -1e-13, -1e-11, -1e-9, -1e-8])
-    chosen = start[inside], push[inside], low[inside]
-    found = chosen[0] + chosen[2] * (1 + shifts[:, None, None, None]) * chosen[1]
-    return np.swapaxes(found, 0, 1).reshape(-1, 5, 2)[:n]
 
 
 @pytest.mark.parametrize("which", [0, 1], ids=["w", "S"])

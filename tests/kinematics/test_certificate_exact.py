@@ -11,7 +11,7 @@ from math import comb
 import flint
 import numpy as np
 import pytest
-from test_certificate import Exact, grazing, segments
+from leg_motions import Exact, grazing, segments
 
 from pentapod.geometry import elevate
 from pentapod.kinematics import LinearPentapod, certify_component

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_certificate import segments
+from leg_motions import segments
 
 from pentapod.compiled import kernels_used
 from pentapod.kinematics import LinearPentapod, certify_component

@@ -5,6 +5,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from built_machines import with_errors
+from rational_polynomials import add, times
 from scipy.optimize import fsolve
 
 from pentapod.errors import ArrayError
@@ -31,32 +33,7 @@ def linear(legs: np.ndarray) -> np.ndarray:
     return np.stack([legs[:-1], legs[1:]], axis=-1)
 
 
-def with_errors(nominal: LinearPentapod, size: float, seed: int) -> AsBuiltPentapod:
-    rng = np.random.default_rng(seed)
-    return AsBuiltPentapod.of(
-        nominal,
-        base_errors=rng.normal(size=(5, 3)) * size,
-        offset_errors=rng.normal(size=5) * size,
-        radii=np.abs(rng.normal(size=5)) * size,
-        zeros=rng.normal(size=5) * size,
-    )
-
-
 # The discriminants w² and S² as polynomials in time, in exact rational arithmetic (kinematics notes, section 3).
-
-
-def add(a, b, factor=1):
-    n = max(len(a), len(b))
-    a, b = a + [Fraction(0)] * (n - len(a)), b + [Fraction(0)] * (n - len(b))
-    return [x + factor * y for x, y in zip(a, b, strict=True)]
-
-
-def times(a, b):
-    out = [Fraction(0)] * (len(a) + len(b) - 1)
-    for j, x in enumerate(a):
-        for k, y in enumerate(b):
-            out[j + k] += x * y
-    return out
 
 
 def eliminate(rows):

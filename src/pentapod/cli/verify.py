@@ -31,7 +31,8 @@ def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -
     loaded = Job.load(job)
     machine = job_machine(loaded)
     with progress_bar(quiet=quiet or as_json) as progress:
-        verdict = judge(loaded, machine, job_toolpath(loaded, job_mesh(loaded))[0], program, progress, strict=strict)
+        mesh = job_mesh(loaded)
+        verdict = judge(loaded, machine, mesh, job_toolpath(loaded, mesh)[0], program, progress, strict=strict)
     if as_json:
         echo_json(verdict.to_dict())
     elif not quiet:

@@ -28,6 +28,7 @@ from pentapod.kinematics.mode import MODES, Mode
 from pentapod.kinematics.motion import MotionProof, certify_motion
 from pentapod.kinematics.pentapod import LinearPentapod
 from pentapod.kinematics.reach import ReachField
+from pentapod.kinematics.roaming import roaming
 from pentapod.kinematics.singularities import (
     architectural_measure,
     orientation_distance,
@@ -96,6 +97,7 @@ __all__ = [
     "position_distance",
     "prove_chords",
     "prove_tip_tube",
+    "roaming",
     "singular_plane",
     "singularity_cofactors",
     "singularity_free_sphere",

@@ -83,7 +83,7 @@ def _slope(g: Floats, distance: float, way: Floats) -> float:
 
 
 @kernel
-def _lower_bound(box: Floats, start: Floats, way: Floats, enough: float, g: Floats) -> float:
+def lower_bound(box: Floats, start: Floats, way: Floats, enough: float, g: Floats) -> float:
     """Return a lower bound, not below the minimum's tangents, on the distance of a moving point from a box."""
     first = _to_box(box, start[0], start[1], start[2], g)
     rising = _slope(g, first, way)
@@ -142,7 +142,7 @@ def nearest_to_point(
     g = np.empty(3)
     leaves = len(starts) - 1
     facet = -1
-    nodes[0], bounds[0] = 0, _lower_bound(boxes[0], start, way, best[0], g)
+    nodes[0], bounds[0] = 0, lower_bound(boxes[0], start, way, best[0], g)
     count = 1
     while count > 0:
         count -= 1
@@ -153,8 +153,8 @@ def nearest_to_point(
         if leaf < 0:
             left, right = 2 * node + 1, 2 * node + 2
             near, far = (
-                _lower_bound(boxes[left], start, way, best[0], g),
-                _lower_bound(boxes[right], start, way, best[0], g),
+                lower_bound(boxes[left], start, way, best[0], g),
+                lower_bound(boxes[right], start, way, best[0], g),
             )
             if far < near:
                 left, right, near, far = right, left, far, near

@@ -18,7 +18,10 @@ from pentapod.toolpath.facet_tree import FacetTree
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.normals import unit_or_zero
 from pentapod.toolpath.solids import Solid
-from pentapod.toolpath.sweep import RESOLUTION_M, TouchingBody, touch
+from pentapod.toolpath.sweep import TouchingBody, touch
+
+TOOL_RESOLUTION_M = 1e-5
+"""Gaps of tools are exact to this."""
 
 _ON_FEATURE = 1e-7  # share of a facet that its nearest point may be off an edge and still lie on it
 _SAMPLED = 33  # points on a segment that runs through the mesh, and again around the deepest
@@ -92,15 +95,30 @@ class MeshDistance:
     def bodies(self, solids: Sequence[Solid], tips: Floats, axes: Floats, within: float) -> tuple[Floats, Floats]:
         """Return gaps (M,) of tools made of `solids`, with tips and unit axes (M, 3), and the mesh points (M, 3).
 
-        Exact to RESOLUTION_M outside and 1 % more inside, erring to the smaller gap; negative where a mesh point
+        Exact to TOOL_RESOLUTION_M outside and 1 % more inside, erring to the smaller gap; negative where a mesh point
         lies inside the tool. What is further away than `within` counts as that far, and its point is NaN.
         """
-        met = touch(self.tree, TouchingBody(tuple(solids)), tips, axes, threshold=-within)
-        kind, rows = met.depths.argmax(axis=1), np.arange(len(tips))
+        low, high = min(s.low - s.rounding for s in solids), max(s.top for s in solids)
+        wide = max(max(s.low_radius, s.high_radius) + s.rounding for s in solids)
+        reach = within + wide
+        gap, point = np.full(len(tips), within), np.full((len(tips), 3), np.nan)
+        # Most tools are seen to be far away by the cylinder around them.
+        near = np.flatnonzero(self._nearest(tips + low * axes, (high - low) * axes, reach)[0] < reach)
+        met = touch(
+            self.tree,
+            TouchingBody(tuple(solids)),
+            tips[near],
+            axes[near],
+            threshold=-within,
+            resolution=TOOL_RESOLUTION_M,
+        )
+        kind, rows = met.depths.argmax(axis=1), np.arange(len(near))
         found = -met.depths[rows, kind]
-        near = np.isfinite(found)
-        gap = np.where(near, found - RESOLUTION_M - 0.01 * np.maximum(-np.where(near, found, 0.0), 0.0), within)
-        return np.minimum(gap, within), met.points[rows, kind]
+        seen = np.isfinite(found)
+        found = np.where(seen, found, within)
+        gap[near] = np.minimum(found - TOOL_RESOLUTION_M + 0.01 * np.minimum(found, 0.0), within)
+        point[near] = met.points[rows, kind]
+        return gap, point
 
     def contains(self, points: ArrayLike) -> Bools:
         """Return which points (M, 3) a closed mesh encloses, by winding numbers: for few points."""
@@ -119,14 +137,14 @@ class MeshDistance:
 
     def _nearest(self, starts: Floats, ways: Floats, within: float) -> tuple[Floats, Floats, Floats, Ints]:
         """Return distances, places on the ways, vectors from the mesh, and facets in tree order (−1: too far)."""
-        from pentapod.toolpath.ball_kernels import nearest_all  # noqa: PLC0415  loads numba
+        from pentapod.toolpath.segment_kernels import nearest_to_segments  # noqa: PLC0415  loads numba
 
         count = len(starts)
         distance, where = np.full(count, within), np.zeros((count, 4))
         facet = np.full(count, -1, dtype=np.intp)
         tree = self.tree
         points, ways = np.ascontiguousarray(starts), np.ascontiguousarray(ways)
-        nearest_all(points, ways, tree.corners, tree.boxes, tree.starts, within, distance, where, facet)
+        nearest_to_segments(points, ways, tree.corners, tree.boxes, tree.starts, within, distance, where, facet)
         away = np.where(facet[:, None] >= 0, starts + where[:, :1] * ways - where[:, 1:], 0.0)
         return distance, where[:, 0], away, facet
 

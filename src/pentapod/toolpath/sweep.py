@@ -104,11 +104,15 @@ def touch(
     axes: Floats,
     *,
     threshold: float = 0.0,
+    resolution: float = RESOLUTION_M,
     progress: Progress = silent,
 ) -> Sweep:
-    """Return what a tool meets that stands at N poses: tips and unit axes (N, 3). As `sweep`, without motion."""
+    """Return what a tool meets that stands at N poses: tips and unit axes (N, 3). As `sweep`, without motion.
+
+    resolution: to which depths are exact, metres, for those who have no time.
+    """
     tips, axes = as_floats(tips, "tips", (None, 3)), as_floats(axes, "axes", (None, 3))
-    return _swept(tree, tool, tips, axes, tips, axes, threshold, progress)
+    return _swept(tree, tool, tips, axes, tips, axes, threshold, progress, resolution)
 
 
 def _swept(
@@ -120,6 +124,7 @@ def _swept(
     axes1: Floats,
     threshold: float,
     progress: Progress,
+    resolution: float = RESOLUTION_M,
 ) -> Sweep:
     if kernels_available():
         from pentapod.toolpath.ball_kernels import nearest_all  # noqa: PLC0415 - loads numba
@@ -146,7 +151,7 @@ def _swept(
                 nearest_all(np.ascontiguousarray(motions[rows, :3]), way, *place, solid.rounding - threshold, *found)
                 depths[k, rows] = np.where(facets[k, rows] < 0, -np.inf, solid.rounding - depths[k, rows])
             else:
-                sweep_all(numbers, motions[rows], *place, threshold, RESOLUTION_M, *found)
+                sweep_all(numbers, motions[rows], *place, threshold, resolution, *found)
     kinds = np.array([KINDS.index(solid.kind) for solid in solids], dtype=np.intp)
     return _by_kind(depths, where, np.where(facets < 0, -1, tree.facets[facets]), kinds)
 

@@ -10,11 +10,12 @@ import numpy as np
 from pentapod.errors import ArrayError, InputError, ProgramError
 from pentapod.files import atomic_write
 from pentapod.machine.machine import Machine
+from pentapod.machine.surroundings import Surroundings
 from pentapod.program.csv import read_csv, read_header
 from pentapod.program.program import Program
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.verify import bodies, component, joints, legs, origin, speed, tool, tracking
+from pentapod.verify import bodies, collisions, component, joints, legs, origin, speed, tool, tracking
 from pentapod.verify.claim import Claim
 from pentapod.verify.replay import SURVEY_SHARE, Replay
 from pentapod.verify.verdict import Certificate, Place, Verdict
@@ -32,7 +33,9 @@ CLAIMS: tuple[Claim, ...] = (
 )
 """Every claim that a verdict makes, in its order; "readable" comes before them where a file is judged.
 
-A file of its own for each subject, with its claims in CLAIMS: a new one is added here and nowhere else."""
+After them come those about the surroundings, where there are any (`collisions`). A file of its own for each subject,
+with its claims in CLAIMS: a new one is added here and nowhere else.
+"""
 
 
 def verify(
@@ -44,6 +47,7 @@ def verify(
     path_tolerance: float,
     axis_tolerance: float,
     job_digest: str | None = None,
+    surroundings: Surroundings | None = None,
     strict: bool = False,
     progress: Progress = silent,
 ) -> Verdict:
@@ -51,9 +55,9 @@ def verify(
 
     toolpath: in the workpiece frame, as the job asks for it. tilt: half angle in radians of the cone about
     the nominal axis in which the tool may stand; axis_tolerance: radians beyond that; path_tolerance: metres.
-    job_digest: of the job that the header must name, None to leave that out. strict: every claim stands in the
-    verdict, also those that do not apply, with the reason; it fails where a claim could not be judged for want of
-    something, and where the header has keys that nobody here knows the meaning of.
+    job_digest: of the job that the header must name, None to leave that out. surroundings: what must not be touched.
+    strict: every claim stands in the verdict, also those that do not apply, with the reason; it fails where a claim
+    could not be judged for want of something, and where the header has keys that nobody here knows the meaning of.
     A malformed file gives a failed verdict with the one claim "readable". Raises ProgramError where there is
     no such file, ArrayError where a tolerance is not a sensible number.
     """
@@ -80,8 +84,9 @@ def verify(
             read.append(_known(read_header(path).unknown))
     replay = Replay(program, machine, toolpath, tilt, path_tolerance, axis_tolerance, job_digest, progress)
     _ = replay.survey
-    for k, claim in enumerate(CLAIMS):
-        progress("verify", SURVEY_SHARE + (1.0 - SURVEY_SHARE) * k / len(CLAIMS), claim.name)
+    claims = (*CLAIMS, *collisions.claims(surroundings or Surroundings()))
+    for k, claim in enumerate(claims):
+        progress("verify", SURVEY_SHARE + (1.0 - SURVEY_SHARE) * k / len(claims), claim.name)
         certificate = claim(replay)
         if certificate is not None:
             read.append(certificate)

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
+from pentapod.geometry.interpolant import clamped_slopes
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.blocks import blocks
 from pentapod.machine.machine import Machine
@@ -52,6 +53,11 @@ class Replay:
             self.progress("verify", SURVEY_SHARE * share, "between the rows")
 
         return survey(self.program, self.machine, self.toolpath.pivot, self.path_tolerance, told)
+
+    @cached_property
+    def slopes(self) -> Floats | None:
+        """Slopes (N, 5) of the legs at the rows, metres a period; None where they go straight from row to row."""
+        return clamped_slopes(self.program.legs) if self.program.interpolation == "cubic" else None
 
     @property
     def pose(self) -> tuple[Floats, Floats]:

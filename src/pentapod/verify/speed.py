@@ -29,17 +29,30 @@ def feed(replay: Replay, kind: SegmentKind) -> Finding | None:
     if not len(chords):
         return None
     spot = standoff and not rapid
-    speed = replay.survey.speeds[chords, 1 if spot else 0]
+    linear = replay.program.interpolation == "linear"
+    speed = (_between_rows(replay, spot=spot) if linear else replay.survey.speeds[:, 1 if spot else 0])[chords]
     worst = int(np.argmax(speed / limit[chords]))
     value, bound = float(speed[worst]), float(limit[chords[worst]])
     whose = "the spot that the program's tool meets on the surface" if spot else "the program's own tip"
     where = "on every segment" if standoff and rapid else f"where the matched place is on a {kind}"
     method = (
-        f"speed of {whose}, proven bound for all times, {where}; within the path tolerance of a segment's end "
-        f"the faster of both feeds counts; {ALLOWANCE:.1%} allowed"
+        f"speed of {whose}, {'from row to row' if linear else 'proven bound for all times'}, {where}; within the path "
+        f"tolerance of a segment's end the faster of both feeds counts; {ALLOWANCE:.1%} allowed"
     )
     passed = value <= bound * (1.0 + ALLOWANCE)
     return Finding(passed, _MM_MIN * value, _MM_MIN * bound, "mm/min", replay.place(int(chords[worst])), method)
+
+
+def _between_rows(replay: Replay, *, spot: bool) -> Floats:
+    """Return the mean speed (M − 1,) of tip or spot over the period that each chord belongs to.
+
+    With linear interpolation the legs' speeds step at each row, and the tip's wavers within each period about its mean:
+    that is the controller's doing, at its own pace, and no feed that anybody set.
+    """
+    position, direction = replay.pose
+    arm = replay.machine.tool_length - (replay.toolpath.pivot if spot else 0.0)
+    points = (position + arm * direction)[::2]
+    return np.repeat(np.linalg.norm(np.diff(points, axis=0), axis=1) / replay.program.period, 2)
 
 
 def _limits(replay: Replay) -> tuple[Floats, Ints]:

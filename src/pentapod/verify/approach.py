@@ -1,0 +1,103 @@
+"""How near bodies come to each other at any time: proven from some moments, and how far bodies stray from there.
+
+Time is cut into stretches of rows. In the middle of each the gaps are computed; from there on no body moves further
+than `roaming` proves of the platform. Stretches that may hold a gap smaller than what is known are cut into eight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.arrays import Floats, Ints
+from pentapod.kinematics.roaming import roaming
+from pentapod.verify.replay import Replay
+
+_LONGEST, _CUT = 64, 8
+_CHUNK = 512
+_NEAR_M, _NEAR = 2e-5, 0.3
+"""A proven gap is not improved on where it is this much, or this share, below one that is met."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stray:
+    """How far, at most, things move from where they are in the middle of n stretches.
+
+    line (n, K): points of the platform line at the offsets asked for, metres. turn (n,): the line's direction.
+    """
+
+    line: Floats
+    turn: Floats
+
+
+Gaps = Callable[[Ints], Floats]
+"""Gaps (n, C) in metres at samples (n,) of the replay."""
+
+Moves = Callable[[Stray], Floats]
+"""By how much (n, C) each of those gaps can shrink at most."""
+
+
+@dataclass(frozen=True)
+class Approach:
+    """The smallest gap, metres: none is smaller at any time. column: of which gap; sample: where. proven: or not."""
+
+    least: float
+    column: int
+    sample: int
+    proven: bool
+
+
+def approach(replay: Replay, gaps: Gaps, moves: Moves, offsets: Floats, *, bound: float = 0.0) -> Approach:
+    """Return the smallest gap over all times. Ends early where a gap at a sample is not above `bound`.
+
+    offsets (K,): along the platform line, metres, of the points whose way `moves` goes by.
+    """
+    count = len(replay.program.legs) - 1
+    size, starts = _LONGEST, np.arange(0, count, _LONGEST)
+    met, found = np.inf, Approach(np.inf, 0, 0, True)
+    while True:
+        ends = np.minimum(starts + size, count)
+        samples = starts + ends
+        values = gaps(samples)
+        worst = np.unravel_index(int(values.argmin()), values.shape)
+        if values[worst] < met:
+            met = float(values[worst])
+            if met <= bound:
+                return Approach(met, int(worst[1]), int(samples[worst[0]]), True)
+        lower = values - moves(_stray(replay, starts, size, offsets))
+        target = met - max(_NEAR_M, _NEAR * (met - bound))
+        again = (lower.min(axis=1) < target) if size > 1 else np.zeros(len(starts), dtype=np.bool_)
+        kept = np.where(again[:, None], np.inf, lower)
+        if (least := float(kept.min())) < found.least:
+            row, column = np.unravel_index(int(kept.argmin()), kept.shape)
+            found = Approach(least, int(column), int(samples[row]), bool(np.isfinite(least)))
+        if not again.any():
+            return found
+        size //= _CUT
+        starts = (starts[again, None] + size * np.arange(_CUT)).ravel()
+        starts = starts[starts < count]
+
+
+def _stray(replay: Replay, starts: Ints, size: int, offsets: Floats) -> Stray:
+    """Return how far the platform strays within `size` intervals from each start, seen from their middle."""
+    (position, direction), last = replay.pose, len(replay.program.legs) - 2
+    line, turn = np.empty((len(starts), len(offsets))), np.empty(len(starts))
+    for first in range(0, len(starts), _CHUNK):
+        rows = slice(first, first + _CHUNK)
+        intervals = np.minimum(starts[rows, None] + np.arange(size), last)
+        lengths = _controls(replay, intervals)
+        middle = starts[rows] + np.minimum(starts[rows] + size, last + 1)
+        line[rows], turn[rows] = roaming(replay.machine.pentapod, position[middle], direction[middle], lengths, offsets)
+    return Stray(line, turn)
+
+
+def _controls(replay: Replay, intervals: Ints) -> Floats:
+    """Return leg lengths (n, M, 5) whose hull holds the legs on intervals (n, m): the Bernstein coefficients."""
+    legs, slopes = replay.program.legs, replay.slopes
+    if slopes is None:
+        return np.concatenate([legs[intervals], legs[intervals[:, -1:] + 1]], axis=1)
+    third = slopes / 3.0
+    start, end = legs[intervals], legs[intervals + 1]
+    return np.concatenate([start, start + third[intervals], end - third[intervals + 1], end[:, -1:]], axis=1)
