@@ -25,6 +25,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
         (
             "table",
             "strategy_tables",
+            "placement_table",
             "job_tables",
             "job",
             "job_placement",

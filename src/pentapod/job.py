@@ -20,16 +20,15 @@ from pentapod.errors import JobError, nearest
 from pentapod.job_tables import (
     AxisTable,
     FeedTable,
-    FixtureTable,
     GougeTable,
     JobTables,
     MachineTable,
     OutputTable,
     PartTable,
-    PlacementTable,
     ToleranceTable,
     ToolTable,
 )
+from pentapod.placement_table import FixtureTable, PlacementTable
 from pentapod.strategy_tables import FILE_KEYS, TABLES, ToolpathTable
 
 _PLACE = re.compile(r"\(at line (\d+), column (\d+)\)")

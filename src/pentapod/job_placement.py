@@ -8,9 +8,9 @@ from pentapod.arrays import Floats
 from pentapod.errors import ArrayError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import Job
-from pentapod.job_tables import Vector
 from pentapod.machine.machine import Machine
 from pentapod.planning.freedom import FREE, Freedom
+from pentapod.table import Vector
 from pentapod.toolpath.mesh import Mesh
 
 _MM = 1e-3
