@@ -139,10 +139,11 @@ class LinearPentapod(FiveLegs):
                 poses(legs, signs, *geometry, position, direction, near)
             else:
                 for block in blocks(len(legs)):
-                    squared = np.square(legs[block].T, order="C")
+                    columns = legs[block].T.copy()
+                    squared = np.square(columns)
                     sign = signs if modes or len(signs) == 1 else signs[block]
                     reduced, near[block] = solve(squared, linear, self.delta, sign[..., 0], sign[..., 1])
-                    near[block] |= legs[block].min(axis=1) < 0.0
+                    near[block] |= columns.min(axis=0) < 0.0
                     position[block], direction[block] = self._shifted(reduced)
             self._solve_near(np.flatnonzero(near), legs, signs, position, direction)
 
