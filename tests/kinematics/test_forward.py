@@ -155,8 +155,9 @@ def test_arguments_broadcast(paper: LinearPentapod) -> None:
 def test_lengths_without_a_pose_give_nan_in_all_modes_and_only_there(paper: LinearPentapod) -> None:
     good = paper.leg_lengths([0.5, 0.25, 3.0], [0.36, 0.48, 0.8])
     legs = np.array([good, [1.0, 1.0, 9.0, 1.0, 1.0], [np.nan, 1.0, 1.0, 1.0, 1.0], good])
+    legs = np.concatenate([legs, good * np.array([[-1.0], [np.inf]]), good * np.where(np.eye(5), -1.0, 1.0)])
     for values in (*paper.assembly_modes(legs), *paper.pose(legs, Component(1, -1))):
-        assert np.isnan(values[1:3]).all()
+        assert np.isnan(values[[1, 2, *range(4, 11)]]).all()
         assert np.isfinite(values[[0, 3]]).all()
 
 

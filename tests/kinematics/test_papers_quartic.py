@@ -83,6 +83,11 @@ def test_n2_n0_14_and_15_are_right_and_n1_wants_a_bracket() -> None:
         root = delta * f * (e5**2 + e4**2 - delta**4 * f**2) * second  # (15)
         assert -d.quartic[1] / (2 * d.quartic[2]) == (first + rest) / below
         discriminant = d.quartic[1] ** 2 - 4 * d.quartic[2] * d.quartic[0]
+        # (16) and (17): pz and w with equal signs have the opposite of the product that t = p · i asks for
+        t, unit = Poly([0, 1]), delta**2 * f
+        product = ((e4 - delta * f) * delta**3 * f * t + e4 * e2 + e5 * e3) / unit**2
+        px, py, u, v = (delta**3 * f * t + e2) / unit, e3 / unit, e4 / unit, e5 / unit
+        assert product == -(t - px * u - py * v)
         assert discriminant / (4 * d.quartic[2] ** 2) == root / below**2
 
 

@@ -1,4 +1,4 @@
-"""Random planning tasks with fixed seeds: parts, paths and tilt cones on the shipped machine.
+"""Random planning tasks with fixed seeds: parts, paths and tilt cones on three machines.
 
 A part is a height field z(x, y) with known normals; a path visits it as a raster, a spiral or a curve. Nothing here is
 known to the planner, and nothing depends on the mesh code.
@@ -6,12 +6,16 @@ known to the planner, and nothing depends on the mesh code.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from pentapod.machine.machine import Machine
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 PARTS = ("dome", "saddle", "hills", "cylinder")
+MACHINES = ("desk", "figure3", "long_line")
+"""The shipped one; the geometry of the paper's Fig. 3, scaled; and one with δ > 1."""
 PATHS = ("raster", "spiral", "curve")
 CONES_DEG = (0.0, 5.0, 10.0, 15.0, 20.0)
 BALL_RADIUS = 0.003
@@ -22,11 +26,18 @@ Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.nd
 
 @dataclass(frozen=True)
 class Instance:
-    """One task: a toolpath in the workpiece frame and a tilt cone (half angle, radians)."""
+    """One task: a toolpath in the workpiece frame, a tilt cone (half angle, radians), and the machine by its name."""
 
     name: str
     toolpath: Toolpath
     tilt: float
+    machine: str
+
+
+def machine(name: str) -> Machine:
+    """Return one of MACHINES."""
+    file = Path(__file__).parent / "machines" / f"{name}.toml"
+    return Machine.load(file if file.exists() else name)
 
 
 def instances(count: int, seed: int = 0) -> list[Instance]:
@@ -43,8 +54,10 @@ def _instance(k: int, rng: np.random.Generator) -> Instance:
     normals = np.stack([-zx, -zy, np.ones_like(z)], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     tips = np.stack([x, y, z], axis=1)  # the ball touches where the axis is the normal: contact and tip coincide
-    name = f"{k}: {part} {1e3 * size:.0f} mm, slopes to {np.degrees(slope):.0f}°, {path}, cone {cone:.0f}°"
-    return Instance(name, Toolpath((Segment(SegmentKind.CUT, tips, normals, 0.02),), BALL_RADIUS), np.radians(cone))
+    on = MACHINES[k % len(MACHINES)]
+    name = f"{k}: {part} {1e3 * size:.0f} mm, slopes to {np.degrees(slope):.0f}°, {path}, cone {cone:.0f}°, {on}"
+    toolpath = Toolpath((Segment(SegmentKind.CUT, tips, normals, 0.02),), BALL_RADIUS)
+    return Instance(name, toolpath, np.radians(cone), on)
 
 
 def _surface(part: str, size: float, slope: float, rng: np.random.Generator) -> Surface:

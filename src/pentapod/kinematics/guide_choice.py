@@ -45,7 +45,7 @@ def stiffness_criterion(leg_stiffness: ArrayLike, tool_length: float) -> Criteri
     """
     springs = as_floats(leg_stiffness, "leg_stiffness", (5,))
     if not (springs > 0.0).all():
-        raise ArrayError("leg_stiffness must be positive", value=springs.min(), expected="N/m")
+        raise ArrayError("leg_stiffness must be positive", value=float(springs.min()), expected="N/m")
 
     def softest(base: Floats, offsets: Floats, positions: Floats, directions: Floats) -> Floats:
         jacobians = _jacobians(base, offsets, positions, directions, tool_length, 1.0)

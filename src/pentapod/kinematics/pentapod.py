@@ -79,7 +79,8 @@ class LinearPentapod(FiveLegs):
     def assembly_modes(self, legs: ArrayLike) -> tuple[Floats, Floats]:
         """Return positions and directions (..., 4, 3) of the four modes, in the order of `COMPONENTS`.
 
-        legs (..., 5) metres. NaN where no pose has these leg lengths: then all four modes are NaN.
+        legs (..., 5) metres. NaN where no pose has these leg lengths (`assembly_obstacles` says why): then all four
+        modes are NaN.
         """
         signs = np.array(COMPONENTS, dtype=np.float64)
         lengths = as_batch(legs, "legs", (5,))
@@ -93,9 +94,10 @@ class LinearPentapod(FiveLegs):
     ) -> tuple[Floats, Floats]:
         """Return positions and directions (..., 3) in a component: a `Component`, or signs (..., 2).
 
-        legs (..., 5) metres; the signs, each ±1, broadcast against their batch. NaN where no pose has these
-        leg lengths, and where a sign is 0 or NaN. out: contiguous arrays (..., 3) to write both to, for large
-        batches again and again. Raises ArrayError for other signs or an `out` of the wrong shape.
+        legs (..., 5) metres; the signs, each ±1, broadcast against their batch. NaN where no pose has these leg
+        lengths (`assembly_obstacles` says why), and where a sign is 0 or NaN. out: contiguous arrays (..., 3) to write
+        both to, for large batches again and again. Raises ArrayError for other signs, shapes that do not fit, or an
+        `out` of the wrong shape.
         """
         lengths, signs = as_batch(legs, "legs", (5,)), as_batch(component, "component", (2,))
         named = (np.abs(signs) == 1.0).all(axis=-1)
@@ -137,9 +139,11 @@ class LinearPentapod(FiveLegs):
                 poses(legs, signs, *geometry, position, direction, near)
             else:
                 for block in blocks(len(legs)):
-                    squared = np.square(legs[block].T, order="C")
+                    columns = legs[block].T.copy()
+                    squared = np.square(columns)
                     sign = signs if modes or len(signs) == 1 else signs[block]
                     reduced, near[block] = solve(squared, linear, self.delta, sign[..., 0], sign[..., 1])
+                    near[block] |= columns.min(axis=0) < 0.0
                     position[block], direction[block] = self._shifted(reduced)
             self._solve_near(np.flatnonzero(near), legs, signs, position, direction)
 

@@ -47,6 +47,7 @@ def poses(
         for k in range(_LANES):
             l1, l2, l3 = squared[0, k], squared[1, k], squared[2, k]
             l4, l5 = squared[3, k], squared[4, k]
+            sound = (l1 >= 0.0) & (l2 >= 0.0) & (l3 >= 0.0) & (l4 >= 0.0) & (l5 >= 0.0)
             l1, l2, l3, l4, l5 = l1 * l1, l2 * l2, l3 * l3, l4 * l4, l5 * l5
             # Leg by leg from the left, as `LinearPart` does it.
             q = m[0, 0] * l1 + m[0, 1] * l2 + m[0, 2] * l3 + m[0, 3] * l4 + m[0, 4] * l5 + constant[0]
@@ -59,7 +60,7 @@ def poses(
             n_squared = n1 * n1 + (delta * delta) * d1
             c = q + delta * (v * py)
             d = (l3 - py * py) * n_squared - c * c
-            close[k] = not ((d1 > limits[0]) & (d > limits[1]))
+            close[k] = not ((d1 > limits[0]) & (d > limits[1]) & sound)
             n2 = (-delta * sign_w[k]) * w
             root = sign_s[k] * np.sqrt(d)
             w = sign_w[k] * w

@@ -60,7 +60,7 @@ def solve_near(legs: Floats, linear: LinearPart, delta: float, sign_w: Floats, s
     w, root = sign_w * w, sign_s * root
     n2, along = -delta * w, DoubleDouble(root, np.zeros_like(root))
     px, pz = (c * n1 - along * n2).high / n_squared.high, (c * n2 + along * n1).high / n_squared.high
-    nothing = 0.0 * (w + root)  # NaN where one of them is
+    nothing = np.where(legs.min(axis=0) >= 0.0, 0.0 * (w + root), np.nan)  # NaN where one of these is, too
     return Reduced(px, py.high + nothing, pz, u.high + nothing, v.high + nothing, w + nothing)
 
 

@@ -49,5 +49,5 @@ def tip_compliance(
 def _stiffness(value: ArrayLike) -> Floats:
     stiffness = as_floats(value, "leg_stiffness", (5,))
     if not (stiffness > 0.0).all():
-        raise ArrayError("leg_stiffness must be positive", value=stiffness.min(), expected="N/m")
+        raise ArrayError("leg_stiffness must be positive", value=float(stiffness.min()), expected="N/m")
     return stiffness
