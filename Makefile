@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test test-all lint bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify clean
+.PHONY: demo test test-all lint bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify reference site clean
 
 demo: $(READY)  ## plan a dome and judge the program
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
@@ -41,6 +41,12 @@ bench-gouge: $(READY)  ## contact points and gouge check against another library
 
 bench-verify: $(READY)  ## the verdict on a million rows: seconds, memory, against numpy.loadtxt and ball arithmetic
 	$(BIN)/python benchmarks/verify.py
+
+reference: $(READY)  ## the pages of docs/reference, from the code
+	$(BIN)/python docs/make_reference.py
+
+site: $(READY)  ## the documentation as a site, in site/
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 $(READY): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "pentapod needs Python 3.11 or newer")'
