@@ -7,14 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.errors import ToolpathError
+from pentapod.geometry.directions import normalised
 from pentapod.job import Job
 from pentapod.progress import Progress, silent
-from pentapod.strategy_tables import sunk_mm
+from pentapod.strategy_tables import FileTable, StrategyTable, sunk_mm
 from pentapod.table import Vector
 from pentapod.toolpath.axis_modes import AxisMode, Between, Fixed, Normal, Pointed
 from pentapod.toolpath.facet_tree import FacetTree
 from pentapod.toolpath.gouge import checked
 from pentapod.toolpath.gouge_report import GougeOptions, Remedy
+from pentapod.toolpath.links import LinkStyle
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.orientation import Orientation
 from pentapod.toolpath.orienting import oriented
@@ -93,8 +95,19 @@ def finished_as_asked(
         tolerance=_MM * (table.tolerance_mm + sunk_mm(job.toolpath)),
         cone=float(np.radians(table.cone_deg)),
         highest=_MM * table.highest_mm,
+        links=None if isinstance(job.toolpath, FileTable) else _link_style(job, job.toolpath, mesh, toolpath),
     )
     return checked(toolpath, tool, FacetTree.of(mesh), options, progress)
+
+
+def _link_style(job: Job, table: StrategyTable, mesh: Mesh, toolpath: Toolpath) -> LinkStyle:
+    """Return how ways are led where the first ones meet the part: along the axis and over the clearance level."""
+    view = normalised(job.part.region_direction)
+    top = max(float((mesh.vertices @ view).max()), float((toolpath.tips @ view).max()))
+    link = job.feed.cut_mm_min if job.feed.link_mm_min is None else job.feed.link_mm_min
+    clearance, approach = _MM * table.clearance_mm, _MM * table.approach_mm
+    level = top + max(clearance, 2.0 * approach)
+    return LinkStyle(view, level, approach, spacing=_MM * table.spacing_mm, feed=_MM * link / 60.0)
 
 
 def _mode(job: Job) -> AxisMode:

@@ -15,6 +15,7 @@ from pentapod.toolpath import Mesh, Segment, SegmentKind, Toolpath
 from pentapod.toolpath.facet_tree import FacetTree
 from pentapod.toolpath.gouge import checked
 from pentapod.toolpath.gouge_report import GougeOptions, Remedy
+from pentapod.toolpath.links import LinkStyle
 from pentapod.toolpath.solids import Cone
 from pentapod.toolpath.sweep import sweep
 from pentapod.toolpath.tools import BallCutter, FlatEnd
@@ -143,6 +144,15 @@ def test_links_and_rapids_that_meet_the_part_are_told():
     assert report.unclear == 1
     assert report.unclear_places == (0,)
     assert "rapids meet the part" in str(report)
+    style = LinkStyle(np.array([0.0, 0.0, 1.0]), level=0.05, approach=3e-3, spacing=2e-3, feed=0.05)
+    through = Toolpath((dive, *path.segments), path.pivot)
+    found, report = checked(through, BALL, tree, GougeOptions(links=style))
+    assert (report.rejoined, report.unclear) == (1, 0)
+    assert [s.kind for s in found.segments] == ["rapid", "link", "cut", "link"]
+    assert found.tips[0, 2] == pytest.approx(0.05)
+    np.testing.assert_array_equal(found.segments[2].tips, path.segments[1].tips)
+    above = found.segments[0]
+    assert (sweep(tree, BALL, above.tips, above.axes, threshold=-1e-3).deepest <= -1e-3).all()
 
 
 @pytest.mark.parametrize("remedies", [(Remedy.TILT,), (Remedy.LIFT,), (Remedy.TILT, Remedy.LIFT, Remedy.DROP)])

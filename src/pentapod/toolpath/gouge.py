@@ -13,6 +13,7 @@ from pentapod.progress import Progress, silent
 from pentapod.toolpath.facet_tree import FacetTree
 from pentapod.toolpath.gouge_report import GougeOptions, GougeReport, Remedy
 from pentapod.toolpath.links import RAPID_SPACING_M, spaced
+from pentapod.toolpath.rejoining import rejoined
 from pentapod.toolpath.sweep import RESOLUTION_M, Sweep, sweep, touch
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.toolpath.tools import Tool
@@ -42,8 +43,6 @@ def checked(
         gouging=int(bad.sum()),
         depths=tuple(float(d) for d in first.depths.max(axis=0, initial=-np.inf)),  # type: ignore[arg-type]
     )
-    if not report.gouging:
-        return toolpath, _proven(report, toolpath, work)
     for remedy in options.remedies:
         if not bad.any():
             break
@@ -55,20 +54,14 @@ def checked(
         elif remedy is Remedy.DROP:
             report = replace(report, dropped=work.drop(bad))
         bad = work.bad(work.found())
-    result = work.toolpath()
-    return result, _proven(report, result, work)
-
-
-def _proven(report: GougeReport, path: Toolpath, work: _Work) -> GougeReport:
-    """Return the report with what is still, or was all along, in the way of any motion of the path."""
-    kinds = np.array([path.segments[k].kind for k in path.segment_of_interval])
-    depths = np.full(len(kinds), -np.inf)
-    for kind in SegmentKind:
-        rows = np.flatnonzero(kinds == kind)
-        threshold = RESOLUTION_M if kind is SegmentKind.RAPID else work.options.tolerance
-        depths[rows] = _met(work, path.tips, path.axes, rows, threshold).deepest
-    left, unclear = (depths > -np.inf) & (kinds == SegmentKind.CUT), (depths > -np.inf) & (kinds != SegmentKind.CUT)
-    return replace(
+    result = work.toolpath() if report.gouging else toolpath
+    depths, cutting = _standing(result, work)
+    if options.links is not None and (depths[~cutting] > -np.inf).any():
+        result, changed = rejoined(result, (depths > -np.inf) & ~cutting, options.links, work.clear)
+        report = replace(report, rejoined=changed)
+        depths, cutting = _standing(result, work) if changed else (depths, cutting)
+    left, unclear = (depths > -np.inf) & cutting, (depths > -np.inf) & ~cutting
+    return result, replace(
         report,
         left=int(left.sum()),
         left_depth=float(depths[left].max(initial=0.0)),
@@ -76,6 +69,16 @@ def _proven(report: GougeReport, path: Toolpath, work: _Work) -> GougeReport:
         unclear=int(unclear.sum()),
         unclear_places=_begins(unclear),
     )
+
+
+def _standing(path: Toolpath, work: _Work) -> tuple[Floats, Bools]:
+    """Return how deep (N − 1,) what is in the way of each motion is, −inf for nothing; and which motions cut."""
+    kinds = np.array([path.segments[k].kind for k in path.segment_of_interval])
+    depths = np.full(len(kinds), -np.inf)
+    for kind in SegmentKind:
+        rows = np.flatnonzero(kinds == kind)
+        depths[rows] = _met(work, path.tips, path.axes, rows, work.threshold(kind)).deepest
+    return depths, np.asarray(kinds == SegmentKind.CUT)
 
 
 def _begins(marked: Bools) -> tuple[int, ...]:
@@ -104,6 +107,15 @@ class _Work:
         points = np.full((len(self.cut), 3, 3), np.nan)
         times[rows], points[rows], facets[rows] = met.times, met.points, met.facets
         return Sweep(depths, times, points, facets)
+
+    def threshold(self, kind: SegmentKind) -> float:
+        """Return the depth, metres, from which a motion of a kind meets the part: a rapid may not even touch."""
+        return RESOLUTION_M if kind is SegmentKind.RAPID else self.options.tolerance
+
+    def clear(self, segment: Segment) -> bool:
+        """Return whether a segment does not meet the part."""
+        met = sweep(self.tree, self.tool, segment.tips, segment.axes, threshold=self.threshold(segment.kind))
+        return bool((met.deepest == -np.inf).all())
 
     def bad(self, met: Sweep) -> Bools:
         """Return which motions (N − 1,) are too deep."""

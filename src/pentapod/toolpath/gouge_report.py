@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
 
 from pentapod.errors import ToolpathError
+from pentapod.toolpath.links import LinkStyle
 from pentapod.toolpath.solids import KINDS
 
 
@@ -25,6 +26,7 @@ class GougeOptions:
     """remedies: tried in this order on what still gouges. tolerance: depth that counts as none, metres.
 
     cone: half angle in radians within which tilting may turn the axis. highest: most that lifting may lift, metres.
+    links: how ways between cuts are led anew where the old ones meet the part; None: they stay, and are told.
     Raises ToolpathError for values that make no sense.
     """
 
@@ -32,6 +34,7 @@ class GougeOptions:
     tolerance: float = 20e-6
     cone: float = float(np.radians(30.0))
     highest: float = 20e-3
+    links: LinkStyle | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         if not (self.tolerance > 0.0 and 0.0 < self.cone < 0.5 * np.pi and self.highest > 0.0):
@@ -47,7 +50,8 @@ class GougeReport:
     gouging: of them too deep at first; depths: the deepest of cutter, shank and holder at first, metres, −inf for none.
     tilted, lifted: waypoints changed; dropped: motions taken out of the cut; most_lifted: metres.
     left: motions still too deep, left_depth how deep, metres; places: the first waypoint of each run of those.
-    unclear: links deeper than the tolerance and rapids that touch, unclear_places likewise.
+    rejoined: ways between cuts led anew. unclear: links deeper than the tolerance and rapids that touch,
+    unclear_places likewise.
     """
 
     motions: int
@@ -60,6 +64,7 @@ class GougeReport:
     left: int = 0
     left_depth: float = 0.0
     places: tuple[int, ...] = ()
+    rejoined: int = 0
     unclear: int = 0
     unclear_places: tuple[int, ...] = ()
 
@@ -82,10 +87,11 @@ class GougeReport:
         return text + self._unclear()
 
     def _unclear(self) -> str:
+        text = f"\n  note: {self.rejoined:,} ways between cuts led over the clearance level" if self.rejoined else ""
         if not self.unclear:
-            return ""
+            return text
         where = _some(self.unclear_places)
-        return f"\n  problem: {self.unclear:,} motions of links and rapids meet the part, from waypoints {where}"
+        return text + f"\n  problem: {self.unclear:,} motions of links and rapids meet the part, from waypoints {where}"
 
 
 def _some(places: tuple[int, ...]) -> str:
