@@ -22,7 +22,7 @@ from pentapod.program import Program
 from pentapod.report import write_report
 from pentapod.report.decimate import keep_extremes, thinned_mesh
 from pentapod.report.signals import Signals
-from pentapod.report.words import duration, number, placement_sentences, rotation_angles_deg
+from pentapod.report.words import duration, number, opening, placement_sentences, rotation_angles_deg
 from pentapod.timing import Trajectory
 from pentapod.toolpath import Toolpath
 
@@ -205,6 +205,9 @@ def test_the_placement_shown_can_be_used(make_job, tmp_path):
 
 
 def test_words():
+    assert opening("short") == "short"
+    assert opening("held; component ++: for all times") == "held"
+    assert opening("a word " * 40) == ("a word " * 14).strip() + " …"
     assert number(None) == "–"
     assert number(-0.5, "mm") == "−0.5 mm"
     assert (duration(28.08), duration(185), duration(3720)) == ("28.1 s", "3 min 05 s", "1 h 02 min")
