@@ -22,7 +22,7 @@ from pentapod.program import Program
 from pentapod.report import write_report
 from pentapod.report.decimate import keep_extremes, thinned_mesh
 from pentapod.report.signals import Signals
-from pentapod.report.words import duration, number, placement_sentences, rotation_angles_deg
+from pentapod.report.words import duration, number, opening, placement_sentences, rotation_angles_deg
 from pentapod.timing import Trajectory
 from pentapod.toolpath import Toolpath
 
@@ -42,7 +42,7 @@ class Page(HTMLParser):
     def handle_starttag(self, tag, attrs):
         if tag not in ("meta", "input", "br", "link", "img"):
             self.open.append(tag)
-        self.outside += [f"{k}={v}" for k, v in attrs if k in ("src", "href")]
+        self.outside += [f"{k}={v}" for k, v in attrs if k in ("src", "href") and not v.startswith("#")]
 
     def handle_endtag(self, tag):
         assert self.open.pop() == tag
@@ -74,7 +74,8 @@ def unpacked(array: dict[str, str]) -> np.ndarray:
 def test_report_of_a_passed_job(make_job, tmp_path):
     outcome = run(Job.load(make_job()), tmp_path / "out")
     text, page = page_of(outcome, tmp_path)
-    assert page.text.index("All 24 claims") < page.text.index("Verdict") < page.text.index("Worst places")
+    count = len(outcome.verdict.certificates)
+    assert page.text.index(f"All {count} claims") < page.text.index("Verdict") < page.text.index("Worst places")
     for certificate in outcome.verdict.certificates:
         assert certificate.claim in page.text
     for stage in outcome.stages:
@@ -205,6 +206,9 @@ def test_the_placement_shown_can_be_used(make_job, tmp_path):
 
 
 def test_words():
+    assert opening("short") == "short"
+    assert opening("held; component ++: for all times") == "held"
+    assert opening("a word " * 40) == ("a word " * 14) + "a …"
     assert number(None) == "–"
     assert number(-0.5, "mm") == "−0.5 mm"
     assert (duration(28.08), duration(185), duration(3720)) == ("28.1 s", "3 min 05 s", "1 h 02 min")

@@ -14,6 +14,9 @@ Figure = dict[str, Any]
 LEG_COLOURS = ("#2a78d6", "#1baa7a", "#e08a00", "#c2417c", "#7a5cd6")
 """One for each leg, the same in every figure; they hold on light and dark ground."""
 
+LEG_DASHES = ("solid", "10px 3px", "2px 2px", "8px 2px 2px 2px", "16px 4px")
+"""One for each leg: told apart without colour, too."""
+
 LIMIT_COLOUR = "#d2413a"
 QUIET_COLOUR = "#8a8f98"
 

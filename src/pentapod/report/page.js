@@ -39,7 +39,14 @@
   draw("scene");
   draw("time");
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", retheme);
-  addEventListener("beforeprint", retheme);
+  // Paper cannot be opened: what is folded on the screen is printed whole.
+  let folded = [];
+  addEventListener("beforeprint", () => {
+    folded = [...document.querySelectorAll("details:not([open])")];
+    for (const details of folded) details.open = true;
+    retheme();
+  });
+  addEventListener("afterprint", () => { for (const details of folded) details.open = false; });
   addEventListener("afterprint", retheme);
 
   const poses = machine.poses;
@@ -56,6 +63,8 @@
     return [...legs, [joints[first], nose], [nose, tip], [tip, tip]];
   }
 
+  const nearest = (t) => poses.reduce((best, pose, k) => Math.abs(pose.t - t) < Math.abs(poses[best].t - t) ? k : best, 0);
+
   const slider = document.getElementById("slider"), readout = document.getElementById("readout");
   const play = document.getElementById("play");
   slider.max = poses.length - 1;
@@ -68,6 +77,8 @@
     const [x, y, z] = pose.tip.map((value) => value.toFixed(1));
     readout.textContent = `${pose.t.toFixed(2)} s, segment ${pose.segment}, tip (${x}, ${y}, ${z}) mm`;
     slider.value = index;
+    slider.setAttribute("aria-valuetext", readout.textContent);
+    if (figures.time) Plotly.relayout("time", { "shapes[0].x0": pose.t, "shapes[0].x1": pose.t });
   }
 
   let timer = 0;
@@ -97,11 +108,18 @@
   drawn.scene.then(() => show(machine.start));
   if (drawn.time) {
     drawn.time.then((holder) => holder.on("plotly_click", (event) => {
-      const t = event.points[0].x;
-      let best = 0;
-      poses.forEach((pose, k) => { if (Math.abs(pose.t - t) < Math.abs(poses[best].t - t)) best = k; });
       stop();
-      show(best);
+      show(nearest(event.points[0].x));
     }));
   }
+  for (const link of document.querySelectorAll("a.go")) {
+    link.addEventListener("click", () => { stop(); show(nearest(Number(link.dataset.time))); });
+  }
+  const colour = document.getElementById("colour");
+  colour.addEventListener("change", () => {
+    const names = figures.scene.data.map((trace) => trace.name);
+    const kinds = Object.keys(machine.colours);
+    const traces = kinds.map((kind) => names.indexOf(machine.colours[kind]));
+    Plotly.restyle("scene", { visible: kinds.map((kind) => kind === colour.value) }, traces);
+  });
 })();

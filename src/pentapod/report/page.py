@@ -21,7 +21,7 @@ from pentapod.report.worst import worst_places
 from pentapod.timing.explain import Explanation
 from pentapod.timing.trajectory import Trajectory
 from pentapod.toolpath.mesh import Mesh
-from pentapod.toolpath.toolpath import Toolpath
+from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 from pentapod.version import __version__
 
 _POSES = 240
@@ -42,7 +42,7 @@ def render(outcome: Outcome) -> str:
 
     folder = resources.files("pentapod.report")
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(number=words.number, duration=words.duration)
+    environment.filters.update(number=words.number, duration=words.duration, opening=words.opening)
     template = environment.from_string((folder / "page.html.j2").read_text(encoding="utf-8"))
     return template.render(
         style=(folder / "style.css").read_text(encoding="utf-8"),
@@ -74,12 +74,14 @@ def _context(outcome: Outcome) -> dict[str, Any]:
         "facts": _facts(outcome, signals),
         "worst": [] if signals is None else worst_places(signals, outcome.machine),
         "story": outcome.find(Explanation),
+        "sheet": _setup_sheet(outcome, signals),
         "placement": None if placed is None else _placement(placed.placement.transform),
         "chosen_by": "" if placed is None else placed.placement.chosen_by,
         "component": "" if placed is None else str(placed.component),
         "stages": outcome.stages,
         "seconds": sum(stage.seconds for stage in outcome.stages),
         "program": program,
+        "poses_shown": signals is not None,
         "provenance": _provenance(outcome),
         "figures": as_script(figures),
         "poses": as_script(_poses(outcome, signals)),
@@ -113,8 +115,7 @@ def _scene(outcome: Outcome, signals: Signals | None) -> Figure:
     traces = [] if mesh is None else [scene.part_trace(mesh, transform, down=placed is not None)]
     traces += [] if mesh is None else scene.fault_traces(mesh, transform)
     if signals is not None:
-        margins = np.interp(signals.times, signals.times[signals.margin_rows], signals.smallest_margins)
-        traces += scene.path_traces(signals.tips, signals.axes, signals.cutting.astype(np.intp), margins)
+        traces += scene.path_traces(signals)
         row = _start_row(signals)
         traces += scene.machine_traces(outcome.machine, signals.tips[row], signals.axes[row])
     elif toolpath is not None and outcome.refusal is not None:
@@ -137,7 +138,11 @@ def _poses(outcome: Outcome, signals: Signals | None) -> dict[str, Any]:
         return {"poses": []}
     machine = outcome.machine
     rows = np.linspace(0, len(signals.times) - 1, min(_POSES, len(signals.times))).astype(np.intp)
-    rows = np.unique(np.append(rows, _start_row(signals)))
+    # Every place that the tables link to has its own pose.
+    linked = [c.where.row for c in outcome.verdict.certificates if c.where.row is not None]
+    linked += [place.row for place in worst_places(signals, machine) if place.row is not None]
+    rows = np.unique(np.concatenate([rows, [_start_row(signals)], np.clip(linked, 0, len(signals.times) - 1)]))
+    rows = rows.astype(np.intp)
     tips, axes = np.round(1e3 * signals.tips[rows], 3), np.round(signals.axes[rows], 6)
     return {
         "poses": [
@@ -149,6 +154,7 @@ def _poses(outcome: Outcome, signals: Signals | None) -> dict[str, Any]:
         "start": int(np.searchsorted(rows, _start_row(signals))),
         "around": _around(signals),
         "moving": scene.MACHINE_TRACES,
+        "colours": scene.CUTS_BY,
         "base": (1e3 * machine.pentapod.base).tolist(),
         "offsets": (1e3 * machine.pentapod.offsets).tolist(),
         "tool_length": 1e3 * machine.tool_length,
@@ -177,6 +183,29 @@ def _placement(transform: RigidTransform) -> dict[str, Any]:
         f"position_mm = [{position}]\n"
         f"rotation_deg = [{', '.join(f'{angle:.8f}' for angle in angles)}]",
     }
+
+
+def _setup_sheet(outcome: Outcome, signals: Signals | None) -> list[tuple[str, str]]:
+    """Return what someone in front of the machine has to prepare: name and value."""
+    job, machine, toolpath = outcome.job, outcome.machine, outcome.find(Toolpath)
+    sheet = [
+        ("tool", words.tool_sentence(job.tool)),
+        ("tool length", f"{1e3 * machine.tool_length:.3f} mm from the platform's origin to the tip"),
+    ]
+    mesh = outcome.find(Mesh)
+    if mesh is not None:
+        size = " × ".join(f"{value:.1f}" for value in 1e3 * np.ptp(mesh.bounds, axis=0))
+        sheet.append(("part", f"{job.mesh_path.name}, {size} mm"))
+    if toolpath is not None:
+        feeds = sorted({round(6e4 * s.feed) for s in toolpath.segments if s.kind == SegmentKind.CUT})
+        sheet.append(("feed on cuts", f"{', '.join(f'{feed:,}' for feed in feeds[:4])} mm/min"))
+    if signals is not None:
+        for name, row in (("first row", 0), ("last row", -1)):
+            tip = ", ".join(f"{value:.2f}" for value in 1e3 * signals.tips[row]).replace("-", "−")
+            legs = ", ".join(f"{value:.3f}" for value in 1e3 * signals.legs[row])
+            sheet.append((name, f"tip at ({tip}) mm, legs {legs} mm"))
+        sheet.append(("rapid rate", f"{6e4 * machine.rapid_velocity:,.0f} mm/min"))
+    return sheet
 
 
 def _provenance(outcome: Outcome) -> list[tuple[str, str]]:

@@ -9,7 +9,7 @@ import numpy as np
 from pentapod.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.report.decimate import keep_extremes
-from pentapod.report.figure import LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR, Figure, packed
+from pentapod.report.figure import LEG_COLOURS, LEG_DASHES, LIMIT_COLOUR, QUIET_COLOUR, Figure, packed
 from pentapod.report.signals import Signals
 
 _BUCKETS = 600
@@ -57,10 +57,12 @@ def _line(times: Floats, values: Floats, row: int, name: str, colour: str, **mor
 
 def _leg_line(times: Floats, values: Floats, leg: int, row: int, unit: str) -> dict[str, Any]:
     hover = f"leg {leg + 1}: %{{y:.5g}} {unit}<extra></extra>"
-    return _line(
+    line = _line(
         times, values, row, f"leg {leg + 1}", LEG_COLOURS[leg], legendgroup=f"leg{leg}", showlegend=row == 1,
         hovertemplate=hover,
     )  # fmt: skip
+    line["line"] = line["line"] | {"dash": LEG_DASHES[leg]}
+    return line
 
 
 def _limits(times: Floats, values: Floats, row: int, unit: str) -> list[dict[str, Any]]:
@@ -102,7 +104,9 @@ def _margin_lines(signals: Signals) -> list[dict[str, Any]]:
     for colour, k in zip(_MARGIN_COLOURS, order, strict=False):
         name = signals.margin_names[k]
         hover = f"{name}: %{{y:.3f}}<extra></extra>"
-        lines.append(_line(times, signals.margins[:, k], 5, name, colour, legend="legend2", hovertemplate=hover))
+        line = _line(times, signals.margins[:, k], 5, name, colour, legend="legend2", hovertemplate=hover)
+        line["line"] = line["line"] | {"dash": LEG_DASHES[len(lines) % len(LEG_DASHES)]}
+        lines.append(line)
     zero = _line(times[[0, -1]], np.zeros(2), 5, "limit", LIMIT_COLOUR, showlegend=False, hoverinfo="skip")
     zero["line"] = zero["line"] | {"dash": "dash", "width": 1.1}
     return [*lines, zero]
@@ -117,8 +121,10 @@ def _layout() -> dict[str, Any]:
         "hovermode": "x",
         "xaxis": {"title": {"text": "time, s"}, "anchor": f"y{count}", "domain": [0.0, 1.0], "showspikes": True,
                   "spikemode": "across", "spikethickness": 1, "spikedash": "dot", "zeroline": False},
+        "shapes": [{"type": "line", "xref": "x", "yref": "paper", "x0": 0, "x1": 0, "y0": 0, "y1": 1,
+                    "line": {"color": QUIET_COLOUR, "width": 1.5}}],
         "legend": {"orientation": "h", "x": 0.0, "y": 1.0, "yanchor": "bottom", "itemsizing": "constant"},
-        "legend2": {"orientation": "h", "x": 0.0, "y": -0.045, "yanchor": "top"},
+        "legend2": {"orientation": "h", "x": 0.0, "y": -0.06, "yanchor": "top"},
     }  # fmt: skip
     for row, title in enumerate(_TITLES, start=1):
         top = 1.0 - (row - 1) * (height + gap)

@@ -2,27 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from pentapod.arrays import Floats, Ints
+from pentapod.arrays import Bools, Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.machine import Machine
 from pentapod.refusal import Refusal
 from pentapod.report.decimate import keep_extremes, thinned_mesh
 from pentapod.report.figure import LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR, Figure, packed
+from pentapod.report.signals import Signals
 from pentapod.toolpath.faults import faults
 from pentapod.toolpath.mesh import Mesh
 
 MACHINE_TRACES = 8
 """Traces that move with the pose: five legs, the platform line, the tool, the tip. They come last."""
 
+CUTS_BY = {
+    "margin": "cuts, by smallest margin",
+    "feed": "cuts, by share of the feed",
+    "cause": "cuts, by what limits them",
+}
+"""The names of the traces of which one at a time is shown."""
+
 _MOST_FACETS = 60_000
 _MOST_EDGES = 5_000
 _BUCKETS = 4_000
 _LIFT_M = 0.5e-3  # along the tool axis: a ball's tip runs on and below the surface, which would hide its path
-_MARGIN_COLOURS = [[0.0, "#c8322b"], [0.15, "#ee8f3c"], [0.4, "#e9d35b"], [1.0, "#2f9e6e"]]
+# Worst is darkest, on a light part: the order can be read without colour, too.
+_MARGIN_COLOURS = [[0.0, "#5c0019"], [0.2, "#b5371c"], [0.5, "#e39a2d"], [1.0, "#9fe0bd"]]
+_CAUSE_COLOURS = ("#14213d", "#8f2d56", "#2a78d6", "#d1603d", "#1baa7a", "#e0a526", "#8ecae6", "#c9b1e8")
 
 
 def part_trace(mesh: Mesh, placement: RigidTransform, *, down: bool) -> dict[str, Any]:
@@ -52,27 +63,63 @@ def fault_traces(mesh: Mesh, placement: RigidTransform) -> list[dict[str, Any]]:
     return traces
 
 
-def path_traces(tips: Floats, axes: Floats, cutting: Ints, margins: Floats) -> list[dict[str, Any]]:
-    """Return the cuts coloured by margin, and the other motion in grey.
-
-    tips, axes (N, 3), cutting, margins (N,).
-    """
-    tips = 1e3 * (tips + _LIFT_M * axes)
-    keep = keep_extremes(margins, _BUCKETS)
-    cuts = np.where(cutting[:, None] != 0, tips, np.nan)[keep]
-    other = _with_gaps(tips, cutting == 0)
-    coloured = _line3d(cuts, "cuts, by smallest margin", "", 5)
-    coloured["line"] = {
-        "width": 5, "color": packed(margins[keep]), "colorscale": _MARGIN_COLOURS, "cmin": 0.0, "cmax": 0.5,
-        "showscale": True,
-        "colorbar": {
-            "title": {"text": "cuts:<br>smallest<br>margin"}, "thickness": 12, "len": 0.5, "x": 0.98, "y": 0.4,
+def path_traces(signals: Signals) -> list[dict[str, Any]]:
+    """Return the cuts coloured by margin, by feed and by what limits them (one is shown at a time), and the rest."""
+    tips = 1e3 * (signals.tips + _LIFT_M * signals.axes)
+    margins = np.interp(signals.times, signals.times[signals.margin_rows], signals.smallest_margins)
+    shares = 100.0 * signals.speeds / signals.speed_limits
+    names = signals.cause_names
+    steps = np.flatnonzero(np.diff(signals.causes))
+    by_cause = _cuts(
+        signals, tips, signals.causes, np.append(steps, steps + 1)[: 2 * _BUCKETS], CUTS_BY["cause"],
+        {
+            "colorscale": _steps(len(names)), "cmin": -0.5, "cmax": len(names) - 0.5,
+            "colorbar": _bar("limited<br>by") | {"tickvals": list(range(len(names))), "ticktext": list(names)},
         },
-    }  # fmt: skip
-    coloured["showlegend"] = False
-    coloured["text"] = [f"margin {value:.3f}" for value in margins[keep]]
-    coloured["hovertemplate"] = "%{text}<br>%{x:.1f}, %{y:.1f}, %{z:.1f} mm<extra></extra>"
-    return [coloured, _line3d(other, "links and rapids", QUIET_COLOUR, 1.5, visible="legendonly")]
+        names,
+    )  # fmt: skip
+    return [
+        _cuts(
+            signals, tips, margins, keep_extremes(margins, _BUCKETS), CUTS_BY["margin"],
+            {"colorscale": _MARGIN_COLOURS, "cmin": 0.0, "cmax": 0.5, "colorbar": _bar("smallest<br>margin")},
+        ),
+        _cuts(
+            signals, tips, shares, keep_extremes(shares, _BUCKETS), CUTS_BY["feed"],
+            {"colorscale": _MARGIN_COLOURS, "cmin": 0.0, "cmax": 100.0, "colorbar": _bar("% of the<br>feed")},
+        ) | {"visible": False},
+        by_cause | {"visible": False},
+        _line3d(_with_gaps(tips, ~signals.cutting), "links and rapids", QUIET_COLOUR, 1.5, visible="legendonly"),
+    ]  # fmt: skip
+
+
+def _cuts(
+    signals: Signals,
+    tips: Floats,
+    values: Floats | Ints,
+    also: Ints,
+    name: str,
+    look: dict[str, Any],
+    words: Sequence[str] = (),
+) -> dict[str, Any]:
+    """Return the cuts coloured by values (N,), thinned: whatever `also` names is kept. words: of whole values."""
+    even = np.linspace(0, len(tips) - 1, min(len(tips), 2 * _BUCKETS)).astype(np.intp)
+    keep = np.unique(np.concatenate([even, also]))
+    trace = _line3d(np.where(signals.cutting[keep, None], tips[keep], np.nan), name, "", 5)
+    trace["line"] = {"width": 5, "color": packed(values[keep]), "showscale": True, **look}
+    trace["showlegend"] = False
+    trace["text"] = [words[int(v)] for v in values[keep]] if words else [f"{float(v):.3g}" for v in values[keep]]
+    trace["hovertemplate"] = "%{text}<br>%{x:.1f}, %{y:.1f}, %{z:.1f} mm<extra></extra>"
+    return trace
+
+
+def _bar(title: str) -> dict[str, Any]:
+    return {"title": {"text": title}, "thickness": 12, "len": 0.5, "x": 0.98, "y": 0.4}
+
+
+def _steps(count: int) -> list[list[Any]]:
+    """Return a colour scale of `count` equal steps."""
+    colours = [_CAUSE_COLOURS[k % len(_CAUSE_COLOURS)] for k in range(count)]
+    return [[edge / count, colour] for k, colour in enumerate(colours) for edge in (k, k + 1)]
 
 
 def blamed_traces(tips: Floats, axes: Floats, refusal: Refusal) -> list[dict[str, Any]]:
@@ -97,7 +144,10 @@ def machine_traces(machine: Machine, tip: Floats, axis: Floats) -> list[dict[str
     angle = np.linspace(0.0, 2.0 * np.pi, 73)
     rim = base.mean(axis=0) + radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(73)])
     joints = _line3d(base, "base joints", QUIET_COLOUR, 1.0)
-    joints |= {"mode": "markers", "marker": {"size": 5, "color": list(LEG_COLOURS)}, "showlegend": False}
+    joints |= {
+        "mode": "markers+text", "marker": {"size": 5, "color": list(LEG_COLOURS)}, "showlegend": False,
+        "text": [f"{k}" for k in range(1, 6)], "textposition": "top center",
+    }  # fmt: skip
     return [
         _line3d(rim, "base plane", QUIET_COLOUR, 2.0),
         joints,
@@ -157,7 +207,7 @@ def _line3d(points: Floats, name: str, colour: str, width: float, **more: Any) -
     }  # fmt: skip
 
 
-def _with_gaps(points: Floats, chosen: Any) -> Floats:
+def _with_gaps(points: Floats, chosen: Bools) -> Floats:
     """Return points (K, 3), thinned, NaN where not chosen so that lines break there."""
     step = max(1, len(points) // _BUCKETS)
     edges = np.flatnonzero(np.diff(chosen.astype(np.int8)))

@@ -26,7 +26,7 @@ class Signals:
     times (N,) s; legs, rates, accelerations (N, 5) m, m/s, m/s², as the controller moves between rows;
     tips, axes (N, 3); speeds (N,), m/s: of the tip, or, with a stand-off and off rapids, of the spot on the
     surface; speed_limits (N,): the feed that is asked for, or the rapid rate; segments (N,) of the toolpath; cutting
-    (N,). margins (K, M) at rows `margin_rows` (K,).
+    (N,). causes (N,): what limits the motion, index into `cause_names`. margins (K, M) at rows `margin_rows` (K,).
     """
 
     times: Floats
@@ -39,13 +39,15 @@ class Signals:
     speed_limits: Floats
     segments: Ints
     cutting: NDArray[np.bool_]
+    causes: Ints
+    cause_names: tuple[str, ...]
     margins: Floats
     margin_rows: Ints
     margin_names: tuple[str, ...]
 
     @classmethod
     def of(cls, program: Program, machine: Machine, trajectory: Trajectory, toolpath: Toolpath) -> Signals:
-        """Compute the signals of a program. The trajectory only tells which segment is due at which time."""
+        """Compute the signals of a program. The trajectory tells which segment is due when, and what limits it."""
         times = program.times
         rates, accelerations = _derivatives(program)
         tips, axes = _poses(program, machine)
@@ -62,13 +64,15 @@ class Signals:
         rows = np.unique(np.append(np.arange(0, len(times), step), len(times) - 1)).astype(np.intp)
         values = [margins(tips[k], axes[k]) for k in np.array_split(rows, -(-len(rows) // _CHUNK))]
         names = tuple(limit.name for limit in margins.limits)
+        profile = trajectory.profile
+        at = np.clip(np.searchsorted(profile.times, times, side="right") - 1, 0, len(profile.active) - 1)
         return cls(
             times, program.legs, rates, accelerations, tips, axes, speeds, feeds[segments], segments,
-            kinds[segments], np.concatenate(values), rows, names,
+            kinds[segments], profile.active[at], tuple(profile.constraint_names), np.concatenate(values), rows, names,
         )  # fmt: skip
 
     def __post_init__(self) -> None:
-        set_frozen(self, margin_names=tuple(self.margin_names))
+        set_frozen(self, margin_names=tuple(self.margin_names), cause_names=tuple(self.cause_names))
 
     @property
     def smallest_margins(self) -> Floats:

@@ -6,6 +6,7 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.job_tables import ToolTable
 
 
 def number(value: float | None, unit: str = "") -> str:
@@ -23,6 +24,24 @@ def duration(seconds: float) -> str:
     if seconds >= 60:
         return f"{int(seconds // 60)} min {int(seconds % 60):02d} s"
     return f"{seconds:.3g} s"
+
+
+def opening(sentence: str, most: int = 100) -> str:
+    """Return the beginning of a long sentence: up to its first semicolon, or as many whole words as fit."""
+    first = sentence.split(";", maxsplit=1)[0]
+    if len(first) <= most:
+        return first
+    return first[:most].rsplit(" ", 1)[0].rstrip(" ,:") + " …"
+
+
+def tool_sentence(tool: ToolTable) -> str:
+    """Return the job's tool in words: its type and the measures that it has."""
+    measures = [
+        f"{key.removesuffix('_mm')} {value:g} mm"
+        for key in ("diameter_mm", "corner_mm", "neck_mm", "reach_mm", "flute_mm", "standoff_mm")
+        if (value := getattr(tool, key)) is not None
+    ]
+    return ", ".join([f"{tool.type} tool", *measures])
 
 
 def rotation_angles_deg(rotation: Floats) -> tuple[float, float, float]:

@@ -77,8 +77,9 @@ class Survey:
     shortest: −`Extreme` of the legs' least lengths on each interval; longest, rates, jerks: `Extreme` on each
     interval; accelerations: at each row. Metres and seconds; exact on the controller's polynomials.
     component: see there. position, direction (M, 3): the poses at the samples, NaN where there are none.
-    away (M − 1,) metres, turned (M − 1,) radians, speeds (M − 1, 2) m/s: proven of each chord between samples: how far
-    the pivot strays from it, how far the axis turns off it, how fast tip and pivot are. Infinite where not proven.
+    away (M − 1,) metres, turned (M − 1,) radians, speeds (M − 1, 3) m/s: proven of each chord between samples: how far
+    the pivot strays from it, how far the axis turns off it, how fast are the tip, the pivot and the faster end
+    of the platform's line with the tool. Infinite where not proven.
     base_widest, platform_closed, platform_open: proven of each chord: −cos of the largest angle at the base joint, cos
     of the least and −cos of the largest one at the platform joint.
     """
@@ -129,9 +130,11 @@ def survey(
         samples = slice(2 * first, 2 * last + 1)
         found.position[samples], found.direction[samples] = machine.pentapod.pose(part.halves, program.component)
         between = slice(2 * first, 2 * last)
-        chords = _chords(found, machine, program, part, between, (machine.tool_length, machine.tool_length - pivot))
+        chords = _chords(found, machine, program, part, between, pivot)
         found.away[between], found.turned[between] = chords.away[:, 1], chords.turned
-        found.speeds[between] = chords.speeds / (0.5 * program.period)
+        found.speeds[between, :2] = chords.speeds[:, :2]
+        found.speeds[between, 2] = chords.speeds[:, 2:].max(axis=1)
+        found.speeds[between] /= 0.5 * program.period
         found.base_widest.see(-chords.base_cosines, 2 * first)
         found.platform_closed.see(chords.platform_cosines[..., 1], 2 * first)
         found.platform_open.see(-chords.platform_cosines[..., 0], 2 * first)
@@ -151,7 +154,7 @@ def _empty(count: int) -> Survey:
         direction=np.empty((2 * count + 1, 3)),
         away=np.empty(2 * count),
         turned=np.empty(2 * count),
-        speeds=np.empty((2 * count, 2)),
+        speeds=np.empty((2 * count, 3)),
         base_widest=Extreme(5),
         platform_closed=Extreme(5),
         platform_open=Extreme(5),
@@ -169,9 +172,13 @@ def _legs(found: Survey, wide: Interpolant, first: int, inner: slice) -> None:
 
 
 def _chords(
-    found: Survey, machine: Machine, program: Program, part: Interpolant, between: slice, arms: tuple[float, float]
+    found: Survey, machine: Machine, program: Program, part: Interpolant, between: slice, pivot: float
 ) -> Chords:
-    """Return what is proven of the two chords of each interval, between poses that are known already."""
+    """Return what is proven of the two chords of each interval, between poses that are known already.
+
+    Of the tip, the pivot, and both ends of what the platform's line carries.
+    """
+    tip, offsets = machine.tool_length, machine.pentapod.offsets
     halves = split(part.bernstein)
     legs = np.stack(halves, axis=1).reshape(-1, 5, part.degree + 1)
     start, end = between, slice(between.start + 1, between.stop + 1)
@@ -181,6 +188,6 @@ def _chords(
         (found.position[start], found.direction[start]),
         (found.position[end], found.direction[end]),
         program.component,
-        arms=np.array(arms),
+        arms=np.array([tip, tip - pivot, offsets.min(), max(offsets.max(), tip)]),
         towards=machine.joints.base_axes,
     )
