@@ -133,6 +133,36 @@ def test_near_a_singularity_the_error_is_that_of_the_rounded_lengths(metres: flo
         found = pentapod.pose(pentapod.leg_lengths(p, i), mode)
         tried += 1
         assert error(found, (p, i)) < 10 * bound  # and so not NaN
-        if bound < 1e-2 * metres:  # the lengths still tell the two roots apart
+        assert pentapod.mode(*found)[0] == mode[0]
+        if bound < 1e-2 * metres:  # and w = 0 is not within rounding either
             np.testing.assert_array_equal(pentapod.mode(*found), mode)
     assert tried > 100
+
+
+@pytest.mark.parametrize("metres", [0.0, 1e-15, 1e-12, 1e-9, 1e-7, 1e-4])
+def test_the_order_is_always_the_one_that_was_asked_for(metres: float) -> None:
+    rng, tried, worst = np.random.default_rng(9), 0, []
+    for offsets in ([-0.3, 0.2, 0.1, -0.15, 0.4], 0.02 + 0.6 * BASE[:, 0], rng.uniform(-0.5, 0.5, 5)):
+        pentapod = GeneralPentapod(BASE, offsets)
+        p, i = random_poses(1500, 10)
+        way = rng.normal(size=(1500, 3))
+        way /= np.linalg.norm(way, axis=1)[:, None]
+        ends = [pentapod.order_value(p + s * way, i) for s in (-1.0, 1.0)]
+        p, i, way, first = (values[ends[0] * ends[1] < 0] for values in (p, i, way, ends[0]))
+        low, high = np.full(len(p), -1.0), np.full(len(p), 1.0)
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            same = pentapod.order_value(p + middle[:, None] * way, i) * first > 0
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        legs = pentapod.leg_lengths(p + (low - metres)[:, None] * way, i)
+        for order in (1, -1):
+            found = pentapod.pose(legs, (order, 1))
+            known = np.isfinite(found[0][:, 0])
+            assert known.mean() > 0.99
+            assert (pentapod.mode(*found)[known, 0] == order).all()
+            worst.append(np.abs(pentapod.leg_lengths(*found) - legs)[known].max(axis=1))
+        tried += len(p)
+    assert tried > 1500
+    residual = np.concatenate(worst)
+    assert np.median(residual) < 4 * EPS
+    assert residual.max() < 1e-12

@@ -19,6 +19,8 @@ from pentapod.kinematics.polish import polish
 from pentapod.kinematics.singularity_polynomial import polynomial_terms
 from pentapod.kinematics.solution_line import SolutionLine
 
+_LEAST_STEP = 2.0**-40  # of the solution line's size; a double root is uncertain by about 2⁻²⁶ of it
+_DOUBLINGS = 24
 _SINGULAR = 1e-12  # below this reciprocal condition no digits are left
 
 
@@ -122,11 +124,29 @@ class GeneralPentapod(FiveLegs):
             outside = np.where(single, tau, np.where(sign[known] > 0.0, high, low))
             tau = root(line, outside, tau)
             p, i = self._pose_of(line, tau)
-            p, i = polish(self, p, i, lengths[known])
+            p, i = self._sided(line, tau, sign[known], *polish(self, p, i, lengths[known]))
             below = _below(p[:, 2] + self.offsets[2] * i[:, 2], i[:, 2])[:, None]
             mirrored = self.mirror(p, i)
             position[block.start + known] = np.where(below, mirrored[0], p)
             direction[block.start + known] = np.where(below, mirrored[1], i)
+        return position, direction
+
+    def _sided(
+        self, line: SolutionLine, tau: Floats, order: Floats, position: Floats, direction: Floats
+    ) -> tuple[Floats, Floats]:
+        """Poses (N, 3) with those that rounding has put beyond the singularity moved back to their order's side.
+
+        Next to a double root f is flat: a step along the line that is as long as the root is uncertain changes the leg
+        lengths by their rounding only.
+        """
+        step = _LEAST_STEP * (np.abs(tau) + np.abs(line.start).max(axis=0))
+        for _ in range(_DOUBLINGS):
+            wrong = np.flatnonzero(self.order_value(position, direction) * order <= 0.0)
+            if not wrong.size:
+                break
+            moved = self._pose_of(line.take(wrong), tau[wrong] + order[wrong] * step[wrong])
+            position[wrong], direction[wrong] = moved
+            step[wrong] *= 2.0
         return position, direction
 
     def _pose_of(self, line: SolutionLine, tau: Floats) -> tuple[Floats, Floats]:
