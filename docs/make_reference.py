@@ -46,7 +46,8 @@ def pages() -> dict[str, str]:
         ),
         "machine.md": _file_page(
             "The machine file",
-            "TOML. Where legs have a number each, one number stands for all. `pentapod machine check FILE` judges a file.",
+            "TOML. Where legs have a number each, one number stands for all. "
+            "`pentapod machine check FILE` judges a file.",
             MachineTables,
         ),
         "commands.md": _MADE + "# Commands\n\n" + "\n".join(_commands()),
