@@ -100,7 +100,9 @@ def check_laws(mesh, tool, options, toolpath):
     assert off.max() <= sunk(options) + noise
     assert surfaces.surface_distance(mesh, middles).max() <= sunk(options) + options.chordal + noise
     if sunk(options) and not isinstance(options, ImageOptions):
-        assert off.min() >= 0.5 * sunk(options)
+        # As deep as asked along the axis, but for creases, where it swings; beside walls the surface is nearer aside.
+        above = contacts + sunk(options) * np.concatenate([s.axes for s in cuts])
+        assert surfaces.surface_distance(mesh, above).max() <= 0.25 * sunk(options) + noise
     steps = np.concatenate([np.linalg.norm(np.diff(s.tips, axis=0), axis=1) for s in cuts])
     assert steps.max() <= options.spacing * (1 + 1e-6)
     assert steps.min() > 0.0
