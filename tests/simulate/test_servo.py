@@ -125,12 +125,12 @@ def test_encoders_hold_within_a_few_steps():
         {},
         {"velocity_feedforward": 0.0},
         {"position_gain": [80, 70, 80, 90, 75], "velocity_feedforward": 0.0, "ripple_force": 0.0},
-        {"dead_time": 1e-3, "encoder_step": 1e-6},
+        {"dead_time": 1e-3},
     ],
-    ids=["as shipped", "no feed-forward", "unequal gains", "late and coarse"],
+    ids=["as shipped", "no feed-forward", "unequal gains", "late"],
 )
 def test_correction_by_pose_lowers_the_contour_error_threefold(drives):
-    """At feeds of cutting: 2000 mm/min at most. What comes faster than the loop's bandwidth nothing takes away."""
+    """At feeds of cutting: 2000 mm/min at most. What is faster than the loops, or finer than the encoders, stays."""
     for seed in range(2):
         (plain, reference), (corrected, _) = (played(8.0, correct=c, seed=seed, **drives) for c in (False, True))
         before, after = contour(plain, reference), contour(corrected, reference)
