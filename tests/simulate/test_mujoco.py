@@ -176,12 +176,14 @@ def test_errors_too_large_are_refused():
     assert "no pose" in str(found)
 
 
-def test_bodies_that_fly_apart_are_refused():
+def test_bodies_that_fly_apart_are_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     reference = reference_of(0.3)
     wild = replace(reference.machine, drives=replace(reference.machine.drives, position_gain=1e5))
     found = play(Reference(reference.program, wild))
     assert isinstance(found, Refusal)
     assert "fly apart" in str(found)
+    assert not list(tmp_path.iterdir())
 
 
 def test_bad_input():

@@ -100,6 +100,16 @@ def simulate_mujoco(
     down. Raises InputError where MuJoCo is missing, ArrayError for forces of a wrong shape.
     """
     mujoco = load_mujoco()
+    mujoco.set_mju_user_warning(_quiet)  # it would write a file into the folder it is called from
+    try:
+        return _run(mujoco, reference, stands, tip_forces, progress)
+    finally:
+        mujoco.set_mju_user_warning(None)
+
+
+def _run(
+    mujoco: Any, reference: Reference, stands: Plant, tip_forces: ArrayLike, progress: Progress
+) -> Physics | Refusal:
     program, machine = reference.program, reference.machine
     rows, parts = len(program.legs), _parts(program.period)
     model = mujoco.MjModel.from_xml_string(stands.xml)
@@ -194,6 +204,10 @@ def _wanted(reference: Reference, parts: int) -> tuple[Floats, Floats, Floats]:
     lengths = reference.at(parts)[0]
     rates = np.diff(lengths, axis=0) / step
     return lengths[:-1], rates, np.diff(rates, axis=0, prepend=np.zeros((1, 5))) / step
+
+
+def _quiet(warning: object) -> None:
+    """Say nothing: what went wrong is counted by MuJoCo too, and told as a refusal."""
 
 
 def _parts(period: float) -> int:
