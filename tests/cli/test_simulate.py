@@ -49,7 +49,7 @@ def test_a_bound_makes_it_a_check(planned, capsys):
     assert simulate(planned, "--within", "1", "-q") == 0
     assert capsys.readouterr() == ("", "")
     assert simulate(planned, "--within", "0.0001", "-q") == 1
-    assert capsys.readouterr().err == "the contour error exceeds 0.0001 mm\n"
+    assert capsys.readouterr().err.endswith(" mm, exceeds 0.0001 mm\n")
 
 
 def test_drives_come_from_the_machine_file(planned, tmp_path, capsys):
@@ -92,3 +92,49 @@ def test_bad_files(planned, tmp_path, capsys):
     assert all(line.startswith("error: ") for line in lines)
     assert "not the machine that the program was made for" in lines[2]
     assert "no pose on this machine" in lines[3]
+
+
+def test_mujoco_as_text_and_json(planned, tmp_path, capsys):
+    pytest.importorskip("mujoco", reason="MuJoCo is not installed")
+    model = tmp_path / "model.xml"
+    assert simulate(planned, "--engine", "mujoco", "--export", str(model), "--cutting-force", "40", "--json") == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    content = json.loads(said.out)
+    assert content["tip_error_mm"]["largest"] <= 0.02
+    assert content["axis_error_deg"]["largest"] <= 0.0057
+    assert content["closure_error_mm"]["largest"] <= 0.02
+    assert content["cutting"]["tip_error_mm"]["largest"] > content["tip_error_mm"]["largest"]
+    spans = [c["leg_forces_n"] for c in (content, content["cutting"])]
+    assert max(spans[1]["most"]) - min(spans[1]["least"]) > max(spans[0]["most"]) - min(spans[0]["least"])
+    assert model.read_text(encoding="utf-8").startswith("<mujoco")
+    # An error of a millimetre is seen, and said where a bound was given.
+    wrong = ["--engine", "mujoco", "--base-error", "4", "0.9", "0", "0.5", "--offset-error", "1", "0.2"]
+    assert simulate(planned, *wrong, "--within", "0.1") == 1
+    said = capsys.readouterr()
+    assert said.out.startswith("mujoco: 4001 setpoints, 4 s\n")
+    assert "leg forces 1 to 5" in said.out
+    assert said.err.startswith("the contour error, ")
+    assert float(said.err.split()[3]) > 0.5  # millimetres
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--correct", "--engine", "mujoco"], "--correct needs --engine servo"),
+        (["--cutting-force", "5"], "--cutting-force needs --engine mujoco"),
+        (["--export", "m.xml"], "--export needs --engine mujoco"),
+        (["--engine", "mujoco", "--base-error", "6", "0", "0", "0"], "base-error"),
+    ],
+)
+def test_options_of_the_other_engine(planned, options, words, capsys):
+    assert simulate(planned, *options) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+
+
+def test_without_mujoco(planned, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    assert simulate(planned, "--engine", "mujoco") == 2
+    assert capsys.readouterr().err == 'error: mujoco: this engine needs MuJoCo; pip install "pentapod[sim]"\n'

@@ -38,25 +38,30 @@ def contour(result, reference):
 
 @pytest.mark.parametrize(("delay", "shares"), [(0, (1.0, 1.0)), (2, (1.0, 1.0)), (3, (0.0, 0.0)), (1, (0.7, 0.4))])
 def test_sampled_drive_is_the_discrete_linear_system(delay, shares):
-    gains, dt = np.array([[80, 60, 90, 70, 100.0], [600, 500, 700, 650, 550.0]]), 1.25e-4
+    gains = np.array([[80, 60, 90, 70, 100.0], [600, 500, 700, 650, 550.0], [50, 30, 0, 80, 120.0]])
+    dt = 1.25e-4
+    drives = LINEAR | {"dead_time": delay * dt, "period": dt}
     result, reference = played(
-        0.4, position_gain=gains[0], velocity_gain=gains[1], period=dt, **(LINEAR | {"dead_time": delay * dt}),
+        0.4, position_gain=gains[0], velocity_gain=gains[1], velocity_integral=gains[2], **drives,
         velocity_feedforward=shares[0], acceleration_feedforward=shares[1],
     )  # fmt: skip
     wanted = reference.at(8)
     free = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]), np.eye(2), np.zeros((2, 1))
     plant, push, *_ = cont2discrete(free, dt)
     for leg in range(5):
-        kp, kv = gains[:, leg]
-        # States: place, rate, place before, and the efforts on their way.
-        n = 3 + delay
+        kp, kv, ki = gains[:, leg]
+        # States: place, rate, place before, integral, and the efforts on their way.
+        n = 4 + delay
         A, B = np.zeros((n, n)), np.zeros((n, 3))
-        effort, by = np.zeros(n), np.array([kv * kp, kv * shares[0], shares[1]])
-        effort[0], effort[2] = -kv * (kp + 1.0 / dt), kv / dt
-        A[:2, :2], A[2, 0] = plant, 1.0
+        slow, slow_by = np.zeros(n), np.array([kp, shares[0], 0.0])
+        slow[0], slow[2] = -kp - 1.0 / dt, 1.0 / dt
+        effort, by = kv * (1.0 + ki * dt) * slow, kv * (1.0 + ki * dt) * slow_by + [0.0, 0.0, shares[1]]
+        effort[3] += kv * ki
+        A[:2, :2], A[2, 0], A[3], B[3] = plant, 1.0, dt * slow, dt * slow_by
+        A[3, 3] = 1.0
         if delay:
-            A[:2, -1], A[3], B[3] = push[:, 0], effort, by
-            A[4:, 3:-1] = np.eye(delay - 1)
+            A[:2, -1], A[4], B[4] = push[:, 0], effort, by
+            A[5:, 4:-1] = np.eye(delay - 1)
         else:
             A[:2] += push @ effort[None]
             B[:2] = push @ by[None]
@@ -73,9 +78,11 @@ def test_fine_sampling_comes_to_the_continuous_drive():
         result, reference = played(0.4, **LINEAR, period=period, velocity_feedforward=0.5)
         lengths, rates, accelerations = reference.at(20)
         u = np.stack([lengths[:, 0] - lengths[0, 0], rates[:, 0], accelerations[:, 0]], axis=1)
-        kp, kv = 80.0, 600.0
-        drive = np.array([[0, 1.0], [-kv * kp, -kv]]), np.array([[0, 0, 0], [kv * kp, 0.5 * kv, 1.0]])
-        _, y, _ = lsim((*drive, np.array([[1.0, 0]]), np.zeros((1, 3))), u, np.arange(len(u)) * 5e-5)
+        kp, kv, ki = 80.0, 600.0, 50.0
+        slow, slow_by = np.array([-kp, -1.0, 0.0]), np.array([kp, 0.5, 0.0])
+        rate = kv * slow + [0.0, 0.0, kv * ki]
+        drive = np.array([[0, 1.0, 0], rate, slow]), np.array([[0, 0, 0], kv * slow_by + [0, 0, 1.0], slow_by])
+        _, y, _ = lsim((*drive, np.array([[1.0, 0, 0]]), np.zeros((1, 3))), u, np.arange(len(u)) * 5e-5)
         off.append(np.abs(result.legs[:, 0] - lengths[0, 0] - y[::20]).max())
         lag = np.abs(u[::20, 0] - y[::20]).max()
     assert lag > 1e-3
@@ -89,7 +96,9 @@ def test_a_leg_that_stands_gives_way_to_the_ripple():
                     program.provenance)  # fmt: skip
     force, pitch = np.array([10, 20, 30, 40, 50.0]), 4e-3
     drives = replace(machine.drives, ripple_force=force, ripple_pitch=pitch, encoder_step=0.0)
-    result = simulate_servo(Reference(still, replace(machine, drives=drives)), seed=5)
+    soft = replace(drives, velocity_integral=0.0)
+    result, firm = (simulate_servo(Reference(still, replace(machine, drives=d)), seed=5) for d in (soft, drives))
+    np.testing.assert_allclose(firm.legs[-1], still.legs[0], atol=1e-9, rtol=0)
     phases = np.random.default_rng(5).uniform(0.0, 2.0 * np.pi, 5)
     for leg in range(5):
 
@@ -116,12 +125,12 @@ def test_encoders_hold_within_a_few_steps():
         {},
         {"velocity_feedforward": 0.0},
         {"position_gain": [80, 70, 80, 90, 75], "velocity_feedforward": 0.0, "ripple_force": 0.0},
-        {"dead_time": 1e-3, "encoder_step": 1e-6},
+        {"dead_time": 1e-3},
     ],
-    ids=["as shipped", "no feed-forward", "unequal gains", "late and coarse"],
+    ids=["as shipped", "no feed-forward", "unequal gains", "late"],
 )
 def test_correction_by_pose_lowers_the_contour_error_threefold(drives):
-    """At feeds of cutting: 2000 mm/min at most. What comes faster than the loop's bandwidth nothing takes away."""
+    """At feeds of cutting: 2000 mm/min at most. What is faster than the loops, or finer than the encoders, stays."""
     for seed in range(2):
         (plain, reference), (corrected, _) = (played(8.0, correct=c, seed=seed, **drives) for c in (False, True))
         before, after = contour(plain, reference), contour(corrected, reference)

@@ -13,14 +13,15 @@ from pentapod.machine.fields import not_negative, per_leg, positive
 
 @dataclass(frozen=True, eq=False)
 class Drives:
-    """Five servo drives: a position loop around a velocity loop, both proportional, with feed-forward.
+    """Five servo drives: a proportional position loop around a velocity loop with an integrator, and feed-forward.
 
-        acceleration = velocity_gain · (position_gain · (wanted − x) + velocity_feedforward · rate wanted − rate)
+        rate error = position_gain · (wanted − x) + velocity_feedforward · rate wanted − rate
+        acceleration = velocity_gain · (rate error + velocity_integral · ∫ rate error)
                        + acceleration_feedforward · acceleration wanted
 
-    Arrays (5,), scalars hold for all legs: position_gain and velocity_gain in 1/s; moving_mass in kg: what a drive
-    feels, the inertia of motor and screw included; ripple_force in N: amplitude of a force that goes up and down once
-    in ripple_pitch metres of travel. The others hold for all legs. velocity_feedforward and
+    Arrays (5,), scalars hold for all legs: position_gain, velocity_gain and velocity_integral in 1/s; moving_mass in
+    kg: what a drive feels, the inertia of motor and screw included; ripple_force in N: amplitude of a force that goes
+    up and down once in ripple_pitch metres of travel. The others hold for all legs. velocity_feedforward and
     acceleration_feedforward: shares, 1 is full. encoder_step: metres, 0 for none. dead_time: seconds from reading the
     encoder to the force. period: seconds of the drive's own loop. contour_gain and contour_rate (1/s): proportional
     and integral share of the correction by pose, where it is asked for.
@@ -30,6 +31,7 @@ class Drives:
 
     position_gain: Floats = field(default_factory=lambda: np.full(5, 80.0))
     velocity_gain: Floats = field(default_factory=lambda: np.full(5, 600.0))
+    velocity_integral: Floats = field(default_factory=lambda: np.full(5, 50.0))
     moving_mass: Floats = field(default_factory=lambda: np.full(5, 100.0))
     ripple_force: Floats = field(default_factory=lambda: np.full(5, 20.0))
     ripple_pitch: Floats = field(default_factory=lambda: np.full(5, 5e-3))
@@ -43,10 +45,19 @@ class Drives:
 
     def __post_init__(self) -> None:
         gains = ("position_gain", "velocity_gain", "moving_mass", "ripple_pitch")
-        per_leg(self, *gains, "ripple_force")
+        per_leg(self, *gains, "velocity_integral", "ripple_force")
         positive(self, *gains, "period")
         shares = ("velocity_feedforward", "acceleration_feedforward")
-        not_negative(self, "ripple_force", *shares, "encoder_step", "dead_time", "contour_gain", "contour_rate")
+        not_negative(
+            self,
+            "velocity_integral",
+            "ripple_force",
+            *shares,
+            "encoder_step",
+            "dead_time",
+            "contour_gain",
+            "contour_rate",
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,6 +41,7 @@ _FILE_KEYS = {
     "tilt": "work.tilt_deg",
     "position_gain": "drives.position_gain_per_s",
     "velocity_gain": "drives.velocity_gain_per_s",
+    "velocity_integral": "drives.velocity_integral_per_s",
     "moving_mass": "drives.moving_mass_kg",
     "ripple_force": "drives.ripple_n",
     "ripple_pitch": "drives.ripple_pitch_mm",
@@ -156,6 +157,7 @@ def _drives(table: DrivesTable) -> Drives:
     return Drives(
         position_gain=np.asarray(table.position_gain_per_s),
         velocity_gain=np.asarray(table.velocity_gain_per_s),
+        velocity_integral=np.asarray(table.velocity_integral_per_s),
         moving_mass=np.asarray(table.moving_mass_kg),
         ripple_force=np.asarray(table.ripple_n),
         ripple_pitch=_si(table.ripple_pitch_mm),

@@ -157,6 +157,9 @@ class DrivesTable(Table):
     velocity_gain_per_s: PerLeg = Field(
         default=_five_of(_DRIVES.velocity_gain), description="gain of the velocity loop, its bandwidth in rad/s"
     )
+    velocity_integral_per_s: PerLeg = Field(
+        default=_five_of(_DRIVES.velocity_integral), description="integral share of the velocity loop, 1 / reset time"
+    )
     moving_mass_kg: PerLeg = Field(
         default=_five_of(_DRIVES.moving_mass), description="what a drive feels, motor and screw included"
     )

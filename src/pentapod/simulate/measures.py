@@ -58,13 +58,14 @@ class Measure:
 class Tracking:
     """A program as it was played, beside what it asks and the toolpath behind it.
 
-    tolerance: metres, of the path; it tells the search how near to look.
+    tolerance: metres, of the path; it tells the search how near to look. more: what else was measured.
     """
 
     played: Played
     reference: Reference
     toolpath: Toolpath
     tolerance: float
+    more: tuple[Measure, ...] = ()
 
     @cached_property
     def measures(self) -> tuple[Measure, ...]:
@@ -88,6 +89,7 @@ class Tracking:
                 "toolpath deviation", "mm", _MM * self._match.distances, "tip (or pivot) to the toolpath, as verified"
             ),
             Measure("leg error", "mm", _MM * np.abs(played.legs - reference.program.legs).max(axis=1), "of any leg"),
+            *self.more,
         )
 
     @cached_property

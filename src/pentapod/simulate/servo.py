@@ -47,7 +47,7 @@ def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False
             program.period,
             parts,
             round(drives.dead_time * parts / program.period),
-            np.stack([drives.position_gain, drives.velocity_gain]),
+            np.stack([drives.position_gain, drives.velocity_gain, drives.velocity_integral]),
             np.array([drives.velocity_feedforward, drives.acceleration_feedforward]),
             drives.encoder_step,
             np.stack([drives.ripple_force / drives.moving_mass, drives.ripple_pitch, phases]),

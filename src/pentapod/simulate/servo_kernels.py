@@ -39,10 +39,10 @@ def drive(
     """Fill leg lengths and accelerations of the drives, both (N, 5), at the rows; from rest at the first row.
 
     lengths (N − 1, 5, 4), accelerations (N − 1, 5, 2): of `Reference`. parts: drive periods in a controller period;
-    delay: drive periods of dead time. gains (2, 5): position and velocity loop, 1/s; shares (2,): of feed-forward.
-    ripple (3, 5): amplitude m/s², pitch m, phase rad. correction (2,): gain and 1/s, zeros for none; then the others
-    tell how pose and path are found: linear_map (4, 5) and constant (4,) of `LinearPart`, geometry (7,): delta, x_3,
-    y_3, z_3, the squares of w and S near a singularity, tool length. component (1, 2) signs, base (5, 2),
+    delay: drive periods of dead time. gains (3, 5): position loop, velocity loop and its integral, 1/s; shares (2,): of
+    feed-forward. ripple (3, 5): amplitude m/s², pitch m, phase rad. correction (2,): gain and 1/s, zeros for none; then
+    the others tell how pose and path are found: linear_map (4, 5) and constant (4,) of `LinearPart`, geometry (7,):
+    delta, x_3, y_3, z_3, the squares of w and S near a singularity, tool length. component (1, 2) signs, base (5, 2),
     offsets (5,), path and path_directions (N, 3) at the rows.
     """
     count, dt = len(lengths), period / parts
@@ -52,6 +52,7 @@ def drive(
         for leg in range(5):
             seen[leg] = math.floor(place[leg] / encoder_step + 0.5) * encoder_step
     waiting, turn = np.zeros((delay + 1, 5)), 0
+    held = np.zeros(5)
     shift, total, error = np.zeros(5), np.zeros(5), np.zeros(5)
     out[0], efforts[0] = place, 0.0
     for row in range(count):
@@ -80,8 +81,9 @@ def drive(
                 read = place[leg]
                 if encoder_step > 0.0:
                     read = math.floor(read / encoder_step + 0.5) * encoder_step
-                by_position = gains[0, leg] * (wanted - read) + shares[0] * wanted_rate
-                effort = gains[1, leg] * (by_position - (read - seen[leg]) / dt) + shares[1] * (a[0] + t * a[1])
+                slow = gains[0, leg] * (wanted - read) + shares[0] * wanted_rate - (read - seen[leg]) / dt
+                held[leg] += dt * slow
+                effort = gains[1, leg] * (slow + gains[2, leg] * held[leg]) + shares[1] * (a[0] + t * a[1])
                 seen[leg] = read
                 waiting[turn, leg] = effort
                 effort = waiting[(turn + 1) % (delay + 1), leg]

@@ -1,0 +1,112 @@
+"""The machine as MJCF, MuJoCo's model format: bodies, joints, closed loops and drives.
+
+Each leg is a cylinder on two hinges at its base joint, and a rod that slides out of it, as long as the slide's
+position says; `connect` constraints close the five loops at the platform's joints. A little damping holds the one
+freedom that legs do not hold, the spin of the tool about its own line.
+
+Solver settings are what makes such loops stiff: constraints as stiff as the step allows, Newton's method to the end.
+MuJoCo's defaults, meant for soft contacts, leave millimetres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.kinematics.as_built import AsBuiltPentapod
+from pentapod.machine.machine import Machine
+
+_SOLREF, _SOLIMP = "0.002 1", "0.9999 0.9999 0.001 0.5 2"
+_SPIN_DAMPING = 0.01  # N·m·s
+_CYLINDER = 0.9  # the fixed part's share of the shortest leg
+_STEEL, _ROD, _SPINDLE = "0.55 0.58 0.62 1", "0.85 0.86 0.88 1", "0.25 0.45 0.75 1"
+
+
+def mjcf(machine: Machine, real: AsBuiltPentapod, position: Floats, direction: Floats, *, step: float) -> str:
+    """Return the model as XML, standing at a pose: position p and direction i (3,), machine frame.
+
+    real: the geometry that stands there, as it was measured or as it is wrong; a slide's position, and a drive's
+    control, is the leg's length in metres. step: seconds. Lengths in metres, masses in kilograms.
+    """
+    joints = position + real.offsets[:, None] * direction
+    vectors = joints - real.base
+    lengths = np.linalg.norm(vectors, axis=1)
+    root = Xml.Element("mujoco", model=machine.name)
+    _add(root, "compiler", angle="radian", autolimits="true")
+    option = _add(root, "option", timestep=[step], gravity=machine.masses.gravity, integrator="implicitfast")
+    option.attrib |= {"solver": "Newton", "iterations": "100", "tolerance": "1e-12"}
+    _add(option, "flag", contact="disable")
+    defaults = _add(root, "default")
+    _add(defaults, "equality", solref=_SOLREF, solimp=_SOLIMP)
+    _add(defaults, "joint", solreflimit=_SOLREF, solimplimit=_SOLIMP)
+    world = _add(root, "worldbody")
+    for leg in range(5):
+        _leg(world, machine, leg, real.base[leg], vectors[leg] / lengths[leg], lengths[leg])
+    _platform(world, machine, real, position, direction)
+    loops = _add(root, "equality")
+    actuators = _add(root, "actuator")
+    drives = machine.drives
+    for leg in range(5):
+        _add(loops, "connect", name=f"loop{leg + 1}", site1=f"rod{leg + 1}", site2=f"platform{leg + 1}")
+        damping = drives.moving_mass[leg] * drives.velocity_gain[leg]
+        stiffness = damping * drives.position_gain[leg]
+        _add(actuators, "position", name=f"drive{leg + 1}", joint=f"leg{leg + 1}", kp=[stiffness], kv=[damping])
+    _add(actuators, "velocity", name="spin", site="origin", gear="0 0 0 0 0 1", kv=[_SPIN_DAMPING])
+    _add(_add(root, "keyframe"), "key", name="start", ctrl=[*lengths, 0.0])
+    Xml.indent(root)
+    return Xml.tostring(root, encoding="unicode") + "\n"
+
+
+def _leg(world: Xml.Element, machine: Machine, leg: int, base: Floats, along: Floats, length: float) -> None:
+    """Add a leg: a cylinder that turns about its base joint, and the rod that slides in it."""
+    name, limits, masses, radius = str(leg + 1), machine.legs, machine.masses, machine.bodies.leg_radius
+    low, high = float(limits.min_length[leg]), float(limits.max_length[leg])
+    body = _add(world, "body", name=f"leg{name}", pos=base, quat=_turn_from_z(along))
+    for axis, letter in (("1 0 0", "u"), ("0 1 0", "v")):
+        _add(body, "joint", name=f"base{name}{letter}", type="hinge", axis=axis)
+    tube = [0.0, 0.0, 0.0, 0.0, 0.0, _CYLINDER * low]
+    _add(body, "geom", type="capsule", fromto=tube, size=[radius], mass=[masses.cylinder], rgba=_STEEL)
+    rod = _add(body, "body", name=f"rod{name}", pos=[0.0, 0.0, length])
+    slide = _add(rod, "joint", name=f"leg{name}", type="slide", axis="0 0 1", ref=[length], range=[low, high])
+    slide.set("armature", _text([machine.drives.moving_mass[leg]]))
+    inner = [0.0, 0.0, 0.0, 0.0, 0.0, _CYLINDER * low - high]
+    _add(rod, "geom", type="capsule", fromto=inner, size=[0.6 * radius], mass=[masses.rod], rgba=_ROD)
+    _add(rod, "site", name=f"rod{name}", size=[1.2 * radius])
+
+
+def _platform(world: Xml.Element, machine: Machine, real: AsBuiltPentapod, position: Floats, direction: Floats) -> None:
+    """Add the platform: a free body whose z axis is the platform line, its origin p."""
+    radius, end, tool = machine.bodies.shaft_radius, machine.tool_length - machine.bodies.shaft_end, machine.tool_length
+    body = _add(world, "body", name="platform", pos=position, quat=_turn_from_z(direction))
+    _add(body, "freejoint", name="platform")
+    shaft, cutter = [0.0, 0.0, float(real.offsets.min()), 0.0, 0.0, end], [0.0, 0.0, end, 0.0, 0.0, tool]
+    _add(body, "geom", type="capsule", fromto=shaft, size=[radius], mass=[machine.masses.platform], rgba=_SPINDLE)
+    _add(body, "geom", type="capsule", fromto=cutter, size=[0.2 * radius], mass="0", rgba=_STEEL)
+    _add(body, "site", name="origin")
+    _add(body, "site", name="tip", pos=[0.0, 0.0, tool])
+    for leg in range(5):
+        _add(body, "site", name=f"platform{leg + 1}", pos=[0.0, 0.0, real.offsets[leg]])
+
+
+def _turn_from_z(direction: Floats) -> Floats:
+    """Return the quaternion (4,), scalar first, of the shortest turn from the z axis to a unit direction (3,).
+
+    Near −z, where there is none, half a turn about x comes first.
+    """
+    u, v, w = direction
+    quaternion = np.array([1.0 + w, -v, u, 0.0] if w > -0.9 else [-v, 1.0 - w, 0.0, u])
+    return quaternion / np.linalg.norm(quaternion)
+
+
+def _add(parent: Xml.Element, tag: str, **attributes: str | Iterable[float]) -> Xml.Element:
+    """Add an element; numbers are written as MJCF takes them."""
+    words = {name: value if isinstance(value, str) else _text(value) for name, value in attributes.items()}
+    return Xml.SubElement(parent, tag, words)
+
+
+def _text(values: Iterable[float]) -> str:
+    """Return numbers separated by blanks, to the last bit."""
+    return " ".join(repr(float(value)) for value in values)

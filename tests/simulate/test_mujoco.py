@@ -1,0 +1,200 @@
+"""MuJoCo plays programs on a model that knows nothing of our kinematics: it judges them, and us."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pentapod.errors import ArrayError, InputError, MachineError
+from pentapod.geometry.directions import angle_between
+from pentapod.kinematics.as_built import AsBuiltPentapod
+from pentapod.kinematics.as_built_forward import as_built_pose
+from pentapod.kinematics.component import COMPONENTS
+from pentapod.kinematics.forces import leg_force_map
+from pentapod.program import Program
+from pentapod.refusal import Refusal
+from pentapod.simulate import Reference, cutting_forces, mujoco_engine, plant, simulate_mujoco
+
+sys.path.append(str(Path(__file__).parents[1] / "program"))
+from short_motion import motion
+
+mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
+
+
+def reference_of(duration=1.2, interpolation="cubic", **masses):
+    program, machine = motion(duration, interpolation)
+    return Reference(program, replace(machine, masses=replace(machine.masses, **masses)))
+
+
+def play(reference, tip_forces=0.0, **errors):
+    return simulate_mujoco(reference, plant(reference, **errors), tip_forces=tip_forces)
+
+
+def off(physics, reference):
+    """Tip error, metres, and axis error, radians, at each row."""
+    return (
+        np.linalg.norm(physics.played.tips - reference.tips[::2], axis=1),
+        angle_between(physics.played.directions, reference.directions[::2]),
+    )
+
+
+@pytest.mark.parametrize(("duration", "interpolation"), [(1.2, "cubic"), (1.2, "linear"), (3.0, "cubic")])
+def test_nominal_programs_track(duration, interpolation):
+    """Loops closed by constraints, driven by forces, under gravity: 20 µm and 0.1 mrad are asked."""
+    reference = reference_of(duration, interpolation)
+    physics = play(reference)
+    tip, axis = off(physics, reference)
+    assert tip.max() <= 20e-6
+    assert axis.max() <= 1e-4
+    assert physics.closure.max() <= 20e-6
+    assert np.ptp(reference.tips, axis=0).max() > 0.05
+
+
+@pytest.mark.parametrize("leg", range(5))
+def test_a_millimetre_at_a_base_joint_shows(leg):
+    """Along its leg, where it counts in full; and our own forward kinematics as built says what MuJoCo finds."""
+    reference = reference_of(0.8)
+    machine, program = reference.machine, reference.program
+    position, direction = machine.pentapod.pose(program.legs[400], program.component)
+    along = machine.pentapod.leg_vectors(position, direction)[leg]
+    errors = np.zeros((5, 3))
+    errors[leg] = 1e-3 * along / np.linalg.norm(along)
+    physics = play(reference, base_errors=errors)
+    tip, _ = off(physics, reference)
+    assert tip.max() >= 0.5e-3
+    real = AsBuiltPentapod.of(machine.pentapod, base_errors=errors)
+    foretold = as_built_pose(real, machine.pentapod, program.legs[::50], program.component)
+    tips = foretold.position + machine.tool_length * foretold.direction
+    assert foretold.proven.all()
+    assert np.linalg.norm(physics.played.tips[::50] - tips, axis=1).max() <= 20e-6
+
+
+def test_a_millimetre_along_the_tool_shows():
+    reference = reference_of(0.8)
+    tip, _ = off(play(reference, offset_errors=[0.0, 1e-3, 0.0, 0.0, 0.0]), reference)
+    assert tip.max() >= 0.5e-3
+
+
+def still(rows=300, **masses):
+    reference = reference_of(0.8, **masses)
+    program = reference.program
+    legs = np.tile(program.legs[400], (rows, 1))
+    held = Program(program.period, legs, "cubic", COMPONENTS[0], program.placement, program.provenance)
+    return Reference(held, reference.machine)
+
+
+def test_leg_forces_are_those_of_statics():
+    reference = still(gravity=np.zeros(3))
+    push = np.array([30.0, -20.0, 50.0])
+    physics = play(reference, tip_forces=push)
+    position, direction = reference.machine.pentapod.pose(reference.program.legs[0], COMPONENTS[0])
+    foretold = leg_force_map(reference.machine.pentapod, position, direction, reference.machine.tool_length) @ push
+    np.testing.assert_allclose(physics.leg_forces[-1], foretold, rtol=1e-3, atol=0.05)
+    assert np.abs(foretold).max() > 50.0
+    # At rest the drives push as the legs do.
+    np.testing.assert_allclose(physics.played.forces[-1], physics.leg_forces[-1], rtol=1e-3, atol=0.05)
+
+
+def test_without_loads_a_still_machine_carries_its_weight_alone():
+    weightless, heavy = (play(still(**m)) for m in ({"gravity": np.zeros(3)}, {}))
+    assert np.abs(weightless.leg_forces[-1]).max() < 1e-3
+    # The base is above, +z down: the five legs' pull along z is the weight of the platform and part of the legs'.
+    reference = still()
+    position, direction = reference.machine.pentapod.pose(reference.program.legs[0], COMPONENTS[0])
+    vectors = reference.machine.pentapod.leg_vectors(position, direction)
+    unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    pull = -float(unit[:, 2] @ heavy.leg_forces[-1])
+    assert 3.0 * 9.81 < pull < (3.0 + 5 * 2.2) * 9.81
+
+
+def test_a_cutting_force_bends_the_way():
+    reference = reference_of(1.2)
+    forces = cutting_forces(reference, np.ones(len(reference.program.legs), dtype=bool), 60.0)
+    speed = np.linalg.norm(np.gradient(reference.tips[::2], 1e-3, axis=0), axis=1)
+    assert np.linalg.norm(forces, axis=1)[speed > 0.01] == pytest.approx(60.0, rel=0.01)
+    free, loaded = play(reference), play(reference, tip_forces=forces)
+    assert np.linalg.norm(loaded.played.tips - free.played.tips, axis=1).max() > 10e-6
+    assert np.abs(loaded.leg_forces).max() > np.abs(free.leg_forces).max()
+    assert not cutting_forces(reference, np.zeros(len(forces), dtype=bool), 60.0).any()
+    with pytest.raises(InputError, match="cutting force"):
+        cutting_forces(reference, np.ones(len(forces), dtype=bool), -1.0)
+
+
+def test_the_model_is_the_machine():
+    reference = reference_of(0.3)
+    stands = plant(reference)
+    model = mujoco.MjModel.from_xml_string(stands.xml)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    machine, program = reference.machine, reference.program
+    np.testing.assert_allclose(data.ctrl[:5], program.legs[0], atol=1e-12)
+    np.testing.assert_allclose(data.site("tip").xpos, reference.tips[0], atol=1e-12)
+    for leg in range(5):
+        base = np.append(machine.pentapod.base[leg], 0.0)
+        np.testing.assert_allclose(data.body(f"leg{leg + 1}").xpos, base, atol=1e-15)
+        ends = [data.site(f"{kind}{leg + 1}").xpos for kind in ("rod", "platform")]
+        np.testing.assert_allclose(ends[0], ends[1], atol=1e-12)
+        assert np.linalg.norm(ends[0] - base) == pytest.approx(program.legs[0, leg], abs=1e-12)
+        np.testing.assert_allclose(model.jnt_range[model.joint(f"leg{leg + 1}").id], [0.489, 0.929])
+    # Five legs hold five of the platform's six freedoms: 15 + 6 joints' freedoms less 15 by the loops, and the spin.
+    assert (model.nv, model.neq) == (21, 5)
+
+
+def test_any_way_up():
+    """A machine whose tool points towards its own base plane's other side: the turn from z is half a turn."""
+    reference = reference_of(0.3)
+    program, machine = reference.program, reference.machine
+    _, direction = machine.pentapod.pose(program.legs[0], (-1, 1))
+    assert direction[2] < -0.9
+    flipped = Program(
+        program.period, np.tile(program.legs[0], (50, 1)), "cubic", COMPONENTS[2], program.placement, program.provenance
+    )
+    other = Reference(flipped, machine)
+    physics = play(other)
+    tip, axis = off(physics, other)
+    assert tip.max() < 20e-6
+    assert axis.max() < 1e-4
+
+
+def test_strokes_end_at_stops():
+    """A program beyond the longest leg runs against the stop, and does not get there."""
+    reference = reference_of(0.4)
+    limits = replace(reference.machine.legs, max_length=float(reference.program.legs.max()) - 2e-3)
+    short = Reference(reference.program, replace(reference.machine, legs=limits))
+    physics = play(short)
+    assert physics.played.legs.max() < limits.max_length[0] + 2e-4
+    assert off(physics, short)[0].max() > 1e-3
+
+
+def test_errors_too_large_are_refused():
+    reference = reference_of(0.3)
+    found = plant(reference, base_errors=np.array([[0.9, 0, 0], [-0.9, 0, 0], [0, 0.9, 0], [0, 0, 0], [0, 0, 0]]))
+    assert isinstance(found, Refusal)
+    assert "no pose" in str(found)
+
+
+def test_bodies_that_fly_apart_are_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    reference = reference_of(0.3)
+    wild = replace(reference.machine, drives=replace(reference.machine.drives, position_gain=1e5))
+    found = play(Reference(reference.program, wild))
+    assert isinstance(found, Refusal)
+    assert "fly apart" in str(found)
+    assert not list(tmp_path.iterdir())
+
+
+def test_bad_input():
+    reference = reference_of(0.3)
+    with pytest.raises(ArrayError, match="tip_forces"):
+        play(reference, tip_forces=np.zeros((7, 3)))
+    with pytest.raises(MachineError, match="base_errors"):
+        plant(reference, base_errors=np.zeros((4, 3)))
+
+
+def test_without_mujoco_one_line_says_what_to_do(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(InputError, match=r'pip install "pentapod\[sim\]"'):
+        mujoco_engine.load_mujoco()
