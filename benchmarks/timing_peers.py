@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_array, vstack
 
 from pentapod.timing.engine import fastest
-from pentapod.timing.jerk import _Problem
+from pentapod.timing.jerk import Problem
 from pentapod.timing.jerk_rows import RowsAt
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.stages import Failure
@@ -65,7 +65,7 @@ def socp(peer, x: np.ndarray, s: np.ndarray, rounds: int) -> tuple[list[Callable
 
 def highs(s: np.ndarray, x: np.ndarray, rows_at: RowsAt, marks: np.ndarray) -> tuple[Callable[[], object], int]:
     """Return how HiGHS takes a first pass, and at how many gridpoints; the objective is linear about the same x."""
-    problem = _Problem.of(s, x, rows_at, marks)
+    problem = Problem.of(s, x, rows_at, marks)
     y, rows = problem.start(), problem.rows
     around = np.minimum(problem.top, problem.ramps)
     count, n = len(problem.s), len(y)
@@ -129,7 +129,7 @@ def our_chain(s: np.ndarray, legs: np.ndarray, velocity: float, acceleration: fl
 
     def chain():
         path = CubicSpline(s, legs)
-        first, second = path(s, 1), path(s, 2)
+        first, second = (np.vstack([k * path.c[3 - k], path(s[-1:], k)]) for k in (1, 2))
         ceiling = np.square((velocity / np.abs(first)).min(axis=1))
         x = fastest(s, first / acceleration, second / acceleration, ceiling)
         if isinstance(x, Failure):

@@ -10,7 +10,7 @@ small part of the ramp, with the ramp's speed and acceleration; so it comes to r
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -43,17 +43,11 @@ _CALM_SHARE = 0.5
 _GROWTH = 1.5
 _END_JERK = 0.98
 _ITERATIONS = 60
+_MOST_AGAIN = 0.6
+"""Share of the coefficients up to which solving only what was lowered is worth it."""
+
 _GAP = 1e-5
 _KEPT = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class SmoothProfile:
-    """x = ṡ² (N,) and its slope x′ = 2 s̈ (N,) at stations (N,), both ends at rest; jerk about constant between."""
-
-    s: Floats
-    x: Floats
-    slope: Floats
 
 
 def jerk_limited(s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: int = PASSES) -> SmoothProfile | Failure:
@@ -61,7 +55,7 @@ def jerk_limited(s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: i
 
     marks: where the path's third derivative has kinks. A Failure where the passes find nothing.
     """
-    problem = _Problem.of(s, x, rows_at, marks)
+    problem = Problem.of(s, x, rows_at, marks)
     y = problem.start()
     around = np.minimum(problem.top, problem.ramps)
     for number in range(passes):
@@ -72,7 +66,32 @@ def jerk_limited(s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: i
             break
         y = better
         around = np.maximum(problem.values(y)[:, 0], 1e-9 * problem.top)
-    return problem.profile(y)
+    return SmoothProfile.of(problem, y)
+
+
+def limited_again(
+    before: SmoothProfile, s: Floats, x: Floats, rows_at: RowsAt, passes: int = PASSES
+) -> SmoothProfile | None:
+    """Return the profile for limits that were lowered at places, from the one before: solved anew about these alone.
+
+    x (N + 1,) at s (N + 1,): the law without jerk limits, lowered too. None where the rests are touched, where most of
+    the path is, or where a pass finds nothing: then it has to be solved as a whole.
+    """
+    problem = before.problem.lowered(s, x, rows_at)
+    stretches = problem.stretches(before.problem)
+    if stretches is None:
+        return None
+    y = before.y
+    around = np.minimum(problem.values(y)[:, 0], problem.top)
+    for number in range(passes):
+        for low, high in stretches:
+            held = (2 if low == 0 else 3, 2 if high == len(y) else 3)
+            found = problem.solved(y, around, number, low, high, held)
+            if found is None and number == 0:
+                return None
+            y = y if found is None else found
+        around = np.maximum(problem.values(y)[:, 0], 1e-9 * problem.top)
+    return SmoothProfile.of(problem, y)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +123,7 @@ class _Ramp:
 
 
 @dataclass(frozen=True, eq=False)
-class _Problem:
+class Problem:
     """Knots, gridpoints and rows of one stretch between two rests."""
 
     s: Floats
@@ -120,7 +139,8 @@ class _Problem:
     length: float
 
     @classmethod
-    def of(cls, s: Floats, x: Floats, rows_at: RowsAt, marks: Floats) -> _Problem:
+    def of(cls, s: Floats, x: Floats, rows_at: RowsAt, marks: Floats) -> Problem:
+        """Return the problem below x (N + 1,) at s (N + 1,); arguments as for `jerk_limited`."""
         length = float(s[-1])
         coarse = rows_at(s)
         start = _Ramp.of(coarse, s, length / 8.0)
@@ -148,6 +168,33 @@ class _Problem:
         weight *= len(grid) / (weight / np.sqrt(np.minimum(top, ramps))).sum()
         return cls(grid, knots, basis, first, rows, top, ramps, weight, start, end, length)
 
+    def lowered(self, s: Floats, x: Floats, rows_at: RowsAt) -> Problem:
+        """Return the problem with the same knots below other limits: x (N + 1,) at s (N + 1,), rows anew."""
+        rows = rows_at(self.s)
+        return replace(self, rows=rows, top=np.minimum(np.interp(self.s, s, x), rows.ceiling))
+
+    def stretches(self, other: Problem) -> list[tuple[int, int]] | None:
+        """Return the coefficients, from and to before, about the gridpoints at which limits are not the other's.
+
+        None where these are at a rest, or most of the path.
+        """
+        changed = (
+            (self.rows.jerks != other.rows.jerks).any(axis=(1, 2))
+            | (self.rows.first != other.rows.first).any(axis=1)
+            | (np.abs(self.top - other.top) > 1e-9 * other.top)
+        )
+        n = len(self.knots) - 4
+        at = np.flatnonzero(changed)
+        if changed[: 4 * GRIDPOINTS_PER_KNOT].any() or changed[-4 * GRIDPOINTS_PER_KNOT :].any():
+            return None
+        if not len(at):
+            return []
+        lows = np.maximum(self.first[at] - LEAD, 0)
+        highs = np.minimum(self.first[at] + 4 + LEAD, n)
+        apart = np.flatnonzero(lows[1:] > highs[:-1]) + 1
+        found = [(int(lows[run[0]]), int(highs[run[-1]])) for run in np.split(np.arange(len(at)), apart)]
+        return found if sum(high - low for low, high in found) < _MOST_AGAIN * n else None
+
     def start(self) -> Floats:
         """Return coefficients to start from; the two at each end are the ramps' and stay."""
         places = (self.knots[1:-3] + self.knots[2:-2] + self.knots[3:-1]) / 3.0
@@ -169,28 +216,28 @@ class _Problem:
         """
         n = len(y)
         if n < 2 * WINDOW:
-            return self._solved(y, around, number, 0, n, (2, 2))
+            return self.solved(y, around, number, 0, n, (2, 2))
         y = y.copy()
         seams = list(range(WINDOW if number % 2 == 0 else WINDOW // 2, n - WINDOW // 2, WINDOW))
         if number == 0:
             for seam in seams:
                 low, high = max(seam - LEAD, 0), min(seam + LEAD, n)
-                found = self._solved(y, around, 0, low, high, (2 if low == 0 else 0, 2 if high == n else 0))
+                found = self.solved(y, around, 0, low, high, (2 if low == 0 else 0, 2 if high == n else 0))
                 if found is None:
-                    return self._solved(y, around, 0, 0, n, (2, 2))
+                    return self.solved(y, around, 0, 0, n, (2, 2))
                 y[seam - 1 : seam + 2] = found[seam - 1 : seam + 2]
         better = y.copy()
         for left, right in pairwise([0, *seams, n]):
             low, high = max(left - 1, 0), min(right + 2, n)
             held = (2 if left == 0 else 3, 2 if right == n else 3)
-            found = self._solved(y, around, number, low, high, held)
+            found = self.solved(y, around, number, low, high, held)
             if found is None and number == 0:
-                return self._solved(y, around, 0, 0, n, (2, 2))
+                return self.solved(y, around, 0, 0, n, (2, 2))
             if found is not None:
                 better[low:high] = found[low:high]
         return better
 
-    def _solved(
+    def solved(
         self, y: Floats, around: Floats, number: int, low: int, high: int, held: tuple[int, int]
     ) -> Floats | None:
         """Return y with the coefficients from low to before high improved; those `held` at either end stay."""
@@ -227,13 +274,30 @@ class _Problem:
         """Return x, x′, x″ (N, 3) at the gridpoints."""
         return np.einsum("ndk,nk->nd", self.basis, y[self.first[:, None] + np.arange(4)])
 
-    def profile(self, y: Floats) -> SmoothProfile:
-        """Return the profile with both rests."""
-        v = self.values(y)
-        return SmoothProfile(
-            np.concatenate([[0.0], self.s, [self.length]]),
+
+@dataclass(frozen=True, eq=False)
+class SmoothProfile:
+    """x = ṡ² (N,) and its slope x′ = 2 s̈ (N,) at stations (N,), both ends at rest; jerk about constant between.
+
+    problem, y: what it is the answer to, and as which coefficients.
+    """
+
+    s: Floats
+    x: Floats
+    slope: Floats
+    problem: Problem
+    y: Floats
+
+    @classmethod
+    def of(cls, problem: Problem, y: Floats) -> SmoothProfile:
+        """Return the profile of coefficients y, with both rests."""
+        v = problem.values(y)
+        return cls(
+            np.concatenate([[0.0], problem.s, [problem.length]]),
             np.concatenate([[0.0], v[:, 0], [0.0]]),
             np.concatenate([[0.0], v[:, 1], [0.0]]),
+            problem,
+            y,
         )
 
 
