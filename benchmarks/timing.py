@@ -1,8 +1,8 @@
 """Time laws against toppra and copp-py in one run, on one core: `make bench-timing`.
 
 Figures are processor time a gridpoint, the best of a few runs, and ratios; peers that are not installed are left out
-(pip install copp-py). Paths: "raster", a 0.1 mm zigzag with 1 mm turns and a pentapod's legs, feed 0.1 m/s (copp-py has
-none and is timed without); "sine", smooth, limited by legs alone. Limits of each leg: 0.5 m/s, 5 m/s², 200 m/s³.
+(pip install copp-py). Paths: "raster", a 0.1 mm zigzag with 1 mm turns and a pentapod's legs, feed 0.1 m/s (for copp-py
+the velocity of a sixth axis); "sine", smooth, limited by legs alone. Limits of each leg: 0.5 m/s, 5 m/s², 200 m/s³.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ import resource
 import time
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
-from importlib.util import find_spec
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
+from timing_peers import copp_robot, highs, our_chain, socp, toppra_chain
 
 from pentapod.timing.engine import fastest
 from pentapod.timing.jerk import PASSES, jerk_limited
@@ -119,24 +119,6 @@ def toppra_solver(p: Problem) -> Callable[[], np.ndarray]:
     return lambda: solve_by_toppra(stages, 0.0, 0.0)
 
 
-def copp_robot(p: Problem, jerk: bool):
-    """Return copp-py's robot with the same limits, None where it is not installed."""
-    if find_spec("copp_py") is None:
-        return None
-    import copp_py as copp  # noqa: PLC0415  (may be missing)
-
-    n = len(p.s)
-    robot = copp.Robot(5, capacity=n)
-    robot.append_s(p.s)
-    robot.set_q(*p.q[:3], 0, **({"dddq": p.q[3]} if jerk else {}))
-    one = np.ones(5)
-    robot.add_velocity_limits(VELOCITY * one, -VELOCITY * one, start_idx_s=0, length=n)
-    robot.add_acceleration_limits(ACCELERATION * one, -ACCELERATION * one, start_idx_s=0, length=n)
-    if jerk:
-        robot.add_jerk_limits(JERK * one, -JERK * one, start_idx_s=0, length=n)
-    return copp, robot
-
-
 def core(sizes: list[int]) -> None:
     """Velocities and accelerations: the core, the NumPy form, toppra and copp-py."""
     for kind in ("raster", "sine"):
@@ -154,7 +136,7 @@ def core(sizes: list[int]) -> None:
                 line += f", toppra {1e6 * theirs / n:6.2f} µs: {theirs / ours:5.0f} times the core, "
                 line += f"{theirs / plain:.1f} times NumPy; durations differ by {same:.1e}"
             print(line, flush=True)
-            if peer := copp_robot(p, jerk=False):
+            if peer := copp_robot(p.s, p.q, (VELOCITY, ACCELERATION, JERK), p.feed):
                 copp, robot = peer
                 task = copp.solver.topp2_ra.Problem(robot.constraints, idx_s_interval=(0, n - 1), a_boundary=(0.0, 0.0))
                 theirs, y = best(lambda c=copp, t=task: c.solver.topp2_ra.solve(t, c.solver.topp2_ra.Options()), 3)
@@ -181,6 +163,45 @@ def jerk(n: int) -> None:
             f"each further {1e6 * each / len(profile.s):.1f} µs; durations after 1, 2, {PASSES}, 8 passes: "
             + ", ".join(f"{d:.4f}" for d in durations)
             + f" s (without jerk limits {p.duration(x):.4f} s)",
+            flush=True,
+        )
+
+
+def jerk_peers(n: int) -> None:
+    """One pass of ours, by HiGHS and by copp-py's TOPP3-SOCP, for the same path; and what these converge to."""
+    for kind in ("raster", "sine"):
+        p = Problem(kind, n)
+        x = p.solved("core")
+        laws = {}
+        for passes in (1, 2, 8):
+            used, profile = best(lambda k=passes, p=p, x=x: jerk_limited(p.s, x, p.jerk_rows, NO_MARKS, k), 3)
+            laws[passes] = used, MotionLaw.through(profile.s, profile.x, profile.slope).duration
+        count = len(profile.s) - 2
+        each = (laws[8][0] - laws[1][0]) / 7.0 / count
+        line = f"{kind:7s} {count} gridpoints: our pass {1e6 * each:.1f} µs"
+        solve, same = highs(p.s, x, p.jerk_rows, NO_MARKS)
+        used, _ = best(solve, 1)
+        line += f"; HiGHS {1e6 * used / same:.0f} µs: {used / same / each:.0f} times"
+        if peer := copp_robot(p.s, p.q, (VELOCITY, ACCELERATION, JERK), p.feed):
+            solves, durations = socp(peer, x, p.s, 6)
+            used, _ = best(solves[0], 1)
+            line += f"; TOPP3-SOCP {1e6 * used / len(p.s):.0f} µs: {used / len(p.s) / each:.0f} times; durations "
+            line += f"{laws[2][1]:.4f} s after 2 passes, {laws[8][1]:.4f} after 8, SOCP's "
+            line += ", ".join(f"{d:.4f}" for d in durations)
+        print(line, flush=True)
+
+
+def chain(n: int) -> None:
+    """From waypoints to samples every millisecond, velocities and accelerations: ours and toppra's."""
+    for kind in ("raster", "sine"):
+        p = Problem(kind, n)
+        ours, theirs = (make(p.s, p.legs, VELOCITY, ACCELERATION, 1e-3) for make in (our_chain, toppra_chain))
+        ours()
+        fast, rows = best(ours, 3)
+        slow, others = best(theirs, 2)
+        print(
+            f"{kind:7s} {n} waypoints to {len(rows)} samples: {1e3 * fast:.1f} ms, toppra {1e3 * slow:.0f} ms "
+            f"({len(others)} samples): {slow / fast:.0f} times",
             flush=True,
         )
 
@@ -218,11 +239,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sizes", type=int, nargs="+", default=[10_000, 100_000, 1_000_000])
     parser.add_argument("--jerk", type=int, default=10_000)
+    parser.add_argument("--peers", type=int, default=2_000)
+    parser.add_argument("--chain", type=int, default=10_000)
     parser.add_argument("--long", type=int, default=1_000_000)
     arguments = parser.parse_args()
     print(versions())
     core(arguments.sizes)
     jerk(arguments.jerk)
+    jerk_peers(arguments.peers)
+    chain(arguments.chain)
     million(arguments.long)
 
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_retime import PATHS
+from test_retime import PATHS, nod
 from timing_paths import Path, machine, straight
 
 from pentapod.timing import Trajectory, certify, retime
 from pentapod.timing import piece as piece_module
 from pentapod.timing.engine import fastest
-from pentapod.timing.jerk import jerk_limited
+from pentapod.timing.jerk import jerk_limited, limited_again
 from pentapod.timing.jerk_rows import JerkRows
 from pentapod.timing.law import MotionLaw
 
@@ -110,6 +110,33 @@ def test_passes_improve_and_two_come_close(name):
     assert durations[1] < 1.02 * durations[-1]
     below = MotionLaw.from_profile(s, x).duration
     assert below < durations[-1]
+
+
+def test_lowered_limits_are_met_by_solving_about_their_places_alone():
+    m, piece = machine(), nod(0.2)
+    s = np.unique(np.concatenate([np.linspace(0, piece.length, 4000), piece.knots]))
+    rows = rows_of(piece, m)
+
+    def lowered(at):
+        r, near = rows(at), 1.0 - 0.2 * (np.abs(at - 0.09) < 0.002)
+        return JerkRows(r.first / near[:, None], r.second, r.offset, r.jerks / near[:, None, None], r.ceiling * near)
+
+    def law_of(p):
+        return MotionLaw.through(p.s, p.x, p.slope)
+
+    before = jerk_limited(s, fastest(s, rows(s).first, rows(s).second, rows(s).ceiling), rows, piece.knots)
+    x = fastest(s, lowered(s).first, lowered(s).second, lowered(s).ceiling)
+    again, whole = limited_again(before, s, x, lowered), jerk_limited(s, x, lowered, piece.knots)
+    far = np.abs(again.s - 0.09) > 0.05
+    assert far.sum() > 0.4 * len(far)
+    assert np.array_equal(again.x[far], before.x[far])  # not solved again
+    assert law_of(before).duration < law_of(again).duration
+    assert law_of(again).duration == pytest.approx(law_of(whole).duration, rel=1e-3)
+    assert (again.x[1:-1] <= lowered(again.s[1:-1]).ceiling * (1 + 1e-6)).all()
+    v = again.problem.values(again.y)
+    jerk = np.sqrt(v[:, :1]) * np.einsum("nkd,nd->nk", lowered(again.problem.s).jerks, v)
+    assert np.abs(jerk).max() < 1.0 + 1e-6
+    assert limited_again(before, s, x, lambda at: lowered(at + 0.09)) is None  # the rests are touched
 
 
 def test_without_a_compiler_the_limits_hold_too(monkeypatch):

@@ -22,6 +22,8 @@ from timing_paths import (
 from pentapod.errors import InputError
 from pentapod.refusal import Refusal
 from pentapod.timing import CONSTRAINTS, Trajectory, retime
+from pentapod.timing.constraints import Limits
+from pentapod.timing.grid import first_grid
 from pentapod.toolpath.toolpath import SegmentKind
 
 TIGHT = {"velocity_margin": 1e-4, "acceleration_margin": 1e-4}
@@ -384,6 +386,17 @@ def test_a_failing_solver_is_a_refusal_that_names_the_gridpoint(monkeypatch):
 def test_margins_are_fractions(margin):
     with pytest.raises(InputError, match="margin"):
         retime(Path((nod(),)), machine(), velocity_margin=margin)
+
+
+def test_corners_have_four_stages_from_knot_to_knot():
+    piece = raster(lines=4, feed=0.3)
+    limits = Limits.of(machine(), 0.002, 0.005, 1.5e-3)
+    s = first_grid(piece, limits)
+    counts = np.diff(np.searchsorted(s, piece.knots))
+    middle = (piece.knots[:-1] + piece.knots[1:]) / 2
+    turns = np.abs(piece(middle, 2)).max(axis=1) > 10.0
+    assert turns.sum() == 9  # three half circles, each with its ramps
+    assert counts[turns].min() >= 4
 
 
 def test_margin_leaves_room():

@@ -12,6 +12,12 @@ from pentapod.timing.paths import PieceLike
 LEAST_STAGES = 24
 """Stages of a piece at least."""
 
+STAGES_IN_CORNERS = 4
+"""Stages of each interval between knots, where the path bends."""
+
+_BENT = 0.1
+"""Share of an acceleration limit that the bend of the path takes by itself in a corner."""
+
 _TOLERANCE = 0.01
 _DRIFT = 0.1
 """Share of an acceleration limit by which the speed gained in a stage may change what the curve itself takes."""
@@ -21,10 +27,10 @@ _ROUNDS = 7
 def first_grid(piece: PieceLike, limits: Limits) -> Floats:
     """Return gridpoints (N + 1,) from 0 to the piece's length.
 
-    Holds the knots, the section ends and where their feeds begin to hold; stages are halved until, at the
-    largest speed and path acceleration that the limits leave there, the leg accelerations and rates in
-    the middle of a stage exceed those at its ends by less than 1 %, and the square of the feed's rate is off by less;
-    and until a stage gains so little speed that one path acceleration suits both of its ends.
+    Holds the knots, the section ends and where their feeds begin to hold, and in corners four stages from knot to knot.
+    Stages are halved until, at the largest speed and path acceleration that the limits leave there, the accelerations
+    and rates in the middle of a stage exceed those at its ends by less than 1 %, and the square of the feed's rate is
+    off by less; and until a stage gains so little speed that one path acceleration suits both of its ends.
     """
     s = _base_grid(piece, limits)
     for _ in range(_ROUNDS):
@@ -46,9 +52,17 @@ def _base_grid(piece: PieceLike, limits: Limits) -> Floats:
     marks[0] = 0.0
     steps = np.diff(marks)
     counts = np.ceil(steps / length * LEAST_STAGES - 1e-9).astype(np.intp)
+    counts[_bent(piece, limits, (marks[:-1] + marks[1:]) / 2.0)] *= STAGES_IN_CORNERS
     stage = np.repeat(np.arange(len(steps)), counts)
     within = np.arange(len(stage)) - np.repeat(np.cumsum(counts) - counts, counts)
     return np.append(marks[stage] + steps[stage] * (within / counts[stage]), length)
+
+
+def _bent(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
+    """Return at which stations (n,) the path's bend alone takes part of an acceleration limit at the largest speed."""
+    course = limits.course(piece, s)
+    use = np.abs(limits.rows(course)[1]).max(axis=1) * limits.ceiling(course)
+    return np.asarray(use > _BENT)
 
 
 def _ramps(piece: PieceLike, limits: Limits) -> Floats:

@@ -10,13 +10,14 @@ small part of the ramp, with the ramp's speed and acceleration; so it comes to r
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from pentapod.arrays import Bools, Floats, Ints
+from pentapod.arrays import Floats, Ints
 from pentapod.timing.jerk_kernels import convex_pass
+from pentapod.timing.jerk_knots import law_knots
 from pentapod.timing.jerk_rows import JerkRows, RowsAt
 from pentapod.timing.spline_kernels import cubic_basis
 from pentapod.timing.stages import Failure
@@ -31,29 +32,16 @@ LEAD = 64
 """Coefficients on either side of a seam, beyond which the path has no say in what happens there."""
 
 _COLD, _WARM = 0.1, 0.01
-_KNOTS_PER_RAMP = 6
-_LEAST_KNOTS = 64
 _JOIN = 0.01
 """Where the spline begins, as a share of the length over which the first ramp would reach another limit."""
 
-_CALM_MARGIN, _CALM_GROWTH, _CALM_MOST = 3.0, 0.3, 12.0
-"""Knots become fewer from so many ramps on inside a stretch of constant speed, how fast with the time, and how few."""
-
-_CALM_SHARE = 0.5
-_GROWTH = 1.5
 _END_JERK = 0.98
 _ITERATIONS = 60
+_MOST_AGAIN = 0.6
+"""Share of the coefficients up to which solving only what was lowered is worth it."""
+
 _GAP = 1e-5
 _KEPT = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class SmoothProfile:
-    """x = ṡ² (N,) and its slope x′ = 2 s̈ (N,) at stations (N,), both ends at rest; jerk about constant between."""
-
-    s: Floats
-    x: Floats
-    slope: Floats
 
 
 def jerk_limited(s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: int = PASSES) -> SmoothProfile | Failure:
@@ -61,7 +49,7 @@ def jerk_limited(s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: i
 
     marks: where the path's third derivative has kinks. A Failure where the passes find nothing.
     """
-    problem = _Problem.of(s, x, rows_at, marks)
+    problem = Problem.of(s, x, rows_at, marks)
     y = problem.start()
     around = np.minimum(problem.top, problem.ramps)
     for number in range(passes):
@@ -72,7 +60,32 @@ def jerk_limited(s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: i
             break
         y = better
         around = np.maximum(problem.values(y)[:, 0], 1e-9 * problem.top)
-    return problem.profile(y)
+    return SmoothProfile.of(problem, y)
+
+
+def limited_again(
+    before: SmoothProfile, s: Floats, x: Floats, rows_at: RowsAt, passes: int = PASSES
+) -> SmoothProfile | None:
+    """Return the profile for limits that were lowered at places, from the one before: solved anew about these alone.
+
+    x (N + 1,) at s (N + 1,): the law without jerk limits, lowered too. None where the rests are touched, where most of
+    the path is, or where a pass finds nothing: then it has to be solved as a whole.
+    """
+    problem = before.problem.lowered(s, x, rows_at)
+    stretches = problem.stretches(before.problem)
+    if stretches is None:
+        return None
+    y = before.y
+    around = np.minimum(problem.values(y)[:, 0], problem.top)
+    for number in range(passes):
+        for low, high in stretches:
+            held = (2 if low == 0 else 3, 2 if high == len(y) else 3)
+            found = problem.solved(y, around, number, low, high, held)
+            if found is None and number == 0:
+                return None
+            y = y if found is None else found
+        around = np.maximum(problem.values(y)[:, 0], 1e-9 * problem.top)
+    return SmoothProfile.of(problem, y)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +117,7 @@ class _Ramp:
 
 
 @dataclass(frozen=True, eq=False)
-class _Problem:
+class Problem:
     """Knots, gridpoints and rows of one stretch between two rests."""
 
     s: Floats
@@ -120,7 +133,8 @@ class _Problem:
     length: float
 
     @classmethod
-    def of(cls, s: Floats, x: Floats, rows_at: RowsAt, marks: Floats) -> _Problem:
+    def of(cls, s: Floats, x: Floats, rows_at: RowsAt, marks: Floats) -> Problem:
+        """Return the problem below x (N + 1,) at s (N + 1,); arguments as for `jerk_limited`."""
         length = float(s[-1])
         coarse = rows_at(s)
         start = _Ramp.of(coarse, s, length / 8.0)
@@ -135,7 +149,7 @@ class _Problem:
             s[::-1],
             length / 8.0,
         )
-        inner = _knots(s, x, coarse, marks, start.join, length - end.join)
+        inner = law_knots(s, x, coarse, marks, start.join, length - end.join)
         steps = np.diff(inner)[:, None] * (np.arange(GRIDPOINTS_PER_KNOT) / GRIDPOINTS_PER_KNOT)
         grid = np.append((inner[:-1, None] + steps).ravel(), inner[-1])
         knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
@@ -147,6 +161,33 @@ class _Problem:
         ramps = np.minimum(start(grid), end(length - grid))
         weight *= len(grid) / (weight / np.sqrt(np.minimum(top, ramps))).sum()
         return cls(grid, knots, basis, first, rows, top, ramps, weight, start, end, length)
+
+    def lowered(self, s: Floats, x: Floats, rows_at: RowsAt) -> Problem:
+        """Return the problem with the same knots below other limits: x (N + 1,) at s (N + 1,), rows anew."""
+        rows = rows_at(self.s)
+        return replace(self, rows=rows, top=np.minimum(np.interp(self.s, s, x), rows.ceiling))
+
+    def stretches(self, other: Problem) -> list[tuple[int, int]] | None:
+        """Return the coefficients, from and to before, about the gridpoints at which limits are not the other's.
+
+        None where these are at a rest, or most of the path.
+        """
+        changed = (
+            (self.rows.jerks != other.rows.jerks).any(axis=(1, 2))
+            | (self.rows.first != other.rows.first).any(axis=1)
+            | (np.abs(self.top - other.top) > 1e-9 * other.top)
+        )
+        n = len(self.knots) - 4
+        at = np.flatnonzero(changed)
+        if changed[: 4 * GRIDPOINTS_PER_KNOT].any() or changed[-4 * GRIDPOINTS_PER_KNOT :].any():
+            return None
+        if not len(at):
+            return []
+        lows = np.maximum(self.first[at] - LEAD, 0)
+        highs = np.minimum(self.first[at] + 4 + LEAD, n)
+        apart = np.flatnonzero(lows[1:] > highs[:-1]) + 1
+        found = [(int(lows[run[0]]), int(highs[run[-1]])) for run in np.split(np.arange(len(at)), apart)]
+        return found if sum(high - low for low, high in found) < _MOST_AGAIN * n else None
 
     def start(self) -> Floats:
         """Return coefficients to start from; the two at each end are the ramps' and stay."""
@@ -169,28 +210,28 @@ class _Problem:
         """
         n = len(y)
         if n < 2 * WINDOW:
-            return self._solved(y, around, number, 0, n, (2, 2))
+            return self.solved(y, around, number, 0, n, (2, 2))
         y = y.copy()
         seams = list(range(WINDOW if number % 2 == 0 else WINDOW // 2, n - WINDOW // 2, WINDOW))
         if number == 0:
             for seam in seams:
                 low, high = max(seam - LEAD, 0), min(seam + LEAD, n)
-                found = self._solved(y, around, 0, low, high, (2 if low == 0 else 0, 2 if high == n else 0))
+                found = self.solved(y, around, 0, low, high, (2 if low == 0 else 0, 2 if high == n else 0))
                 if found is None:
-                    return self._solved(y, around, 0, 0, n, (2, 2))
+                    return self.solved(y, around, 0, 0, n, (2, 2))
                 y[seam - 1 : seam + 2] = found[seam - 1 : seam + 2]
         better = y.copy()
         for left, right in pairwise([0, *seams, n]):
             low, high = max(left - 1, 0), min(right + 2, n)
             held = (2 if left == 0 else 3, 2 if right == n else 3)
-            found = self._solved(y, around, number, low, high, held)
+            found = self.solved(y, around, number, low, high, held)
             if found is None and number == 0:
-                return self._solved(y, around, 0, 0, n, (2, 2))
+                return self.solved(y, around, 0, 0, n, (2, 2))
             if found is not None:
                 better[low:high] = found[low:high]
         return better
 
-    def _solved(
+    def solved(
         self, y: Floats, around: Floats, number: int, low: int, high: int, held: tuple[int, int]
     ) -> Floats | None:
         """Return y with the coefficients from low to before high improved; those `held` at either end stay."""
@@ -227,67 +268,28 @@ class _Problem:
         """Return x, x′, x″ (N, 3) at the gridpoints."""
         return np.einsum("ndk,nk->nd", self.basis, y[self.first[:, None] + np.arange(4)])
 
-    def profile(self, y: Floats) -> SmoothProfile:
-        """Return the profile with both rests."""
-        v = self.values(y)
-        return SmoothProfile(
-            np.concatenate([[0.0], self.s, [self.length]]),
+
+@dataclass(frozen=True, eq=False)
+class SmoothProfile:
+    """x = ṡ² (N,) and its slope x′ = 2 s̈ (N,) at stations (N,), both ends at rest; jerk about constant between.
+
+    problem, y: what it is the answer to, and as which coefficients.
+    """
+
+    s: Floats
+    x: Floats
+    slope: Floats
+    problem: Problem
+    y: Floats
+
+    @classmethod
+    def of(cls, problem: Problem, y: Floats) -> SmoothProfile:
+        """Return the profile of coefficients y, with both rests."""
+        v = problem.values(y)
+        return cls(
+            np.concatenate([[0.0], problem.s, [problem.length]]),
             np.concatenate([[0.0], v[:, 0], [0.0]]),
             np.concatenate([[0.0], v[:, 1], [0.0]]),
+            problem,
+            y,
         )
-
-
-def _knots(s: Floats, x: Floats, rows: JerkRows, marks: Floats, begin: float, end: float) -> Floats:
-    """Return inner knots (K,) from begin to end: even in the time of the law x, at marks, ever closer to the rests.
-
-    Where that law keeps its speed and no other limit is near there is little to find: knots are few.
-    """
-    speed = np.sqrt(x)
-    steps = 2.0 * np.diff(s) / (speed[:-1] + speed[1:])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ramps = 2.0 * np.abs(rows.jerks[:, :, 2]).max(axis=1) / np.abs(rows.first).max(axis=1)
-    ramp = float(np.median(ramps[np.isfinite(ramps) & (ramps > 0.0)]))
-    calm = _calm(x, rows)
-    room = _seconds_to_others(steps, calm) - _CALM_MARGIN * ramp
-    every = min(ramp / _KNOTS_PER_RAMP, float(steps.sum()) / _LEAST_KNOTS)
-    wide = every * np.clip(1.0 + _CALM_GROWTH * room / every, 1.0, _CALM_MOST)
-    number = np.concatenate([[0.0], np.cumsum(2.0 * steps / (wide[:-1] + wide[1:]))])
-    even = np.interp(np.linspace(0.0, number[-1], int(np.ceil(number[-1])) + 1), number, s)
-    marks = marks[np.interp(marks, s, wide) < _CALM_MOST * every]
-    gap = np.interp(s, (even[1:] + even[:-1]) / 2.0, np.diff(even))
-    knots = np.sort(np.concatenate([even, marks]))
-    length = end - begin
-    near = begin * _GROWTH ** np.arange(1, 200)
-    far = (s[-1] - end) * _GROWTH ** np.arange(1, 200)
-    near = near[(near * (1.0 - 1.0 / _GROWTH) < np.interp(near, s, gap)) & (near < 0.45 * length)]
-    far = far[(far * (1.0 - 1.0 / _GROWTH) < np.interp(s[-1] - far, s, gap)) & (far < 0.45 * length)]
-    low = near[-1] if len(near) else begin
-    high = s[-1] - (far[-1] if len(far) else s[-1] - end)
-    knots = np.concatenate([[begin], near, knots[(knots > low) & (knots < high)], (s[-1] - far)[::-1], [end]])
-    # Knots much closer than their neighbourhood asks for add rows and no freedom.
-    least = 0.2 * np.minimum(np.interp(knots, s, gap), np.minimum(knots, s[-1] - knots))
-    kept = [begin]
-    for knot, room in zip(knots[1:-1].tolist(), least[1:-1].tolist(), strict=True):
-        if knot - kept[-1] > room:
-            kept.append(knot)
-    while len(kept) > 1 and end - kept[-1] < least[-2]:
-        kept.pop()
-    return np.array([*kept, end])
-
-
-def _calm(x: Floats, rows: JerkRows) -> Bools:
-    """Return at which gridpoints (N + 1,) the law x keeps its speed, far from the limits of acceleration and jerk."""
-    steady = np.abs(np.diff(x)) <= 1e-6 * x[:-1]
-    use = np.maximum(
-        np.abs(rows.second * x[:, None] - rows.offset).max(axis=1),
-        np.abs(rows.jerks[:, :, 0]).max(axis=1) * x**1.5,
-    )
-    return np.append(steady, False) & np.append(False, steady) & (use < _CALM_SHARE)
-
-
-def _seconds_to_others(steps: Floats, calm: Bools) -> Floats:
-    """Return how far (N + 1,) in seconds each gridpoint is from the nearest that is not calm; steps (N,) in seconds."""
-    times = np.concatenate([[0.0], np.cumsum(steps)])
-    since = times - np.maximum.accumulate(np.where(calm, 0.0, times))
-    until = np.minimum.accumulate(np.where(calm, times[-1], times)[::-1])[::-1] - times
-    return np.minimum(since, until)

@@ -1,8 +1,9 @@
 """The two passes without a compiler: the path cut into windows through which NumPy moves side by side.
 
-A window starts its pass a lead too early, from rest; after the lead it has forgotten that. It has for certain
-where its value at the seam is its neighbour's, bit for bit: then the windows together are the pass over the whole.
-Where a seam differs the lead is doubled, until at last there is one window, which is the whole.
+Where most gridpoints run at their ceilings, `by_runs` is done sooner and is tried first. A window starts its pass a
+lead too early, from rest; after the lead it has forgotten that. It has for certain where its value at the seam is its
+neighbour's, bit for bit: then the windows together are the pass over the whole. Where a seam differs the lead is
+doubled, until at last there is one window, which is the whole.
 """
 
 from __future__ import annotations
@@ -12,25 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.arrays import Bools, Floats
+from pentapod.timing.runs import by_runs
+from pentapod.timing.stage_rows import StageRows, least_reach, left_root, right_root
 from pentapod.timing.stages import NOT_CONTROLLABLE, TOO_FAST_END, UNBOUNDED, Failure, Stages, admitted
 
 _LEAD = 32
 _WIDTH = 6
 """Width of a window in leads: the narrower, the more is done at once, and the more is done twice."""
 
-_TOUCH = 1e-13
-_VAIN = 1e-13
-_STEPS = 100
-
 
 def solve(stages: Stages, x_start: float, x_end: float) -> Floats | Failure:
     """Return the largest x (N + 1,), or why there is none."""
     if x_end > stages.ceiling[-1]:
         return Failure(len(stages) - 1, TOO_FAST_END)
-    lead, x = _LEAD, None
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        rows = StageRows.of(stages)
+        x = by_runs(rows, x_start) if x_end == 0.0 else None
+        lead = _LEAD
         while x is None:
-            x = _Windows.of(stages, lead).solve(x_start, x_end)
+            x = _Windows.of(rows, lead).solve(x_start, x_end)
             lead *= 2
     return x
 
@@ -53,32 +54,14 @@ class _Windows:
     lead: int
 
     @classmethod
-    def of(cls, stages: Stages, lead: int) -> _Windows:
+    def of(cls, rows: StageRows, lead: int) -> _Windows:
         """Return windows with a lead, or one window where the lead is not small against the path."""
-        count = len(stages)
+        count = len(rows.ceiling)
         width = _WIDTH * lead if 2 * _WIDTH * lead < count else count
         windows = -(-count // width)
-        twice = np.append(2.0 * np.diff(stages.s), 0.0)
-        a, b = stages.first, stages.second
-        c = np.broadcast_to(stages.offset, a.shape)
-        after = np.minimum(np.arange(count) + 1, count - 1)
-        f = np.hstack([a, a[after] + twice[:, None] * b[after]])
-        g, shift = np.hstack([b, b[after]]), np.hstack([c, c[after]])
-        sign = np.where(f < 0.0, -1.0, 1.0)
-        f, g, shift = f * sign, g * sign, shift * sign
-        # Rows whose u-term is vain bound x alone.
-        ceiling = np.array(stages.ceiling)
-        vain = f <= (_VAIN * twice / np.maximum(np.maximum(ceiling, ceiling[after]), 1e-300))[:, None]
-        alone = np.where(vain & (g != 0.0), (1.0 + shift * np.sign(g)) / np.abs(g), np.inf).min(axis=1)
-        ceiling = np.minimum(ceiling, np.where(twice > 0.0, alone, np.inf))
-        r = 1.0 / np.where(vain, 1.0, f)
-        per = (1.0 / twice)[:, None]
-        lows = np.hstack([np.where(vain, -np.inf, (shift - 1.0) * r), np.full_like(per, -np.inf)])
-        highs = np.hstack([np.where(vain, np.inf, (shift + 1.0) * r), np.full_like(per, np.inf)])
-        slopes = np.hstack([np.where(vain, 0.0, g * r), per])
-        columns = ((lows, -np.inf), (highs, np.inf), (slopes, 0.0), (twice, 0.0), (ceiling, np.inf))
-        lows, highs, slopes, twice, ceiling = (_cut(y, windows, width, fill) for y, fill in columns)
-        return cls(lows, highs, slopes, twice, ceiling, count, lead)
+        fills = ((rows.lows, -np.inf), (rows.highs, np.inf), (rows.slopes, 0.0), (rows.twice, 0.0))
+        cut = (_cut(y, windows, width, fill) for y, fill in (*fills, (rows.ceiling, np.inf)))
+        return cls(*cut, count=count, lead=lead)
 
     def solve(self, x_start: float, x_end: float) -> Floats | Failure | None:
         """Return the largest x (count,), why there is none, or None where a seam differs."""
@@ -126,18 +109,18 @@ class _Windows:
         # Far above what can be reached, Newton would lose digits.
         far = ~(x <= 1e3 * after[1]) & ~still
         if far.any():
-            x[far] = np.minimum(x[far], _reach(lows[:, far], highs[:, far], slopes[:, far]))
+            x[far] = np.minimum(x[far], least_reach(lows[:, far], highs[:, far], slopes[:, far]))
         lost = np.isinf(x) & ~still
         if still.any() or lost.any():
             moving = ~still & ~lost
-            x[moving], lost[moving] = _right_root(lows[:, moving], highs[:, moving], slopes[:, moving], x[moving])
+            x[moving], lost[moving] = right_root(lows[:, moving], highs[:, moving], slopes[:, moving], x[moving])
             x[still], low[still] = np.minimum(x[still], after[1, still]), after[0, still]
             lost |= still & (low > x)
         else:
-            x, lost = _right_root(lows, highs, slopes, x)
+            x, lost = right_root(lows, highs, slopes, x)
         must = np.flatnonzero((after[0] > 0.0) & ~still & ~lost)
         if len(must):
-            low[must], lost[must] = _left_root(lows[:, must], highs[:, must], slopes[:, must], x[must])
+            low[must], lost[must] = left_root(lows[:, must], highs[:, must], slopes[:, must], x[must])
         return np.stack([low, x]), lost
 
     def _forward(self, low: Floats, high: Floats, x_start: float) -> Floats | None:
@@ -168,57 +151,3 @@ def _cut(y: Floats, windows: int, width: int, fill: float) -> Floats:
     whole = np.full((windows * width, *y.shape[1:]), fill)
     whole[: len(y)] = y
     return np.ascontiguousarray(np.moveaxis(whole.reshape(windows, width, *y.shape[1:]), 0, -1))
-
-
-def _reach(lows: Floats, highs: Floats, slopes: Floats) -> Floats:
-    """Return a bound (w,) of x: that of each row together with the last, which is the reach of the next x."""
-    tilt = slopes[:-1] - slopes[-1]
-    bound = np.where(tilt > 0.0, highs[:-1] / tilt, (highs[-1] - lows[:-1]) / -tilt)
-    return 1.01 * np.where((tilt != 0.0) & np.isfinite(bound), bound, np.inf).min(axis=0)
-
-
-def _right_root(lows: Floats, highs: Floats, slopes: Floats, cap: Floats) -> tuple[Floats, Bools]:
-    """Return the largest x (w,) up to cap that leaves an interval of u, and where there is none."""
-    result, bad = cap.copy(), np.zeros(len(cap), dtype=bool)
-    at, x = np.arange(len(cap)), cap
-    for attempt in range(_STEPS):
-        t = slopes * x
-        below, above = lows - t, highs - t
-        least, most = below.max(axis=0), above.min(axis=0)
-        gap, close = least - most, _TOUCH * (np.abs(least) + np.abs(most))
-        go = np.flatnonzero((gap > close) | ((gap < -close) & (attempt > 0)))
-        if not len(go):
-            break
-        at, x, gap = at[go], x[go], gap[go]
-        lows, highs, slopes = lows[:, go], highs[:, go], slopes[:, go]
-        column = np.arange(len(go))
-        slope = slopes[above[:, go].argmin(axis=0), column] - slopes[below[:, go].argmax(axis=0), column]
-        new = np.where(slope > 0.0, np.minimum(x - gap / slope, cap[at]), np.where(gap > 0.0, -1.0, x))
-        result[at] = np.maximum(new, 0.0)
-        under = np.flatnonzero(new < 0.0)
-        if len(under):
-            least, most = lows[:, under].max(axis=0), highs[:, under].min(axis=0)
-            bad[at[under]] = least - most > _TOUCH * (np.abs(least) + np.abs(most))
-        more = np.flatnonzero((new != x) & (new >= 0.0))
-        at, x, lows, highs, slopes = at[more], new[more], lows[:, more], highs[:, more], slopes[:, more]
-    return result, bad
-
-
-def _left_root(lows: Floats, highs: Floats, slopes: Floats, top: Floats) -> tuple[Floats, Bools]:
-    """Return the least x (w,) up to top that leaves an interval of u, and where there is none."""
-    x, bad = np.zeros_like(top), np.zeros(len(top), dtype=bool)
-    column = np.arange(len(top))
-    for _ in range(_STEPS):
-        below, above = lows - slopes * x, highs - slopes * x
-        least, most = below.max(axis=0), above.min(axis=0)
-        gap = least - most
-        go = (gap > _TOUCH * (np.abs(least) + np.abs(most))) & ~bad
-        if not go.any():
-            break
-        slope = slopes[above.argmin(axis=0), column] - slopes[below.argmax(axis=0), column]
-        new = np.where(go, np.where(slope < 0.0, x - gap / slope, np.inf), x)
-        bad |= ~(new <= top * (1.0 + 1e-12))
-        if (bad | (new == x)).all():
-            break
-        x = np.where(bad, x, new)
-    return np.minimum(x, top), bad

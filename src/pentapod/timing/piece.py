@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from pentapod.timing.law import MotionLaw
 from pentapod.timing.paths import PieceLike
 from pentapod.timing.stages import Failure
 
+if TYPE_CHECKING:
+    from pentapod.timing.jerk import SmoothProfile
+
 _BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 _REFINEMENTS = 4
 _SWITCHING_LOSS = 3e-4
@@ -31,7 +35,7 @@ class PieceProfile:
     """Squared speeds x (N + 1,) in m²/s² at stations s (N + 1,) in metres of a piece, linear in s between.
 
     ease_acceleration, ease_speed and ease_jerk (N + 1,): factors ≤ 1 on the limits at each gridpoint, where a plan at
-    full limits was measured to exceed them.
+    full limits was measured to exceed them. before: what was found for the limits before these were eased.
     """
 
     piece: PieceLike
@@ -42,6 +46,7 @@ class PieceProfile:
     ease_speed: Floats
     ease_jerk: Floats
     engine: Engine = "core"
+    before: SmoothProfile | None = None
 
     @cached_property
     def course(self) -> Course:
@@ -62,13 +67,19 @@ class PieceProfile:
         limits = tuple(dict.fromkeys(names[row] for row in x.conflict))
         return replace(x, limits=limits, station=float(self.s[x.gridpoint]) if x.gridpoint >= 0 else None)
 
-    def smooth_law(self) -> MotionLaw | Failure:
-        """Return the fastest law below this profile that keeps the legs' jerk limits too."""
+    @cached_property
+    def smooth(self) -> SmoothProfile | Failure:
+        """The fastest profile below this one that keeps the jerk limits too."""
         if not kernels_available():
             return Failure(-1, "jerk limits need the compiled kernels")
-        from pentapod.timing.jerk import jerk_limited  # noqa: PLC0415  (compiled: loaded where it is used)
+        from pentapod.timing.jerk import jerk_limited, limited_again  # noqa: PLC0415  (compiled: loaded where it is used)
 
-        smooth = jerk_limited(self.s, self.x, self._jerk_rows, self.piece.knots)
+        again = limited_again(self.before, self.s, self.x, self._jerk_rows) if self.before else None
+        return again or jerk_limited(self.s, self.x, self._jerk_rows, self.piece.knots)
+
+    def smooth_law(self) -> MotionLaw | Failure:
+        """Return the law of `smooth`."""
+        smooth = self.smooth
         return smooth if isinstance(smooth, Failure) else MotionLaw.through(smooth.s, smooth.x, smooth.slope)
 
     def _jerk_rows(self, s: Floats) -> JerkRows:
@@ -91,13 +102,15 @@ class PieceProfile:
 
     def eased(self, acceleration: Floats, speed: Floats, jerk: Floats | None = None) -> PieceProfile | Failure:
         """Return the profile solved anew with further factors (N + 1,) on accelerations, speeds and jerks."""
+        smooth = self.__dict__.get("smooth")
         return self.with_(
+            before=None if isinstance(smooth, Failure) else smooth,
             ease_acceleration=self.ease_acceleration * acceleration,
             ease_speed=self.ease_speed * speed,
             ease_jerk=self.ease_jerk if jerk is None else self.ease_jerk * jerk,
         ).solved()
 
-    def with_(self, **changes: Floats) -> PieceProfile:
+    def with_(self, **changes: Any) -> PieceProfile:
         """Return a copy on the same grid, which keeps the path's derivatives."""
         copy = replace(self, **changes)
         if "course" in self.__dict__:
