@@ -12,6 +12,7 @@ from pentapod.toolpath import Mesh, Region
 from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.resampling import resample, without_duplicates
 from pentapod.toolpath.slicing import LevelSet, chained
+from pentapod.toolpath.topology import Topology
 
 ALL = Region(angle=np.pi / 2, direction=(0.0, 0.0, 1.0))
 WHOLE_BALL = ([0.0, 1.0, 0.0], -0.045, 0.005, 19)
@@ -173,3 +174,10 @@ def test_the_cost_of_slicing_is_foretold():
     mesh = Mesh.of(*surfaces.sphere())
     count = level_set(mesh, WHOLE_BALL).crossings
     assert len(slice_mesh(mesh, WHOLE_BALL).points) == count + 19
+
+
+def test_nothing_has_no_edges():
+    topology = Topology(np.zeros((0, 3), dtype=np.intp), 0)
+    assert topology.edges.shape == (0, 2)
+    assert topology.edge_of_side.shape == (0, 3)
+    assert topology.border_loops == 0

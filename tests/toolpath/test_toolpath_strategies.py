@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import toolpath_surfaces as surfaces
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -214,6 +214,7 @@ def bumpy_laws(name, seed, exponent):
 
 @settings(max_examples=9, deadline=None)
 @given(name=st.sampled_from(sorted(STRATEGIES)), seed=st.integers(0, 10_000), exponent=st.floats(-2.0, 3.0))
+@example(name="edges", seed=4349, exponent=2.845)  # passes that meet, with axes that do not
 def test_bumpy_grids(name, seed, exponent):
     bumpy_laws(name, seed, exponent)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pentapod.arrays import Floats
+from pentapod.geometry.directions import angle_between
 from pentapod.toolpath import links
 from pentapod.toolpath.clearing import Clearing
 from pentapod.toolpath.heightfield import HeightField
@@ -99,7 +100,7 @@ class _Joiner:
         if k == 0:
             return [self._proven(links.entry(down.tips[0], down.axes[0], self.style)), down]
         gap = float(np.linalg.norm(self.tips[k][0] - self.tips[k - 1][-1]))
-        turn = float(np.abs(self.runs[k].normals[0] - self.runs[k - 1].normals[-1]).max())
+        turn = float(angle_between(self.runs[k].normals[0], self.runs[k - 1].normals[-1]))
         if gap < _TOUCH_M and turn < _TOUCH_M:
             self.counts.stay_downs += 1
             return []

@@ -35,7 +35,8 @@ class Topology:
         key = (np.minimum(a, b) * np.intp(self.vertex_count) + np.maximum(a, b)).ravel()
         order = np.argsort(key, kind="stable")
         ordered = key[order]
-        return order, np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]]))
+        first = np.concatenate([[True], ordered[1:] != ordered[:-1]])[: len(ordered)]
+        return order, np.flatnonzero(first)
 
     @cached_property
     def edges(self) -> Ints:
