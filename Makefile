@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test test-all lint bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify reference site clean
+.PHONY: demo test test-all lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify reference site clean
 
 demo: $(READY)  ## plan a dome and judge the program
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
@@ -22,6 +22,9 @@ lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
+
+mutation: $(READY)  ## do the tests of the verdict notice changes of it?
+	$(BIN)/python benchmarks/mutation.py
 
 bench: $(READY)  ## stage times, and kinematics against Newton
 	$(BIN)/python benchmarks/pipeline.py

@@ -1,0 +1,142 @@
+"""Would the tests notice? Mutants of verify/ by cosmic-ray's operators, each run against the tests of the verdict.
+
+Run ``make mutation``; ``--sample 100`` takes so many of the mutants at random, ``--files legs.py speed.py`` those of
+some files. A mutant lives in a child process that is forked once everything else is loaded and compiled, and
+dies with the first test that fails. What survives is listed with its line: each is a test that is missing, or a change
+that means nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import importlib.machinery
+import os
+import random
+import resource
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import CodeType
+
+import pytest
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator
+
+ROOT = Path(__file__).resolve().parents[1]
+VERIFY = ROOT / "src" / "pentapod" / "verify"
+FILES = (
+    "claim.py",
+    "component.py",
+    "joints.py",
+    "judge.py",
+    "legs.py",
+    "origin.py",
+    "speed.py",
+    "tracking.py",
+    "verdict.py",
+)
+TESTS = (
+    "tests/verify/test_claims_by_hand.py",
+    "tests/verify/test_verdict_catches.py",
+    "tests/verify/test_standoff_feed.py",
+    "tests/verify/test_replay_oracles.py",
+)
+OPERATORS = (
+    "NumberReplacer",
+    "AddNot",
+    "ReplaceAndWithOr",
+    "ReplaceOrWithAnd",
+    "ReplaceTrueWithFalse",
+    "ReplaceFalseWithTrue",
+    "ReplaceUnaryOperator_Delete_Not",
+    "ReplaceUnaryOperator_Delete_USub",
+    "ZeroIterationForLoop",
+    *(f"ReplaceComparisonOperator_{a}_{b}" for a, b in (("Lt", "GtE"), ("LtE", "Gt"), ("Gt", "LtE"), ("GtE", "Lt"))),
+    *(f"ReplaceComparisonOperator_{a}_{b}" for a, b in (("Eq", "NotEq"), ("Is", "IsNot"), ("IsNot", "Is"))),
+    *(f"ReplaceBinaryOperator_{a}_{b}" for a, b in (("Add", "Sub"), ("Sub", "Add"), ("Mul", "Div"), ("Div", "Mul"))),
+)
+_CPU_SECONDS = 120  # a mutant that runs longer than this never ends: killed
+
+
+def mutants(file: Path) -> Iterator[tuple[str, str, str]]:
+    """Yield (operator, what changed, source) for every mutant of a file."""
+    source = file.read_text(encoding="utf-8")
+    for name in OPERATORS:
+        operator, occurrence = get_operator(f"core/{name}")(), 0
+        while (mutated := mutate_code(source, operator, occurrence)) is not None:
+            changed = difflib.unified_diff(source.splitlines(), mutated.splitlines(), lineterm="", n=0)
+            lines = [line for line in changed if line[:1] in "+-@" and line[:3] not in ("+++", "---")]
+            yield name, "  ".join(lines), mutated
+            occurrence += 1
+
+
+def survives(file: Path, mutated: str) -> bool:
+    """Return whether all tests pass with this source in place of the file's; in a child process."""
+    child = os.fork()
+    if child:
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    resource.setrlimit(resource.RLIMIT_CPU, (_CPU_SECONDS, _CPU_SECONDS))
+    silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 1)
+    os.dup2(silence, 2)
+    for name in [name for name in sys.modules if name.startswith(("pentapod.verify", "replay_cases"))]:
+        del sys.modules[name]
+    usual = importlib.machinery.SourceFileLoader.get_code
+
+    def get_code(self: importlib.machinery.SourceFileLoader, fullname: str) -> CodeType | None:
+        if Path(self.path) == file:
+            return compile(mutated, self.path, "exec", dont_inherit=True)
+        return usual(self, fullname)
+
+    importlib.machinery.SourceFileLoader.get_code = get_code
+    try:
+        tests = [str(ROOT / test) for test in TESTS]
+        code = pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-k", "not cubic", *tests])
+    except BaseException:
+        code = 1
+    os._exit(int(code))
+
+
+def warm() -> None:
+    """Load and compile what mutants share."""
+    sys.path.insert(0, str(ROOT / "tests" / "verify"))
+    import replay_cases as cases  # noqa: PLC0415 - found by the line above
+
+    from pentapod.verify import verify  # noqa: PLC0415 - the children load it anew
+
+    for interpolation in ("linear", "cubic"):
+        case = cases.good_case(interpolation=interpolation)
+        if not verify(case.program, case.machine, case.toolpath, **cases.TOLERANCES).passed:
+            raise SystemExit("the good program does not pass")
+
+
+def main() -> int:
+    """Print what survives, and the share that is killed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--files", nargs="*", default=FILES)
+    parser.add_argument("--sample", type=int, default=0, help="how many mutants, at random; 0 for all")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--least", type=float, default=0.9, help="share that has to be killed")
+    given = parser.parse_args()
+    os.chdir(ROOT)
+    warm()
+    todo = [(VERIFY / name, *mutant) for name in given.files for mutant in mutants(VERIFY / name)]
+    total = len(todo)
+    if given.sample and given.sample < total:
+        todo = random.Random(given.seed).sample(todo, given.sample)
+    start, killed = time.perf_counter(), 0
+    for number, (file, operator, changed, source) in enumerate(todo, start=1):
+        if survives(file, source):
+            print(f"survived: {file.name} {operator}: {changed}", flush=True)
+        else:
+            killed += 1
+        if number % 20 == 0:
+            print(f"{number} of {len(todo)} mutants, {killed} killed, {time.perf_counter() - start:.0f} s", flush=True)
+    print(f"{killed} of {len(todo)} mutants killed: {killed / len(todo):.1%} (of {total} that there are)")
+    return 0 if killed >= given.least * len(todo) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

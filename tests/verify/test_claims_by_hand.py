@@ -1,0 +1,268 @@
+"""What each claim says, number by number: value, bound, unit, place and words, recomputed by hand from the rows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import replay_cases as cases
+
+from pentapod.kinematics.certificate import certify_component
+from pentapod.program import quantised
+from pentapod.verify import Certificate, Claim, Place, Replay, Verdict, verify
+from pentapod.verify.claim import Finding
+from pentapod.verify.survey import ComponentFindings, Extreme
+from pentapod.verify.tracking import _raised, at_samples
+
+
+@pytest.fixture(scope="module")
+def replay(linear):
+    return Replay(linear.program, linear.machine, linear.toolpath, *cases.TOLERANCES.values(), "job-1")
+
+
+@pytest.fixture(scope="module")
+def found(linear):
+    verdict = verify(linear.program, linear.machine, linear.toolpath, **cases.TOLERANCES, job_digest="job-1")
+    return {c.claim: c for c in verdict.certificates}
+
+
+def worst(values):
+    """Value, row and leg (from 1) of the largest of values (N, 5)."""
+    row, leg = np.unravel_index(int(np.argmax(values)), values.shape)
+    return values[row, leg], int(row), int(leg) + 1
+
+
+@pytest.mark.parametrize(
+    ("claim", "unit", "measure", "limit"),
+    [
+        ("legs not too short", "mm", lambda rows, _: -rows, "min_length"),
+        ("legs not too long", "mm", lambda rows, _: rows, "max_length"),
+        ("leg rates", "mm/s", lambda rows, h: np.abs(np.diff(rows, axis=0)) / h, "max_velocity"),
+        (
+            "leg accelerations",
+            "mm/s²",
+            lambda rows, h: np.abs(np.diff(rows[[0, *range(len(rows)), -1]], n=2, axis=0)) / h**2,
+            "max_acceleration",
+        ),
+        (
+            "leg jerks",
+            "mm/s³",
+            lambda rows, h: np.abs(np.diff(rows[[0, *range(len(rows)), -1]], n=3, axis=0)) / h**3,
+            "max_jerk",
+        ),
+    ],
+)
+def test_legs_by_differences_of_the_rows(linear, found, claim, unit, measure, limit):
+    """With lines between rows all extremes are differences of rows."""
+    value, row, leg = worst(measure(linear.program.legs, linear.program.period))
+    certificate = found[claim]
+    assert certificate.value == pytest.approx(1e3 * abs(value), rel=1e-9)
+    assert certificate.bound == pytest.approx(1e3 * getattr(linear.machine.legs, limit)[0])
+    assert certificate.unit == unit
+    assert certificate.method.startswith(f"leg {leg} is closest to its limit; ")
+    assert "exact" in certificate.method or claim == "leg jerks"
+    assert abs(certificate.where.row - row) <= 1
+    assert certificate.where.time_s == pytest.approx(certificate.where.row * linear.program.period, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("claim", "sign"),
+    [("base joint cones", 1), ("platform joints not too closed", -1), ("platform joints not too open", 1)],
+)
+def test_joints_by_angles_at_the_samples(linear, found, claim, sign):
+    position, direction = linear.machine.pentapod.pose(linear.program.legs, linear.program.component)
+    base = np.column_stack([linear.machine.pentapod.base, np.zeros(5)])
+    legs = position[:, None] + linear.machine.pentapod.offsets[:, None] * direction[:, None] - base
+    axes = linear.machine.joints.base_axes if "base" in claim else direction[:, None]
+    cosine = (legs * axes).sum(axis=2) / np.linalg.norm(legs, axis=2) / np.linalg.norm(axes, axis=-1)
+    value, row, leg = worst(sign * np.degrees(np.arccos(cosine)))
+    certificate = found[claim]
+    assert sign * certificate.value == pytest.approx(value, abs=0.02)
+    assert sign * certificate.value >= value - 1e-9
+    assert certificate.unit == "deg"
+    assert f"joint of leg {leg} " in certificate.method
+    assert "proven bound" in certificate.method
+    assert abs(certificate.where.row - row) <= 1
+
+
+def test_rest_at_both_ends(linear, found):
+    legs, h = linear.program.legs, linear.program.period
+    for claim, step, row in (("starts at rest", legs[1] - legs[0], 0), ("ends at rest", legs[-1] - legs[-2], -1)):
+        certificate, leg = found[claim], int(np.argmax(np.abs(step)))
+        assert certificate.value == pytest.approx(1e3 * abs(step[leg]) / h, rel=1e-9)
+        assert certificate.bound == pytest.approx(1e3 * linear.machine.legs.max_acceleration[leg] * h)
+        assert certificate.unit == "mm/s"
+        assert f"leg {leg + 1} over the {'first' if row == 0 else 'last'} period" in certificate.method
+        assert certificate.where.row == row % len(legs)
+
+
+def test_ends_of_the_path(linear, found, replay):
+    for claim, k in (("starts at the toolpath's start", 0), ("ends at the toolpath's end", -1)):
+        distance = np.linalg.norm(replay.pivots[k] - linear.toolpath.pivots[k])
+        assert found[claim].value == pytest.approx(1e3 * distance, rel=1e-6, abs=1e-12)
+        assert found[claim].bound == pytest.approx(1e3 * cases.TOLERANCES["path_tolerance"])
+        assert found[claim].where.row == (0 if k == 0 else len(linear.program.legs) - 1)
+
+
+def test_deviations_by_their_parts(linear, found, replay):
+    match, away = replay.match, replay.survey.away
+    around = np.maximum(np.append(away, 0.0), np.append(0.0, away))
+    deviation = match.distances + around
+    tip = found["tip deviation"]
+    assert tip.value == pytest.approx(1e3 * deviation.max(), rel=1e-9)
+    assert tip.where.row == int(np.argmax(deviation)) // 2
+    assert f"{1e6 * around[np.argmax(deviation)]:.2g} µm" in tip.method
+    assert "3 mm from the tip" in tip.method
+    chord = np.minimum(match.times.astype(int), len(away) - 1)
+    covered = match.waypoint_distances + away[chord]
+    cover = found["toolpath covered"]
+    assert cover.value == pytest.approx(1e3 * covered.max(), rel=1e-9)
+    assert cover.method.endswith(f"farthest: waypoint {np.argmax(covered)}")
+    assert "not reached" not in cover.method
+    axis = found["axis deviation"]
+    assert np.degrees(match.angles.max()) <= axis.value <= np.degrees(match.angles.max()) + 2e-3
+    assert axis.bound == pytest.approx(5.1)
+    assert "tilt cone 5 deg and tolerance 0.1 deg" in axis.method
+
+
+def test_waypoints_that_are_missed_are_counted(linear):
+    """The whole toolpath 0.1 mm higher."""
+    up = np.array([0.0, 0.0, 1e-4])
+    segments = tuple(replace(segment, tips=segment.tips + up) for segment in linear.toolpath.segments)
+    toolpath = type(linear.toolpath)(segments, linear.toolpath.pivot)
+    verdict = verify(linear.program, linear.machine, toolpath, **cases.TOLERANCES)
+    (cover,) = (c for c in verdict.certificates if c.claim == "toolpath covered")
+    assert cover.method.endswith(" waypoints are not reached")
+    far = int(cover.method.split("; ")[-1].split(" ")[0])
+    # But for those that it comes near while it goes straight up or down.
+    assert 0.8 * len(toolpath.tips) <= far <= len(toolpath.tips)
+    assert not cover.passed
+
+
+@pytest.mark.parametrize("rise", [0.0, 1e-4])
+def test_what_unit_vectors_may_turn_between_two_samples(rise):
+    """An arc of the given height over its chord adds that much, at any angle."""
+    for angle in (0.0, 0.1, 1.0, 3.0):
+        raised = _raised(np.array([angle]), np.array([rise]), np.array([0.25]))[0] - 0.25
+        apart = 2.0 * np.sin(0.5 * raised) - 2.0 * np.sin(0.5 * angle)
+        assert apart == pytest.approx(rise, abs=1e-12)
+    assert _raised(np.array([np.pi]), np.array([1.0]), np.array([0.0]))[0] == pytest.approx(np.pi)
+
+
+def test_chords_that_meet_at_a_sample():
+    assert at_samples(np.array([1.0, 3.0, 2.0])).tolist() == [1.0, 3.0, 3.0, 2.0]
+
+
+def test_the_axis_is_bounded_between_coarse_samples():
+    """Arcs that cross at right angles in the middle of one long chord: the bound is above what happens there."""
+    own, path = 0.3, 0.2
+    t = np.linspace(0.0, 1.0, 101)
+    across = np.stack([np.sin(own * (t - 0.5)), 0 * t, np.cos(own * (t - 0.5))], axis=1)
+    along = np.stack([0 * t, np.sin(path * (t - 0.5) + 0.4), np.cos(path * (t - 0.5) + 0.4)], axis=1)
+    straight = across[0] * (1 - t[:, None]) + across[-1] * t[:, None]
+    angles = np.arccos(np.clip((straight * along).sum(axis=1) / np.linalg.norm(straight, axis=1), -1, 1))
+    ends = max(angles[0], angles[-1])
+    rise = 0.25 * own**2 + 0.125 * path**2 + path**3 / 60.0
+    assert angles.max() <= _raised(np.array([ends]), np.array([rise]), np.zeros(1))[0]
+
+
+# Claims and verdicts as such.
+
+
+def claim_of(finding, **options):
+    return Claim("a claim", lambda _: finding, **options)
+
+
+HELD = Finding(np.bool_(True), 1.0 / 3.0, np.inf, "mm", Place(), "by hand")
+
+
+def test_a_claim_gives_plain_numbers(replay):
+    certificate = claim_of(HELD)(replay)
+    assert certificate == Certificate("a claim", True, 0.333333333333, None, "mm", Place(), "by hand")
+    assert type(certificate.passed) is bool
+    assert claim_of(None)(replay) is None
+
+
+def test_what_a_strict_verdict_says_of_an_idle_claim():
+    assert claim_of(None, idle="nothing there").unjudged().method == "does not apply: nothing there"
+    assert claim_of(None).unjudged().passed
+    assert not claim_of(None, owed=True).unjudged().passed
+
+
+def test_claims_that_need_a_pose_or_a_proof_fail_without(linear):
+    legs = linear.program.legs.copy()
+    legs[1000] = 0.02
+    broken = Replay(
+        replace(linear.program, legs=quantised(legs)), linear.machine, linear.toolpath, *cases.TOLERANCES.values()
+    )
+    certificate = claim_of(HELD)(broken)
+    assert not certificate.passed
+    assert certificate.method == "not judged: the leg lengths have no pose at 3 of the samples"
+    assert certificate.where.row == 999
+    assert certificate.where.segment is None
+    assert claim_of(HELD, needs_pose=False)(broken).passed
+    unproven = claim_of(HELD, needs_pose=False, needs_proof=True)(broken)
+    assert not unproven.passed
+    assert unproven.value is None
+    assert unproven.method.startswith("undecided: too near a singularity to prove where the motion goes on ")
+    assert unproven.where.row in (998, 999)
+
+
+def test_component_answers(linear, found):
+    for claim in ("component kept, w", "component kept, S"):
+        assert found[claim].method.startswith("held; component ++: ")
+        assert "0.02 mm" in found[claim].method
+    legs = linear.program.legs.copy()
+    legs[1000] = 0.02
+    broken = replace(linear.program, legs=quantised(legs))
+    verdict = verify(broken, linear.machine, linear.toolpath, **cases.TOLERANCES)
+    (refuted,) = (c for c in verdict.certificates if c.claim == "component kept, S")
+    assert refuted.method.startswith("refuted: the legs have no pose, first from 0.99")
+    assert "2 intervals refuted" in refuted.method
+    assert refuted.where.row == 999
+    assert refuted.bound == 0.0
+
+
+def test_component_findings_keep_the_first(linear):
+    """Two blocks: in the second an interval has no pose."""
+    legs = linear.program.legs[:40].copy()
+    legs[30] = 0.02
+    rows = np.stack([legs[:-1], legs[1:]], axis=-1)
+    found = ComponentFindings()
+    for first in (0, 20):
+        found.see(certify_component(linear.machine.pentapod, rows[first : first + 20], (1, 1)), first)
+    assert found.refuted == 2
+    assert found.undecided == 0
+    assert found.first_refuted is not None
+    assert found.first_refuted[0] == 29
+    assert 0.0 <= found.first_refuted[1] <= found.first_refuted[2] <= 1.0
+    assert found.first_undecided is None
+
+
+def test_extremes_over_blocks():
+    extreme, values = Extreme(2), np.random.default_rng(1).integers(0, 9, (30, 2)).astype(float)
+    for first in range(0, 30, 7):
+        extreme.see(values[first : first + 7], first)
+    assert extreme.values.tolist() == values.max(axis=0).tolist()
+    assert extreme.at.tolist() == values.argmax(axis=0).tolist()
+
+
+def test_a_verdict_without_claims_is_no_pass():
+    good = Certificate("a", True, None, None, "", Place(), "")
+    assert not Verdict(()).passed
+    assert Verdict((good,)).passed
+    assert not Verdict((good, replace(good, passed=False))).passed
+    assert Verdict((good,)).to_dict()["certificates"][0]["where"] == {"time_s": None, "row": None, "segment": None}
+
+
+@pytest.mark.parametrize("name", ["machine", "machine_digest"])
+def test_either_name_or_digest_of_the_machine_is_enough_to_refuse(linear, name):
+    source = replace(linear.program.provenance, **{name: "another"})
+    verdict = verify(replace(linear.program, provenance=source), linear.machine, linear.toolpath, **cases.TOLERANCES)
+    assert [c.claim for c in verdict.certificates if not c.passed] == ["machine"]
+
+
+def test_zero_is_a_tolerance_of_angles_but_not_of_lengths(linear):
+    given = {**cases.TOLERANCES, "tilt": 0.0, "axis_tolerance": 0.0}
+    assert not verify(linear.program, linear.machine, linear.toolpath, **given).passed
+    with pytest.raises(Exception, match="path_tolerance"):
+        verify(linear.program, linear.machine, linear.toolpath, **{**cases.TOLERANCES, "path_tolerance": 0.0})
