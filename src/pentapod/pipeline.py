@@ -19,6 +19,7 @@ from pentapod.job_surroundings import job_surroundings
 from pentapod.job_tool import FileReport, Reports, finished_as_asked, job_tool
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import ControllerSettings, Machine
+from pentapod.machine.surroundings import Surroundings
 from pentapod.machine.tool_limits import ToolLimits
 from pentapod.outcome import Outcome, Stage, refusal_verdict
 from pentapod.plan_arrays import arrays_of
@@ -66,14 +67,17 @@ def run(
     clock = _Clock(progress)
     machine = job_machine(job)
     mesh = clock.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
-    freedom = job_freedom(job, machine, mesh)
+    freedom, surroundings = job_freedom(job, machine, mesh), job_surroundings(job, machine, mesh)
     toolpath, _ = clock.time("toolpath", lambda: job_toolpath(job, mesh, progress), says=lambda made: str(made[1]))
     with staged(folder) as staging:
-        program = _Task(job, machine, toolpath, freedom, clock).program(staging / PROGRAM)
+        task = _Task(job, machine, toolpath, freedom, surroundings, clock)
+        program = task.program(staging / PROGRAM)
         if isinstance(program, Refusal):
             verdict = refusal_verdict(program)
         else:
-            verdict = clock.time("verify", lambda: judge(job, machine, mesh, toolpath, staging / PROGRAM, progress))
+            verdict = clock.time(
+                "verify", lambda: judge(job, machine, surroundings, toolpath, staging / PROGRAM, progress)
+            )
         outcome = Outcome(job, machine, tuple(clock.stages), verdict)
         write_arrays(arrays_of(outcome), staging / ARRAYS)
         for name, write in (writers or {}).items():
@@ -145,7 +149,7 @@ def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
 def judge(
     job: Job,
     machine: Machine,
-    mesh: Mesh,
+    surroundings: Surroundings,
     toolpath: Toolpath,
     program: Path,
     progress: Progress = silent,
@@ -161,7 +165,7 @@ def judge(
         path_tolerance=job.tolerance.path_mm * _MM,
         axis_tolerance=float(np.radians(job.tolerance.axis_deg)),
         job_digest=job.digest,
-        surroundings=job_surroundings(job, machine, mesh),
+        surroundings=surroundings,
         strict=strict,
         progress=progress,
     )
@@ -175,6 +179,7 @@ class _Task:
     machine: Machine
     toolpath: Toolpath
     freedom: Freedom
+    surroundings: Surroundings
     clock: _Clock
 
     def program(self, file: Path) -> Program | Refusal:
@@ -200,6 +205,7 @@ class _Task:
             tilt=float(np.radians(self.job.axis.tilt_deg)),
             freedom=self.freedom,
             component=None if wanted is None else Component.parse(wanted),
+            surroundings=self.surroundings,
             solver=self.job.placement.solver,
             progress=self.clock.progress,
         )

@@ -26,13 +26,15 @@ def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -
     compared with the toolpath that the job asks for.
     """
     from pentapod.job import Job
+    from pentapod.job_surroundings import job_surroundings
     from pentapod.pipeline import job_machine, job_mesh, job_toolpath, judge
 
     loaded = Job.load(job)
     machine = job_machine(loaded)
     with progress_bar(quiet=quiet or as_json) as progress:
         mesh = job_mesh(loaded)
-        verdict = judge(loaded, machine, mesh, job_toolpath(loaded, mesh)[0], program, progress, strict=strict)
+        surroundings = job_surroundings(loaded, machine, mesh)
+        verdict = judge(loaded, machine, surroundings, job_toolpath(loaded, mesh)[0], program, progress, strict=strict)
     if as_json:
         echo_json(verdict.to_dict())
     elif not quiet:

@@ -47,6 +47,10 @@ class Surroundings:
         return (*legs, "spindle", *((TOOL_BODY,) if self.tool else ()))
 
 
+NOTHING = Surroundings()
+"""Nothing in the way, and a tool without shank and holder."""
+
+
 @dataclass(frozen=True, eq=False)
 class MovingBodies:
     """Where the moving bodies are in N poses, in an obstacle's frame, metres.

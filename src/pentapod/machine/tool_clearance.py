@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -60,7 +61,7 @@ def leg_tool_gap(machine: Machine, solids: Sequence[Solid], leg: int, cosine: An
     joint = machine.tool_length - float(machine.pentapod.offsets[leg])
     sine = _sine(cosine, do)
     end_r, end_h = length * sine, joint + length * cosine
-    gap: Any = np.inf
+    gaps: list[Any] = []
     for solid in solids:
         low, high = solid.low, solid.high
         found: Any = joint - high
@@ -73,8 +74,8 @@ def leg_tool_gap(machine: Machine, solids: Sequence[Solid], leg: int, cosine: An
         share = do.least(do.most(share, 0.0), 1.0)
         aside, off = end_r - solid.low_radius - share * step_r, end_h - low - share * step_h
         found = do.least(found, do.sqrt(aside * aside + off * off + _TINY)) - solid.rounding
-        gap = do.least(gap, found)
-    return gap - machine.bodies.leg_radius
+        gaps.append(found)
+    return reduce(do.least, gaps) - machine.bodies.leg_radius
 
 
 def leg_tool_gaps(machine: Machine, solids: Sequence[Solid], position: Floats, direction: Floats) -> Floats:

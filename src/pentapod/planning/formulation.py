@@ -28,8 +28,8 @@ By = Literal["nothing", "lean", "step and lean"]
 def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, by: By = "nothing") -> Any:
     """Return the casadi function of one waypoint: margins K, and the square of the share of the cone that is used.
 
-    Of step 6, lean a 2, pivot 3, nominal 3, pair 3×2, R 3×3, t 3. kinds: which margins. pair: columns, the directions
-    of the lean's two numbers; what of them lies along the nominal axis does not count.
+    Of step 6, lean a 2, pivot 3, nominal 3, pair 3×2, R 3×3, t 3, contacts. kinds: which margins. pair: columns, the
+    directions of the lean's two numbers; what of them lies along the nominal axis does not count.
     by: also return the margins' derivatives by a, K × 2, or by (step, a), K × 8.
     """
     import casadi as ca  # noqa: PLC0415  heavy: only when planning
@@ -43,12 +43,13 @@ def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, 
     turn = ca.mtimes(rotation, _cayley(step[3:]))
     turned = ca.mtimes(turn, (nominal + across) / ca.sqrt(1.0 + square))
     tip = ca.mtimes(turn, pivot) + translation + step[:3] - setting.task.pivot * turned
-    values = margins.symbolic(tip, turned)[list(kinds)]
+    numbers = ca.SX.sym("contacts", margins.contact_numbers)
+    values = margins.symbolic(tip, turned, turn, translation + step[:3], numbers)[list(kinds)]
     used = square / setting.cone**2 if setting.task.tilt > 0.0 else ca.SX(0.0)
     unknowns = {"nothing": [], "lean": [a], "step and lean": [ca.vertcat(step, a)]}[by]
     slopes = [ca.densify(ca.jacobian(values, x)) for x in unknowns]
     return ca.Function(
-        "point", [step, a, pivot, nominal, pair, rotation, translation], [values, used, *slopes], {"cse": True}
+        "point", [step, a, pivot, nominal, pair, rotation, translation, numbers], [values, used, *slopes], {"cse": True}
     )
 
 
@@ -71,6 +72,7 @@ def lean_slopes(setting: Setting, margins: Margins, transform: RigidTransform, k
     task = setting.task
 
     def slopes(frames: Floats, leans: Floats, rows: Ints) -> Floats:
+        touching = setting.contacts(margins, transform, np.einsum("nk,nkj->nj", leans, frames), rows)
         _, _, found = point(
             np.zeros((6, 1)),
             leans.T,
@@ -79,6 +81,7 @@ def lean_slopes(setting: Setting, margins: Margins, transform: RigidTransform, k
             frames.reshape(-1, 6).T,
             rotation,
             translation,
+            touching.T,
         )
         return found.reshape(2, len(kinds), len(rows)).transpose(2, 1, 0)
 

@@ -20,6 +20,8 @@ from pentapod.planning.setting import Candidate, Setting
 _POINTS, _ROUNDS = 96, 16
 _NEAR = 0.6
 """Kinds of margin within this much of the smallest one are considered from the start."""
+_ENOUGH, _NEARER, _NEAREST = 1e-4, 0.25, 1e-3
+"""With contacts: a gain that calls for another round; by how much steps are shortened without one, and how far."""
 _TRANSLATION_STEP_M, _ROTATION_STEP = 0.4, 0.8
 _UPRIGHT_WEIGHT = 1e-6
 """Of the field's coefficients beside the margin: they only decide where the margin does not."""
@@ -51,9 +53,10 @@ class IpoptSolver:
 
     def raise_margin(self, start: Candidate) -> Candidate:
         """Return a candidate with the largest smallest margin near `start`; never a worse one."""
-        best, (rows, kinds) = start, self._first(start)
+        best, (rows, kinds), reach = start, self._first(start), 1.0
+        touching = bool(start.margins.surroundings.obstacles)
         for _ in range(_ROUNDS):
-            transform, raw = self._solve(best, rows, kinds)
+            transform, raw = self._solve(best, rows, kinds, reach)
             coefficients = self.setting.within_cone(raw)
             values = self.setting.values(best.margins, transform, coefficients)
             considered = float(values[np.ix_(rows, kinds)].min())
@@ -61,7 +64,11 @@ class IpoptSolver:
             if smallest > before:
                 best = Candidate(best.margins, transform, coefficients, smallest)
             more = self._with_worst(rows, kinds, values, max(considered, before), raw)
-            if len(more[0]) == len(rows) and len(more[1]) == len(kinds):
+            if touching and smallest <= before + _ENOUGH:  # contacts hold near where they were taken
+                reach *= _NEARER
+            elif not touching and len(more[0]) == len(rows) and len(more[1]) == len(kinds):
+                break
+            if reach < _NEAREST:
                 break
             rows, kinds = more
         return best
@@ -83,6 +90,7 @@ class IpoptSolver:
             ca.DM.zeros(6, count), course.cone * ca.mtimes(c, ca.DM(course.basis.T)), task.pivots.T, task.nominal.T,
             course.frames.transpose(2, 0, 1).reshape(3, -1), np.tile(start.transform.rotation, (1, count)),
             np.tile(start.transform.translation[:, None], (1, count)),
+            setting.contacts(start.margins, start.transform, course.leans(first), np.arange(count)).T,
         )  # fmt: skip
         x, scale = ca.vec(c), max(course.cost_of(first), 1e-9)
         problem = {
@@ -115,15 +123,18 @@ class IpoptSolver:
             kinds, np.flatnonzero(values.min(axis=0) < level)
         )
 
-    def _solve(self, at: Candidate, rows: Ints, kinds: Ints) -> tuple[RigidTransform, Floats]:
-        """Return placement and coefficients with the largest smallest margin over waypoints `rows`."""
+    def _solve(self, at: Candidate, rows: Ints, kinds: Ints, share: float) -> tuple[RigidTransform, Floats]:
+        """Return placement and coefficients with the largest smallest margin over waypoints `rows`.
+
+        share: of the longest step of the placement that is allowed.
+        """
         setting, task = self.setting, self.setting.task
         count = 32 * int(np.ceil(len(rows) / 32))  # in buckets, so that few solvers are built
         rows = np.concatenate([rows, np.full(count - len(rows), rows[0], dtype=np.intp)])
         basis, c = setting.basis[rows], at.coefficients
         motion = self._motion
         shifts = np.abs(motion[:3]).sum(axis=0) > 0.0
-        reach, moving = np.where(shifts, _TRANSLATION_STEP_M, _ROTATION_STEP), motion.shape[1]
+        reach, moving = share * np.where(shifts, _TRANSLATION_STEP_M, _ROTATION_STEP), motion.shape[1]
         start = np.concatenate([np.zeros(moving), [at.smallest], c.ravel(), (basis @ c).ravel()])
         if task.tilt == 0.0:
             start = start[: moving + 1]
@@ -137,6 +148,7 @@ class IpoptSolver:
                 basis.ravel(),
                 at.transform.rotation.T.ravel(),
                 at.transform.translation,
+                setting.contacts(at.margins, at.transform, setting.leans(c, rows), rows).ravel(),
             ]),
             lbg=0.0,
             ubg=np.concatenate([np.zeros(equations), np.full(solver.size1_out("g") - equations, np.inf)]),
@@ -173,10 +185,11 @@ class IpoptSolver:
         coefficients = ca.MX.sym("c", 2, size)
         points, basis = ca.MX.sym("points", 6, count), ca.MX.sym("basis", size, count)
         rotation, translation = ca.MX.sym("R", 3, 3), ca.MX.sym("t", 3)
+        touching = ca.MX.sym("contacts", at.margins.contact_numbers, count)
         margins, used = point_function(setting, at.margins, kinds).map(count)(
             ca.repmat(step, 1, count), leans, points[:3, :], points[3:, :],
             np.tile(setting.domain.lean_plane.T, (1, count)),
-            ca.repmat(rotation, 1, count), ca.repmat(translation, 1, count),
+            ca.repmat(rotation, 1, count), ca.repmat(translation, 1, count), touching,
         )  # fmt: skip
         unknowns, constraints, lean = [moves, least], [ca.vec(margins - least)], ca.MX(0.0)
         if self.free and setting.freedom.is_bounded:
@@ -188,7 +201,7 @@ class IpoptSolver:
             constraints = [ca.vec(leans - ca.mtimes(coefficients, basis)), *constraints, 1.0 - used.T]
         problem = {
             "x": ca.vertcat(*unknowns),
-            "p": ca.vertcat(ca.vec(points), ca.vec(basis), ca.vec(rotation), translation),
+            "p": ca.vertcat(ca.vec(points), ca.vec(basis), ca.vec(rotation), translation, ca.vec(touching)),
             "f": -least + _UPRIGHT_WEIGHT * lean,
             "g": ca.vertcat(*constraints),
         }

@@ -14,8 +14,13 @@ from typing import Any
 import numpy as np
 
 from pentapod.arrays import Floats
+from pentapod.errors import ArrayError
+from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import Machine
+from pentapod.machine.surroundings import NOTHING, TOOL_BODY, Surroundings
+from pentapod.machine.tool_clearance import Arithmetic, leg_spindle_gap, leg_tool_gap
+from pentapod.planning.contacts import NUMBERS, comforts, contacts, margin_formulas, names
 
 W_COMFORTABLE = float(np.sin(np.radians(60.0)))
 """|w| of a tool axis 30° off the base normal: margin 1."""
@@ -25,6 +30,9 @@ S_COMFORTABLE_FRACTION = 0.25
 
 CLEARANCE_COMFORTABLE_M = 0.05
 """Gap between two legs that counts as margin 1."""
+
+TOOL_COMFORTABLE_M = 0.02
+"""Gap between a leg and the spindle or tool that it is joined to, that counts as margin 1."""
 
 _BLOCK = 16_384
 """Poses at a time: a hundred intermediate values of each need not be held for a million."""
@@ -46,33 +54,68 @@ class Limit:
 class Margins:
     """The margins of one machine in one component.
 
-    Called with tips and tool axes (..., 3) in the machine frame it returns (..., M), M = len(limits).
+    Called with tips and tool axes (..., 3) in the machine frame it returns (..., M), M = len(limits). surroundings:
+    what must not be touched; its margins come last, and need to know where the workpiece stands.
     """
 
     machine: Machine
     component: Component
     limits: tuple[Limit, ...]
     sides: tuple[float, ...]
+    surroundings: Surroundings = NOTHING
 
     @classmethod
-    def of(cls, machine: Machine, component: Component) -> Margins:
+    def of(cls, machine: Machine, component: Component, surroundings: Surroundings = NOTHING) -> Margins:
         """Build the margins of `machine` in `component`."""
-        return cls(machine, component, _limits(machine), _home_sides(machine, component))
+        limits = (*_limits(machine, surroundings), *_outer_limits(surroundings))
+        return cls(machine, component, limits, _home_sides(machine, component), surroundings)
 
-    def __call__(self, tips: Floats, axes: Floats) -> Floats:
-        """Return margins (..., M) of tool tips and axes (tip → spindle), both (..., 3), machine frame."""
+    def __call__(self, tips: Floats, axes: Floats, placement: RigidTransform | None = None) -> Floats:
+        """Return margins (..., M) of tool tips and axes (tip → spindle), both (..., 3), machine frame.
+
+        placement: of the workpiece; needed where there are obstacles.
+        """
+        own = self.own(tips, axes)
+        if not self.surroundings.obstacles:
+            return own
+        if placement is None:
+            raise ArrayError("gaps to the part need to know where it stands", key="placement")
+        outer = contacts(self.machine, self.surroundings, tips.reshape(-1, 3), axes.reshape(-1, 3), placement).margins
+        return np.concatenate([own, outer.reshape(*own.shape[:-1], -1)], axis=-1)
+
+    def own(self, tips: Floats, axes: Floats) -> Floats:
+        """Return the margins (..., M) of the machine alone: without those to obstacles, which come last."""
         if tips.ndim == 2 and len(tips) > _BLOCK:
             blocks = range(0, len(tips), _BLOCK)
-            return np.concatenate([self(tips[k : k + _BLOCK], axes[k : k + _BLOCK]) for k in blocks])
+            return np.concatenate([self.own(tips[k : k + _BLOCK], axes[k : k + _BLOCK]) for k in blocks])
         tip, axis = list(np.moveaxis(tips, -1, 0)), list(np.moveaxis(axes, -1, 0))
         rows = self.rows(tip, axis, np.sqrt, np.minimum, np.maximum, np.where)
         return np.stack(np.broadcast_arrays(*rows), axis=-1)
 
-    def symbolic(self, tip: Any, axis: Any) -> Any:
-        """Return the column of the same margins for casadi SX vectors tip and axis (3)."""
+    def contacts(self, tips: Floats, axes: Floats, placement: RigidTransform) -> Floats:
+        """Return the contacts (n, contact_numbers) that the formulas need, of poses (n, 3); none without obstacles."""
+        if not self.surroundings.obstacles:
+            return np.zeros((len(tips), 0))
+        return contacts(self.machine, self.surroundings, tips, axes, placement).numbers
+
+    @property
+    def contact_numbers(self) -> int:
+        """How many numbers the contacts of one pose are."""
+        return NUMBERS * len(names(self.surroundings))
+
+    def symbolic(self, tip: Any, axis: Any, turn: Any = None, shift: Any = None, numbers: Any = None) -> Any:
+        """Return the column of the same margins for casadi SX vectors tip and axis (3).
+
+        turn, shift: the workpiece's rotation (3×3) and translation; numbers: of its contacts, see `contacts`. All three
+        are needed where there are obstacles.
+        """
         import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
-        rows = self.rows(ca.vertsplit(tip), ca.vertsplit(axis), ca.sqrt, ca.fmin, ca.fmax, ca.if_else)
+        pose = ca.vertsplit(tip), ca.vertsplit(axis)
+        rows = self.rows(*pose, ca.sqrt, ca.fmin, ca.fmax, ca.if_else)
+        if self.surroundings.obstacles:
+            placement = (lambda k, j: turn[k, j]), ca.vertsplit(shift)
+            rows += margin_formulas(self.machine, self.surroundings, pose, placement, ca.vertsplit(numbers))
         return ca.vertcat(*rows)
 
     def rows(self, tip: Sequence[Any], axis: Sequence[Any], sqrt: Any, least: Any, most: Any, where: Any) -> list[Any]:
@@ -124,6 +167,12 @@ class Margins:
             offset = (robot.base[k] - robot.base[j]).tolist()
             gap = _segment_distance(offset, vectors[j], vectors[k], side, sqrt, least, most, where)
             rows.append((gap - 2.0 * m.bodies.leg_radius) / CLEARANCE_COMFORTABLE_M)
+
+        do, cosines = Arithmetic(sqrt, least, most, where), [dot(vectors[k], direction) / lengths[k] for k in range(5)]
+        rows += [leg_spindle_gap(m, k, cosines[k], do) / TOOL_COMFORTABLE_M for k in range(5)]
+        if tool := self.surroundings.tool:
+            gaps = [leg_tool_gap(m, tool, k, cosines[k], lengths[k], do) for k in range(5)]
+            rows += [gap / TOOL_COMFORTABLE_M for gap in gaps]
         return rows
 
 
@@ -178,7 +227,7 @@ def _s_comfortable(machine: Machine) -> float:
     return S_COMFORTABLE_FRACTION * float(np.mean(0.5 * (machine.legs.min_length + machine.legs.max_length)))
 
 
-def _limits(machine: Machine) -> tuple[Limit, ...]:
+def _limits(machine: Machine, surroundings: Surroundings) -> tuple[Limit, ...]:
     legs, joints = machine.legs, machine.joints
 
     def length(half_stroke: float) -> Callable[[float], float]:
@@ -221,4 +270,16 @@ def _limits(machine: Machine) -> tuple[Limit, ...]:
             )
         )
     rows += [Limit(f"legs {j + 1} and {k + 1} touch", "mm", length(CLEARANCE_COMFORTABLE_M)) for j, k in _PAIRS]
+    held = ("spindle", TOOL_BODY) if surroundings.tool else ("spindle",)
+    rows += [
+        Limit(f"leg {k + 1} touches the {body}", "mm", length(TOOL_COMFORTABLE_M)) for body in held for k in range(5)
+    ]
     return tuple(rows)
+
+
+def _outer_limits(surroundings: Surroundings) -> tuple[Limit, ...]:
+    def length(comfort: float) -> Callable[[float], float]:
+        return lambda margin: -margin * comfort * 1e3
+
+    both = zip(names(surroundings), comforts(surroundings), strict=True)
+    return tuple(Limit(name, "mm", length(comfort)) for name, comfort in both)

@@ -9,6 +9,7 @@ from pentapod.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.machine.machine import Machine
+from pentapod.machine.surroundings import NOTHING, Surroundings
 from pentapod.planning.blame import refusal
 from pentapod.planning.freedom import FREE, Freedom
 from pentapod.planning.ipopt import IpoptSolver
@@ -62,6 +63,7 @@ def plan(
     tilt: float = 0.0,
     freedom: Freedom = FREE,
     component: Component | None = None,
+    surroundings: Surroundings = NOTHING,
     seed: int = 0,
     solver: SolverName = "sequential",
     progress: Progress = silent,
@@ -70,18 +72,18 @@ def plan(
 
     tilt: half angle in radians of the cone around the nominal axis within which the tool may lean.
     freedom: the allowed placements; of them, and of all components where none is given, the one with the largest
-    smallest margin is kept. Deterministic for a seed. Returns a Refusal that names limits, waypoints and shortfalls
-    where the part does not fit.
+    smallest margin is kept. surroundings: what legs, spindle and tool must not touch. Deterministic for a seed. Returns
+    a Refusal that names limits, waypoints and shortfalls where the part does not fit.
     """
     setting = Setting.of(Task.of(toolpath, tilt), machine, freedom)
     improves = SequentialSolver if solver == "sequential" else IpoptSolver
     components = COMPONENTS if component is None else (component,)
     if freedom.moves:
         progress("placement", 0.0, "sampling")
-        guesses = first_guesses(setting.task, machine, components, seed, freedom=freedom)
-        starts = [(Margins.of(machine, g.component), g.transform) for g in guesses]
+        guesses = first_guesses(setting.task, machine, components, seed, freedom=freedom, surroundings=surroundings)
+        starts = [(Margins.of(machine, g.component, surroundings), g.transform) for g in guesses]
     else:
-        starts = [(Margins.of(machine, c), pose) for pose in freedom.poses for c in components]
+        starts = [(Margins.of(machine, c, surroundings), pose) for pose in freedom.poses for c in components]
     best: Candidate | None = None
     moving = improves(setting, freedom.moves)
     for k, (margins, transform) in enumerate(starts):
@@ -104,7 +106,9 @@ def plan(
     tips, axes = setting.task.machine_poses(best.transform, lean(setting.task.nominal, leans))
     chosen = Placement(best.transform, _choice(freedom, best.transform))
     names = tuple(limit.name for limit in best.margins.limits)
-    return PlacedPath(toolpath, chosen, best.margins.component, tips, axes, best.margins(tips, axes), names)
+    return PlacedPath(
+        toolpath, chosen, best.margins.component, tips, axes, best.margins(tips, axes, best.transform), names
+    )
 
 
 def _choice(freedom: Freedom, chosen: RigidTransform) -> str:

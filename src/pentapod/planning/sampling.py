@@ -11,6 +11,7 @@ from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import Machine
+from pentapod.machine.surroundings import NOTHING, Surroundings
 from pentapod.planning.freedom import FREE, Freedom
 from pentapod.planning.margins import Margins
 from pentapod.planning.task import Task
@@ -42,10 +43,12 @@ def first_guesses(
     seed: int,
     samples: int = SAMPLES,
     freedom: Freedom = FREE,
+    surroundings: Surroundings = NOTHING,
 ) -> list[Guess]:
     """Return the best few of the allowed placements for each component, best first; deterministic for a seed.
 
-    Each placement is judged on a dozen representatives with their nominal axes, the best again with a cone of tilts.
+    Each placement is judged on a dozen representatives with their nominal axes, the best again with a cone of tilts and
+    with the surroundings.
     """
     rng = np.random.default_rng(seed)
     rows = task.representatives(12)
@@ -53,7 +56,8 @@ def first_guesses(
     mean_axis = mean_axis / max(float(np.linalg.norm(mean_axis)), 1e-9)
     guesses: list[Guess] = []
     for component in components:
-        margins = Margins.of(machine, component)
+        margins = Margins.of(machine, component, surroundings)
+        simple = task.tilt == 0.0 and not surroundings.obstacles
         rotations, places = _rotations(mean_axis, -float(component.w), samples, rng), _places(machine, samples, rng)
         if freedom.is_bounded:
             rotations, origins = freedom.within(rotations, places - rotations @ centre, rng)
@@ -71,7 +75,7 @@ def first_guesses(
         score = _score(task, margins, rotations, translations, rows)
         best = _best(score)
         found = [
-            Guess(t, component, float(_smallest(task, margins, t, rows) if task.tilt > 0.0 else score[k]))
+            Guess(t, component, float(score[k] if simple else _smallest(task, margins, t, rows)))
             for k in best
             for t in (freedom.nearest_to(RigidTransform(_orthonormal(rotations[k]), translations[k])),)
         ]
@@ -99,7 +103,7 @@ def best_tilted_margins(
         t1, t2 = tangent_frame(task.nominal[rows])
         b = grid[:, None, :1] * t1 + grid[:, None, 1:] * t2
         tips, axes = task.machine_poses(placement, lean(task.nominal[rows], b), rows)
-        all_margins = margins(tips, axes)
+        all_margins = margins(tips, axes, placement)
         choice = all_margins.min(axis=-1).argmax(axis=0)
         out[rows] = all_margins[choice, np.arange(len(rows))]
         leans[rows] = b[choice, np.arange(len(rows))]
@@ -129,7 +133,7 @@ def _different(guesses: list[Guess], centre: Floats) -> list[Guess]:
 def _score(task: Task, margins: Margins, r: Floats, t: Floats, rows: Ints) -> Floats:
     turned = np.einsum("sij,nj->sni", r, task.nominal[rows])
     tips = np.einsum("sij,nj->sni", r, task.pivots[rows]) + t[:, None, :] - task.pivot * turned
-    return margins(tips, turned).min(axis=(-1, -2))
+    return margins.own(tips, turned).min(axis=(-1, -2))
 
 
 def _smallest(task: Task, margins: Margins, placement: RigidTransform, rows: Ints) -> float:

@@ -116,9 +116,10 @@ class SequentialSolver:
             self._functions[key] = Vectorised(point_function(self.setting, margins, kinds, by="step and lean"))
         task = self.setting.task
         leans = (self.setting.basis[rows] @ coefficients).T if task.tilt > 0.0 else np.zeros((2, 1))
+        touching = self.setting.contacts(margins, transform, self.setting.leans(coefficients, rows), rows)
         _, _, slopes = self._functions[key](
             np.zeros((6, 1)), leans, task.pivots[rows].T, task.nominal[rows].T,
             self.setting.domain.lean_plane.reshape(-1, 1),
-            transform.rotation.T.reshape(-1, 1), transform.translation[:, None],
+            transform.rotation.T.reshape(-1, 1), transform.translation[:, None], touching.T,
         )  # fmt: skip
         return slopes.reshape(8, len(margins.limits), len(rows)).transpose(2, 1, 0)

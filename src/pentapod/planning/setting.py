@@ -78,12 +78,21 @@ class Setting:
         self, margins: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints | slice = slice(None)
     ) -> Floats:
         """Return the margins (n, M) at waypoints `rows`."""
-        return margins(*self.task.machine_poses(transform, self.axes(coefficients, rows), rows))
+        return margins(*self.task.machine_poses(transform, self.axes(coefficients, rows), rows), transform)
 
     def values_of(self, margins: Margins, transform: RigidTransform, leans: Floats) -> Floats:
         """Return the margins (N, M) at all waypoints for leans (N, 3), workpiece frame."""
         axes = lean(self.task.nominal, leans)
-        return margins(*self.task.machine_poses(transform, axes))
+        return margins(*self.task.machine_poses(transform, axes), transform)
+
+    def contacts(self, margins: Margins, transform: RigidTransform, leans: Floats, rows: Ints) -> Floats:
+        """Return the contacts (n, margins.contact_numbers) for leans (n, 3), workpiece frame, at waypoints `rows`.
+
+        What of a lean lies along the nominal axis does not count.
+        """
+        nominal = self.task.nominal[rows]
+        across = leans - (leans * nominal).sum(axis=1, keepdims=True) * nominal
+        return margins.contacts(*self.task.machine_poses(transform, lean(nominal, across), rows), transform)
 
     def steepness(self, coefficients: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """Return the share of the cone (n,) that each lean uses: 1 on its edge."""

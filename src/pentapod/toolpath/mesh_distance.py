@@ -115,7 +115,7 @@ class MeshDistance:
         kind, rows = met.depths.argmax(axis=1), np.arange(len(near))
         found = -met.depths[rows, kind]
         seen = np.isfinite(found)
-        found = np.where(seen, found, within)
+        found = np.where(seen, found, within + TOOL_RESOLUTION_M)
         gap[near] = np.minimum(found - TOOL_RESOLUTION_M + 0.01 * np.minimum(found, 0.0), within)
         point[near] = met.points[rows, kind]
         return gap, point

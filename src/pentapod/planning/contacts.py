@@ -1,0 +1,147 @@
+"""Contacts: margins of all that moves against the part, its fixture and what stands in the machine.
+
+Gaps are exact distances from meshes. How they change is told by contacts: the line point of a body (on a leg, on the
+tool's axis) whose ball is the body's nearest part, and the mesh point and normal opposite. The gap of that ball from
+the plane through the mesh point is a formula of the pose, equal to the true gap and with its derivatives where the
+contact was taken. Both solvers work with that formula, and are judged by the true gaps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.machine.machine import Machine
+from pentapod.machine.surroundings import LEGS, TOOL_BODY, MovingBodies, Obstacle, Surroundings, spindle_ends
+from pentapod.toolpath.solids import Solid
+
+COMFORTABLE_M = {"leg": 0.05, "spindle": 0.02, TOOL_BODY: 0.005}
+"""Gaps that count as margin 1: a spindle and a tool work near the part by nature."""
+
+NUMBERS = 8
+"""Of a contact: place on the body's line, normal (3), mesh point (3), radius of the ball."""
+
+_CAP = 1.2  # margins are not looked at beyond this
+_FLAT = 1e-3  # sine of the angle to the axis below which a nearest part counts as flat
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """margins (N, C) of poses, and the contacts (N, C · NUMBERS) that they come from; C: as many as `names`."""
+
+    margins: Floats
+    numbers: Floats
+
+
+def names(surroundings: Surroundings) -> tuple[str, ...]:
+    """Return what each margin stands for, (C,): "leg 3 touches the part"."""
+    return tuple(f"{body} touches the {o.name}" for o in surroundings.obstacles for body in surroundings.names)
+
+
+def comforts(surroundings: Surroundings) -> tuple[float, ...]:
+    """Return the gaps (C,) in metres that count as margin 1."""
+    return tuple(COMFORTABLE_M[body.rstrip(" 12345")] for _ in surroundings.obstacles for body in surroundings.names)
+
+
+def contacts(
+    machine: Machine, surroundings: Surroundings, tips: Floats, axes: Floats, placement: RigidTransform
+) -> Contacts:
+    """Return the contacts of tool poses (N, 3), machine frame, with the workpiece placed."""
+    position, direction = tips + machine.tool_length * axes, -axes
+    found: list[Floats] = []
+    for obstacle in surroundings.obstacles:
+        bodies = MovingBodies.at(machine, position, direction, placement if obstacle.clamped else None)
+        found += _lines(machine, obstacle, bodies)
+        if surroundings.tool:
+            found.append(_tool(obstacle, surroundings.tool, bodies))
+    both = np.stack(found, axis=1)
+    return Contacts(both[..., 0] / np.array(comforts(surroundings)), both[..., 1:].reshape(len(tips), -1))
+
+
+def margin_formulas(
+    machine: Machine,
+    surroundings: Surroundings,
+    pose: tuple[Sequence[Any], Sequence[Any]],
+    placement: tuple[Callable[[int, int], Any], Sequence[Any]],
+    numbers: Sequence[Any],
+) -> list[Any]:
+    """Return the margins (C,) as formulas of the pose, contacts given.
+
+    pose: components of tip and axis, machine frame. placement: the entries of its rotation, and its translation.
+    numbers: of all contacts, one after the other. NumPy arrays or casadi symbols.
+    """
+    tip, axis = pose
+    turn, shift = placement
+    lever = [machine.tool_length - float(z) for z in machine.pentapod.offsets]
+    base = machine.pentapod.base.tolist()
+    formulas: list[Any] = []
+    for obstacle in surroundings.obstacles:
+        for body in range(len(surroundings.names)):
+            column = len(formulas)
+            s, *rest = numbers[NUMBERS * column : NUMBERS * (column + 1)]
+            normal, point, radius = rest[:3], rest[3:6], rest[6]
+            if body < LEGS:
+                start = [*base[body], 0.0]
+                x = [start[k] + s * (tip[k] + lever[body] * axis[k] - start[k]) for k in range(3)]
+            else:
+                x = [tip[k] + s * axis[k] for k in range(3)]
+            if obstacle.clamped:
+                off = [x[k] - shift[k] for k in range(3)]
+                x = [sum(turn(k, j) * off[k] for k in range(3)) for j in range(3)]
+            gap = sum(normal[k] * (x[k] - point[k]) for k in range(3)) - radius
+            formulas.append(gap / comforts(surroundings)[column])
+    return formulas
+
+
+def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies) -> list[Floats]:
+    """Return for legs and spindle the gaps and the numbers of their contacts, six of (N, 1 + NUMBERS)."""
+    count = len(bodies.tips)
+    top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
+    columns: list[Floats] = []
+    for body in range(LEGS + 1):
+        radius = float(bodies.radii[body])
+        cap = _CAP * COMFORTABLE_M["leg" if body < LEGS else "spindle"]
+        starts, ends = bodies.starts[:, body], bodies.ends[:, body]
+        found = obstacle.surface.segments(starts, ends, cap + radius)
+        near = found.distance < cap + radius
+        at = starts + found.place[:, None] * (ends - starts)
+        place = found.place if body < LEGS else top + found.place * (nose - top)
+        column = np.zeros((count, 1 + NUMBERS))
+        column[:, 0], column[:, -1] = found.distance - radius, -cap
+        column[near, 1], column[near, 2:5] = place[near], found.normal[near]
+        column[near, 5:8] = (at - found.distance[:, None] * found.normal)[near]
+        column[near, -1] = radius
+        # Where no way out is known the gap is a number that no step changes.
+        lost = near & ~found.normal.any(axis=1)
+        column[lost, -1] = -column[lost, 0]
+        columns.append(column)
+    return columns
+
+
+def _tool(obstacle: Obstacle, solids: tuple[Solid, ...], bodies: MovingBodies) -> Floats:
+    """Return for the tool body the gaps and the numbers of its contacts (N, 1 + NUMBERS)."""
+    from pentapod.toolpath.sweep_kernels import meridian_distance  # noqa: PLC0415  loads numba
+
+    cap = _CAP * COMFORTABLE_M[TOOL_BODY]
+    gaps, points = obstacle.surface.bodies(solids, bodies.tips, bodies.axes, cap)
+    gaps = np.minimum(gaps + obstacle.allowance, cap)
+    column = np.zeros((len(gaps), 1 + NUMBERS))
+    column[:, 0], column[:, -1] = gaps, -cap
+    shapes = [np.array(solid.numbers) for solid in solids]
+    for row in np.flatnonzero(np.isfinite(points[:, 0]) & (gaps < cap)):
+        tip, axis, point = bodies.tips[row], bodies.axes[row], points[row]
+        height = float((point - tip) @ axis)
+        across = point - tip - height * axis
+        aside = float(np.linalg.norm(across))
+        _, by_r, by_h = min(meridian_distance(shape, aside, height) for shape in shapes)
+        # From the body to the mesh point; the line along it meets the axis where the ball's middle is.
+        away = (by_r / aside if aside > 0.0 else 0.0) * across + by_h * axis
+        place = height - aside / max(by_r, _FLAT) * by_h
+        reach = float(-away @ (tip + place * axis - point))
+        column[row, 1:] = (place, *(-away), *point, reach - gaps[row])
+    return column
