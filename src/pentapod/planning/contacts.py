@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import LEGS, TOOL_BODY, MovingBodies, Obstacle, Surroundings, spindle_ends
@@ -106,21 +106,30 @@ def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies) -> list[F
     for body in range(LEGS + 1):
         radius = float(bodies.radii[body])
         cap = _CAP * COMFORTABLE_M["leg" if body < LEGS else "spindle"]
-        starts, ends = bodies.starts[:, body], bodies.ends[:, body]
+        column = np.zeros((count, 1 + NUMBERS))
+        column[:, 0], column[:, -1] = cap, -cap
+        columns.append(column)
+        rows = _boxed(obstacle, bodies.starts[:, body], bodies.ends[:, body], cap + radius)
+        if not len(rows):
+            continue
+        starts, ends = bodies.starts[rows, body], bodies.ends[rows, body]
         found = obstacle.surface.segments(starts, ends, cap + radius)
         near = found.distance < cap + radius
         at = starts + found.place[:, None] * (ends - starts)
         place = found.place if body < LEGS else top + found.place * (nose - top)
-        column = np.zeros((count, 1 + NUMBERS))
-        column[:, 0], column[:, -1] = found.distance - radius, -cap
-        column[near, 1], column[near, 2:5] = place[near], found.normal[near]
-        column[near, 5:8] = (at - found.distance[:, None] * found.normal)[near]
-        column[near, -1] = radius
         # Where no way out is known the gap is a number that no step changes.
-        lost = near & ~found.normal.any(axis=1)
-        column[lost, -1] = -column[lost, 0]
-        columns.append(column)
+        known, gap = found.normal.any(axis=1), found.distance - radius
+        numbers = (gap, place, *found.normal.T, *(at - found.distance[:, None] * found.normal).T)
+        exact = np.column_stack([*numbers, np.where(known, radius, -gap)])
+        column[rows[near]] = exact[near]
     return columns
+
+
+def _boxed(obstacle: Obstacle, starts: Floats, ends: Floats, within: float) -> Ints:
+    """Return the segments (M, 3) to (M, 3) whose boxes come within `within` of the obstacle's box."""
+    low, high = obstacle.surface.bounds
+    apart = np.maximum(np.minimum(starts, ends) - high, low - np.maximum(starts, ends)).max(axis=1)
+    return np.flatnonzero(apart < within)
 
 
 def _tool(obstacle: Obstacle, solids: tuple[Solid, ...], bodies: MovingBodies) -> Floats:
