@@ -43,10 +43,11 @@ def test_margins_and_slopes_are_casadis(desk, cap, by):
     count = len(task.pivots)
     leans, pair = 0.1 * rng.normal(size=(2, count)), setting.domain.lean_plane.T
     fixed = np.zeros((6, 1)), pair.T.reshape(-1, 1), transform.rotation.T.reshape(-1, 1), transform.translation[:, None]
-    found = Vectorised(function)(fixed[0], leans, task.pivots.T, task.nominal.T, *fixed[1:])
+    touching = np.zeros((0, count))  # there is nothing to touch
+    found = Vectorised(function)(fixed[0], leans, task.pivots.T, task.nominal.T, *fixed[1:], touching)
     for k in range(0, count, 37):
         row = [fixed[0], leans[:, k], task.pivots[k], task.nominal[k], pair, transform.rotation, transform.translation]
-        for ours, theirs in zip(found, function(*row), strict=True):
+        for ours, theirs in zip(found, function(*row, touching[:, k]), strict=True):
             np.testing.assert_array_equal(ours[:, k], np.asarray(theirs).ravel(order="F"))
 
 

@@ -53,14 +53,20 @@ def contacts(
 ) -> Contacts:
     """Return the contacts of tool poses (N, 3), machine frame, with the workpiece placed."""
     position, direction = tips + machine.tool_length * axes, -axes
-    found: list[Floats] = []
-    for obstacle in surroundings.obstacles:
-        bodies = MovingBodies.at(machine, position, direction, placement if obstacle.clamped else None)
-        found += _lines(machine, obstacle, bodies)
+    comfortable, moving = np.array(comforts(surroundings)), len(surroundings.names)
+    both = np.zeros((len(tips), len(comfortable), 1 + NUMBERS))
+    both[..., 0], both[..., -1] = _CAP * comfortable, -_CAP * comfortable
+    for k, obstacle in enumerate(surroundings.obstacles):
+        frame = placement if obstacle.clamped else None
+        rows = _near(machine, obstacle, surroundings.tool, tips, axes, frame)
+        if not len(rows):
+            continue
+        bodies = MovingBodies.at(machine, position[rows], direction[rows], frame)
+        columns = _lines(machine, obstacle, bodies)
         if surroundings.tool:
-            found.append(_tool(obstacle, surroundings.tool, bodies))
-    both = np.stack(found, axis=1)
-    return Contacts(both[..., 0] / np.array(comforts(surroundings)), both[..., 1:].reshape(len(tips), -1))
+            columns.append(_tool(obstacle, surroundings.tool, bodies))
+        both[rows, k * moving : (k + 1) * moving] = np.stack(columns, axis=1)
+    return Contacts(both[..., 0] / comfortable, both[..., 1:].reshape(len(tips), -1))
 
 
 def margin_formulas(
@@ -123,6 +129,38 @@ def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies) -> list[F
         exact = np.column_stack([*numbers, np.where(known, radius, -gap)])
         column[rows[near]] = exact[near]
     return columns
+
+
+def _near(
+    machine: Machine,
+    obstacle: Obstacle,
+    tool: Sequence[Solid],
+    tips: Floats,
+    axes: Floats,
+    frame: RigidTransform | None,
+) -> Ints:
+    """Return the poses (N, 3) in which the box around any body comes near the obstacle's box: most do not."""
+    robot, bodies = machine.pentapod, machine.bodies
+    base = np.column_stack([robot.base, np.zeros(LEGS)])
+    if frame is not None:
+        back = frame.inverse()
+        tips, axes, base = back.apply(tips), back.rotate(axes), back.apply(base)
+    low, high = obstacle.surface.bounds
+    top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
+    lines = [(base[k], tips + (machine.tool_length - robot.offsets[k]) * axes) for k in range(LEGS)]
+    reaches = [_CAP * COMFORTABLE_M["leg"] + bodies.leg_radius] * LEGS
+    lines.append((tips + nose * axes, tips + top * axes))
+    reaches.append(_CAP * COMFORTABLE_M["spindle"] + bodies.shaft_radius)
+    if tool:
+        least, most = min(s.low - s.rounding for s in tool), max(s.top for s in tool)
+        lines.append((tips + least * axes, tips + most * axes))
+        wide = max(max(s.low_radius, s.high_radius) + s.rounding for s in tool)
+        reaches.append(_CAP * COMFORTABLE_M[TOOL_BODY] + wide)
+    near = np.zeros(len(tips), dtype=np.bool_)
+    for (a, b), reach in zip(lines, reaches, strict=True):
+        apart = np.maximum(np.minimum(a, b) - high, low - np.maximum(a, b)).max(axis=1)
+        near |= apart < reach
+    return np.flatnonzero(near)
 
 
 def _boxed(obstacle: Obstacle, starts: Floats, ends: Floats, within: float) -> Ints:
