@@ -103,7 +103,7 @@ def test_margins_are_distances_of_samples(desk, crowd, place):
 def test_the_formula_equals_the_margins_and_their_slopes(desk, crowd, place):
     """At the poses where contacts were taken: the value, and central differences of the true margins."""
     margins = Margins.of(desk, PLUS, crowd)
-    tips, axes = poses(desk, 60, seed=3)
+    tips, axes = poses(desk, 80, seed=3)
     count = len(names(crowd))
     tip, axis, turn, shift = (ca.SX.sym("x", *size) for size in ((3,), (3,), (3, 3), (3,)))
     numbers = ca.SX.sym("c", margins.contact_numbers)

@@ -20,7 +20,7 @@ from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import LEGS, TOOL_BODY, MovingBodies, Obstacle, Surroundings, spindle_ends
 from pentapod.toolpath.solids import Solid
 
-COMFORTABLE_M = {"leg": 0.05, "spindle": 0.02, TOOL_BODY: 0.005}
+COMFORTABLE_M = {"leg": 0.05, "spindle": 0.01, TOOL_BODY: 0.005}
 """Gaps that count as margin 1: a spindle and a tool work near the part by nature."""
 
 NUMBERS = 8
