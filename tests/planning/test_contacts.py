@@ -127,7 +127,7 @@ def test_the_formula_equals_the_margins_and_their_slopes(desk, crowd, place):
         promised = np.asarray(slope) @ np.concatenate([way, turned])
         close += int((np.abs(promised - differences) < 0.02 * (1.0 + np.abs(differences)))[near].sum())
         seen += int(near.sum())
-    assert seen > 60
+    assert seen > 50
     assert close > 0.95 * seen  # the rest have two nearest points, or a tool's distance known to 10 µm only
 
 
