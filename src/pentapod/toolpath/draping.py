@@ -18,6 +18,7 @@ _MOST_ROUNDS = 14
 _TORN = 4.0
 _ROUGH = 0.1
 _FINE = 0.02
+_FIRST = 0.25
 _NOT_QUITE_HALF = 0.47
 """Where chords are tested: a symmetric bend would hide in the middle."""
 
@@ -30,7 +31,8 @@ def draped(lines: list[Floats], landing: Landing, *, spacing: float, chordal: fl
     surface, and where neighbours land so far apart that the surface between them must be torn; what is torn by less
     than a tenth of the spacing (straightest lines part at a mesh's corners) is bridged.
     """
-    fine = [spaced(line, spacing) for line in lines]
+    # Two bends within one chord could hide from a test of one place.
+    fine = [spaced(line, _FIRST * spacing) for line in lines]
     owner = np.repeat(np.arange(len(fine)), [len(line) for line in fine])
     plane, owner, points, normals, landed = _refined(np.concatenate(fine), owner, landing, chordal)
     steps = np.where(owner[1:] == owner[:-1], np.linalg.norm(np.diff(plane, axis=0), axis=1), 0.0)
