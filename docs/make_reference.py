@@ -155,6 +155,7 @@ def _cell(text: str) -> str:
 
 
 def _commands() -> Iterator[str]:
+    yield _help(cli, "pentapod", "##")
     for verb in VERBS:
         command = cli.get_command(click.Context(cli), verb)
         if command is None:
@@ -166,7 +167,9 @@ def _commands() -> Iterator[str]:
 
 
 def _help(command: click.Command, name: str, level: str) -> str:
-    context = click.Context(command, info_name=name, max_content_width=_WIDE, terminal_width=_WIDE)
+    # With the names that `cli` gives its help option: click remembers the option that is asked for first.
+    shared: dict[str, Any] = dict(cli.context_settings)
+    context = click.Context(command, info_name=name, max_content_width=_WIDE, terminal_width=_WIDE, **shared)
     return f"{level} {name}\n\n```text\n{command.get_help(context).rstrip()}\n```\n"
 
 

@@ -55,9 +55,22 @@ def _print_version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
         ctx.exit()
 
 
+def _print_completion(ctx: click.Context, _: click.Parameter, value: str | None) -> None:
+    if value is not None:
+        from click.shell_completion import get_completion_class
+
+        kind = get_completion_class(value)
+        if kind is not None:
+            click.echo(kind(cli, {}, "pentapod", "_PENTAPOD_COMPLETE").source())
+        ctx.exit()
+
+
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--version", is_flag=True, expose_value=False, is_eager=True, callback=_print_version,
               help="Show the version and exit.")  # fmt: skip
+@click.option("--completion", type=click.Choice(["bash", "zsh", "fish"]), expose_value=False, is_eager=True,
+              callback=_print_completion, help="Print what the shell needs to complete words, and exit.")  # fmt: skip
+@click.option("--debug", is_flag=True, expose_value=False, help="With any verb: errors show their traceback.")
 def cli() -> None:
     """From a surface mesh to a checked leg-length program for a five-legged parallel robot.
 

@@ -26,9 +26,16 @@ def _print_formats(ctx: click.Context, _: click.Parameter, value: bool) -> None:
         ctx.exit()
 
 
+def _complete_format(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
+    from pentapod.program.posts import post_names
+
+    del ctx, param
+    return [name for name in post_names() if name.startswith(incomplete)]
+
+
 @click.command()
 @click.argument("program", type=click.Path(path_type=Path))
-@click.option("--to", "name", required=True, help="Format; --formats lists them.")
+@click.option("--to", "name", required=True, shell_complete=_complete_format, help="Format; --formats lists them.")
 @click.option("-o", "--out", required=True, type=click.Path(path_type=Path), help="Folder for the files.")
 @click.option("--job", type=click.Path(path_type=Path), help="The job it was made from: tells the machine.")
 @click.option("--machine", help="The machine's name or file, where there is no job.")

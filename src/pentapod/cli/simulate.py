@@ -60,6 +60,7 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
         load_mujoco()  # a missing one is said at once
     read, loaded = read_csv(program), Job.load(job)
     reference = Reference(read, PostInput(read, job_machine(loaded)).the_machine())
+    same_job = read.provenance.job_digest == loaded.digest
     with progress_bar(quiet=quiet or as_json) as progress:
         progress("toolpath", 0.0)
         toolpath, _ = job_toolpath(loaded, job_mesh(loaded, progress), progress)
@@ -74,9 +75,13 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
     largest = max(part.measures[0].largest for part in tracking)
     passed = within_mm is None or largest <= within_mm
     if as_json:
-        echo_json({"engine": engine, "rows": len(read.legs), "done": True, "passed": passed, **content})
+        echo_json(
+            {"engine": engine, "rows": len(read.legs), "same_job": same_job, "done": True, "passed": passed, **content}
+        )
     elif not quiet:
         click.echo("\n".join([f"{engine}: {len(read.legs)} setpoints, {read.duration:.6g} s", *lines]))
+    if not same_job and not quiet:
+        click.echo("note: the program was made from another job, so its toolpath may be another", err=True)
     if not passed:
         click.echo(f"the contour error, {largest:.3g} mm, exceeds {within_mm:g} mm", err=True)
     return 0 if passed else 1

@@ -19,7 +19,8 @@ from pentapod.arrays import Floats
 from pentapod.kinematics.as_built import AsBuiltPentapod
 from pentapod.machine.machine import Machine
 
-_SOLREF, _SOLIMP = "0.002 1", "0.9999 0.9999 0.001 0.5 2"
+_STEPS = 2.0  # time constant of the constraints, in steps: the least that is stable
+_SOLIMP = "0.9999 0.9999 0.001 0.5 2"
 _SPIN_DAMPING = 0.01  # N·m·s
 _CYLINDER = 0.9  # the fixed part's share of the shortest leg
 _STEEL, _ROD, _SPINDLE = "0.55 0.58 0.62 1", "0.85 0.86 0.88 1", "0.25 0.45 0.75 1"
@@ -40,8 +41,9 @@ def mjcf(machine: Machine, real: AsBuiltPentapod, position: Floats, direction: F
     option.attrib |= {"solver": "Newton", "iterations": "100", "tolerance": "1e-12"}
     _add(option, "flag", contact="disable")
     defaults = _add(root, "default")
-    _add(defaults, "equality", solref=_SOLREF, solimp=_SOLIMP)
-    _add(defaults, "joint", solreflimit=_SOLREF, solimplimit=_SOLIMP)
+    stiff = [_STEPS * step, 1.0]
+    _add(defaults, "equality", solref=stiff, solimp=_SOLIMP)
+    _add(defaults, "joint", solreflimit=stiff, solimplimit=_SOLIMP)
     world = _add(root, "worldbody")
     for leg in range(5):
         _leg(world, machine, leg, real.base[leg], vectors[leg] / lengths[leg], lengths[leg])

@@ -19,7 +19,7 @@ from pentapod.simulate.mjcf import mjcf
 from pentapod.simulate.played import Played
 from pentapod.simulate.reference import Reference
 
-LONGEST_STEP_S = 1e-3
+LONGEST_STEP_S = 5e-4
 _REST_S = 0.3  # so long the machine stands before the start, until the drives carry its weight
 _STILL = np.zeros(5)
 _NEWS = 500  # rows between two reports of progress
