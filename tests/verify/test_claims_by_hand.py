@@ -1,5 +1,6 @@
 """What each claim says, number by number: value, bound, unit, place and words, recomputed by hand from the rows."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import replay_cases as cases
 
 from pentapod.kinematics.certificate import certify_component
 from pentapod.program import quantised
-from pentapod.verify import Certificate, Claim, Place, Replay, Verdict, verify
+from pentapod.verify import CLAIMS, Certificate, Claim, Place, Replay, Verdict, verify, write_verdict
 from pentapod.verify.claim import Finding
 from pentapod.verify.survey import ComponentFindings, Extreme
 from pentapod.verify.tracking import _raised, at_samples
@@ -266,3 +267,103 @@ def test_zero_is_a_tolerance_of_angles_but_not_of_lengths(linear):
     assert not verify(linear.program, linear.machine, linear.toolpath, **given).passed
     with pytest.raises(Exception, match="path_tolerance"):
         verify(linear.program, linear.machine, linear.toolpath, **{**cases.TOLERANCES, "path_tolerance": 0.0})
+
+
+# How much is allowed beyond a limit.
+
+
+def judged(replay, name, machine=None, **changes):
+    """Whether a claim holds on the same motion, judged on another machine or with other tolerances."""
+    other = replace(replay, machine=machine or replay.machine, **changes)
+    _ = replay.match
+    other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"survey", "match", "pivots", "axes"}})
+    (claim,) = (claim for claim in CLAIMS if claim.name == name)
+    certificate = claim(other)
+    assert certificate is not None
+    return certificate.passed
+
+
+@pytest.mark.parametrize(
+    ("claim", "name", "allowed"),
+    [
+        ("leg rates", "max_velocity", 1e-3),
+        ("leg accelerations", "max_acceleration", 1e-3),
+        ("leg jerks", "max_jerk", 0.05),
+        ("starts at rest", "max_acceleration", 1e-3),
+        ("ends at rest", "max_acceleration", 1e-3),
+        ("legs not too long", "max_length", 0.0),
+        ("legs not too short", "min_length", 0.0),
+    ],
+)
+def test_allowance_on_limits_of_legs(replay, found, claim, name, allowed):
+    per = replay.program.period if "rest" in claim else 1.0
+    needed = found[claim].value / 1e3 / per
+    sign = -1.0 if name == "min_length" else 1.0
+    for share, holds in ((0.9 * allowed - 1e-9, True), (1.1 * allowed + 1e-6, False)):
+        legs = replace(replay.machine.legs, **{name: np.full(5, needed / (1.0 + sign * share))})
+        assert judged(replay, claim, replace(replay.machine, legs=legs)) is holds
+
+
+@pytest.mark.parametrize(
+    ("claim", "name", "side"),
+    [
+        ("base joint cones", "base_cone", None),
+        ("platform joints not too closed", "platform_range", 0),
+        ("platform joints not too open", "platform_range", 1),
+    ],
+)
+def test_nothing_is_allowed_beyond_a_joint(replay, found, claim, name, side):
+    joints, needed = replay.machine.joints, np.radians(found[claim].value)
+    for wider, holds in ((1e-9, True), (-1e-9, False)):
+        limit = np.array(getattr(joints, name))
+        limit[... if side is None else (slice(None), side)] = needed + (-wider if side == 0 else wider)
+        assert judged(replay, claim, replace(replay.machine, joints=replace(joints, **{name: limit}))) is holds
+
+
+@pytest.mark.parametrize("claim", ["tip deviation", "toolpath covered"])
+def test_allowance_on_the_path_tolerance(replay, found, claim):
+    for share, holds in ((0.9e-3, True), (1.1e-3, False)):
+        assert judged(replay, claim, path_tolerance=1e-3 * found[claim].value / (1.0 + share)) is holds
+
+
+def test_allowance_on_the_axis_tolerance(replay, found):
+    needed = np.radians(found["axis deviation"].value) - replay.tilt
+    assert needed < 0.0
+    for share, holds in ((0.9e-3, True), (1.1e-3, False)):
+        tolerance = np.radians(0.1)
+        tilt = np.radians(found["axis deviation"].value) - tolerance * (1.0 + share)
+        assert judged(replay, "axis deviation", tilt=tilt, axis_tolerance=tolerance) is holds
+
+
+def test_bounds_for_all_times_are_undecided_where_the_motion_is_not_proven(replay):
+    """One chord of which nothing is proven: every claim that speaks of the time between samples fails."""
+    other, partly = replace(replay), copy(replay.survey)
+    _ = replay.match
+    partly.away = partly.away.copy()
+    partly.away[7] = np.inf
+    other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"match", "pivots", "axes"}})
+    other.__dict__["survey"] = partly
+    answers = [answer for claim in CLAIMS if (answer := claim(other)) is not None]
+    undecided = {answer.claim for answer in answers if answer.method.startswith("undecided")}
+    assert undecided == {answer.claim for answer in answers if not answer.passed}
+    assert undecided >= {
+        "base joint cones",
+        "platform joints not too closed",
+        "platform joints not too open",
+        "clearance between legs and shaft",
+        "tip deviation",
+        "axis deviation",
+        "toolpath covered",
+        "feed on cuts",
+        "feed on links",
+        "rapid rate",
+    }
+    assert "leg rates" not in undecided
+    assert all(answer.where.row == 3 for answer in answers if answer.claim in undecided)
+
+
+def test_a_verdict_that_json_cannot_hold_is_not_written(tmp_path):
+    verdict = Verdict((Certificate("a", True, np.nan, None, "", Place(), ""),))
+    with pytest.raises(ValueError, match="JSON"):
+        write_verdict(verdict, tmp_path / "verdict.json")
+    assert list(tmp_path.iterdir()) == []
