@@ -219,3 +219,32 @@ def test_words():
     leaning = RigidTransform(np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]]), np.zeros(3))
     assert "leans 90.00°" in placement_sentences(leaning)[1]
     assert "towards 0.0°" in placement_sentences(leaning)[1]
+
+
+def test_a_long_job_stays_small():
+    """100,000 waypoints and 400,000 rows: the path and the plots, thinned, and their extremes kept."""
+    from pentapod.machine import Machine
+    from pentapod.report.plots import time_figure
+    from pentapod.report.scene import path_traces
+
+    count, machine = 400_000, Machine.load("desk")
+    random = np.random.default_rng(4)
+    legs = 0.7 + 0.1 * random.standard_normal((count, 5))
+    axes = np.tile([0.0, 0.0, 1.0], (count, 1))
+    speeds = np.abs(random.standard_normal(count))
+    margins = random.random((40_000, 20))
+    signals = Signals(
+        np.arange(count) * 1e-3, legs, legs - 0.7, legs - 0.7, legs[:, :3], axes, speeds, np.full(count, 5.0),
+        np.arange(count) // 100, np.arange(count) % 1000 > 99, np.arange(count) // 90 % 7, tuple("abcdefg"),
+        margins, np.arange(0, count, 10), tuple(f"margin {k}" for k in range(20)),
+    )  # fmt: skip
+    plots, traces = time_figure(signals, machine), path_traces(signals)
+    assert len(json.dumps(plots)) + len(json.dumps(traces)) < 3e6
+    by_leg = [trace for trace in plots["data"] if trace["name"] == "leg 3"]
+    assert unpacked(by_leg[0]["y"]).max() == pytest.approx(1e3 * legs[:, 2].max(), rel=1e-6)
+    by_margin, by_feed, by_cause, _ = traces
+    cut = signals.cutting[::10]
+    assert unpacked(by_margin["line"]["color"]).min() <= margins[cut].min() + 1e-6
+    assert unpacked(by_feed["line"]["color"]).max() == pytest.approx(20.0 * speeds.max(), rel=1e-6)
+    assert set(unpacked(by_cause["line"]["color"])) == set(range(7))
+    assert [trace.get("visible", True) for trace in traces] == [True, False, False, "legendonly"]

@@ -320,6 +320,36 @@ def test_nothing_is_allowed_beyond_a_joint(replay, found, claim, name, side):
         assert judged(replay, claim, replace(replay.machine, joints=replace(joints, **{name: limit}))) is holds
 
 
+@pytest.mark.parametrize("leg", range(5))
+@pytest.mark.parametrize(
+    ("claim", "name", "extreme"),
+    [
+        ("leg rates", "max_velocity", "rates"),
+        ("leg accelerations", "max_acceleration", "accelerations"),
+        ("leg jerks", "max_jerk", "jerks"),
+        ("legs not too long", "max_length", "longest"),
+        ("legs not too short", "min_length", "shortest"),
+    ],
+)
+def test_each_leg_is_held_to_its_own_limit(replay, claim, name, extreme, leg):
+    """All legs have room but one, whose limit is 8 % too tight; that one is named, with its own numbers."""
+    needed = np.abs(getattr(replay.survey, extreme).values)
+    least = name == "min_length"
+    limit = needed * (0.5 if least else 2.0)
+    limit[leg] = needed[leg] * (1.08 if least else 1.0 / 1.08)
+    machine = replace(replay.machine, legs=replace(replay.machine.legs, **{name: limit}))
+    other = replace(replay, machine=machine)
+    _ = replay.match
+    other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"survey", "match"}})
+    (found,) = (claim_ for claim_ in CLAIMS if claim_.name == claim)
+    certificate = found(other)
+    assert not certificate.passed
+    assert certificate.method.startswith(f"leg {leg + 1} is closest to its limit; ")
+    assert certificate.value == pytest.approx(1e3 * needed[leg])
+    assert certificate.bound == pytest.approx(1e3 * limit[leg])
+    assert certificate.where.row == int(getattr(replay.survey, extreme).at[leg])
+
+
 @pytest.mark.parametrize("claim", ["tip deviation", "toolpath covered"])
 def test_allowance_on_the_path_tolerance(replay, found, claim):
     for share, holds in ((0.9e-3, True), (1.1e-3, False)):

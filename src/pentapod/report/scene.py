@@ -29,7 +29,7 @@ CUTS_BY = {
 
 _MOST_FACETS = 60_000
 _MOST_EDGES = 5_000
-_BUCKETS = 4_000
+_BUCKETS = 2_500
 _LIFT_M = 0.5e-3  # along the tool axis: a ball's tip runs on and below the surface, which would hide its path
 # Worst is darkest, on a light part: the order can be read without colour, too.
 _MARGIN_COLOURS = [[0.0, "#5c0019"], [0.2, "#b5371c"], [0.5, "#e39a2d"], [1.0, "#9fe0bd"]]
