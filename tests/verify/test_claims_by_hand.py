@@ -397,3 +397,15 @@ def test_a_verdict_that_json_cannot_hold_is_not_written(tmp_path):
     with pytest.raises(ValueError, match="JSON"):
         write_verdict(verdict, tmp_path / "verdict.json")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_the_legs_alone_tell_is_judged_without_a_pose(linear):
+    legs = linear.program.legs.copy()
+    legs[1000] = 0.02
+    program = replace(linear.program, legs=quantised(legs))
+    verdict = verify(program, linear.machine, linear.toolpath, **cases.TOLERANCES, job_digest="job-1")
+    judged_anyway = {c.claim for c in verdict.certificates if not c.method.startswith("not judged")}
+    assert judged_anyway >= {"machine", "job", "component kept, w", "component kept, S", "legs not too short"}
+    assert judged_anyway >= {"legs not too long", "leg rates", "leg accelerations", "leg jerks"}
+    assert judged_anyway >= {"starts at rest", "ends at rest"}
+    assert not judged_anyway & {"tip deviation", "axis deviation", "toolpath covered", "rapid rate", "base joint cones"}
