@@ -10,6 +10,7 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.planning.freedom import FREE, Freedom
+from pentapod.planning.weights import Weights
 from pentapod.table import Vector
 from pentapod.toolpath.mesh import Mesh
 
@@ -34,6 +35,12 @@ def job_freedom(job: Job, machine: Machine, mesh: Mesh) -> Freedom:
     reference = _pose(np.zeros(3), table.rotation_deg or (0.0, 0.0, 0.0))
     low, high = corners.min(axis=0), corners.max(axis=0)
     return Freedom.free(low=low, high=high, reference=reference, largest_turn=float(np.radians(turn)))
+
+
+def job_weights(job: Job) -> Weights:
+    """Return the weights of the margins that the job asks for."""
+    table = job.placement
+    return Weights(table.weight_strokes, table.weight_singularities, table.weight_joints, table.weight_bodies)
 
 
 def _on_table(job: Job, machine: Machine, mesh: Mesh) -> Freedom:

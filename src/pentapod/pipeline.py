@@ -13,7 +13,7 @@ import numpy as np
 from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, write_arrays, write_json
 from pentapod.errors import MachineError, MeshError
 from pentapod.job import Job
-from pentapod.job_placement import job_freedom
+from pentapod.job_placement import job_freedom, job_weights
 from pentapod.job_strategy import job_options
 from pentapod.job_surroundings import job_surroundings
 from pentapod.job_tool import FileReport, Reports, finished_as_asked, job_tool
@@ -184,7 +184,7 @@ class _Task:
 
     def program(self, file: Path) -> Program | Refusal:
         """Plan, write the program to `file` and return it; or return the first refusal."""
-        placed = self.clock.time("placement", self._placed)
+        placed = self.clock.time("placement", self._placed, says=_interrupted)
         if isinstance(placed, Refusal):
             return placed
         path = self.clock.time("leg path", lambda: self._path(placed))
@@ -206,6 +206,8 @@ class _Task:
             freedom=self.freedom,
             component=None if wanted is None else Component.parse(wanted),
             surroundings=self.surroundings,
+            weights=job_weights(self.job),
+            then=self.job.placement.then,
             solver=self.job.placement.solver,
             progress=self.clock.progress,
         )
@@ -234,6 +236,13 @@ class _Task:
         spots = tips - self.toolpath.pivot * direction if beam else None
         uses = certify(trajectory, self.machine, legs=program.legs, tips=tips, axes=-direction, spots=spots)
         return explain(trajectory, self.machine, uses, slow)
+
+
+def _interrupted(placed: PlacedPath | Refusal) -> str:
+    """Return what a search that was interrupted came to; nothing else is worth a line."""
+    if isinstance(placed, Refusal) or "interrupted" not in placed.placement.chosen_by:
+        return ""
+    return f"placement: {placed.placement.chosen_by}; smallest margin {placed.smallest_margin:.3f}"
 
 
 class _Clock:

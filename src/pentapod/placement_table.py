@@ -47,6 +47,16 @@ class PlacementTable(Table):
     poses_mm_deg: tuple[Pose, ...] | None = Field(
         default=None, min_length=1, description="fixture: poses to choose from, each position_mm and rotation_deg"
     )
+    weight_strokes: Positive = Field(
+        default=1.0, description="room that the legs' strokes are to have, against singularities, joints and bodies"
+    )
+    weight_singularities: Positive = Field(default=1.0, description="the same for distances to the singular surfaces")
+    weight_joints: Positive = Field(default=1.0, description="the same for the angles of base and platform joints")
+    weight_bodies: Positive = Field(default=1.0, description="the same for gaps between bodies")
+    then: Literal["force", "time"] | None = Field(
+        default=None,
+        description="second aim, for a tenth of the margin: least leg force per cutting force, or least machining time",
+    )
     component: Literal["++", "+-", "-+", "--"] | None = Field(
         default=None, description="signs of w and S of the assembly mode; the best one when left out"
     )

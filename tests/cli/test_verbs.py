@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -290,7 +292,8 @@ def test_ik_and_fk_as_a_pipe():
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_ctrl_c_leaves_nothing_and_says_so(tmp_path):
-    job = Path(__file__).parents[2] / "toolpaths" / "dome.toml"
+    """While nothing that fits is found; the part of this job never fits."""
+    job = Path(__file__).parents[2] / "toolpaths" / "oversize.toml"
     process = subprocess.Popen(
         [*PENTAPOD, "plan", str(job), "-o", str(tmp_path / "out")], stderr=subprocess.PIPE, text=True
     )
@@ -305,3 +308,42 @@ def test_ctrl_c_leaves_nothing_and_says_so(tmp_path):
     assert said.strip().endswith("interrupted")
     assert "Traceback" not in said
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_ctrl_c_in_the_search_for_a_placement_goes_on_with_the_best_so_far(make_job, tmp_path, capsys, monkeypatch):
+    path = make_job()
+    path.write_text(path.read_text().split("[placement]")[0])
+
+    @contextmanager
+    def interrupting(**_):
+        def progress(stage: str, fraction: float, note: str = "") -> None:
+            if "best margin so far" in note:
+                signal.raise_signal(signal.SIGINT)
+
+        yield progress
+
+    monkeypatch.setattr("pentapod.cli.plan.progress_bar", interrupting)
+    assert run(["plan", str(path), "-o", str(tmp_path / "out"), "--explain"]) == 0
+    said = capsys.readouterr().out
+    assert "placement: largest smallest margin, the search interrupted after 1 of up to 10 starts" in said
+    assert "verdict: passed" in said
+    assert "leg 1 too long" in said  # the table of limits
+
+
+def test_explain_prints_the_blame_table(make_job, tmp_path, capsys):
+    out = ["-o", str(tmp_path / "out"), "--explain"]
+    assert run(["plan", str(make_job()), *out]) == 0
+    table = capsys.readouterr().out
+    rows = re.findall(r"^(\S.*?) {2,}(\d\.\d{4}) +([\d.e+]+) (mm|deg) +(\d+) ", table, re.M)
+    margins = [float(row[1]) for row in rows]
+    assert len(rows) > 20
+    assert margins == sorted(margins)
+    assert run(["plan", str(make_job()), *out, "--json"]) == 0
+    limits = json.loads(capsys.readouterr().out)["limits"]
+    assert [limit["margin"] for limit in limits] == pytest.approx(margins, abs=1e-4)
+    assert sum(limit["share"] for limit in limits) == pytest.approx(1.0)
+    assert run(["plan", str(make_job(TOO_FAR)), *out]) == 1
+    refused = capsys.readouterr().out
+    assert "limit in the way" in refused
+    assert re.search(r"too long +\d+ mm +\d+", refused)

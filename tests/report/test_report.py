@@ -6,6 +6,7 @@ import base64
 import json
 import re
 from html.parser import HTMLParser
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from pentapod.job import Job
 from pentapod.job_placement import job_freedom
 from pentapod.outcome import Outcome
 from pentapod.pipeline import job_machine, job_mesh, run
+from pentapod.planning import PlacedPath
 from pentapod.program import Program
 from pentapod.report import write_report
 from pentapod.report.decimate import keep_extremes, thinned_mesh
@@ -219,6 +221,25 @@ def test_words():
     leaning = RigidTransform(np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]]), np.zeros(3))
     assert "leans 90.00°" in placement_sentences(leaning)[1]
     assert "towards 0.0°" in placement_sentences(leaning)[1]
+
+
+def test_the_setup_sheet_names_the_limit_at_every_place(make_job, tmp_path):
+    """The stretches of the band join to the whole path, and each is told by the limit that is nearest there."""
+    outcome = run(Job.load(make_job()), tmp_path / "out")
+    placed = outcome.find(PlacedPath)
+    assert placed is not None
+    text, page = page_of(outcome, tmp_path)
+    told = re.findall(r"<title>([^<]*): waypoints (\d+) to (\d+), smallest margin ([\d.-]+)</title>", text)
+    assert int(told[0][1]) == 0
+    assert int(told[-1][2]) == len(placed.tips) - 1
+    for before, after in pairwise(told):
+        assert int(after[1]) == int(before[2]) + 1
+    for name, first, last, margin in told:
+        stretch = placed.margins[int(first) : int(last) + 1]
+        assert float(margin) == pytest.approx(stretch.min(), abs=1e-3)
+        assert placed.margin_names[int(stretch.min(axis=0).argmin())] == name.replace("&gt;", ">")
+    assert text.count('aria-label="from ') == 2
+    assert "nearest limits" in page.text
 
 
 def test_a_long_job_stays_small():

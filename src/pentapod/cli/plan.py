@@ -4,28 +4,39 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option, verdict_text
+
+if TYPE_CHECKING:
+    from pentapod.outcome import Outcome
 
 
 @click.command()
 @click.argument("job", type=click.Path(path_type=Path))
 @click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True,
               help="Folder for the files.")  # fmt: skip
+@click.option("--explain", is_flag=True, help="Print which limits bind, where, and by how much.")
 @json_option
 @quiet_option
-def plan(job: Path, out: Path, as_json: bool, quiet: bool) -> int:
+def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int:
     """Plan JOB.toml: write program.csv, verdict.json, report.html and plan.npz.
 
     The folder changes only when the run ends: then its four files are of one run. A job that cannot be done
     leaves no program.csv.
+
+    Ctrl-C during the search for a placement ends the search and goes on with the best found so far, if that fits; at
+    any other time it ends the command and changes nothing.
     """
     from pentapod.artefacts import PROGRAM, REPORT
     from pentapod.job import Job
     from pentapod.pipeline import run
+    from pentapod.planning import PlacedPath
+    from pentapod.planning.binding import bindings
     from pentapod.report import write_report
     from pentapod.timing import Explanation
 
@@ -37,9 +48,13 @@ def plan(job: Path, out: Path, as_json: bool, quiet: bool) -> int:
         seconds = {stage.name: round(stage.seconds, 3) for stage in outcome.stages}
         story = outcome.find(Explanation)
         told = {} if story is None else {"timing": story.to_dict()}
+        if explain and (placed := outcome.find(PlacedPath)) is not None:
+            told["limits"] = [dataclasses.asdict(binding) for binding in bindings(placed, outcome.machine)]
         echo_json({**outcome.to_dict(), **told, "out": str(out), "seconds": seconds})
     elif not quiet:
         click.echo("\n".join(stage.said for stage in outcome.stages if stage.said))
+        if explain:
+            click.echo(_explained(outcome))
         if refusal is None:
             click.echo(verdict_text(outcome.verdict))
             click.echo(f"program: {out / PROGRAM}")
@@ -49,3 +64,15 @@ def plan(job: Path, out: Path, as_json: bool, quiet: bool) -> int:
     elif not outcome.passed and quiet:
         click.echo("the verdict failed", err=True)
     return 0 if outcome.passed else 1
+
+
+def _explained(outcome: Outcome) -> str:
+    """Return the blame table of a run: of its refusal, or of the plan that fits."""
+    from pentapod.cli.explain import bindings_text, blames_text
+    from pentapod.planning import PlacedPath
+    from pentapod.planning.binding import bindings
+
+    if outcome.refusal is not None and outcome.refusal.blames:
+        return blames_text(outcome.refusal)
+    placed = outcome.find(PlacedPath)
+    return "" if placed is None else bindings_text(bindings(placed, outcome.machine))

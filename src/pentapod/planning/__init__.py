@@ -5,5 +5,6 @@ from pentapod.planning.leg_path import LegPath, LegPiece, leg_path
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.planning.placement import Placement
 from pentapod.planning.plan import plan
+from pentapod.planning.weights import Weights
 
-__all__ = ["Freedom", "LegPath", "LegPiece", "PlacedPath", "Placement", "leg_path", "plan"]
+__all__ = ["Freedom", "LegPath", "LegPiece", "PlacedPath", "Placement", "Weights", "leg_path", "plan"]

@@ -18,6 +18,7 @@ from pentapod.planning.freedom import Freedom
 from pentapod.planning.margins import Margins
 from pentapod.planning.setting import Setting
 from pentapod.planning.vectorised import Vectorised
+from pentapod.planning.weights import weighed
 
 Slopes = Callable[[Floats, Floats, Ints], Floats]
 
@@ -28,8 +29,8 @@ By = Literal["nothing", "lean", "step and lean"]
 def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, by: By = "nothing") -> Any:
     """Return the casadi function of one waypoint: margins K, and the square of the share of the cone that is used.
 
-    Of step 6, lean a 2, pivot 3, nominal 3, pair 3×2, R 3×3, t 3, contacts. kinds: which margins. pair: columns, the
-    directions of the lean's two numbers; what of them lies along the nominal axis does not count.
+    Of step 6, lean a 2, pivot 3, nominal 3, pair 3×2, R 3×3, t 3, contacts. The margins are weighed; kinds:
+    which. pair: columns, the directions of the lean's two numbers; what of them lies along the nominal axis does not count.
     by: also return the margins' derivatives by a, K × 2, or by (step, a), K × 8.
     """
     import casadi as ca  # noqa: PLC0415  heavy: only when planning
@@ -45,6 +46,8 @@ def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, 
     tip = ca.mtimes(turn, pivot) + translation + step[:3] - setting.task.pivot * turned
     numbers = ca.SX.sym("contacts", margins.contact_numbers)
     values = margins.symbolic(tip, turned, turn, translation + step[:3], numbers)[list(kinds)]
+    if not setting.weights.are_even:
+        values = weighed(values, ca.DM(setting.weights.of(margins.limits)[list(kinds)]))
     used = square / setting.cone**2 if setting.task.tilt > 0.0 else ca.SX(0.0)
     unknowns = {"nothing": [], "lean": [a], "step and lean": [ca.vertcat(step, a)]}[by]
     slopes = [ca.densify(ca.jacobian(values, x)) for x in unknowns]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -40,14 +40,18 @@ _BLOCK = 16_384
 _PAIRS = tuple(combinations(range(5), 2))
 
 
+Group = Literal["strokes", "singularities", "joints", "bodies"]
+
+
 @dataclass(frozen=True)
 class Limit:
-    """What one margin row stands for. name: as a user knows it; unit: of the shortfall, mm or deg."""
+    """What one margin row stands for. name: as a user knows it; unit: of the shortfall, mm or deg; group: its kind."""
 
     name: str
     unit: str
     shortfall: Callable[[float], float]
     """Converts a negative margin into how far beyond the limit it is, in `unit`."""
+    group: Group = "bodies"
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,19 +244,20 @@ def _limits(machine: Machine, surroundings: Surroundings) -> tuple[Limit, ...]:
         )
 
     half = (0.5 * (legs.max_length - legs.min_length)).tolist()
-    rows = [Limit(f"leg {k + 1} too short", "mm", length(half[k])) for k in range(5)]
-    rows += [Limit(f"leg {k + 1} too long", "mm", length(half[k])) for k in range(5)]
+    rows = [Limit(f"leg {k + 1} too short", "mm", length(half[k]), "strokes") for k in range(5)]
+    rows += [Limit(f"leg {k + 1} too long", "mm", length(half[k]), "strokes") for k in range(5)]
     rows.append(
         Limit(
             "singular surface w = 0",
             "deg",
-            lambda m: float(np.degrees(np.arcsin(min(1.0, -m * W_COMFORTABLE)))),
+            lambda m: float(np.degrees(np.arcsin(np.clip(-m * W_COMFORTABLE, -1.0, 1.0)))),
+            "singularities",
         )
     )
-    rows.append(Limit("singular surface S = 0", "mm", length(_s_comfortable(machine))))
+    rows.append(Limit("singular surface S = 0", "mm", length(_s_comfortable(machine)), "singularities"))
     for k, angle in enumerate(joints.base_cone.tolist()):
         edge = float(np.cos(angle))
-        rows.append(Limit(f"base joint {k + 1} beyond its cone", "deg", cone(edge, 1.0 - edge, 1.0)))
+        rows.append(Limit(f"base joint {k + 1} beyond its cone", "deg", cone(edge, 1.0 - edge, 1.0), "joints"))
     for k, (least, most) in enumerate(joints.platform_range.tolist()):
         scale = 0.5 * float(np.cos(least) - np.cos(most))
         rows.append(
@@ -260,6 +265,7 @@ def _limits(machine: Machine, surroundings: Surroundings) -> tuple[Limit, ...]:
                 f"platform joint {k + 1} beyond its largest angle",
                 "deg",
                 cone(float(np.cos(most)), scale, 1.0),
+                "joints",
             )
         )
         rows.append(
@@ -267,6 +273,7 @@ def _limits(machine: Machine, surroundings: Surroundings) -> tuple[Limit, ...]:
                 f"platform joint {k + 1} below its least angle",
                 "deg",
                 cone(float(np.cos(least)), scale, -1.0),
+                "joints",
             )
         )
     rows += [Limit(f"legs {j + 1} and {k + 1} touch", "mm", length(CLEARANCE_COMFORTABLE_M)) for j, k in _PAIRS]

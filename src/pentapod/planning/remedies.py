@@ -27,7 +27,7 @@ def remedies(setting: Setting, best: Candidate, improve: Raise, needed: float) -
 
 
 def _move(setting: Setting, best: Candidate, improve: Raise, needed: float) -> str:
-    moved = improve(Setting.of(setting.task, setting.machine), best)
+    moved = improve(Setting.of(setting.task, setting.machine, weights=setting.weights), best)
     if moved.smallest < needed:
         return ""
     shift = (moved.transform.translation - best.transform.translation) * 1e3
@@ -42,7 +42,9 @@ def _cone(setting: Setting, best: Candidate, improve: Raise, needed: float) -> s
     for tilt in task.tilt + _WIDER:
         if tilt > _WIDEST:
             break
-        wider = Setting.of(Task(task.pivots, task.nominal, task.pivot, float(tilt)), setting.machine, setting.freedom)
+        wider = Setting.of(
+            Task(task.pivots, task.nominal, task.pivot, float(tilt)), setting.machine, setting.freedom, setting.weights
+        )
         if improve(wider, wider.first_candidate(best.margins, best.transform)).smallest >= needed:
             return f"allow a tilt of {np.degrees(tilt):.0f}°, which is enough"
     return ""
@@ -58,7 +60,7 @@ def _region(setting: Setting, best: Candidate, improve: Raise, needed: float) ->
         inside = np.flatnonzero((np.abs(setting.task.pivots - middle) <= share * half + 1e-9).all(axis=1))
         found = None
         if len(inside) > 0:
-            part = Setting.of(setting.task.at(inside), setting.machine, setting.freedom)
+            part = Setting.of(setting.task.at(inside), setting.machine, setting.freedom, setting.weights)
             found = improve(part, part.first_candidate(start.margins, start.transform))
         if found is not None and found.smallest >= needed:
             fits, start = share, found

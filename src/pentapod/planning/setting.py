@@ -16,6 +16,7 @@ from pentapod.planning.margins import Margins
 from pentapod.planning.sampling import best_tilted_margins
 from pentapod.planning.task import Task
 from pentapod.planning.tilt import FieldDomain, lean
+from pentapod.planning.weights import EVEN, Weights, weighed
 
 CONE_SHARE = 0.98
 """Share of the tilt cone used by the optimisers; the rest absorbs what happens between waypoints."""
@@ -26,7 +27,7 @@ _FITTED = 192
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A placement in a component (the margins') with a tilt field's coefficients, and its smallest margin."""
+    """A placement in a component (the margins') with a tilt field's coefficients, and its smallest margin, weighed."""
 
     margins: Margins
     transform: RigidTransform
@@ -46,13 +47,14 @@ class Setting:
     domain: FieldDomain
     basis: Floats
     freedom: Freedom
+    weights: Weights
 
     @classmethod
-    def of(cls, task: Task, machine: Machine, freedom: Freedom = FREE) -> Setting:
-        """Return the setting of a task on a machine, with the placements that are allowed."""
+    def of(cls, task: Task, machine: Machine, freedom: Freedom = FREE, weights: Weights = EVEN) -> Setting:
+        """Return the setting of a task on a machine, with the allowed placements and the weights of the margins."""
         domain = FieldDomain.around(task.pivots, task.nominal, _CELLS)
         basis = domain.basis(task.pivots) if task.tilt > 0.0 else np.zeros((len(task.pivots), 0))
-        return cls(task, machine, domain, basis, freedom)
+        return cls(task, machine, domain, basis, freedom, weights)
 
     @property
     def cone(self) -> float:
@@ -77,13 +79,17 @@ class Setting:
     def values(
         self, margins: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints | slice = slice(None)
     ) -> Floats:
-        """Return the margins (n, M) at waypoints `rows`."""
-        return margins(*self.task.machine_poses(transform, self.axes(coefficients, rows), rows), transform)
+        """Return the margins (n, M), weighed, at waypoints `rows`."""
+        axes = self.axes(coefficients, rows)
+        return self._weighed(margins, margins(*self.task.machine_poses(transform, axes, rows), transform))
 
     def values_of(self, margins: Margins, transform: RigidTransform, leans: Floats) -> Floats:
-        """Return the margins (N, M) at all waypoints for leans (N, 3), workpiece frame."""
+        """Return the margins (N, M), weighed, at all waypoints for leans (N, 3), workpiece frame."""
         axes = lean(self.task.nominal, leans)
-        return margins(*self.task.machine_poses(transform, axes), transform)
+        return self._weighed(margins, margins(*self.task.machine_poses(transform, axes), transform))
+
+    def _weighed(self, margins: Margins, plain: Floats) -> Floats:
+        return plain if self.weights.are_even else weighed(plain, self.weights.of(margins.limits))
 
     def contacts(self, margins: Margins, transform: RigidTransform, leans: Floats, rows: Ints) -> Floats:
         """Return the contacts (n, margins.contact_numbers) for leans (n, 3), workpiece frame, at waypoints `rows`.

@@ -16,6 +16,7 @@ from pentapod.planning.placed_path import PlacedPath
 from pentapod.program.program import Program
 from pentapod.report import plots, scene, words
 from pentapod.report.figure import Figure, as_script
+from pentapod.report.setup_sheet import setup_sheet
 from pentapod.report.signals import Signals
 from pentapod.report.worst import worst_places
 from pentapod.timing.explain import Explanation
@@ -76,6 +77,7 @@ def _context(outcome: Outcome) -> dict[str, Any]:
         "story": outcome.find(Explanation),
         "sheet": _setup_sheet(outcome, signals),
         "placement": None if placed is None else _placement(placed.placement.transform),
+        "setup_sheet": setup_sheet(outcome),
         "chosen_by": "" if placed is None else placed.placement.chosen_by,
         "component": "" if placed is None else str(placed.component),
         "stages": outcome.stages,

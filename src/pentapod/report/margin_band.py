@@ -1,0 +1,72 @@
+"""The margins along the path as a band: as high as the smallest margin, in the colour of the limit that binds there."""
+
+from __future__ import annotations
+
+from html import escape
+from itertools import pairwise
+
+import numpy as np
+
+from pentapod.geometry.polyline import arc_length
+from pentapod.planning.placed_path import PlacedPath
+from pentapod.report.figure import LIMIT_COLOUR, QUIET_COLOUR
+
+_COLUMNS = 480
+_WIDTH, _HEIGHT, _LEFT, _BOTTOM = 1080.0, 200.0, 44.0, 26.0
+_COLOURS = ("#2a78d6", "#e08a00", "#1baa7a", "#c2417c", "#7a5cd6", "#5f7d8c", "#a3742a", "#3b9ab2")
+
+
+def margin_band(placed: PlacedPath) -> str:
+    """Return the band as SVG with its legend: over the way of the tip, mm. Each stretch names its limit."""
+    way = 1e3 * arc_length(placed.tips)
+    smallest, nearest = placed.margins.min(axis=1), placed.margins.argmin(axis=1)
+    edges = np.unique(np.linspace(0, len(smallest), min(_COLUMNS, len(smallest)) + 1).astype(np.intp))
+    worst = np.array([a + int(smallest[a:b].argmin()) for a, b in pairwise(edges)])
+    order = [
+        int(k) for k in np.argsort(-np.bincount(nearest[worst], minlength=len(placed.margin_names)), kind="stable")
+    ]
+    colours = {k: (_COLOURS[n] if n < len(_COLOURS) else QUIET_COLOUR) for n, k in enumerate(order)}
+    top = max(float(smallest[worst].max()), 0.05)
+    low = min(float(smallest.min()), 0.0)
+    total = max(float(way[-1]), 1e-9)
+
+    def x(value: float) -> float:
+        return _LEFT + (_WIDTH - _LEFT) * value / total
+
+    def y(value: float) -> float:
+        return 8.0 + (_HEIGHT - _BOTTOM - 8.0) * (top - value) / (top - low)
+
+    limits = nearest[worst]
+    breaks = np.flatnonzero(np.diff(limits)) + 1
+    parts: list[str] = []
+    for run in np.split(np.arange(len(worst)), breaks):
+        a, b = int(edges[run[0]]), int(edges[run[-1] + 1]) - 1
+        left, right = x(float(way[a])), x(float(way[min(b + 1, len(way) - 1)]))
+        corners = [(left, y(0.0)), (left, y(float(smallest[worst[run[0]]])))]
+        corners += [(x(float(way[w])), y(float(smallest[w]))) for w in worst[run]]
+        corners += [(right, y(float(smallest[worst[run[-1]]]))), (right, y(0.0))]
+        points = " ".join(f"{px:.1f},{py:.1f}" for px, py in corners)
+        name = escape(placed.margin_names[int(limits[run[0]])])
+        told = f"{name}: waypoints {a} to {b}, smallest margin {float(smallest[a : b + 1].min()):.3f}"
+        parts.append(
+            f'<polygon points="{points}" fill="{colours[int(limits[run[0]])]}"><title>{told}</title></polygon>'
+        )
+    zero = f'<line x1="{_LEFT}" x2="{_WIDTH}" y1="{y(0.0):.1f}" y2="{y(0.0):.1f}" stroke="{LIMIT_COLOUR}"/>'
+    ticks = "".join(
+        f'<text x="{_LEFT - 6}" y="{y(v) + 4:.1f}" text-anchor="end">{v:.2f}</text>' for v in (0.0, 0.5 * top, top)
+    )
+    ends = (
+        f'<text x="{_LEFT}" y="{_HEIGHT - 6}">0</text>'
+        f'<text x="{_WIDTH}" y="{_HEIGHT - 6}" text-anchor="end">{total:.0f} mm along the path</text>'
+    )
+    present = [k for k in order if (limits == k).any()]
+    legend = "".join(
+        f'<span style="white-space:nowrap;margin-right:1.2em"><span style="color:{colours[k]}">■</span> '
+        f"{escape(placed.margin_names[k])}</span>"
+        for k in present[: len(_COLOURS)]
+    )
+    others = "" if len(present) <= len(_COLOURS) else f'<span style="color:{QUIET_COLOUR}">■</span> others'
+    return (
+        f'<svg viewBox="0 0 {_WIDTH:.0f} {_HEIGHT:.0f}" width="100%" role="img" font-size="12" fill="currentColor" '
+        f'aria-label="smallest margin along the path">{"".join(parts)}{zero}{ticks}{ends}</svg><p>{legend}{others}</p>'
+    )

@@ -1,0 +1,44 @@
+"""The sheet for whoever clamps the part: the drawing, the table's terms, and where the plan is tight."""
+
+from __future__ import annotations
+
+from html import escape
+
+from pentapod.outcome import Outcome
+from pentapod.planning.binding import Binding, bindings
+from pentapod.planning.placed_path import PlacedPath
+from pentapod.report.margin_band import margin_band
+from pentapod.report.placement_views import placement_views
+from pentapod.report.words import number
+from pentapod.toolpath.mesh import Mesh
+
+_ROWS = 10
+
+
+def setup_sheet(outcome: Outcome) -> str:
+    """Return the sheet as HTML, for the section on the placement; empty where no placement was found."""
+    placed = outcome.find(PlacedPath)
+    if placed is None:
+        return ""
+    table = outcome.job.placement
+    height = table.table_z_mm if table.mode == "table" else None
+    surface = None if height is None else 1e-3 * height
+    told = "" if height is None else f"<p>It stands on the table, whose surface is at z = {number(height, 'mm')}.</p>"
+    rows = "".join(_row(binding) for binding in bindings(placed, outcome.machine)[:_ROWS])
+    return (
+        f'{told}<div class="columns">{placement_views(outcome.find(Mesh), placed, outcome.machine, surface)}</div>'
+        f"<h3>Margins along the path</h3>{margin_band(placed)}"
+        '<p class="hint">As high as the smallest margin (0: a limit, about 1: comfortable), in the colour of the limit '
+        "that is nearest; point at it for its name.</p>"
+        '<div class="scroll"><table><thead><tr><th>nearest limits</th><th class="n">smallest margin</th>'
+        '<th class="n">room</th><th class="n">at waypoint</th><th class="n">nearest on</th></tr></thead>'
+        f"<tbody>{rows}</tbody></table></div>"
+    )
+
+
+def _row(binding: Binding) -> str:
+    room = number(binding.room, binding.unit) if binding.unit else "–"
+    return (
+        f'<tr><td>{escape(binding.limit)}</td><td class="n">{number(binding.margin)}</td><td class="n">{room}</td>'
+        f'<td class="n">{binding.worst}</td><td class="n">{100.0 * binding.share:.1f} %</td></tr>'
+    )

@@ -1,0 +1,22 @@
+"""The same job gives the same files, bit for bit, however many threads the linear algebra runs on."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+COMMAND = [sys.executable, "-c", "from pentapod.cli.main import main; main()", "plan"]
+
+
+def test_one_thread_or_two(make_job, tmp_path):
+    path = make_job(("tilt_deg = 0", "tilt_deg = 10"), ("stepover_mm = 15", "stepover_mm = 5"))
+    path.write_text(path.read_text().split("[placement]")[0] + '[placement]\nthen = "force"\n')
+    files: list[dict[str, bytes]] = []
+    for threads in ("1", "2"):
+        out = tmp_path / threads
+        environment = os.environ | dict.fromkeys(VARIABLES, threads)
+        subprocess.run([*COMMAND, str(path), "-o", str(out), "--quiet"], env=environment, check=True)
+        files.append({name: (out / name).read_bytes() for name in ("program.csv", "plan.npz", "verdict.json")})
+    assert files[0] == files[1]
