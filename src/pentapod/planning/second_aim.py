@@ -96,30 +96,34 @@ class LeastTime:
         times, weights = self._times(at)
         rows = np.flatnonzero((weights != 0.0).any(axis=1))
 
-        def legs(poses: Poses) -> Floats:
+        def legs_and_tips(poses: Poses) -> Floats:
             tips, axes = poses
-            return robot.leg_lengths(tips + length * axes, -axes)
+            return np.hstack([robot.leg_lengths(tips + length * axes, -axes), tips])
 
-        by_motion, by_lean = _partials(setting, at, rows, model.motion, legs)
+        by_motion, by_lean = _partials(setting, at, rows, model.motion, legs_and_tips)
         by_motion = np.einsum("ni,nik->nk", weights[rows], by_motion)
         by_lean = np.einsum("ni,nik->nk", weights[rows], by_lean)
         slope = np.concatenate([by_motion.sum(axis=0), (setting.basis[rows].T @ by_lean * setting.cone).ravel()])
         return np.array([times.sum()]), slope[None]
 
     def _times(self, at: Candidate) -> tuple[Floats, Floats]:
-        """Return the least time of each interval, (N − 1,), and the derivative of their sum by leg lengths (N, 5)."""
+        """Return the least time of each interval, (N − 1,), and the derivative of their sum by legs and tip (N, 8)."""
         setting, machine = self.setting, self.setting.machine
         tips, axes = setting.task.machine_poses(at.transform, setting.axes(at.coefficients))
         steps = np.diff(machine.pentapod.leg_lengths(tips + machine.tool_length * axes, -axes), axis=0)
         by_leg = np.abs(steps) / machine.legs.max_velocity
         leg = by_leg.argmax(axis=1)
         index = np.arange(len(leg))
-        by_feed = np.linalg.norm(np.diff(tips, axis=0), axis=1) / self.feeds
-        slowest = by_leg[index, leg]
-        held = np.where(slowest > by_feed, np.sign(steps[index, leg]) / machine.legs.max_velocity[leg], 0.0)
-        weights = np.zeros((len(tips), 5))
-        weights[index, leg] -= held
-        weights[index + 1, leg] += held
+        chords = np.diff(tips, axis=0)
+        way = np.linalg.norm(chords, axis=1)
+        by_feed, slowest = way / self.feeds, by_leg[index, leg]
+        held = slowest > by_feed
+        by_step = np.zeros((len(chords), 8))
+        by_step[index, leg] = np.where(held, np.sign(steps[index, leg]) / machine.legs.max_velocity[leg], 0.0)
+        by_step[:, 5:] = np.where(held[:, None], 0.0, chords / (np.maximum(way, 1e-12) * self.feeds)[:, None])
+        weights = np.zeros((len(tips), 8))
+        weights[:-1] -= by_step
+        weights[1:] += by_step
         return np.maximum(slowest, by_feed), weights
 
 
