@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from pentapod import Component, Machine, PlacedPath, Toolpath, plan
@@ -61,8 +62,6 @@ def main() -> None:
 
 def draw(strict: np.ndarray, leaning: np.ndarray, out: Path) -> None:
     """Draw the smallest margin along the path, strict and leaning."""
-    import matplotlib.pyplot as plt
-
     figure, axes = plt.subplots(figsize=(9.0, 3.8), layout="constrained")
     axes.axhspan(min(strict.min(), 0.0) - 0.05, 0.0, color="#d2413a", alpha=0.12, label="beyond a limit")
     axes.plot(strict, color="#e08a00", label="along the normals")

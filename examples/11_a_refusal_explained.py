@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from pentapod import Component, Machine, Refusal, Toolpath, plan
@@ -50,8 +51,6 @@ def main() -> None:
 
 def draw(toolpath: Toolpath, refusal: Refusal, out: Path) -> None:
     """Draw the path from above, with the waypoints that each limit is to blame for."""
-    import matplotlib.pyplot as plt
-
     figure, axes = plt.subplots(figsize=(9.0, 6.2), layout="constrained")
     x, y = 1e3 * toolpath.tips[:, 0], 1e3 * toolpath.tips[:, 1]
     axes.plot(x, y, color="#8a8f98", linewidth=0.8, label="within all limits")

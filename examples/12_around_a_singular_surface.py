@@ -2,10 +2,10 @@
 
     python examples/12_around_a_singular_surface.py --out docs/led_around.png
 
-A dome of 60 mm is put naively, its axis upright and high under the base, where the plane S = 0 of the line's position
-(the two modes of a component meet there) cuts the work. With strict normals the path comes within 5 mm of it. The
-planner may shift the part by 60 mm along each axis, turn it by 10°, and lean the tool by 10°: it leads the path away. The
-distance is told by the kinematics, not by the planner's margins.
+A dome of 60 mm is put naively, its axis upright and high under the base, where the plane S = 0 of the position
+(two modes meet there) cuts the work. With strict normals the path comes within 5 mm of it. The planner may shift the
+part by 60 mm along each axis, turn it by 10°, and lean the tool by 10°: it leads the path away. The distance is told by
+the kinematics, not by the planner's margins.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from pentapod import Component, Machine, PlacedPath, RigidTransform, Toolpath, plan
@@ -84,8 +85,6 @@ def main() -> None:
 
 def draw(before: np.ndarray, after: np.ndarray, out: Path) -> None:
     """Draw the distance to the singular surface along both paths."""
-    import matplotlib.pyplot as plt
-
     figure, axes = plt.subplots(figsize=(9.0, 3.8), layout="constrained")
     axes.axhspan(0.0, 1e3 * NEAR, color="#d2413a", alpha=0.15, label="within 5 mm of S = 0")
     axes.plot(1e3 * before, color="#e08a00", label="naive placement, strict normals")
