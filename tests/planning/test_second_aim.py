@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from pentapod.planning.weights import NEEDED_MARGIN
 
 from pentapod.errors import ArrayError
 from pentapod.kinematics.forces import leg_force_map
@@ -15,6 +14,7 @@ from pentapod.planning.second_aim import aim_of, improved
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Setting
 from pentapod.planning.task import Task
+from pentapod.planning.weights import NEEDED_MARGIN
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 TILT = np.radians(12.0)
