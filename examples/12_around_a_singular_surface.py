@@ -50,6 +50,7 @@ def naive_placement(machine: Machine, toolpath: Toolpath) -> RigidTransform:
     """Return the placement under the base's middle, upright, raised until the path is 3 mm from the surface."""
     upright = np.diag([1.0, -1.0, -1.0])
     low, high = 0.1, float(machine.work.centre[2])
+    placement = RigidTransform(upright, machine.work.centre)
     for _ in range(50):
         middle = 0.5 * (low + high)
         placement = RigidTransform(upright, np.array([*machine.work.centre[:2], middle]))

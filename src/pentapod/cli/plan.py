@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -47,7 +47,7 @@ def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int
     if as_json:
         seconds = {stage.name: round(stage.seconds, 3) for stage in outcome.stages}
         story = outcome.find(Explanation)
-        told = {} if story is None else {"timing": story.to_dict()}
+        told: dict[str, Any] = {} if story is None else {"timing": story.to_dict()}
         if explain and (placed := outcome.find(PlacedPath)) is not None:
             told["limits"] = [dataclasses.asdict(binding) for binding in bindings(placed, outcome.machine)]
         echo_json({**outcome.to_dict(), **told, "out": str(out), "seconds": seconds})
