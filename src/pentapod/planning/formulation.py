@@ -29,8 +29,8 @@ By = Literal["nothing", "lean", "step and lean"]
 def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, by: By = "nothing") -> Any:
     """Return the casadi function of one waypoint: margins K, and the square of the share of the cone that is used.
 
-    Of step 6, lean a 2, pivot 3, nominal 3, pair 3×2, R 3×3, t 3, contacts. The margins are weighed; kinds:
-    which. pair: columns, the directions of the lean's two numbers; what of them lies along the nominal axis does not count.
+    Of step 6, lean a 2, pivot 3, nominal 3, pair 3×2, R 3×3, t 3, contacts. The margins are weighed; kinds: which.
+    pair: columns, the directions of the lean's two numbers; what of them lies along the nominal axis does not count.
     by: also return the margins' derivatives by a, K × 2, or by (step, a), K × 8.
     """
     import casadi as ca  # noqa: PLC0415  heavy: only when planning

@@ -46,8 +46,8 @@ def plan(
 
     tilt: half angle in radians of the cone around the nominal axis within which the tool may lean.
     freedom: the allowed placements; of them, and of all components where none is given, the one with the largest
-    smallest margin is kept, the margins weighed by `weights`. surroundings: what legs, spindle and tool must
-    not touch. then: second aim, for which up to a tenth of that margin is given. Deterministic for a seed. Returns a Refusal that
+    smallest margin is kept, the margins weighed by `weights`. surroundings: what legs, spindle and tool must not touch.
+    then: second aim, for which up to a tenth of that margin is given. Deterministic for a seed. Returns a Refusal that
     names limits, waypoints and shortfalls where the part does not fit. An interruption (Ctrl-C) of the search for a
     placement ends it with the best found so far, if that fits; else KeyboardInterrupt is raised.
     """
