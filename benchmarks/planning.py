@@ -149,8 +149,8 @@ def along_path(task: Instance, setting: Setting, at: Candidate, axes: np.ndarray
     """Return axis rates and second derivatives of the legs along the path, at one density, for axes (N, 3)."""
     tips, turned = setting.task.machine_poses(at.transform, axes)
     component = at.margins.component
-    values, names = at.margins(tips, turned), tuple(limit.name for limit in at.margins.limits)
-    placed = PlacedPath(task.toolpath, Placement(at.transform, "benchmark"), component, tips, turned, values, names)
+    values, limits = at.margins(tips, turned, at.transform), at.margins.limits
+    placed = PlacedPath(task.toolpath, Placement(at.transform, "benchmark"), component, tips, turned, values, limits)
     path = leg_path(placed, setting.machine, path_tolerance=20e-6, axis_tolerance=np.radians(0.5))
     if isinstance(path, Refusal):
         raise SystemExit(f"no leg path for {task.name}: {path}")

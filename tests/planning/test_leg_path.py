@@ -9,6 +9,7 @@ from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.planning.leg_path import LegPath, leg_path
+from pentapod.planning.margins import Limit
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.planning.placement import Placement
 from pentapod.refusal import Refusal
@@ -22,7 +23,8 @@ def placed_on(machine, toolpath):
     turn = RigidTransform(np.diag([1.0, -1.0, -1.0]), machine.work.centre)
     axes = turn.rotate(toolpath.axes)
     tips = turn.apply(toolpath.tips)
-    return PlacedPath(toolpath, Placement(turn, "test"), Component(1, 1), tips, axes, np.ones((len(tips), 1)), ("m",))
+    margins, limits = np.ones((len(tips), 1)), (Limit("none", "mm", abs),)
+    return PlacedPath(toolpath, Placement(turn, "test"), Component(1, 1), tips, axes, margins, limits)
 
 
 def fan(points, lean):

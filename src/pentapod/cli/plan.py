@@ -49,7 +49,7 @@ def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int
         story = outcome.find(Explanation)
         told: dict[str, Any] = {} if story is None else {"timing": story.to_dict()}
         if explain and (placed := outcome.find(PlacedPath)) is not None:
-            told["limits"] = [dataclasses.asdict(binding) for binding in bindings(placed, outcome.machine)]
+            told["limits"] = [dataclasses.asdict(binding) for binding in bindings(placed)]
         echo_json({**outcome.to_dict(), **told, "out": str(out), "seconds": seconds})
     elif not quiet:
         click.echo("\n".join(stage.said for stage in outcome.stages if stage.said))
@@ -75,4 +75,4 @@ def _explained(outcome: Outcome) -> str:
     if outcome.refusal is not None and outcome.refusal.blames:
         return blames_text(outcome.refusal)
     placed = outcome.find(PlacedPath)
-    return "" if placed is None else bindings_text(bindings(placed, outcome.machine))
+    return "" if placed is None else bindings_text(bindings(placed))

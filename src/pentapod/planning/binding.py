@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.machine.machine import Machine
 from pentapod.planning.blame import ranges
-from pentapod.planning.margins import Margins
 from pentapod.planning.placed_path import PlacedPath
 
 
@@ -28,15 +26,13 @@ class Binding:
     waypoints: tuple[tuple[int, int], ...]
 
 
-def bindings(placed: PlacedPath, machine: Machine) -> tuple[Binding, ...]:
+def bindings(placed: PlacedPath) -> tuple[Binding, ...]:
     """Return every limit of a plan, the nearest first."""
-    known = {limit.name: limit for limit in Margins.of(machine, placed.component).limits}
     nearest = placed.margins.argmin(axis=1)
     found: list[Binding] = []
     for k in np.argsort(placed.margins.min(axis=0), kind="stable"):
-        name, column, here = placed.margin_names[k], placed.margins[:, k], nearest == k
-        margin, limit = float(column.min()), known.get(name)
-        room = float("nan") if limit is None else abs(limit.shortfall(margin))
-        unit = "" if limit is None else limit.unit
-        found.append(Binding(name, margin, int(column.argmin()), room, unit, float(here.mean()), ranges(here)))
+        limit, column, here = placed.limits[k], placed.margins[:, k], nearest == k
+        margin, worst = float(column.min()), int(column.argmin())
+        room, share = abs(limit.shortfall(margin)), float(here.mean())
+        found.append(Binding(limit.name, margin, worst, room, limit.unit, share, ranges(here)))
     return tuple(found)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from pentapod.arrays import Floats, frozen, set_frozen
 from pentapod.kinematics.component import Component
+from pentapod.planning.margins import Limit
 from pentapod.planning.placement import Placement
 from pentapod.toolpath.toolpath import Toolpath
 
@@ -14,8 +15,8 @@ from pentapod.toolpath.toolpath import Toolpath
 class PlacedPath:
     """Tool poses in the machine frame, one for each waypoint of the toolpath.
 
-    tips (N, 3) metres; axes (N, 3) unit, tip → spindle; margins (N, M), normalised, 0 at a limit, named by
-    margin_names (M,).
+    tips (N, 3) metres; axes (N, 3) unit, tip → spindle; margins (N, M), normalised, 0 at a limit; limits (M,): what
+    each stands for.
     """
 
     toolpath: Toolpath
@@ -24,11 +25,16 @@ class PlacedPath:
     tips: Floats
     axes: Floats
     margins: Floats
-    margin_names: tuple[str, ...]
+    limits: tuple[Limit, ...]
 
     def __post_init__(self) -> None:
         for name in ("tips", "axes", "margins"):
             set_frozen(self, **{name: frozen(getattr(self, name), name, (len(self.toolpath), None))})
+
+    @property
+    def margin_names(self) -> tuple[str, ...]:
+        """The names (M,) of the limits."""
+        return tuple(limit.name for limit in self.limits)
 
     @property
     def smallest_margin(self) -> float:

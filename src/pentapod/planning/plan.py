@@ -68,9 +68,9 @@ def plan(
         leans = leans if calm is None else setting.course.leans(calm)
     tips, axes = setting.task.machine_poses(best.transform, lean(setting.task.nominal, leans))
     chosen = Placement(best.transform, found.choice)
-    names = tuple(limit.name for limit in best.margins.limits)
+    margins = best.margins
     return PlacedPath(
-        toolpath, chosen, best.margins.component, tips, axes, best.margins(tips, axes, best.transform), names
+        toolpath, chosen, margins.component, tips, axes, margins(tips, axes, best.transform), margins.limits
     )
 
 

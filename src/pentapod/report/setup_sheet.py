@@ -24,7 +24,7 @@ def setup_sheet(outcome: Outcome) -> str:
     height = table.table_z_mm if table.mode == "table" else None
     surface = None if height is None else 1e-3 * height
     told = "" if height is None else f"<p>It stands on the table, whose surface is at z = {number(height, 'mm')}.</p>"
-    rows = "".join(_row(binding) for binding in bindings(placed, outcome.machine)[:_ROWS])
+    rows = "".join(_row(binding) for binding in bindings(placed)[:_ROWS])
     return (
         f'{told}<div class="columns">{placement_views(outcome.find(Mesh), placed, outcome.machine, surface)}</div>'
         f"<h3>Margins along the path</h3>{margin_band(placed)}"
