@@ -61,12 +61,17 @@ def margin_band(placed: PlacedPath) -> str:
     )
     present = [k for k in order if (limits == k).any()]
     legend = "".join(
-        f'<span style="white-space:nowrap;margin-right:1.2em"><span style="color:{colours[k]}">■</span> '
+        f'<span style="white-space:nowrap;margin-right:1.2em">{_swatch(colours[k])} '
         f"{escape(placed.margin_names[k])}</span>"
         for k in present[: len(_COLOURS)]
     )
-    others = "" if len(present) <= len(_COLOURS) else f'<span style="color:{QUIET_COLOUR}">■</span> others'
+    others = "" if len(present) <= len(_COLOURS) else f"{_swatch(QUIET_COLOUR)} others"
     return (
         f'<svg viewBox="0 0 {_WIDTH:.0f} {_HEIGHT:.0f}" width="100%" role="img" font-size="12" fill="currentColor" '
         f'aria-label="smallest margin along the path">{"".join(parts)}{zero}{ticks}{ends}</svg><p>{legend}{others}</p>'
     )
+
+
+def _swatch(colour: str) -> str:
+    """Return a square of a colour: a picture, which paper keeps, and no text that would have to be legible."""
+    return f'<svg width="10" height="10" aria-hidden="true"><rect width="10" height="10" fill="{colour}"/></svg>'
