@@ -15,6 +15,9 @@ from pentapod.planning.setting import Candidate, Setting
 REACH = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
 """The unit of a placement step: metres, and tan(angle / 2). The unit of a coefficient is the cone."""
 
+_PATIENCE = {"maxiter": 5_000, "time_limit": 20.0}
+"""Linear programs take milliseconds; where the simplex method goes in circles, on a degenerate one, no step is taken."""
+
 _NEAR = 0.4
 """Margins within this much of the level enter the model."""
 _WORST_OF_KIND, _STEEPEST, _STEEP = 12, 60, 0.3
@@ -91,6 +94,7 @@ class LinearModel:
             b_ub=np.concatenate([self.values - smallest, np.maximum(np.append(1.0 - self.steepness, self.room), 0.0)]),
             bounds=[(-reach, reach)] * count + [(0.0, None)],
             method="highs-ds",
+            options=_PATIENCE,
         )
         x = np.zeros(count + 1) if answer.x is None else np.asarray(answer.x, dtype=np.float64)
         moving = self.motion.shape[1]

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+import numpy as np
+
 from pentapod.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS, Component
@@ -20,6 +22,9 @@ from pentapod.planning.weights import NEEDED_MARGIN
 from pentapod.progress import Progress, silent
 
 SolverName = Literal["sequential", "ipopt"]
+
+HOPELESS = -0.5
+"""First guesses all below this smallest margin: whether the part fits with nothing around it is looked at first."""
 
 REFINED = 4
 """How many first guesses are improved in any case."""
@@ -88,7 +93,12 @@ def search(
     """
     freedom, best, tried, count, interrupted = setting.freedom, None, 0, 1, False
     try:
-        starts = _starts(setting, component, surroundings, seed, progress)
+        starts, promise = _starts(setting, component, surroundings, seed, progress)
+        if promise < HOPELESS and surroundings is not NOTHING:
+            # What does not fit with nothing around does not fit; that is found much sooner.
+            alone = search(setting, component, seed=seed, solver=solver, progress=progress)
+            if alone.best.smallest < NEEDED_MARGIN:
+                return alone
         count = min(len(starts), TRIED) if freedom.moves else len(starts)
         improver = SOLVERS[solver](setting, freedom.moves)
         for margins, transform in starts[:count]:
@@ -111,10 +121,12 @@ def search(
 
 def _starts(
     setting: Setting, component: Component | None, surroundings: Surroundings, seed: int, progress: Progress
-) -> list[Start]:
+) -> tuple[list[Start], float]:
+    """Return where to start, and the smallest margin of the most promising guess (∞ where nothing is guessed)."""
     components, machine, freedom = COMPONENTS if component is None else (component,), setting.machine, setting.freedom
     if not freedom.moves:
-        return [(Margins.of(machine, c, surroundings), pose) for pose in freedom.poses for c in components]
+        return [(Margins.of(machine, c, surroundings), pose) for pose in freedom.poses for c in components], np.inf
     progress("placement", 0.0, "sampling")
     guesses = first_guesses(setting.task, machine, components, seed, freedom=freedom, surroundings=surroundings)
-    return [(Margins.of(machine, g.component, surroundings), g.transform) for g in guesses]
+    starts = [(Margins.of(machine, g.component, surroundings), g.transform) for g in guesses]
+    return starts, max(g.margin for g in guesses)
