@@ -6,56 +6,17 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import settings
 
 from pentapod.cli.new import dome_stl
-from pentapod.machine import Machine
+from usual_job import job_text
 
 # A busy machine is no failure. Every run looks at the same examples, so that a run can be repeated;
 # HYPOTHESIS_PROFILE=search looks for new ones.
 settings.register_profile("same", deadline=None, derandomize=True)
 settings.register_profile("search", deadline=None, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
-
-JOB = """\
-[part]
-mesh = "part.stl"
-unit = "mm"
-
-[machine]
-name = "desk"
-
-[tool]
-type = "ball"
-diameter_mm = 10
-
-[toolpath]
-stepover_mm = 15
-spacing_mm = 4
-
-[axis]
-tilt_deg = 0
-
-[feed]
-cut_mm_min = 3000
-
-[tolerance]
-path_mm = 0.05
-
-[placement]
-mode = "fixed"
-position_mm = {position}
-rotation_deg = [180, 0, 0]
-component = "++"
-"""
-
-
-def job_text() -> str:
-    """The part in the middle of the work volume, its top towards the base: nothing is left to search for."""
-    centre = Machine.load("desk").work.centre * 1e3
-    return JOB.format(position=np.round(centre, 3).tolist())
 
 
 @pytest.fixture

@@ -80,8 +80,8 @@ def chromium():
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     """The report of the small job of all tests."""
-    from conftest import job_text
     from pentapod.cli.new import dome_stl
+    from usual_job import job_text
 
     folder = tmp_path_factory.mktemp("report")
     (folder / "part.stl").write_bytes(dome_stl(cells=12))

@@ -16,7 +16,7 @@ REACH = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
 """The unit of a placement step: metres, and tan(angle / 2). The unit of a coefficient is the cone."""
 
 _PATIENCE = {"maxiter": 5_000, "time_limit": 20.0}
-"""Linear programs take milliseconds; where the simplex method goes in circles, on a degenerate one, there is no step."""
+"""Linear programs take milliseconds; where the simplex method goes in circles, no step is taken."""
 
 _NEAR = 0.4
 """Margins within this much of the level enter the model."""
