@@ -94,11 +94,10 @@ def test_the_banded_program_is_solved_as_ipopt_solves_it(seed):
 
 
 def test_a_program_without_interior_has_no_answer():
-    task, course = course_of(0)
+    _, course = course_of(0)
     centre = np.zeros((course.hessian.shape[1] // 2, 2))
     point, slopes = np.array([3, 3]), np.array([[1.0, 0.0], [-1.0, 0.0]])
     program = AxisProgram(
         course.hessian, course.gradient, 1.0, course.basis, point, slopes, np.array([-0.2, -0.2]), centre, 2.0
     )
     assert program.solved() is None
-    assert len(task.pivots) > 3

@@ -100,7 +100,12 @@ class AxisCourse:
         rate, bend = _differences(size, 1), _differences(size, 2)
         normal = self.basis.T @ self.basis + 1e-6 * (bend.T @ bend) + 1e-9 * (rate.T @ rate) + 1e-12 * sparse.eye(size)
         c = solveh_banded(_banded(normal, _DEGREE + 1), self.basis.T @ wanted, lower=True)
-        return np.asarray(c / np.maximum(1.0, np.linalg.norm(c, axis=1, keepdims=True)), dtype=np.float64)
+        return within_discs(np.asarray(c, dtype=np.float64))
+
+
+def within_discs(c: Floats) -> Floats:
+    """Return coefficients (K, 2) with those outside the unit disc brought to its edge."""
+    return c / np.maximum(1.0, np.linalg.norm(c, axis=1, keepdims=True))
 
 
 def banded_product(lower: Floats, x: Floats) -> Floats:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints
-from pentapod.planning.axis_course import AxisCourse
+from pentapod.planning.axis_course import AxisCourse, within_discs
 from pentapod.planning.formulation import Slopes, lean_slopes
 from pentapod.planning.interior_point import AxisProgram
 from pentapod.planning.setting import Candidate, Setting
@@ -76,7 +76,7 @@ class _Calming:
         for _ in range(_STEPS):
             trial = self.program(model, missed).solved()
             if trial is not None:
-                trial = trial / np.maximum(1.0, np.linalg.norm(trial, axis=1, keepdims=True))
+                trial = within_discs(trial)
                 margins = self.values(trial)
                 short = self.keep - float(margins.min())
                 gain = self.course.cost_of(self.c) - self.course.cost_of(trial)

@@ -13,6 +13,7 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.planning.axis_course import within_discs
 from pentapod.planning.formulation import point_function, room_function, stepped
 from pentapod.planning.linear_model import valleys
 from pentapod.planning.setting import Candidate, Setting
@@ -101,7 +102,7 @@ class IpoptSolver:
         lower = np.concatenate([np.full(len(kinds) * count, keep), np.zeros(len(first))])
         solver = ca.nlpsol("calm", "ipopt", problem, _OPTIONS)
         found = np.asarray(solver(x0=first.ravel(), lbg=lower, ubg=np.inf)["x"], dtype=np.float64).reshape(-1, 2)
-        found = found / np.maximum(1.0, np.linalg.norm(found, axis=1, keepdims=True))
+        found = within_discs(found)
         values = setting.values_of(start.margins, start.transform, course.leans(found))
         return found if values.min() >= keep - 1e-4 else None
 

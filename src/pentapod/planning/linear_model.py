@@ -15,8 +15,8 @@ from pentapod.planning.setting import Candidate, Setting
 REACH = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
 """The unit of a placement step: metres, and tan(angle / 2). The unit of a coefficient is the cone."""
 
-_PATIENCE = {"maxiter": 5_000, "time_limit": 20.0}
-"""Linear programs take milliseconds; where the simplex method goes in circles, no step is taken."""
+_PIVOTS = 5_000
+"""Linear programs take some hundred pivots; where the simplex method goes in circles, no step is taken."""
 
 _NEAR = 0.4
 """Margins within this much of the level enter the model."""
@@ -94,9 +94,9 @@ class LinearModel:
             b_ub=np.concatenate([self.values - smallest, np.maximum(np.append(1.0 - self.steepness, self.room), 0.0)]),
             bounds=[(-reach, reach)] * count + [(0.0, None)],
             method="highs-ds",
-            options=_PATIENCE,
+            options={"maxiter": _PIVOTS},
         )
-        x = np.zeros(count + 1) if answer.x is None else np.asarray(answer.x, dtype=np.float64)
+        x = np.asarray(answer.x, dtype=np.float64) if answer.status == 0 else np.zeros(count + 1)
         moving = self.motion.shape[1]
         step, change = REACH * (self.motion @ x[:moving]), x[moving:-1] * self.setting.cone
         return step, change.reshape(-1, 2), float(x[-1])

@@ -99,6 +99,8 @@ def search(
             alone = search(setting, component, seed=seed, solver=solver, progress=progress)
             if alone.best.smallest < NEEDED_MARGIN:
                 return alone
+            if alone.interrupted:
+                raise KeyboardInterrupt
         count = min(len(starts), TRIED) if freedom.moves else len(starts)
         improver = SOLVERS[solver](setting, freedom.moves)
         for margins, transform in starts[:count]:

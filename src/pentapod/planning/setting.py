@@ -79,16 +79,15 @@ class Setting:
     def values(
         self, margins: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints | slice = slice(None)
     ) -> Floats:
-        """Return the margins (n, M), weighed, at waypoints `rows`."""
-        axes = self.axes(coefficients, rows)
-        return self._weighed(margins, margins(*self.task.machine_poses(transform, axes, rows), transform))
+        """Return the margins (n, M), weighed, of the tilt field with these coefficients at waypoints `rows`."""
+        return self.values_of(margins, transform, self.leans(coefficients, rows), rows)
 
-    def values_of(self, margins: Margins, transform: RigidTransform, leans: Floats) -> Floats:
-        """Return the margins (N, M), weighed, at all waypoints for leans (N, 3), workpiece frame."""
-        axes = lean(self.task.nominal, leans)
-        return self._weighed(margins, margins(*self.task.machine_poses(transform, axes), transform))
-
-    def _weighed(self, margins: Margins, plain: Floats) -> Floats:
+    def values_of(
+        self, margins: Margins, transform: RigidTransform, leans: Floats, rows: Ints | slice = slice(None)
+    ) -> Floats:
+        """Return the margins (n, M), weighed, for leans (n, 3), workpiece frame, at waypoints `rows`."""
+        axes = lean(self.task.nominal[rows], leans)
+        plain = margins(*self.task.machine_poses(transform, axes, rows), transform)
         return plain if self.weights.are_even else weighed(plain, self.weights.of(margins.limits))
 
     def contacts(self, margins: Margins, transform: RigidTransform, leans: Floats, rows: Ints) -> Floats:
