@@ -8,6 +8,7 @@ import toolpath_surfaces as surfaces
 
 from pentapod.errors import InputError, MeshError
 from pentapod.toolpath import UNITS, load_mesh, write_stl
+from pentapod.toolpath.obj import read_obj
 
 
 @pytest.fixture
@@ -98,6 +99,7 @@ def nan_stl(ball):
 
 PLY_HEAD = b"ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\n"
 PLY_FACES = b"element face %d\nproperty list uchar int vertex_indices\nend_header\n"
+OBJ_POINTS = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 PLY_POINTS = b"0 0 0\n1 0 0\n0 1 0\n"
 
 BAD = {
@@ -122,9 +124,21 @@ BAD = {
     "cut.ply": (lambda _: PLY_HEAD % 3 + PLY_FACES % 5 + PLY_POINTS + b"3 0 1 2\n", "PLY|truncated"),
     "points.ply": (lambda _: PLY_HEAD % 3 + b"end_header\n" + PLY_POINTS, "no facets|cannot be read"),
     "index.ply": (lambda _: PLY_HEAD % 3 + PLY_FACES % 1 + PLY_POINTS + b"3 0 1 9\n", "not there|cannot be read"),
-    "words.obj": (lambda _: b"a letter, not a mesh", "no facets|cannot be read"),
-    "index.obj": (lambda _: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 8\n", "not there|cannot be read"),
-    "nan.obj": (lambda _: b"v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", "not finite|cannot be read"),
+    "words.obj": (lambda _: b"a letter, not a mesh", "words.obj:1: a: cannot be read as OBJ: an unknown word"),
+    "index.obj": (lambda _: OBJ_POINTS + b"f 1 2 8\n", "index.obj:4: f: .*not there"),
+    "early.obj": (lambda _: b"v 0 0 0\nf -1 -2 -3\n" + OBJ_POINTS, "early.obj:2: f: .*not there"),
+    "nan.obj": (lambda _: OBJ_POINTS.replace(b"v 1", b"v nan") + b"f 1 2 3\n", "not finite"),
+    "letter.obj": (lambda _: OBJ_POINTS.replace(b"v 1", b"v l") + b"f 1 2 3\n", "letter.obj:2: v: .*not three numbers"),
+    "line.obj": (lambda _: OBJ_POINTS + b"f 1 2\n", "line.obj:4: f: .*not three corners"),
+    "curve.obj": (lambda _: OBJ_POINTS + b"curv 0 1 1 2 3\n", "curve.obj:4: curv: .*an unknown word"),
+    "cut.obj": (lambda _: OBJ_POINTS + b"f 1 2 3\nf 1 3 2", "cut.obj:5: the last line has no end"),
+    "points.obj": (lambda _: OBJ_POINTS, "no facets"),
+    "letter.ply": (
+        lambda _: PLY_HEAD % 3 + PLY_FACES % 1 + PLY_POINTS.replace(b"1 0", b"l 0") + b"3 0 1 2\n",
+        "letter.ply:11: cannot be read as PLY: not numbers .*l 0 0",
+    ),
+    "head.ply": (lambda _: PLY_HEAD.replace(b"float y", b"flo.at y") % 3 + PLY_FACES % 1, "head.ply:5: .*of a header"),
+    "end.ply": (lambda _: PLY_HEAD % 3, 'end.ply:7: .*"end_header" is missing'),
     "part.step": (lambda _: b"ISO-10303-21;", "not a mesh format"),
 }
 
@@ -152,7 +166,7 @@ def test_missing_file_directory_and_bad_scale(tmp_path):
 
 @pytest.mark.parametrize("suffix", ["stl", "ply", "obj"])
 def test_no_truncation_ends_in_a_raw_traceback(tmp_path, suffix):
-    """Every cut of a file is read (a text may end early and still be whole) or refused with an InputError."""
+    """Every cut is refused with an InputError; but an OBJ does not tell how many lines it has."""
     import trimesh
 
     path = tmp_path / f"ball.{suffix}"
@@ -161,11 +175,44 @@ def test_no_truncation_ends_in_a_raw_traceback(tmp_path, suffix):
     refused = 0
     for size in range(0, len(data), max(1, len(data) // 60)):
         path.write_bytes(data[:size])
+        message = ""
         try:
             load_mesh(path, "mm")
-        except InputError:
-            refused += 1
-    assert refused > (5 if suffix == "obj" else 55)
+        except InputError as error:
+            message = str(error)
+        refused += bool(message)
+        if message:
+            assert path.name in message
+        else:
+            assert data[:size].endswith(b"\n")
+            assert suffix == "obj" or not data[size:].strip()
+    assert refused > 50
+
+
+def test_obj_as_others_write_it(tmp_path):
+    """Polygons, textures, corners counted from the end, groups, continued lines; what belongs to no facet is told."""
+    path = tmp_path / "a.obj"
+    path.write_text(
+        "# Blender\nmtllib a.mtl\no part\nv 0 0 0\nv 10 0 0 1 0 0\nv 10 10 0\n v 0 10 0 # a corner\nvt 0 0\nvn 0 0 1\n"
+        "g top\nusemtl red\ns off\nf 1/1/1 2/1/1 3//1 4\nv 5 5 9\nf -1 -5 \\\n -4\nl 1 2\nv 7 7 7\n\n"
+    )
+    mesh = load_mesh(path, "mm")
+    assert mesh.diagnosis.facets == 3
+    assert mesh.diagnosis.area == pytest.approx(1e-4 + 0.5 * 10e-3 * np.hypot(5e-3, 9e-3))
+    assert "1 of 6 vertices belong to no facet" in str(mesh.diagnosis)
+
+
+def test_obj_reads_what_another_reader_reads(tmp_path, ball):
+    import trimesh
+
+    path = tmp_path / "ball.obj"
+    shape = trimesh.Trimesh(*surfaces.sphere(50.0, 2), process=False)
+    shape.export(path)
+    again = trimesh.load(path, force="mesh", process=False)
+    vertices, faces, notes = read_obj(path, path.read_bytes())
+    np.testing.assert_array_equal(vertices, again.vertices)
+    np.testing.assert_array_equal(faces, again.faces)
+    assert not notes
 
 
 def test_bytes_after_the_last_facet_are_noted(tmp_path, ball):

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import io
-import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +10,8 @@ from pentapod.arrays import Floats, Ints
 from pentapod.errors import MeshError, nearest
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.mesh import CREASE_ANGLE, Mesh
+from pentapod.toolpath.obj import read_obj
+from pentapod.toolpath.ply import read_ply
 from pentapod.toolpath.stl import check_stl_size, read_stl
 
 UNITS: dict[str, float] = {"mm": 1e-3, "cm": 1e-2, "inch": 25.4e-3, "m": 1.0}
@@ -79,8 +78,10 @@ def _read(path: Path) -> tuple[Floats, Ints, tuple[str, ...]]:
     if suffix == ".stl":
         triangles, notes = read_stl(path, data)
         vertices, faces = triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
+    elif suffix == ".obj":
+        vertices, faces, notes = read_obj(path, data)
     else:
-        vertices, faces = _through_trimesh(path, suffix, data)
+        vertices, faces = read_ply(path, data)
     if not len(faces):
         raise MeshError("the mesh has no facets", file=path, expected="a surface made of triangles")
     return vertices, faces, notes
@@ -113,40 +114,6 @@ def _check_head(path: Path, suffix: str, head: bytes, size: int) -> None:
         wide = head.startswith((b"\xff\xfe", b"\xfe\xff"))
         what = "not UTF-8 text but UTF-16" if wide else "it holds zero bytes"
         raise MeshError(f"cannot be read as OBJ: {what}", file=path, line=1, remedy="save it as UTF-8")
-
-
-def _through_trimesh(path: Path, suffix: str, data: bytes) -> tuple[Floats, Ints]:
-    import trimesh  # noqa: PLC0415 - heavy, and only needed here
-
-    try:
-        loaded: Any = trimesh.load(
-            io.BytesIO(data), file_type=suffix[1:], force="mesh", process=False, skip_materials=True
-        )
-        vertices = np.asarray(loaded.vertices, dtype=np.float64)
-        faces = np.asarray(loaded.faces).reshape(-1, 3)
-    except Exception as error:  # what a reader raises on a broken file is not foreseeable
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        name = suffix[1:].upper()
-        raise MeshError(f"cannot be read as {name}: {reason}", file=path, remedy="the file may be truncated") from error
-    if vertices.ndim != 2 or vertices.shape[1] != 3:
-        raise MeshError(f"a vertex of this {suffix[1:].upper()} is not three numbers", file=path)
-    if suffix == ".ply":
-        _check_ply_counts(path, data, len(vertices), len(faces))
-    return vertices, faces.astype(np.intp)
-
-
-def _check_ply_counts(path: Path, data: bytes, vertices: int, faces: int) -> None:
-    """Raise MeshError where the header announces more than was read."""
-    header = data.split(b"end_header", 1)[0]
-    announced = {m[1]: int(m[2]) for m in re.finditer(rb"element\s+(\w+)\s+(\d+)", header)}
-    for name, found in ((b"face", faces), (b"vertex", vertices)):
-        # Of a cloud of points, which has no facets at all, something better is said later.
-        if announced.get(name, 0) > found and announced.get(b"face", 0):
-            raise MeshError(
-                f"truncated: the header announces {announced[name]:,} {name.decode()}, the file holds {found:,}",
-                file=path,
-                remedy="export the mesh again",
-            )
 
 
 def _unit_missing(path: Path, vertices: Floats) -> MeshError:

@@ -13,11 +13,11 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.errors import MeshError
+from pentapod.toolpath.text_mesh import AGAIN, line_of
 
 _HEADER = 84
 _FACET = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
-_AGAIN = "export the mesh again; the file may have been cut off on its way"
 
 
 def read_stl(path: Path, data: bytes) -> tuple[Floats, tuple[str, ...]]:
@@ -34,14 +34,14 @@ def read_stl(path: Path, data: bytes) -> tuple[Floats, tuple[str, ...]]:
         raise MeshError("a text file, not STL", file=path, expected='binary STL, or text that begins with "solid"')
     if announced is None:
         raise MeshError(
-            f"truncated: {len(data)} bytes, shorter than the header of a binary STL", file=path, remedy=_AGAIN
+            f"truncated: {len(data)} bytes, shorter than the header of a binary STL", file=path, remedy=AGAIN
         )
     held = (len(data) - _HEADER) // _FACET.itemsize
     if held < announced:
         raise MeshError(
             f"truncated: the header announces {announced:,} facets, the file holds {held:,}",
             file=path,
-            remedy=_AGAIN,
+            remedy=AGAIN,
         )
     extra = len(data) - _HEADER - _FACET.itemsize * announced
     return _binary(data, announced), (f"{extra:,} bytes after the last facet ignored",)
@@ -55,11 +55,11 @@ def check_stl_size(path: Path, head: bytes, size: int) -> None:
     held = (size - _HEADER) // _FACET.itemsize
     if held < announced:
         raise MeshError(
-            f"truncated: the header announces {announced:,} facets, the file holds {held:,}", file=path, remedy=_AGAIN
+            f"truncated: the header announces {announced:,} facets, the file holds {held:,}", file=path, remedy=AGAIN
         )
     if held > 2 * announced + 100:
         raise MeshError(
-            f"the header announces {announced:,} facets, the file has room for {held:,}", file=path, remedy=_AGAIN
+            f"the header announces {announced:,} facets, the file has room for {held:,}", file=path, remedy=AGAIN
         )
 
 
@@ -96,8 +96,8 @@ def _ascii(path: Path, data: bytes) -> Floats:
             f"truncated or malformed: {facets:,} facets begin, {words[b'endfacet']:,} end, "
             f"{len(numbers):,} vertices in all" + ("" if words[b"endsolid"] else ', "endsolid" is missing'),
             file=path,
-            line=data.count(b"\n") + 1,
-            remedy=_AGAIN,
+            line=line_of(data, len(data)),
+            remedy=AGAIN,
         )
     if not numbers:
         return np.zeros((0, 3, 3))
@@ -117,7 +117,7 @@ def _not_a_number(path: Path, data: bytes) -> MeshError:
             try:
                 float(word)
             except ValueError:
-                line = data.count(b"\n", 0, match.start()) + 1
+                line = line_of(data, match.start())
                 value = word.decode("ascii", "replace")
                 return MeshError("a vertex is not three numbers", file=path, line=line, value=value)
     return MeshError("a vertex is not three numbers", file=path)

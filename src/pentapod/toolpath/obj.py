@@ -1,0 +1,101 @@
+"""OBJ: vertices and facets of Wavefront's text format, strictly; a line that is not understood is named.
+
+The format: https://www.martinreddy.net/gfx/3d/OBJ.spec. `v x y z` and `f` with three corners or more count, corners as
+`vertex/texture/normal` from 1, or from the end where negative; polygons are cut into fans. Textures, normals, groups
+and materials are passed over. Curves, surfaces and words that are not known are refused: nothing is left out silently.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from pentapod.arrays import Floats, Ints
+from pentapod.errors import MeshError
+from pentapod.toolpath.text_mesh import AGAIN, NUMBER, check_last_line, line_of
+
+_CORNER = rb"[-+]?\d+(?:/[-+]?\d*){0,2}"
+_GAP = rb"[ \t]+"
+_PASSED_OVER = (
+    rb"#.*|(?:vt|vn|vp|g|o|s|mg|usemtl|mtllib|usemap|maplib|bevel|c_interp|d_interp|lod|shadow_obj|trace_obj|p|l)"
+    rb"(?:[ \t].*)?"
+)
+_VERTEX_LINE = rb"v(?:" + _GAP + NUMBER + rb"){3,8}"
+_FACET_LINE = rb"f(?:" + _GAP + _CORNER + rb"){3,}"
+_STRANGE = re.compile(
+    rb"^(?![ \t]*(?:(?:" + _VERTEX_LINE + rb"|" + _FACET_LINE + rb")[ \t]*(?:#.*)?|" + _PASSED_OVER
+    + rb")?[ \t\r]*$)[ \t]*(\S+).*$",
+    re.MULTILINE,
+)  # fmt: skip
+_VERTEX = re.compile(rb"^[ \t]*v" + 3 * (_GAP + rb"(" + NUMBER + rb")"), re.MULTILINE)
+_FACET = re.compile(rb"^[ \t]*f((?:" + _GAP + _CORNER + rb")+)", re.MULTILINE)
+_REST_OF_CORNER = re.compile(rb"/\S*")
+
+
+def read_obj(path: Path, data: bytes) -> tuple[Floats, Ints, tuple[str, ...]]:
+    """Return vertices (V, 3) in the file's own numbers, facets (F, 3), and notes. Raises MeshError naming the line."""
+    data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ") if b"\\" in data else data
+    if strange := _STRANGE.search(data):
+        word = strange[1].decode("utf-8", "replace")[:20]
+        what = {"v": "a vertex is not three numbers", "f": "a facet is not three corners or more"}
+        text = strange[0].decode("utf-8", "replace").strip()[:40]
+        raise MeshError(
+            f"cannot be read as OBJ: {what.get(word, 'an unknown word')}",
+            file=path, line=line_of(data, strange.start()), key=word, value=text, remedy=AGAIN,
+        )  # fmt: skip
+    check_last_line(path, data)
+    vertices, places = _vertices(data)
+    faces = _facets(path, data, places)
+    return vertices, faces, _unused(len(vertices), faces)
+
+
+def _vertices(data: bytes) -> tuple[Floats, Ints]:
+    """Return vertices (V, 3), and where (V,) in the file each stands."""
+    parts, places = [np.zeros((0, 3))], [np.zeros(0, dtype=np.intp)]
+    for matches in _batches(_VERTEX.finditer(data)):
+        parts.append(np.array([match.groups() for match in matches], dtype=np.bytes_).astype(np.float64))
+        places.append(np.array([match.start() for match in matches]))
+    return np.concatenate(parts), np.concatenate(places)
+
+
+def _facets(path: Path, data: bytes, places: Ints) -> Ints:
+    """Return triangles (F, 3) of vertex indices from 0. Raises MeshError for a corner that is not there (yet)."""
+    parts = [np.zeros((0, 3), dtype=np.intp)]
+    for matches in _batches(_FACET.finditer(data)):
+        corners = [_REST_OF_CORNER.sub(b"", match[1]).split() for match in matches]
+        count = np.array([len(words) for words in corners])
+        index = np.array([int(word) for words in corners for word in words], dtype=np.intp)
+        owner = np.repeat(np.arange(len(matches)), count)
+        before = np.searchsorted(places, np.array([match.start() for match in matches]))
+        index = np.where(index < 0, before[owner] + index, index - 1)
+        wrong = (index < 0) | (index >= len(places))
+        if wrong.any():
+            match = matches[int(owner[wrong.argmax()])]
+            raise MeshError(
+                f"a facet names a vertex that is not there; the mesh has {len(places):,} vertices",
+                file=path, line=line_of(data, match.start()), key="f", value=match[1].decode().strip()[:40],
+                remedy=AGAIN,
+            )  # fmt: skip
+        # Corner k and k + 1 of a polygon make a triangle with its first, for all k but the first and last.
+        first = np.cumsum(count) - count
+        place = np.arange(len(index)) - first[owner]
+        middle = np.flatnonzero((place > 0) & (place < count[owner] - 1))
+        parts.append(np.stack([index[first[owner[middle]]], index[middle], index[middle + 1]], axis=1))
+    return np.concatenate(parts)
+
+
+def _batches(matches: Iterator[re.Match[bytes]]) -> Iterator[list[re.Match[bytes]]]:
+    """Return matches a hundred thousand at a time: objects of Python are large."""
+    while batch := list(islice(matches, 100_000)):
+        yield batch
+
+
+def _unused(count: int, faces: Ints) -> tuple[str, ...]:
+    """Return a note where vertices belong to no facet: a file that was cut off at the end of a line looks like that."""
+    left = count - len(np.unique(faces))
+    whole = "an OBJ does not tell how many facets it should have"
+    return (f"{left:,} of {count:,} vertices belong to no facet: was the file cut off? {whole}",) if left else ()

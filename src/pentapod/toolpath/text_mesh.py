@@ -1,0 +1,26 @@
+"""What readers of mesh files in text share: numbers, lines, and the marks of a file that was cut off."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pentapod.errors import MeshError
+
+NUMBER = rb"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[nN][aA][nN]|[iI][nN][fF](?:[iI][nN][iI][tT][yY])?)"
+"""A number as a pattern; nan and inf are told from words, for the mesh says which facet has them."""
+
+AGAIN = "export the mesh again; the file may have been cut off on its way"
+
+
+def line_of(data: bytes, position: int) -> int:
+    """Return the number, from 1, of the line that holds a byte."""
+    return data.count(b"\n", 0, position) + 1
+
+
+def check_last_line(path: Path, data: bytes) -> None:
+    """Raise MeshError where the last line has no end: it was cut off."""
+    if data[-1:] not in (b"\n", b"\r"):
+        raise MeshError(
+            "the last line has no end: the file was cut off",
+            file=path, line=line_of(data, len(data)), remedy="export the mesh again, or end the last line",
+        )  # fmt: skip
