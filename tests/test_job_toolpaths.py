@@ -9,6 +9,7 @@ import pytest
 
 from pentapod.cli.main import run as run_cli
 from pentapod.errors import JobError
+from pentapod.geometry import angle_between
 from pentapod.job import Job
 from pentapod.pipeline import job_mesh, job_toolpath, run
 from pentapod.toolpath import SegmentKind
@@ -80,6 +81,15 @@ def test_axes_and_remedies_of_the_job_are_used(make_job):
     assert "problem" not in str(report).splitlines()[-1]
     assert "ways between cuts led over" in str(report)
     assert any(segment.kind is SegmentKind.CUT for segment in path.segments)
+
+
+@pytest.mark.parametrize("lead", [0, 12])
+def test_the_cap_on_steps_holds_in_every_axis_mode(make_job, lead):
+    """Near the point that the axis is turned from, the axis turns fast; and with a lead, at every turn of a pass."""
+    near = f'tilt_deg = 0\nmode = "toward"\npoint_mm = [0, 0, -30]\nlead_deg = {lead}'
+    job = Job.load(make_job(("tilt_deg = 0", near), (STRATEGY, STRATEGY + "\naxis_step_deg = 2")))
+    path, _ = job_toolpath(job, job_mesh(job))
+    assert angle_between(path.axes[1:], path.axes[:-1]).max() <= np.radians(2.0) * (1 + 1e-8)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from pentapod.progress import Progress, silent
 from pentapod.strategy_tables import FileTable, StrategyTable, sunk_mm
 from pentapod.table import Vector
 from pentapod.toolpath.axis_modes import AxisMode, Between, Fixed, Normal, Pointed
+from pentapod.toolpath.axis_steps import stepped
 from pentapod.toolpath.facet_tree import FacetTree
 from pentapod.toolpath.gouge import checked
 from pentapod.toolpath.gouge_report import GougeOptions, Remedy
@@ -86,8 +87,9 @@ def finished_as_asked(
     job: Job, mesh: Mesh, tool: Tool, toolpath: Toolpath, progress: Progress = silent
 ) -> tuple[Toolpath, object]:
     """Return a toolpath with the axes and without the gouges that the job asks for, and what the check found."""
-    if job.toolpath.strategy != "file":
-        toolpath = oriented(toolpath, tool, job_orientation(job))
+    axis_step = np.inf if isinstance(job.toolpath, FileTable) else np.radians(job.toolpath.axis_step_deg)
+    if not isinstance(job.toolpath, FileTable):
+        toolpath = stepped(oriented(toolpath, tool, job_orientation(job)), axis_step)
     table = job.gouge
     options = GougeOptions(
         tuple(Remedy(name) for name in table.remedy),
@@ -97,7 +99,9 @@ def finished_as_asked(
         highest=_MM * table.highest_mm,
         links=None if isinstance(job.toolpath, FileTable) else _link_style(job, job.toolpath, mesh, toolpath),
     )
-    return checked(toolpath, tool, FacetTree.of(mesh), options, progress)
+    toolpath, report = checked(toolpath, tool, FacetTree.of(mesh), options, progress)
+    # What was tilted clear may turn faster than before.
+    return stepped(toolpath, axis_step) if report.tilted else toolpath, report
 
 
 def _link_style(job: Job, table: StrategyTable, mesh: Mesh, toolpath: Toolpath) -> LinkStyle:

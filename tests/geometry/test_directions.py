@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pentapod.errors import ArrayError
-from pentapod.geometry import angle_between, normalised, tangent_frame
+from pentapod.geometry import angle_between, normalised, partway, tangent_frame
 
 numbers = st.floats(-1.0, 1.0, allow_subnormal=False)
 
@@ -31,6 +31,18 @@ def test_angle_to_a_turned_vector_is_the_turn(angle: float) -> None:
     t1, _ = tangent_frame(a)
     np.testing.assert_allclose(angle_between(a, np.cos(angle) * a + np.sin(angle) * t1), angle, rtol=0, atol=1e-15)
     np.testing.assert_allclose(angle_between(a, -(np.cos(angle) * a + np.sin(angle) * t1)), np.pi - angle, atol=1e-15)
+
+
+def test_partway_divides_the_turn_evenly_even_between_opposites() -> None:
+    rng = np.random.default_rng(2)
+    a = normalised(rng.normal(size=(60, 3)))
+    b = normalised(rng.normal(size=(60, 3)))
+    b[:20], b[20:30], b[30:40] = -a[:20], a[20:30], normalised(1e-9 * b[30:40] - a[30:40])
+    share = rng.uniform(0, 1, 60)
+    found = partway(a, b, share)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=1e-15)
+    np.testing.assert_allclose(angle_between(a, found), share * angle_between(a, b), atol=1e-8)
+    np.testing.assert_allclose(angle_between(found, b), (1 - share) * angle_between(a, b), atol=1e-8)
 
 
 def test_small_angles_keep_their_digits() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,8 +11,10 @@ from hypothesis import strategies as st
 
 from pentapod.errors import InputError
 from pentapod.geometry import angle_between
+from pentapod.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.toolpath.axis_modes import Between, Fixed, Normal, Pointed, leaned
 from pentapod.toolpath.axis_smoothing import rate_capped, smoothed
+from pentapod.toolpath.axis_steps import stepped
 from pentapod.toolpath.orientation import Orientation
 
 
@@ -137,6 +141,33 @@ def test_a_path_within_the_cap_is_left_alone():
 def test_nonsense_is_refused(bad):
     with pytest.raises(InputError):
         Orientation(**bad)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10_000), pivot=st.sampled_from([3e-3, 0.0, -5e-3]), degrees=st.floats(0.5, 30.0))
+def test_the_cap_on_steps_holds_and_the_pivot_keeps_its_way(seed, pivot, degrees):
+    """Waypoints stay; what comes between lies evenly on the straight way of the pivot."""
+    rng = np.random.default_rng(seed)
+    tips = np.cumsum(rng.normal(size=(9, 3)), axis=0) * 1e-3
+    axes = rng.normal(size=(9, 3))
+    axes[4] = -axes[3]
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    cut, rapid = (SegmentKind.CUT, 0.01), (SegmentKind.RAPID, np.inf)
+    pieces = [(cut, slice(0, 5)), (rapid, slice(4, 9))]
+    path = Toolpath(tuple(Segment(kind, tips[r], axes[r], feed) for (kind, feed), r in pieces), pivot)
+    step = np.radians(degrees)
+    found = stepped(path, step)
+    turns = angle_between(found.axes[1:], found.axes[:-1])
+    assert turns.max() <= step * (1 + 1e-8)
+    rows = [int(np.flatnonzero((found.tips == tip).all(axis=1))[0]) for tip in tips]
+    np.testing.assert_array_equal(found.axes[rows], axes)
+    for k, (a, b) in enumerate(pairwise(rows)):
+        whole = float(angle_between(axes[k], axes[k + 1]))
+        assert b - a == max(np.ceil(whole / step - 1e-9), 1)
+        np.testing.assert_allclose(turns[a:b], whole / (b - a), atol=1e-7)
+        straight = path.pivots[k] + np.linspace(0, 1, b - a + 1)[:, None] * (path.pivots[k + 1] - path.pivots[k])
+        np.testing.assert_allclose(found.pivots[a : b + 1], straight, atol=1e-15)
+    assert stepped(found, step * (1 + 1e-6)) is found
 
 
 def test_a_finished_toolpath_is_turned_and_stays_whole():

@@ -13,7 +13,7 @@ from pentapod.geometry.bernstein import (
     to_power,
     unscaled,
 )
-from pentapod.geometry.directions import angle_between, normalised, tangent_frame
+from pentapod.geometry.directions import angle_between, normalised, partway, tangent_frame
 from pentapod.geometry.level_set import enclosed_volume, zero_surface
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.positivity import Positivity, positivity
@@ -33,6 +33,7 @@ __all__ = [
     "hull",
     "multiply",
     "normalised",
+    "partway",
     "positivity",
     "scaled",
     "split",

@@ -27,6 +27,22 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> Floats:
     return 2.0 * np.arctan2(np.linalg.norm(u - v, axis=-1), np.linalg.norm(u + v, axis=-1))
 
 
+def partway(start: Floats, end: Floats, share: Floats) -> Floats:
+    """Return unit vectors (..., 3) that lie `share` (...), 0 to 1, of the way from unit start to unit end.
+
+    On great circles, evenly. Between opposite vectors all ways are as short: one of them is taken.
+    """
+    angle = np.asarray(share * angle_between(start, end))[..., None]
+    aside = end - np.einsum("...i,...i->...", start, end)[..., None] * start
+    length = np.linalg.norm(aside, axis=-1, keepdims=True)
+    any_way = tangent_frame(start)[0]
+    aside = np.where(length > 1e-12, aside / np.where(length > 1e-12, length, 1.0), any_way)
+    # Near opposites the first difference keeps few digits: once more makes it square.
+    aside = normalised(aside - np.einsum("...i,...i->...", start, aside)[..., None] * start)
+    mixed = np.cos(angle) * start + np.sin(angle) * aside
+    return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
+
+
 def tangent_frame(directions: ArrayLike) -> tuple[Floats, Floats]:
     """Return unit t1, t2 (..., 3) with (t1, t2, direction) right-handed. Directions are unit.
 

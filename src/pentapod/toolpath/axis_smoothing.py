@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 from pentapod.arrays import Floats
 from pentapod.errors import ToolpathError
-from pentapod.geometry.directions import angle_between
+from pentapod.geometry.directions import angle_between, partway
 
 _ROUNDS = 2
 _SAME_SIDE = 0.5
@@ -35,7 +35,7 @@ def smoothed(points: Floats, axes: Floats, reach: float, tolerance: float) -> Fl
         mixed = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
         angle = angle_between(mixed, axes)
         share = np.minimum(1.0, tolerance / np.maximum(angle, 1e-300))
-        result = _turned(axes, mixed, angle, share)
+        result = partway(axes, mixed, share)
     return result
 
 
@@ -52,15 +52,6 @@ def _weights(points: Floats, axes: Floats, reach: float) -> csr_array:
     matrix = coo_array((np.exp(-2.0 * (d / reach) ** 2), (row, column)), shape=(len(points), len(points))).tocsr()
     total = np.asarray(matrix.sum(axis=1)).ravel()
     return csr_array(matrix.multiply(1.0 / total[:, None]))
-
-
-def _turned(start: Floats, end: Floats, angle: Floats, share: Floats) -> Floats:
-    """Return the axes (N, 3) that lie `share` (N,) of the way from start to end, on great circles."""
-    sine = np.where(angle > 1e-9, np.sin(angle), 1.0)
-    first = np.where(angle > 1e-9, np.sin((1.0 - share) * angle) / sine, 1.0 - share)
-    second = np.where(angle > 1e-9, np.sin(share * angle) / sine, share)
-    mixed = first[:, None] * start + second[:, None] * end
-    return mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
 
 
 def rate_capped(points: Floats, axes: Floats, rate: float) -> Floats:

@@ -22,6 +22,9 @@ from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.shooting import Shots, neighbours, shoot
 from pentapod.toolpath.tools import Tool
 
+_ROUGH = 0.1
+_STRETCH, _STEEPEST = 4.0, 60.0
+
 
 class Laying(StrEnum):
     """project: along the view, as a slide projector would. wrap: along the surface, lengths kept, as a label would."""
@@ -75,7 +78,16 @@ def draw_curves(mesh: Mesh, tool: Tool, options: CurveOptions) -> Drawing:
     lines = [options.scale * line @ turn for line in options.lines]
     landing = projection(mesh, options) if options.laying is Laying.PROJECT else wrapping(mesh, options)
     landing = sunk(landing, lambda plane: np.full(len(plane), options.depth))
-    passes, lost = draped(lines, landing, spacing=options.spacing, chordal=options.chordal)
+    bridge, stretch = tear(options, options.laying, options.spacing)
+    passes, lost = draped(
+        lines,
+        landing,
+        spacing=options.spacing,
+        chordal=options.chordal,
+        bridge=bridge,
+        stretch=stretch,
+        sink=options.depth,
+    )
     if not len(passes):
         raise ToolpathError(
             "no line meets the surface",
@@ -92,6 +104,16 @@ def draw_curves(mesh: Mesh, tool: Tool, options: CurveOptions) -> Drawing:
         visible=options.laying is Laying.PROJECT,
         notes=notes,
     )
+
+
+def tear(options: PathOptions, laying: Laying | str, spacing: float) -> tuple[float, float]:
+    """Return what is bridged, metres, and by how much lines may be stretched where the surface is not torn.
+
+    Straightest lines part at a mesh's corners; what is projected parts at steps alone, and stretches on slopes.
+    """
+    if laying is Laying.WRAP:
+        return _ROUGH * spacing, _STRETCH
+    return options.chordal, min(1.1 / max(np.cos(options.region.angle), 1e-9), _STEEPEST)
 
 
 def flat_turn(angle: float) -> Floats:

@@ -14,22 +14,30 @@ from pentapod.toolpath.passes import Passes
 Landing = Callable[[Floats], tuple[Floats, Floats, Bools]]
 """Points of the plane (N, 2) → points on the surface (N, 3), normals (N, 3), and whether (N,) they landed."""
 
-_MOST_ROUNDS = 14
-_TORN = 4.0
-_ROUGH = 0.1
+_MOST_ROUNDS = 16
 _FINE = 0.02
 _FIRST = 0.25
-_NOT_QUITE_HALF = 0.47
-"""Where chords are tested: a symmetric bend would hide in the middle."""
+_PLACES = (0.47, 0.21, 0.78)
+"""Where a chord is tested, one after the other: a symmetric bend would hide in the middle, two bends from one place."""
 
 
-def draped(lines: list[Floats], landing: Landing, *, spacing: float, chordal: float) -> tuple[Passes, float]:
+def draped(
+    lines: list[Floats],
+    landing: Landing,
+    *,
+    spacing: float,
+    chordal: float,
+    bridge: float,
+    stretch: float,
+    sink: float = 0.0,
+) -> tuple[Passes, float]:
     """Return flat lines (n, 2) on a surface, and which share of their length did not land.
 
-    Points are added between those that were given until the middle of every chord is within a fiftieth of `chordal`
-    metres of the surface's own line, and none are further apart than `spacing`. A line is broken where it leaves the
-    surface, and where neighbours land so far apart that the surface between them must be torn; what is torn by less
-    than a tenth of the spacing (straightest lines part at a mesh's corners) is bridged.
+    Points are added between those that were given until every chord is within a fiftieth of `chordal` metres of the
+    surface's own line, wherever it is tested, and none are further apart than `spacing`. A line is broken where it
+    leaves the surface, and where neighbours land so far apart that the surface between them must be torn: further than
+    `stretch` times their distance in the plane. What is torn by less than `bridge` metres is bridged. sink: depth of
+    the landing in metres, by which neighbours part at a crease.
     """
     # Two bends within one chord could hide from a test of one place.
     fine = [spaced(line, _FIRST * spacing) for line in lines]
@@ -37,7 +45,8 @@ def draped(lines: list[Floats], landing: Landing, *, spacing: float, chordal: fl
     plane, owner, points, normals, landed = _refined(np.concatenate(fine), owner, landing, chordal)
     steps = np.where(owner[1:] == owner[:-1], np.linalg.norm(np.diff(plane, axis=0), axis=1), 0.0)
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    whole = (owner[1:] == owner[:-1]) & landed[1:] & landed[:-1] & (gaps <= _TORN * steps + _ROUGH * spacing)
+    swing = sink * np.linalg.norm(np.diff(normalised(normals), axis=0), axis=1)
+    whole = (owner[1:] == owner[:-1]) & landed[1:] & landed[:-1] & (gaps <= stretch * steps + bridge + swing)
     runs = _runs(whole)
     passes = Passes.of([(points[a : b + 1], normals[a : b + 1]) for a, b in runs], owner[[a for a, _ in runs]])
     length = float(steps.sum())
@@ -59,14 +68,15 @@ def _refined(
 ) -> tuple[Floats, Ints, Floats, Floats, Bools]:
     """Return points of lines, the line (N,) of each, with more between, where they land, normals, and whether."""
     points, normals, landed = landing(plane)
-    unsure = owner[1:] == owner[:-1]
+    passed = np.where(owner[1:] == owner[:-1], 0, len(_PLACES))
     for _ in range(_MOST_ROUNDS):
-        rows = np.flatnonzero(unsure)
+        rows = np.flatnonzero(passed < len(_PLACES))
         if not len(rows):
             break
-        between = (1.0 - _NOT_QUITE_HALF) * plane[rows] + _NOT_QUITE_HALF * plane[rows + 1]
+        share = np.array(_PLACES)[passed[rows], None]
+        between = (1.0 - share) * plane[rows] + share * plane[rows + 1]
         new_points, new_normals, new_landed = landing(between)
-        chord = (1.0 - _NOT_QUITE_HALF) * points[rows] + _NOT_QUITE_HALF * points[rows + 1]
+        chord = (1.0 - share) * points[rows] + share * points[rows + 1]
         all_landed = new_landed & landed[rows] & landed[rows + 1]
         off = np.where(all_landed, np.linalg.norm(new_points - chord, axis=1), 0.0)
         rim = (landed[rows] != new_landed) | (landed[rows + 1] != new_landed)
@@ -78,10 +88,9 @@ def _refined(
             for old, new in ((plane, between), (points, new_points), (normals, new_normals))
         )
         landed, owner = np.insert(landed, at, new_landed[split]), np.insert(owner, at, owner[at])
-        # Both halves of what was split are looked at again.
-        unsure = np.zeros(len(plane) - 1, dtype=np.bool_)
-        place = at + np.arange(len(at))
-        unsure[place - 1] = unsure[place] = True
+        # Both halves of what was split are tested from the start.
+        passed[rows] = np.where(split, 0, passed[rows] + 1)
+        passed = np.insert(passed, at, 0)
     return plane, owner, points, normals, landed
 
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from pentapod.arrays import Floats
-from pentapod.geometry.directions import angle_between
+from pentapod.geometry.directions import partway
 from pentapod.geometry.polyline import arc_length
 from pentapod.toolpath.orientation import Orientation
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
@@ -52,11 +52,6 @@ def _carry(old: Floats, tips: Floats, axes: Floats, known: np.ndarray[tuple[int]
     for a, b in pairwise(rows):
         if b > a + 1:
             way = arc_length(old[a : b + 1])
-            share = (way / way[-1])[1:-1, None] if way[-1] > 0.0 else np.full((b - a - 1, 1), 0.5)
-            tips[a + 1 : b] += (1.0 - share) * (tips[a] - old[a]) + share * (tips[b] - old[b])
-            angle = float(angle_between(axes[a], axes[b]))
-            if angle > 1e-9:
-                mixed = np.sin((1.0 - share) * angle) * axes[a] + np.sin(share * angle) * axes[b]
-            else:
-                mixed = (1.0 - share) * axes[a] + share * axes[b]
-            axes[a + 1 : b] = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
+            share = (way / way[-1])[1:-1] if way[-1] > 0.0 else np.full(b - a - 1, 0.5)
+            tips[a + 1 : b] += np.outer(1.0 - share, tips[a] - old[a]) + np.outer(share, tips[b] - old[b])
+            axes[a + 1 : b] = partway(axes[a], axes[b], share)

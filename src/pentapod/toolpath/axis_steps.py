@@ -1,0 +1,40 @@
+"""Axis steps: further waypoints where the tool axis turns by more than it may from one to the next."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pentapod.geometry.directions import angle_between, partway
+from pentapod.toolpath.toolpath import Segment, Toolpath
+
+_SLACK = 1.0 - 1e-9
+
+
+def stepped(toolpath: Toolpath, axis_step: float) -> Toolpath:
+    """Return a toolpath whose axis turns by at most `axis_step` radians between waypoints.
+
+    What is put between two waypoints divides the turn evenly; the pivot (a ball's centre, the spot of a beam) goes
+    straight from one to the other. A toolpath that keeps the step is returned as it is.
+    """
+    segments = tuple(_divided(segment, toolpath.pivot, axis_step) for segment in toolpath.segments)
+    same = all(new is old for new, old in zip(segments, toolpath.segments, strict=True))
+    return toolpath if same else Toolpath(segments, toolpath.pivot)
+
+
+def _divided(segment: Segment, pivot: float, axis_step: float) -> Segment:
+    turn = angle_between(segment.axes[1:], segment.axes[:-1])
+    parts = np.maximum(np.ceil(turn / axis_step * _SLACK), 1.0).astype(np.intp)
+    if (parts == 1).all():
+        return segment
+    interval = np.repeat(np.arange(len(parts)), parts)
+    share = (np.arange(len(interval)) - (np.cumsum(parts) - parts)[interval]) / parts[interval]
+    axes = partway(segment.axes[interval], segment.axes[interval + 1], share)
+    pivots = segment.tips + pivot * segment.axes
+    middle = (1.0 - share)[:, None] * pivots[interval] + share[:, None] * pivots[interval + 1]
+    tips = np.where(share[:, None] > 0.0, middle - pivot * axes, segment.tips[interval])
+    axes = np.where(share[:, None] > 0.0, axes, segment.axes[interval])
+    return replace(
+        segment, tips=np.concatenate([tips, segment.tips[-1:]]), axes=np.concatenate([axes, segment.axes[-1:]])
+    )
