@@ -73,6 +73,11 @@ def oversize(x: Floats, y: Floats) -> Floats:
     return 20.0 * np.cos(2.0 * np.pi * x / 400.0) * np.cos(2.0 * np.pi * y / 400.0)
 
 
+def rail(x: Floats, y: Floats) -> Floats:
+    """Rounded back of a rail, 600 mm long, that rises and falls by 3 mm: too long for one set-up."""
+    return 3.0 * np.cos(2.0 * np.pi * x / 200.0) - y**2 / 160.0
+
+
 HOLE_MM = (12.0, -8.0, 18.0)
 """Centre and radius of the hole in the wavy plate."""
 
@@ -93,6 +98,7 @@ PARTS: dict[str, tuple[Height, tuple[Floats, Floats, Ints]]] = {
     "saddle": (saddle, square_grid(150.0, 150.0, 100)),
     "wavy": (wavy, with_hole(*square_grid(150.0, 120.0, 150))),
     "relief": (relief, square_grid(100.0, 100.0, 140)),
+    "rail": (rail, square_grid(600.0, 70.0, 240)),
     "oversize": (oversize, square_grid(600.0, 600.0, 100)),
 }
 

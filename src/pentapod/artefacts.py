@@ -19,6 +19,9 @@ PROGRAM, VERDICT, REPORT, ARRAYS = "program.csv", "verdict.json", "report.html",
 NAMES = (PROGRAM, ARRAYS, REPORT, VERDICT)
 """In the order in which they move into the folder: the verdict comes last and stands for all."""
 
+SETUPS = "setup-[1-9]*"
+"""Folders of the same files, one for each set-up of a job that needs several."""
+
 
 def check_folder(folder: Path) -> None:
     """Raise InputError where the folder cannot be made or written; makes nothing that stays."""
@@ -48,6 +51,10 @@ def staged(folder: Path) -> Generator[Path]:
     try:
         yield staging
         (folder / VERDICT).unlink(missing_ok=True)  # until the new one is there, no verdict is better than the old
+        for old in folder.glob(SETUPS):
+            shutil.rmtree(old, ignore_errors=True)
+        for new in staging.glob(SETUPS):
+            new.replace(folder / new.name)
         for name in NAMES:
             if (staging / name).exists():
                 (staging / name).replace(folder / name)

@@ -10,7 +10,7 @@ from pentapod.errors import ToolpathError
 from pentapod.geometry.directions import normalised
 from pentapod.job import Job
 from pentapod.progress import Progress, silent
-from pentapod.strategy_tables import FileTable, StrategyTable, sunk_mm
+from pentapod.strategy_tables import FileTable, sunk_mm
 from pentapod.table import Vector
 from pentapod.toolpath.axis_modes import AxisMode, Between, Fixed, Normal, Pointed
 from pentapod.toolpath.axis_steps import stepped
@@ -26,6 +26,7 @@ from pentapod.toolpath.toolpath import Toolpath
 from pentapod.toolpath.tools import BallCutter, BullNose, FlatEnd, Lollipop, StandOff, Tool
 
 _MM = 1e-3
+_FILE_STYLE_MM = (10.0, 3.0, 2.0)  # clearance, approach and spacing, where the path comes from a file
 
 
 @dataclass(frozen=True)
@@ -97,21 +98,23 @@ def finished_as_asked(
         tolerance=_MM * (table.tolerance_mm + sunk_mm(job.toolpath)),
         cone=float(np.radians(table.cone_deg)),
         highest=_MM * table.highest_mm,
-        links=None if isinstance(job.toolpath, FileTable) else _link_style(job, job.toolpath, mesh, toolpath),
+        links=None if isinstance(job.toolpath, FileTable) else job_link_style(job, mesh, toolpath),
     )
     toolpath, report = checked(toolpath, tool, FacetTree.of(mesh), options, progress)
     # What was tilted clear may turn faster than before.
     return stepped(toolpath, axis_step) if report.tilted else toolpath, report
 
 
-def _link_style(job: Job, table: StrategyTable, mesh: Mesh, toolpath: Toolpath) -> LinkStyle:
-    """Return how ways are led where the first ones meet the part: along the axis and over the clearance level."""
-    view = normalised(job.part.region_direction)
+def job_link_style(job: Job, mesh: Mesh, toolpath: Toolpath) -> LinkStyle:
+    """Return how ways are led that the toolpath did not have: along the axis and over the clearance level."""
+    table, view = job.toolpath, normalised(job.part.region_direction)
     top = max(float((mesh.vertices @ view).max()), float((toolpath.tips @ view).max()))
     link = job.feed.cut_mm_min if job.feed.link_mm_min is None else job.feed.link_mm_min
-    clearance, approach = _MM * table.clearance_mm, _MM * table.approach_mm
-    level = top + max(clearance, 2.0 * approach)
-    return LinkStyle(view, level, approach, spacing=_MM * table.spacing_mm, feed=_MM * link / 60.0)
+    clearance, approach, spacing = _FILE_STYLE_MM
+    if not isinstance(table, FileTable):
+        clearance, approach, spacing = table.clearance_mm, table.approach_mm, table.spacing_mm
+    level = top + _MM * max(clearance, 2.0 * approach)
+    return LinkStyle(view, level, _MM * approach, spacing=_MM * spacing, feed=_MM * link / 60.0)
 
 
 def _mode(job: Job) -> AxisMode:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from pentapod.job import Job
 from pentapod.machine.machine import Machine
+from pentapod.planning.placed_path import PlacedPath
+from pentapod.program.program import Program
 from pentapod.refusal import Refusal
+from pentapod.toolpath.parting import Piece
 from pentapod.verify.verdict import Certificate, Place, Verdict
 
 Value = TypeVar("Value")
@@ -57,11 +60,85 @@ class Outcome:
         return self.refusal is None and self.verdict.passed
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the content of verdict.json; a refused job's has the key "refusal" besides."""
+        """Return the content of verdict.json; one of a refused job, or of several set-ups, tells so."""
         content = self.verdict.to_dict()
         if self.refusal is not None:
             content["refusal"] = refusal_dict(self.refusal)
+        if (setups := self.find(SetUps)) is not None:
+            content["setups"] = [part.to_dict() for part in setups.parts]
         return content
+
+
+@dataclass(frozen=True)
+class SetUp:
+    """One of several set-ups: its number from 1, the piece of the job's toolpath, and what its own run reached."""
+
+    number: int
+    piece: Piece
+    outcome: Outcome
+
+    @property
+    def folder(self) -> str:
+        """The folder of its files, within the job's."""
+        return f"setup-{self.number}"
+
+    @property
+    def answer(self) -> str:
+        """The verdict in a word."""
+        return "passed" if self.outcome.passed else "refused" if self.outcome.refusal else "FAILED"
+
+    @property
+    def margin(self) -> float | None:
+        """The smallest margin of its placement; None where it has none."""
+        placed = self.outcome.find(PlacedPath)
+        return None if placed is None else placed.smallest_margin
+
+    @property
+    def duration(self) -> float | None:
+        """Seconds of its program; None where it has none."""
+        program = self.outcome.find(Program)
+        return None if program is None else program.duration
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return its entry in verdict.json."""
+        return {
+            "folder": self.folder,
+            "piece": str(self.piece),
+            "passed": self.outcome.passed,
+            "smallest_margin": self.margin,
+            "duration_s": self.duration,
+        }
+
+
+@dataclass(frozen=True)
+class SetUps:
+    """The set-ups into which a job was split, in their order.
+
+    cuts: how many intervals of the toolpath are cut; missed: how many of them in no set-up, or in more than one.
+    """
+
+    parts: tuple[SetUp, ...]
+    cuts: int
+    missed: int
+
+    def __str__(self) -> str:
+        lines = [f"{len(self.parts)} set-ups, for one placement cannot reach all:"]
+        lines += [f"  {part.folder}: {part.piece}, verdict {part.answer}" for part in self.parts]
+        return "\n".join(lines)
+
+    @property
+    def verdict(self) -> Verdict:
+        """All claims about all set-ups, and that they are the whole work."""
+        words = f"{self.cuts} intervals between waypoints are cut; the set-ups' pieces were counted against them"
+        whole = Certificate("every cut is made in one set-up", self.missed == 0, self.missed, 0.0, "", Place(), words)
+        return Verdict((
+            whole,
+            *(
+                replace(certificate, claim=f"set-up {part.number}: {certificate.claim}")
+                for part in self.parts
+                for certificate in part.outcome.verdict.certificates
+            ),
+        ))  # fmt: skip
 
 
 def refusal_verdict(refusal: Refusal) -> Verdict:

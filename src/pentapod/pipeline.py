@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
 from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, write_arrays, write_json
-from pentapod.errors import MachineError, MeshError
+from pentapod.clock import Clock
+from pentapod.errors import InputError, MachineError, MeshError
 from pentapod.job import Job
 from pentapod.job_placement import job_freedom, job_weights
 from pentapod.job_strategy import job_options
 from pentapod.job_surroundings import job_surroundings
-from pentapod.job_tool import FileReport, Reports, finished_as_asked, job_tool
+from pentapod.job_tool import FileReport, Reports, finished_as_asked, job_link_style, job_tool
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import ControllerSettings, Machine
 from pentapod.machine.surroundings import Surroundings
 from pentapod.machine.tool_limits import ToolLimits
-from pentapod.outcome import Outcome, Stage, refusal_verdict
+from pentapod.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
 from pentapod.plan_arrays import arrays_of
 from pentapod.planning import Freedom, LegPath, PlacedPath, leg_path, plan
-from pentapod.program import Program, Provenance, sample, write_csv
+from pentapod.planning.plan import Wishes, fits
+from pentapod.planning.setups import setups
+from pentapod.program import Program, Provenance, read_header, sample, write_csv
 from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
 from pentapod.strategy_tables import FileTable
@@ -37,6 +38,8 @@ from pentapod.toolpath import (
     toolpath_with_report,
 )
 from pentapod.toolpath.formats import read_toolpath
+from pentapod.toolpath.links import LinkStyle
+from pentapod.toolpath.parting import Piece, cutting_intervals, part_of
 from pentapod.verify import Verdict, verify
 from pentapod.version import __version__
 
@@ -44,7 +47,6 @@ _MM = 1e-3
 _MM_MIN = 1e-3 / 60.0
 _LARGEST_TOLERANCE = 0.1  # of the part's largest extent
 
-Value = TypeVar("Value")
 Writer = Callable[[Outcome, Path], object]
 
 
@@ -64,27 +66,71 @@ def run(
     """
     folder = Path(out)
     check_folder(folder)
-    clock = _Clock(progress)
+    clock = Clock(progress)
     machine = job_machine(job)
     mesh = clock.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
     freedom, surroundings = job_freedom(job, machine, mesh), job_surroundings(job, machine, mesh)
     toolpath, _ = clock.time("toolpath", lambda: job_toolpath(job, mesh, progress), says=lambda made: str(made[1]))
+    task = _Task(job, machine, toolpath, freedom, surroundings, clock)
     with staged(folder) as staging:
-        task = _Task(job, machine, toolpath, freedom, surroundings, clock)
-        program = task.program(staging / PROGRAM)
-        if isinstance(program, Refusal):
-            verdict = refusal_verdict(program)
-        else:
-            verdict = clock.time(
-                "verify", lambda: judge(job, machine, surroundings, toolpath, staging / PROGRAM, progress)
-            )
-        outcome = Outcome(job, machine, tuple(clock.stages), verdict)
-        write_arrays(arrays_of(outcome), staging / ARRAYS)
-        for name, write in (writers or {}).items():
-            progress("report", 0.0, name)
-            write(outcome, staging / name)
-        write_json(outcome.to_dict(), staging / VERDICT)
+        outcome = _reached(task, staging, writers or {})
+        if outcome.refusal is not None and outcome.refusal.stage == "placement" and job.placement.setups > 1:
+            style = job_link_style(job, mesh, toolpath)
+            outcome = _split(task, style, outcome.refusal, staging, writers or {})
     return outcome
+
+
+def _reached(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+    """Run the stages after the toolpath and the verdict, write the files, and return what was reached."""
+    program, clock = task.program(staging / PROGRAM), task.clock
+    if isinstance(program, Refusal):
+        verdict = refusal_verdict(program)
+    else:
+        judged = (task.job, task.machine, task.surroundings, task.toolpath, staging / PROGRAM, clock.progress)
+        verdict = clock.time("verify", lambda: judge(*judged))
+    return _written(Outcome(task.job, task.machine, tuple(clock.stages), verdict), staging, writers, clock.progress)
+
+
+def _written(outcome: Outcome, staging: Path, writers: Mapping[str, Writer], progress: Progress) -> Outcome:
+    write_arrays(arrays_of(outcome), staging / ARRAYS)
+    for name, write in writers.items():
+        progress("report", 0.0, name)
+        write(outcome, staging / name)
+    write_json(outcome.to_dict(), staging / VERDICT)
+    return outcome
+
+
+def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+    """Do a job that one placement cannot do in several set-ups, each in a folder of its own; or refuse it."""
+    job, toolpath, clock = task.job, task.toolpath, task.clock
+    # What was refused is not what is reached in the end.
+    clock.stages = [stage for stage in clock.stages if stage.value is not refusal]
+    search = (task.toolpath, task.fits, style, job.placement.setups, refusal, clock.progress)
+    found = clock.time("set-ups", lambda: setups(*search))
+    if isinstance(found, Refusal):
+        verdict = refusal_verdict(found)
+        return _written(Outcome(job, task.machine, tuple(clock.stages), verdict), staging, writers, clock.progress)
+    parts: list[SetUp] = []
+    before = [stage for stage in clock.stages if stage.name not in ("toolpath", "set-ups")]
+    for number, piece in enumerate(found, start=1):
+        clock.progress("set-ups", (number - 1) / len(found), f"planning {number} of {len(found)}")
+        own, part = Clock(clock.progress), part_of(toolpath, piece, style)
+        own.stages += [*before, Stage("toolpath", 0.0, part, f"set-up {number} of {len(found)}: {piece}")]
+        folder = staging / f"setup-{number}"
+        folder.mkdir()
+        own_task = dataclasses.replace(task, toolpath=part, clock=own, piece=piece)
+        parts.append(SetUp(number, piece, _reached(own_task, folder, writers)))
+    times = np.sum([piece.cuts(toolpath) for piece in found], axis=0)
+    cutting = cutting_intervals(toolpath)
+    done = SetUps(tuple(parts), int(cutting.sum()), int((times != cutting).sum()))
+    clock.stages.append(Stage("set-ups planned", sum(_seconds(part) for part in parts), done, str(done)))
+    return _written(Outcome(job, task.machine, tuple(clock.stages), done.verdict), staging, writers, clock.progress)
+
+
+def _seconds(part: SetUp) -> float:
+    """Return how long the stages of a set-up alone took."""
+    names = [stage.name for stage in part.outcome.stages]
+    return sum(stage.seconds for stage in part.outcome.stages[names.index("toolpath") :])
 
 
 def job_machine(job: Job) -> Machine:
@@ -135,6 +181,16 @@ def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Too
     return toolpath, Reports((report, gouges))
 
 
+def program_toolpath(job: Job, mesh: Mesh, program: Path, progress: Progress = silent) -> Toolpath:
+    """Return the toolpath that a program file is about: the job's, or its set-up's piece of it."""
+    toolpath, _ = job_toolpath(job, mesh, progress)
+    try:
+        piece = read_header(program).provenance.piece
+    except InputError:  # the verdict says what is wrong with the file
+        return toolpath
+    return toolpath if piece is None else part_of(toolpath, piece, job_link_style(job, mesh, toolpath))
+
+
 def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
     """Return the toolpath as a strategy lays it or a file tells it, and what that came to."""
     if isinstance(job.toolpath, FileTable):
@@ -180,7 +236,8 @@ class _Task:
     toolpath: Toolpath
     freedom: Freedom
     surroundings: Surroundings
-    clock: _Clock
+    clock: Clock
+    piece: Piece | None = None
 
     def program(self, file: Path) -> Program | Refusal:
         """Plan, write the program to `file` and return it; or return the first refusal."""
@@ -197,20 +254,24 @@ class _Task:
         self.clock.time("explain", lambda: self._explanation(path, trajectory, program), says=str)
         return program
 
+    def fits(self, part: Toolpath) -> bool:
+        """Return whether a placement for a part of the toolpath is found."""
+        return fits(part, self.machine, **self._wishes())
+
     def _placed(self) -> PlacedPath | Refusal:
+        then, progress = self.job.placement.then, self.clock.progress
+        return plan(self.toolpath, self.machine, **self._wishes(), then=then, progress=progress)
+
+    def _wishes(self) -> Wishes:
         wanted = self.job.placement.component
-        return plan(
-            self.toolpath,
-            self.machine,
-            tilt=float(np.radians(self.job.axis.tilt_deg)),
-            freedom=self.freedom,
-            component=None if wanted is None else Component.parse(wanted),
-            surroundings=self.surroundings,
-            weights=job_weights(self.job),
-            then=self.job.placement.then,
-            solver=self.job.placement.solver,
-            progress=self.clock.progress,
-        )
+        return {
+            "tilt": float(np.radians(self.job.axis.tilt_deg)),
+            "freedom": self.freedom,
+            "component": None if wanted is None else Component.parse(wanted),
+            "surroundings": self.surroundings,
+            "weights": job_weights(self.job),
+            "solver": self.job.placement.solver,
+        }
 
     def _path(self, placed: PlacedPath) -> LegPath | Refusal:
         tolerance = self.job.tolerance
@@ -222,7 +283,7 @@ class _Task:
         )
 
     def _program(self, placed: PlacedPath, trajectory: Trajectory, file: Path) -> Program:
-        source = Provenance(self.machine.name, self.machine.digest, self.job.digest, __version__)
+        source = Provenance(self.machine.name, self.machine.digest, self.job.digest, __version__, self.piece)
         program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
         write_csv(program, file)
         return program
@@ -243,21 +304,3 @@ def _interrupted(placed: PlacedPath | Refusal) -> str:
     if isinstance(placed, Refusal) or "interrupted" not in placed.placement.chosen_by:
         return ""
     return f"placement: {placed.placement.chosen_by}; smallest margin {placed.smallest_margin:.3f}"
-
-
-class _Clock:
-    """Runs stages and keeps their names, times and values."""
-
-    def __init__(self, progress: Progress) -> None:
-        self.progress = progress
-        self.stages: list[Stage] = []
-
-    def time(self, name: str, stage: Callable[[], Value], says: Callable[[Value], str] | None = None) -> Value:
-        """Return what a stage gives; it is kept with its wall time, and with what `says` says of it."""
-        self.progress(name, 0.0)
-        start = time.perf_counter()
-        value = stage()
-        seconds = time.perf_counter() - start
-        self.stages.append(Stage(name, seconds, value, says(value) if says else ""))
-        self.progress(name, 1.0)
-        return value

@@ -60,6 +60,12 @@ class PlacementTable(Table):
     component: Literal["++", "+-", "-+", "--"] | None = Field(
         default=None, description="signs of w and S of the assembly mode; the best one when left out"
     )
+    setups: int = Field(
+        default=1,
+        ge=1,
+        le=20,
+        description="most set-ups into which the work may be split where one placement cannot reach all of it",
+    )
     solver: Literal["sequential", "ipopt"] = Field(
         default="sequential", description='"sequential" (quick), or "ipopt" (the slow reference)'
     )
@@ -79,6 +85,8 @@ class PlacementTable(Table):
             wrong("largest_turn_deg", "a rotation alone bounds nothing", "the largest turn from rotation_deg")
         if self.mode == "table" and self.table_z_mm is None:
             wrong("table_z_mm", "the table's height is missing", "z of its surface in mm")
+        if self.mode == "fixed" and self.setups > 1:
+            wrong("setups", "one fixed placement is one set-up", "another mode, or no setups")
         if self.mode == "fixture" and self.poses_mm_deg is None:
             wrong("poses_mm_deg", "the fixture's poses are missing", "[[x, y, z, turn x, turn y, turn z], ...]")
         for key in ("table_x_mm", "table_y_mm"):

@@ -27,13 +27,14 @@ def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int
     """Plan JOB.toml: write program.csv, verdict.json, report.html and plan.npz.
 
     The folder changes only when the run ends: then its four files are of one run. A job that cannot be done
-    leaves no program.csv.
+    leaves no program.csv. A job in several set-ups has these files in a folder for each, setup-1, setup-2, and so on.
 
     Ctrl-C during the search for a placement ends the search and goes on with the best found so far, if that fits; at
     any other time it ends the command and changes nothing.
     """
     from pentapod.artefacts import PROGRAM, REPORT
     from pentapod.job import Job
+    from pentapod.outcome import SetUps
     from pentapod.pipeline import run
     from pentapod.planning import PlacedPath
     from pentapod.planning.binding import bindings
@@ -57,7 +58,9 @@ def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int
             click.echo(_explained(outcome))
         if refusal is None:
             click.echo(verdict_text(outcome.verdict))
-            click.echo(f"program: {out / PROGRAM}")
+            setups = outcome.find(SetUps)
+            folders = [out] if setups is None else [out / part.folder for part in setups.parts]
+            click.echo("\n".join(f"program: {folder / PROGRAM}" for folder in folders))
         click.echo(f"report: {out / REPORT}")
     if refusal is not None:
         click.echo(f"refused: {refusal}", err=True)
@@ -69,9 +72,12 @@ def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int
 def _explained(outcome: Outcome) -> str:
     """Return the blame table of a run: of its refusal, or of the plan that fits."""
     from pentapod.cli.explain import bindings_text, blames_text
+    from pentapod.outcome import SetUps
     from pentapod.planning import PlacedPath
     from pentapod.planning.binding import bindings
 
+    if (setups := outcome.find(SetUps)) is not None:
+        return "\n\n".join(f"{part.folder}\n{_explained(part.outcome)}" for part in setups.parts)
     if outcome.refusal is not None and outcome.refusal.blames:
         return blames_text(outcome.refusal)
     placed = outcome.find(PlacedPath)

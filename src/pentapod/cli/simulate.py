@@ -48,7 +48,7 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
     modelled.
     """
     from pentapod.job import Job
-    from pentapod.pipeline import job_machine, job_mesh, job_toolpath
+    from pentapod.pipeline import job_machine, job_mesh, program_toolpath
     from pentapod.program import read_csv
     from pentapod.program.posts import PostInput
     from pentapod.refusal import Refusal
@@ -63,7 +63,7 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
     same_job = read.provenance.job_digest == loaded.digest
     with progress_bar(quiet=quiet or as_json) as progress:
         progress("toolpath", 0.0)
-        toolpath, _ = job_toolpath(loaded, job_mesh(loaded, progress), progress)
+        toolpath = program_toolpath(loaded, job_mesh(loaded, progress), program, progress)
         task = _Task(reference, toolpath, loaded.tolerance.path_mm * 1e-3, progress)
         found = task.servo(**given) if engine == "servo" else task.mujoco(**given)
     if isinstance(found, Refusal):

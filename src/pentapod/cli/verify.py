@@ -27,14 +27,15 @@ def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -
     """
     from pentapod.job import Job
     from pentapod.job_surroundings import job_surroundings
-    from pentapod.pipeline import job_machine, job_mesh, job_toolpath, judge
+    from pentapod.pipeline import job_machine, job_mesh, judge, program_toolpath
 
     loaded = Job.load(job)
     machine = job_machine(loaded)
     with progress_bar(quiet=quiet or as_json) as progress:
         mesh = job_mesh(loaded)
         surroundings = job_surroundings(loaded, machine, mesh)
-        verdict = judge(loaded, machine, surroundings, job_toolpath(loaded, mesh)[0], program, progress, strict=strict)
+        toolpath = program_toolpath(loaded, mesh, program)
+        verdict = judge(loaded, machine, surroundings, toolpath, program, progress, strict=strict)
     if as_json:
         echo_json(verdict.to_dict())
     elif not quiet:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypedDict
 
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import Machine
@@ -26,6 +27,17 @@ from pentapod.toolpath.toolpath import Toolpath
 
 CALM_SHARE = 0.9
 """Share of the best smallest margin that is kept when the axis is made calm."""
+
+
+class Wishes(TypedDict):
+    """What `plan` and `fits` are told of a placement."""
+
+    tilt: float
+    freedom: Freedom
+    component: Component | None
+    surroundings: Surroundings
+    weights: Weights
+    solver: SolverName
 
 
 def plan(
@@ -72,6 +84,28 @@ def plan(
     return PlacedPath(
         toolpath, chosen, margins.component, tips, axes, margins(tips, axes, best.transform), margins.limits
     )
+
+
+def fits(
+    toolpath: Toolpath,
+    machine: Machine,
+    *,
+    tilt: float,
+    freedom: Freedom,
+    component: Component | None,
+    surroundings: Surroundings,
+    weights: Weights,
+    solver: SolverName,
+) -> bool:
+    """Return whether `plan` finds a placement: the quick answer, without axes along the path and without remedies.
+
+    Raises KeyboardInterrupt where the search is interrupted.
+    """
+    setting = Setting.of(Task.of(toolpath, tilt), machine, freedom, weights)
+    found = search(setting, component, surroundings, solver=solver)
+    if found.interrupted:
+        raise KeyboardInterrupt
+    return found.best.smallest >= NEEDED_MARGIN
 
 
 def _refusal(setting: Setting, best: Candidate, improves: Callable[[Setting, bool], Solver]) -> Refusal:

@@ -8,15 +8,16 @@ import tomllib
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from pentapod.arrays import Floats
-from pentapod.errors import ArrayError, InputError, ProgramError
+from pentapod.errors import ArrayError, InputError, ProgramError, ToolpathError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.program.program import FORMAT_VERSION, Program, Provenance
+from pentapod.toolpath.parting import Piece
 
 MAGIC = "pentapod_program"
 KEYS = (
@@ -31,6 +32,9 @@ KEYS = (
     "placement_mm",
     "rows",
 )
+WAYPOINTS, BOX = "setup_waypoints", "setup_box_mm"
+SETUP_KEYS = (WAYPOINTS, BOX)
+"""Keys that only the programs of several set-ups have."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,10 @@ def header_text(program: Program) -> str:
         _matrix(program.placement),
         str(len(program.legs)),
     )
-    return "".join(f"# {key} = {value}\n" for key, value in zip(KEYS, values, strict=True))
+    lines = [f"# {key} = {value}\n" for key, value in zip(KEYS, values, strict=True)]
+    if source.piece is not None:
+        lines += [f"# {WAYPOINTS} = [{source.piece.first}, {source.piece.last}]\n", f"# {BOX} = {_box(source.piece)}\n"]
+    return "".join(lines)
 
 
 def parse_header(lines: list[str], file: Path) -> Header:
@@ -122,9 +129,10 @@ class _Reader:
                 machine_digest=self._text("machine_digest"),
                 job_digest=self._text("job_digest"),
                 pentapod_version=self._text("pentapod_version"),
+                piece=self._piece(),
             ),
             rows=self._rows(),
-            unknown=tuple(key for key in self.values if key not in KEYS),
+            unknown=tuple(key for key in self.values if key not in (*KEYS, *SETUP_KEYS)),
         )
 
     def _wrong(self, key: str, expected: str) -> ProgramError:
@@ -147,6 +155,25 @@ class _Reader:
         if not (period > 0.0 and math.isfinite(period)):
             raise self._wrong("period_s", "a positive number of seconds")
         return period
+
+    def _piece(self) -> Piece | None:
+        present = [key for key in SETUP_KEYS if key in self.values]
+        if not present:
+            return None
+        if len(present) < len(SETUP_KEYS):
+            missing = next(key for key in SETUP_KEYS if key not in self.values)
+            raise ProgramError("the header lacks this key", file=self.file, key=missing, remedy="plan the job again")
+        pair, corners = self.values[WAYPOINTS], self.values[BOX]
+        if not isinstance(pair, list) or [type(k) for k in cast("list[Any]", pair)] != [int, int]:
+            raise self._wrong(WAYPOINTS, "the first and the last waypoint")
+        expected = "two opposite corners, [[x, y, z], [x, y, z]]"
+        if not isinstance(corners, list) or [_length(c) for c in cast("list[Any]", corners)] != [3, 3]:
+            raise self._wrong(BOX, expected)
+        low, high = ([_bound(entry) for entry in corner] for corner in corners)
+        try:
+            return Piece(pair[0], pair[1], (low[0], low[1], low[2]), (high[0], high[1], high[2]))
+        except ToolpathError as error:
+            raise self._wrong(BOX, f"{expected}, and waypoints that rise") from error
 
     def _rows(self) -> int:
         rows = self.values["rows"]
@@ -186,6 +213,17 @@ def _number(value: Any, shift: int = 0) -> float:
     return float(exact.scaleb(shift)) if exact.adjusted() > -400 else 0.0
 
 
+def _length(value: Any) -> int:
+    return len(cast("list[Any]", value)) if isinstance(value, list) else 0
+
+
+def _bound(value: Any) -> float:
+    """Return millimetres, or ±inf, as metres; NaN for anything else."""
+    if isinstance(value, Decimal) and value.is_infinite():
+        return float(value)
+    return _number(value, shift=-3)
+
+
 def _string(text: str) -> str:
     """Return a TOML basic string; JSON's escapes are TOML's, but for DEL."""
     try:
@@ -203,6 +241,11 @@ def _matrix(placement: RigidTransform) -> str:
         for row, shift in zip(matrix, shifts, strict=True)
     )
     return "[" + ", ".join(rows) + "]"
+
+
+def _box(piece: Piece) -> str:
+    corners = (", ".join(_decimal(x, 3) if math.isfinite(x) else str(x) for x in c) for c in (piece.low, piece.high))
+    return "[" + ", ".join(f"[{corner}]" for corner in corners) + "]"
 
 
 def _decimal(value: float, shift: int) -> str:

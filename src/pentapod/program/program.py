@@ -12,18 +12,23 @@ from pentapod.arrays import Floats, frozen, set_frozen
 from pentapod.errors import ProgramError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
+from pentapod.toolpath.parting import Piece
 
 FORMAT_VERSION = 1
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """What a program was made from: names and hashes, as they stand in its header."""
+    """What a program was made from: names and hashes, as they stand in its header.
+
+    piece: of the toolpath, where the program is one of several set-ups.
+    """
 
     machine: str
     machine_digest: str
     job_digest: str
     pentapod_version: str
+    piece: Piece | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import numpy as np
 
 from pentapod.files import atomic_write
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.outcome import Outcome
+from pentapod.outcome import Outcome, SetUps
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.program.program import Program
 from pentapod.report import plots, scene, words
@@ -77,6 +77,7 @@ def _context(outcome: Outcome) -> dict[str, Any]:
         "story": outcome.find(Explanation),
         "sheet": _setup_sheet(outcome, signals),
         "placement": None if placed is None else _placement(placed.placement.transform),
+        "setups": outcome.find(SetUps),
         "setup_sheet": setup_sheet(outcome),
         "chosen_by": "" if placed is None else placed.placement.chosen_by,
         "component": "" if placed is None else str(placed.component),
@@ -126,6 +127,8 @@ def _scene(outcome: Outcome, signals: Signals | None) -> Figure:
         if placed is not None:
             worst = int(placed.margins.min(axis=1).argmin())
             traces += scene.machine_traces(outcome.machine, placed.tips[worst], placed.axes[worst])
+    elif toolpath is not None and (setups := outcome.find(SetUps)) is not None:
+        traces += scene.piece_traces(toolpath, [part.piece for part in setups.parts])
     return scene.scene_figure(traces, down=placed is not None)
 
 

@@ -16,6 +16,8 @@ from pentapod.report.figure import LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR, Figu
 from pentapod.report.signals import Signals
 from pentapod.toolpath.faults import faults
 from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.parting import Piece
+from pentapod.toolpath.toolpath import Toolpath
 
 MACHINE_TRACES = 8
 """Traces that move with the pose: five legs, the platform line, the tool, the tip. They come last."""
@@ -134,6 +136,17 @@ def blamed_traces(tips: Floats, axes: Floats, refusal: Refusal) -> list[dict[str
         points = _line3d(tips[np.minimum(chosen, len(tips) - 1)], blame.constraint, colours[k % len(colours)], 1.0)
         points |= {"mode": "markers", "marker": {"size": 3, "color": colours[k % len(colours)]}}
         traces.append(points)
+    return traces
+
+
+def piece_traces(toolpath: Toolpath, pieces: Sequence[Piece]) -> list[dict[str, Any]]:
+    """Return the cuts of each set-up in a colour of its own, workpiece frame."""
+    tips = 1e3 * (toolpath.tips + _LIFT_M * toolpath.axes)
+    traces: list[dict[str, Any]] = []
+    for k, piece in enumerate(pieces):
+        cuts = np.append(piece.cuts(toolpath), False)
+        ends = cuts | np.concatenate([[False], cuts[:-1]])
+        traces.append(_line3d(_with_gaps(tips, ends), f"set-up {k + 1}", LEG_COLOURS[k % len(LEG_COLOURS)], 4.0))
     return traces
 
 

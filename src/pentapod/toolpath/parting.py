@@ -1,59 +1,144 @@
-"""Parting: contiguous parts of a toolpath, each a toolpath that comes to the work and leaves it."""
+"""Parting: pieces of a toolpath, each a toolpath that comes to the work and leaves it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pentapod.arrays import Floats, Ints
+from pentapod.arrays import Bools, Ints
 from pentapod.errors import ToolpathError
+from pentapod.toolpath import links
+from pentapod.toolpath.links import LinkStyle
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+
+Corner = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Parting:
-    """How a part begins and ends on the surface: a straight stretch along the axis, metres, at a feed, m/s."""
+class Piece:
+    """Which cuts of a toolpath: those between two waypoints, first and last, whose middles are within a box.
 
-    approach: float
-    feed: float
+    low, high: the box's corners, metres, workpiece frame; what is on the high sides is outside. Raises ToolpathError
+    for a piece that can hold nothing.
+    """
+
+    first: int
+    last: int
+    low: Corner = (-np.inf, -np.inf, -np.inf)
+    high: Corner = (np.inf, np.inf, np.inf)
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.first < self.last and all(a < b for a, b in zip(self.low, self.high, strict=True))):
+            raise ToolpathError("no such piece", value=(self.first, self.last, self.low, self.high))
+
+    @property
+    def is_boxed(self) -> bool:
+        """Whether a box bounds the piece."""
+        return bool(np.isfinite([*self.low, *self.high]).any())
+
+    def __str__(self) -> str:
+        """Return the piece in words: "x up to 12.5 mm, y 0 to 30 mm", or its waypoints."""
+        if not self.is_boxed:
+            return f"waypoints {self.first} to {self.last}"
+        bounds = [_bound(name, a, b) for name, a, b in zip("xyz", self.low, self.high, strict=True)]
+        return ", ".join(bound for bound in bounds if bound)
+
+    def cuts(self, toolpath: Toolpath) -> Bools:
+        """Return which intervals (N − 1,) between waypoints are cuts of this piece."""
+        middles = 0.5 * (toolpath.tips[:-1] + toolpath.tips[1:])
+        within: Bools = np.all((middles >= self.low) & (middles < self.high), axis=1)
+        within[: self.first] = within[self.last :] = False
+        return np.asarray(cutting_intervals(toolpath) & within, dtype=np.bool_)
+
+
+def _bound(name: str, low: float, high: float) -> str:
+    """Return one direction's bounds in words; nothing where there are none."""
+    if np.isfinite(low) and np.isfinite(high):
+        return f"{name} {1e3 * low:.6g} to {1e3 * high:.6g} mm"
+    if np.isfinite(high):
+        return f"{name} up to {1e3 * high:.6g} mm"
+    return f"{name} from {1e3 * low:.6g} mm" if np.isfinite(low) else ""
+
+
+def cutting_intervals(toolpath: Toolpath) -> Bools:
+    """Return which intervals (N − 1,) between waypoints are cuts."""
+    cutting = np.array([segment.kind is SegmentKind.CUT for segment in toolpath.segments])
+    return np.asarray(cutting[toolpath.segment_of_interval], dtype=np.bool_)
 
 
 def pass_ends(toolpath: Toolpath) -> Ints:
-    """Return the waypoint (P,) at which each pass ends: the last of each run of cutting segments."""
-    cutting = np.array([segment.kind is SegmentKind.CUT for segment in toolpath.segments])
-    last = cutting & ~np.append(cutting[1:], False)
-    return toolpath.starts[1:][last]
+    """Return the waypoint (P,) at which each pass ends: the last of each run of cutting intervals."""
+    cutting = cutting_intervals(toolpath)
+    return np.flatnonzero(cutting & ~np.append(cutting[1:], False)) + 1
 
 
-def part_of(toolpath: Toolpath, first: int, last: int, parting: Parting) -> Toolpath:
-    """Return the motion from waypoint `first` to waypoint `last`, with what it takes to begin and end it.
+def part_of(toolpath: Toolpath, piece: Piece, style: LinkStyle) -> Toolpath:
+    """Return the motion that makes the cuts of a piece, in their order.
 
-    What leads to the first cut from elsewhere is left out, and what leads on from the last one, but for the path's own
-    beginning and end. Raises ToolpathError where no cut lies between the waypoints.
+    Between cuts that follow each other in the whole, and before its first and after its last, the ways are those of the
+    whole; where cuts are left out the tool retracts, crosses at the clearance level and comes down as `style` says.
+    Raises ToolpathError where the piece holds no cut.
     """
-    if not 0 <= first < last < len(toolpath):
-        raise ToolpathError("no such part", value=(first, last), expected=f"0 ≤ first < last < {len(toolpath)}")
-    segments = [
-        Segment(segment.kind, segment.tips[a : b + 1], segment.axes[a : b + 1], segment.feed)
-        for segment, start, end in zip(toolpath.segments, toolpath.starts[:-1], toolpath.starts[1:], strict=True)
-        for a, b in [(max(first - int(start), 0), min(last, int(end)) - int(start))]
-        if b > a
-    ]
-    cuts = [k for k, segment in enumerate(segments) if segment.kind is SegmentKind.CUT]
-    if not cuts:
-        raise ToolpathError("there is no cut in this part", value=(first, last))
-    lead, tail = segments[: cuts[0]], segments[cuts[-1] + 1 :]
-    if first > 0:
-        lead = [_straight(segments[cuts[0]], 0, parting)]
-    if last < len(toolpath) - 1:
-        tail = [_straight(segments[cuts[-1]], -1, parting)]
-    return Toolpath((*lead, *segments[cuts[0] : cuts[-1] + 1], *tail), toolpath.pivot)
+    chosen = piece.cuts(toolpath)
+    if not chosen.any():
+        raise ToolpathError("there is no cut in this piece", value=str(piece))
+    return _Parted(toolpath, style).joined(_runs(chosen))
 
 
-def _straight(cut: Segment, end: int, parting: Parting) -> Segment:
-    """Return the approach to a cut's beginning (end 0), or the retract from its end (end −1), along the axis."""
-    tip, axis = cut.tips[end], cut.axes[end]
-    away: Floats = tip + parting.approach * axis
-    tips = np.stack([away, tip] if end == 0 else [tip, away])
-    return Segment(SegmentKind.LINK, tips, np.tile(axis, (2, 1)), parting.feed)
+def _runs(chosen: Bools) -> list[tuple[int, int]]:
+    """Return the first and last waypoint of each run of chosen intervals (N − 1,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]))).reshape(-1, 2)
+    return [(int(a), int(b)) for a, b in edges]
+
+
+class _Parted:
+    def __init__(self, toolpath: Toolpath, style: LinkStyle) -> None:
+        self.whole, self.style, self.cutting = toolpath, style, cutting_intervals(toolpath)
+
+    def joined(self, runs: list[tuple[int, int]]) -> Toolpath:
+        last = len(self.whole) - 1
+        segments = self._lead(runs[0][0])
+        for k, (a, b) in enumerate(runs):
+            segments += self._stretch(a, b)
+            if k + 1 < len(runs):
+                segments += self._between(b, runs[k + 1][0])
+        segments += self._tail(runs[-1][1], last)
+        return Toolpath(tuple(segments), self.whole.pivot)
+
+    def _stretch(self, a: int, b: int) -> list[Segment]:
+        """Return what the whole does from waypoint a to waypoint b."""
+        starts = self.whole.starts
+        found: list[Segment] = []
+        for segment, start, end in zip(self.whole.segments, starts[:-1].tolist(), starts[1:].tolist(), strict=True):
+            low, high = max(a, start) - start, min(b, end) - start
+            if high > low:
+                tips, axes = segment.tips[low : high + 1], segment.axes[low : high + 1]
+                found.append(replace(segment, tips=tips, axes=axes))
+        return found
+
+    def _lead(self, a: int) -> list[Segment]:
+        if not self.cutting[:a].any():
+            return self._stretch(0, a)
+        down = self._approach(a)
+        return [links.entry(down.tips[0], down.axes[0], self.style), down]
+
+    def _tail(self, b: int, last: int) -> list[Segment]:
+        if not self.cutting[b:].any():
+            return self._stretch(b, last)
+        up = self._retract(b)
+        return [up, links.leave(up.tips[-1], up.axes[-1], self.style)]
+
+    def _between(self, b: int, a: int) -> list[Segment]:
+        if not self.cutting[b:a].any():
+            return self._stretch(b, a)
+        up, down = self._retract(b), self._approach(a)
+        return [up, links.rapid(up.tips[-1], up.axes[-1], down.tips[0], down.axes[0], self.style), down]
+
+    def _approach(self, a: int) -> Segment:
+        tips = self.whole.tips
+        return links.approach(tips[a], self.whole.axes[a], tips[a + 1] - tips[a], self.style)
+
+    def _retract(self, b: int) -> Segment:
+        tips = self.whole.tips
+        return links.retract(tips[b], self.whole.axes[b], tips[b] - tips[b - 1], self.style)
