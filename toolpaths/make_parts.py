@@ -74,7 +74,7 @@ def oversize(x: Floats, y: Floats) -> Floats:
 
 
 def rail(x: Floats, y: Floats) -> Floats:
-    """Rounded back of a rail, 600 mm long, that rises and falls by 3 mm: too long for one set-up."""
+    """Back of a rail: rounded, rising and falling by 3 mm along its 800 mm, too long for one set-up."""
     return 3.0 * np.cos(2.0 * np.pi * x / 200.0) - y**2 / 160.0
 
 
@@ -98,7 +98,7 @@ PARTS: dict[str, tuple[Height, tuple[Floats, Floats, Ints]]] = {
     "saddle": (saddle, square_grid(150.0, 150.0, 100)),
     "wavy": (wavy, with_hole(*square_grid(150.0, 120.0, 150))),
     "relief": (relief, square_grid(100.0, 100.0, 140)),
-    "rail": (rail, square_grid(600.0, 70.0, 240)),
+    "rail": (rail, square_grid(800.0, 60.0, 320)),
     "oversize": (oversize, square_grid(600.0, 600.0, 100)),
 }
 

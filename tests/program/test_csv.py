@@ -10,7 +10,9 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.program import Program, Provenance, quantised, read_csv, write_csv
 from pentapod.program.csv import read_header
+from pentapod.toolpath.parting import Piece
 
+INF = float("inf")
 SOURCE = Provenance("desk", "m123", "j456", "0.1.0")
 
 
@@ -301,3 +303,40 @@ def test_a_name_that_is_no_text_leaves_no_file(tmp_path):
 def test_a_million_rows(tmp_path):
     before = program(1_000_000)
     same(before, read_csv(write_csv(before, tmp_path / "p.csv")))
+
+
+CORNER = st.tuples(*[st.one_of(st.floats(-10.0, -1e-9), st.just(-INF))] * 3)
+
+
+@settings(max_examples=60)
+@given(first=st.integers(0, 10**9), count=st.integers(1, 10**6), low=CORNER, high=CORNER)
+def test_a_piece_comes_back_bit_for_bit(tmp_path_factory, first, count, low, high):
+    path = tmp_path_factory.mktemp("p") / "program.csv"
+    piece = Piece(first, first + count, low, (-high[0], -high[1], -high[2]))
+    write_csv(program(rows=2, provenance=Provenance("desk", "m", "j", "v", piece)), path)
+    assert read_csv(path).provenance.piece == piece
+    assert read_header(path).unknown == ()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("# setup_waypoints = [2, 9]\n", "", "setup_waypoints"),
+        ("[2, 9]", "[9, 2]", "setup_box_mm"),
+        ("[2, 9]", "[2.0, 9]", "setup_waypoints"),
+        ("[2, 9]", "2", "setup_waypoints"),
+        ("[-inf, 0.0, -inf]", "[-inf, 0.0]", "setup_box_mm"),
+        ("[-inf, 0.0, -inf]", "[nan, 0.0, -inf]", "setup_box_mm"),
+        ("[-inf, 0.0, -inf]", '["x", 0.0, -inf]', "setup_box_mm"),
+    ],
+)
+def test_bad_pieces_are_named(tmp_path, old, new, key):
+    path = tmp_path / "program.csv"
+    piece = Piece(2, 9, (-INF, 0.0, -INF), (INF, 0.5, INF))
+    write_csv(program(rows=2, provenance=Provenance("desk", "m", "j", "v", piece)), path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(ProgramError) as caught:
+        read_csv(path)
+    assert caught.value.key == key

@@ -13,7 +13,7 @@ from pentapod.toolpath import load_mesh
 from pentapod.toolpath.stl import read_stl
 
 FOLDER = Path(__file__).parents[2] / "toolpaths"
-SLOPES_DEG = {"dome": 40.0, "saddle": 35.0, "wavy": 19.5, "relief": 16.5, "rail": 23.6, "oversize": 17.5}
+SLOPES_DEG = {"dome": 40.0, "saddle": 35.0, "wavy": 19.5, "relief": 16.5, "rail": 20.4, "oversize": 17.5}
 FACETS_WITHIN_UM = {"dome": 5.0, "saddle": 5.0, "wavy": 15.0, "relief": 10.0, "rail": 15.0, "oversize": 50.0}
 
 

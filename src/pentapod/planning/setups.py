@@ -18,7 +18,7 @@ from pentapod.toolpath.toolpath import Toolpath
 
 Fits = Callable[[Toolpath], bool]
 
-SLICES = 64
+SLICES = 32
 """Box borders stand at so many places along the part's extent."""
 
 
@@ -114,14 +114,18 @@ class _Search:
         """Return the place after the last end that fits, from the one at `start` on, and the pieces; by halving."""
         # All at once is known not to fit, in columns neither: slabs across the other direction would have.
         low, high, best = start - 1, len(way.ends) - (start == 0), None
-        middle = high - 1 if start > 0 else (low + high) // 2
+        middle = start  # the least comes first: where it does not fit nothing does
         while high - low > 1:
             pieces = self._pieces(way, start, middle)
             if all(self.fits(part_of(self.toolpath, piece, self.style)) for piece in pieces):
-                low, best = middle, (middle + 1, pieces)
+                # The rest may well fit as a whole.
+                low, middle = middle, (middle + high) // 2 if middle > start or start == 0 else high - 1
+                best = (low + 1, pieces)
+            elif middle == start:
+                return None
             else:
                 high = middle
-            middle = (low + high) // 2
+                middle = (low + high) // 2
         return best
 
     def _pieces(self, way: _Way, start: int, end: int) -> list[Piece]:
