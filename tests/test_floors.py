@@ -33,6 +33,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
             "job_surroundings",
             "job_tool",
             "outcome",
+            "clock",
             "plan_arrays",
             "artefacts",
             "pipeline",

@@ -14,6 +14,7 @@ from pentapod.errors import InputError, JobError, MeshError, ToolpathError
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job
 from pentapod.job_placement import job_freedom
+from pentapod.outcome import SetUps
 from pentapod.pipeline import job_machine, job_mesh, job_toolpath, run
 from pentapod.planning import PlacedPath
 from pentapod.program import read_csv
@@ -66,6 +67,11 @@ def test_shipped_jobs(name, tmp_path):
         assert any("too long" in blame.constraint for blame in refusal.blames)
         assert all(blame.shortfall > 0 and blame.waypoints for blame in refusal.blames)
         assert names(tmp_path) == WHOLE - {"program.csv"}
+    elif name == "rail":
+        setups = outcome.find(SetUps)
+        assert setups is not None
+        assert len(setups.parts) == 2
+        assert all(names(tmp_path / part.folder) == WHOLE for part in setups.parts)
     else:
         assert names(tmp_path) == WHOLE
         assert len(outcome.verdict.certificates) > 15

@@ -28,7 +28,8 @@ EACH = {"program.csv", "plan.npz", "verdict.json"}
 def text(setups: int = 3, scale: float = 3.0) -> str:
     """A dome of 180 mm that two poses of a fixture, 120 mm apart, reach together."""
     centre = Machine.load("desk").work.centre * 1e3 + (0.0, 0.0, 20.0)
-    places = np.round([centre - (60.0, 0.0, 0.0), centre + (60.0, 0.0, 0.0)], 3).tolist()
+    shift = np.array([60.0, 0.0, 0.0])
+    places = np.round([centre - shift, centre + shift], 3).tolist()
     poses = [[*place, 180, 0, 0] for place in places]
     head = job_text().split("[placement]")[0].replace('unit = "mm"', f'unit = "mm"\nscale = {scale}')
     head = head.replace("stepover_mm = 15", "stepover_mm = 45").replace("spacing_mm = 4", "spacing_mm = 9")
