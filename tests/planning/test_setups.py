@@ -73,10 +73,10 @@ def test_no_split_between_passes_has_fewer_pieces(places, width):
     assert all(fits(part_of(path, piece, STYLE)) for piece in pieces)
 
 
-def test_what_can_be_split_between_passes_is():
+def test_what_can_be_split_between_passes_is_and_evenly():
     path = passes([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
     pieces = setups(path, no_wider(1.0, 0.3), STYLE, 9, WHOLE)
-    assert [str(piece) for piece in pieces] == ["waypoints 0 to 35", "waypoints 35 to 53"]
+    assert [str(piece) for piece in pieces] == ["waypoints 0 to 26", "waypoints 26 to 53"]
     assert {piece.last for piece in pieces} <= {int(e) for e in pass_ends(path)}
 
 

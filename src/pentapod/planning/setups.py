@@ -92,23 +92,31 @@ class _Search:
     def split(self, way: _Way, most: int) -> tuple[Piece, ...]:
         """Return the fewest pieces of one way, at most `most`; none where they are not enough."""
         pieces: list[Piece] = []
-        reached, start = np.zeros_like(self.cutting), 0
+        reached, start, shelves = np.zeros_like(self.cutting), 0, 0
         while start < len(way.ends):
-            if len(pieces) + way.columns > most:
-                pieces = []
-                break
-            self.progress("set-ups", float(reached.sum() / self.cutting.sum()), f"{way.name}: {len(pieces)} so far")
-            found = self._furthest(way, start)
-            if not found:
-                pieces = []
-                break
-            start, more = found
+            found = None
+            if len(pieces) + way.columns <= most:
+                self.progress("set-ups", float(reached.mean() / self.cutting.mean()), f"{way.name}: {shelves} so far")
+                found = self._furthest(way, start)
+            if found is None:
+                self.reached = max(self.reached, reached, key=np.count_nonzero)
+                return ()
+            (start, more), shelves = found, shelves + 1
             pieces += more
             for piece in more:
                 reached |= piece.cuts(self.toolpath)
-        if reached.sum() > self.reached.sum():
-            self.reached = reached
-        return tuple(pieces)
+        self.reached = reached
+        even = self._even(way, shelves)
+        return tuple(even if 0 < len(even) <= len(pieces) else pieces)
+
+    def _even(self, way: _Way, shelves: int) -> list[Piece]:
+        """Return as many pieces that share the way evenly, where they fit: none is then tighter than it must be."""
+        edges = [0, *(len(way.ends) * k // shelves for k in range(1, shelves + 1))]
+        pieces = [piece for a, b in pairwise(edges) if b > a for piece in self._pieces(way, a, b - 1)]
+        return pieces if self._all_fit(pieces) else []
+
+    def _all_fit(self, pieces: list[Piece]) -> bool:
+        return all(self.fits(part_of(self.toolpath, piece, self.style)) for piece in pieces)
 
     def _furthest(self, way: _Way, start: int) -> tuple[int, list[Piece]] | None:
         """Return the place after the last end that fits, from the one at `start` on, and the pieces; by halving."""
@@ -117,7 +125,7 @@ class _Search:
         middle = start  # the least comes first: where it does not fit nothing does
         while high - low > 1:
             pieces = self._pieces(way, start, middle)
-            if all(self.fits(part_of(self.toolpath, piece, self.style)) for piece in pieces):
+            if self._all_fit(pieces):
                 # The rest may well fit as a whole.
                 low, middle = middle, (middle + high) // 2 if middle > start or start == 0 else high - 1
                 best = (low + 1, pieces)
