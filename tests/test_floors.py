@@ -40,6 +40,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
         ),
     ),
     (("report",),),
+    (("view",),),
     (("cli",),),
 )
 PLACES = {

@@ -1,6 +1,9 @@
-"""From a job's table [placement] to the placements that the planner may choose from."""
+"""From a job's table [placement] to the placements that the planner may choose from, and back."""
 
 from __future__ import annotations
+
+import dataclasses
+import json
 
 import numpy as np
 
@@ -9,6 +12,7 @@ from pentapod.errors import ArrayError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import Job
 from pentapod.machine.machine import Machine
+from pentapod.placement_table import PLACEMENT_KEYS, PlacementTable
 from pentapod.planning.freedom import FREE, Freedom
 from pentapod.planning.weights import Weights
 from pentapod.table import Vector
@@ -16,6 +20,8 @@ from pentapod.toolpath.mesh import Mesh
 
 _MM = 1e-3
 _EVERYWHERE = (-np.inf, np.inf)
+_PLACE_KEYS = frozenset(("mode", *(key for keys in PLACEMENT_KEYS.values() for key in keys)))
+"""What says where the part may go; the other keys say what is wanted of the plan."""
 
 
 def job_freedom(job: Job, machine: Machine, mesh: Mesh) -> Freedom:
@@ -41,6 +47,38 @@ def job_weights(job: Job) -> Weights:
     """Return the weights of the margins that the job asks for."""
     table = job.placement
     return Weights(table.weight_strokes, table.weight_singularities, table.weight_joints, table.weight_bodies)
+
+
+def job_at(job: Job, placement: RigidTransform) -> Job:
+    """Return the job with its part fixed at a placement, told as `placement_toml` tells it; all else stays."""
+    table = job.placement
+    kept = {name: getattr(table, name) for name in table.model_fields_set - _PLACE_KEYS}
+    position = _rounded(placement.translation / _MM, 6)
+    angles = _rounded(np.array(rotation_angles_deg(placement.rotation)), 8)
+    fixed = PlacementTable(mode="fixed", position_mm=position, rotation_deg=angles, **kept)
+    return dataclasses.replace(job, tables=job.tables.model_copy(update={"placement": fixed}))
+
+
+def _rounded(values: Floats, digits: int) -> Vector:
+    x, y, z = (round(float(value), digits) + 0.0 for value in values)  # no −0
+    return x, y, z
+
+
+def placement_toml(table: PlacementTable) -> str:
+    """Return a table [placement] as a job file has it: what is not as by default."""
+    content = table.model_dump(mode="json", exclude_defaults=True)
+    lines = [f"{key} = {json.dumps(value)}" for key, value in content.items()]
+    return "\n".join(["[placement]", *lines])
+
+
+def rotation_angles_deg(rotation: Floats) -> tuple[float, float, float]:
+    """Return the turns about the fixed x, then y, then z axis (degrees) that make up a rotation (3, 3)."""
+    x = np.arctan2(rotation[2, 1], rotation[2, 2])
+    y = np.arctan2(-rotation[2, 0], np.hypot(rotation[2, 1], rotation[2, 2]))
+    z = np.arctan2(rotation[1, 0], rotation[0, 0])
+    if np.hypot(rotation[2, 1], rotation[2, 2]) < 1e-9:  # only the sum or difference of x and z is known
+        x, z = np.arctan2(-rotation[1, 2], rotation[1, 1]), 0.0
+    return float(np.degrees(x)), float(np.degrees(y)), float(np.degrees(z))
 
 
 def _on_table(job: Job, machine: Machine, mesh: Mesh) -> Freedom:

@@ -73,10 +73,27 @@ def run(
     toolpath, _ = clock.time("toolpath", lambda: job_toolpath(job, mesh, progress), says=lambda made: str(made[1]))
     task = _Task(job, machine, toolpath, freedom, surroundings, clock)
     with staged(folder) as staging:
+<<<<<<< HEAD
         outcome = _reached(task, staging, writers or {})
         if outcome.refusal is not None and outcome.refusal.stage == "placement" and job.placement.setups > 1:
             style = job_link_style(job, mesh, toolpath)
             outcome = _split(task, style, outcome.refusal, staging, writers or {})
+=======
+        task = _Task(job, machine, toolpath, freedom, surroundings, clock)
+        program = task.program(staging / PROGRAM)
+        if isinstance(program, Refusal):
+            verdict = refusal_verdict(program)
+        else:
+            verdict = clock.time(
+                "verify", lambda: judge(job, machine, surroundings, toolpath, staging / PROGRAM, progress)
+            )
+        outcome = Outcome(job, machine, tuple(clock.stages), verdict)
+        write_arrays(arrays_of(outcome, folder), staging / ARRAYS)
+        for name, write in (writers or {}).items():
+            progress("report", 0.0, name)
+            write(outcome, staging / name)
+        write_json(outcome.to_dict(), staging / VERDICT)
+>>>>>>> 2097032 (Viewer: a run live in a browser; drag the part, see its margins, plan anew there)
     return outcome
 
 

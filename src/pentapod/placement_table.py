@@ -72,9 +72,9 @@ class PlacementTable(Table):
 
     @model_validator(mode="after")
     def _numbers(self) -> PlacementTable:
-        for mode, keys in _PLACEMENT_KEYS.items():
+        for mode, keys in PLACEMENT_KEYS.items():
             for key in keys:
-                if mode != self.mode and key not in _PLACEMENT_KEYS[self.mode] and key in self.model_fields_set:
+                if mode != self.mode and key not in PLACEMENT_KEYS[self.mode] and key in self.model_fields_set:
                     wrong(key, f'means nothing when mode = "{self.mode}"', f'mode = "{mode}", or no {key}')
         if self.mode == "fixed" and self.matrix is None and self.position_mm is None:
             what = "a fixed placement needs " + ("a position" if self.rotation_deg is not None else "its numbers")
@@ -98,7 +98,7 @@ class PlacementTable(Table):
         return self
 
 
-_PLACEMENT_KEYS: dict[str, tuple[str, ...]] = {
+PLACEMENT_KEYS: dict[str, tuple[str, ...]] = {
     "fixed": ("position_mm", "rotation_deg", "matrix"),
     "free": ("box_mm", "rotation_deg", "largest_turn_deg"),
     "table": ("table_z_mm", "table_x_mm", "table_y_mm", "up"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,9 +23,16 @@ Arrays = dict[str, NDArray[Any]]
 _MM = 1e3
 
 
-def arrays_of(outcome: Outcome) -> Arrays:
-    """Return every array of the stages that were reached, by name: `stage.quantity_unit`."""
-    arrays: Arrays = {}
+JOB_FILE = "job.file"
+"""The job file that the run was made from: relative to the run's folder where there is such a way."""
+
+
+def arrays_of(outcome: Outcome, folder: Path) -> Arrays:
+    """Return every array of the stages that were reached, by name: `stage.quantity_unit`; and `JOB_FILE`.
+
+    folder: of the run.
+    """
+    arrays: Arrays = {JOB_FILE: np.array(_way(outcome.job.path, folder))}
     if (toolpath := outcome.find(Toolpath)) is not None:
         arrays |= toolpath_arrays(toolpath)
     if (placed := outcome.find(PlacedPath)) is not None:
@@ -35,6 +44,13 @@ def arrays_of(outcome: Outcome) -> Arrays:
     if (program := outcome.find(Program)) is not None:
         arrays |= {"program.time_s": program.times, "program.legs_mm": program.legs * _MM}
     return arrays
+
+
+def _way(job: Path, folder: Path) -> str:
+    try:
+        return Path(os.path.relpath(job.resolve(), folder.resolve())).as_posix()
+    except ValueError:  # on another drive
+        return job.resolve().as_posix()
 
 
 def matrix_mm(transform: RigidTransform) -> Floats:

@@ -4,6 +4,7 @@ import os
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
@@ -42,7 +43,19 @@ def test_every_command_runs_as_written(page, tmp_path, monkeypatch):
     for line in "".join(blocks(page, "sh")).splitlines():
         words = shlex.split(line)
         assert words[0] == "pentapod"
-        assert run(words[1:]) == 0, line
+        if words[1] == "view":
+            serve_and_interrupt(words[1:])
+        else:
+            assert run(words[1:]) == 0, line
+
+
+def serve_and_interrupt(words):
+    """Run `pentapod view`, where no browser opens, until it says its address; then press Ctrl-C."""
+    command = [sys.executable, "-c", "from pentapod.cli.main import main; main()", *words, "--no-open"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as serving:
+        assert serving.stdout.readline().startswith("http://127.0.0.1:")
+        serving.send_signal(signal.SIGINT)
+        assert serving.wait(60) == 0
 
 
 @pytest.mark.parametrize("page", GUIDES, ids=lambda page: page.stem)

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job
-from pentapod.job_placement import job_freedom
+from pentapod.job_placement import job_freedom, rotation_angles_deg
 from pentapod.outcome import Outcome
 from pentapod.pipeline import job_machine, job_mesh, run
 from pentapod.planning import PlacedPath
@@ -24,7 +24,7 @@ from pentapod.program import Program
 from pentapod.report import write_report
 from pentapod.report.decimate import keep_extremes, thinned_mesh
 from pentapod.report.signals import Signals
-from pentapod.report.words import duration, number, opening, placement_sentences, rotation_angles_deg
+from pentapod.report.words import duration, number, opening, placement_sentences
 from pentapod.timing import Trajectory
 from pentapod.toolpath import Toolpath
 

@@ -19,6 +19,7 @@ VERBS = {
     "plan": "pentapod.cli.plan:plan",
     "verify": "pentapod.cli.verify:verify",
     "simulate": "pentapod.cli.simulate:simulate",
+    "view": "pentapod.cli.view:view",
     "post": "pentapod.cli.post:post",
     "toolpath": "pentapod.cli.toolpath:toolpath",
     "machine": "pentapod.cli.machine:machine",

@@ -11,7 +11,13 @@ import numpy as np
 
 from pentapod.files import atomic_write
 from pentapod.geometry.rigid import RigidTransform
+<<<<<<< HEAD
 from pentapod.outcome import Outcome, SetUps
+=======
+from pentapod.job import Job
+from pentapod.job_placement import job_at, placement_toml
+from pentapod.outcome import Outcome
+>>>>>>> 2097032 (Viewer: a run live in a browser; drag the part, see its margins, plan anew there)
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.program.program import Program
 from pentapod.report import plots, scene, words
@@ -76,8 +82,12 @@ def _context(outcome: Outcome) -> dict[str, Any]:
         "worst": [] if signals is None else worst_places(signals, outcome.machine),
         "story": outcome.find(Explanation),
         "sheet": _setup_sheet(outcome, signals),
+<<<<<<< HEAD
         "placement": None if placed is None else _placement(placed.placement.transform),
         "setups": outcome.find(SetUps),
+=======
+        "placement": None if placed is None else _placement(outcome.job, placed.placement.transform),
+>>>>>>> 2097032 (Viewer: a run live in a browser; drag the part, see its margins, plan anew there)
         "setup_sheet": setup_sheet(outcome),
         "chosen_by": "" if placed is None else placed.placement.chosen_by,
         "component": "" if placed is None else str(placed.component),
@@ -175,18 +185,13 @@ def _around(signals: Signals) -> list[list[float]]:
     return np.stack([low - room, high + room], axis=1).round(2).tolist()
 
 
-def _placement(transform: RigidTransform) -> dict[str, Any]:
+def _placement(job: Job, transform: RigidTransform) -> dict[str, Any]:
     matrix = transform.matrix
     matrix[:3, 3] *= 1e3
-    angles = words.rotation_angles_deg(transform.rotation)
-    position = ", ".join(f"{value:.6f}" for value in matrix[:3, 3])
     return {
         "sentences": words.placement_sentences(transform),
         "matrix": [[f"{value:.6f}".replace("-", "−") for value in row] for row in matrix],
-        "toml": "[placement]\n"
-        'mode = "fixed"\n'
-        f"position_mm = [{position}]\n"
-        f"rotation_deg = [{', '.join(f'{angle:.8f}' for angle in angles)}]",
+        "toml": placement_toml(job_at(job, transform).placement),
     }
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job_tables import ToolTable
 
@@ -42,16 +41,6 @@ def tool_sentence(tool: ToolTable) -> str:
         if (value := getattr(tool, key)) is not None
     ]
     return ", ".join([f"{tool.type} tool", *measures])
-
-
-def rotation_angles_deg(rotation: Floats) -> tuple[float, float, float]:
-    """Return the turns about the fixed x, then y, then z axis (degrees) that make up a rotation (3, 3)."""
-    x = np.arctan2(rotation[2, 1], rotation[2, 2])
-    y = np.arctan2(-rotation[2, 0], np.hypot(rotation[2, 1], rotation[2, 2]))
-    z = np.arctan2(rotation[1, 0], rotation[0, 0])
-    if np.hypot(rotation[2, 1], rotation[2, 2]) < 1e-9:  # only the sum or difference of x and z is known
-        x, z = np.arctan2(-rotation[1, 2], rotation[1, 1]), 0.0
-    return float(np.degrees(x)), float(np.degrees(y)), float(np.degrees(z))
 
 
 def placement_sentences(transform: RigidTransform) -> list[str]:

@@ -1,0 +1,87 @@
+"""Motion: where the tool is at a time, told in the workpiece frame, so that it moves with the part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.geometry.directions import normalised
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.machine.machine import Machine
+from pentapod.program import Program
+from pentapod.toolpath.toolpath import Toolpath
+from pentapod.view.opened import Opened
+
+_ROWS = 200_000
+
+
+@dataclass(frozen=True, eq=False)
+class Stance:
+    """The machine at one pose of the tool, machine frame, metres.
+
+    tip, axis (3,): axis unit, tip → spindle. legs (5,): lengths. within (5,): whether each keeps its stroke. bases,
+    joints (5, 3): where the legs begin and end.
+    """
+
+    tip: Floats
+    axis: Floats
+    legs: Floats
+    within: tuple[bool, ...]
+    bases: Floats
+    joints: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Tool poses over time, workpiece frame: times (N,) in seconds, tips and axes (N, 3), tip → spindle."""
+
+    times: Floats
+    tips: Floats
+    axes: Floats
+
+    @classmethod
+    def of(cls, run: Opened) -> Motion:
+        """Return the motion of a run: of its program, else along its toolpath."""
+        if run.program is None:
+            return cls.of_toolpath(run.toolpath, run.machine)
+        return cls.of_program(run.program, run.machine)
+
+    @classmethod
+    def of_program(cls, program: Program, machine: Machine) -> Motion:
+        """Return the motion of a program; a long one is thinned to two hundred thousand rows."""
+        rows = np.unique(np.linspace(0, len(program.legs) - 1, min(len(program.legs), _ROWS)).astype(np.intp))
+        position, direction = machine.pentapod.pose(program.legs[rows], program.component)
+        back = program.placement.inverse()
+        tips = back.apply(position + machine.tool_length * direction)
+        return cls(program.times[rows], tips, back.rotate(-direction))
+
+    @classmethod
+    def of_toolpath(cls, toolpath: Toolpath, machine: Machine) -> Motion:
+        """Return the motion along a toolpath at its feeds: no program, no ramps."""
+        way = np.linalg.norm(np.diff(toolpath.tips, axis=0), axis=1)
+        feeds = np.array([min(segment.feed, machine.rapid_velocity) for segment in toolpath.segments])
+        seconds = np.maximum(way / feeds[toolpath.segment_of_interval], 1e-6)
+        return cls(np.concatenate([[0.0], np.cumsum(seconds)]), toolpath.tips, toolpath.axes)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first to the last pose."""
+        return float(self.times[-1])
+
+    def pose(self, time: float) -> tuple[Floats, Floats]:
+        """Return tip and axis (3,), workpiece frame, at a time in seconds: in a straight line between rows."""
+        tip, axis = (np.array([np.interp(time, self.times, c) for c in rows.T]) for rows in (self.tips, self.axes))
+        return tip, normalised(axis)
+
+    def stance(self, time: float, machine: Machine, placement: RigidTransform) -> Stance:
+        """Return how the machine stands at a time where the part is at a placement."""
+        tip, axis = self.pose(time)
+        tip, axis = placement.apply(tip), placement.rotate(axis)
+        position = tip + machine.tool_length * axis
+        bases = np.column_stack([machine.pentapod.base, np.zeros(5)])
+        joints = position - machine.pentapod.offsets[:, None] * axis
+        legs = np.linalg.norm(joints - bases, axis=1)
+        within = (legs >= machine.legs.min_length) & (legs <= machine.legs.max_length)
+        return Stance(tip, axis, legs, tuple(bool(k) for k in within), bases, joints)

@@ -1,0 +1,136 @@
+"""open_run: what the folder of a run holds, with the job that it was made from, ready to be looked at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pentapod.arrays import Floats
+from pentapod.artefacts import ARRAYS, PROGRAM
+from pentapod.errors import InputError
+from pentapod.geometry.directions import tangent_frame
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.job import Job
+from pentapod.job_surroundings import job_surroundings
+from pentapod.job_tool import job_tool
+from pentapod.kinematics.component import COMPONENTS, Component
+from pentapod.machine.machine import Machine
+from pentapod.machine.surroundings import Surroundings
+from pentapod.outcome import Outcome
+from pentapod.pipeline import job_machine, job_mesh
+from pentapod.plan_arrays import JOB_FILE
+from pentapod.planning import PlacedPath
+from pentapod.program import Program, read_csv
+from pentapod.progress import Progress, silent
+from pentapod.toolpath.formats import read_toolpath
+from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.toolpath import Toolpath
+from pentapod.toolpath.tools import Tool
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """A run. placement: workpiece → machine. axes (N, 3): the chosen tool axes, workpiece frame.
+
+    program: None where the job was refused; then the part stands in the middle of the work volume with nominal axes,
+    unless a placement was found. same_job: whether the job is still what the program was made from.
+    """
+
+    folder: Path
+    job: Job
+    machine: Machine
+    mesh: Mesh
+    tool: Tool
+    toolpath: Toolpath
+    surroundings: Surroundings
+    placement: RigidTransform
+    component: Component
+    axes: Floats
+    program: Program | None
+    same_job: bool
+
+
+def open_run(folder: str | Path, job: str | Path | None = None, progress: Progress = silent) -> Opened:
+    """Return the run of a folder; its job is found by what the run says, or given.
+
+    Raises InputError: no run in the folder, its job is not there any more, or one of its files is broken.
+    """
+    folder = Path(folder)
+    file = folder / ARRAYS
+    if not file.is_file():
+        what = "there is no run in this folder" if folder.is_dir() else "no such folder"
+        raise InputError(what, file=folder, expected=f"a folder with {ARRAYS}", remedy="pentapod plan JOB.toml -o DIR")
+    progress("open", 0.0, "arrays")
+    toolpath = read_toolpath(file, "npz")
+    arrays = _arrays(file)
+    loaded = Job.load(_job_file(folder, arrays) if job is None else job)
+    progress("open", 0.3, "mesh")
+    machine, mesh = job_machine(loaded), job_mesh(loaded)
+    progress("open", 0.7, "program")
+    program = read_csv(folder / PROGRAM) if (folder / PROGRAM).is_file() else None
+    wanted = loaded.placement.component
+    first = COMPONENTS[0] if wanted is None else Component.parse(wanted)
+    placement, component, axes = _placed(arrays, toolpath, machine, first)
+    return Opened(
+        folder, loaded, machine, mesh, job_tool(loaded), toolpath, job_surroundings(loaded, machine, mesh), placement,
+        component, axes, program, program is None or program.provenance.job_digest == loaded.digest,
+    )  # fmt: skip
+
+
+def run_of(outcome: Outcome, folder: Path) -> Opened | None:
+    """Return the run of an outcome that was written into a folder; None where it came to no program."""
+    mesh, toolpath = outcome.find(Mesh), outcome.find(Toolpath)
+    placed, program = outcome.find(PlacedPath), outcome.find(Program)
+    if mesh is None or toolpath is None or placed is None or program is None:
+        return None
+    job, machine, placement = outcome.job, outcome.machine, placed.placement.transform
+    return Opened(
+        folder, job, machine, mesh, job_tool(job), toolpath, job_surroundings(job, machine, mesh), placement,
+        placed.component, placement.inverse().rotate(placed.axes), program, same_job=True,
+    )  # fmt: skip
+
+
+def _arrays(file: Path) -> dict[str, NDArray[Any]]:
+    """Return the arrays of the placement, as far as there are any, and of the job's file."""
+    wanted = (JOB_FILE, "placed.placement_mm", "placed.component", "placed.axes")
+    with np.load(file, allow_pickle=False) as archive:
+        return {name: np.asarray(archive[name]) for name in wanted if name in archive}
+
+
+def _job_file(folder: Path, arrays: dict[str, NDArray[Any]]) -> Path:
+    remedy = "name it with --job"
+    if JOB_FILE not in arrays:
+        raise InputError("the run does not say which job it was made from", file=folder / ARRAYS, remedy=remedy)
+    path = folder / str(arrays[JOB_FILE])
+    if not path.is_file():
+        raise InputError("the job of this run is not there any more", file=path, remedy=remedy)
+    return path
+
+
+def _placed(
+    arrays: dict[str, NDArray[Any]], toolpath: Toolpath, machine: Machine, component: Component
+) -> tuple[RigidTransform, Component, Floats]:
+    """Return what the run found; without a placement the middle of the work volume, in `component`."""
+    if "placed.axes" not in arrays:
+        return _middle(toolpath, machine, component), component, toolpath.axes
+    matrix = arrays["placed.placement_mm"].copy()
+    matrix[:3, 3] *= 1e-3
+    placement = RigidTransform.from_matrix(matrix)
+    w, s = (int(sign) for sign in arrays["placed.component"])
+    return placement, Component(w, s), placement.inverse().rotate(arrays["placed.axes"])
+
+
+def _middle(toolpath: Toolpath, machine: Machine, component: Component) -> RigidTransform:
+    """Return the placement with the path in the middle of the work volume, its mean axis along the machine's z."""
+    mean = toolpath.axes.mean(axis=0)
+    length = float(np.linalg.norm(mean))
+    axis = mean / length if length > 1e-6 else np.array([0.0, 0.0, 1.0])
+    upward = np.array([0.0, 0.0, -float(component.w)])
+    to, back = (np.column_stack([*tangent_frame(a), a]) for a in (upward, axis))
+    u, _, v = np.linalg.svd(to @ back.T)
+    rotation = u @ v
+    return RigidTransform(rotation, machine.work.centre - rotation @ toolpath.tips.mean(axis=0))

@@ -1,0 +1,89 @@
+"""Panel: the controls beside the scene, and what they say in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.job_placement import rotation_angles_deg
+from pentapod.report.words import duration, number
+from pentapod.view.motion import Motion, Stance
+from pentapod.view.opened import Opened
+from pentapod.view.study import Reach
+
+if TYPE_CHECKING:
+    import viser
+
+SPEEDS = ("1/4 ×", "1 ×", "4 ×", "16 ×", "64 ×")
+_FACTORS = dict(zip(SPEEDS, (0.25, 1.0, 4.0, 16.0, 64.0), strict=True))
+_STEPS = 2000
+
+
+class Panel:
+    """The handles of the controls; what they do is said in `server`."""
+
+    def __init__(self, server: viser.ViserServer, run: Opened, motion: Motion) -> None:
+        gui = server.gui
+        gui.set_panel_label(f"pentapod · {run.job.path.name}")
+        gui.add_markdown(run_words(run))
+        with gui.add_folder("Motion"):
+            self.time = gui.add_slider("time, s", 0.0, motion.duration, motion.duration / _STEPS, 0.0)
+            self.play = gui.add_checkbox("play", initial_value=False)
+            self.speed = gui.add_dropdown("speed", SPEEDS, initial_value="1 ×")
+            self.stance = gui.add_markdown("")
+        with gui.add_folder("Placement"):
+            self.reach = gui.add_markdown("")
+            self.tilted = gui.add_checkbox(
+                "lean as best", initial_value=False,
+                hint="Judge each place with the best tool axis within the job's cone, not with the one that was chosen",
+            )  # fmt: skip
+            self.tilted.disabled = run.job.axis.tilt_deg == 0.0
+            self.place = gui.add_markdown("")
+            self.back = gui.add_button("back to the plan")
+        with gui.add_folder("Plan anew"):
+            self.replan = gui.add_button("plan with the part here")
+            self.bar = gui.add_progress_bar(0.0, visible=False)
+            self.news = gui.add_markdown("")
+
+    @property
+    def speed_factor(self) -> float:
+        """How much faster than in life the motion is shown."""
+        return _FACTORS[self.speed.value]
+
+
+def run_words(run: Opened) -> str:
+    """Return what is looked at."""
+    if run.program is None:
+        return "**Refused**: no program. Drag the part until it can be reached."
+    lines = [f"Component {run.component}, {duration(run.program.duration)}, {len(run.toolpath):,} waypoints."]
+    if not run.same_job:
+        lines.append("The job was changed since: the program is that of an earlier one.")
+    return " ".join(lines)
+
+
+def reach_words(reach: Reach) -> str:
+    """Return what a placement comes to."""
+    worst = reach.worst
+    room = (
+        f", {number(abs(worst.room), worst.unit)} {'beyond' if worst.room < 0.0 else 'to spare'}" if worst.unit else ""
+    )
+    answer = "**Fits.**" if reach.fits else f"**Does not fit** at {100.0 * reach.beyond:.1f} % of the path."
+    return (
+        f"{answer} Smallest margin {number(worst.margin)}: {worst.limit}{room}, at waypoint {worst.waypoint:,} "
+        f"({len(reach.rows):,} judged)."
+    )
+
+
+def place_words(placement: RigidTransform) -> str:
+    """Return where the part stands, in the numbers of a job file."""
+    position = ", ".join(f"{round(1e3 * value, 2) + 0.0:.2f}" for value in placement.translation.tolist())
+    angles = ", ".join(f"{round(angle, 2) + 0.0:.2f}" for angle in rotation_angles_deg(placement.rotation))
+    return f"position ({position}) mm, turned by ({angles})°".replace("-", "−")
+
+
+def stance_words(time: float, stance: Stance) -> str:
+    """Return the pose of the tool and the lengths of the legs; one beyond its stroke stands out."""
+    tip = ", ".join(f"{1e3 * value:.1f}" for value in stance.tip)
+    legs = [f"{1e3 * length:.2f}" for length in stance.legs]
+    told = ", ".join(leg if fits else f"**{leg}!**" for leg, fits in zip(legs, stance.within, strict=True))
+    return f"{time:.2f} s, tip ({tip}) mm, legs {told} mm".replace("-", "−")

@@ -1,0 +1,136 @@
+"""Scene: the machine, the part and the path as viser draws them, machine frame, metres."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pentapod.arrays import Floats
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.machine.surroundings import mounted
+from pentapod.report.decimate import thinned_mesh
+from pentapod.report.figure import LEG_COLOURS, LIMIT_COLOUR
+from pentapod.view.motion import Stance
+from pentapod.view.opened import Opened
+from pentapod.view.shapes import along, quaternion, revolved, rotation_of, tool_mesh
+from pentapod.view.study import Reach, Study
+
+if TYPE_CHECKING:
+    import viser
+
+Rgb = tuple[int, int, int]
+
+PART = "/part"
+"""The node that is dragged; mesh and path hang on it."""
+
+_MOST_FACETS = 120_000
+_LIFT_M = 0.5e-3  # of the path along the tool axis: a ball's tip runs on and below the surface
+_SHAFT_SHARE = 0.25  # of the spindle's radius, for what joins tip and spindle where the job does not say
+_STEEL, _DARK, _PART_COLOUR, _BEAM = (150, 156, 166), (84, 90, 100), (195, 206, 217), (224, 60, 40)
+
+
+class Scene:
+    """One run in a viser scene. The part is dragged about its middle; what is on the tool moves as one."""
+
+    def __init__(self, server: viser.ViserServer, run: Opened, study: Study) -> None:
+        self._server, self._run, self._study = server, run, study
+        self._middle = run.mesh.bounds.mean(axis=0)
+        api = server.scene
+        self._set_up(server)
+        size = float(np.ptp(run.mesh.bounds, axis=0).max())
+        self.part = api.add_transform_controls(PART, scale=0.75 * size, depth_test=False, line_width=3.0)
+        self.set_placement(run.placement)
+        vertices, faces = thinned_mesh(run.mesh.vertices, run.mesh.faces, _MOST_FACETS)
+        api.add_mesh_simple(f"{PART}/mesh", vertices - self._middle, faces, color=_PART_COLOUR, side="double")
+        tips = run.toolpath.tips[study.shown] + _LIFT_M * run.axes[study.shown] - self._middle
+        grey = np.full((len(tips) - 1, 2, 3), 128, dtype=np.uint8)
+        self._path = api.add_line_segments(
+            f"{PART}/path", np.stack([tips[:-1], tips[1:]], axis=1), grey, thickness=3.5, thickness_units="screen"
+        )
+        self._add_base()
+        self._tool = api.add_frame("/tool", show_axes=False)
+        self._add_tool()
+        radius = run.machine.bodies.leg_radius
+        self._legs = [self._cylinder(f"/legs/{k + 1}", radius, _rgb(LEG_COLOURS[k])) for k in range(5)]
+
+    @property
+    def placement(self) -> RigidTransform:
+        """Where the part stands now, workpiece → machine."""
+        rotation = rotation_of(np.asarray(self.part.wxyz, dtype=np.float64))
+        position = np.asarray(self.part.position, dtype=np.float64)
+        return RigidTransform(rotation, position - rotation @ self._middle)
+
+    def set_placement(self, placement: RigidTransform) -> None:
+        """Put the part somewhere."""
+        self.part.wxyz = quaternion(placement.rotation)
+        self.part.position = placement.apply(self._middle)
+
+    def show_reach(self, reach: Reach) -> None:
+        """Colour the path by its margins."""
+        colours = reach.colours(self._study.shown)
+        self._path.colors = np.stack([colours[:-1], colours[1:]], axis=1)
+
+    def show_stance(self, stance: Stance) -> None:
+        """Move legs and tool; a leg beyond its stroke is red."""
+        with self._server.atomic():
+            self._tool.position, self._tool.wxyz = stance.tip, quaternion(along(stance.axis))
+            for k, leg in enumerate(self._legs):
+                leg.position = stance.bases[k]
+                leg.wxyz = quaternion(along((stance.joints[k] - stance.bases[k]) / stance.legs[k]))
+                leg.scale = (1.0, 1.0, float(stance.legs[k]))
+                leg.color = _rgb(LEG_COLOURS[k] if stance.within[k] else LIMIT_COLOUR)
+
+    def _set_up(self, server: viser.ViserServer) -> None:
+        """Look at the work from the side, the base above it."""
+        machine = self._run.machine
+        centre, upward = machine.work.centre, -float(np.sign(machine.work.centre[2]) or 1.0)
+        server.scene.set_up_direction((0.0, 0.0, upward))
+        span = float(machine.legs.max_length.max())
+        camera = server.initial_camera
+        middle = centre * [1.0, 1.0, 0.6]
+        camera.position = middle + span * np.array([0.45, -0.85, 0.25 * upward])
+        camera.look_at = middle + span * np.array([0.15, 0.0, 0.0])  # the panel covers the right
+        camera.up = (0.0, 0.0, upward)
+
+    def _add_base(self) -> None:
+        base = np.column_stack([self._run.machine.pentapod.base, np.zeros(5)])
+        centre = base.mean(axis=0)
+        radius = 1.12 * float(np.linalg.norm(base - centre, axis=1).max())
+        turn = np.linspace(0.0, 2.0 * np.pi, 97)
+        rim = centre + radius * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
+        rims = np.stack([rim[:-1], rim[1:]], axis=1)
+        self._server.scene.add_line_segments("/base/rim", rims, _DARK, thickness=3.0, thickness_units="screen")
+        ball = 1.8 * self._run.machine.bodies.leg_radius
+        for k, joint in enumerate(base):
+            self._server.scene.add_icosphere(f"/base/{k + 1}", ball, color=_rgb(LEG_COLOURS[k]), position=joint)
+            self._server.scene.add_label(f"/base/{k + 1}/name", f"{k + 1}")
+
+    def _add_tool(self) -> None:
+        """Everything that is fixed to the tool: spindle, platform joints, shank and cutter, beam."""
+        run, api = self._run, self._server.scene
+        machine, offsets = run.machine, run.machine.pentapod.offsets
+        heights = machine.tool_length - offsets
+        top, nose = float(heights.max()), machine.bodies.shaft_end
+        self._cylinder("/tool/spindle", machine.bodies.shaft_radius, _STEEL, nose, top)
+        self._cylinder("/tool/shaft", _SHAFT_SHARE * machine.bodies.shaft_radius, _DARK, 0.0, nose)
+        for k, height in enumerate(heights.tolist()):
+            ball = 1.6 * machine.bodies.leg_radius
+            api.add_icosphere(f"/tool/joint{k + 1}", ball, color=_rgb(LEG_COLOURS[k]), position=(0.0, 0.0, height))
+        cutter = [solid for solid in run.tool.solids if solid.kind == "cutter"]
+        for name, solids, colour in (("cutter", cutter, _DARK), ("body", mounted(run.tool.solids, machine), _STEEL)):
+            if solids:
+                vertices, faces = tool_mesh(solids)
+                api.add_mesh_simple(f"/tool/{name}", vertices, faces, color=colour)
+        if run.tool.pivot < 0.0:
+            self._cylinder("/tool/beam", 0.4e-3, _BEAM, run.tool.pivot, 0.0)
+
+    def _cylinder(self, name: str, radius: float, colour: Rgb, low: float = 0.0, high: float = 1.0) -> viser.MeshHandle:
+        profile: Floats = np.array([[0.0, low], [radius, low], [radius, high], [0.0, high]])
+        return self._server.scene.add_mesh_simple(name, *revolved(profile), color=colour)
+
+
+def _rgb(colour: str) -> Rgb:
+    """Return the numbers of "#rrggbb"."""
+    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return red, green, blue
