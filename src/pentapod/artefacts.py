@@ -22,6 +22,8 @@ NAMES = (PROGRAM, ARRAYS, REPORT, VERDICT)
 SETUPS = "setup-[1-9]*"
 """Folders of the same files, one for each set-up of a job that needs several."""
 
+_UNFINISHED = ".unfinished-"
+
 
 def check_folder(folder: Path) -> None:
     """Raise InputError where the folder cannot be made or written; makes nothing that stays."""
@@ -47,7 +49,7 @@ def staged(folder: Path) -> Generator[Path]:
     """
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     folder.mkdir(parents=True, exist_ok=True)
-    staging = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
+    staging = Path(tempfile.mkdtemp(prefix=_UNFINISHED, dir=folder))
     try:
         yield staging
         (folder / VERDICT).unlink(missing_ok=True)  # until the new one is there, no verdict is better than the old
@@ -67,6 +69,11 @@ def staged(folder: Path) -> Generator[Path]:
                 path.rmdir()
         raise
     shutil.rmtree(staging, ignore_errors=True)
+
+
+def unstaged(folder: Path) -> Path:
+    """Return where a folder within a staged one will stand in the end."""
+    return Path(*(part for part in folder.parts if not part.startswith(_UNFINISHED)))
 
 
 def write_json(content: Mapping[str, Any], path: Path) -> None:

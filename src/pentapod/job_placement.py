@@ -20,7 +20,7 @@ from pentapod.toolpath.mesh import Mesh
 
 _MM = 1e-3
 _EVERYWHERE = (-np.inf, np.inf)
-_PLACE_KEYS = frozenset(("mode", *(key for keys in PLACEMENT_KEYS.values() for key in keys)))
+_PLACE_KEYS = frozenset(("mode", "setups", *(key for keys in PLACEMENT_KEYS.values() for key in keys)))
 """What says where the part may go; the other keys say what is wanted of the plan."""
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, write_arrays, write_json
+from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, unstaged, write_arrays, write_json
 from pentapod.clock import Clock
 from pentapod.errors import InputError, MachineError, MeshError
 from pentapod.job import Job
@@ -73,27 +73,10 @@ def run(
     toolpath, _ = clock.time("toolpath", lambda: job_toolpath(job, mesh, progress), says=lambda made: str(made[1]))
     task = _Task(job, machine, toolpath, freedom, surroundings, clock)
     with staged(folder) as staging:
-<<<<<<< HEAD
         outcome = _reached(task, staging, writers or {})
         if outcome.refusal is not None and outcome.refusal.stage == "placement" and job.placement.setups > 1:
             style = job_link_style(job, mesh, toolpath)
             outcome = _split(task, style, outcome.refusal, staging, writers or {})
-=======
-        task = _Task(job, machine, toolpath, freedom, surroundings, clock)
-        program = task.program(staging / PROGRAM)
-        if isinstance(program, Refusal):
-            verdict = refusal_verdict(program)
-        else:
-            verdict = clock.time(
-                "verify", lambda: judge(job, machine, surroundings, toolpath, staging / PROGRAM, progress)
-            )
-        outcome = Outcome(job, machine, tuple(clock.stages), verdict)
-        write_arrays(arrays_of(outcome, folder), staging / ARRAYS)
-        for name, write in (writers or {}).items():
-            progress("report", 0.0, name)
-            write(outcome, staging / name)
-        write_json(outcome.to_dict(), staging / VERDICT)
->>>>>>> 2097032 (Viewer: a run live in a browser; drag the part, see its margins, plan anew there)
     return outcome
 
 
@@ -109,7 +92,7 @@ def _reached(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outco
 
 
 def _written(outcome: Outcome, staging: Path, writers: Mapping[str, Writer], progress: Progress) -> Outcome:
-    write_arrays(arrays_of(outcome), staging / ARRAYS)
+    write_arrays(arrays_of(outcome, unstaged(staging)), staging / ARRAYS)
     for name, write in writers.items():
         progress("report", 0.0, name)
         write(outcome, staging / name)

@@ -11,13 +11,9 @@ import numpy as np
 
 from pentapod.files import atomic_write
 from pentapod.geometry.rigid import RigidTransform
-<<<<<<< HEAD
-from pentapod.outcome import Outcome, SetUps
-=======
 from pentapod.job import Job
 from pentapod.job_placement import job_at, placement_toml
-from pentapod.outcome import Outcome
->>>>>>> 2097032 (Viewer: a run live in a browser; drag the part, see its margins, plan anew there)
+from pentapod.outcome import Outcome, SetUps
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.program.program import Program
 from pentapod.report import plots, scene, words
@@ -82,12 +78,8 @@ def _context(outcome: Outcome) -> dict[str, Any]:
         "worst": [] if signals is None else worst_places(signals, outcome.machine),
         "story": outcome.find(Explanation),
         "sheet": _setup_sheet(outcome, signals),
-<<<<<<< HEAD
-        "placement": None if placed is None else _placement(placed.placement.transform),
-        "setups": outcome.find(SetUps),
-=======
         "placement": None if placed is None else _placement(outcome.job, placed.placement.transform),
->>>>>>> 2097032 (Viewer: a run live in a browser; drag the part, see its margins, plan anew there)
+        "setups": outcome.find(SetUps),
         "setup_sheet": setup_sheet(outcome),
         "chosen_by": "" if placed is None else placed.placement.chosen_by,
         "component": "" if placed is None else str(placed.component),
