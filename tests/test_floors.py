@@ -28,6 +28,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
             "placement_table",
             "job_tables",
             "job",
+            "job_cutting",
             "job_placement",
             "job_strategy",
             "job_surroundings",

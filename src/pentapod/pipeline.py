@@ -12,6 +12,7 @@ from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, u
 from pentapod.clock import Clock
 from pentapod.errors import InputError, MachineError, MeshError
 from pentapod.job import Job
+from pentapod.job_cutting import job_cutting
 from pentapod.job_placement import job_freedom, job_weights
 from pentapod.job_strategy import job_options
 from pentapod.job_surroundings import job_surroundings
@@ -222,6 +223,7 @@ def judge(
         axis_tolerance=float(np.radians(job.tolerance.axis_deg)),
         job_digest=job.digest,
         surroundings=surroundings,
+        cutting=job_cutting(job, surroundings),
         strict=strict,
         progress=progress,
     )

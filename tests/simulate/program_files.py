@@ -12,35 +12,21 @@ from pentapod.toolpath.formats import write_toolpath
 sys.path.append(str(Path(__file__).parents[1] / "program"))
 from short_motion import motion, placed
 
-JOB = """\
-[part]
-mesh = "part.stl"
-unit = "mm"
+from usual_job import job_text
 
-[machine]
-name = "desk"
 
-[tool]
-type = "ball"
-diameter_mm = 1e-6
-
-[toolpath]
-strategy = "file"
-file = "path.npz"
-
-[feed]
-cut_mm_min = 3000
-
-[tolerance]
-path_mm = 0.05
-"""
+def job_of_a_file() -> str:
+    """The usual job, but with a toolpath from a file and a needle for a tool."""
+    strategy = 'strategy = "file"\nfile = "path.npz"'
+    text = job_text().replace("stepover_mm = 15\nspacing_mm = 4", strategy)
+    return text.replace("diameter_mm = 10", "diameter_mm = 1e-6")
 
 
 def write_job(folder: Path, duration: float) -> tuple[str, str]:
     """Write job.toml, part.stl, path.npz and program.csv; return the paths of job and program."""
     program, _ = motion(duration)
     (folder / "part.stl").write_bytes(dome_stl(cells=12))
-    (folder / "job.toml").write_text(JOB, encoding="utf-8")
+    (folder / "job.toml").write_text(job_of_a_file(), encoding="utf-8")
     write_toolpath(placed().transformed(program.placement.inverse()), folder / "path.npz")
     write_csv(program, folder / "program.csv")
     return str(folder / "job.toml"), str(folder / "program.csv")

@@ -16,6 +16,7 @@ from pentapod.kinematics.forces import leg_force_map
 from pentapod.program import Program
 from pentapod.refusal import Refusal
 from pentapod.simulate import Reference, cutting_forces, mujoco_engine, plant, simulate_mujoco
+from pentapod.simulate.load import leg_loads
 
 sys.path.append(str(Path(__file__).parents[1] / "program"))
 from short_motion import motion
@@ -75,6 +76,51 @@ def test_a_millimetre_along_the_tool_shows():
     reference = reference_of(0.8)
     tip, _ = off(play(reference, offset_errors=[0.0, 1e-3, 0.0, 0.0, 0.0]), reference)
     assert tip.max() >= 0.5e-3
+
+
+def test_the_load_feeds_the_energy_of_the_bodies():
+    """What the drives give beside their own inertia is what MuJoCo's bodies gain on the way, at all times.
+
+    Energies of rigid bodies, their masses and inertias taken from the compiled model; virtual work knows none of them.
+    """
+    reference = reference_of(1.2)
+    machine, program = reference.machine, reference.program
+    model, h = mujoco.MjModel.from_xml_string(plant(reference).xml), program.period
+    gravity = machine.masses.gravity
+    direction = reference.directions[::2]
+    position = reference.tips[::2] - machine.tool_length * direction
+    vectors = machine.pentapod.leg_vectors(position, direction)
+    lengths = np.linalg.norm(vectors, axis=2)
+
+    def energy(name, points, axes):
+        """Of a body whose origin is at points (N, 3), its z axis along axes (N, 3)."""
+        body = model.body(name)
+        centre = points + body.ipos[2] * axes
+        v, w = (np.diff(x, axis=0) / h for x in (centre, axes))
+        moving = 0.5 * body.mass * (v * v).sum(axis=1) + 0.5 * body.inertia[0] * (w * w).sum(axis=1)
+        return moving - body.mass * (0.5 * (centre[1:] + centre[:-1]) @ gravity)
+
+    total = energy("platform", position, direction)
+    for leg in range(5):
+        along, base = vectors[:, leg] / lengths[:, leg, None], np.append(machine.pentapod.base[leg], 0.0)
+        total = total + energy(f"leg{leg + 1}", np.tile(base, (len(along), 1)), along)
+        total = total + energy(f"rod{leg + 1}", base + vectors[:, leg], along)
+    power = np.diff(total) / h
+    rates = (program.legs[2:] - program.legs[:-2]) / (2.0 * h)
+    given = (leg_loads(reference)[1:-1] * rates).sum(axis=1)
+    assert np.abs(given).max() > 1.0
+    np.testing.assert_allclose(given, power, atol=2e-3 * np.abs(given).max())
+
+
+def test_the_load_fed_forward_lowers_the_error():
+    errors = []
+    for share in (0.0, 1.0):
+        reference = reference_of(1.2)
+        drives = replace(reference.machine.drives, load_feedforward=share)
+        errors.append(off(play(Reference(reference.program, replace(reference.machine, drives=drives))), reference))
+    (without, turned), (with_it, turned_less) = errors
+    assert with_it.max() < 0.7 * without.max()
+    assert turned_less.max() < 0.7 * turned.max()
 
 
 def still(rows=300, **masses):

@@ -11,7 +11,11 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics import Component
 from pentapod.machine import load_machine
 from pentapod.program import Program, Provenance, quantised
+from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+from pentapod.toolpath.tools import BallCutter
+from pentapod.verify import Cutting
 
 BALL = 3e-3
 FEED = 0.03
@@ -40,6 +44,20 @@ def on_surface(x, y):
     points, normals = surface(x, y)
     # The tip lies a radius below the ball's centre along the axis; with the axis normal it is the contact.
     return points, normals
+
+
+def hill(shape=(121, 81)):
+    """Vertices and facets of that hill, 60 mm by 40 mm, as an open sheet."""
+    x, y = np.meshgrid(*(np.linspace(-w, w, n) for w, n in zip((0.03, 0.02), shape, strict=True)), indexing="ij")
+    k = np.arange(x.size).reshape(shape)
+    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
+    facets = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return surface(x.ravel(), y.ravel())[0], facets
+
+
+def cutting_of(vertices, facets, tool=None, depth=5e-5):
+    tool = tool or BallCutter(BALL)
+    return Cutting(MeshDistance.of(Mesh.of(vertices, facets)), tool.solids, depth)
 
 
 def slerp(a, b, f):

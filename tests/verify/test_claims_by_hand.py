@@ -10,14 +10,15 @@ import replay_cases as cases
 from pentapod.kinematics.certificate import certify_component
 from pentapod.program import quantised
 from pentapod.verify import CLAIMS, Certificate, Claim, Place, Replay, Verdict, verify, write_verdict
-from pentapod.verify.claim import Finding
+from pentapod.verify.claim import Finding, Idle
 from pentapod.verify.survey import ComponentFindings, Extreme
 from pentapod.verify.tracking import _raised, at_samples
 
 
 @pytest.fixture(scope="module")
 def replay(linear):
-    return Replay(linear.program, linear.machine, linear.toolpath, *cases.TOLERANCES.values(), "job-1")
+    given = (*cases.TOLERANCES.values(), "job-1")
+    return Replay(linear.program, linear.machine, linear.toolpath, *given, cutting=cases.cutting_of(*cases.hill()))
 
 
 @pytest.fixture(scope="module")
@@ -180,13 +181,15 @@ def test_a_claim_gives_plain_numbers(replay):
     certificate = claim_of(HELD)(replay)
     assert certificate == Certificate("a claim", True, 0.333333333333, None, "mm", Place(), "by hand")
     assert type(certificate.passed) is bool
-    assert claim_of(None)(replay) is None
+    assert claim_of(Idle("nothing there"))(replay) == Idle("nothing there")
 
 
 def test_what_a_strict_verdict_says_of_an_idle_claim():
-    assert claim_of(None, idle="nothing there").unjudged().method == "does not apply: nothing there"
-    assert claim_of(None).unjudged().passed
-    assert not claim_of(None, owed=True).unjudged().passed
+    claim, where = claim_of(HELD), Place()
+    idle = claim.unjudged(Idle("nothing there"))
+    assert idle == Certificate("a claim", True, None, None, "", where, "does not apply: nothing there")
+    unknown = claim.unjudged(Idle("nobody says", unknown=True))
+    assert unknown == Certificate("a claim", False, None, None, "", where, "unknown: nobody says")
 
 
 def test_claims_that_need_a_pose_or_a_proof_fail_without(linear):
@@ -373,7 +376,7 @@ def test_bounds_for_all_times_are_undecided_where_the_motion_is_not_proven(repla
     partly.away[7] = np.inf
     other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"match", "pivots", "axes"}})
     other.__dict__["survey"] = partly
-    answers = [answer for claim in CLAIMS if (answer := claim(other)) is not None]
+    answers = [answer for claim in CLAIMS if isinstance(answer := claim(other), Certificate)]
     undecided = {answer.claim for answer in answers if answer.method.startswith("undecided")}
     assert undecided == {answer.claim for answer in answers if not answer.passed}
     assert undecided >= {
@@ -383,6 +386,8 @@ def test_bounds_for_all_times_are_undecided_where_the_motion_is_not_proven(repla
         "clearance between legs and shaft",
         "tip deviation",
         "axis deviation",
+        "gouge on cuts and links",
+        "gouge on rapids",
         "toolpath covered",
         "feed on cuts",
         "feed on links",

@@ -24,19 +24,7 @@ def surface_of(shape):
     return MeshDistance.of(Mesh.of(np.asarray(shape.vertices), np.asarray(shape.faces)))
 
 
-def hill():
-    """The surface that the program machines, as an open sheet."""
-    x, y = np.meshgrid(np.linspace(-0.03, 0.03, 41), np.linspace(-0.02, 0.02, 31), indexing="ij")
-    k = np.arange(41 * 31).reshape(41, 31)
-    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
-    return trimesh.Trimesh(
-        cases.surface(x.ravel(), y.ravel())[0],
-        np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]),
-        process=False,
-    )
-
-
-PART = Obstacle("part", surface_of(hill()), clamped=True, allowance=5e-5)
+PART = Obstacle("part", MeshDistance.of(Mesh.of(*cases.hill((41, 31)))), clamped=True, allowance=5e-5)
 
 
 def post(at, radius=0.01, height=0.3):

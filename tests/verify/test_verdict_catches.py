@@ -15,11 +15,12 @@ from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import CLAIMS, verify, write_verdict
 
 GEOMETRY = {"tip deviation", "toolpath covered"}
+CUTTING = cases.cutting_of(*cases.hill())
 FEEDS = {"feed on cuts", "feed on links", "rapid rate"}
 
 
 def judge(case, **changes):
-    given = {"job_digest": "job-1", **cases.TOLERANCES, **changes}
+    given = {"job_digest": "job-1", "cutting": CUTTING, **cases.TOLERANCES, **changes}
     return verify(case.program, case.machine, case.toolpath, **given)
 
 
@@ -367,7 +368,7 @@ def test_bodies_touch(good):
 
 def test_file_passes_like_the_program(good, tmp_path):
     path = write_csv(good.program, tmp_path / "program.csv")
-    verdict = verify(path, good.machine, good.toolpath, **cases.TOLERANCES, job_digest="job-1")
+    verdict = verify(path, good.machine, good.toolpath, **cases.TOLERANCES, job_digest="job-1", cutting=CUTTING)
     assert verdict.passed
     assert verdict.certificates[0].claim == "readable"
     assert verdict.certificates[1:] == judge(good).certificates
@@ -406,12 +407,13 @@ def test_strict_verdict_refuses_unknown_keys(linear, tmp_path):
     path = write_csv(linear.program, tmp_path / "program.csv")
 
     def strict(**changes):
-        given = {**cases.TOLERANCES, "job_digest": "job-1", **changes}
+        given = {**cases.TOLERANCES, "job_digest": "job-1", "cutting": CUTTING, **changes}
         return verify(path, linear.machine, linear.toolpath, strict=True, **given)
 
     assert strict().passed
     assert [c.claim for c in strict().certificates][:2] == ["readable", "no unknown keys in the header"]
     assert failed(strict(job_digest=None)) == {"job"}
+    assert failed(strict(cutting=None)) == {"gouge on cuts and links", "gouge on rapids"}
     path.write_bytes(path.read_bytes().replace(b"# rows", b"# spindle_rpm = 3\n# coolant = true\n# rows", 1))
     assert verify(path, linear.machine, linear.toolpath, **cases.TOLERANCES).passed
     verdict = strict()

@@ -17,14 +17,15 @@ class Drives:
 
         rate error = position_gain · (wanted − x) + velocity_feedforward · rate wanted − rate
         acceleration = velocity_gain · (rate error + velocity_integral · ∫ rate error)
-                       + acceleration_feedforward · acceleration wanted
+                       + acceleration_feedforward · acceleration wanted + load_feedforward · load / moving_mass
 
     Arrays (5,), scalars hold for all legs: position_gain, velocity_gain and velocity_integral in 1/s; moving_mass in
     kg: what a drive feels, the inertia of motor and screw included; ripple_force in N: amplitude of a force that goes
-    up and down once in ripple_pitch metres of travel. The others hold for all legs. velocity_feedforward and
-    acceleration_feedforward: shares, 1 is full. encoder_step: metres, 0 for none. dead_time: seconds from reading the
-    encoder to the force. period: seconds of the drive's own loop. contour_gain and contour_rate (1/s): proportional
-    and integral share of the correction by pose, where it is asked for.
+    up and down once in ripple_pitch metres of travel. The others hold for all legs. velocity_feedforward,
+    acceleration_feedforward and load_feedforward: shares, 1 is full; the load is that of the `Masses`. encoder_step:
+    metres, 0 for none. dead_time: seconds from reading the encoder to the force. period: seconds of the drive's own
+    loop. contour_gain and contour_rate (1/s): proportional and integral share of the correction by pose, where it is
+    asked for.
 
     Raises MachineError: numbers that are negative or not finite, gains, masses, pitch or period that are 0.
     """
@@ -37,17 +38,18 @@ class Drives:
     ripple_pitch: Floats = field(default_factory=lambda: np.full(5, 5e-3))
     velocity_feedforward: float = 1.0
     acceleration_feedforward: float = 1.0
+    load_feedforward: float = 1.0
     encoder_step: float = 1e-7
     dead_time: float = 2.5e-4
     period: float = 1.25e-4
-    contour_gain: float = 2.0
-    contour_rate: float = 200.0
+    contour_gain: float = 4.0
+    contour_rate: float = 400.0
 
     def __post_init__(self) -> None:
         gains = ("position_gain", "velocity_gain", "moving_mass", "ripple_pitch")
         per_leg(self, *gains, "velocity_integral", "ripple_force")
         positive(self, *gains, "period")
-        shares = ("velocity_feedforward", "acceleration_feedforward")
+        shares = ("velocity_feedforward", "acceleration_feedforward", "load_feedforward")
         not_negative(
             self,
             "velocity_integral",

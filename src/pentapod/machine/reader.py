@@ -163,6 +163,7 @@ def _drives(table: DrivesTable) -> Drives:
         ripple_pitch=_si(table.ripple_pitch_mm),
         velocity_feedforward=table.velocity_feedforward,
         acceleration_feedforward=table.acceleration_feedforward,
+        load_feedforward=table.load_feedforward,
         encoder_step=table.encoder_step_mm / 1000.0,
         dead_time=table.dead_time_ms / 1000.0,
         period=table.period_ms / 1000.0,

@@ -173,6 +173,9 @@ class DrivesTable(Table):
     acceleration_feedforward: Share = Field(
         default=_DRIVES.acceleration_feedforward, description="share of the wanted acceleration given as a force"
     )
+    load_feedforward: Share = Field(
+        default=_DRIVES.load_feedforward, description="share of the forces that [masses] need given; MuJoCo alone"
+    )
     encoder_step_mm: NotNegative = Field(
         default=round(1e3 * _DRIVES.encoder_step, 12), description="resolution of the leg scales; 0: continuous"
     )

@@ -18,11 +18,11 @@ import numpy as np
 from pentapod.arrays import Floats
 from pentapod.kinematics.as_built import AsBuiltPentapod
 from pentapod.machine.machine import Machine
+from pentapod.simulate.bodies import Capsule, leg_cylinder, leg_rod, spindle
 
 _STEPS = 2.0  # time constant of the constraints, in steps: the least that is stable
 _SOLIMP = "0.9999 0.9999 0.001 0.5 2"
 _SPIN_DAMPING = 0.01  # N·m·s
-_CYLINDER = 0.9  # the fixed part's share of the shortest leg
 _STEEL, _ROD, _SPINDLE = "0.55 0.58 0.62 1", "0.85 0.86 0.88 1", "0.25 0.45 0.75 1"
 
 
@@ -64,33 +64,36 @@ def mjcf(machine: Machine, real: AsBuiltPentapod, position: Floats, direction: F
 
 def _leg(world: Xml.Element, machine: Machine, leg: int, base: Floats, along: Floats, length: float) -> None:
     """Add a leg: a cylinder that turns about its base joint, and the rod that slides in it."""
-    name, limits, masses, radius = str(leg + 1), machine.legs, machine.masses, machine.bodies.leg_radius
-    low, high = float(limits.min_length[leg]), float(limits.max_length[leg])
+    name, limits = str(leg + 1), machine.legs
+    stroke = [float(limits.min_length[leg]), float(limits.max_length[leg])]
     body = _add(world, "body", name=f"leg{name}", pos=base, quat=_turn_from_z(along))
     for axis, letter in (("1 0 0", "u"), ("0 1 0", "v")):
         _add(body, "joint", name=f"base{name}{letter}", type="hinge", axis=axis)
-    tube = [0.0, 0.0, 0.0, 0.0, 0.0, _CYLINDER * low]
-    _add(body, "geom", type="capsule", fromto=tube, size=[radius], mass=[masses.cylinder], rgba=_STEEL)
+    _capsule(body, leg_cylinder(machine, leg), _STEEL)
     rod = _add(body, "body", name=f"rod{name}", pos=[0.0, 0.0, length])
-    slide = _add(rod, "joint", name=f"leg{name}", type="slide", axis="0 0 1", ref=[length], range=[low, high])
+    slide = _add(rod, "joint", name=f"leg{name}", type="slide", axis="0 0 1", ref=[length], range=stroke)
     slide.set("armature", _text([machine.drives.moving_mass[leg]]))
-    inner = [0.0, 0.0, 0.0, 0.0, 0.0, _CYLINDER * low - high]
-    _add(rod, "geom", type="capsule", fromto=inner, size=[0.6 * radius], mass=[masses.rod], rgba=_ROD)
-    _add(rod, "site", name=f"rod{name}", size=[1.2 * radius])
+    _capsule(rod, leg_rod(machine, leg), _ROD)
+    _add(rod, "site", name=f"rod{name}", size=[1.2 * machine.bodies.leg_radius])
 
 
 def _platform(world: Xml.Element, machine: Machine, real: AsBuiltPentapod, position: Floats, direction: Floats) -> None:
     """Add the platform: a free body whose z axis is the platform line, its origin p."""
-    radius, end, tool = machine.bodies.shaft_radius, machine.tool_length - machine.bodies.shaft_end, machine.tool_length
+    shaft, tool = spindle(machine, float(real.offsets.min())), machine.tool_length
     body = _add(world, "body", name="platform", pos=position, quat=_turn_from_z(direction))
     _add(body, "freejoint", name="platform")
-    shaft, cutter = [0.0, 0.0, float(real.offsets.min()), 0.0, 0.0, end], [0.0, 0.0, end, 0.0, 0.0, tool]
-    _add(body, "geom", type="capsule", fromto=shaft, size=[radius], mass=[machine.masses.platform], rgba=_SPINDLE)
-    _add(body, "geom", type="capsule", fromto=cutter, size=[0.2 * radius], mass="0", rgba=_STEEL)
+    _capsule(body, shaft, _SPINDLE)
+    _capsule(body, Capsule(shaft.high, tool, 0.2 * shaft.radius, 0.0), _STEEL)
     _add(body, "site", name="origin")
     _add(body, "site", name="tip", pos=[0.0, 0.0, tool])
     for leg in range(5):
         _add(body, "site", name=f"platform{leg + 1}", pos=[0.0, 0.0, real.offsets[leg]])
+
+
+def _capsule(body: Xml.Element, capsule: Capsule, colour: str) -> None:
+    """Add a capsule along the body's z axis."""
+    ends = [0.0, 0.0, capsule.low, 0.0, 0.0, capsule.high]
+    _add(body, "geom", type="capsule", fromto=ends, size=[capsule.radius], mass=[capsule.mass], rgba=colour)
 
 
 def _turn_from_z(direction: Floats) -> Floats:

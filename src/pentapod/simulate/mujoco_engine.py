@@ -14,6 +14,7 @@ from pentapod.kinematics.as_built import AsBuiltPentapod
 from pentapod.kinematics.as_built_forward import as_built_pose
 from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
+from pentapod.simulate.load import leg_loads
 from pentapod.simulate.measures import Measure
 from pentapod.simulate.mjcf import mjcf
 from pentapod.simulate.played import Played
@@ -125,7 +126,7 @@ def _run(
     drives = _Drives(reference, model, data)
     data.xfrc_applied[body] = wrench[0]
     for _ in range(int(np.ceil(_REST_S / model.opt.timestep))):
-        drives.tell(program.legs[0], _STILL, _STILL)
+        drives.tell(program.legs[0], _STILL, _STILL, wanted[3][0])
         mujoco.mj_step(model, data)
     sites = [model.site(name).id for name in _SITES]
     places, axes = np.empty((rows, len(sites), 3)), np.empty((rows, 3))
@@ -181,8 +182,8 @@ class _Drives:
         """Leg lengths (5,) now, metres."""
         return self._data.qpos[self._places]
 
-    def tell(self, length: Floats, rate: Floats, acceleration: Floats) -> None:
-        """Set what the drives want during the next step, each (5,)."""
+    def tell(self, length: Floats, rate: Floats, acceleration: Floats, load: Floats) -> None:
+        """Set what the drives want during the next step, and what they have to carry, each (5,)."""
         d = self._drives
         ahead = d.velocity_feedforward * rate
         # What moves now moves as it was told for the step before.
@@ -191,11 +192,12 @@ class _Drives:
         )
         self._ahead = ahead
         push = d.velocity_gain * (ahead + d.velocity_integral * self._held) + d.acceleration_feedforward * acceleration
+        push += d.load_feedforward * load / d.moving_mass
         self._data.ctrl[:5] = length + push / (d.position_gain * d.velocity_gain)
 
 
-def _wanted(reference: Reference, parts: int) -> tuple[Floats, Floats, Floats]:
-    """Return lengths, rates and accelerations (K, 5) for each step.
+def _wanted(reference: Reference, parts: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return lengths, rates, accelerations and loads (K, 5) for each step.
 
     MuJoCo's steps set rates first and then move by the new rates. A leg that is to be at the next length after the step
     needs the forward difference as its rate, and the second difference as its acceleration.
@@ -203,7 +205,10 @@ def _wanted(reference: Reference, parts: int) -> tuple[Floats, Floats, Floats]:
     step = reference.program.period / parts
     lengths = reference.at(parts)[0]
     rates = np.diff(lengths, axis=0) / step
-    return lengths[:-1], rates, np.diff(rates, axis=0, prepend=np.zeros((1, 5))) / step
+    accelerations = np.diff(rates, axis=0, prepend=np.zeros((1, 5))) / step
+    at_rows, share = leg_loads(reference), np.arange(parts)[:, None] / parts
+    loads = at_rows[:-1, None] * (1.0 - share) + at_rows[1:, None] * share
+    return lengths[:-1], rates, accelerations, loads.reshape(-1, 5)
 
 
 def _quiet(warning: object) -> None:

@@ -10,6 +10,11 @@ from pentapod.arrays import Floats
 from pentapod.compiled import kernel
 from pentapod.kinematics.quadratic_kernels import poses
 
+Known = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats]
+"""How pose and path are found: linear_map (4, 5) and constant (4,) of `LinearPart`; geometry (7,): delta, x_3, y_3,
+z_3, the squares of w and S near a singularity, tool length; component (1, 2) signs, base (5, 2), offsets (5,), path and
+path_directions (N, 3) at the rows."""
+
 _STANDING = 1e-8  # metres in a period: legs that are slower have no direction
 
 
@@ -25,14 +30,7 @@ def drive(
     encoder_step: float,
     ripple: Floats,
     correction: Floats,
-    linear_map: Floats,
-    constant: Floats,
-    geometry: Floats,
-    component: Floats,
-    base: Floats,
-    offsets: Floats,
-    path: Floats,
-    path_directions: Floats,
+    known: Known,
     out: Floats,
     efforts: Floats,
 ) -> None:
@@ -40,10 +38,7 @@ def drive(
 
     lengths (N − 1, 5, 4), accelerations (N − 1, 5, 2): of `Reference`. parts: drive periods in a controller period;
     delay: drive periods of dead time. gains (3, 5): position loop, velocity loop and its integral, 1/s; shares (2,): of
-    feed-forward. ripple (3, 5): amplitude m/s², pitch m, phase rad. correction (2,): gain and 1/s, zeros for none; then
-    the others tell how pose and path are found: linear_map (4, 5) and constant (4,) of `LinearPart`, geometry (7,):
-    delta, x_3, y_3, z_3, the squares of w and S near a singularity, tool length. component (1, 2) signs, base (5, 2),
-    offsets (5,), path and path_directions (N, 3) at the rows.
+    feed-forward. ripple (3, 5): amplitude m/s², pitch m, phase rad. correction (2,): gain and 1/s, zeros for none.
     """
     count, dt = len(lengths), period / parts
     window = min(count, int(3.0 / (gains[0].min() * period)) + 3)
@@ -57,10 +52,7 @@ def drive(
     out[0], efforts[0] = place, 0.0
     for row in range(count):
         if correction[0] > 0.0 or correction[1] > 0.0:
-            contour(
-                seen, row, window, linear_map, constant, geometry, component, base, offsets, path, path_directions,
-                error,
-            )  # fmt: skip
+            contour(seen, row, window, known, error)
             along, square = 0.0, 0.0
             for leg in range(5):
                 total[leg] += correction[1] * period * error[leg]
@@ -100,21 +92,17 @@ def contour(
     legs: Floats,
     row: int,
     window: int,
-    linear_map: Floats,
-    constant: Floats,
-    geometry: Floats,
-    component: Floats,
-    base: Floats,
-    offsets: Floats,
-    path: Floats,
-    path_directions: Floats,
+    known: Known,
     error: Floats,
 ) -> None:
     """Fill the leg lengths (5,), metres, that lead from a pose back onto the path; zeros where there is no pose.
 
     The pose is that of the legs as the encoders see them. Tip and direction of the path at the place nearest to
-    the tip, among the `window` rows before this one, minus those of the pose; through the Jacobian.
+    it, among the `window` rows before this one, minus those of the pose; through the Jacobian. A turn counts as what it
+    moves at the end of the tool: were the tip alone to choose the place, then where the tool turns nearly on the
+    spot a hair's breadth of the tip would ask for another axis, whose correction moves the tip.
     """
+    linear_map, constant, geometry, component, base, offsets, path, path_directions = known
     position, direction = np.empty((1, 3)), np.empty((1, 3))
     near = np.empty(1, dtype=np.bool_)
     poses(
@@ -129,13 +117,15 @@ def contour(
     for k in range(max(0, row - window), min(row + 2, len(path) - 1)):
         along, square, away = 0.0, 0.0, 0.0
         for j in range(3):
-            step = path[k + 1, j] - path[k, j]
-            along += step * (p[j] + tool * i[j] - path[k, j])
-            square += step * step
+            step, swing = path[k + 1, j] - path[k, j], tool * (path_directions[k + 1, j] - path_directions[k, j])
+            along += step * (p[j] + tool * i[j] - path[k, j]) + swing * tool * (i[j] - path_directions[k, j])
+            square += step * step + swing * swing
         along = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
         for j in range(3):
-            off = p[j] + tool * i[j] - path[k, j] - along * (path[k + 1, j] - path[k, j])
-            away += off * off
+            step, swing = path[k + 1, j] - path[k, j], tool * (path_directions[k + 1, j] - path_directions[k, j])
+            off = p[j] + tool * i[j] - path[k, j] - along * step
+            turned = tool * (i[j] - path_directions[k, j]) - along * swing
+            away += off * off + turned * turned
         if away <= best:
             best, at, fraction = away, k, along
     turn, move = np.empty(3), np.empty(3)

@@ -27,24 +27,29 @@ class Finding:
 
 
 @dataclass(frozen=True)
+class Idle:
+    """A claim was not judged, and why. unknown: it should have been: a strict verdict refuses that."""
+
+    why: str
+    unknown: bool = False
+
+
+@dataclass(frozen=True)
 class Claim:
-    """name as a user reads it; judge returns None where the claim does not apply.
+    """name as a user reads it; judge returns what it found, or that there is nothing to judge.
 
     needs_pose: the claim means something only where the leg lengths have a pose at every sample; it fails
     without being judged where they have none. needs_proof: its value is a bound for all times, which exists only where
-    the motion between the samples is proven; else it is undecided, and fails. idle: why it does not apply where
-    judge returns None; owed: it should have applied, so that a strict verdict counts it as failed.
+    the motion between the samples is proven; else it is undecided, and fails.
     """
 
     name: str
-    judge: Callable[[Replay], Finding | None]
+    judge: Callable[[Replay], Finding | Idle]
     needs_pose: bool = True
     needs_proof: bool = False
-    idle: str = ""
-    owed: bool = False
 
-    def __call__(self, replay: Replay) -> Certificate | None:
-        """Return the certificate of this claim, or None where it does not apply."""
+    def __call__(self, replay: Replay) -> Certificate | Idle:
+        """Return the certificate of this claim, or why there is none."""
         if self.needs_pose and len(replay.unposed):
             first = int(replay.unposed[0])
             method = f"not judged: the leg lengths have no pose at {len(replay.unposed)} of the samples"
@@ -54,14 +59,15 @@ class Claim:
             method = f"undecided: too near a singularity to prove where the motion goes on {count} half periods"
             return Certificate(self.name, False, None, None, "", replay.place(first), method)
         found = self.judge(replay)
-        if found is None:
-            return None
+        if isinstance(found, Idle):
+            return found
         value, bound = _plain(found.value), _plain(found.bound)
         return Certificate(self.name, bool(found.passed), value, bound, found.unit, found.where, found.method)
 
-    def unjudged(self) -> Certificate:
-        """Return the certificate that stands in a strict verdict where the claim does not apply."""
-        return Certificate(self.name, not self.owed, None, None, "", Place(), f"does not apply: {self.idle}")
+    def unjudged(self, idle: Idle) -> Certificate:
+        """Return the certificate that stands in a strict verdict where the claim was not judged."""
+        method = f"{'unknown' if idle.unknown else 'does not apply'}: {idle.why}"
+        return Certificate(self.name, not idle.unknown, None, None, "", Place(), method)
 
 
 def _plain(number: float | None) -> float | None:

@@ -15,8 +15,9 @@ from pentapod.program.csv import read_csv, read_header
 from pentapod.program.program import Program
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.verify import bodies, collisions, component, joints, legs, origin, speed, tool, tracking
+from pentapod.verify import bodies, collisions, component, gouge, joints, legs, origin, speed, tool, tracking
 from pentapod.verify.claim import Claim
+from pentapod.verify.cutting import Cutting
 from pentapod.verify.replay import SURVEY_SHARE, Replay
 from pentapod.verify.verdict import Certificate, Place, Verdict
 
@@ -27,6 +28,7 @@ CLAIMS: tuple[Claim, ...] = (
     *legs.CLAIMS,
     *joints.CLAIMS,
     *bodies.CLAIMS,
+    *gouge.CLAIMS,
     *tracking.CLAIMS,
     *speed.CLAIMS,
     *tool.CLAIMS,
@@ -48,6 +50,7 @@ def verify(
     axis_tolerance: float,
     job_digest: str | None = None,
     surroundings: Surroundings | None = None,
+    cutting: Cutting | None = None,
     strict: bool = False,
     progress: Progress = silent,
 ) -> Verdict:
@@ -56,6 +59,7 @@ def verify(
     toolpath: in the workpiece frame, as the job asks for it. tilt: half angle in radians of the cone about
     the nominal axis in which the tool may stand; axis_tolerance: radians beyond that; path_tolerance: metres.
     job_digest: of the job that the header must name, None to leave that out. surroundings: what must not be touched.
+    cutting: what cuts, and into which part; without it gouges are unknown.
     strict: every claim stands in the verdict, also those that do not apply, with the reason; it fails where a claim
     could not be judged for want of something, and where the header has keys that nobody here knows the meaning of.
     A malformed file gives a failed verdict with the one claim "readable". Raises ProgramError where there is
@@ -82,16 +86,16 @@ def verify(
         read = [Certificate(READABLE, True, None, None, "", Place(), method)]
         if strict:
             read.append(_known(read_header(path).unknown))
-    replay = Replay(program, machine, toolpath, tilt, path_tolerance, axis_tolerance, job_digest, progress)
+    replay = Replay(program, machine, toolpath, tilt, path_tolerance, axis_tolerance, job_digest, progress, cutting)
     _ = replay.survey
     claims = (*CLAIMS, *collisions.claims(surroundings or Surroundings()))
     for k, claim in enumerate(claims):
         progress("verify", SURVEY_SHARE + (1.0 - SURVEY_SHARE) * k / len(claims), claim.name)
-        certificate = claim(replay)
-        if certificate is not None:
-            read.append(certificate)
+        answer = claim(replay)
+        if isinstance(answer, Certificate):
+            read.append(answer)
         elif strict:
-            read.append(claim.unjudged())
+            read.append(claim.unjudged(answer))
     progress("verify", 1.0)
     return Verdict(tuple(read))
 

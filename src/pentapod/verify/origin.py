@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pentapod.verify.claim import Claim, Finding
+from pentapod.verify.claim import Claim, Finding, Idle
 from pentapod.verify.replay import Replay
 from pentapod.verify.verdict import Place
 
@@ -17,10 +17,10 @@ def machine(replay: Replay) -> Finding:
     return Finding(passed, None, None, "", Place(), method)
 
 
-def job(replay: Replay) -> Finding | None:
+def job(replay: Replay) -> Finding | Idle:
     """Judge that the program was made from this job, by digest; not asked where no digest is given."""
     if replay.job_digest is None:
-        return None
+        return Idle("no job is given to compare with", unknown=True)
     made_from = replay.program.provenance.job_digest
     method = f"header: made from job {made_from}, judged for job {replay.job_digest}"
     return Finding(made_from == replay.job_digest, None, None, "", Place(), method)
@@ -28,5 +28,5 @@ def job(replay: Replay) -> Finding | None:
 
 CLAIMS = (
     Claim("machine", machine, needs_pose=False),
-    Claim("job", job, needs_pose=False, idle="no job is given to compare with", owed=True),
+    Claim("job", job, needs_pose=False),
 )

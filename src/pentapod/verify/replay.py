@@ -16,6 +16,7 @@ from pentapod.machine.machine import Machine
 from pentapod.program.program import Program
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
+from pentapod.verify.cutting import Cutting
 from pentapod.verify.matching import Match, match
 from pentapod.verify.survey import Survey, survey
 from pentapod.verify.verdict import Place
@@ -32,8 +33,9 @@ class Replay:
     """What the claims look at. Derived values are computed when first asked for, and kept.
 
     tilt and axis_tolerance in radians, path_tolerance in metres. job_digest: of the job that the program
-    should belong to, None where that is not asked. *Samples* are the rows and the moments halfway between
-    them: M = 2N − 1, sample 2k is row k. *Chords* are the M − 1 stretches of time between them.
+    should belong to, None where that is not asked. cutting: what cuts into which part, None where nobody says.
+    *Samples* are the rows and the moments halfway between them: M = 2N − 1, sample 2k is row k. *Chords* are the M − 1
+    stretches of time between them.
     """
 
     program: Program
@@ -44,6 +46,7 @@ class Replay:
     axis_tolerance: float
     job_digest: str | None = None
     progress: Progress = silent
+    cutting: Cutting | None = None
 
     @cached_property
     def survey(self) -> Survey:

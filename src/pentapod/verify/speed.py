@@ -8,14 +8,14 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.toolpath.toolpath import SegmentKind
-from pentapod.verify.claim import ALLOWANCE, Claim, Finding
+from pentapod.verify.claim import ALLOWANCE, Claim, Finding, Idle
 from pentapod.verify.replay import Replay
 
 _MM_MIN = 60e3  # mm/min in 1 m/s
 
 
-def feed(replay: Replay, kind: SegmentKind) -> Finding | None:
-    """Judge the speed on the segments of one kind; None where the program has no such motion.
+def feed(replay: Replay, kind: SegmentKind) -> Finding | Idle:
+    """Judge the speed on the segments of one kind; idle where the program has no such motion.
 
     A cutter's feed is the speed of its tip. What works from a stand-off meets the surface at the pivot: there the
     feed is the speed of that spot, while the tip may go as fast as on rapids, and has to keep to that everywhere.
@@ -27,7 +27,7 @@ def feed(replay: Replay, kind: SegmentKind) -> Finding | None:
     if standoff and rapid:
         chords, limit = np.arange(len(governing)), np.full(len(governing), replay.machine.rapid_velocity)
     if not len(chords):
-        return None
+        return Idle(f"no moment belongs to a {kind}")
     spot = standoff and not rapid
     linear = replay.program.interpolation == "linear"
     speed = (_between_rows(replay, spot=spot) if linear else replay.survey.speeds[:, 1 if spot else 0])[chords]
@@ -94,7 +94,7 @@ def rest(replay: Replay, *, at_end: bool) -> Finding:
 
 CLAIMS = (
     *(
-        Claim(name, partial(feed, kind=kind), needs_proof=True, idle=f"no moment belongs to a {kind}")
+        Claim(name, partial(feed, kind=kind), needs_proof=True)
         for name, kind in (
             ("feed on cuts", SegmentKind.CUT),
             ("feed on links", SegmentKind.LINK),

@@ -10,7 +10,7 @@ import numpy as np
 from pentapod.arrays import Floats
 from pentapod.geometry.interpolant import Interpolant, largest_length
 from pentapod.program.resolution import QUANTA_PER_M
-from pentapod.verify.claim import ALLOWANCE, Claim, Finding
+from pentapod.verify.claim import ALLOWANCE, Claim, Finding, Idle
 from pentapod.verify.legs import JERK_ALLOWANCE
 from pentapod.verify.replay import Replay
 
@@ -79,12 +79,12 @@ def _below(replay: Replay, values: Floats, limit: float, told: tuple[float, str,
     return Finding(value <= allowed, factor * value, factor * limit, unit, replay.place(2 * row), method)
 
 
-def _where_limited(replay: Replay, *, name: str, judge: Callable[[Replay], Finding]) -> Finding | None:
-    return judge(replay) if name in replay.machine.tool_limits.given() else None
+def _where_limited(replay: Replay, *, name: str, judge: Callable[[Replay], Finding]) -> Finding | Idle:
+    return judge(replay) if name in replay.machine.tool_limits.given() else Idle("neither machine nor job limits it")
 
 
 CLAIMS = tuple(
-    Claim(claim, partial(_where_limited, name=name, judge=judge), idle="neither machine nor job limits it")
+    Claim(claim, partial(_where_limited, name=name, judge=judge))
     for claim, name, judge in (
         ("tip acceleration", "max_tip_acceleration", acceleration),
         ("tip jerk", "max_tip_jerk", jerk),

@@ -1,0 +1,24 @@
+"""From a job to what cuts into its part, and how deep it may."""
+
+from __future__ import annotations
+
+from pentapod.job import Job
+from pentapod.job_tool import job_tool
+from pentapod.machine.surroundings import Surroundings
+from pentapod.strategy_tables import sunk_mm
+from pentapod.verify import Cutting
+
+_MM = 1e-3
+
+
+def job_cutting(job: Job, surroundings: Surroundings) -> Cutting | None:
+    """Return what a job cuts; surroundings: with its part. None where there is none.
+
+    What counts as no gouge, and what the job engraves, is no gouge here either. Raises JobError where the tool's
+    lengths make no tool.
+    """
+    depth = job.gouge.tolerance_mm + sunk_mm(job.toolpath)
+    for obstacle in surroundings.obstacles:
+        if obstacle.name == "part":
+            return Cutting(obstacle.surface, job_tool(job).solids, _MM * depth)
+    return None

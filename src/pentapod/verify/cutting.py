@@ -1,0 +1,33 @@
+"""Cutting: what cuts, into what, and how deep it may."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.errors import ArrayError
+from pentapod.toolpath.mesh_distance import MeshDistance
+from pentapod.toolpath.solids import Solid
+
+
+@dataclass(frozen=True, eq=False)
+class Cutting:
+    """surface: of the finished part, workpiece frame. solids: of the tool; those of kind "cutter" cut.
+
+    depth: metres by which cuts and links may go into the part: what counts as no gouge, and what is engraved on
+    purpose. Raises ArrayError where it is negative.
+    """
+
+    surface: MeshDistance
+    solids: tuple[Solid, ...]
+    depth: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.depth) and self.depth >= 0.0):
+            raise ArrayError("must not be negative", key="depth", value=self.depth)
+
+    @property
+    def cutter(self) -> tuple[Solid, ...]:
+        """The solids that cut; none of a laser."""
+        return tuple(solid for solid in self.solids if solid.kind == "cutter")

@@ -1,0 +1,73 @@
+"""Claims that the cutter does not cut into the finished part: proven for all times, from the replayed poses."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from pentapod.arrays import Bools
+from pentapod.toolpath.toolpath import SegmentKind
+from pentapod.verify.claim import Claim, Finding, Idle
+from pentapod.verify.cutting import Cutting
+from pentapod.verify.immersion import Immersion, immersion
+from pentapod.verify.replay import Replay
+
+
+def gouge(replay: Replay, *, rapid: bool) -> Finding | Idle:
+    """Judge how deep the cutter is in the part: on rapids, or on cuts and links."""
+    cutting = replay.cutting
+    if cutting is None:
+        return Idle("no part's mesh to compare with", unknown=True)
+    if not cutting.cutter:
+        return Idle("the tool has no cutting part")
+    chords = _rapid(replay) if rapid else ~_rapid(replay)
+    if not chords.any():
+        return Idle(f"no moment belongs to {'a rapid' if rapid else 'a cut or a link'}")
+    allowed = 0.0 if rapid else cutting.depth
+    bound = allowed + replay.path_tolerance
+    found = immersion(replay, cutting.surface, cutting.cutter, chords, bound=bound)
+    passed, inside = found.most <= bound, _enclosed(replay, cutting)
+    if passed and inside:
+        return Finding(False, None, 1e3 * bound, "mm", replay.place(0), "the cutter begins inside the part")
+    method = _method(found, bound) + f"; allowed: {1e3 * replay.path_tolerance:g} mm off the toolpath"
+    if not rapid:
+        method += f", and {1e3 * cutting.depth:g} mm that count as none or are engraved"
+    return Finding(passed, 1e3 * found.most, 1e3 * bound, "mm", replay.place(found.sample), method)
+
+
+def _method(found: Immersion, bound: float) -> str:
+    if found.met:
+        return "this deep is the cutter in the part at this moment; others may be worse"
+    if not np.isfinite(found.most):
+        return "not proven: the tool turns too far within half a period"
+    what = "deepest mesh point inside the cutter" if found.most > 0.0 else "smallest gap of the cutter, negative,"
+    return (
+        f"proven bound for all times of the {what}: swept exactly along straight stretches of the replayed motion, "
+        "with what that strays from them"
+    )
+
+
+def _rapid(replay: Replay) -> Bools:
+    """Return which chords (M − 1,) are rapids; within the path tolerance of a cut or a link they are not."""
+    toolpath, arcs = replay.toolpath, replay.match.arcs
+    lengths = np.linalg.norm(np.diff(toolpath.pivots, axis=0), axis=1)
+    ends = np.concatenate([[0.0], np.cumsum(lengths)])[toolpath.starts]
+    other = np.array([segment.kind is not SegmentKind.RAPID for segment in toolpath.segments])
+    before = np.concatenate([[0], np.cumsum(other)])
+    last = len(other) - 1
+    low = np.searchsorted(ends[1:], arcs[:-1] - replay.path_tolerance, side="left").clip(max=last)
+    high = (np.searchsorted(ends, arcs[1:] + replay.path_tolerance, side="right") - 1).clip(0, last)
+    return np.asarray(before[high + 1] == before[low])
+
+
+def _enclosed(replay: Replay, cutting: Cutting) -> bool:
+    """Return whether the cutter begins wholly inside: what never meets the surface stays on its side."""
+    top = max(solid.top for solid in cutting.cutter) - replay.toolpath.pivot
+    return bool(cutting.surface.contains(replay.pivots[:1] + top * replay.axes[:1]).any())
+
+
+CLAIMS = (
+    Claim("gouge on cuts and links", partial(gouge, rapid=False), needs_proof=True),
+    Claim("gouge on rapids", partial(gouge, rapid=True), needs_proof=True),
+)

@@ -1,0 +1,193 @@
+"""How deep a tool goes into a mesh at any time: swept along straight stretches, and how far the motion is off those.
+
+A stretch is some chords between samples. On it the tool is swept as if its pivot went straight and its axis turned
+evenly: exactly, between the samples too. Where the motion really is differs from that by what is measured at the
+samples and what is proven of the chords between them. Stretches that may hold something deeper than what is
+known are cut into eight, down to single chords; most programs are decided long before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.arrays import Bools, Floats, Ints
+from pentapod.geometry.directions import angle_between
+from pentapod.kinematics.blocks import blocks
+from pentapod.toolpath.mesh_distance import MeshDistance
+from pentapod.toolpath.solids import Solid
+from pentapod.toolpath.sweep import RESOLUTION_M, TouchingBody, sweep, touch
+from pentapod.verify.replay import Replay
+
+_LONGEST, _CUT = 64, 8
+_FAR_M = 1e-3
+"""Gaps are not looked at beyond this: farther is as good."""
+_NEAR_M, _NEAR = 2e-6, 0.03
+"""A proven depth is not improved on where it is this much, or this share of what is allowed, above one that is met."""
+_WIDEST = 1.0
+"""Radians: arcs that turn farther are not taken for one stretch."""
+_LOOKED_AT, _AT_ONCE = 512, 4096
+_BLOCK = 1 << 16
+
+
+@dataclass(frozen=True)
+class Immersion:
+    """The largest depth, metres; a negative one is a gap. sample: where.
+
+    met: it is the depth at that moment, and others may be larger; else none is larger at any time.
+    """
+
+    most: float
+    sample: int
+    met: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretches:
+    """From sample starts (n,) to ends (n,)."""
+
+    starts: Ints
+    ends: Ints
+
+    def where(self, keep: Bools | slice | Ints) -> _Stretches:
+        return _Stretches(self.starts[keep], self.ends[keep])
+
+    def cut(self, size: int) -> _Stretches:
+        """Return the stretches of at most `size` chords that make these up."""
+        parts = -(-(self.ends - self.starts) // size)
+        number = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+        starts = np.repeat(self.starts, parts) + size * number
+        return _Stretches(starts, np.minimum(starts + size, np.repeat(self.ends, parts)))
+
+
+def immersion(
+    replay: Replay, surface: MeshDistance, solids: tuple[Solid, ...], chords: Bools, *, bound: float
+) -> Immersion:
+    """Return how deep solids of the tool go into a mesh of the workpiece frame on some chords (M − 1,) of a replay.
+
+    Ends early where a depth that is met is above `bound`, metres.
+    """
+    body = TouchingBody(solids, replay.toolpath.pivot)
+    lever = max(max(abs(s.low - body.pivot), abs(s.high - body.pivot)) + _width(s) for s in solids)
+    if all(solid.is_ball and solid.low == body.pivot for solid in solids):
+        lever = 0.0  # the ball's path does not know how the tool turns about its centre
+    met = _met(replay, surface, body, chords)
+    if met.most > bound:
+        return met
+    most = Immersion(-np.inf, 0)
+    size, todo = _LONGEST, _runs(chords).cut(_LONGEST)
+    while len(todo.starts):
+        stray = _strays(replay, todo, lever)
+        order = np.argsort(stray, kind="stable")
+        again = np.zeros(len(order), dtype=np.bool_)
+        for part in blocks(len(order), _AT_ONCE):
+            rows = order[part]
+            own, off = todo.where(rows), stray[rows]
+            target = met.most + max(_NEAR_M, _NEAR * (bound - met.most))
+            enough = target - float(_unresolved(target)) - float(off[-1])
+            depth, known = _swept(replay, surface, body, own, max(enough, -_FAR_M))
+            upper = depth + _unresolved(depth) + off
+            lower = np.where(known, depth - off, -np.inf)
+            deepest = int(np.argmax(lower))
+            if lower[deepest] > met.most:
+                met = Immersion(float(lower[deepest]), int(own.starts[deepest]), met=True)
+                if met.most > bound:
+                    return met
+            again[rows] = (upper > target) & (size > 1)
+            kept = np.where(again[rows], -np.inf, upper)
+            worst = int(np.argmax(kept))
+            if kept[worst] > most.most:
+                most = Immersion(float(kept[worst]), int(own.starts[worst]))
+        size //= _CUT
+        todo = todo.where(again).cut(size) if again.any() else todo.where(again)
+    return most
+
+
+def _unresolved(depth: ArrayLike) -> Floats:
+    """Return by how much a depth may be larger than the sweep says."""
+    return RESOLUTION_M + 0.01 * np.maximum(depth, 0.0)
+
+
+def _width(solid: Solid) -> float:
+    return max(solid.low_radius, solid.high_radius) + solid.rounding
+
+
+def _runs(chords: Bools) -> _Stretches:
+    """Return the runs of marked chords."""
+    edges = np.diff(np.concatenate([[0], chords.astype(np.int8), [0]]))
+    return _Stretches(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1))
+
+
+def _met(replay: Replay, surface: MeshDistance, body: TouchingBody, chords: Bools) -> Immersion:
+    """Return the largest depth at some samples; −1 mm where nothing is nearer."""
+    own = np.flatnonzero(chords)
+    samples = own[:: max(1, len(own) // _LOOKED_AT)]
+    axes = replay.axes[samples]
+    tips = replay.pivots[samples] - body.pivot * axes
+    depths = touch(surface.tree, body, tips, axes, threshold=-_FAR_M).deepest
+    deepest = int(np.argmax(depths))
+    return Immersion(max(float(depths[deepest]), -_FAR_M), int(samples[deepest]), met=True)
+
+
+def _swept(
+    replay: Replay, surface: MeshDistance, body: TouchingBody, of: _Stretches, threshold: float
+) -> tuple[Floats, Bools]:
+    """Return depths (n,) on straight stretches, none below `threshold`, and whether (n,) they are above it."""
+    both = np.stack([of.starts, of.ends], axis=1).ravel()
+    axes = replay.axes[both]
+    tips = replay.pivots[both] - body.pivot * axes
+    depth = sweep(surface.tree, body, tips, axes, threshold=threshold, every=2).deepest
+    return np.maximum(depth, threshold), depth > threshold
+
+
+def _strays(replay: Replay, stretches: _Stretches, lever: float) -> Floats:
+    """Return by how much (n,) points of the tool are at most off the straight stretch, at any time, metres.
+
+    lever: how far they are from the pivot at most. A moment is compared with the place of the stretch that is nearest
+    to it. Between two samples that place goes evenly, and unit vectors on an arc θ are off the line through two of
+    them by no more than θ²/8.
+    """
+    found = np.empty(len(stretches.starts))
+    counts = stretches.ends - stretches.starts + 1
+    bounds = np.searchsorted(np.cumsum(counts), np.arange(0, counts.sum(), _BLOCK))
+    for first, last in zip(bounds, np.append(bounds[1:], len(counts)), strict=True):
+        if last > first:
+            found[first:last] = _stray(replay, stretches.where(slice(first, last)), counts[first:last], lever)
+    return found
+
+
+def _stray(replay: Replay, of: _Stretches, counts: Ints, lever: float) -> Floats:
+    begins = np.cumsum(counts) - counts
+    sample = np.repeat(of.starts - begins, counts) + np.arange(counts.sum())
+    start, end = replay.pivots[of.starts], replay.pivots[of.ends]
+    first, last = replay.axes[of.starts], replay.axes[of.ends]
+    way, turn = end - start, last - first
+    square = np.einsum("ij,ij->i", way, way) + lever**2 * np.einsum("ij,ij->i", turn, turn)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    off, turned = replay.pivots[sample] - start[owner], replay.axes[sample] - first[owner]
+    along = np.einsum("ij,ij->i", off, way[owner]) + lever**2 * np.einsum("ij,ij->i", turned, turn[owner])
+    share = np.clip(along / np.where(square > 0.0, square, 1.0)[owner], 0.0, 1.0)[:, None]
+    aside = np.maximum.reduceat(np.linalg.norm(off - share * way[owner], axis=1), begins)
+    # The last sample of a stretch begins no chord of it.
+    chord = np.minimum(sample, (of.ends - 1)[owner])
+    away = np.maximum.reduceat(replay.survey.away[chord], begins)
+    if lever == 0.0:
+        return aside + away
+    angle = angle_between(first, last)
+    swung = replay.axes[sample] - _on_arc(first, last, angle, owner, share)
+    apart = np.maximum.reduceat(np.linalg.norm(swung, axis=1), begins) + 0.125 * angle**2
+    tilt = np.arcsin(np.minimum(apart, 1.0)) + np.maximum.reduceat(replay.survey.turned[chord], begins)
+    return np.where(angle < _WIDEST, aside + away + lever * tilt, np.inf)
+
+
+def _on_arc(first: Floats, last: Floats, angle: Floats, owner: Ints, share: Floats) -> Floats:
+    """Return unit vectors at a share (K, 1) of the arcs from first to last (n, 3), of angles (n,)."""
+    sine = np.sin(angle)
+    arc = (sine > 1e-9)[owner, None]
+    safe = np.where(sine > 1e-9, sine, 1.0)[owner, None]
+    wide = angle[owner, None]
+    a = np.where(arc, np.sin((1.0 - share) * wide) / safe, 1.0 - share)
+    b = np.where(arc, np.sin(share * wide) / safe, share)
+    return a * first[owner] + b * last[owner]

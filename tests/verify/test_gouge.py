@@ -1,0 +1,188 @@
+"""Claims about gouges: proven depths are never below what dense samples find, and each corruption is caught."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import replay_cases as cases
+import trimesh
+
+from pentapod.errors import ArrayError
+from pentapod.geometry.interpolant import Interpolant
+from pentapod.toolpath.tools import BallCutter, FlatEnd, StandOff
+from pentapod.verify import Cutting, verify
+
+CUTS, RAPIDS = "gouge on cuts and links", "gouge on rapids"
+LARGE = 1e3  # trimesh counts in units of about this many to the metre
+
+
+def judged(case, cutting, **options):
+    found = verify(
+        case.program, case.machine, case.toolpath, job_digest="job-1", **cases.TOLERANCES, cutting=cutting, **options
+    )
+    return {c.claim: c for c in found.certificates}
+
+
+def failed(case, cutting):
+    return {name for name, c in judged(case, cutting).items() if not c.passed}
+
+
+def raised(rise, tool=None, **options):
+    vertices, facets = cases.hill()
+    return cases.cutting_of(vertices + np.array([0.0, 0.0, rise]), facets, tool, **options)
+
+
+def with_block(low, high, tool=None, rise=0.0):
+    """The hill, raised, and a closed block from corner to corner."""
+    vertices, facets = cases.hill()
+    vertices = vertices + np.array([0.0, 0.0, rise])
+    box = trimesh.creation.box(bounds=[low, high])
+    both = np.concatenate([facets, len(vertices) + np.asarray(box.faces)])
+    return cases.cutting_of(np.concatenate([vertices, np.asarray(box.vertices)]), both, tool)
+
+
+def moments(case, every=1, parts=2):
+    """Tips and axes of the program in the workpiece frame, at rows and parts of the way between them."""
+    program, machine = case.program, case.machine
+    b = Interpolant.through(program.legs, program.period, program.interpolation).bernstein[::every]
+    n, t = b.shape[-1] - 1, np.arange(parts) / parts
+    basis = np.array([[_choose(n, k) * x**k * (1 - x) ** (n - k) for k in range(n + 1)] for x in t])
+    legs = np.einsum("nlk,tk->ntl", b, basis).reshape(-1, 5)
+    position, direction = machine.pentapod.pose(legs, program.component)
+    home = program.placement.inverse()
+    return home.apply(position + machine.tool_length * direction), home.rotate(-direction)
+
+
+def _choose(n, k):
+    return [[1], [1, 1], [1, 2, 1], [1, 3, 3, 1]][n][k]
+
+
+@pytest.fixture(params=["cubic", "linear"])
+def good(request):
+    return request.getfixturevalue(request.param)
+
+
+@pytest.mark.parametrize("rise", [-2e-4, 0.0, 4e-5])
+def test_the_depth_of_a_ball_is_proven_and_close(good, rise):
+    """Against trimesh's nearest points from the ball's centre, at dense moments."""
+    cutting = raised(rise)
+    tips, axes = moments(good, every=7, parts=3)
+    mesh = cutting.surface.mesh
+    shape = trimesh.Trimesh(LARGE * mesh.vertices, mesh.faces, process=False)
+    near = np.flatnonzero(tips[:, 2] < 6e-3)
+    distance = trimesh.proximity.closest_point(shape, LARGE * (tips + cases.BALL * axes)[near])[1] / LARGE
+    deepest = cases.BALL - distance.min()
+    found = judged(good, cutting)
+    assert found[CUTS].passed
+    assert found[CUTS].unit == "mm"
+    assert found[CUTS].bound == pytest.approx(0.05 + 0.02)
+    most = max(found[CUTS].value, found[RAPIDS].value)
+    assert deepest <= 1e-3 * most <= deepest + 5e-6 + 0.03 * (7e-5 - deepest)
+    assert "proven bound for all times" in found[CUTS].method
+    assert ("gap" in found[CUTS].method) == (rise < 0.0)
+
+
+@pytest.mark.parametrize("rise", [8e-5, 1e-3])
+def test_a_toolpath_that_gouges_is_caught_by_that_alone(good, rise):
+    """The program follows its toolpath perfectly: only the part tells that the toolpath is wrong."""
+    assert failed(good, raised(rise)) == {CUTS, RAPIDS}
+    found = judged(good, raised(rise))[CUTS]
+    assert 0.07 < found.value <= 1e3 * rise + 1e-3
+    assert "others may be worse" in found.method
+
+
+def test_what_is_engraved_is_no_gouge(good):
+    engraved = raised(2e-4, depth=2e-4)
+    assert failed(good, engraved) == {RAPIDS}  # they begin and end on the surface here
+    assert judged(good, engraved)[CUTS].bound == pytest.approx(0.22)
+    assert judged(good, raised(-1e-4, depth=0.0))[CUTS].passed
+
+
+def pushed(case, depth):
+    """The tool pushed into the part along its axis, smoothly, in the middle of the first cut."""
+    start, stop = case.toolpath.starts[1:3]
+    first, last = (int(np.argmin(np.linalg.norm(case.tips - case.toolpath.tips[k], axis=1))) for k in (start, stop))
+    middle = (first + last) // 2
+    push = depth * np.exp(-(((np.arange(len(case.tips)) - middle) / 40.0) ** 2))
+    tips = case.tips - push[:, None] * case.axes
+    kind = case.program.interpolation
+    program = cases.program_of(case.machine, tips, case.axes, lean=0.5 * cases.TILT, interpolation=kind)
+    return replace(case, program=program), middle
+
+
+def test_a_tip_pushed_into_the_part_is_caught(good):
+    corrupted, middle = pushed(good, 1.5e-4)
+    found = judged(corrupted, raised(0.0))
+    assert {CUTS, "tip deviation"} <= {name for name, c in found.items() if not c.passed}
+    assert found[RAPIDS].passed
+    assert found[CUTS].where.segment == 1
+    assert abs(found[CUTS].where.row - middle) < 120
+    slight, _ = pushed(good, 4e-5)
+    found = judged(slight, raised(0.0))
+    assert found[CUTS].passed
+    assert 0.04 <= found[CUTS].value < 0.044
+
+
+def test_what_is_in_the_way_of_rapids_is_caught_by_their_claim(cubic):
+    """A plate above all that is cut; only the last rapid rises so far."""
+    found = judged(cubic, with_block([-0.03, -0.02, 0.0185], [0.03, 0.02, 0.0205]))
+    assert {name for name, c in found.items() if not c.passed} == {RAPIDS}
+    assert found[RAPIDS].bound == pytest.approx(0.02)
+    assert found[RAPIDS].where.segment == 9
+
+
+def test_a_fin_between_two_rows_is_caught():
+    """A thin tool, rows three millimetres apart, and a fin that it passes through between two samples."""
+    coarse = cases.good_case(interpolation="cubic")
+    program = replace(coarse.program, legs=coarse.program.legs[::100], period=100 * cases.PERIOD)
+    case, thin = replace(coarse, program=program), FlatEnd(1e-4, flute=2e-3)
+    tips, _ = moments(case)
+    cut = np.flatnonzero((np.abs(tips[:, 0]) < 6e-3) & (np.abs(tips[:, 1]) < 1e-4) & (tips[:, 2] < 4.2e-3))
+    step = int(np.argmax(np.diff(tips[cut, 0])))
+    left, right = tips[cut[step], 0], tips[cut[step + 1], 0]
+    assert right - left > 8e-4
+    middle = 0.5 * (left + right)
+    assert np.abs(tips[:, 0] - middle).min() > 3e-4
+    fin = with_block([middle - 1e-4, -1e-3, 3e-3], [middle + 1e-4, 1e-3, 5e-3], thin, rise=-1e-3)
+    before, after = (judged(case, cutting)[CUTS] for cutting in (raised(-1e-3, thin), fin))
+    assert before.passed, before
+    assert not after.passed, after
+
+
+def test_a_flute_counts_with_its_lean(cubic):
+    """A wall beside the passes that the ball clears; the leaning flute above it does or does not."""
+    tips, axes = moments(cubic, every=3, parts=1)
+    heights = np.linspace(cases.BALL, 0.03, 28)
+    across = np.sqrt(1.0 - axes[:, :1] ** 2)
+    reach = ((tips[:, None] + heights[:, None] * axes[:, None])[..., 0] + cases.BALL * across).max()
+    assert reach > (tips + cases.BALL * axes)[:, 0].max() + cases.BALL + 4e-4
+    long = BallCutter(cases.BALL, flute=0.03)
+    for wall, tool, caught in ((reach + 2e-4, long, False), (reach - 2e-4, long, True), (reach - 2e-4, None, False)):
+        block = with_block([wall, -0.02, 0.0], [0.05, 0.02, 0.05], tool, rise=-1e-3)
+        assert (CUTS in failed(cubic, block)) == caught
+
+
+def test_a_cutter_that_begins_inside_is_caught(cubic):
+    """Nothing of the surface ever comes near: what is inside stays inside."""
+    box = trimesh.creation.box(bounds=[[-0.2, -0.2, -0.2], [0.2, 0.2, 0.2]])
+    cutting = cases.cutting_of(np.asarray(box.vertices), np.asarray(box.faces))
+    found = judged(cubic, cutting)
+    assert not found[CUTS].passed
+    assert found[CUTS].method == "the cutter begins inside the part"
+
+
+def test_nothing_that_cuts_and_nothing_to_cut(cubic):
+    jet = cases.cutting_of(*cases.hill(), StandOff(5e-3))
+    assert not {CUTS, RAPIDS} & judged(cubic, jet).keys()
+    assert not {CUTS, RAPIDS} & judged(cubic, None).keys()
+    strict = judged(cubic, jet, strict=True)
+    assert strict[CUTS].passed
+    assert strict[CUTS].method == "does not apply: the tool has no cutting part"
+    strict = judged(cubic, None, strict=True)
+    assert not strict[CUTS].passed
+    assert strict[RAPIDS].method == "unknown: no part's mesh to compare with"
+
+
+def test_a_negative_depth_is_bad_input():
+    with pytest.raises(ArrayError, match="depth"):
+        Cutting(raised(0.0).surface, (), -1e-6)
