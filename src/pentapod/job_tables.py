@@ -26,7 +26,10 @@ class PartTable(Table):
         default=None, description="unit of the numbers in the mesh file: compulsory, for no format says it"
     )
     scale: Positive = Field(default=1.0, description="factor applied to the mesh after its unit")
-    repair: bool = Field(default=False, description="drop doubled and degenerate facets, unify the winding")
+    repair: bool = Field(
+        default=False,
+        description="turn facets so that all are wound alike (doubled or empty ones are left out anyway, and told)",
+    )
     region_box_mm: tuple[Vector, Vector] | None = Field(
         default=None,
         description="machine only inside this box: two opposite corners, mesh frame, scaled",

@@ -350,7 +350,12 @@ def test_a_million_facets(tmp_path):
     mesh = load_mesh(path, "mm")
     assert len(mesh.faces) == 2 * 708**2
     toolpath, report = toolpath_with_report(mesh, BALL, RasterOptions(stepover=5e-4))
-    assert report.passes == 200
+    # A hundred millimetres by half a millimetre, a little less on slopes, and lines for what is left at the border.
+    assert 200 <= report.passes <= 215
     assert report.retracts == 1
+    lines = [s for s in toolpath.segments if s.kind is SegmentKind.CUT]
+    points, normals = surfaces.random_points(mesh, 20_000, Region())
+    distance = surfaces.distance_to_lines(points, normals, [s.tips for s in lines], [s.axes for s in lines], 2e-5)
+    assert (distance <= 1.05 * 0.5 * 5e-4).mean() >= 0.999
     cuts, _ = of_kind(toolpath, SegmentKind.CUT)
     assert np.abs(cuts[:, 2] - waves(cuts[:, 0], cuts[:, 1])).max() < 1e-6

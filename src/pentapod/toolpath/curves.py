@@ -22,9 +22,6 @@ from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.shooting import Shots, neighbours, shoot
 from pentapod.toolpath.tools import Tool
 
-_ROUGH = 0.1
-_STRETCH, _STEEPEST = 4.0, 60.0
-
 
 class Laying(StrEnum):
     """project: along the view, as a slide projector would. wrap: along the surface, lengths kept, as a label would."""
@@ -78,16 +75,8 @@ def draw_curves(mesh: Mesh, tool: Tool, options: CurveOptions) -> Drawing:
     lines = [options.scale * line @ turn for line in options.lines]
     landing = projection(mesh, options) if options.laying is Laying.PROJECT else wrapping(mesh, options)
     landing = sunk(landing, lambda plane: np.full(len(plane), options.depth))
-    bridge, stretch = tear(options, options.laying, options.spacing)
-    passes, lost = draped(
-        lines,
-        landing,
-        spacing=options.spacing,
-        chordal=options.chordal,
-        bridge=bridge,
-        stretch=stretch,
-        sink=options.depth,
-    )
+    wrapped = options.laying is Laying.WRAP
+    passes, notes = draped(lines, landing, options, spacing=options.spacing, wrapped=wrapped, sink=options.depth)
     if not len(passes):
         raise ToolpathError(
             "no line meets the surface",
@@ -95,25 +84,14 @@ def draw_curves(mesh: Mesh, tool: Tool, options: CurveOptions) -> Drawing:
             value=None if options.position is None else np.asarray(options.position).tolist(),
             expected="a position from which the lines reach the region",
         )
-    notes = (f"{100.0 * lost:.2g} % of the lines lie beside the region and are left out",) if lost > 1e-6 else ()
     return Drawing(
         passes,
         0.0,
         Order.GIVEN if options.in_order else Order.SHORTEST,
         sink=options.depth,
-        visible=options.laying is Laying.PROJECT,
+        visible=not wrapped,
         notes=notes,
     )
-
-
-def tear(options: PathOptions, laying: Laying | str, spacing: float) -> tuple[float, float]:
-    """Return what is bridged, metres, and by how much lines may be stretched where the surface is not torn.
-
-    Straightest lines part at a mesh's corners; what is projected parts at steps alone, and stretches on slopes.
-    """
-    if laying is Laying.WRAP:
-        return _ROUGH * spacing, _STRETCH
-    return options.chordal, min(1.1 / max(np.cos(options.region.angle), 1e-9), _STEEPEST)
 
 
 def flat_turn(angle: float) -> Floats:

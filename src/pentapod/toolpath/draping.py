@@ -9,12 +9,14 @@ import numpy as np
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import normalised
 from pentapod.toolpath.links import spaced
+from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.passes import Passes
 
 Landing = Callable[[Floats], tuple[Floats, Floats, Bools]]
 """Points of the plane (N, 2) → points on the surface (N, 3), normals (N, 3), and whether (N,) they landed."""
 
 _MOST_ROUNDS = 16
+_STRETCH, _STEEPEST, _ROUGH = 4.0, 60.0, 0.1
 _FINE = 0.02
 _FIRST = 0.25
 _PLACES = (0.47, 0.21, 0.78)
@@ -24,33 +26,38 @@ _PLACES = (0.47, 0.21, 0.78)
 def draped(
     lines: list[Floats],
     landing: Landing,
+    options: PathOptions,
     *,
     spacing: float,
-    chordal: float,
-    bridge: float,
-    stretch: float,
+    wrapped: bool,
     sink: float = 0.0,
-) -> tuple[Passes, float]:
-    """Return flat lines (n, 2) on a surface, and which share of their length did not land.
+    slope: float = 0.0,
+) -> tuple[Passes, tuple[str, ...]]:
+    """Return flat lines (n, 2) on a surface, and a note of what did not land.
 
-    Points are added between those that were given until every chord is within a fiftieth of `chordal` metres of the
-    surface's own line, wherever it is tested, and none are further apart than `spacing`. A line is broken where it
-    leaves the surface, and where neighbours land so far apart that the surface between them must be torn: further than
-    `stretch` times their distance in the plane. What is torn by less than `bridge` metres is bridged. sink: depth of
-    the landing in metres, by which neighbours part at a crease.
+    Points are added between those that were given until every chord is within a fiftieth of the chordal tolerance of
+    the surface's own line, wherever it is tested, and none are further apart than `spacing` metres. A line is broken
+    where it leaves the surface, and where neighbours land so far apart that the surface between them must be torn.
+    Wrapped lines part a little at a mesh's corners, which is bridged; projected ones part at steps alone, but are
+    stretched on slopes. sink: depth of the landing in metres, by which neighbours part at a crease; slope: by how much
+    it changes per metre.
     """
     # Two bends within one chord could hide from a test of one place.
     fine = [spaced(line, _FIRST * spacing) for line in lines]
     owner = np.repeat(np.arange(len(fine)), [len(line) for line in fine])
-    plane, owner, points, normals, landed = _refined(np.concatenate(fine), owner, landing, chordal)
+    plane, owner, points, normals, landed = _refined(np.concatenate(fine), owner, landing, options.chordal)
     steps = np.where(owner[1:] == owner[:-1], np.linalg.norm(np.diff(plane, axis=0), axis=1), 0.0)
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     swing = sink * np.linalg.norm(np.diff(normalised(normals), axis=0), axis=1)
-    whole = (owner[1:] == owner[:-1]) & landed[1:] & landed[:-1] & (gaps <= stretch * steps + bridge + swing)
+    steepest = min(1.1 / max(np.cos(options.region.angle), 1e-9), _STEEPEST)
+    stretch, bridge = (_STRETCH, _ROUGH * spacing) if wrapped else (steepest, options.chordal)
+    near = gaps <= (stretch + slope) * steps + bridge + swing
+    whole = (owner[1:] == owner[:-1]) & landed[1:] & landed[:-1] & near
     runs = _runs(whole)
     passes = Passes.of([(points[a : b + 1], normals[a : b + 1]) for a, b in runs], owner[[a for a, _ in runs]])
     length = float(steps.sum())
-    return passes, 1.0 - float(steps[whole].sum()) / length if length > 0.0 else 1.0
+    lost = 1.0 - float(steps[whole].sum()) / length if length > 0.0 else 1.0
+    return passes, (f"{100.0 * lost:.2g} % of the lines lie beside the region and are left out",) if lost > 1e-6 else ()
 
 
 def sunk(landing: Landing, depth: Callable[[Floats], Floats]) -> Landing:

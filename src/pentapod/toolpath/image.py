@@ -11,7 +11,7 @@ from scipy.ndimage import map_coordinates
 
 from pentapod.arrays import Bools, Floats, Ints, frozen, set_frozen
 from pentapod.errors import ToolpathError
-from pentapod.toolpath.curves import CurveOptions, Laying, flat_turn, projection, tear, wrapping
+from pentapod.toolpath.curves import CurveOptions, Laying, flat_turn, projection, wrapping
 from pentapod.toolpath.draping import draped, sunk
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.mesh import Mesh
@@ -99,16 +99,18 @@ def draw_image(mesh: Mesh, tool: Tool, options: ImageOptions) -> Drawing:
         raise ToolpathError("nothing of the picture is dark enough", key="threshold", value=options.threshold)
     if options.effect is Effect.DEPTH:
         landing = sunk(landing, lambda plane: options.depth * _shade(darkness, pixel, plane @ turn.T))
-    spacing = min(options.spacing, pixel)
-    bridge, stretch = tear(options, options.laying, spacing)
     sink = options.depth if options.effect is Effect.DEPTH else 0.0
-    stretch += 1.5 * sink / pixel  # from white to black within a pixel
-    passes, lost = draped(
-        lines, landing, spacing=spacing, chordal=options.chordal, bridge=bridge, stretch=stretch, sink=sink
+    passes, notes = draped(
+        lines,
+        landing,
+        options,
+        spacing=min(options.spacing, pixel),
+        wrapped=options.laying is Laying.WRAP,
+        sink=sink,
+        slope=1.5 * sink / pixel,  # from white to black within a pixel
     )
     if not len(passes):
         raise ToolpathError("the picture does not meet the surface", key="position")
-    notes = (f"{100.0 * lost:.2g} % of the lines lie beside the region and are left out",) if lost > 1e-6 else ()
     visible = options.laying is Laying.PROJECT
     if options.effect is Effect.POWER:
         power = np.array(shades)[passes.levels]

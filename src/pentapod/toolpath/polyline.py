@@ -11,7 +11,6 @@ import numpy as np
 from pentapod.arrays import Bools, Floats, frozen, set_frozen
 from pentapod.errors import ToolpathError
 from pentapod.toolpath.closest import closest, normals_at
-from pentapod.toolpath.curves import Laying, tear
 from pentapod.toolpath.draping import draped, sunk
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.finishing import nothing_left
@@ -68,18 +67,8 @@ def draw_polyline(mesh: Mesh, tool: Tool, options: PolylineOptions) -> Drawing:
 
     lines = [np.asarray(line) for line in options.lines if len(line) > 1]
     landing = sunk(land, lambda points: np.full(len(points), options.depth))
-    bridge, stretch = tear(options, Laying.PROJECT, options.spacing)
-    passes, lost = draped(
-        lines,
-        landing,
-        spacing=options.spacing,
-        chordal=options.chordal,
-        bridge=bridge,
-        stretch=stretch,
-        sink=options.depth,
-    )
+    passes, notes = draped(lines, landing, options, spacing=options.spacing, wrapped=False, sink=options.depth)
     if not len(passes):
         raise ToolpathError("no line meets the surface", key="lines", remedy="check the unit and the view")
-    notes = (f"{100.0 * lost:.2g} % of the lines lie beside the region and are left out",) if lost > 1e-6 else ()
     visible = options.towards is Towards.VIEW
     return Drawing(passes, 0.0, Order.GIVEN, sink=options.depth, visible=visible, notes=notes)

@@ -69,18 +69,10 @@ class _Mounted:
 
 
 @dataclass(frozen=True)
-class BallCutter(_Mounted):
-    """A ball-ended cutter. radius: of the ball; flute: cutting length from the tip, the ball alone if None.
-
-    Metres. Raises ToolpathError unless the radius is positive and the flute at least as long.
-    """
+class _Balled(_Mounted):
+    """A ball at the lower end. radius: of the ball, metres."""
 
     radius: float
-    flute: float | None = None
-
-    def __post_init__(self) -> None:
-        _positive("radius", self.radius)
-        _flute(self.flute, self.radius)
 
     @property
     def pivot(self) -> float:
@@ -101,19 +93,32 @@ class BallCutter(_Mounted):
         """Return the tips: the ball's centre lies a radius above the contact along the normal."""
         return contacts + self.radius * (normals - axes)
 
+
+@dataclass(frozen=True)
+class BallCutter(_Balled):
+    """A ball-ended cutter. radius: of the ball; flute: cutting length from the tip, the ball alone if None.
+
+    Metres. Raises ToolpathError unless the radius is positive and the flute at least as long.
+    """
+
+    flute: float | None = None
+
+    def __post_init__(self) -> None:
+        _positive("radius", self.radius)
+        _flute(self.flute, self.radius)
+
     def _cutter(self) -> tuple[Solid, ...]:
         return _rounded_end(self.radius, self.radius, self.flute)
 
 
 @dataclass(frozen=True)
-class Lollipop(_Mounted):
+class Lollipop(_Balled):
     """A ball on a thinner neck, for undercuts. radius: of the ball; neck_radius; reach: from tip to neck's end.
 
     Metres. The neck counts as shank: it must not touch. Raises ToolpathError unless 0 < neck < ball, 2 radius <
     reach.
     """
 
-    radius: float
     neck_radius: float
     reach: float
 
@@ -125,31 +130,12 @@ class Lollipop(_Mounted):
             raise _wrong("reach", self.reach, f"more than the ball's diameter, {2.0 * self.radius} m")
 
     @property
-    def pivot(self) -> float:
-        """The ball's centre, a radius above the tip."""
-        return self.radius
-
-    @property
-    def leans(self) -> bool:
-        """True: about the ball's centre."""
-        return True
-
-    @property
-    def scallop_radius(self) -> float:
-        """The ball's."""
-        return self.radius
-
-    @property
     def solids(self) -> tuple[Solid, ...]:
         """The ball, the neck from its centre on, shank and holder above the neck."""
         ball = Solid("cutter", self.radius, self.radius, 0.0, 0.0, self.radius)
         neck = Solid("shank", self.radius, self.reach, self.neck_radius, self.neck_radius)
         shank = stacked("shank", self.shank, self.reach)
         return (ball, neck, *shank, *stacked("holder", self.holder, max([self.reach, *(s.high for s in shank)])))
-
-    def tips(self, contacts: Floats, normals: Floats, axes: Floats) -> Floats:
-        """Return the tips: the ball's centre lies a radius above the contact along the normal."""
-        return contacts + self.radius * (normals - axes)
 
 
 @dataclass(frozen=True)
