@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -50,6 +51,21 @@ def test_the_digest_follows_the_toolpath_file(make_job, tmp_path):
     with (tmp_path / "path.csv").open("a") as stream:
         stream.write("\n")
     assert Job.load(job).digest != before
+
+
+def test_long_work_on_a_toolpath_shows_its_progress(make_job, tmp_path, monkeypatch):
+    told = []
+
+    @contextmanager
+    def recorder(*, quiet):
+        assert not quiet
+        yield lambda stage, fraction, note="": told.append((stage, fraction, note))
+
+    monkeypatch.setattr("pentapod.cli.toolpath.progress_bar", recorder)
+    assert run_cli(["toolpath", str(make_job()), "-o", str(tmp_path / "path.csv")]) == 0
+    assert [note for stage, _, note in told if stage == "mesh" and note] == ["reading", "welding", "edges"]
+    assert {stage for stage, _, _ in told} == {"mesh", "toolpath", "gouge"}
+    assert all(0.0 <= fraction <= 1.0 for _, fraction, _ in told)
 
 
 @pytest.mark.parametrize(

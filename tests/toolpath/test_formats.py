@@ -124,6 +124,8 @@ def test_apt_as_others_write_it(tmp_path):
     assert [s.kind for s in path.segments] == ["cut"]  # RAPID was the first GOTO's alone
     assert path.segments[0].feed == pytest.approx(10 * 0.0254 / 60)
     assert path.pivot == pytest.approx(0.25 * 0.0254)
+    (tmp_path / "small.apt").write_text(APT.lower())
+    np.testing.assert_array_equal(read_toolpath(tmp_path / "small.apt").tips, path.tips)
 
 
 def test_gcode_modes(tmp_path):

@@ -213,7 +213,7 @@ def bumpy_laws(name, seed, exponent):
 
 
 @settings(max_examples=9, deadline=None)
-@given(name=st.sampled_from(sorted(STRATEGIES)), seed=st.integers(0, 10_000), exponent=st.floats(-2.0, 3.0))
+@given(name=st.sampled_from(sorted(STRATEGIES)), seed=st.integers(0, 10_000), exponent=st.floats(-3.0, 3.0))
 @example(name="edges", seed=4349, exponent=2.845)  # passes that meet, with axes that do not
 def test_bumpy_grids(name, seed, exponent):
     bumpy_laws(name, seed, exponent)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from pentapod.cli.output import echo_json, json_option, quiet_option
+from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
 
 
 @click.command()
@@ -33,8 +33,11 @@ def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet
 
     format_of(out, format_name)  # an unknown one is said at once
     loaded = Job.load(job)
-    mesh = job_mesh(loaded)
-    path, came_to = job_toolpath(loaded, mesh)
+    with progress_bar(quiet=quiet or as_json) as progress:
+        mesh = job_mesh(loaded, progress)
+        progress("mesh", 1.0)
+        progress("toolpath", 0.0)
+        path, came_to = job_toolpath(loaded, mesh, progress)
     write_toolpath(path, out, format_name)
     kinds = [str(segment.kind) for segment in path.segments]
     lengths = [1e3 * float(arc_length(segment.tips)[-1]) for segment in path.segments]

@@ -107,9 +107,10 @@ class _Reader:
         self.unit = _MM[words[0].upper()]
 
     def _multax(self, words: list[str], line: int) -> None:
-        if words not in ([], ["ON"], ["OFF"]):
+        mode = [word.upper() for word in words]
+        if mode not in ([], ["ON"], ["OFF"]):
             raise self.wrong("neither ON nor OFF", line, "MULTAX", value=",".join(words)[:40])
-        self.five_axis = words != ["OFF"]
+        self.five_axis = mode != ["OFF"]
 
     def _fedrat(self, words: list[str], line: int) -> None:
         if len(words) != 2 or words[1].upper() not in _PER_MINUTE:
