@@ -45,11 +45,13 @@ class IpoptSolver:
     """Improves candidates of one setting with IPOPT; free: whether the placement may move.
 
     whole: all waypoints and all kinds of margin at once, with no constraint generation: plain, and very slow.
+    patience: processor seconds after which IPOPT gives up.
     """
 
     setting: Setting
     free: bool
     whole: bool = False
+    patience: float = 1e6
     _solvers: dict[Any, Any] = field(default_factory=dict[Any, Any])
 
     def raise_margin(self, start: Candidate) -> Candidate:
@@ -100,7 +102,7 @@ class IpoptSolver:
             "g": ca.vertcat(ca.vec(margins), 1.0 - ca.sum1(c * c).T),
         }
         lower = np.concatenate([np.full(len(kinds) * count, keep), np.zeros(len(first))])
-        solver = ca.nlpsol("calm", "ipopt", problem, _OPTIONS)
+        solver = ca.nlpsol("calm", "ipopt", problem, self._options)
         found = np.asarray(solver(x0=first.ravel(), lbg=lower, ubg=np.inf)["x"], dtype=np.float64).reshape(-1, 2)
         found = within_discs(found)
         values = setting.values_of(start.margins, start.transform, course.leans(found))
@@ -163,6 +165,10 @@ class IpoptSolver:
         return setting.freedom.nearest_to(stepped(at.transform, motion @ x[:moving])), coefficients
 
     @property
+    def _options(self) -> dict[str, Any]:
+        return _OPTIONS | {"ipopt.max_cpu_time": self.patience}
+
+    @property
     def _motion(self) -> Floats:
         motion = self.setting.freedom.motion
         return motion if self.free else motion[:, :0]
@@ -206,5 +212,5 @@ class IpoptSolver:
             "f": -least + _UPRIGHT_WEIGHT * lean,
             "g": ca.vertcat(*constraints),
         }
-        self._solvers[key] = ca.nlpsol("plan", "ipopt", problem, _OPTIONS)
+        self._solvers[key] = ca.nlpsol("plan", "ipopt", problem, self._options)
         return self._solvers[key]
