@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from planning_instances import instances
 
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS
@@ -11,6 +12,7 @@ from pentapod.planning.ipopt import IpoptSolver
 from pentapod.planning.linear_model import REACH
 from pentapod.planning.margins import Margins
 from pentapod.planning.sampling import first_guesses
+from pentapod.planning.search import search
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Setting
 from pentapod.planning.task import Task
@@ -43,8 +45,18 @@ def test_raising_the_margin_matches_the_reference(setting, start, raised):
     """Both end in a local optimum of a problem with kinks; the default may not be the poorer one by much."""
     reference = IpoptSolver(setting, free=True).raise_margin(start)
     assert raised.smallest > start.smallest
-    assert raised.smallest >= 0.95 * reference.smallest
+    assert raised.smallest >= 0.97 * reference.smallest
     assert setting.steepness(raised.coefficients).max() <= 1.0 + 1e-12
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [1, 3, 4, 6])
+def test_a_search_with_either_solver_ends_alike(desk, number):
+    """From one start they may reach different tops of a landscape with many; from several the best is the same."""
+    instance = instances(7)[number]
+    setting = Setting.of(Task.of(instance.toolpath, instance.tilt), desk)
+    ours, reference = search(setting), search(setting, solver="ipopt")
+    assert ours.best.smallest >= 0.999 * reference.best.smallest
 
 
 def test_the_result_recomputed_is_what_was_claimed(setting, raised):

@@ -2,7 +2,7 @@
 
 Unknowns: a small placement step (3 translations in metres, a Cayley rotation vector) around a given placement, in so
 far as the placement is free, and the lean a (2) of the waypoint, told in a pair of directions. Both solvers build on
-this function: the reference hands it to IPOPT, the default takes its Jacobian.
+this function: the reference hands it to IPOPT, the default takes its derivatives.
 """
 
 from __future__ import annotations
@@ -54,6 +54,21 @@ def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, 
     return ca.Function(
         "point", [step, a, pivot, nominal, pair, rotation, translation, numbers], [values, used, *slopes], {"cse": True}
     )
+
+
+def curvature_function(setting: Setting, margins: Margins) -> Any:
+    """Return the casadi function of one waypoint: second derivatives, 8 × 8 by (step, a), of weights · margins.
+
+    Of the arguments of `point_function`, and the weights M, one for each margin.
+    """
+    import casadi as ca  # noqa: PLC0415  heavy: only when planning
+
+    point = point_function(setting, margins, range(len(margins.limits)))
+    step, a, weights = ca.SX.sym("step", 6), ca.SX.sym("a", 2), ca.SX.sym("weights", len(margins.limits))
+    rest = [ca.SX.sym(point.name_in(k), point.sparsity_in(k)) for k in range(2, point.n_in())]
+    values, _ = point(step, a, *rest)
+    bent, _ = ca.hessian(ca.dot(weights, values), ca.vertcat(step, a))
+    return ca.Function("curvature", [step, a, *rest, weights], [ca.densify(bent)], {"cse": True})
 
 
 def room_function(freedom: Freedom) -> Any:

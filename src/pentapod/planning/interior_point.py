@@ -77,12 +77,12 @@ class _Solver:
             except LinAlgError:
                 return None
             affine = self.step(factor, c, s, z, dual, off, np.zeros_like(s))
-            least = min(_longest(s, affine[1]), _longest(z, affine[2]))
+            least = min(longest_step(s, affine[1]), longest_step(z, affine[2]))
             target = float((s + least * affine[1]) @ (z + least * affine[2]))
             # No further than the gap that is good enough: beyond it the matrix only loses digits.
             centring = max((target / gap) ** 3 * gap, 0.3 * _GAP * p.scale) / len(s)
             dc, ds, dz = self.step(factor, c, s, z, dual, off, centring - affine[1] * affine[2])
-            length = _TO_BOUNDARY * min(_longest(s, ds), _longest(z, dz), 1.0 / _TO_BOUNDARY)
+            length = _TO_BOUNDARY * min(longest_step(s, ds), longest_step(z, dz), 1.0 / _TO_BOUNDARY)
             if length < 1e-9:
                 return None
             c, s, z = c + length * dc, s + length * ds, z + length * dz
@@ -163,7 +163,7 @@ class _Solver:
         return d, ds, wanted - (z / s) * ds
 
 
-def _longest(values: Floats, change: Floats) -> float:
+def longest_step(values: Floats, change: Floats) -> float:
     """Return the largest step in [0, 1] that keeps values ≥ 0."""
     falling = change < 0.0
     return min(1.0, float((-values[falling] / change[falling]).min(initial=1.0)))

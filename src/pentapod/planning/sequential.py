@@ -1,13 +1,14 @@
-"""The default solver: small linear and quadratic programs in sequence, on the waypoints and margins that are smallest.
+"""The default solver: small quadratic programs in sequence, on the waypoints and margins that are smallest.
 
-Raising the smallest margin is sequential linear programming with a trust region (Fletcher, Practical Methods of
+Raising the smallest margin is sequential quadratic programming with a trust region (Fletcher, Practical Methods of
 Optimization, ch. 14: minimax); calming the field is a convex cost under the margins to keep, by feasible steps only.
-Every step is judged by the margins themselves, so a poor linear model costs a step, never a limit.
+Every step is judged by the margins themselves, so a poor model costs a step, never a limit.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.calming import calmed
+from pentapod.planning.curvature import Curvature
 from pentapod.planning.formulation import point_function, room_function, stepped
 from pentapod.planning.linear_model import LinearModel, valleys
 from pentapod.planning.margins import Margins
@@ -38,6 +40,10 @@ class SequentialSolver:
     setting: Setting
     free: bool
     _functions: dict[Any, Any] = field(default_factory=dict[Any, Any])
+
+    @cached_property
+    def _curvature(self) -> Curvature:
+        return Curvature(self.setting)
 
     def raise_margin(self, start: Candidate) -> Candidate:
         """Return a candidate with the largest smallest margin near `start`; never a worse one."""
@@ -68,7 +74,7 @@ class SequentialSolver:
         best = Candidate(start.margins, start.transform, start.coefficients, smallest)
         model = self.model(best, rows, best.smallest)
         for _ in range(_STEPS):
-            step, change, promise = model.best_step(reach)
+            step, change, promise = self._curvature.best_step(model, best, reach)
             if promise < _LEAST:
                 break
             transform = setting.freedom.nearest_to(stepped(best.transform, step)) if self.free else best.transform
@@ -78,7 +84,6 @@ class SequentialSolver:
             reach *= 2.0 if gain > 0.6 * promise else 1.0 if gain > 0.25 * promise else 0.4
             if gain > 0.05 * promise:
                 best = Candidate(best.margins, transform, coefficients, float(values.min()))
-                extra = _NO_ROWS
             elif reach < _LEAST:
                 break
             else:  # what came out worst may not have been in the model
