@@ -1,5 +1,6 @@
 """Verdict on a million rows: seconds, memory, and each part against what others offer for it.
 
+Gouges and collisions are judged too, against a mesh of the hill that the program machines, with shank and holder.
 Reading against numpy.loadtxt; how far the motion strays between samples against the same proof in ball arithmetic
 (`prove_tip_tube`); the whole verdict against merely loading the file with numpy.loadtxt. CPU seconds of one process.
 """
@@ -20,9 +21,14 @@ from pentapod import Machine, Program, Provenance, Toolpath
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics import Component, prove_tip_tube
+from pentapod.machine.surroundings import Obstacle, Surroundings, mounted
 from pentapod.program import quantised, read_csv, write_csv
 from pentapod.toolpath import Segment, SegmentKind
-from pentapod.verify import verify
+from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.mesh_distance import MeshDistance
+from pentapod.toolpath.solids import Cone
+from pentapod.toolpath.tools import BallCutter
+from pentapod.verify import Cutting, verify
 
 BALL, FEED, RAMP = 3e-3, 0.025, 2.0
 
@@ -75,14 +81,29 @@ def case(rows: int, waypoints: int) -> tuple[Machine, Toolpath, Program]:
     return machine, Toolpath((cut,), pivot=BALL), program
 
 
+def hill(cells: int) -> Mesh:
+    """Return the surface that the spiral lies on, as an open sheet."""
+    side = np.linspace(-0.04, 0.04, cells + 1)
+    x, y = (q.ravel() for q in np.meshgrid(side, side, indexing="ij"))
+    k = np.arange(len(x)).reshape(cells + 1, cells + 1)
+    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
+    facets = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return Mesh.of(np.stack([x, y, 4e-3 * np.cos(x / 0.02) * np.cos(y / 0.03)], axis=-1), facets)
+
+
 def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rows", type=int, default=1_000_000)
     parser.add_argument("--waypoints", type=int, default=100_000)
+    parser.add_argument("--cells", type=int, default=200, help="of the hill's mesh, each way")
     given = parser.parse_args()
     _, toolpath, program = (machine, *_) = case(given.rows, given.waypoints)
     tolerances = {"tilt": 0.0, "path_tolerance": 20e-6, "axis_tolerance": np.radians(0.5), "job_digest": "bench"}
+    surface = MeshDistance.of(hill(given.cells))
+    tool = BallCutter(BALL, shank=(Cone(0.03, 2e-3, 2e-3),), holder=(Cone(0.02, 8e-3, 8e-3),))
+    around = Surroundings((Obstacle("part", surface, clamped=True, allowance=5e-5),), mounted(tool.solids, machine))
+    tolerances |= {"surroundings": around, "cutting": Cutting(surface, tool.solids, 5e-5)}
     with tempfile.TemporaryDirectory() as folder:
         short, path = Path(folder, "short.csv"), Path(folder, "program.csv")
         # Kernels compile and load once on a machine, not for each program.
@@ -107,6 +128,8 @@ def main() -> None:
         if not certificate.passed:
             print(f"  FAIL {certificate.claim}: {certificate.value} ({certificate.bound}) {certificate.method}")
     memory = f"peak {peak / 1024:.0f} MB (before it {before / 1024:.0f} MB)"
+    gouge = [c for c in verdict.certificates if c.claim == "gouge on cuts and links"]
+    print(f"gouge: {[c.value for c in gouge]} mm of {[c.bound for c in gouge]} mm, {2 * given.cells**2:,} facets")
     print(f"verify: {seconds:.1f} s, {1e6 * seconds / rows:.1f} µs/row, {memory}")
     print(f"reading: {reading:.2f} s; numpy.loadtxt takes {loading / reading:.2f} × that")
     print(f"the whole verdict takes {seconds / loading:.1f} × what numpy.loadtxt takes to load the file")

@@ -57,20 +57,13 @@ finally:
 """
 
 
-def test_pentakins_agrees(tmp_path):
-    rng = np.random.default_rng(0)
-    nominal = LinearPentapod.quadratic(
-        0.2 * np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)]), 0.5
-    )
-    machine = AsBuiltPentapod.of(
-        nominal,
-        base_errors=rng.normal(size=(5, 3)) * 1e-3,
-        offset_errors=rng.normal(size=5) * 1e-3,
-        radii=[0.0, 0.002, 0.005, 0.001, 0.008],
-    )
-    n = 500
-    p = rng.uniform((-0.2, -0.2, 0.4), (0.2, 0.2, 0.8), (n, 3))
-    tilts = rng.uniform(-25.0, 25.0, (n, 2))
+NOMINAL = LinearPentapod.quadratic(
+    0.2 * np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)]), 0.5
+)
+
+
+def asked(machine, p, tilts, tmp_path):
+    """What pentakins makes of poses: p (n, 3) metres, A and B (n, 2) degrees. Legs (n, 5), error codes, and poses."""
     job = {
         "hal": str(HAL),
         "module": str(MODULE),
@@ -96,16 +89,45 @@ def test_pentakins_agrees(tmp_path):
     )
     assert run.returncode == 0, run.stderr
     answer = json.loads(run.stdout[run.stdout.index("{") :])
-    a, b = np.radians(tilts).T
-    i = np.c_[np.cos(a) * np.sin(b), -np.sin(a), np.cos(a) * np.cos(b)]
-    legs = machine.leg_lengths(p, i)
-    assert np.abs(legs * 1e3 - np.array(answer["inverse"])).max() < 2e-12
     forward = np.array(answer["forward"])
     assert (forward[:, 0] == 0).all()
-    found = as_built_pose(machine, nominal, legs, (1, 1))
+    return np.array(answer["inverse"]) * 1e-3, forward[:, 1:4] * 1e-3, pointing(forward[:, 4:])
+
+
+def pointing(tilts):
+    """The directions (n, 3) of A and B (n, 2) degrees."""
+    a, b = np.radians(tilts).T
+    return np.c_[np.cos(a) * np.sin(b), -np.sin(a), np.cos(a) * np.cos(b)]
+
+
+def poses(rng, n):
+    return rng.uniform((-0.2, -0.2, 0.4), (0.2, 0.2, 0.8), (n, 3)), rng.uniform(-25.0, 25.0, (n, 2))
+
+
+def test_pentakins_agrees(tmp_path):
+    rng = np.random.default_rng(0)
+    machine = AsBuiltPentapod.of(
+        NOMINAL,
+        base_errors=rng.normal(size=(5, 3)) * 1e-3,
+        offset_errors=rng.normal(size=5) * 1e-3,
+        radii=[0.0, 0.002, 0.005, 0.001, 0.008],
+    )
+    p, tilts = poses(rng, 500)
+    theirs, position, direction = asked(machine, p, tilts, tmp_path)
+    legs = machine.leg_lengths(p, pointing(tilts))
+    assert np.abs(legs - theirs).max() < 2e-15
+    found = as_built_pose(machine, NOMINAL, legs, (1, 1))
     assert found.proven.mean() > 0.99
-    a, b = np.radians(forward[:, 4:]).T
-    theirs = np.c_[np.cos(a) * np.sin(b), -np.sin(a), np.cos(a) * np.cos(b)]
     sure = found.proven
-    assert np.abs(found.position - forward[:, 1:4] * 1e-3)[sure].max() < 1e-9
-    assert np.abs(found.direction - theirs)[sure].max() < 1e-9
+    assert np.abs(found.position - position)[sure].max() < 1e-9
+    assert np.abs(found.direction - direction)[sure].max() < 1e-9
+
+
+def test_pentakins_agrees_with_the_closed_form(tmp_path):
+    """On the linear pentapod itself, all rings of radius 0: legs, and Newton's poses against the closed form."""
+    p, tilts = poses(np.random.default_rng(1), 500)
+    theirs, position, direction = asked(AsBuiltPentapod.of(NOMINAL), p, tilts, tmp_path)
+    assert np.abs(NOMINAL.leg_lengths(p, pointing(tilts)) - theirs).max() < 1e-9
+    ours = NOMINAL.pose(theirs, (1, 1))
+    assert np.abs(ours[0] - position).max() < 1e-9
+    assert np.abs(ours[1] - direction).max() < 1e-9

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
+from pentapod.kinematics.blocks import blocks
 from pentapod.kinematics.roaming import roaming
 from pentapod.verify.replay import Replay
 
 _LONGEST, _CUT = 64, 8
-_CHUNK = 512
+_AT_ONCE, _CHUNK = 4096, 512  # stretches: the bodies of all of a long program would fill the memory
 _NEAR_M, _NEAR = 2e-5, 0.3
 """A proven gap is not improved on where it is this much, or this share, below one that is met."""
 
@@ -60,13 +61,14 @@ def approach(replay: Replay, gaps: Gaps, moves: Moves, offsets: Floats, *, bound
     while True:
         ends = np.minimum(starts + size, count)
         samples = starts + ends
-        values = gaps(samples)
+        values = np.concatenate([gaps(samples[part]) for part in blocks(len(samples), _AT_ONCE)])
         worst = np.unravel_index(int(values.argmin()), values.shape)
         if values[worst] < met:
             met = float(values[worst])
             if met <= bound:
                 return Approach(met, int(worst[1]), int(samples[worst[0]]), True)
-        lower = values - moves(_stray(replay, starts, size, offsets))
+        strays = (moves(_stray(replay, starts[part], size, offsets)) for part in blocks(len(starts), _AT_ONCE))
+        lower = values - np.concatenate(list(strays))
         target = met - max(_NEAR_M, _NEAR * (met - bound))
         again = (lower.min(axis=1) < target) if size > 1 else np.zeros(len(starts), dtype=np.bool_)
         kept = np.where(again[:, None], np.inf, lower)
