@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import sys
 from importlib import resources
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pentapod.cli.main import run
@@ -43,6 +45,24 @@ def test_servo_as_text_and_json(planned, capsys):
     assert corrected["contour_error_mm"]["rms"] < plain["contour_error_mm"]["rms"]
     assert simulate(planned, "--json", "--seed", "1") == 0
     assert json.loads(capsys.readouterr().out)["contour_error_mm"] != plain["contour_error_mm"]
+
+
+def test_plots_show_every_measure_with_its_extremes(planned, tmp_path, capsys):
+    page = tmp_path / "simulation.html"
+    assert simulate(planned, "--json", "--plots", str(page)) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["plots"] == str(page)
+    text = page.read_text(encoding="utf-8")
+    assert "<link" not in text
+    start = text.index('id="figure">') + len('id="figure">')
+    figure = json.loads(text[start : text.index("</script>", start)])
+    titles = [axis["title"]["text"] for name, axis in figure["layout"].items() if name.startswith("yaxis")]
+    assert titles[0] == "contour error, mm"
+    assert titles[-2:] == ["error of each leg, mm", "force of each drive, N"]
+    assert len(figure["data"]) == len(titles) - 2 + 10
+    packed = figure["data"][0]["y"]
+    drawn = np.frombuffer(base64.b64decode(packed["bdata"]), dtype=packed["dtype"])
+    assert drawn.max() == pytest.approx(said["contour_error_mm"]["largest"], rel=1e-6)
 
 
 def test_a_bound_makes_it_a_check(planned, capsys):

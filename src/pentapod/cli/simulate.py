@@ -38,6 +38,8 @@ _LEG = click.IntRange(1, 5)
               help="MuJoCo: a platform joint is off along the tool by so many mm; may be repeated.")  # fmt: skip
 @click.option("--within", "within_mm", type=click.FloatRange(0.0, min_open=True), metavar="MM",
               help="Fail where the tip leaves the programmed path by more.")  # fmt: skip
+@click.option("--plots", "plots", type=click.Path(path_type=Path), metavar="FILE",
+              help="Write every measure against time as a page for the browser.")  # fmt: skip
 @json_option
 @quiet_option
 @click.pass_context
@@ -54,7 +56,7 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
     from pentapod.refusal import Refusal
     from pentapod.simulate import Reference, load_mujoco
 
-    engine, within_mm = given["engine"], given["within_mm"]
+    engine, within_mm, plots = given["engine"], given["within_mm"], given.pop("plots")
     _check_options(ctx, engine)
     if engine == "mujoco":
         load_mujoco()  # a missing one is said at once
@@ -72,6 +74,12 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
         click.echo(f"refused: {found}", err=True)
         return 1
     lines, content, tracking = found
+    if plots is not None:
+        from pentapod.report import write_simulation
+
+        names = ("as programmed", f"with {given['cutting_force_n']} N on cuts")
+        write_simulation(plots, program.name, engine, lines, list(zip(names, tracking, strict=False)))
+        lines, content = [*lines, f"  plots: {plots}"], {**content, "plots": str(plots)}
     largest = max(part.measures[0].largest for part in tracking)
     passed = within_mm is None or largest <= within_mm
     if as_json:

@@ -1,5 +1,6 @@
-"""The report: one self-contained HTML page on a run."""
+"""Reports: one self-contained HTML page on a run, or on a simulation."""
 
 from pentapod.report.page import write_report
+from pentapod.report.simulated import write_simulation
 
-__all__ = ["write_report"]
+__all__ = ["write_report", "write_simulation"]
