@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -67,8 +68,11 @@ def approach(replay: Replay, gaps: Gaps, moves: Moves, offsets: Floats, *, bound
             met = float(values[worst])
             if met <= bound:
                 return Approach(met, int(worst[1]), int(samples[worst[0]]), True)
-        strays = (moves(_stray(replay, starts[part], size, offsets)) for part in blocks(len(starts), _AT_ONCE))
-        lower = values - np.concatenate(list(strays))
+        if size == _LONGEST:
+            lower = values - moves(_first_stray(replay, starts, offsets))
+        else:
+            strays = (moves(_stray(replay, starts[part], size, offsets)) for part in blocks(len(starts), _AT_ONCE))
+            lower = values - np.concatenate(list(strays))
         target = met - max(_NEAR_M, _NEAR * (met - bound))
         again = (lower.min(axis=1) < target) if size > 1 else np.zeros(len(starts), dtype=np.bool_)
         kept = np.where(again[:, None], np.inf, lower)
@@ -80,6 +84,14 @@ def approach(replay: Replay, gaps: Gaps, moves: Moves, offsets: Floats, *, bound
         size //= _CUT
         starts = (starts[again, None] + size * np.arange(_CUT)).ravel()
         starts = starts[starts < count]
+
+
+def _first_stray(replay: Replay, starts: Ints, offsets: Floats) -> Stray:
+    """Return how far the platform strays within the longest stretches: claims that ask the same share the answer."""
+    key = ("stray", offsets.tobytes())
+    if key not in replay.shared:
+        replay.shared[key] = _stray(replay, starts, _LONGEST, offsets)
+    return cast("Stray", replay.shared[key])
 
 
 def _stray(replay: Replay, starts: Ints, size: int, offsets: Floats) -> Stray:

@@ -60,8 +60,8 @@ def _clear(replay: Replay, *, obstacle: Obstacle, surroundings: Surroundings, co
         )
         return chosen.segments(obstacle.surface, _FAR_M).distance.reshape(-1, len(columns))
 
-    offsets = _offsets(machine, tool)
-    found = approach(replay, gaps, lambda stray: _moves(stray, tool)[:, columns], offsets, bound=bound)
+    offsets = _offsets(machine, surroundings.tool)
+    found = approach(replay, gaps, lambda stray: _moves(stray, surroundings.tool)[:, columns], offsets, bound=bound)
     name, most = surroundings.names[columns[found.column]], _TOOL_FAR_M if tool else _FAR_M
     if found.least > bound and _enclosed(replay, obstacle, frame, columns):
         return Finding(False, None, 1e3 * bound, "mm", replay.place(0), f"{name} is inside the {obstacle.name}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -61,6 +61,11 @@ class Replay:
     def slopes(self) -> Floats | None:
         """Slopes (N, 5) of the legs at the rows, metres a period; None where they go straight from row to row."""
         return clamped_slopes(self.program.legs) if self.program.interpolation == "cubic" else None
+
+    @cached_property
+    def shared(self) -> dict[Hashable, object]:
+        """What claims have reckoned that others ask as well."""
+        return {}
 
     @property
     def pose(self) -> tuple[Floats, Floats]:
