@@ -47,7 +47,7 @@ def write_simulation(
 def simulation_figure(runs: Sequence[tuple[str, Tracking]]) -> Figure:
     """Return the figure: a row for each measure, with each run; then error and drive's force of each leg, last run."""
     first = runs[0][1]
-    times = np.arange(len(first.played.legs)) * first.reference.program.period
+    times = np.arange(len(first.played.legs), dtype=np.float64) * float(first.reference.program.period)
     traces, titles = list[dict[str, Any]](), list[str]()
     for k, measure in enumerate(first.measures):
         titles.append(f"{measure.name}, {measure.unit}")
