@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job
 from pentapod.job_placement import job_freedom, rotation_angles_deg
+from pentapod.job_surroundings import job_surroundings
 from pentapod.outcome import Outcome
 from pentapod.pipeline import job_machine, job_mesh, run
 from pentapod.planning import PlacedPath
@@ -26,7 +27,7 @@ from pentapod.report.decimate import keep_extremes, thinned_mesh
 from pentapod.report.signals import Signals
 from pentapod.report.words import duration, number, opening, placement_sentences
 from pentapod.timing import Trajectory
-from pentapod.toolpath import Toolpath
+from pentapod.toolpath import Mesh, Toolpath
 
 TOO_FAR = ("position_mm = [", "position_mm = [1000.0, 0, 700] # [")
 
@@ -116,7 +117,10 @@ def test_signals_are_those_of_the_program(make_job, tmp_path):
     assert program is not None
     assert trajectory is not None
     assert toolpath is not None
-    signals = Signals.of(program, outcome.machine, trajectory, toolpath)
+    mesh = outcome.find(Mesh)
+    assert mesh is not None
+    surroundings = job_surroundings(outcome.job, outcome.machine, mesh)
+    signals = Signals.of(program, outcome.machine, trajectory, toolpath, surroundings)
     by_claim = {c.claim: c for c in outcome.verdict.certificates}
     rate = by_claim["leg rates"].value
     assert rate is not None
@@ -126,6 +130,16 @@ def test_signals_are_those_of_the_program(make_job, tmp_path):
     assert 1e3 * np.abs(signals.accelerations).max() == pytest.approx(acceleration, rel=2e-2)
     assert np.abs(signals.rates[[0, -1]]).max() < 1e-9
     assert signals.margins.min() > 0
+    # Gaps to the part are margins too, and at the waypoints those of the plan.
+    placed = outcome.find(PlacedPath)
+    assert placed is not None
+    assert signals.margin_names == placed.margin_names
+    assert signals.margins[0] == pytest.approx(placed.margins[0], abs=1e-4)
+    assert signals.margins[-1] == pytest.approx(placed.margins[-1], abs=1e-4)
+    gaps = [k for k, name in enumerate(signals.margin_names) if "the part" in name]
+    assert len(gaps) >= 6
+    spindle = by_claim["spindle clear of the part"].value
+    assert spindle is not None
 
 
 def test_report_of_a_refused_job(make_job, tmp_path):
@@ -238,7 +252,14 @@ def test_the_setup_sheet_names_the_limit_at_every_place(make_job, tmp_path):
         stretch = placed.margins[int(first) : int(last) + 1]
         assert float(margin) == pytest.approx(stretch.min(), abs=1e-3)
         assert placed.margin_names[int(stretch.min(axis=0).argmin())] == name.replace("&gt;", ">")
-    assert text.count('aria-label="from ') == 2
+    views = re.findall(r'aria-label="((?:the part )?from [^"]*)">(.*?)</svg>', text, re.S)
+    assert len(views) == 3
+    # The base hangs above: seen from above, with x to the right, y comes towards one. No mirror image.
+    assert "y down" in views[0][0]
+    circles = np.array(re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', views[0][1]), dtype=float)
+    base = 1e3 * outcome.machine.pentapod.base
+    assert circles - circles[0] == pytest.approx(base - base[0], abs=0.2)
+    assert re.findall(r">(\d)</text>", views[0][1]) == list("12345")
     assert "nearest limits" in page.text
 
 

@@ -36,8 +36,18 @@
     for (const id of Object.keys(drawn)) Plotly.relayout(id, theme(figures[id].layout));
   }
 
+  // Figures keep the pixels that they were drawn with: on paper they are scaled to its width (A4 less its margins).
+  const PAPER_PX = 700;
+  const scaling = new ResizeObserver((changes) => {
+    for (const { target } of changes) {
+      const width = target.querySelector(".svg-container")?.offsetWidth || target.clientWidth;
+      target.style.setProperty("--paper", Math.min(1, PAPER_PX / width));
+    }
+  });
+
   draw("scene");
   draw("time");
+  for (const holder of document.querySelectorAll(".figure")) scaling.observe(holder);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", retheme);
   // Paper cannot be opened: what is folded on the screen is printed whole.
   let folded = [];

@@ -13,6 +13,8 @@ from pentapod.files import atomic_write
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import Job
 from pentapod.job_placement import job_at, placement_toml
+from pentapod.job_surroundings import job_surroundings
+from pentapod.machine.surroundings import NOTHING, Surroundings
 from pentapod.outcome import Outcome, SetUps
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.program.program import Program
@@ -63,7 +65,7 @@ def _context(outcome: Outcome) -> dict[str, Any]:
     trajectory, toolpath = outcome.find(Trajectory), outcome.find(Toolpath)
     signals = None
     if program is not None and trajectory is not None and toolpath is not None:
-        signals = Signals.of(program, outcome.machine, trajectory, toolpath)
+        signals = Signals.of(program, outcome.machine, trajectory, toolpath, _surroundings(outcome))
     figures: dict[str, Figure] = {"scene": _scene(outcome, signals)}
     if signals is not None:
         figures["time"] = plots.time_figure(signals, outcome.machine)
@@ -91,6 +93,12 @@ def _context(outcome: Outcome) -> dict[str, Any]:
         "figures": as_script(figures),
         "poses": as_script(_poses(outcome, signals)),
     }
+
+
+def _surroundings(outcome: Outcome) -> Surroundings:
+    """Return what the planner kept clear of."""
+    mesh = outcome.find(Mesh)
+    return NOTHING if mesh is None else job_surroundings(outcome.job, outcome.machine, mesh)
 
 
 def _facts(outcome: Outcome, signals: Signals | None) -> list[tuple[str, str]]:
@@ -182,7 +190,7 @@ def _placement(job: Job, transform: RigidTransform) -> dict[str, Any]:
     matrix[:3, 3] *= 1e3
     return {
         "sentences": words.placement_sentences(transform),
-        "matrix": [[f"{value:.6f}".replace("-", "−") for value in row] for row in matrix],
+        "matrix": [[f"{round(value, 6) + 0.0:.6f}".replace("-", "−") for value in row] for row in matrix.tolist()],
         "toml": placement_toml(job_at(job, transform).placement),
     }
 

@@ -26,7 +26,7 @@ def setup_sheet(outcome: Outcome) -> str:
     told = "" if height is None else f"<p>It stands on the table, whose surface is at z = {number(height, 'mm')}.</p>"
     rows = "".join(_row(binding) for binding in bindings(placed)[:_ROWS])
     return (
-        f'{told}<div class="columns">{placement_views(outcome.find(Mesh), placed, outcome.machine, surface)}</div>'
+        f'{told}<div class="views">{placement_views(outcome.find(Mesh), placed, outcome.machine, surface)}</div>'
         f"<h3>Margins along the path</h3>{margin_band(placed)}"
         '<p class="hint">As high as the smallest margin (0: a limit, about 1: comfortable), in the colour of the limit '
         "that is nearest; point at it for its name.</p>"

@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from pentapod.arrays import Floats, Ints, set_frozen
 from pentapod.machine.machine import Machine
+from pentapod.machine.surroundings import NOTHING, Surroundings
 from pentapod.planning.margins import Margins
 from pentapod.program.program import Program
 from pentapod.timing.trajectory import Trajectory
@@ -26,7 +27,8 @@ class Signals:
     times (N,) s; legs, rates, accelerations (N, 5) m, m/s, m/s², as the controller moves between rows;
     tips, axes (N, 3); speeds (N,), m/s: of the tip, or, with a stand-off and off rapids, of the spot on the
     surface; speed_limits (N,): the feed that is asked for, or the rapid rate; segments (N,) of the toolpath; cutting
-    (N,). causes (N,): what limits the motion, index into `cause_names`. margins (K, M) at rows `margin_rows` (K,).
+    (N,). causes (N,): what limits the motion, index into `cause_names`. margins (K, M) at rows `margin_rows` (K,),
+    collisions with the surroundings among them.
     """
 
     times: Floats
@@ -46,8 +48,18 @@ class Signals:
     margin_names: tuple[str, ...]
 
     @classmethod
-    def of(cls, program: Program, machine: Machine, trajectory: Trajectory, toolpath: Toolpath) -> Signals:
-        """Compute the signals of a program. The trajectory tells which segment is due when, and what limits it."""
+    def of(
+        cls,
+        program: Program,
+        machine: Machine,
+        trajectory: Trajectory,
+        toolpath: Toolpath,
+        surroundings: Surroundings = NOTHING,
+    ) -> Signals:
+        """Compute the signals of a program. The trajectory tells which segment is due when, and what limits it.
+
+        surroundings: what legs, spindle and tool must not touch; the gaps to it are margins, too.
+        """
         times = program.times
         rates, accelerations = _derivatives(program)
         tips, axes = _poses(program, machine)
@@ -59,10 +71,11 @@ class Signals:
             speeds = np.where(rapid, speeds, np.linalg.norm(np.gradient(spots, program.period, axis=0), axis=1))
         feeds = np.array([min(s.feed, machine.rapid_velocity) for s in toolpath.segments])
         kinds = np.array([s.kind == SegmentKind.CUT for s in toolpath.segments])
-        margins = Margins.of(machine, program.component)
+        margins = Margins.of(machine, program.component, surroundings)
         step = max(1, -(-len(times) // MOST_MARGIN_ROWS))
         rows = np.unique(np.append(np.arange(0, len(times), step), len(times) - 1)).astype(np.intp)
-        values = [margins(tips[k], axes[k]) for k in np.array_split(rows, -(-len(rows) // _CHUNK))]
+        blocks = np.array_split(rows, -(-len(rows) // _CHUNK))
+        values = [margins(tips[k], axes[k], program.placement) for k in blocks]
         names = tuple(limit.name for limit in margins.limits)
         profile = trajectory.profile
         at = np.clip(np.searchsorted(profile.times, times, side="right") - 1, 0, len(profile.active) - 1)
