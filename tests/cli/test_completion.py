@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 
+import click
 import pytest
 
-from pentapod.cli.main import VERBS, run
+from pentapod.cli.main import VERBS, cli, run
 from pentapod.program.posts import post_names
 
 PENTAPOD = [sys.executable, "-c", "from pentapod.cli.main import main; main()"]
@@ -44,3 +46,43 @@ def test_a_traceback_is_shown_when_asked_for(tmp_path, capsys):
         run(["plan", missing, "--debug"])
     assert run(["--help"]) == 0
     assert "--debug" in capsys.readouterr().out
+
+
+def commands():
+    """Every command with the words that call it."""
+    context = click.Context(cli)
+    for verb in VERBS:
+        command = cli.get_command(context, verb)
+        inner = command.commands.items() if isinstance(command, click.Group) else [(None, command)]
+        yield from ((verb if name is None else f"{verb} {name}", leaf) for name, leaf in inner)
+
+
+@pytest.mark.parametrize(
+    ("words", "command"), list(commands()), ids=lambda value: value if isinstance(value, str) else ""
+)
+def test_every_command_can_be_quiet_and_tell_scripts(words, command):
+    options = {option for parameter in command.params for option in parameter.opts}
+    assert {"--quiet", "--json"} <= options, words
+
+
+def test_progress_tells_stage_and_rate(monkeypatch):
+    """On a terminal; elsewhere nothing is said."""
+    from rich.progress import Progress
+
+    from pentapod.cli.output import progress_bar
+    from pentapod.progress import silent
+
+    with progress_bar(quiet=False) as progress:
+        assert progress is silent, "stderr is no terminal here"
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    shown = {}
+    monkeypatch.setattr(
+        Progress, "stop", lambda self: shown.update({t.description: dict(t.fields) for t in self.tasks})
+    )
+    with progress_bar(quiet=False) as progress:
+        for share in (0.1, 0.2, 0.3, 0.4):
+            progress("verify", share, "rows")
+            time.sleep(0.02)
+    assert shown["verify"]["note"] == "rows"
+    assert shown["verify"]["rate"].endswith(" %/s")
+    assert float(shown["verify"]["rate"].split()[0]) > 0.0

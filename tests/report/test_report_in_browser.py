@@ -204,6 +204,12 @@ def test_prints_on_a4(chromium, report, tmp_path):
     opened.page.emulate_media(media="print")
     pdf = opened.page.pdf(path=tmp_path / "report.pdf", prefer_css_page_size=True)
     assert re.search(rb"/MediaBox \[0 0 59[45]\.?\d* 84[12]", pdf), "A4 in points"
+    # Figures keep the pixels of the screen and are scaled to the paper.
+    figures = opened.page.evaluate(
+        "[...document.querySelectorAll('.figure .svg-container')].map(n => n.getBoundingClientRect().width)"
+    )
+    assert len(figures) == 2
+    assert all(400 < width <= 704 for width in figures)
     # Nothing is wider than the paper, less its margins: 186 mm at 96 dots an inch.
     opened.page.set_viewport_size({"width": 703, "height": 1000})
     wide = opened.page.evaluate(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pentapod.cli.output import echo_json, json_option
+from pentapod.cli.output import echo_json, json_option, quiet_option
 
 if TYPE_CHECKING:
     from pentapod.arrays import Floats
@@ -34,7 +34,8 @@ _machine_option = click.option(
 @click.argument("pose", nargs=-1, type=float, metavar="[X Y Z I J K]")
 @_machine_option
 @json_option
-def ik(pose: tuple[float, ...], machine_name: str, as_json: bool) -> int:
+@quiet_option
+def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -> int:
     """Leg lengths in mm of a tool pose: tip X Y Z in mm, and tool axis I J K, machine frame.
 
     The axis points from the tip to the spindle, as in APT; it need not have unit length. Without numbers, CSV
@@ -57,7 +58,7 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool) -> int:
     components = [_component(signs) for signs in machine.pentapod.component(position, direction)]
     columns: dict[str, Any] = {name: legs[:, k] * 1e3 for k, name in enumerate(LEGS)}
     columns |= {"component": components, "within_strokes": within.tolist()}
-    _print(columns, as_json=as_json, one=bool(pose))
+    _print(columns, as_json=as_json, one=bool(pose), quiet=quiet)
     return 0
 
 
@@ -66,7 +67,8 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool) -> int:
 @click.option("-c", "--component", help='Signs of w and S: "++", "+-", "-+", "--"; all four when left out.')
 @_machine_option
 @json_option
-def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_json: bool) -> int:
+@quiet_option
+def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_json: bool, quiet: bool) -> int:
     """Tool poses of five leg lengths in mm: tip in mm, tool axis, distances to singularities.
 
     Five legs have four poses, one in each component, or none. Without numbers, CSV is read from stdin: a
@@ -89,7 +91,7 @@ def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_jso
     columns |= {name: -direction[:, k] for k, name in enumerate(POSE[3:])}
     columns["singularity_mm"] = position_distance(machine.pentapod, position, direction) * 1e3
     columns["singularity_deg"] = np.degrees(orientation_distance(machine.pentapod, position, direction))
-    _print(columns, as_json=as_json, one=bool(legs) and component is not None)
+    _print(columns, as_json=as_json, one=bool(legs) and component is not None, quiet=quiet)
     return 0 if np.isfinite(tips).all() else 1
 
 
@@ -134,12 +136,14 @@ def _rows(numbers: tuple[float, ...], names: tuple[str, ...]) -> Floats:
     return rows
 
 
-def _print(columns: dict[str, Any], *, as_json: bool, one: bool) -> None:
-    """Print columns of equal length: as JSON (an object for one row, else a list), or as CSV."""
+def _print(columns: dict[str, Any], *, as_json: bool, one: bool, quiet: bool) -> None:
+    """Print columns of equal length: as JSON (an object for one row, else a list), or, unless quiet, as CSV."""
     values = [list(column) for column in columns.values()]
     records = [dict(zip(columns, (_plain(v) for v in row), strict=True)) for row in zip(*values, strict=True)]
     if as_json:
         echo_json(records[0] if one else records)
+        return
+    if quiet:
         return
     lines = [",".join(columns)]
     lines += [",".join(_text(value) for value in record.values()) for record in records]

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import click
 
-from pentapod.cli.output import echo_json, json_option
+from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
 
 
 @click.group()
@@ -16,14 +16,15 @@ def machine() -> None:
 
 @machine.command("list")
 @json_option
-def list_machines(as_json: bool) -> int:
+@quiet_option
+def list_machines(as_json: bool, quiet: bool) -> int:
     """List the machines that ship with pentapod."""
     from pentapod.machine import shipped_machines
 
     names = list(shipped_machines())
     if as_json:
         echo_json(names)
-    else:
+    elif not quiet:
         click.echo("\n".join(names))
     return 0
 
@@ -31,7 +32,8 @@ def list_machines(as_json: bool) -> int:
 @machine.command()
 @click.argument("name_or_file")
 @json_option
-def check(name_or_file: str, as_json: bool) -> int:
+@quiet_option
+def check(name_or_file: str, as_json: bool, quiet: bool) -> int:
     """Explain a machine (a shipped NAME or a FILE.toml), and whether it keeps its limits in its work volume.
 
     Exit code 1 where it does not; 2 where the file describes a machine that cannot exist.
@@ -39,7 +41,9 @@ def check(name_or_file: str, as_json: bool) -> int:
     from pentapod.machine import Machine, explain
     from pentapod.machine import check as check_machine
 
-    report = check_machine(Machine.load(name_or_file))
+    with progress_bar(quiet=quiet or as_json) as progress:
+        progress("check", 0.0, name_or_file)
+        report = check_machine(Machine.load(name_or_file))
     passed = all(finding.passed for finding in report.findings)
     if as_json:
         findings = [
@@ -62,6 +66,6 @@ def check(name_or_file: str, as_json: bool) -> int:
                 "findings": findings,
             }
         )
-    else:
+    elif not quiet:
         click.echo(explain(report))
     return 0 if passed else 1

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pentapod.cli.output import quiet_option
+from pentapod.cli.output import echo_json, json_option, quiet_option
 
 if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
@@ -30,8 +30,9 @@ _WIDTH = 46
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@json_option
 @quiet_option
-def new(folder: Path, quiet: bool) -> int:
+def new(folder: Path, as_json: bool, quiet: bool) -> int:
     """Write DIR/job.toml, every key explained, and DIR/part.stl, a shallow 60 mm dome, to start from."""
     from pentapod.errors import InputError
     from pentapod.files import atomic_write
@@ -44,7 +45,9 @@ def new(folder: Path, quiet: bool) -> int:
         temporary.write_bytes(dome_stl())
     with atomic_write(folder / JOB) as temporary:
         temporary.write_text(job_text(), encoding="utf-8")
-    if not quiet:
+    if as_json:
+        echo_json({"files": [str(folder / JOB), str(folder / MESH)]})
+    elif not quiet:
         click.echo(f"wrote {folder / JOB} and {folder / MESH}")
         click.echo(f"next: pentapod plan {folder / JOB} -o {folder / 'out'}")
     return 0

@@ -48,7 +48,7 @@ def _finite(value: Any) -> Any:
 
 @contextmanager
 def progress_bar(*, quiet: bool) -> Generator[Progress]:
-    """Yield a Progress that draws bars on stderr, one for each stage; silent when stderr is no terminal.
+    """Yield a Progress that draws bars on stderr, one for each stage, with its rate; silent off terminals.
 
     What the log `pentapod` has to say (that kernels are compiled) stands above the bars.
     """
@@ -59,22 +59,26 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
         return
     from rich.console import Console
     from rich.logging import RichHandler
-    from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bars
 
     tasks: dict[str, TaskID] = {}
     columns = (
         TextColumn("{task.description:<10}"),
         BarColumn(),
+        TextColumn("{task.fields[rate]:>9}"),
         TimeElapsedColumn(),
+        TimeRemainingColumn(compact=True),
         TextColumn("{task.fields[note]}"),
     )
     with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
 
         def show(stage: str, fraction: float, note: str = "") -> None:
             if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=1.0, note=note)
-            bars.update(tasks[stage], completed=fraction, note=note)
+                tasks[stage] = bars.add_task(stage, total=1.0, note=note, rate="")
+            speed = bars.tasks[tasks[stage]].speed
+            rate = f"{100.0 * speed:.3g} %/s" if speed and fraction < 1.0 else ""
+            bars.update(tasks[stage], completed=fraction, note=note, rate=rate)
 
         log = logging.getLogger("pentapod")
         handler, level = (

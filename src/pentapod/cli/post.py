@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pentapod.cli.output import echo_json, json_option, quiet_option
+from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
 
 if TYPE_CHECKING:
     from pentapod.machine import Machine
@@ -65,11 +65,15 @@ def post(
     from pentapod.program.posts import PostInput, find_post, placed_toolpath, write_post
 
     find_post(name)  # an unknown one is said at once
-    read = read_csv(program)
-    beside = program.with_name("plan.npz")
-    plan = beside if plan is None and beside.exists() else plan
-    toolpath = None if plan is None else placed_toolpath(plan, read)
-    files = write_post(PostInput(read, _machine(read, job, machine), toolpath), name, out)
+    with progress_bar(quiet=quiet or as_json) as progress:
+        progress("reading", 0.0, program.name)
+        read = read_csv(program)
+        beside = program.with_name("plan.npz")
+        plan = beside if plan is None and beside.exists() else plan
+        toolpath = None if plan is None else placed_toolpath(plan, read)
+        progress("reading", 1.0, program.name)
+        progress("writing", 0.0, name)
+        files = write_post(PostInput(read, _machine(read, job, machine), toolpath), name, out)
     if as_json:
         echo_json({"format": name, "files": [str(file) for file in files]})
     elif not quiet:

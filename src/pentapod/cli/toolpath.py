@@ -34,11 +34,14 @@ def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet
     format_of(out, format_name)  # an unknown one is said at once
     loaded = Job.load(job)
     with progress_bar(quiet=quiet or as_json) as progress:
+        progress("mesh", 0.0)
         mesh = job_mesh(loaded, progress)
         progress("mesh", 1.0)
         progress("toolpath", 0.0)
         path, came_to = job_toolpath(loaded, mesh, progress)
-    write_toolpath(path, out, format_name)
+        progress("toolpath", 1.0)
+        progress("writing", 0.0, out.name)
+        write_toolpath(path, out, format_name)
     kinds = [str(segment.kind) for segment in path.segments]
     lengths = [1e3 * float(arc_length(segment.tips)[-1]) for segment in path.segments]
     by_kind = {kind: sum(v for k, v in zip(kinds, lengths, strict=True) if k == kind) for kind in set(kinds)}

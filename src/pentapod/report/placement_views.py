@@ -9,11 +9,11 @@ import numpy as np
 from pentapod.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.planning.placed_path import PlacedPath
-from pentapod.report.decimate import keep_extremes, thinned_mesh
+from pentapod.report.decimate import thinned_mesh
 from pentapod.report.figure import LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR
 from pentapod.toolpath.mesh import Mesh
 
-_FACETS, _POINTS = 1200, 400
+_FACETS, _POINTS = 1200, 1500
 _LETTER = 15.0  # of a drawing 500 wide
 
 
@@ -52,7 +52,9 @@ def _subject(mesh: Mesh | None, placed: PlacedPath, machine: Machine, table: flo
     transform, worst = placed.placement.transform, int(placed.margins.min(axis=1).argmin())
     axis, tip = placed.axes[worst], placed.tips[worst]
     joints = tip + (machine.tool_length - machine.pentapod.offsets)[:, None] * axis
-    tips = placed.tips[keep_extremes(placed.tips[:, 0], _POINTS // 4)]
+    starts = placed.toolpath.starts
+    even = np.linspace(0, len(placed.tips) - 1, min(len(placed.tips), _POINTS)).astype(np.intp)
+    tips = placed.tips[np.unique(np.concatenate([even, starts[:: -(-len(starts) // _POINTS)]]))]
     facets = np.zeros((0, 3, 3))
     if mesh is not None:
         vertices, faces = thinned_mesh(mesh.vertices, mesh.faces, _FACETS)
