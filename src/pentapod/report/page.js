@@ -39,6 +39,7 @@
   // Figures keep the pixels that they were drawn with: on paper they are scaled to its width (A4 less its margins).
   const PAPER_PX = 700;
   const scaling = new ResizeObserver((changes) => {
+    if (matchMedia("print").matches) return;  // what is scaled already tells nothing
     for (const { target } of changes) {
       const width = target.querySelector(".svg-container")?.offsetWidth || target.clientWidth;
       target.style.setProperty("--paper", Math.min(1, PAPER_PX / width));
