@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test test-all lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify reference site clean
+.PHONY: demo test test-all lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify reference pictures site clean
 
 demo: $(READY)  ## plan a dome and judge the program
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
@@ -47,6 +47,11 @@ bench-verify: $(READY)  ## the verdict on a million rows: seconds, memory, again
 
 reference: $(READY)  ## the pages of docs/reference, from the code
 	$(BIN)/python docs/make_reference.py
+
+pictures: $(READY)  ## the screenshots of the documentation, from the tests that open a browser
+	mkdir -p out/shots
+	PENTAPOD_SHOTS=out/shots $(BIN)/pytest tests/report/test_report_in_browser.py tests/view/test_viewer.py -k "drawn or draws"
+	cp out/shots/report.png out/shots/sheet.png out/shots/view.png docs/
 
 site: $(READY)  ## the documentation as a site, in site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict

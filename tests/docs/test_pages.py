@@ -10,10 +10,15 @@ import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pentapod.cli.main import run
+from pentapod.geometry import RigidTransform
 from pentapod.job import Job
+from pentapod.kinematics import Component
+from pentapod.machine import Machine
+from pentapod.program import Program, Provenance, write_csv
 
 ROOT = Path(__file__).parents[2]
 GUIDES = [*sorted(ROOT.glob("docs/howto/*.md")), ROOT / "docs" / "tutorial.md"]
@@ -79,6 +84,40 @@ def test_every_table_of_a_job_is_one(page, tmp_path):
         job = tmp_path / "job.toml"
         job.write_text("".join(f"[{name}]\n{keys}\n" for name, keys in tables.items()), encoding="utf-8")
         Job.load(job)
+
+
+def test_the_post_of_ones_own_is_one(tmp_path):
+    """The package of the guide, installed as pip would leave it; in a process of its own."""
+    guide = ROOT / "docs" / "howto" / "post.md"
+    (code,), (entry,) = blocks(guide, "python"), blocks(guide, "toml")
+    package, marks = tmp_path / "site" / "my_package", tmp_path / "site" / "my_package-1.0.dist-info"
+    package.mkdir(parents=True)
+    marks.mkdir()
+    (package / "__init__.py").write_text("", encoding="utf-8")
+    (package / "posts.py").write_text(code, encoding="utf-8")
+    (marks / "METADATA").write_text("Metadata-Version: 2.1\nName: my_package\nVersion: 1.0\n", encoding="utf-8")
+    points = entry.replace('[project.entry-points."pentapod.posts"]', "[pentapod.posts]").replace('"', "")
+    (marks / "entry_points.txt").write_text(points, encoding="utf-8")
+    legs = np.linspace([0.6, 0.65, 0.7, 0.75, 0.8], [0.61, 0.64, 0.72, 0.74, 0.79], 40)
+    machine = Machine.load("desk")
+    source = Provenance(machine.name, machine.digest, "", "1")
+    program = Program(1e-3, legs, "cubic", Component(1, 1), RigidTransform.identity(), source)
+    write_csv(program, tmp_path / "program.csv")
+    path = os.pathsep.join([str(tmp_path / "site"), str(ROOT / "src")])
+    pentapod = [sys.executable, "-c", "from pentapod.cli.main import main; main()", "post"]
+
+    def said(*words):
+        done = subprocess.run([*pentapod, *words], env={**os.environ, "PYTHONPATH": path}, cwd=tmp_path,
+                              capture_output=True, text=True, check=False)  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert "the drives of my machine" in said("--formats")
+    said("program.csv", "--to", "mine", "-o", "written")
+    rows = [line for line in (tmp_path / "written" / "legs.txt").read_text().splitlines() if line[0].isdigit()]
+    table = np.array([[float(value) for value in row.split(";")] for row in rows])
+    assert table[:, 0] == pytest.approx(np.arange(40.0))
+    assert table[:, 1:] == pytest.approx(1e6 * program.legs, abs=1e-3)
 
 
 def test_the_site_builds_without_a_warning(tmp_path):

@@ -39,7 +39,7 @@ class Scene:
         api = server.scene
         self._set_up(server)
         size = float(np.ptp(run.mesh.bounds, axis=0).max())
-        self.part = api.add_transform_controls(PART, scale=0.75 * size, depth_test=False, line_width=3.0)
+        self.part = api.add_transform_controls(PART, scale=0.6 * size, depth_test=False, opacity=0.7, line_width=3.0)
         self.set_placement(run.placement)
         vertices, faces = thinned_mesh(run.mesh.vertices, run.mesh.faces, _MOST_FACETS)
         api.add_mesh_simple(f"{PART}/mesh", vertices - self._middle, faces, color=_PART_COLOUR, side="double")
@@ -88,9 +88,9 @@ class Scene:
         server.scene.set_up_direction((0.0, 0.0, upward))
         span = float(machine.legs.max_length.max())
         camera = server.initial_camera
-        middle = centre * [1.0, 1.0, 0.6]
-        camera.position = middle + span * np.array([0.45, -0.85, 0.25 * upward])
-        camera.look_at = middle + span * np.array([0.15, 0.0, 0.0])  # the panel covers the right
+        middle = centre * [1.0, 1.0, 0.7]
+        camera.position = middle + span * np.array([0.35, -0.7, 0.25 * upward])
+        camera.look_at = middle + span * np.array([0.12, 0.0, 0.0])  # the panel covers the right
         camera.up = (0.0, 0.0, upward)
 
     def _add_base(self) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from pentapod.errors import InputError, ProgramError
 from pentapod.program.header import header_text
 from pentapod.program.posts.registry import Post, PostInput, read_file, register
-from pentapod.program.posts.rows import check_legs, check_rows, header_of, made_of
+from pentapod.program.posts.rows import of_archive
 from pentapod.program.program import Program
 from pentapod.program.resolution import to_millimetres
 
@@ -43,11 +43,7 @@ def _read(folder: Path) -> Program:
             header, legs = str(archive.attrs["header"]), np.asarray(archive["legs_mm"], dtype=np.float64)
     except (OSError, KeyError, ValueError) as error:
         raise ProgramError("not an HDF5 file of a program, or a broken one", file=file) from error
-    found = header_of(header.splitlines(), file)
-    if legs.ndim != 2 or legs.shape[1] != 5:
-        raise ProgramError("wrong shape", file=file, key="legs_mm", value=legs.shape, expected="(rows, 5)")
-    check_rows(len(legs), found, file)
-    return made_of(found, check_legs(legs / 1e3, file))
+    return of_archive(header, legs, file)
 
 
 HDF5 = register(Post("hdf5", "HDF5 archive (extra hdf5)", _write, _read))

@@ -12,7 +12,7 @@ from pentapod.errors import ProgramError
 from pentapod.files import packed_arrays
 from pentapod.program.header import header_text
 from pentapod.program.posts.registry import Post, PostInput, read_file, register
-from pentapod.program.posts.rows import check_legs, check_rows, header_of, made_of
+from pentapod.program.posts.rows import of_archive
 from pentapod.program.program import Program
 from pentapod.program.resolution import to_millimetres
 
@@ -36,11 +36,7 @@ def _read(folder: Path) -> Program:
             header, legs = str(archive["header"]), np.asarray(archive["legs_mm"], dtype=np.float64)
     except (ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise ProgramError("not a NumPy archive of a program, or a broken one", file=file) from error
-    found = header_of(header.splitlines(), file)
-    if legs.ndim != 2 or legs.shape[1] != 5:
-        raise ProgramError("wrong shape", file=file, key="legs_mm", value=legs.shape, expected="(rows, 5)")
-    check_rows(len(legs), found, file)
-    return made_of(found, check_legs(legs / 1e3, file))
+    return of_archive(header, legs, file)
 
 
 NPZ = register(Post("npz", "NumPy archive", _write, _read))

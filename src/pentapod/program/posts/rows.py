@@ -46,6 +46,15 @@ def check_legs(legs: Floats, file: Path) -> Floats:
     return quantised(legs)
 
 
+def of_archive(header: str, legs_mm: Floats, file: Path) -> Program:
+    """Return the program of an archive: its header's text and its legs (N, 5), millimetres. Raises ProgramError."""
+    found = header_of(header.splitlines(), file)
+    if legs_mm.ndim != 2 or legs_mm.shape[1] != 5:
+        raise ProgramError("wrong shape", file=file, key="legs_mm", value=legs_mm.shape, expected="(rows, 5)")
+    check_rows(len(legs_mm), found, file)
+    return made_of(found, check_legs(legs_mm / 1e3, file))
+
+
 def made_of(header: Header, legs: Floats) -> Program:
     """Return the program of a header and its rows (N, 5), metres."""
     return Program(
