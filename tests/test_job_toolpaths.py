@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from contextlib import contextmanager
 
 import numpy as np
@@ -97,6 +98,17 @@ def test_axes_and_remedies_of_the_job_are_used(make_job):
     assert "problem" not in str(report).splitlines()[-1]
     assert "ways between cuts led over" in str(report)
     assert any(segment.kind is SegmentKind.CUT for segment in path.segments)
+
+
+def test_a_tilt_that_breaks_the_cap_on_turning_is_told(make_job):
+    """A holder just over the ball meets the dome; tilting clear turns the axis fast, the cap is slow."""
+    fixed = ("tilt_deg = 0", 'tilt_deg = 0\nmode = "fixed"\ndirection = [0, 0, 1]\nrate_deg_mm = 0.1')
+    wide = (BALL, BALL + "\nflute_mm = 5.1\nholder_mm = [[20, 40, 40]]")
+    job = Job.load(make_job(fixed, wide, ("[feed]", '[gouge]\nremedy = ["tilt"]\ncone_deg = 60\n\n[feed]')))
+    path, report = job_toolpath(job, job_mesh(job))
+    assert "waypoints tilted clear" in str(report)
+    assert re.search(r"problem: tilted clear, the axis turns by up to \S+ deg/mm, the cap is 0.1", str(report))
+    assert angle_between(path.axes[1:], path.axes[:-1]).max() <= np.radians(3.0) * (1 + 1e-8)
 
 
 @pytest.mark.parametrize("lead", [0, 12])

@@ -13,7 +13,7 @@ from pentapod.progress import Progress, silent
 from pentapod.strategy_tables import FileTable, sunk_mm
 from pentapod.table import Vector
 from pentapod.toolpath.axis_modes import AxisMode, Between, Fixed, Normal, Pointed
-from pentapod.toolpath.axis_steps import stepped
+from pentapod.toolpath.axis_steps import fastest_turn, stepped
 from pentapod.toolpath.facet_tree import FacetTree
 from pentapod.toolpath.gouge import checked
 from pentapod.toolpath.gouge_report import GougeOptions, Remedy
@@ -26,6 +26,8 @@ from pentapod.toolpath.toolpath import Toolpath
 from pentapod.toolpath.tools import BallCutter, BullNose, FlatEnd, Lollipop, StandOff, Tool
 
 _MM = 1e-3
+_SLACK = 1.05
+"""The cap counts along the contacts; the pivot's way is a little longer or shorter."""
 _FILE_STYLE_MM = (10.0, 3.0, 2.0)  # clearance, approach and spacing, where the path comes from a file
 
 
@@ -49,6 +51,17 @@ class FileReport:
 
     def __str__(self) -> str:
         return f"{self.name}: {self.waypoints:,} waypoints in {self.segments:,} segments, read as they are"
+
+
+@dataclass(frozen=True)
+class TurnReport:
+    """Axes that had to be tilted clear of a gouge turn faster than the job's cap, both in degrees per millimetre."""
+
+    fastest: float
+    most: float
+
+    def __str__(self) -> str:
+        return f"  problem: tilted clear, the axis turns by up to {self.fastest:.3g} deg/mm, the cap is {self.most:.3g}"
 
 
 def job_tool(job: Job) -> Tool:
@@ -101,8 +114,12 @@ def finished_as_asked(
         links=None if isinstance(job.toolpath, FileTable) else job_link_style(job, mesh, toolpath),
     )
     toolpath, report = checked(toolpath, tool, FacetTree.of(mesh), options, progress)
+    if not report.tilted:
+        return toolpath, report
     # What was tilted clear may turn faster than before.
-    return stepped(toolpath, axis_step) if report.tilted else toolpath, report
+    toolpath = stepped(toolpath, axis_step)
+    fastest, most = float(np.degrees(fastest_turn(toolpath))) * _MM, job.axis.rate_deg_mm
+    return toolpath, Reports((report, TurnReport(fastest, most))) if most and fastest > most * _SLACK else report
 
 
 def job_link_style(job: Job, mesh: Mesh, toolpath: Toolpath) -> LinkStyle:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from pentapod.geometry.directions import angle_between, partway
-from pentapod.toolpath.toolpath import Segment, Toolpath
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 _SLACK = 1.0 - 1e-9
 
@@ -21,6 +21,17 @@ def stepped(toolpath: Toolpath, axis_step: float) -> Toolpath:
     segments = tuple(_divided(segment, toolpath.pivot, axis_step) for segment in toolpath.segments)
     same = all(new is old for new, old in zip(segments, toolpath.segments, strict=True))
     return toolpath if same else Toolpath(segments, toolpath.pivot)
+
+
+def fastest_turn(toolpath: Toolpath) -> float:
+    """Return how fast the axis turns at most along cuts, radians per metre of the pivot's way."""
+    fastest = 0.0
+    for segment in toolpath.segments:
+        if segment.kind is SegmentKind.CUT:
+            way = np.linalg.norm(np.diff(segment.tips + toolpath.pivot * segment.axes, axis=0), axis=1)
+            turn = angle_between(segment.axes[1:], segment.axes[:-1])
+            fastest = max(fastest, float((turn / np.maximum(way, 1e-9)).max()))
+    return fastest
 
 
 def _divided(segment: Segment, pivot: float, axis_step: float) -> Segment:
