@@ -65,7 +65,7 @@ def test_long_work_on_a_toolpath_shows_its_progress(make_job, tmp_path, monkeypa
     monkeypatch.setattr("pentapod.cli.toolpath.progress_bar", recorder)
     assert run_cli(["toolpath", str(make_job()), "-o", str(tmp_path / "path.csv")]) == 0
     assert [note for stage, _, note in told if stage == "mesh" and note] == ["reading", "welding", "edges"]
-    assert {stage for stage, _, _ in told} == {"mesh", "toolpath", "gouge"}
+    assert {stage for stage, _, _ in told} == {"mesh", "toolpath", "gouge", "writing"}
     assert all(0.0 <= fraction <= 1.0 for _, fraction, _ in told)
 
 
