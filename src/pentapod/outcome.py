@@ -99,6 +99,12 @@ class SetUp:
         program = self.outcome.find(Program)
         return None if program is None else program.duration
 
+    @property
+    def seconds(self) -> float:
+        """Wall time of its own stages, from its toolpath on."""
+        names = [stage.name for stage in self.outcome.stages]
+        return sum(stage.seconds for stage in self.outcome.stages[names.index("toolpath") :])
+
     def to_dict(self) -> dict[str, Any]:
         """Return its entry in verdict.json."""
         return {

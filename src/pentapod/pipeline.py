@@ -23,7 +23,7 @@ from pentapod.machine.surroundings import Surroundings
 from pentapod.machine.tool_limits import ToolLimits
 from pentapod.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
 from pentapod.plan_arrays import arrays_of
-from pentapod.planning import Freedom, LegPath, PlacedPath, leg_path, plan
+from pentapod.planning import Freedom, LegPath, PlacedPath, Placement, leg_path, plan
 from pentapod.planning.plan import Wishes, fits
 from pentapod.planning.setups import setups
 from pentapod.program import Program, Provenance, read_header, sample, write_csv
@@ -89,7 +89,10 @@ def _reached(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outco
     else:
         judged = (task.job, task.machine, task.surroundings, task.toolpath, staging / PROGRAM, clock.progress)
         verdict = clock.time("verify", lambda: judge(*judged))
-    return _written(Outcome(task.job, task.machine, tuple(clock.stages), verdict), staging, writers, clock.progress)
+    outcome = Outcome(task.job, task.machine, tuple(clock.stages), verdict)
+    if (placed := outcome.find(PlacedPath)) is not None:
+        outcome = dataclasses.replace(outcome, machine=task.on(placed.placement).machine)
+    return _written(outcome, staging, writers, clock.progress)
 
 
 def _written(outcome: Outcome, staging: Path, writers: Mapping[str, Writer], progress: Progress) -> Outcome:
@@ -124,14 +127,8 @@ def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, write
     times = np.sum([piece.cuts(toolpath) for piece in found], axis=0)
     cutting = cutting_intervals(toolpath)
     done = SetUps(tuple(parts), int(cutting.sum()), int((times != cutting).sum()))
-    clock.stages.append(Stage("set-ups planned", sum(_seconds(part) for part in parts), done, str(done)))
+    clock.stages.append(Stage("set-ups planned", sum(part.seconds for part in parts), done, str(done)))
     return _written(Outcome(job, task.machine, tuple(clock.stages), done.verdict), staging, writers, clock.progress)
-
-
-def _seconds(part: SetUp) -> float:
-    """Return how long the stages of a set-up alone took."""
-    names = [stage.name for stage in part.outcome.stages]
-    return sum(stage.seconds for stage in part.outcome.stages[names.index("toolpath") :])
 
 
 def job_machine(job: Job) -> Machine:
@@ -243,9 +240,19 @@ class _Task:
 
     def program(self, file: Path) -> Program | Refusal:
         """Plan, write the program to `file` and return it; or return the first refusal."""
-        placed = self.clock.time("placement", self._placed, says=_interrupted)
+        placed = self.clock.time("placement", self._placed, says=_remarks)
         if isinstance(placed, Refusal):
             return placed
+        return self.on(placed.placement).written(placed, file)
+
+    def on(self, placement: Placement) -> _Task:
+        """Return the task with the machine's guides where a placement wants them."""
+        if placement.slides is None:
+            return self
+        return dataclasses.replace(self, machine=self.machine.at(placement.slides))
+
+    def written(self, placed: PlacedPath, file: Path) -> Program | Refusal:
+        """Write the program of a placed path to `file` and return it; or return the first refusal."""
         path = self.clock.time("leg path", lambda: self._path(placed))
         if isinstance(path, Refusal):
             return path
@@ -301,8 +308,12 @@ class _Task:
         return explain(trajectory, self.machine, uses, slow)
 
 
-def _interrupted(placed: PlacedPath | Refusal) -> str:
-    """Return what a search that was interrupted came to; nothing else is worth a line."""
-    if isinstance(placed, Refusal) or "interrupted" not in placed.placement.chosen_by:
+def _remarks(placed: PlacedPath | Refusal) -> str:
+    """Return where guides are to stand, and what an interrupted search came to; nothing else is worth a line."""
+    if isinstance(placed, Refusal):
         return ""
-    return f"placement: {placed.placement.chosen_by}; smallest margin {placed.smallest_margin:.3f}"
+    chosen = placed.placement
+    lines = [f"guides 1 to 5 at {chosen.guides}"] if chosen.guides else []
+    if "interrupted" in chosen.chosen_by:
+        lines.append(f"placement: {chosen.chosen_by}; smallest margin {placed.smallest_margin:.3f}")
+    return "\n".join(lines)

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pentapod.arrays import Floats, frozen, set_frozen
 from pentapod.errors import MachineError
+from pentapod.kinematics.guides import ReconfigurablePentapod
 from pentapod.kinematics.pentapod import LinearPentapod
 from pentapod.kinematics.singularities import architectural_measure
 from pentapod.machine.digest import digest_of
@@ -155,7 +157,9 @@ class Machine:
 
     tool_length: metres from p (the platform line's origin, where offset = 0) along i to the tool tip.
     rapid_velocity: largest tip speed in m/s on rapids. drives, masses: for simulation alone; a program does not
-    depend on them. tool_limits: of the motion of tip and axis, none unless set.
+    depend on them. tool_limits: of the motion of tip and axis, none unless set. guides: of a reconfigurable machine, on
+    which the base joints are set before a program runs; slides (5,) metres: where they stand, `pentapod` is that
+    geometry.
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
     spindle's nose would be above the lowest platform joint.
@@ -173,10 +177,13 @@ class Machine:
     drives: Drives = field(default_factory=Drives)
     masses: Masses = field(default_factory=Masses)
     tool_limits: ToolLimits = field(default_factory=ToolLimits)
+    guides: ReconfigurablePentapod | None = None
+    slides: Floats = field(default_factory=lambda: np.zeros(5))
     architecture: float = field(init=False)
 
     def __post_init__(self) -> None:
         positive(self, "tool_length", "rapid_velocity")
+        set_frozen(self, slides=frozen(self.slides, "slides", (5,)))
         measure = architectural_measure(self.pentapod)
         set_frozen(self, architecture=measure)
         if measure < ARCHITECTURAL_LIMIT:
@@ -207,13 +214,22 @@ class Machine:
     def digest(self) -> str:
         """16 hexadecimal digits over all numbers that programs depend on: equal machines have equal digests.
 
-        Name, drives and masses do not count.
+        Name, drives and masses do not count. With its guides elsewhere it is another machine.
         """
         return digest_of(dict(_numbers(self)))
 
     def with_tool(self, tool_length: float) -> Machine:
         """Return this machine with another tool: metres from p to the tip. Raises MachineError."""
         return dataclasses.replace(self, tool_length=tool_length)
+
+    def at(self, slides: ArrayLike) -> Machine:
+        """Return this machine with its guides at slides (5,), metres.
+
+        Raises MachineError: it has no guides, or is architecturally singular there. Their travel is not looked at.
+        """
+        if self.guides is None:
+            raise MachineError("this machine has no guides", key="guides", value=np.asarray(slides).tolist())
+        return dataclasses.replace(self, pentapod=self.guides.at(slides), slides=np.asarray(slides, dtype=np.float64))
 
 
 def _numbers(machine: Machine) -> Iterator[tuple[str, object]]:
@@ -224,3 +240,5 @@ def _numbers(machine: Machine) -> Iterator[tuple[str, object]]:
             yield f"{type(part).__name__}.{item.name}", getattr(part, item.name)
     yield from (("tool_length", machine.tool_length), ("rapid_velocity", machine.rapid_velocity))
     yield from machine.tool_limits.given().items()
+    if machine.guides is not None:
+        yield from (("guides", machine.guides.guides), ("travel", machine.guides.travel))

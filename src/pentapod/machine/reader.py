@@ -15,10 +15,11 @@ from pydantic_core import ErrorDetails
 
 from pentapod.arrays import Floats
 from pentapod.errors import InputError, MachineError, nearest
+from pentapod.kinematics.guides import ReconfigurablePentapod
 from pentapod.kinematics.pentapod import LinearPentapod
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.machine import Bodies, ControllerSettings, JointLimits, LegLimits, Machine, WorkVolume
-from pentapod.machine.tables import DrivesTable, GeometryTable, MachineTables, MassesTable
+from pentapod.machine.tables import DrivesTable, GeometryTable, GuidesTable, MachineTables, MassesTable
 from pentapod.machine.tool_limits import ToolLimits
 
 OFFSET_TOLERANCE_M = 1e-6  # offsets in a file are rounded; beyond a micrometre they mean another machine
@@ -37,6 +38,8 @@ _FILE_KEYS = {
     "base": "geometry.base_mm",
     "delta": "geometry.delta",
     "offsets": "geometry.platform_mm",
+    "guides": "guides.direction",
+    "travel": "guides.least_mm",
     "tool_length": "tool.length_mm",
     "tilt": "work.tilt_deg",
     "position_gain": "drives.position_gain_per_s",
@@ -117,9 +120,10 @@ def _si(values: object) -> Floats:
 
 def _build(tables: MachineTables) -> Machine:
     legs, joints, bodies, work = tables.legs, tables.joints, tables.bodies, tables.work
+    pentapod = _geometry(tables.geometry)
     return Machine(
         name=tables.name,
-        pentapod=_geometry(tables.geometry),
+        pentapod=pentapod,
         legs=LegLimits(
             min_length=_si(legs.min_length_mm),
             max_length=_si(legs.max_length_mm),
@@ -150,7 +154,22 @@ def _build(tables: MachineTables) -> Machine:
         drives=_drives(tables.drives),
         masses=_masses(tables.masses),
         tool_limits=ToolLimits.of(tables.tool),
+        guides=_guides(tables.guides, pentapod),
     )
+
+
+def _guides(table: GuidesTable, pentapod: LinearPentapod) -> ReconfigurablePentapod | None:
+    travel = _si(np.stack([table.least_mm, table.greatest_mm], axis=1))
+    if not travel.any():
+        return None
+    if ((travel[:, 0] > 0.0) | (travel[:, 1] < 0.0)).any():
+        raise MachineError(
+            "base_mm is not within the travel of the guides",
+            key="travel",
+            value=travel.tolist(),
+            expected="least_mm at most 0, greatest_mm at least 0",
+        )
+    return ReconfigurablePentapod(pentapod, np.asarray(table.direction), travel)
 
 
 def _drives(table: DrivesTable) -> Drives:

@@ -94,6 +94,16 @@ class GeometryTable(Table):
     )
 
 
+class GuidesTable(Table):
+    """Guides of a reconfigurable machine: the base joints are set along them before a program runs."""
+
+    direction: FivePairs = Field(
+        default=[[0.0, 1.0]] * 5, description="of each guide in the base plane, unit [x, y]; [0, 0] for a fixed joint"
+    )
+    least_mm: PerLeg = Field(default=[0.0] * 5, description="least slide from base_mm along it")
+    greatest_mm: PerLeg = Field(default=[0.0] * 5, description="greatest slide; no guides where none can move")
+
+
 class LegsTable(Table):
     """What the legs can do; one number for all, or five."""
 
@@ -217,6 +227,7 @@ class MachineTables(Table):
     name: Annotated[str, Field(min_length=1, pattern=r"^[\w .+-]+$")] = Field(description="what it is called")
     description: str = Field(default="", description="one sentence")
     geometry: GeometryTable
+    guides: GuidesTable = Field(default_factory=GuidesTable, description="on which base joints can be set, if they can")
     legs: LegsTable
     joints: JointsTable
     bodies: BodiesTable

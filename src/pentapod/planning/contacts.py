@@ -75,16 +75,17 @@ def margin_formulas(
     pose: tuple[Sequence[Any], Sequence[Any]],
     placement: tuple[Callable[[int, int], Any], Sequence[Any]],
     numbers: Sequence[Any],
+    joints: tuple[Sequence[Sequence[Any]], Sequence[Any]],
 ) -> list[Any]:
     """Return the margins (C,) as formulas of the pose, contacts given.
 
     pose: components of tip and axis, machine frame. placement: the entries of its rotation, and its translation.
-    numbers: of all contacts, one after the other. NumPy arrays or casadi symbols.
+    numbers: of all contacts, one after the other. joints: base attachments (5) of two, and platform offsets (5). NumPy
+    arrays or casadi symbols.
     """
     tip, axis = pose
     turn, shift = placement
-    lever = [machine.tool_length - float(z) for z in machine.pentapod.offsets]
-    base = machine.pentapod.base.tolist()
+    base, lever = joints[0], [machine.tool_length - z for z in joints[1]]
     formulas: list[Any] = []
     for obstacle in surroundings.obstacles:
         for body in range(len(surroundings.names)):

@@ -15,7 +15,7 @@ import numpy as np
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.freedom import Freedom
-from pentapod.planning.margins import Margins
+from pentapod.planning.margins import Joints, Margins
 from pentapod.planning.setting import Setting
 from pentapod.planning.vectorised import Vectorised
 from pentapod.planning.weights import weighed
@@ -35,6 +35,31 @@ def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, 
     """
     import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
+    inputs, values, used = _point(setting, margins, kinds, None)
+    step, a = inputs[:2]
+    unknowns = {"nothing": [], "lean": [a], "step and lean": [ca.vertcat(step, a)]}[by]
+    slopes = [ca.densify(ca.jacobian(values, x)) for x in unknowns]
+    return ca.Function("point", inputs, [values, used, *slopes], {"cse": True})
+
+
+def guide_function(setting: Setting, margins: Margins) -> Any:
+    """Return the casadi function of one waypoint with the guides free: all margins, and their derivatives M × 13.
+
+    Of slides 5 from where the guides of the setting's machine stand, and then as `point_function`; the derivatives are
+    by (step, slides, a).
+    """
+    import casadi as ca  # noqa: PLC0415
+
+    slides = ca.SX.sym("slides", 5)
+    inputs, values, _ = _point(setting, margins, range(len(margins.limits)), slides)
+    slopes = ca.densify(ca.jacobian(values, ca.vertcat(inputs[0], slides, inputs[1])))
+    return ca.Function("guides", [slides, *inputs], [values, slopes], {"cse": True})
+
+
+def _point(setting: Setting, margins: Margins, kinds: Sequence[int], slides: Any) -> tuple[list[Any], Any, Any]:
+    """Return the symbols of a waypoint, its weighed margins, and the square of the share of the cone; see above."""
+    import casadi as ca  # noqa: PLC0415
+
     step, a = ca.SX.sym("step", 6), ca.SX.sym("a", 2)
     pivot, nominal = ca.SX.sym("pivot", 3), ca.SX.sym("nominal", 3)
     pair, rotation, translation = ca.SX.sym("pair", 3, 2), ca.SX.sym("R", 3, 3), ca.SX.sym("t", 3)
@@ -45,15 +70,21 @@ def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, 
     turned = ca.mtimes(turn, (nominal + across) / ca.sqrt(1.0 + square))
     tip = ca.mtimes(turn, pivot) + translation + step[:3] - setting.task.pivot * turned
     numbers = ca.SX.sym("contacts", margins.contact_numbers)
-    values = margins.symbolic(tip, turned, turn, translation + step[:3], numbers)[list(kinds)]
+    joints = None if slides is None else _slid(setting, margins, slides)
+    values = margins.symbolic(tip, turned, turn, translation + step[:3], numbers, joints)[list(kinds)]
     if not setting.weights.are_even:
         values = weighed(values, ca.DM(setting.weights.of(margins.limits)[list(kinds)]))
     used = square / setting.cone**2 if setting.task.tilt > 0.0 else ca.SX(0.0)
-    unknowns = {"nothing": [], "lean": [a], "step and lean": [ca.vertcat(step, a)]}[by]
-    slopes = [ca.densify(ca.jacobian(values, x)) for x in unknowns]
-    return ca.Function(
-        "point", [step, a, pivot, nominal, pair, rotation, translation, numbers], [values, used, *slopes], {"cse": True}
-    )
+    return [step, a, pivot, nominal, pair, rotation, translation, numbers], values, used
+
+
+def _slid(setting: Setting, margins: Margins, slides: Any) -> Joints:
+    """Return the joints with the guides moved on by slides; a platform joint moves with its guide's part along x."""
+    (bases, offsets), guides = margins.joints, setting.machine.guides
+    ways = np.zeros((5, 2)) if guides is None else guides.guides
+    moved = [[x + slides[k] * ways[k, 0], y + slides[k] * ways[k, 1]] for k, (x, y) in enumerate(bases)]
+    delta = setting.machine.pentapod.delta
+    return moved, [z + delta * slides[k] * ways[k, 0] for k, z in enumerate(offsets)]
 
 
 def curvature_function(setting: Setting, margins: Margins) -> Any:

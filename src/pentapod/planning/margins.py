@@ -40,6 +40,9 @@ _BLOCK = 16_384
 _PAIRS = tuple(combinations(range(5), 2))
 
 
+Joints = tuple[Sequence[Sequence[Any]], Sequence[Any]]
+"""Base attachments (5) of two and platform offsets (5), metres: numbers or expressions."""
+
 Group = Literal["strokes", "singularities", "joints", "bodies"]
 
 
@@ -107,25 +110,55 @@ class Margins:
         """How many numbers the contacts of one pose are."""
         return NUMBERS * len(names(self.surroundings))
 
-    def symbolic(self, tip: Any, axis: Any, turn: Any = None, shift: Any = None, numbers: Any = None) -> Any:
+    def symbolic(
+        self,
+        tip: Any,
+        axis: Any,
+        turn: Any = None,
+        shift: Any = None,
+        numbers: Any = None,
+        joints: Joints | None = None,
+    ) -> Any:
         """Return the column of the same margins for casadi SX vectors tip and axis (3).
 
         turn, shift: the workpiece's rotation (3×3) and translation; numbers: of its contacts, see `contacts`. All three
-        are needed where there are obstacles.
+        are needed where there are obstacles. joints: as in `rows`.
         """
         import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
         pose = ca.vertsplit(tip), ca.vertsplit(axis)
-        rows = self.rows(*pose, ca.sqrt, ca.fmin, ca.fmax, ca.if_else)
+        rows = self.rows(*pose, ca.sqrt, ca.fmin, ca.fmax, ca.if_else, joints)
         if self.surroundings.obstacles:
             placement = (lambda k, j: turn[k, j]), ca.vertsplit(shift)
-            rows += margin_formulas(self.machine, self.surroundings, pose, placement, ca.vertsplit(numbers))
+            known = self.joints if joints is None else joints
+            rows += margin_formulas(self.machine, self.surroundings, pose, placement, ca.vertsplit(numbers), known)
         return ca.vertcat(*rows)
 
-    def rows(self, tip: Sequence[Any], axis: Sequence[Any], sqrt: Any, least: Any, most: Any, where: Any) -> list[Any]:
-        """Return the margin expressions, in the order of `limits`; the arguments are three components each."""
+    @property
+    def joints(self) -> Joints:
+        """Where the joints are: base attachments (5) of two, and platform offsets (5), metres."""
+        robot = self.machine.pentapod
+        return robot.base.tolist(), robot.offsets.tolist()
+
+    def rows(
+        self,
+        tip: Sequence[Any],
+        axis: Sequence[Any],
+        sqrt: Any,
+        least: Any,
+        most: Any,
+        where: Any,
+        joints: Joints | None = None,
+    ) -> list[Any]:
+        """Return the margin expressions, in the order of `limits`; tip and axis are three components each.
+
+        joints: where base joints on guides, and the platform joints that belong to them, are, as expressions; where the
+        machine has them by default. The singular surfaces do not change with them, and gaps between a leg and what
+        hangs on its platform line change so little that they are taken as they are.
+        """
         m = self.machine
-        robot, legs, joints = m.pentapod, m.legs, m.joints
+        bases, offsets = self.joints if joints is None else joints
+        robot, legs, cones = m.pentapod, m.legs, m.joints
         u, v, w = -axis[0], -axis[1], -axis[2]  # i points to the tip
         p = [tip[k] + m.tool_length * axis[k] for k in range(3)]
 
@@ -133,7 +166,7 @@ class Margins:
             return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
         vectors, lengths = [], []
-        for (x, y), z in zip(robot.base.tolist(), robot.offsets.tolist(), strict=True):
+        for (x, y), z in zip(bases, offsets, strict=True):
             d = [p[0] + z * u - x, p[1] + z * v - y, p[2] + z * w]
             vectors.append(d)
             lengths.append(sqrt(dot(d, d)))
@@ -157,18 +190,18 @@ class Margins:
 
         direction = [u, v, w]
         for d, length, a, cone in zip(
-            vectors, lengths, joints.base_axes.tolist(), joints.base_cone.tolist(), strict=True
+            vectors, lengths, cones.base_axes.tolist(), cones.base_cone.tolist(), strict=True
         ):
             edge = float(np.cos(cone))
             rows.append((dot(d, a) / length - edge) / (1.0 - edge))
-        for k, (least_angle, most_angle) in enumerate(joints.platform_range.tolist()):
+        for k, (least_angle, most_angle) in enumerate(cones.platform_range.tolist()):
             scale = 0.5 * (np.cos(least_angle) - np.cos(most_angle))
             cosine = dot(vectors[k], direction) / lengths[k]
             rows.append((cosine - float(np.cos(most_angle))) / scale)
             rows.append((float(np.cos(least_angle)) - cosine) / scale)
 
         for (j, k), side in zip(_PAIRS, self.sides, strict=True):
-            offset = (robot.base[k] - robot.base[j]).tolist()
+            offset = [b - a for a, b in zip(bases[j], bases[k], strict=True)]
             gap = _segment_distance(offset, vectors[j], vectors[k], side, sqrt, least, most, where)
             rows.append((gap - 2.0 * m.bodies.leg_radius) / CLEARANCE_COMFORTABLE_M)
 
@@ -181,7 +214,7 @@ class Margins:
 
 
 def _segment_distance(
-    offset: Sequence[float],
+    offset: Sequence[Any],
     d1: Sequence[Any],
     d2: Sequence[Any],
     side: float,

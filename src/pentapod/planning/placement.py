@@ -9,7 +9,16 @@ from pentapod.geometry.rigid import RigidTransform
 
 @dataclass(frozen=True)
 class Placement:
-    """Rigid transform workpiece → machine, and what it was chosen by ("job", "largest smallest margin", ...)."""
+    """Rigid transform workpiece → machine, and what it was chosen by ("job", "largest smallest margin", ...).
+
+    slides (5,): where the guides of a reconfigurable machine are to stand, metres; None for other machines.
+    """
 
     transform: RigidTransform
     chosen_by: str
+    slides: tuple[float, ...] | None = None
+
+    @property
+    def guides(self) -> str:
+        """Where the guides are to stand, in words; nothing for a machine that has none."""
+        return "" if self.slides is None else ", ".join(f"{1e3 * slide:.3f}" for slide in self.slides) + " mm"

@@ -10,11 +10,12 @@ from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import NOTHING, Surroundings
 from pentapod.planning.blame import refusal
 from pentapod.planning.freedom import FREE, Freedom
+from pentapod.planning.guiding import guided
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.planning.placement import Placement
 from pentapod.planning.remedies import remedies
 from pentapod.planning.sampling import best_tilted_margins
-from pentapod.planning.search import SOLVERS, Solver, SolverName, search
+from pentapod.planning.search import SOLVERS, Search, Solver, SolverName, search
 from pentapod.planning.second_aim import SecondAim, aim_of, improved
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Candidate, Setting
@@ -58,13 +59,14 @@ def plan(
 
     tilt: half angle in radians of the cone around the nominal axis within which the tool may lean.
     freedom: the allowed placements; of them, and of all components where none is given, the one with the largest
-    smallest margin is kept, the margins weighed by `weights`. surroundings: what legs, spindle and tool must not touch.
+    smallest margin is kept, the margins weighed by `weights`; a machine's guides are chosen with it. surroundings: what
+    legs, spindle and tool must not touch.
     then: second aim, for which up to a tenth of that margin is given. Deterministic for a seed. Returns a Refusal that
     names limits, waypoints and shortfalls where the part does not fit. An interruption (Ctrl-C) of the search for a
     placement ends it with the best found so far, if that fits; else KeyboardInterrupt is raised.
     """
     setting = Setting.of(Task.of(toolpath, tilt), machine, freedom, weights)
-    found = search(setting, component, surroundings, seed=seed, solver=solver, progress=progress)
+    setting, found = _searched(setting, component, surroundings, seed, solver, progress)
     best = found.best
     if best.smallest < NEEDED_MARGIN:
         progress("placement", 1.0, "it does not fit; looking for what would")
@@ -79,7 +81,8 @@ def plan(
         calm = SOLVERS[solver](setting, False).calm(best, min(keep, best.smallest))
         leans = leans if calm is None else setting.course.leans(calm)
     tips, axes = setting.task.machine_poses(best.transform, lean(setting.task.nominal, leans))
-    chosen = Placement(best.transform, found.choice)
+    slides = None if machine.guides is None else tuple(setting.machine.slides.tolist())
+    chosen = Placement(best.transform, found.choice, slides)
     margins = best.margins
     return PlacedPath(
         toolpath, chosen, margins.component, tips, axes, margins(tips, axes, best.transform), margins.limits
@@ -102,10 +105,24 @@ def fits(
     Raises KeyboardInterrupt where the search is interrupted.
     """
     setting = Setting.of(Task.of(toolpath, tilt), machine, freedom, weights)
-    found = search(setting, component, surroundings, solver=solver)
+    _, found = _searched(setting, component, surroundings, 0, solver, silent)
     if found.interrupted:
         raise KeyboardInterrupt
     return found.best.smallest >= NEEDED_MARGIN
+
+
+def _searched(
+    setting: Setting,
+    component: Component | None,
+    surroundings: Surroundings,
+    seed: int,
+    solver: SolverName,
+    progress: Progress,
+) -> tuple[Setting, Search]:
+    """Return what the search found, and the setting: with its machine's guides as chosen, where it has some."""
+    if setting.machine.guides is not None:
+        return guided(setting, component, surroundings, seed=seed, solver=solver, progress=progress)
+    return setting, search(setting, component, surroundings, seed=seed, solver=solver, progress=progress)
 
 
 def _refusal(setting: Setting, best: Candidate, improves: Callable[[Setting, bool], Solver]) -> Refusal:

@@ -53,6 +53,7 @@ def read_csv(path: str | Path) -> Program:
         component=header.component,
         placement=header.placement,
         provenance=header.provenance,
+        slides=header.slides,
     )
 
 

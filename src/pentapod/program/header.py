@@ -32,6 +32,8 @@ KEYS = (
     "placement_mm",
     "rows",
 )
+GUIDES = "guides_mm"
+"""A key that only the programs of reconfigurable machines have."""
 WAYPOINTS, BOX = "setup_waypoints", "setup_box_mm"
 SETUP_KEYS = (WAYPOINTS, BOX)
 """Keys that only the programs of several set-ups have."""
@@ -47,6 +49,7 @@ class Header:
     placement: RigidTransform
     provenance: Provenance
     rows: int
+    slides: tuple[float, ...] | None = None
     unknown: tuple[str, ...] = ()
 
 
@@ -66,6 +69,8 @@ def header_text(program: Program) -> str:
         str(len(program.legs)),
     )
     lines = [f"# {key} = {value}\n" for key, value in zip(KEYS, values, strict=True)]
+    if program.slides is not None:
+        lines.append(f"# {GUIDES} = [{', '.join(_decimal(x, 3) for x in program.slides)}]\n")
     if source.piece is not None:
         lines += [f"# {WAYPOINTS} = [{source.piece.first}, {source.piece.last}]\n", f"# {BOX} = {_box(source.piece)}\n"]
     return "".join(lines)
@@ -132,7 +137,8 @@ class _Reader:
                 piece=self._piece(),
             ),
             rows=self._rows(),
-            unknown=tuple(key for key in self.values if key not in (*KEYS, *SETUP_KEYS)),
+            slides=self._slides(),
+            unknown=tuple(key for key in self.values if key not in (*KEYS, GUIDES, *SETUP_KEYS)),
         )
 
     def _wrong(self, key: str, expected: str) -> ProgramError:
@@ -155,6 +161,15 @@ class _Reader:
         if not (period > 0.0 and math.isfinite(period)):
             raise self._wrong("period_s", "a positive number of seconds")
         return period
+
+    def _slides(self) -> tuple[float, ...] | None:
+        if GUIDES not in self.values:
+            return None
+        given = self.values[GUIDES]
+        slides = [_number(entry, shift=-3) for entry in cast("list[Any]", given)] if isinstance(given, list) else []
+        if len(slides) != 5 or not all(map(math.isfinite, slides)):
+            raise self._wrong(GUIDES, "five numbers of mm, one for each guide")
+        return tuple(slides)
 
     def _piece(self) -> Piece | None:
         present = [key for key in SETUP_KEYS if key in self.values]

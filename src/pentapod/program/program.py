@@ -12,6 +12,7 @@ from pentapod.arrays import Floats, frozen, set_frozen
 from pentapod.errors import ProgramError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
+from pentapod.machine.machine import Machine
 from pentapod.toolpath.parting import Piece
 
 FORMAT_VERSION = 1
@@ -37,7 +38,8 @@ class Program:
 
     legs (N, 5): lengths in metres, row k is due at k · period seconds. interpolation: how the controller
     moves between rows: "linear", or "cubic": the C2 cubic spline through the rows with zero end
-    velocities. component: in which the motion must stay. placement: workpiece → machine.
+    velocities. component: in which the motion must stay. placement: workpiece → machine. slides: where the guides of a
+    reconfigurable machine stand, metres; None for other machines.
     """
 
     period: float
@@ -46,6 +48,7 @@ class Program:
     component: Component
     placement: RigidTransform
     provenance: Provenance
+    slides: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         set_frozen(self, legs=frozen(self.legs, "legs", (None, 5)))
@@ -53,6 +56,10 @@ class Program:
             raise ProgramError("a program needs at least two rows", value=self.legs.shape)
         if not (np.isfinite(self.period) and self.period > 0.0):
             raise ProgramError("the period must be positive", value=self.period)
+
+    def machine(self, machine: Machine) -> Machine:
+        """Return a machine as the program wants it: its guides where they are to stand. Raises MachineError."""
+        return machine if self.slides is None or machine.guides is None else machine.at(self.slides)
 
     @cached_property
     def times(self) -> Floats:

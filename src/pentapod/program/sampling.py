@@ -43,4 +43,5 @@ def sample(
         component=component,
         placement=placement,
         provenance=provenance or Provenance(machine.name, machine.digest, "", __version__),
+        slides=None if machine.guides is None else tuple(machine.slides.tolist()),
     )

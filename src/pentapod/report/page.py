@@ -202,6 +202,10 @@ def _setup_sheet(outcome: Outcome, signals: Signals | None) -> list[tuple[str, s
         ("tool", words.tool_sentence(job.tool)),
         ("tool length", f"{1e3 * machine.tool_length:.3f} mm from the platform's origin to the tip"),
     ]
+    placed = outcome.find(PlacedPath)
+    if placed is not None and placed.placement.guides:
+        stand = placed.placement.guides.replace("-", "−")
+        sheet.append(("guides 1 to 5", f"set to {stand} from where the machine file has the base joints"))
     mesh = outcome.find(Mesh)
     if mesh is not None:
         size = " × ".join(f"{value:.1f}" for value in 1e3 * np.ptp(mesh.bounds, axis=0))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.errors import ArrayError, InputError, ProgramError
+from pentapod.errors import ArrayError, InputError, MachineError, ProgramError
 from pentapod.files import atomic_write
 from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import Surroundings
@@ -86,6 +86,10 @@ def verify(
         read = [Certificate(READABLE, True, None, None, "", Place(), method)]
         if strict:
             read.append(_known(read_header(path).unknown))
+    try:
+        machine = program.machine(machine)
+    except MachineError as error:
+        return Verdict((*read, Certificate(origin.GUIDES, False, None, None, "", Place(), str(error))))
     replay = Replay(program, machine, toolpath, tilt, path_tolerance, axis_tolerance, job_digest, progress, cutting)
     _ = replay.survey
     claims = (*CLAIMS, *collisions.claims(surroundings or Surroundings()))

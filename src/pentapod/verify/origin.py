@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pentapod.verify.claim import Claim, Finding, Idle
 from pentapod.verify.replay import Replay
 from pentapod.verify.verdict import Place
+
+GUIDES = "guides within their travel"
 
 
 def machine(replay: Replay) -> Finding:
@@ -26,7 +30,22 @@ def job(replay: Replay) -> Finding | Idle:
     return Finding(made_from == replay.job_digest, None, None, "", Place(), method)
 
 
+def guides(replay: Replay) -> Finding | Idle:
+    """Judge that the guides of a reconfigurable machine stand within their travel; not asked of other machines."""
+    machine, slides = replay.machine, replay.program.slides
+    if machine.guides is None:
+        return Idle("the machine has no guides")
+    if slides is None:
+        return Finding(False, None, 0.0, "mm", Place(), "the header does not say where the guides stand")
+    least, greatest = machine.guides.travel.T
+    rooms = 1e3 * np.minimum(np.array(slides) - least, greatest - np.array(slides))
+    stand = ", ".join(f"{1e3 * slide:.6g}" for slide in slides)
+    method = f"header: guides at {stand} mm; the least room to an end of their travel"
+    return Finding(bool(rooms.min() >= 0.0), float(rooms.min()), 0.0, "mm", Place(), method)
+
+
 CLAIMS = (
     Claim("machine", machine, needs_pose=False),
+    Claim(GUIDES, guides, needs_pose=False),
     Claim("job", job, needs_pose=False),
 )

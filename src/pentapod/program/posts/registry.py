@@ -30,15 +30,16 @@ class PostInput:
         """Return the machine. Raises InputError where there is none, or not that of the program."""
         if self.machine is None:
             raise InputError("this post needs the machine", key="machine", remedy="name it with --machine or --job")
-        if self.machine.digest != self.program.provenance.machine_digest:
+        machine = self.program.machine(self.machine)
+        if machine.digest != self.program.provenance.machine_digest:
             raise InputError(
                 "this is not the machine that the program was made for",
                 key="machine_digest",
-                value=self.machine.digest,
+                value=machine.digest,
                 expected=self.program.provenance.machine_digest,
                 remedy="give the job with --job: it may change the tool or the controller's period",
             )
-        return self.machine
+        return machine
 
     def the_toolpath(self) -> Toolpath:
         """Return the toolpath as placed. Raises InputError where there is none."""
