@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from pentapod.cli.new import dome_stl
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job
 from pentapod.job_placement import job_freedom, rotation_angles_deg
@@ -27,7 +28,7 @@ from pentapod.report.decimate import keep_extremes, thinned_mesh
 from pentapod.report.signals import Signals
 from pentapod.report.words import duration, number, opening, placement_sentences
 from pentapod.timing import Trajectory
-from pentapod.toolpath import Mesh, Toolpath
+from pentapod.toolpath import Mesh, Toolpath, load_mesh
 
 TOO_FAR = ("position_mm = [", "position_mm = [1000.0, 0, 700] # [")
 
@@ -152,6 +153,44 @@ def test_report_of_a_refused_job(make_job, tmp_path):
         assert blame.constraint in page.text
     assert "time" not in data(text, "figures")
     assert data(text, "poses") == {"poses": []}
+
+
+def test_a_refusal_is_drawn_in_the_machine_where_it_came_nearest(make_job, tmp_path):
+    outcome = run(Job.load(make_job(TOO_FAR)), tmp_path / "out")
+    text, _ = page_of(outcome, tmp_path)
+    traces = {trace["name"]: trace for trace in data(text, "figures")["scene"]["data"]}
+    attempt, machine = outcome.refusal.attempt, outcome.machine
+    assert attempt.smallest_margin < 0.0
+    # The blamed waypoints lie on the path where it was tried, in the machine; lifted a little off the surface.
+    for blame in outcome.refusal.blames:
+        points = np.stack([unpacked(traces[blame.constraint][axis]) for axis in "xyz"], axis=1)
+        chosen = np.concatenate([np.arange(a, b + 1) for a, b in blame.waypoints])
+        np.testing.assert_allclose(points, 1e3 * attempt.tips[chosen], atol=0.51)
+    # The legs stand at the waypoint with the smallest margin, as long as the pose there needs them.
+    worst = int(attempt.margins.min(axis=1).argmin())
+    tip, axis = attempt.tips[worst], attempt.axes[worst]
+    lengths = np.linalg.norm(machine.pentapod.leg_vectors(tip + machine.tool_length * axis, -axis), axis=-1)
+    for k in range(5):
+        ends = np.stack([unpacked(traces[f"leg {k + 1}"][axis]) for axis in "xyz"], axis=1)
+        assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(1e3 * lengths[k], abs=0.01)
+
+
+def test_the_fixture_is_drawn(make_job, tmp_path):
+    path = make_job()
+    path.with_name("held.stl").write_bytes(dome_stl(cells=4))
+    text = path.read_text()
+    for frame, name in (("machine", "table"), ("part", "fixture")):
+        path.write_text(f'{text}\n[fixture]\nmesh = "held.stl"\nunit = "mm"\nframe = "{frame}"\n')
+        outcome = run(Job.load(path), tmp_path / frame)
+        page, _ = page_of(outcome, tmp_path)
+        trace = next(t for t in data(page, "figures")["scene"]["data"] if t["name"] == name)
+        placed = outcome.find(PlacedPath)
+        shown = placed if placed is not None else outcome.refusal.attempt
+        vertices = load_mesh(path.with_name("held.stl"), "mm").vertices
+        wanted = vertices if frame == "machine" else shown.placement.transform.apply(vertices)
+        points = np.stack([unpacked(trace[axis]) for axis in "xyz"], axis=1)
+        np.testing.assert_allclose(np.sort(points, axis=0), np.sort(1e3 * wanted, axis=0), atol=1e-3)
+        assert (f"<title>{name}</title>" in page) is (placed is not None)
 
 
 def test_report_of_a_failed_verdict_puts_the_failures_first(make_job, tmp_path):

@@ -6,7 +6,8 @@ import numpy as np
 
 from pentapod.arrays import Bools, Floats
 from pentapod.planning.margins import Margins
-from pentapod.refusal import Blame, Refusal
+from pentapod.planning.placed_path import PlacedPath, UnplacedPath
+from pentapod.refusal import Blame
 
 
 def blame(values: Floats, margins: Margins, needed: float) -> tuple[Blame, ...]:
@@ -25,15 +26,18 @@ def ranges(mask: Bools) -> tuple[tuple[int, int], ...]:
     return tuple((int(a), int(b) - 1) for a, b in edges.reshape(-1, 2))
 
 
-def refusal(values: Floats, margins: Margins, needed: float, remedies: tuple[str, ...], *, fixed: bool) -> Refusal:
+def refusal(
+    values: Floats, attempt: PlacedPath, margins: Margins, needed: float, remedies: tuple[str, ...], *, fixed: bool
+) -> UnplacedPath:
     """Return the refusal of a placement whose best margins are values (N, M); remedies: phrases for "Try to …"."""
     blames = blame(values, margins, needed)
     short = int((values.min(axis=1) < needed).sum())
     where = "at the given placement" if fixed else "at the best placement found"
     otherwise = "turn or move the part" if fixed else "scale the part down; no wider cone or large region of it fits"
-    return Refusal(
+    return UnplacedPath(
         "placement",
         f"the part does not fit the machine {where}: {short} of {len(values)} waypoints are out of limits",
         blames,
         remedy="Try to " + (", or to ".join(remedies) or otherwise),
+        attempt=attempt,
     )

@@ -21,6 +21,7 @@ from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import NOTHING, TOOL_BODY, Surroundings
 from pentapod.machine.tool_clearance import Arithmetic, leg_spindle_gap, leg_tool_gap
 from pentapod.planning.contacts import NUMBERS, comforts, contacts, margin_formulas, names
+from pentapod.planning.passing import passing_gap
 
 W_COMFORTABLE = float(np.sin(np.radians(60.0)))
 """|w| of a tool axis 30° off the base normal: margin 1."""
@@ -202,7 +203,7 @@ class Margins:
 
         for (j, k), side in zip(_PAIRS, self.sides, strict=True):
             offset = [b - a for a, b in zip(bases[j], bases[k], strict=True)]
-            gap = _segment_distance(offset, vectors[j], vectors[k], side, sqrt, least, most, where)
+            gap = passing_gap(offset, vectors[j], vectors[k], side, sqrt, least, most, where)
             rows.append((gap - 2.0 * m.bodies.leg_radius) / CLEARANCE_COMFORTABLE_M)
 
         do, cosines = Arithmetic(sqrt, least, most, where), [dot(vectors[k], direction) / lengths[k] for k in range(5)]
@@ -211,44 +212,6 @@ class Margins:
             gaps = [leg_tool_gap(m, tool, k, cosines[k], lengths[k], do) for k in range(5)]
             rows += [gap / TOOL_COMFORTABLE_M for gap in gaps]
         return rows
-
-
-def _segment_distance(
-    offset: Sequence[Any],
-    d1: Sequence[Any],
-    d2: Sequence[Any],
-    side: float,
-    sqrt: Any,
-    least: Any,
-    most: Any,
-    where: Any,
-) -> Any:
-    """Return the distance of segments α d1 and offset + β d2, α, β in [0, 1]; offset in the base plane.
-
-    It is negative where one has passed through the other: where the nearest points lie inside both and
-    the second runs on the other side of the first than `side`, the sign of offset · (d1 × d2), says.
-    The quadratic in (α, β) is minimised on the unit square by clamping α, then β, then α again.
-    """
-    ox, oy = offset
-    a = d1[0] * d1[0] + d1[1] * d1[1] + d1[2] * d1[2]
-    e = d2[0] * d2[0] + d2[1] * d2[1] + d2[2] * d2[2]
-    b = d1[0] * d2[0] + d1[1] * d2[1] + d1[2] * d2[2]
-    c, f = -(d1[0] * ox + d1[1] * oy), -(d2[0] * ox + d2[1] * oy)
-    area = a * e - b * b + 1e-12 * a * e  # parallel legs: any α will do, the later clamps repair it
-
-    def clamp(x: Any) -> Any:
-        return least(most(x, 0.0), 1.0)
-
-    alpha = clamp((b * f - c * e) / area)
-    beta = clamp((b * alpha + f) / e)
-    alpha = clamp((b * beta - c) / a)
-    gx = alpha * d1[0] - beta * d2[0] - ox
-    gy = alpha * d1[1] - beta * d2[1] - oy
-    gz = alpha * d1[2] - beta * d2[2]
-    gap = sqrt(gx * gx + gy * gy + gz * gz + 1e-18)  # the last term keeps the derivative finite at contact
-    triple = ox * (d1[1] * d2[2] - d1[2] * d2[1]) + oy * (d1[2] * d2[0] - d1[0] * d2[2])
-    inside = alpha * (1.0 - alpha) * beta * (1.0 - beta)
-    return where(side * triple * inside < 0.0, -gap, gap)
 
 
 def _home_sides(machine: Machine, component: Component) -> tuple[float, ...]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from pentapod.arrays import Floats, frozen, set_frozen
 from pentapod.kinematics.component import Component
 from pentapod.planning.margins import Limit
 from pentapod.planning.placement import Placement
+from pentapod.refusal import Refusal
 from pentapod.toolpath.toolpath import Toolpath
 
 
@@ -50,3 +51,10 @@ class PlacedPath:
     def pivots(self) -> Floats:
         """The points (N, 3) about which the tool is tilted, machine frame, metres."""
         return self.tips + self.toolpath.pivot * self.axes
+
+
+@dataclass(frozen=True)
+class UnplacedPath(Refusal):
+    """The refusal of a placement, with the attempt that came nearest: what is out of its limits there, and where."""
+
+    attempt: PlacedPath = field(kw_only=True)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypedDict
 
+from pentapod.arrays import Floats
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import NOTHING, Surroundings
 from pentapod.planning.blame import refusal
 from pentapod.planning.freedom import FREE, Freedom
 from pentapod.planning.guiding import guided
-from pentapod.planning.placed_path import PlacedPath
+from pentapod.planning.placed_path import PlacedPath, UnplacedPath
 from pentapod.planning.placement import Placement
 from pentapod.planning.remedies import remedies
 from pentapod.planning.sampling import best_tilted_margins
@@ -70,7 +71,7 @@ def plan(
     best = found.best
     if best.smallest < NEEDED_MARGIN:
         progress("placement", 1.0, "it does not fit; looking for what would")
-        return _refusal(setting, best, SOLVERS[solver])
+        return _refusal(toolpath, setting, best, SOLVERS[solver])
     keep = max(CALM_SHARE * best.smallest, NEEDED_MARGIN)
     if then is not None and (freedom.moves or tilt > 0.0):
         progress("placement", 1.0, f"margin {best.smallest:.3f}; now for {then}")
@@ -80,13 +81,7 @@ def plan(
         progress("tool axis", 0.0, f"smallest margin {best.smallest:.3f}")
         calm = SOLVERS[solver](setting, False).calm(best, min(keep, best.smallest))
         leans = leans if calm is None else setting.course.leans(calm)
-    tips, axes = setting.task.machine_poses(best.transform, lean(setting.task.nominal, leans))
-    slides = None if machine.guides is None else tuple(setting.machine.slides.tolist())
-    chosen = Placement(best.transform, found.choice, slides)
-    margins = best.margins
-    return PlacedPath(
-        toolpath, chosen, margins.component, tips, axes, margins(tips, axes, best.transform), margins.limits
-    )
+    return _path(toolpath, setting, best, leans, found.choice)
 
 
 def fits(
@@ -125,14 +120,27 @@ def _searched(
     return setting, search(setting, component, surroundings, seed=seed, solver=solver, progress=progress)
 
 
-def _refusal(setting: Setting, best: Candidate, improves: Callable[[Setting, bool], Solver]) -> Refusal:
-    values, _ = best_tilted_margins(setting.task, best.margins, best.transform)
+def _path(toolpath: Toolpath, setting: Setting, at: Candidate, leans: Floats, chosen_by: str) -> PlacedPath:
+    """Return the path at a candidate's placement with leans (N, 3), workpiece frame."""
+    tips, axes = setting.task.machine_poses(at.transform, lean(setting.task.nominal, leans))
+    slides = None if setting.machine.guides is None else tuple(setting.machine.slides.tolist())
+    values = at.margins(tips, axes, at.transform)
+    placement = Placement(at.transform, chosen_by, slides)
+    return PlacedPath(toolpath, placement, at.margins.component, tips, axes, values, at.margins.limits)
+
+
+def _refusal(
+    toolpath: Toolpath, setting: Setting, best: Candidate, improves: Callable[[Setting, bool], Solver]
+) -> UnplacedPath:
+    values, leans = best_tilted_margins(setting.task, best.margins, best.transform)
     if (values.min(axis=1) >= NEEDED_MARGIN).all():  # each waypoint alone would do, not all with one smooth field
+        leans = setting.leans(best.coefficients)
         poses = setting.task.machine_poses(best.transform, setting.axes(best.coefficients))
         values = best.margins(*poses, best.transform)
 
     def improve(other: Setting, start: Candidate) -> Candidate:
         return improves(other, True).raise_margin(start)
 
-    found = remedies(setting, best, improve, NEEDED_MARGIN)
-    return refusal(values, best.margins, NEEDED_MARGIN, found, fixed=not setting.freedom.moves)
+    found, fixed = remedies(setting, best, improve, NEEDED_MARGIN), not setting.freedom.moves
+    attempt = _path(toolpath, setting, best, leans, "best attempt")
+    return refusal(values, attempt, best.margins, NEEDED_MARGIN, found, fixed=fixed)

@@ -19,6 +19,7 @@ LEG_DASHES = ("solid", "10px 3px", "2px 2px", "8px 2px 2px 2px", "16px 4px")
 
 LIMIT_COLOUR = "#d2413a"
 QUIET_COLOUR = "#8a8f98"
+HELD_COLOUR = "#a08a6a"
 
 
 def packed(values: ArrayLike, dtype: str = "f4") -> dict[str, str]:

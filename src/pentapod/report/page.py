@@ -16,10 +16,11 @@ from pentapod.job_placement import job_at, placement_toml
 from pentapod.job_surroundings import job_surroundings
 from pentapod.machine.surroundings import NOTHING, Surroundings
 from pentapod.outcome import Outcome, SetUps
-from pentapod.planning.placed_path import PlacedPath
+from pentapod.planning.placed_path import PlacedPath, UnplacedPath
 from pentapod.program.program import Program
 from pentapod.report import plots, scene, words
 from pentapod.report.figure import Figure, as_script
+from pentapod.report.held import held_mesh
 from pentapod.report.setup_sheet import setup_sheet
 from pentapod.report.signals import Signals
 from pentapod.report.worst import worst_places
@@ -121,22 +122,27 @@ def _facts(outcome: Outcome, signals: Signals | None) -> list[tuple[str, str]]:
 
 
 def _scene(outcome: Outcome, signals: Signals | None) -> Figure:
-    """Return the 3D figure: in the machine where a placement was found, else the workpiece alone."""
-    mesh, toolpath = outcome.find(Mesh), outcome.find(Toolpath)
+    """Return the 3D figure: in the machine where a placement was found or tried, else the workpiece alone."""
+    mesh, toolpath, refusal = outcome.find(Mesh), outcome.find(Toolpath), outcome.refusal
     placed = outcome.find(PlacedPath)
+    if placed is None and isinstance(refusal, UnplacedPath):
+        placed = refusal.attempt
     transform = RigidTransform.identity() if placed is None else placed.placement.transform
     traces = [] if mesh is None else [scene.part_trace(mesh, transform, down=placed is not None)]
     traces += [] if mesh is None else scene.fault_traces(mesh, transform)
+    if placed is not None and (held := held_mesh(outcome, placed)) is not None:
+        traces.append(scene.fixture_trace(held, down=True))
     if signals is not None:
         traces += scene.path_traces(signals)
         row = _start_row(signals)
         traces += scene.machine_traces(outcome.machine, signals.tips[row], signals.axes[row])
-    elif toolpath is not None and outcome.refusal is not None:
+    elif toolpath is not None and refusal is not None:
         shown = toolpath if placed is None else placed
-        traces += scene.blamed_traces(shown.tips, shown.axes, outcome.refusal)
+        traces += scene.blamed_traces(shown.tips, shown.axes, refusal)
         if placed is not None:
-            worst = int(placed.margins.min(axis=1).argmin())
-            traces += scene.machine_traces(outcome.machine, placed.tips[worst], placed.axes[worst])
+            worst, slides = int(placed.margins.min(axis=1).argmin()), placed.placement.slides
+            machine = outcome.machine if slides is None else outcome.machine.at(slides)
+            traces += scene.machine_traces(machine, placed.tips[worst], placed.axes[worst])
     elif toolpath is not None and (setups := outcome.find(SetUps)) is not None:
         traces += scene.piece_traces(toolpath, [part.piece for part in setups.parts])
     return scene.scene_figure(traces, down=placed is not None)

@@ -10,7 +10,8 @@ from pentapod.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.report.decimate import thinned_mesh
-from pentapod.report.figure import LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR
+from pentapod.report.figure import HELD_COLOUR, LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR
+from pentapod.report.held import Held
 from pentapod.toolpath.mesh import Mesh
 
 _FACETS, _POINTS = 1200, 1500
@@ -22,6 +23,7 @@ class _Subject:
     """What is drawn, machine frame, metres. facets (F, 3, 3); tips (K, 3); base, joints (5, 3); far, tip, origin (3,).
 
     hangs: whether the base is above the work, so that the machine's z points down. table: z of its surface, if any.
+    around (G, 3, 3): facets of what holds the part; holder: its name.
     """
 
     facets: Floats
@@ -33,11 +35,18 @@ class _Subject:
     origin: Floats
     hangs: bool
     table: float | None
+    around: Floats
+    holder: str
 
 
-def placement_views(mesh: Mesh | None, placed: PlacedPath, machine: Machine, table: float | None) -> str:
-    """Return the views as SVG elements. table: height z of the table's surface, metres, where there is one."""
-    subject = _subject(mesh, placed, machine, table)
+def placement_views(
+    mesh: Mesh | None, placed: PlacedPath, machine: Machine, table: float | None, held: Held | None = None
+) -> str:
+    """Return the views as SVG elements.
+
+    table: height z of the table's surface, metres, where there is one; held: what holds the part.
+    """
+    subject = _subject(mesh, placed, machine, table, held)
     # Seen as someone sees it who stands at the machine: with z pointing down, y comes towards one where x is to the
     # right. Drawn the other way it would be the mirror image.
     y, side = ("down", "y towards you") if subject.hangs else ("up", "y away from you")
@@ -48,7 +57,9 @@ def placement_views(mesh: Mesh | None, placed: PlacedPath, machine: Machine, tab
     )
 
 
-def _subject(mesh: Mesh | None, placed: PlacedPath, machine: Machine, table: float | None) -> _Subject:
+def _subject(
+    mesh: Mesh | None, placed: PlacedPath, machine: Machine, table: float | None, held: Held | None
+) -> _Subject:
     transform, worst = placed.placement.transform, int(placed.margins.min(axis=1).argmin())
     axis, tip = placed.axes[worst], placed.tips[worst]
     joints = tip + (machine.tool_length - machine.pentapod.offsets)[:, None] * axis
@@ -61,7 +72,12 @@ def _subject(mesh: Mesh | None, placed: PlacedPath, machine: Machine, table: flo
         facets = transform.apply(vertices)[faces]
     base = np.column_stack([machine.pentapod.base, np.zeros(5)])
     far, hangs = joints[int(np.argmin(machine.pentapod.offsets))], bool(machine.work.centre[2] > 0.0)
-    return _Subject(facets, tips, base, joints, far, tip, transform.translation, hangs, table)
+    around = np.zeros((0, 3, 3))
+    if held is not None:
+        vertices, faces = thinned_mesh(held.vertices, held.faces, _FACETS)
+        around = vertices[faces]
+    origin, name = transform.translation, "" if held is None else held.name
+    return _Subject(facets, tips, base, joints, far, tip, origin, hangs, table, around, name)
 
 
 def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool = False) -> str:
@@ -72,7 +88,7 @@ def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool =
         return 1e3 * points[..., axes] * (1.0, up)
 
     seen = [flat(subject.tips), flat(subject.facets).reshape(-1, 2)]
-    seen += [] if close else [flat(subject.base), flat(subject.joints)]
+    seen += [] if close else [flat(subject.base), flat(subject.joints), flat(subject.around).reshape(-1, 2)]
     shown = np.concatenate(seen)
     low, high = shown.min(axis=0), shown.max(axis=0)
     room = 0.07 * float((high - low).max())
@@ -88,8 +104,12 @@ def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool =
             f'<polyline points="{at(points)}" fill="none" stroke="{colour}" stroke-width="{width * unit:.2f}" {more}/>'
         )
 
-    shape = "".join(f"M{at(facet)}Z" for facet in flat(subject.facets))
-    parts = [f'<path d="{shape}" fill="{QUIET_COLOUR}" fill-opacity="0.45"/>']
+    def filled(facets: Floats, colour: str, name: str) -> str:
+        shape = "".join(f"M{at(facet)}Z" for facet in flat(facets))
+        return f'<path d="{shape}" fill="{colour}" fill-opacity="0.45"><title>{name}</title></path>'
+
+    parts = [filled(subject.around, HELD_COLOUR, subject.holder)] if len(subject.around) else []
+    parts.append(filled(subject.facets, QUIET_COLOUR, "part"))
     if axes[1] == 2:
         ends = np.array([low[0], high[0]])
         parts.append(line(np.column_stack([ends, np.zeros(2)]), QUIET_COLOUR, 1.0, 'stroke-dasharray="4 3"'))

@@ -12,7 +12,8 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.machine import Machine
 from pentapod.refusal import Refusal
 from pentapod.report.decimate import keep_extremes, thinned_mesh
-from pentapod.report.figure import LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR, Figure, packed
+from pentapod.report.figure import HELD_COLOUR, LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR, Figure, packed
+from pentapod.report.held import Held
 from pentapod.report.signals import Signals
 from pentapod.toolpath.faults import faults
 from pentapod.toolpath.mesh import Mesh
@@ -40,14 +41,23 @@ _CAUSE_COLOURS = ("#14213d", "#8f2d56", "#2a78d6", "#d1603d", "#1baa7a", "#e0a52
 
 def part_trace(mesh: Mesh, placement: RigidTransform, *, down: bool) -> dict[str, Any]:
     """Return the part's surface, thinned for display, lit from above. down: as in `scene_figure`."""
-    vertices, faces = thinned_mesh(mesh.vertices, mesh.faces, _MOST_FACETS)
-    x, y, z = 1e3 * placement.apply(vertices).T
+    return _surface(placement.apply(mesh.vertices), mesh.faces, "part", "#c3ced9", down=down)
+
+
+def fixture_trace(held: Held, *, down: bool) -> dict[str, Any]:
+    """Return the surface of what holds the part; see through, so that it hides nothing."""
+    return _surface(held.vertices, held.faces, held.name, HELD_COLOUR, down=down) | {"opacity": 0.55}
+
+
+def _surface(vertices: Floats, faces: Ints, name: str, colour: str, *, down: bool) -> dict[str, Any]:
+    vertices, faces = thinned_mesh(vertices, faces, _MOST_FACETS)
+    x, y, z = 1e3 * vertices.T
     i, j, k = faces.T
     return {
         "type": "mesh3d",
         "x": packed(x), "y": packed(y), "z": packed(z),
         "i": packed(i, "i4"), "j": packed(j, "i4"), "k": packed(k, "i4"),
-        "color": "#c3ced9", "opacity": 1.0, "hoverinfo": "skip", "name": "part", "showlegend": True,
+        "color": colour, "opacity": 1.0, "hoverinfo": "skip", "name": name, "showlegend": True,
         "lighting": {"ambient": 0.8, "diffuse": 0.35, "specular": 0.05, "roughness": 0.9, "fresnel": 0.1},
         "lightposition": {"x": 30_000, "y": -60_000, "z": -40_000 if down else 40_000},
     }  # fmt: skip

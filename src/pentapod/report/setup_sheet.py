@@ -7,6 +7,7 @@ from html import escape
 from pentapod.outcome import Outcome
 from pentapod.planning.binding import Binding, bindings
 from pentapod.planning.placed_path import PlacedPath
+from pentapod.report.held import held_mesh
 from pentapod.report.margin_band import margin_band
 from pentapod.report.placement_views import placement_views
 from pentapod.report.words import number
@@ -24,9 +25,11 @@ def setup_sheet(outcome: Outcome) -> str:
     height = table.table_z_mm if table.mode == "table" else None
     surface = None if height is None else 1e-3 * height
     told = "" if height is None else f"<p>It stands on the table, whose surface is at z = {number(height, 'mm')}.</p>"
+    held = held_mesh(outcome, placed)
+    views = placement_views(outcome.find(Mesh), placed, outcome.machine, surface, held)
     rows = "".join(_row(binding) for binding in bindings(placed)[:_ROWS])
     return (
-        f'{told}<div class="views">{placement_views(outcome.find(Mesh), placed, outcome.machine, surface)}</div>'
+        f'{told}<div class="views">{views}</div>'
         f"<h3>Margins along the path</h3>{margin_band(placed)}"
         '<p class="hint">As high as the smallest margin (0: a limit, about 1: comfortable), in the colour of the limit '
         "that is nearest; point at it for its name.</p>"
