@@ -18,7 +18,7 @@ from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import NOTHING, Surroundings
 from pentapod.planning.formulation import guide_function, room_function, stepped
-from pentapod.planning.linear_model import REACH, valleys
+from pentapod.planning.linear_model import REACH, by_field, valleys
 from pentapod.planning.margins import Margins
 from pentapod.planning.sampling import best_tilted_margins, first_guesses
 from pentapod.planning.search import SOLVERS, Search, SolverName, search
@@ -202,7 +202,7 @@ class _Climb:
         point, kind = np.nonzero(values < float(values.min()) + _NEAR)
         motion = setting.freedom.motion if setting.freedom.moves else setting.freedom.motion[:, :0]
         slope, count = slopes(setting, at, rows)[point, kind], motion.shape[1]
-        field = _by_field(setting.basis[rows][point], slope[:, 11:]) * setting.cone
+        field = by_field(setting.basis[rows][point], slope[:, 11:]) * setting.cone
         rising = np.hstack([-slope[:, :6] * REACH @ motion, -slope[:, 6:11] * _SLIDE_M, -field])
         share, steep = _cone(setting, at)
         kept, bound = [np.hstack([np.zeros((len(steep), count + 5)), steep])], [1.0 - share]
@@ -229,11 +229,6 @@ class _Climb:
         return _Step(REACH * (motion @ x[:count]), _SLIDE_M * x[count : count + 5], change, float(x[-1]))
 
 
-def _by_field(basis: Floats, by_lean: Floats) -> Floats:
-    """Return derivatives by the coefficients, (R, 2·size), of basis (R, size) and derivatives by the lean (R, 2)."""
-    return (basis[:, :, None] * by_lean[:, None, :]).reshape(len(basis), 2 * basis.shape[1])
-
-
 def _cone(setting: Setting, at: Candidate) -> tuple[Floats, Floats]:
     """Return the shares of the cone that the steepest leans use in directions about theirs, and their derivatives."""
     steepness = setting.steepness(at.coefficients)
@@ -245,5 +240,5 @@ def _cone(setting: Setting, at: Candidate) -> tuple[Floats, Floats]:
     for turn in _TANGENTS:
         direction = np.cos(turn) * outward + np.sin(turn) * aside
         shares.append(np.cos(turn) * steepness[steep])
-        derivatives.append(_by_field(setting.basis[steep], direction @ setting.domain.lean_plane.T))
+        derivatives.append(by_field(setting.basis[steep], direction @ setting.domain.lean_plane.T))
     return np.concatenate(shares), np.concatenate(derivatives)

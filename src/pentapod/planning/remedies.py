@@ -38,16 +38,20 @@ def _move(setting: Setting, best: Candidate, improve: Raise, needed: float) -> s
 
 
 def _cone(setting: Setting, best: Candidate, improve: Raise, needed: float) -> str:
+    """Return the least of a few wider cones that was found to do; the widest is tried first: it may not do either."""
     task = setting.task
-    for tilt in task.tilt + _WIDER:
-        if tilt > _WIDEST:
-            break
-        wider = Setting.of(
-            Task(task.pivots, task.nominal, task.pivot, float(tilt)), setting.machine, setting.freedom, setting.weights
+    wider = [float(tilt) for tilt in task.tilt + _WIDER if tilt <= _WIDEST]
+
+    def fits(tilt: float) -> bool:
+        there = Setting.of(
+            Task(task.pivots, task.nominal, task.pivot, tilt), setting.machine, setting.freedom, setting.weights
         )
-        if improve(wider, wider.first_candidate(best.margins, best.transform)).smallest >= needed:
-            return f"allow a tilt of {np.degrees(tilt):.0f}°, which is enough"
-    return ""
+        return improve(there, there.first_candidate(best.margins, best.transform)).smallest >= needed
+
+    if not wider or not fits(wider[-1]):
+        return ""
+    enough = next((tilt for tilt in wider[:-1] if fits(tilt)), wider[-1])
+    return f"allow a tilt of {np.degrees(enough):.0f}°, which is enough"
 
 
 def _region(setting: Setting, best: Candidate, improve: Raise, needed: float) -> str:
