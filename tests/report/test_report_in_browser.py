@@ -116,10 +116,7 @@ def opened(request, chromium, report):
     if shots := os.environ.get("PENTAPOD_SHOTS"):
         page.page.screenshot(path=Path(shots) / f"report-{request.param}.png", full_page=True)
         if request.param == "light":
-            page.page.evaluate("document.querySelector('#near').click()")
-            page.page.wait_for_timeout(2000)
             page.page.locator("section", has=page.page.locator("#scene")).screenshot(path=Path(shots) / "report.png")
-            page.page.evaluate("document.querySelector('#near').click()")
             page.page.locator(".sheet").screenshot(path=Path(shots) / "sheet.png")
     yield page
     page.page.close()

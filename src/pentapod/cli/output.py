@@ -75,10 +75,12 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
 
         def show(stage: str, fraction: float, note: str = "") -> None:
             if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=1.0, note=note, rate="")
+                # What does not tell how far it is pulses, so that it is seen to be at work.
+                tasks[stage] = bars.add_task(stage, total=None, note=note, rate="")
             speed = bars.tasks[tasks[stage]].speed
             rate = f"{100.0 * speed:.3g} %/s" if speed and fraction < 1.0 else ""
-            bars.update(tasks[stage], completed=fraction, note=note, rate=rate)
+            total = 1.0 if fraction > 0.0 else None
+            bars.update(tasks[stage], total=total, completed=fraction, note=note, rate=rate)
 
         log = logging.getLogger("pentapod")
         handler, level = (
