@@ -14,14 +14,15 @@ from pentapod.errors import InputError, JobError, MeshError, ToolpathError
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job
 from pentapod.job_placement import job_freedom
+from pentapod.job_surroundings import job_surroundings
 from pentapod.outcome import SetUps
-from pentapod.pipeline import job_machine, job_mesh, job_toolpath, run
-from pentapod.planning import PlacedPath
+from pentapod.pipeline import job_machine, job_mesh, job_toolpath, judge, run
+from pentapod.planning import LegPath, PlacedPath
 from pentapod.program import read_csv
 from pentapod.refusal import Refusal
 from pentapod.strategy_tables import TABLES
-from pentapod.timing import Explanation
-from pentapod.toolpath import SegmentKind
+from pentapod.timing import Explanation, Trajectory
+from pentapod.toolpath import SegmentKind, Toolpath
 
 TOOLPATHS = Path(__file__).parents[1] / "toolpaths"
 SHIPPED = sorted(path.stem for path in TOOLPATHS.glob("*.toml"))
@@ -267,3 +268,48 @@ def test_a_job_may_limit_the_tool(make_job, tmp_path):
     assert {"tip jerk", "axis acceleration"} <= set(found)
     assert "axis velocity" not in found
     assert "tip acceleration" in str(outcome.find(Explanation))
+
+
+def test_a_dwell_after_each_cut_by_job_key(make_job, tmp_path):
+    """The verdict judges it from the file; a program for the same job without the key fails that claim."""
+    outcomes = {
+        name: run(
+            Job.load(make_job(("cut_mm_min = 3000", "cut_mm_min = 3000" + more), name=f"{name}.toml")), tmp_path / name
+        )
+        for name, more in (("plain", ""), ("dwell", "\ndwell_s = 0.25"))
+    }
+    assert all(outcome.passed for outcome in outcomes.values())
+    toolpath = outcomes["dwell"].find(Toolpath)
+    count = sum(seconds == 0.25 for seconds in toolpath.dwells)
+    assert count >= 1
+    claims = {c.claim: c for c in outcomes["dwell"].verdict.certificates}
+    assert claims["dwells"].passed
+    assert claims["dwells"].value == pytest.approx(0.25, abs=0.02)
+    assert claims["exact stops"].passed
+    taken = [outcome.find(Trajectory).duration for outcome in outcomes.values()]
+    assert taken[1] - taken[0] > 0.25 * count
+    job = Job.load(make_job(("cut_mm_min = 3000", "cut_mm_min = 3000\ndwell_s = 0.25")))
+    mesh = job_mesh(job)
+    judged = judge(
+        job,
+        job_machine(job),
+        job_surroundings(job, job_machine(job), mesh),
+        toolpath,
+        tmp_path / "plain" / "program.csv",
+    )
+    assert not {c.claim: c for c in judged.certificates}["dwells"].passed
+
+
+def test_exact_stops_at_corners_by_job_key(make_job, tmp_path):
+    pieces = [
+        len(
+            run(
+                Job.load(make_job(("cut_mm_min = 3000", f"cut_mm_min = 3000\nstop_angle_deg = {angle}"))),
+                tmp_path / str(angle),
+            )
+            .find(LegPath)
+            .pieces
+        )
+        for angle in (135, 60)
+    ]
+    assert pieces[1] > pieces[0]

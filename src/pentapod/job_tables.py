@@ -184,6 +184,18 @@ class FeedTable(Table):
     link_mm_min: Positive | None = Field(
         default=None, le=100_000.0, description="feed of approaches and links; the cutting feed when left out"
     )
+    dwell_s: float | None = Field(
+        default=None,
+        ge=0.0,
+        le=3600.0,
+        description="at the end of each cut: an exact stop, and standing for so long; no stop when left out",
+    )
+    stop_angle_deg: float = Field(
+        default=135.0,
+        gt=0.0,
+        le=180.0,
+        description="an exact stop at every corner where the toolpath turns by more; others are rounded in passing",
+    )
     max_tip_acceleration_mm_s2: Positive | None = Field(default=None, description="of the tip; the machine's if less")
     max_tip_jerk_mm_s3: Positive | None = Field(default=None, description="of the tip; the machine's if less")
     max_axis_velocity_deg_s: Positive | None = Field(

@@ -176,6 +176,8 @@ def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Too
     tool = job_tool(job)
     toolpath, report = _drawn(job, mesh, tool)
     toolpath, gouges = finished_as_asked(job, mesh, tool, toolpath, progress)
+    if job.feed.dwell_s is not None:
+        toolpath = toolpath.stopping(job.feed.dwell_s)
     return toolpath, Reports((report, gouges))
 
 
@@ -195,7 +197,7 @@ def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
         file = job.file("file")
         read = read_toolpath(file, job.toolpath.format, pivot=tool.pivot, feed=job.feed.cut_mm_min * _MM_MIN)
         # Whatever the file says of its tool, this job's is the one that moves.
-        read = Toolpath(read.segments, tool.pivot)
+        read = dataclasses.replace(read, pivot=tool.pivot)
         return read, FileReport(file.name, len(read), len(read.segments))
     return toolpath_with_report(mesh, tool, job_options(job))
 
@@ -289,6 +291,7 @@ class _Task:
             self.machine,
             path_tolerance=tolerance.path_mm * _MM,
             axis_tolerance=float(np.radians(tolerance.axis_deg)),
+            stop_angle=float(np.radians(self.job.feed.stop_angle_deg)),
         )
 
     def _program(self, placed: PlacedPath, trajectory: Trajectory, file: Path) -> Program:

@@ -76,6 +76,7 @@ def _leg_path(path: LegPath) -> Arrays:
     values = [[p(np.asarray(p.knots), order) for p in path.pieces] for order in range(3)]
     return {
         "leg_path.piece_starts_mm": np.asarray(path.starts) * _MM,
+        "leg_path.dwells_s": path.dwells,
         "leg_path.knots_mm": np.concatenate(knots) * _MM,
         "leg_path.legs_mm": np.concatenate(values[0]) * _MM,
         "leg_path.legs_first": np.concatenate(values[1]),

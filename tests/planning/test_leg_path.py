@@ -1,5 +1,7 @@
 """LegPath: true to inverse kinematics, over the tip's arc length, within tolerance, resting where it must."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -245,3 +247,35 @@ def test_a_path_that_does_not_move_is_refused(desk):
 def test_tolerances_must_be_positive(desk, mixed, bad):
     with pytest.raises(ToolpathError, match="path_tolerance"):
         leg_path(mixed[0], desk, path_tolerance=bad, axis_tolerance=AXIS_TOLERANCE)
+
+
+def test_stops_and_dwells_where_the_toolpath_asks(desk, mixed):
+    """The path goes exactly through these waypoints, which no rounding of corners would let it."""
+    placed, free = mixed
+    toolpath = placed.toolpath
+    cut = toolpath.segments[2]
+    halves = (
+        replace(cut, tips=cut.tips[:26], axes=cut.axes[:26], dwell=0.0),
+        replace(cut, tips=cut.tips[25:], axes=cut.axes[25:]),
+    )
+    last = replace(toolpath.segments[-1], dwell=2.0)
+    asked = replace(toolpath, segments=(*toolpath.segments[:2], *halves, toolpath.segments[3], last), wait=0.25)
+    path = leg_path(placed_on(desk, asked), desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    assert len(path.pieces) == len(free.pieces) + 1
+    assert path.dwells.tolist() == [0.25, *[0.0] * (len(path.pieces) - 1), 2.0]
+    corner = placed.tips[toolpath.starts[2] + 25]
+    at = [
+        np.linalg.norm(path.pose(path.starts)[0] - corner, axis=1).min(),
+        np.linalg.norm(free.pose(np.linspace(0, free.length, 20_001))[0] - corner, axis=1).min(),
+    ]
+    assert at[0] < 1e-9
+    assert at[1] > 1e-6
+
+
+def test_stops_at_corners_as_sharp_as_asked(desk, mixed):
+    placed, free = mixed
+    path = leg_path(placed, desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE, stop_angle=np.radians(80.0))
+    assert isinstance(path, LegPath)
+    assert len(path.pieces) == len(free.pieces) + 2  # both corners of 90°
+    assert not path.dwells.any()

@@ -66,6 +66,11 @@ class Piece:
 @dataclass
 class Path:
     pieces: tuple
+    standing: tuple = ()
+
+    @property
+    def dwells(self):
+        return np.array(self.standing or (0.0,) * (len(self.pieces) + 1))
 
     @property
     def starts(self):

@@ -26,13 +26,20 @@ def some_toolpath(seed=0, pivot=3e-3):
     kinds = ["rapid", "link", "cut", "cut", "link", "rapid"]
     feeds = [np.inf, 0.05, 0.025, 1 / 60, 0.05, np.inf]
     powers = [1.0, 1.0, 0.25, 0.6, 1.0, 1.0]
+    dwells = [None, 0.0, None, 1.25, 0.003, 2.0]
     return Toolpath(
         tuple(
-            Segment(SegmentKind(kind), tips[a : b + 1], axes[a : b + 1], feed, power)
-            for kind, feed, power, a, b in zip(kinds, feeds, powers, cuts, cuts[1:], strict=False)
+            Segment(SegmentKind(kind), tips[a : b + 1], axes[a : b + 1], feed, power, dwell)
+            for kind, feed, power, dwell, a, b in zip(kinds, feeds, powers, dwells, cuts, cuts[1:], strict=False)
         ),
         pivot,
+        wait=0.5,
     )
+
+
+def stands(path):
+    """Seconds by waypoint."""
+    return {int(at): seconds for at, seconds in zip(path.starts, path.dwells, strict=True) if seconds is not None}
 
 
 def round_trip(format_name: str, toolpath: Toolpath, folder: Path) -> Toolpath:
@@ -52,6 +59,7 @@ def round_trip(format_name: str, toolpath: Toolpath, folder: Path) -> Toolpath:
     np.testing.assert_allclose(feeds[1], feeds[0], rtol=2e-6)
     powers = [[path.segments[k].power for k in o] for path, o in zip((toolpath, again), owners, strict=True)]
     np.testing.assert_allclose(powers[1], 1.0 if "power" in form.loses else powers[0], atol=1e-9)
+    assert stands(again) == ({} if "dwell" in form.loses else pytest.approx(stands(toolpath), abs=1e-9))
     assert form.write(toolpath) == file.read_bytes()
     return again
 
@@ -137,6 +145,49 @@ def test_gcode_modes(tmp_path):
     np.testing.assert_allclose(feeds, [10 * 0.0254 / 60, 10 * 0.0254 / 60, 0.0254 * 2 / 60])
 
 
+def test_apt_delays(tmp_path):
+    text = APT.replace("FEDRAT/10", "DELAY/3\nFEDRAT/10").replace("GOTO/1,0", "DELAY/1.5\nDELAY/.25\nGOTO/1,0")
+    (tmp_path / "a.apt").write_text(text.replace("FINI", "DELAY/0\nFINI"))
+    path = read_toolpath(tmp_path / "a.apt")
+    assert path.wait == 3.0
+    assert stands(path) == {0: 3.0, 1: 1.75, 2: 0.0}
+
+
+LONG = """\
+G21 G90 G94{extra}
+G0 X0 Y0 Z0 {a}0 {b}0
+{first}
+G1 X1 F60
+X2 {second}
+{third}
+X3
+{fourth}
+M2
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "blocks", "expected"),
+    [
+        # By the book of each: LinuxCNC's P is in seconds; elsewhere P is in milliseconds, X and U in seconds.
+        ("a.ngc", ("G4 P2", "", "G4 P0.25", ""), {0: 2.0, 2: 0.25}),
+        ("a.ngc", ("G61.1", "", "G64 P0.01", ""), {1: 0.0, 2: 0.0}),
+        ("a.ngc", ("G61", "", "", "N7 G04 P0"), {3: 0.0}),
+        ("a.nc", ("G4 P2000", "", "G04 X0.25", "G4 U1.5"), {0: 2.0, 2: 0.25, 3: 1.5}),
+        ("a.nc", ("G61", "", "G64", ""), {1: 0.0, 2: 0.0}),
+        ("a.nc", ("", "G9", "", ""), {2: 0.0}),
+    ],
+)
+def test_gcode_dwells_and_exact_stops(tmp_path, name, blocks, expected):
+    a, b = "AB" if name == "a.ngc" else "BC"
+    words = dict(zip(("first", "second", "third", "fourth"), blocks, strict=True))
+    text = LONG.format(a=a, b=b, extra="" if name == "a.ngc" else " G43.4 H1", **words)
+    (tmp_path / name).write_text(text)
+    path = read_toolpath(tmp_path / name)
+    assert len(path) == 4
+    assert stands(path) == expected
+
+
 def test_rotary_conventions_are_those_of_their_machines(tmp_path):
     """XYZAB against rotation matrices of the kinematics notes, XYZBC against C on B."""
     from scipy.spatial.transform import Rotation
@@ -168,6 +219,8 @@ BAD = {
         (APT.replace("0.6,0.8\nFINI", "0.6,0.9\nFINI"), r"a.apt:11: GOTO: the tool axis has not unit length"),
         (APT.replace("GOTO/1,0", "GOTO/1,O"), r"a.apt:11: GOTO: not a finite number \(got 'O'\)"),
         (APT.replace("FINI\n", ""), r"FINI is missing"),
+        (APT.replace("RAPID", "DELAY/5,REV"), r"a.apt:7: DELAY: not a time"),
+        (APT.replace("RAPID", "DELAY/-5"), r"a.apt:7: DELAY: a time below 0"),
         (APT.replace("FINI\n", "FINI\nGOTO/0,0,0,0,0,1\n"), r"a.apt:13: GOTO: a word after FINI"),
         (APT.replace("FEDRAT/10,IPM\n", ""), r"FEDRAT before it"),
     ],
@@ -183,13 +236,22 @@ BAD = {
         (NGC.replace("X1", "X[#1+2]"), r"a.ngc:5: X\[#1\+2\]: not a word"),
         (NGC.replace("M2\n", ""), r"M2 or M30 is missing"),
         (NGC.replace("G1 Z0 F10", "G1 Z0 F-10"), r"F-10: the feed must be positive"),
+        (NGC.replace("M2\n", "G4\nM2\n"), r"a.ngc:7: G4: a dwell without its time"),
+        (NGC.replace("M2\n", "G4 P-1\nM2\n"), r"a.ngc:7: G4: a dwell without its time"),
+        (NGC.replace("M2\n", "G4 X1\nM2\n"), r"a.ngc:7: G4: a dwell without its time"),
     ],
-    "a.nc": [(NGC.replace("a0 b0", "b0 c0"), r"a.nc:3: X: tool centre point programming is off")],
+    "a.nc": [
+        (NGC.replace("M2\n", "G4 P2.5\nM2\n").replace("%\nG20", "%\nG43.4 H1 G20").replace("a0 b0", "b0 c0"),
+         r"a.nc:7: P2.5: seconds or milliseconds\?"),
+        (NGC.replace("a0 b0", "b0 c0"), r"a.nc:3: X: tool centre point programming is off"),
+    ],
     "a.csv": [
         ("x,y,z,i,j,k\n0,0,0,0,0,1\n", r"a.csv:1: the columns x, y, z have no unit"),
         (PLAIN + "1,0,0,0,0,1,glide,5\n", r"a.csv:3: kind: unknown"),
         (PLAIN + "1,0,0,0,0,1,cut,\n", r"a.csv:3: feed_mm_min"),
         (PLAIN.replace("min\n", "min,power\n").replace("rt,", "rt,,1") + "1,0,0,0,0,1,cut,9,2\n", r"csv:3: power"),
+        (PLAIN.replace("min\n", "min,power,dwell_s\n").replace("rt,", "rt,,1,") + "1,0,0,0,0,1,cut,9,1,-2\n",
+         r"a.csv:3: dwell_s: a time below 0"),
         ("x_mm,y_mm,z_mm,i,j,k\n0,0,0,0,0\n", r"a.csv:2: wrong number of columns"),
         ("# waypoints = 3\n" + PLAIN + "1,0,0,0,0,1,cut,9\n", r"the file was cut"),
     ],

@@ -19,7 +19,7 @@ from pentapod.planning.tool_curve import ToolCurve
 from pentapod.refusal import Blame, Refusal
 from pentapod.toolpath.toolpath import Segment, SegmentKind
 
-STOP_ANGLE = np.radians(135.0)
+STOP_ANGLE = float(np.radians(135.0))
 """A path that turns back more sharply than this stops at the corner: rounding it would need a crawl."""
 
 TOLERANCE_SHARE = 0.8
@@ -102,13 +102,18 @@ class LegPiece:
 
 @dataclass(frozen=True, eq=False)
 class LegPath:
-    """Pieces in order; the machine rests between them. starts (P + 1,): station where each begins, and the end."""
+    """Pieces in order; the machine rests between them.
+
+    starts (P + 1,): station where each begins, and the end. dwells (P + 1,): seconds for which it stands there.
+    """
 
     pieces: tuple[LegPiece, ...]
     starts: Floats
+    dwells: Floats
 
     def __post_init__(self) -> None:
-        set_frozen(self, pieces=tuple(self.pieces), starts=frozen(self.starts, "starts", (None,)))
+        set_frozen(self, pieces=tuple(self.pieces))
+        set_frozen(self, **{name: frozen(getattr(self, name), name, (None,)) for name in ("starts", "dwells")})
 
     @property
     def length(self) -> float:
@@ -144,16 +149,23 @@ class LegPath:
 
 
 def leg_path(
-    placed: PlacedPath, machine: Machine, *, path_tolerance: float, axis_tolerance: float
+    placed: PlacedPath,
+    machine: Machine,
+    *,
+    path_tolerance: float,
+    axis_tolerance: float,
+    stop_angle: float = STOP_ANGLE,
 ) -> LegPath | Refusal:
     """Return the smooth leg path through the placed tool poses.
 
     path_tolerance: how far in metres the pivot (the cutter's ball centre, the beam's spot) may leave the toolpath;
     axis_tolerance: how far in radians the axis may leave the planned one. Corners are rounded within both. The machine
-    stops where a rapid meets another kind of motion, and at corners sharper than STOP_ANGLE. Raises
-    ToolpathError for tolerances that are not positive. Returns a Refusal where the tool would have to stand still.
+    stops where a rapid meets another kind of motion, where the toolpath asks for it, and at corners that turn by more
+    than `stop_angle` radians. Raises ToolpathError for numbers that are not positive. Returns a Refusal where the tool
+    would have to stand still.
     """
-    for name, value in (("path_tolerance", path_tolerance), ("axis_tolerance", axis_tolerance)):
+    given = {"path_tolerance": path_tolerance, "axis_tolerance": axis_tolerance, "stop_angle": stop_angle}
+    for name, value in given.items():
         if not value > 0.0:
             raise ToolpathError("must be positive", key=name, value=value)
     toolpath = placed.toolpath
@@ -170,8 +182,15 @@ def leg_path(
         )
     points, u = points[keep], np.concatenate([[0.0], np.cumsum(steps[moving])])
     segment = toolpath.segment_of_interval[moving]
-    stops = np.flatnonzero(_stops(points, toolpath.pivot, segment, toolpath.segments)) + 1
-    bounds = np.concatenate([[0], stops, [len(points) - 1]])
+    stops = np.zeros(len(points), dtype=np.bool_)
+    stops[1:-1] = _stops(points, toolpath.pivot, segment, toolpath.segments, stop_angle)
+    dwells = np.zeros(len(points))
+    for waypoint, seconds in zip(toolpath.starts, toolpath.dwells, strict=True):
+        if seconds is not None:
+            stood = int(keep[: waypoint + 1].sum()) - 1
+            stops[stood], dwells[stood] = True, dwells[stood] + seconds
+    stops[[0, -1]] = True
+    bounds = np.flatnonzero(stops)
     pieces = []
     for a, b in pairwise(bounds.tolist()):
         spline = rounded(
@@ -195,7 +214,7 @@ def leg_path(
                 waypoints=np.flatnonzero(keep)[a : b + 1],
             )
         )
-    return LegPath(tuple(pieces), np.concatenate([[0.0], np.cumsum([p.length for p in pieces])]))
+    return LegPath(tuple(pieces), np.concatenate([[0.0], np.cumsum([p.length for p in pieces])]), dwells[bounds])
 
 
 def _tolerance(path: float, axis: float) -> TooFar:
@@ -220,19 +239,22 @@ def _distance_to_origin(a: Floats, b: Floats) -> Floats:
     return np.linalg.norm(a + np.clip(foot, 0.0, 1.0)[:, None] * step, axis=1)
 
 
-def _stops(points: Floats, pivot: float, segment: Ints, segments: tuple[Segment, ...]) -> Bools:
-    """Return for each inner waypoint (N − 2,) whether the machine stops there. points (N, 6): pivots and axes."""
+def _stops(points: Floats, pivot: float, segment: Ints, segments: tuple[Segment, ...], angle: float) -> Bools:
+    """Return for each inner waypoint (N − 2,) whether the motion itself asks for a stop there.
+
+    points (N, 6): pivots and axes. angle: radians, of the corners at which it does.
+    """
     rapid = np.array([s.kind is SegmentKind.RAPID for s in segments])[segment]
     pivots, tips = points[:, :3], points[:, :3] - pivot * points[:, 3:]
-    return (rapid[1:] != rapid[:-1]) | _turns_back(pivots) | _turns_back(tips)
+    return (rapid[1:] != rapid[:-1]) | _turns(pivots, angle) | _turns(tips, angle)
 
 
-def _turns_back(points: Floats) -> Bools:
-    """Return for each inner point (N − 2,) of a polyline whether it turns more sharply than STOP_ANGLE there."""
+def _turns(points: Floats, angle: float) -> Bools:
+    """Return for each inner point (N − 2,) of a polyline whether it turns by more than an angle there."""
     step = np.diff(points, axis=0)
     length = np.linalg.norm(step, axis=1)
     moves = length > 1e-9
-    sharp = (step[1:] * step[:-1]).sum(axis=1) < np.cos(STOP_ANGLE) * length[1:] * length[:-1]
+    sharp = (step[1:] * step[:-1]).sum(axis=1) < np.cos(angle) * length[1:] * length[:-1]
     return sharp & moves[1:] & moves[:-1]
 
 

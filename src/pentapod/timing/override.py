@@ -57,8 +57,10 @@ def override(
     starts = trajectory.starts
     if start >= trajectory.duration - 0.5 * period:
         return _resumed(trajectory, machine, max(start, trajectory.duration), share, options)
-    k = int(np.searchsorted(starts, start + 0.5 * period, side="right")) - 1
+    k = max(int(np.searchsorted(starts, start + 0.5 * period, side="right")) - 1, 0)
     local = start - float(starts[k])
+    if local > trajectory.laws[k].duration - 0.5 * period:  # standing there; a dwell takes its own time
+        k, local = k + 1, 0.0
     if local < 0.5 * period:  # at an exact stop: the new plan starts from rest, too
         return (
             _ended(trajectory, k, period)
@@ -84,7 +86,8 @@ def _rest(
     pieces = path.pieces[first:]
     cuts = [station] + [0.0] * (len(pieces) - 1)
     parts = (PiecePart(piece, cut, share, machine.rapid_velocity) for piece, cut in zip(pieces, cuts, strict=True))
-    return retime(PathParts(tuple(parts)), machine, **options)
+    dwells = np.append(0.0, path.dwells[first + 1 :])
+    return retime(PathParts(tuple(parts), dwells), machine, **options)
 
 
 def _resumed(
@@ -132,18 +135,11 @@ def _ended(trajectory: Trajectory, k: int, period: float) -> Trajectory:
     if k == 0:  # not started: standing at the beginning is a motion of no length, of one period
         begin = trajectory.indices[0]
         still = joined([Nodes.resting(period, 0.0)])
-        first = _clip(trajectory.profile, 0.0, 0.0, 0.0, 0.0)
-        profile = replace(
-            first,
-            times=np.array([0.0, period]),
-            stations=first.stations[[0, 0]],
-            speeds=first.speeds[[0, 0]],
-            active=first.active[[0, 0]],
-            shares=first.shares[[0, 0]],
-        )
-        return Trajectory(trajectory.path, (begin,), (still,), profile)
+        dwells = np.array([trajectory.dwells[0], 0.0])
+        profile = _clip(trajectory.profile, 0.0, 0.0, 0.0, 0.0).standing(0.0, float(dwells[0]) + period)
+        return Trajectory(trajectory.path, (begin,), (still,), profile, dwells)
     profile = _clip(trajectory.profile, 0.0, float(trajectory.starts[k]), 0.0, 0.0)
-    return Trajectory(trajectory.path, trajectory.indices[:k], trajectory.laws[:k], profile)
+    return Trajectory(trajectory.path, trajectory.indices[:k], trajectory.laws[:k], profile, trajectory.dwells[: k + 1])
 
 
 def _turned(trajectory: Trajectory, rest: Trajectory | None, k: int, turn: Turn) -> Trajectory:
@@ -157,7 +153,7 @@ def _turned(trajectory: Trajectory, rest: Trajectory | None, k: int, turn: Turn)
     ]
     if rest is None:
         return _assembled(trajectory, None, k, index, law, profiles)
-    joins, end = float(turn.parts[1].times[0]), float(rest.starts[1])
+    joins, end = float(turn.parts[1].times[0]), rest.laws[0].duration
     first, others = (
         _clip(rest.profile, joins / turn.slower, end, 0.0, offset),
         _clip(rest.profile, end, np.inf, 0.0, offset),
@@ -184,6 +180,7 @@ def _assembled(
             shares=np.concatenate([p.shares for p in profiles]),
             constraint_names=names,
         ),
+        np.append(trajectory.dwells[: k + 1], 0.0 if rest is None else rest.dwells[1:]),
     )
 
 

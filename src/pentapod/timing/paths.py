@@ -47,10 +47,13 @@ class PieceLike(Protocol):
 class LegPathLike(Protocol):
     """Pieces, each at rest at both ends.
 
-    starts (P + 1,): global arc length in metres at which each piece starts, and the end.
+    starts (P + 1,): global arc length in metres at which each piece starts, and the end. dwells (P + 1,): seconds for
+    which the machine stands there.
     """
 
     @property
     def pieces(self) -> Sequence[PieceLike]: ...  # noqa: D102
     @property
     def starts(self) -> Floats: ...  # noqa: D102
+    @property
+    def dwells(self) -> Floats: ...  # noqa: D102

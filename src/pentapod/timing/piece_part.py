@@ -94,9 +94,10 @@ class PiecePart:
 
 @dataclass(frozen=True, eq=False)
 class PathParts:
-    """Parts of pieces, one after the other, as a path of its own."""
+    """Parts of pieces, one after the other, as a path of its own. dwells (P + 1,): as of any path, seconds."""
 
     pieces: tuple[PiecePart, ...]
+    dwells: Floats
 
     @property
     def starts(self) -> Floats:

@@ -47,14 +47,15 @@ def unheld(
 ) -> tuple[Unheld, ...]:
     """Return where on cuts the speed on the surface is below `held` of the feed, the longest first.
 
-    Judged every `period` seconds. surface_rate: how far the spot on the surface moves for each metre of global s, at
-    stations (n,); without it the tip's own way counts.
+    Judged every `period` seconds; standing that the toolpath asks for does not count. surface_rate: how far the spot on
+    the surface moves for each metre of global s, at stations (n,); without it the tip's own way counts.
     """
     times = np.arange(int(np.ceil(trajectory.duration / period)) + 1) * period
     stations, segments, profile = trajectory.station(times), trajectory.segment(times), trajectory.profile
     rate = np.ones(len(times)) if surface_rate is None else surface_rate(stations)
     feeds = trajectory.feeds(times)
-    share = np.where(np.isfinite(feeds), trajectory.station(times, 1) * rate / feeds, 1.0)
+    wanted = np.isfinite(feeds) & ~trajectory.standing(times)
+    share = np.where(wanted, trajectory.station(times, 1) * rate / feeds, 1.0)
     cuts = {
         int(segment)
         for k in trajectory.indices

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pentapod.arrays import Floats
 from pentapod.errors import InputError
 from pentapod.machine.machine import Machine
 from pentapod.progress import Progress, silent
@@ -33,10 +34,11 @@ def retime(
 
     Leg velocities, accelerations and (limit_jerk) jerks, the feed on cuts and links and the rapid rate on rapids
     hold at and between the gridpoints, and on the setpoints as the controller joins them (`machine.controller`). Each
-    piece goes from rest to rest and lasts a whole number of periods. The margins are fractions of the
-    limits that the plan leaves free; the rounding of setpoints and what happens between gridpoints uses part
-    of them. Pieces of no length are passed over. Method: TOPP-RA (Pham and Pham 2018), by a compiled core; engine
-    "toppra" takes the reference instead, "numpy" the form that needs no compiler.
+    piece goes from rest to rest and lasts a whole number of periods; between them the machine stands as long as the
+    path asks (`dwells`), in whole periods. The margins are fractions of the limits that the plan leaves free; the
+    rounding of setpoints and what happens between gridpoints uses part of them. Pieces of no length are passed over.
+    Method: TOPP-RA (Pham and Pham 2018), by a compiled core; engine "toppra" takes the reference instead, "numpy" the
+    form that needs no compiler.
 
     Raises InputError where a margin is not in (0, 0.5), or for an unknown engine.
     """
@@ -65,24 +67,39 @@ def retime(
         profiles.append(profile)
         done += path.pieces[k].length
         progress("timing", done / total, f"piece {len(profiles)} of {len(indices)}")
+    dwells = _dwells(path, indices, period)
     if cubic or limit_jerk:
-        smoothed = sampled_laws(profiles, machine, smooth=limit_jerk)
+        smoothed = sampled_laws(profiles, machine, dwells, smooth=limit_jerk)
         if isinstance(smoothed, Unmended):
             return refusal(path, indices[smoothed.index], smoothed.failure)
         profiles, laws = smoothed
     else:
         laws = [MotionLaw.from_profile(p.s, p.x) for p in profiles]
         laws = [law.stretched(whole_periods(law.duration, period)) for law in laws]
-    return Trajectory(path, tuple(indices), tuple(laws), _profile(path, indices, profiles, laws, smooth=limit_jerk))
+    profile = _profile(path, indices, profiles, laws, dwells, smooth=limit_jerk)
+    return Trajectory(path, tuple(indices), tuple(laws), profile, dwells)
+
+
+def _dwells(path: LegPathLike, indices: list[int], period: float) -> Floats:
+    """Return the seconds (L + 1,) of standing before each moving piece and after the last, in whole periods."""
+    owner = np.searchsorted(indices, np.arange(len(path.pieces) + 1), side="left")
+    periods = np.bincount(owner, np.ceil(np.asarray(path.dwells) / period - 1e-9), len(indices) + 1)
+    return periods * period
 
 
 def _profile(
-    path: LegPathLike, indices: list[int], profiles: list[PieceProfile], laws: list[MotionLaw], *, smooth: bool
+    path: LegPathLike,
+    indices: list[int],
+    profiles: list[PieceProfile],
+    laws: list[MotionLaw],
+    dwells: Floats,
+    *,
+    smooth: bool,
 ) -> Profile:
-    starts = np.concatenate([[0.0], np.cumsum([law.duration for law in laws])])
+    starts = dwells[0] + np.concatenate([[0.0], np.cumsum([law.duration for law in laws] + dwells[1:])])
     times = [np.interp(p.s, law.stations, law.times) for p, law in zip(profiles, laws, strict=True)]
     active = [p.active(law if smooth else None) for p, law in zip(profiles, laws, strict=True)]
-    return Profile(
+    profile = Profile(
         times=np.concatenate([start + t for start, t in zip(starts, times, strict=False)]),
         stations=np.concatenate([float(path.starts[k]) + p.s for k, p in zip(indices, profiles, strict=True)]),
         speeds=np.concatenate([law(t, 1) for law, t in zip(laws, times, strict=True)]),
@@ -90,3 +107,4 @@ def _profile(
         shares=np.concatenate([share for _, share in active]),
         constraint_names=CONSTRAINTS,
     )
+    return profile.standing(0.0, float(starts[-1]))

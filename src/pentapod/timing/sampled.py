@@ -50,12 +50,17 @@ class Unmended:
 
 @dataclass(frozen=True, eq=False)
 class _Timed:
-    """A piece's profile, by which factor its law is run slower, and whether its jerk is limited."""
+    """A piece's profile, by which factor its law is run slower, and whether its jerk is limited.
+
+    before, after: periods for which the machine stands at its ends; between two pieces they count with the first.
+    """
 
     profile: PieceProfile
     slower: float
     smooth: bool
     period: float
+    before: int
+    after: int
 
     @cached_property
     def law(self) -> MotionLaw:
@@ -76,10 +81,15 @@ class _Timed:
     def rows(self, phase: float) -> Floats:
         """Return the rows as if they came later by `phase` periods, the last one at the end."""
         law, piece = self.law, self.profile.piece
-        s = law((np.arange(round(law.duration / self.period) + 1) + phase) * self.period)
+        count = self.before + round(law.duration / self.period) + self.after
+        s = self.stations(count + 1, phase)
         s[-1] = law.length
         tool = piece.pose(s) if self.profile.limits.tool.given() else ()
         return np.column_stack([piece(s, 0), s, *tool])
+
+    def stations(self, count: int, phase: float = 0.0) -> Floats:
+        """Return the stations (count,) of the rows, `phase` periods later."""
+        return self.law((np.arange(count) - self.before + phase) * self.period)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,14 +126,18 @@ def whole_periods(duration: float, period: float) -> float:
 
 
 def sampled_laws(
-    profiles: list[PieceProfile], machine: Machine, *, smooth: bool
+    profiles: list[PieceProfile], machine: Machine, dwells: Floats, *, smooth: bool
 ) -> tuple[list[PieceProfile], list[MotionLaw]] | Unmended:
     """Return profiles and laws whose setpoints keep the machine's limits and the feeds, as they are joined.
 
-    smooth: jerks are limited too.
+    dwells (P + 1,): seconds of standing before each piece, and after the last. smooth: jerks are limited too.
     """
     period = machine.controller.period
-    timed = [_Timed(profile, 1.0, smooth, period) for profile in profiles]
+    stood = np.rint(dwells / period).astype(int).tolist()
+    timed = [
+        _Timed(profile, 1.0, smooth, period, stood[0] if k == 0 else 0, stood[k + 1])
+        for k, profile in enumerate(profiles)
+    ]
     uses: list[_Use | None] = [None] * len(timed)
     exceeding: list[int] = []
     for attempt in range(_EASINGS + _SLOWINGS):
@@ -137,8 +151,9 @@ def sampled_laws(
             if attempt < _EASINGS:
                 # Easing shifts all later setpoints against the path: ease for the rows between as well.
                 use = use.worst(_use(timed[k], timed[k].rows(0.5), machine, smooth))
-                rows = timed[k].law(np.arange(len(use.speed)) * period)
-                eased = _eased(timed[k].profile, rows, use, _EXTRA - attempt * _EXTRA_PER_ROUND)
+                eased = _eased(
+                    timed[k].profile, timed[k].stations(len(use.speed)), use, _EXTRA - attempt * _EXTRA_PER_ROUND
+                )
                 if isinstance(eased, Failure):
                     return Unmended(k, eased)
                 timed[k] = replace(timed[k], profile=eased)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, Ints, as_floats, set_frozen
+from pentapod.arrays import Bools, Floats, Ints, as_floats, frozen, set_frozen
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.paths import LegPathLike, PieceLike
 
@@ -29,27 +29,48 @@ class Profile:
     shares: Floats
     constraint_names: tuple[str, ...]
 
+    def standing(self, start: float, end: float) -> Profile:
+        """Return the profile from `start` to `end` seconds, with standing where it begins later or ends sooner."""
+        rows, times = np.arange(len(self.times)), self.times
+        if start < times[0]:
+            rows, times = np.append(0, rows), np.append(start, times)
+        if end > times[-1]:
+            rows, times = np.append(rows, rows[-1]), np.append(times, end)
+        columns = (y[rows] for y in (self.stations, self.speeds, self.active, self.shares))
+        return Profile(times, *columns, constraint_names=self.constraint_names)
+
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """Legs as functions of time, at rest at both ends and at each stop between pieces.
 
     path: the leg path; indices: those of its pieces that move; laws: their motion laws, one after the other.
-    Each lasts a whole number of the controller's periods, so that exact stops fall on setpoints.
+    Each lasts a whole number of the controller's periods, so that exact stops fall on setpoints. dwells (L + 1,):
+    seconds for which the machine stands before each law, and after the last; whole periods, too.
     """
 
     path: LegPathLike
     indices: tuple[int, ...]
     laws: tuple[MotionLaw, ...]
     profile: Profile
+    dwells: Floats
 
     def __post_init__(self) -> None:
         set_frozen(self, indices=tuple(self.indices), laws=tuple(self.laws))
+        set_frozen(self, dwells=frozen(self.dwells, "dwells", (len(self.laws) + 1,)))
 
     @property
     def starts(self) -> Floats:
-        """Time (P + 1,) in seconds at which each moving piece starts, and the end."""
-        return np.concatenate([[0.0], np.cumsum([law.duration for law in self.laws])])
+        """Time (L + 1,) in seconds at which each law sets off, and when all is over, standing at the end included."""
+        lasting = [law.duration for law in self.laws] + self.dwells[1:]
+        return self.dwells[0] + np.concatenate([[0.0], np.cumsum(lasting)])
+
+    def standing(self, t: ArrayLike) -> Bools:
+        """Return at which times (n,) in seconds the machine stands because it was told to."""
+        time, starts = np.asarray(t, dtype=np.float64), self.starts
+        ends = np.append(0.0, starts[:-1] + [law.duration for law in self.laws])
+        begun = np.minimum(np.searchsorted(starts, time, side="right"), len(self.laws))
+        return np.asarray((time >= ends[begun]) & (self.dwells[begun] > 0.0))
 
     @property
     def duration(self) -> float:
@@ -125,6 +146,6 @@ class Trajectory:
             piece, law = self.path.pieces[self.indices[k]], self.laws[k]
             local = time[here] - starts[k]
             # The sum of durations is rounded: its end must be the law's end.
-            local = np.where(time[here] >= starts[k + 1], np.maximum(local, law.duration), local)
+            local = np.where(time[here] >= starts[k + 1] - self.dwells[k + 1], np.maximum(local, law.duration), local)
             result[here] = evaluate(piece, law, local, *more)
         return result

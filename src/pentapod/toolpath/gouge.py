@@ -223,12 +223,13 @@ class _Work:
             a, b = int(self.path.starts[k]), int(self.path.starts[k + 1])
             breaks = [a, *(a + 1 + np.flatnonzero(np.diff(self.dropped[a:b].astype(np.int8)))).tolist(), b]
             for p, q in pairwise(breaks):
+                dwell = old.dwell if q == b else None
                 if self.dropped[p]:
                     feed = link_feeds[0] if link_feeds else old.feed
-                    segments.append(Segment(SegmentKind.LINK, *self._bridge(p, q), feed))
+                    segments.append(Segment(SegmentKind.LINK, *self._bridge(p, q), feed, dwell=dwell))
                 else:
-                    segments.append(replace(old, tips=self.tips[p : q + 1], axes=self.axes[p : q + 1]))
-        return Toolpath(tuple(segments), self.path.pivot)
+                    segments.append(replace(old, tips=self.tips[p : q + 1], axes=self.axes[p : q + 1], dwell=dwell))
+        return replace(self.path, segments=tuple(segments))
 
 
 def _met(work: _Work, tips: Floats, axes: Floats, rows: Ints, threshold: float) -> Sweep:

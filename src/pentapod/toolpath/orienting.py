@@ -39,7 +39,7 @@ def oriented(toolpath: Toolpath, tool: Tool, orientation: Orientation) -> Toolpa
         replace(segment, tips=tips[a : b + 1], axes=axes[a : b + 1])
         for segment, (a, b) in zip(toolpath.segments, pairwise(toolpath.starts), strict=True)
     ]
-    return Toolpath(tuple(segments), toolpath.pivot)
+    return replace(toolpath, segments=tuple(segments))
 
 
 def _carry(old: Floats, tips: Floats, axes: Floats, known: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> None:

@@ -6,6 +6,7 @@ A cut that was leaned, lifted or dropped leaves links behind that were laid for 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from pentapod.arrays import Bools
 from pentapod.toolpath import links
@@ -38,7 +39,7 @@ def rejoined(
             if all(clear(segment) for segment in other):
                 way, changed = other, changed + 1
         segments += way if after is None else [*way, path.segments[after]]
-    return Toolpath(tuple(segments), path.pivot), changed
+    return replace(path, segments=tuple(segments)), changed
 
 
 def _way(before: Segment | None, after: Segment | None, style: LinkStyle) -> list[Segment]:

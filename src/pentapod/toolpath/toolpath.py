@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 
@@ -29,8 +30,9 @@ class Segment:
 
     tips (N, 3): tool tips, metres, workpiece frame. axes (N, 3): unit, tip → spindle. feed: speed of the
     tip in m/s that the process wants; infinite on rapids (the machine's rapid rate holds there). power: share of
-    full laser (or spindle) power while cutting, 0 to 1. N ≥ 2. Raises ToolpathError for an empty
-    segment, a bad feed or power, or an axis that is not of unit length.
+    full laser (or spindle) power while cutting, 0 to 1. dwell: seconds for which the tool stands at the segment's end,
+    0 for an exact stop without waiting, None where it passes on without a stop. N ≥ 2. Raises ToolpathError for
+    an empty segment, a bad feed, power or dwell, or an axis that is not of unit length.
     """
 
     kind: SegmentKind
@@ -38,6 +40,7 @@ class Segment:
     axes: Floats
     feed: float
     power: float = 1.0
+    dwell: float | None = None
 
     def __post_init__(self) -> None:
         tips, axes = frozen(self.tips, "tips", (None, 3)), frozen(self.axes, "axes", (None, 3))
@@ -50,6 +53,8 @@ class Segment:
             raise ToolpathError("feed must be positive", value=self.feed)
         if not 0.0 <= self.power <= 1.0:
             raise ToolpathError("power must be a share of full power", value=self.power, expected="0 to 1")
+        if self.dwell is not None:
+            _check_seconds("dwell", self.dwell)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,17 +63,20 @@ class Toolpath:
 
     pivot: distance in metres from the tip along the axis to the point about which the tool may tilt
     without leaving the surface: the ball's radius for a ball cutter, −stand-off for a beam or spray
-    (the spot on the surface), 0 for a fixed tip. Waypoints are the poses of all segments, joints once.
-    Raises ToolpathError where two segments do not join.
+    (the spot on the surface), 0 for a fixed tip. wait: seconds for which the tool stands at the first waypoint before
+    it sets off. Waypoints are the poses of all segments, joints once. Raises ToolpathError where two segments do not
+    join, or for a bad wait.
     """
 
     segments: tuple[Segment, ...]
     pivot: float = 0.0
+    wait: float = 0.0
 
     def __post_init__(self) -> None:
         set_frozen(self, segments=tuple(self.segments))
         if not self.segments:
             raise ToolpathError("the toolpath is empty")
+        _check_seconds("wait", self.wait)
         for k, (a, b) in enumerate(zip(self.segments, self.segments[1:], strict=False)):
             gap = float(np.abs(a.tips[-1] - b.tips[0]).max() + np.abs(a.axes[-1] - b.axes[0]).max())
             if gap > JOIN_TOLERANCE_M:
@@ -99,6 +107,11 @@ class Toolpath:
         """Index (N − 1,) of the segment to which the interval between waypoints k and k + 1 belongs."""
         return np.repeat(np.arange(len(self.segments)), np.diff(self.starts))
 
+    @cached_property
+    def dwells(self) -> tuple[float | None, ...]:
+        """Seconds for which the tool stands at each segment's first waypoint, and at the end (S + 1); None: no stop."""
+        return (self.wait or None, *(s.dwell for s in self.segments))
+
     def __len__(self) -> int:
         return int(self.starts[-1]) + 1
 
@@ -108,10 +121,22 @@ class Toolpath:
 
     def transformed(self, transform: RigidTransform) -> Toolpath:
         """Return the same motion seen after a rigid transform."""
-        return Toolpath(
-            tuple(
-                Segment(s.kind, transform.apply(s.tips), transform.rotate(s.axes), s.feed, s.power)
-                for s in self.segments
-            ),
-            self.pivot,
+        moved = (replace(s, tips=transform.apply(s.tips), axes=transform.rotate(s.axes)) for s in self.segments)
+        return replace(self, segments=tuple(moved))
+
+    def stopping(self, dwell: float) -> Toolpath:
+        """Return the same motion, standing `dwell` seconds (0: an exact stop) wherever a cut ends without a stop."""
+        kinds = [s.kind for s in self.segments]
+        ends = [
+            a is SegmentKind.CUT and b is not SegmentKind.CUT for a, b in zip(kinds, [*kinds[1:], None], strict=True)
+        ]
+        stopped = (
+            replace(s, dwell=dwell) if end and s.dwell is None else s
+            for s, end in zip(self.segments, ends, strict=True)
         )
+        return replace(self, segments=tuple(stopped))
+
+
+def _check_seconds(name: str, seconds: float) -> None:
+    if not (math.isfinite(seconds) and seconds >= 0.0):
+        raise ToolpathError("must be a time", key=name, value=seconds, expected="seconds, 0 or more")

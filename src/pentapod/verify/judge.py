@@ -15,7 +15,7 @@ from pentapod.program.csv import read_csv, read_header
 from pentapod.program.program import Program
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.verify import bodies, collisions, component, gouge, joints, legs, origin, speed, tool, tracking
+from pentapod.verify import bodies, collisions, component, gouge, joints, legs, origin, speed, standing, tool, tracking
 from pentapod.verify.claim import Claim
 from pentapod.verify.cutting import Cutting
 from pentapod.verify.replay import SURVEY_SHARE, Replay
@@ -31,6 +31,7 @@ CLAIMS: tuple[Claim, ...] = (
     *gouge.CLAIMS,
     *tracking.CLAIMS,
     *speed.CLAIMS,
+    *standing.CLAIMS,
     *tool.CLAIMS,
 )
 """Every claim that a verdict makes, in its order; "readable" comes before them where a file is judged.

@@ -37,7 +37,8 @@ def placed_toolpath(plan: str | Path, program: Program) -> Toolpath:
             remedy="give the plan.npz that was written with it",
         )  # fmt: skip
     bounds = zip(given.segments, given.starts[:-1], given.starts[1:], strict=True)
-    return Toolpath(tuple(replace(s, tips=tips[a : b + 1], axes=axes[a : b + 1]) for s, a, b in bounds), given.pivot)
+    placed = (replace(s, tips=tips[a : b + 1], axes=axes[a : b + 1]) for s, a, b in bounds)
+    return replace(given, segments=tuple(placed))
 
 
 def _write(given: PostInput, form: str, file: str) -> dict[str, bytes]:

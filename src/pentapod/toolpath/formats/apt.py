@@ -1,8 +1,9 @@
-"""APT / CLDATA: GOTO with i, j, k, MULTAX, RAPID, FEDRAT, UNITS. ISO 4343; the words of everyday cutter location files.
+"""APT / CLDATA: GOTO with i, j, k, MULTAX, RAPID, FEDRAT, DELAY, UNITS: the everyday words of ISO 4343.
 
 The reader is strict: what it cannot honour (a missing unit, CUTCOM, TRACUT, a word it does not know) is an error,
-not a guess. i, j, k point from the tip to the spindle. RAPID counts for the next GOTO alone. A `$$` remark
-"pentapod link" or "pentapod cut" tells moves on feed apart, for APT has no word for it.
+not a guess. i, j, k point from the tip to the spindle. RAPID counts for the next GOTO alone. DELAY/s stops at the
+last point for s seconds; DELAY/0 is an exact stop. A `$$` remark "pentapod link" or "pentapod cut" tells moves on feed
+apart, for APT has no word for it.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from pentapod.errors import ToolpathError, nearest
-from pentapod.toolpath.formats.moves import Moves, plain, poses
-from pentapod.toolpath.formats.reading import number, read_lines
+from pentapod.toolpath.formats.moves import Moves, plain, poses, stands
+from pentapod.toolpath.formats.reading import number, read_lines, seconds
 from pentapod.toolpath.formats.registry import Defaults, Format, register
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
@@ -36,7 +37,7 @@ _REFUSED = {
     "CYCLE": "drilling cycles are not read: export points",
     "GODLTA": "increments are not read: export absolute points",
 }
-_WORDS = ("UNITS", "MULTAX", "FEDRAT", "RAPID", "GOTO", "FROM", "CUTTER", "FINI")
+_WORDS = ("UNITS", "MULTAX", "FEDRAT", "RAPID", "GOTO", "FROM", "CUTTER", "DELAY", "FINI")
 
 
 @dataclass
@@ -136,6 +137,11 @@ class _Reader:
         ball = len(numbers) > 1 and abs(numbers[1] - 0.5 * numbers[0]) <= 1e-6 * numbers[0]
         self.pivot = numbers[1] * self.unit * 1e-3 if ball else 0.0
 
+    def _delay(self, words: list[str], line: int) -> None:
+        if len(words) != 1:
+            raise self.wrong("not a time", line, "DELAY", value=",".join(words)[:40], expected="DELAY/seconds")
+        self.moves.stand(seconds(words[0], self.file, line, "DELAY"))
+
     def _from(self, words: list[str], line: int) -> None:
         if self.moves.tips:
             raise self.wrong("FROM after the first point", line, "FROM")
@@ -174,6 +180,7 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
 
 def _write(toolpath: Toolpath) -> bytes:
     tips, axes, kinds, feeds = poses(toolpath)
+    dwells = stands(toolpath)
     lines = ["PARTNO PENTAPOD", "UNITS/MM", f"$$ {_REMARK}pivot_mm {1e3 * toolpath.pivot!r}", "MULTAX/ON"]
     kind, feed = SegmentKind.CUT, np.nan
     for k in range(len(tips)):
@@ -191,6 +198,8 @@ def _write(toolpath: Toolpath) -> bytes:
                 lines.append(f"FEDRAT/{plain(feed, 6)},MMPM")
         point = ",".join([*(plain(v, 7) for v in tips[k]), *(plain(v, 12) for v in axes[k])])
         lines.append(f"GOTO/{point}")
+        if k in dwells:
+            lines.append(f"DELAY/{plain(dwells[k], 9)}")
     return ("\n".join([*lines, "FINI"]) + "\n").encode()
 
 

@@ -1,4 +1,4 @@
-"""Plain CSV: one waypoint a row, units in the column names, and how the waypoint is reached."""
+"""Plain CSV: one waypoint a row, units in the column names; how it is reached, and how long the tool stands there."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import re
 from pathlib import Path
 
 from pentapod.errors import ToolpathError
-from pentapod.toolpath.formats.moves import Moves, plain, poses
-from pentapod.toolpath.formats.reading import number, read_lines
+from pentapod.toolpath.formats.moves import Moves, plain, poses, stands
+from pentapod.toolpath.formats.reading import number, read_lines, seconds
 from pentapod.toolpath.formats.registry import Defaults, Format, register
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 _MAGIC = "pentapod_toolpath"
-_COLUMNS = "x_mm,y_mm,z_mm,i,j,k,kind,feed_mm_min,power"
+_COLUMNS = "x_mm,y_mm,z_mm,i,j,k,kind,feed_mm_min,power,dwell_s"
+_OPTIONAL = (",dwell_s", ",power,dwell_s", ",kind,feed_mm_min,power,dwell_s")
 _MM = {"mm": 1.0, "m": 1e3, "inch": 25.4}
 _HEADER = re.compile(r"#\s*(\w+)\s*=\s*(\S+)\s*$")
 _START = "start"
@@ -43,6 +44,8 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
         if not 0.0 <= power <= 1.0:
             raise ToolpathError("not a share", file=file, line=line, key="power", value=cells[8], expected="0 to 1")
         moves.add([v * scale for v in values[:3]], values[3:], kind, feed, line, "i,j,k", power)
+        if len(cells) > 9 and cells[9]:
+            moves.stand(seconds(cells[9], file, line, "dwell_s"))
     if "waypoints" in header:
         text, line = header["waypoints"]
         if number(text, file, line, "waypoints") != len(moves.tips):
@@ -60,7 +63,7 @@ def _unit(file: Path, line: int, names: str) -> float:
     """Return millimetres in the unit of the first three columns. Raises ToolpathError for other columns."""
     for unit, scale in _MM.items():
         known = _COLUMNS.replace("x_mm,y_mm,z_mm", f"x_{unit},y_{unit},z_{unit}")
-        if names in (known, known.removesuffix(",power"), known.removesuffix(",kind,feed_mm_min,power")):
+        if names in (known, *(known.removesuffix(missing) for missing in _OPTIONAL)):
             return scale
     bare = names.split(",")[:3] == ["x", "y", "z"]
     what = "the columns x, y, z have no unit" if bare else "wrong column names"
@@ -87,6 +90,7 @@ def _how(file: Path, line: int, cells: list[str], defaults: Defaults, *, first: 
 
 def _write(toolpath: Toolpath) -> bytes:
     tips, axes, kinds, feeds = poses(toolpath)
+    dwells = stands(toolpath)
     powers = [toolpath.segments[k].power for k in toolpath.segment_of_interval]
     lines = [f"# {_MAGIC} = 1", f"# pivot_mm = {1e3 * toolpath.pivot!r}", f"# waypoints = {len(tips)}", _COLUMNS]
     for k in range(len(tips)):
@@ -94,7 +98,8 @@ def _write(toolpath: Toolpath) -> bytes:
         kind = str(kinds[k - 1]) if k else _START
         feed = plain(float(feeds[k - 1]), 6) if k and kinds[k - 1] != SegmentKind.RAPID else ""
         power = plain(powers[k - 1], 9) if k else "1.0"
-        lines.append(",".join([*cells, kind, feed, power]))
+        dwell = plain(dwells[k], 9) if k in dwells else ""
+        lines.append(",".join([*cells, kind, feed, power, dwell]))
     return ("\n".join(lines) + "\n").encode()
 
 

@@ -2,8 +2,11 @@
 
 Coordinates are those of the tip in the workpiece. LinuxCNC's pentakins works that way from the start; controllers of
 XYZBC machines need G43.4, which the reader insists on before the first move. G0 is a rapid, G1 a cut, or a link after
-a comment "(pentapod link)". Understood are G90 G91 G20 G21 G93 G94 and modal words; arcs, cycles, cutter compensation,
-coordinate systems other than G54 to G59, and expressions are errors: what is not understood is not guessed.
+a comment "(pentapod link)". G4 stops at the last point: P tells LinuxCNC seconds and other controllers whole
+milliseconds, X and U tell those seconds; of no time it is an exact stop, and so is every point in the mode G61.1 (G61
+of other controllers) and the end of a block with G9. Understood are G90 G91 G20 G21 G93 G94 and modal words; arcs,
+cycles, cutter compensation, coordinate systems other than G54 to G59, and expressions are errors: what is not
+understood is not guessed.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from pentapod.errors import ToolpathError
-from pentapod.toolpath.formats.moves import Moves, plain, poses
+from pentapod.toolpath.formats.moves import Moves, plain, poses, stands
 from pentapod.toolpath.formats.reading import number, read_lines
 from pentapod.toolpath.formats.registry import Defaults, Format, register
 from pentapod.toolpath.formats.rotary import AB, BC, Rotary
@@ -26,7 +29,9 @@ from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 _WORD = re.compile(r"([A-Z])([+-]?(?:\d+\.?\d*|\.\d+))")
 _COMMENT = re.compile(r"\(([^()]*)\)|;(.*)$")
 _REMARK = "pentapod "
-_IDLE_G = frozenset({4.0, 17.0, 18.0, 19.0, 40.0, 49.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 61.0, 61.1, 64.0, 80.0})
+_IDLE_G = frozenset({17.0, 18.0, 19.0, 40.0, 49.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 80.0})
+_PATH_MODES = frozenset({61.0, 61.1, 64.0})
+_DWELL, _STOP = ("G", 4.0), ("G", 9.0)
 _IDLE_M = frozenset({0.0, 1.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 48.0, 49.0})
 _ENDS = frozenset({2.0, 30.0})
 _LINEAR = ("X", "Y", "Z")
@@ -49,6 +54,7 @@ class _Reader:
     feed: float | None = None
     kind: SegmentKind = SegmentKind.CUT
     pivot: float | None = None
+    stopping: bool = False
     place: dict[str, float] = field(default_factory=dict[str, float])
     ended: int | None = None
 
@@ -102,9 +108,12 @@ class _Reader:
 
     def _block(self, block: str, line: int) -> None:
         words = self._words(block, line)
+        if _DWELL in words:
+            self._dwell(words, line)
+            return
         # A block's modes hold for the block itself, wherever in it they stand.
         for letter, value in words:
-            if letter == "G":
+            if letter == "G" and (letter, value) != _STOP:
                 self._mode(value, line)
         values: dict[str, float] = {}
         for letter, value in words:
@@ -120,6 +129,20 @@ class _Reader:
                 raise self.wrong("an unknown word", line, letter, expected="".join([*_LINEAR, *self.rotary.words]))
         if values:
             self._move(values, line, own_feed=any(letter == "F" for letter, _ in words))
+            if self.stopping or _STOP in words:
+                self.moves.stand(0.0)
+
+    def _dwell(self, words: list[tuple[str, float]], line: int) -> None:
+        """Stand at the last point, by a block of G4."""
+        times = [(letter, value) for letter, value in words if (letter, value) != _DWELL and letter != "N"]
+        letters = ("P", "X", "U") if self.needs_tcp else ("P",)
+        if len(times) != 1 or times[0][0] not in letters or times[0][1] < 0.0:
+            raise self.wrong("a dwell without its time", line, "G4", expected=" or ".join(f"G4 {x}…" for x in letters))
+        letter, value = times[0]
+        milliseconds = self.needs_tcp and letter == "P"
+        if milliseconds and value != int(value):
+            raise self.wrong("seconds or milliseconds?", line, f"P{value:g}", remedy=f"write G4 X{value:g} for seconds")
+        self.moves.stand(1e-3 * value if milliseconds else value)
 
     def _mode(self, code: float, line: int) -> None:
         word = f"G{code:g}"
@@ -134,6 +157,8 @@ class _Reader:
         elif code in (93.0, 94.0):
             if self.inverse != (code == 93.0):
                 self.inverse, self.feed = code == 93.0, None
+        elif code in _PATH_MODES:
+            self.stopping = code == (61.0 if self.needs_tcp else 61.1)
         elif code == 43.4:
             self.tcp = True
         elif code not in _IDLE_G:
@@ -191,6 +216,7 @@ def _read(file: Path, defaults: Defaults, rotary: Rotary, *, needs_tcp: bool) ->
 
 def _write(toolpath: Toolpath, rotary: Rotary, *, needs_tcp: bool, inverse_time: bool = False) -> bytes:
     tips, axes, kinds, feeds = poses(toolpath)
+    dwells = stands(toolpath)
     angles = rotary.angles(axes)
     lines = ["%", f"(pentapod pivot_mm {1e3 * toolpath.pivot!r})", f"G21 G90 G{93 if inverse_time else 94}"]
     lines += ["G43.4 H1"] if needs_tcp else []
@@ -213,6 +239,8 @@ def _write(toolpath: Toolpath, rotary: Rotary, *, needs_tcp: bool, inverse_time:
             feed = float(feeds[k - 1])
             words.append(f"F{plain(feed, 6)}")
         lines.append(" ".join(words))
+        if k in dwells:
+            lines.append(f"G4 {'X' if needs_tcp else 'P'}{plain(dwells[k], 9)}")
     lines += ["G49"] if needs_tcp else []
     return ("\n".join([*lines, "M2", "%"]) + "\n").encode()
 

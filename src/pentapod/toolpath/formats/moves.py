@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.arrays import Floats, Ints
 from pentapod.errors import ToolpathError
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
@@ -23,7 +23,8 @@ _SAME_FEED = 1e-6
 class Moves:
     """Poses in the order of a file, gathered by a reader. Millimetres, mm/min; a rapid's feed is infinite.
 
-    Each pose has the kind, feed and power of the move that leads to it; those of the first are of no account.
+    Each pose has the kind, feed and power of the move that leads to it; those of the first are of no account. dwells:
+    seconds for which the tool stands at each pose, None where it does not stop; wait: before the first pose is known.
     """
 
     file: Path
@@ -32,6 +33,8 @@ class Moves:
     kinds: list[SegmentKind] = field(default_factory=list)
     feeds: list[float] = field(default_factory=list)
     powers: list[float] = field(default_factory=list)
+    dwells: list[float | None] = field(default_factory=list)
+    wait: float = 0.0
 
     def add(
         self,
@@ -55,11 +58,19 @@ class Moves:
         self.kinds.append(kind)
         self.feeds.append(feed)
         self.powers.append(power)
+        self.dwells.append(None)
+
+    def stand(self, seconds: float) -> None:
+        """Stop exactly at the last pose, and stand there."""
+        if self.dwells:
+            self.dwells[-1] = (self.dwells[-1] or 0.0) + seconds
+        else:
+            self.wait += seconds
 
     def toolpath(self, pivot: float) -> Toolpath:
         """Return the toolpath: neighbours of one kind, feed and power make a segment; poses that repeat are left out.
 
-        pivot: metres. Raises ToolpathError for fewer than two poses.
+        Where the tool stands a segment ends. pivot: metres. Raises ToolpathError for fewer than two poses.
         """
         tips, axes = np.array(self.tips).reshape(-1, 3) * 1e-3, np.array(self.axes).reshape(-1, 3)
         moved = np.ones(len(tips), dtype=np.bool_)
@@ -69,16 +80,28 @@ class Moves:
             raise ToolpathError("the file holds no motion", file=self.file, expected="at least two different poses")
         feeds, powers = np.array(self.feeds)[rows], np.array(self.powers)[rows]
         kinds = [self.kinds[row] for row in rows]
+        dwells = self._dwells(np.cumsum(moved) - 1, len(rows))
         breaks = [1]
         for k in range(2, len(rows)):
             same_feed = feeds[k] == feeds[k - 1] or abs(feeds[k] - feeds[k - 1]) <= _SAME_FEED * feeds[k - 1]
-            if kinds[k] != kinds[k - 1] or not same_feed or powers[k] != powers[k - 1]:
+            same = kinds[k] == kinds[k - 1] and same_feed and powers[k] == powers[k - 1]
+            if not same or dwells[k - 1] is not None:
                 breaks.append(k)
         segments = [
-            Segment(kinds[a], tips[rows[a - 1 : b]], axes[rows[a - 1 : b]], feeds[a] / 6e4, float(powers[a]))
+            Segment(
+                kinds[a], tips[rows[a - 1 : b]], axes[rows[a - 1 : b]], feeds[a] / 6e4, float(powers[a]), dwells[b - 1]
+            )
             for a, b in pairwise([*breaks, len(rows)])
         ]
-        return Toolpath(tuple(segments), pivot)
+        return Toolpath(tuple(segments), pivot, self.wait + (dwells[0] or 0.0))
+
+    def _dwells(self, owner: Ints, count: int) -> list[float | None]:
+        """Return the dwells of the poses that stay; owner: for each pose the one that it repeats, or itself."""
+        dwells: list[float | None] = [None] * count
+        for pose, seconds in zip(owner.tolist(), self.dwells, strict=True):
+            if seconds is not None:
+                dwells[pose] = (dwells[pose] or 0.0) + seconds
+        return dwells
 
 
 def poses(toolpath: Toolpath) -> tuple[Floats, Floats, list[SegmentKind], Floats]:
@@ -87,6 +110,11 @@ def poses(toolpath: Toolpath) -> tuple[Floats, Floats, list[SegmentKind], Floats
     kinds = [toolpath.segments[k].kind for k in owner]
     feeds = np.array([segment.feed for segment in toolpath.segments])[owner] * 6e4
     return toolpath.tips * 1e3, toolpath.axes, kinds, feeds
+
+
+def stands(toolpath: Toolpath) -> dict[int, float]:
+    """Return the seconds for which the tool stands at waypoints where it stops, by the waypoints' indices."""
+    return {int(at): s for at, s in zip(toolpath.starts, toolpath.dwells, strict=True) if s is not None}
 
 
 def plain(value: float, digits: int) -> str:

@@ -18,11 +18,23 @@ from pentapod.toolpath.formats.registry import Defaults, Format, register
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 _MM, _MM_MIN = 1e3, 6e4
-_NAMES = ("tips_mm", "axes", "pivot_mm", "segment_starts", "segment_kinds", "segment_feeds_mm_min", "segment_powers")
+_NAMES = (
+    "tips_mm",
+    "axes",
+    "pivot_mm",
+    "segment_starts",
+    "segment_kinds",
+    "segment_feeds_mm_min",
+    "segment_powers",
+    "dwells_s",
+)
 
 
 def toolpath_arrays(toolpath: Toolpath) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a toolpath, workpiece frame; a segment's first waypoint is its start."""
+    """Return the arrays of a toolpath, workpiece frame; a segment's first waypoint is its start.
+
+    dwells_s (S + 1,): standing at the first waypoint of each segment, and at the end; NaN where it does not stop.
+    """
     values = (
         toolpath.tips * _MM,
         toolpath.axes,
@@ -31,6 +43,7 @@ def toolpath_arrays(toolpath: Toolpath) -> dict[str, NDArray[Any]]:
         np.array([str(s.kind) for s in toolpath.segments]),
         np.array([s.feed for s in toolpath.segments]) * _MM_MIN,
         np.array([s.power for s in toolpath.segments]),
+        np.array([np.nan if dwell is None else dwell for dwell in toolpath.dwells]),
     )
     return {f"toolpath.{name}": value for name, value in zip(_NAMES, values, strict=True)}
 
@@ -60,14 +73,15 @@ def _toolpath(arrays: dict[str, NDArray[Any]]) -> Toolpath:
     tips, axes = arrays["tips_mm"] / _MM, arrays["axes"]
     starts = arrays["segment_starts"].astype(np.intp)
     kinds, feeds, powers = arrays["segment_kinds"], arrays["segment_feeds_mm_min"] / _MM_MIN, arrays["segment_powers"]
-    fits = len(starts) - 1 == len(kinds) == len(feeds) == len(powers)
+    dwells = [None if np.isnan(seconds) else float(seconds) for seconds in arrays["dwells_s"]]
+    fits = len(starts) - 1 == len(kinds) == len(feeds) == len(powers) == len(dwells) - 1
     if not fits or starts[0] != 0 or starts[-1] != len(tips) - 1:
         raise ToolpathError("the segments do not fit the waypoints", key="toolpath.segment_starts")
     segments = [
-        Segment(SegmentKind(str(kind)), tips[a : b + 1], axes[a : b + 1], float(feed), float(power))
-        for kind, feed, power, (a, b) in zip(kinds, feeds, powers, pairwise(starts), strict=True)
+        Segment(SegmentKind(str(kind)), tips[a : b + 1], axes[a : b + 1], float(feed), float(power), dwell)
+        for kind, feed, power, dwell, (a, b) in zip(kinds, feeds, powers, dwells[1:], pairwise(starts), strict=True)
     ]
-    return Toolpath(tuple(segments), float(arrays["pivot_mm"].item()) / _MM)
+    return Toolpath(tuple(segments), float(arrays["pivot_mm"].item()) / _MM, dwells[0] or 0.0)
 
 
 def _write(toolpath: Toolpath) -> bytes:

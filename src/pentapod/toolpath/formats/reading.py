@@ -66,6 +66,14 @@ def check_head(file: Path) -> bytes:
     return head
 
 
+def seconds(text: str, file: Path, line: int, word: str) -> float:
+    """Return a time, 0 or more. Raises ToolpathError naming the word."""
+    value = number(text, file, line, word)
+    if value < 0.0:
+        raise ToolpathError("a time below 0", file=file, line=line, key=word, value=text.strip()[:40])
+    return value
+
+
 def number(text: str, file: Path, line: int, word: str) -> float:
     """Return a finite number. Raises ToolpathError naming the word."""
     try:

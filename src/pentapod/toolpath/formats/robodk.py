@@ -61,6 +61,6 @@ ROBODK = register(
         "RoboDK: X,Y,Z,NX,NY,NZ,speed",
         _read,
         _write,
-        loses=frozenset({"links", "pivot", "end", "power"}),
+        loses=frozenset({"links", "pivot", "end", "power", "dwell"}),
     )
 )

@@ -107,4 +107,4 @@ def _code(path: Toolpath) -> bytes:
 def _within(path: Toolpath, rapid: float) -> Toolpath:
     """Return the toolpath with no feed beyond the machine's rapid rate; rapids stay rapids."""
     segments = (s if np.isinf(s.feed) else dataclasses.replace(s, feed=min(s.feed, rapid)) for s in path.segments)
-    return Toolpath(tuple(segments), path.pivot)
+    return dataclasses.replace(path, segments=tuple(segments))

@@ -1,0 +1,88 @@
+"""Claims about where the toolpath asks for a stop: that the robot comes to rest there, and stands for so long."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pentapod.arrays import Bools
+from pentapod.geometry.directions import angle_between
+from pentapod.geometry.polyline import arc_length
+from pentapod.verify.claim import ALLOWANCE, Claim, Finding
+from pentapod.verify.replay import Replay
+
+STILL_M = 1e-9
+"""A leg that moves by less from row to row stands: the resolution of the coarsest program files."""
+
+_SECONDS = 1e-9
+
+
+def exact_stops(replay: Replay) -> Finding | None:
+    """Judge that the robot comes to rest wherever the toolpath stops; None where it does not."""
+    stops = _stops(replay)
+    if not stops:
+        return None
+    period, limit = replay.program.period, replay.machine.legs.max_acceleration
+    shares = (np.abs(np.diff(replay.program.legs, axis=0)) / (limit * period**2)).max(axis=1)
+    slowest = [low + int(np.argmin(shares[low:high])) for low, high, _ in stops]
+    worst = slowest[int(np.argmax(shares[slowest]))]
+    step = np.abs(replay.program.legs[worst + 1] - replay.program.legs[worst])
+    leg = int(np.argmax(step / limit))
+    value, bound = float(step[leg]) / period, float(limit[leg]) * period
+    method = (
+        f"of {len(stops)} stops the one where most is left of the legs' speed, over the slowest period within the path "
+        f"tolerance of it; the bound is what leg {leg + 1}'s greatest acceleration changes in one period"
+    )
+    passed = value <= bound * (1.0 + ALLOWANCE)
+    return Finding(passed, 1e3 * value, 1e3 * bound, "mm/s", replay.place(2 * worst), method)
+
+
+def dwells(replay: Replay) -> Finding | None:
+    """Judge that the robot stands as long as the toolpath asks; None where it asks for none."""
+    asked = [stop for stop in _stops(replay) if stop[2] > 0.0]
+    if not asked:
+        return None
+    still = np.abs(np.diff(replay.program.legs, axis=0)).max(axis=1) <= STILL_M
+    stood = [_longest_run(still[low:high]) * replay.program.period for low, high, _ in asked]
+    worst = int(np.argmin(np.array(stood) - [seconds for _, _, seconds in asked]))
+    value, bound = stood[worst], asked[worst][2]
+    method = (
+        f"of {len(asked)} dwells the one that falls short most, or is exceeded least: the longest time without a leg "
+        f"moving more than {1e3 * STILL_M:g} mm from row to row, within the path tolerance of the place"
+    )
+    return Finding(value >= bound - _SECONDS, value, bound, "s", replay.place(2 * asked[worst][0]), method)
+
+
+def _stops(replay: Replay) -> list[tuple[int, int, float]]:
+    """Return the steps from row to row, from and to before, near each stop of the toolpath, and its seconds."""
+    path, match, count = replay.toolpath, replay.match, len(replay.program.legs) - 1
+    arcs = arc_length(path.pivots)
+    rows = slice(None, None, 2)
+    low, high = (
+        np.searchsorted(match.arcs[rows], arcs[path.starts] + side * replay.path_tolerance, where)
+        for side, where in ((-1.0, "left"), (1.0, "right"))
+    )
+    # Where the tool turns on the spot its way does not tell one waypoint from the next.
+    turned = np.append(0.0, np.cumsum(angle_between(path.axes[:-1], path.axes[1:])))[path.starts]
+    first, last = (
+        np.searchsorted(match.turned[rows], turned + side * replay.axis_tolerance, where)
+        for side, where in ((-1.0, "left"), (1.0, "right"))
+    )
+    low, high = np.maximum(low, first), np.minimum(high, last)
+    return [
+        # A program that jumps over the place altogether is judged by the step that does.
+        (min(a, count - 1), min(max(b, a + 1), count), seconds)
+        for a, b, seconds in zip(low.tolist(), (high - 1).tolist(), path.dwells, strict=True)
+        if seconds is not None
+    ]
+
+
+def _longest_run(flags: Bools) -> int:
+    """Return the length of the longest run of flags that are set."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+CLAIMS = (
+    Claim("exact stops", exact_stops, idle="the toolpath asks for no stop"),
+    Claim("dwells", dwells, idle="the toolpath asks for no dwell"),
+)

@@ -1,0 +1,59 @@
+"""Claims about stops, on a program whose standing is made and taken away by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import replay_cases as cases
+
+from pentapod.verify import verify
+
+
+@pytest.fixture(scope="module")
+def linear():
+    return cases.good_case(interpolation="linear")
+
+
+def stood(case, stroke, rows, dwell):
+    """The case with so many rows of standing at the end of a stroke, and a toolpath that asks for `dwell` there."""
+    parts = cases.strokes()
+    before = len(cases.timed(parts[: stroke + 1])[0]) - 1
+    segments = list(case.toolpath.segments)
+    segments[stroke] = replace(segments[stroke], dwell=dwell)
+    legs = np.insert(case.program.legs, before, np.repeat(case.program.legs[before : before + 1], rows, 0), axis=0)
+    return replace(case.toolpath, segments=tuple(segments)), replace(case.program, legs=legs), before
+
+
+def judged(case, toolpath, program):
+    verdict = verify(program, case.machine, toolpath, **cases.TOLERANCES)
+    return {c.claim: c for c in verdict.certificates}
+
+
+def test_nothing_is_claimed_where_no_stop_is_asked_for(linear):
+    assert not {"exact stops", "dwells"} & set(judged(linear, linear.toolpath, linear.program))
+
+
+@pytest.mark.parametrize("stroke", [1, 4, 8])
+@pytest.mark.parametrize(("rows", "passed"), [(40, True), (39, False)])
+def test_a_dwell_is_held_to_its_time(linear, stroke, rows, passed):
+    toolpath, program, before = stood(linear, stroke, rows, 0.040)
+    found = judged(linear, toolpath, program)["dwells"]
+    assert found.passed is passed
+    assert found.bound == 0.040
+    assert found.value == pytest.approx(rows * cases.PERIOD, abs=3e-3)
+    assert abs(found.where.row - before) < 60
+    assert judged(linear, toolpath, program)["exact stops"].passed
+
+
+def test_a_dwell_elsewhere_does_not_count(linear):
+    _, program, _ = stood(linear, 4, 60, None)
+    toolpath, _, _ = stood(linear, 1, 0, 0.040)
+    assert not judged(linear, toolpath, program)["dwells"].passed
+
+
+def test_a_program_that_passes_on_has_no_exact_stop(linear):
+    """Through the end of the first cut at the feed, by leaving out the rows about the stop."""
+    toolpath, program, before = stood(linear, 1, 0, 0.0)
+    assert judged(linear, toolpath, program)["exact stops"].passed
+    gap = replace(program, legs=np.delete(program.legs, np.arange(before - 60, before + 60), axis=0))
+    assert not judged(linear, toolpath, gap)["exact stops"].passed
