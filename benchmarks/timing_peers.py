@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_array, vstack
 
 from pentapod.timing.engine import fastest
-from pentapod.timing.jerk import Problem
+from pentapod.timing.jerk_problem import Problem
 from pentapod.timing.jerk_rows import RowsAt
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.stages import Failure

@@ -277,5 +277,5 @@ def test_stops_at_corners_as_sharp_as_asked(desk, mixed):
     placed, free = mixed
     path = leg_path(placed, desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE, stop_angle=np.radians(80.0))
     assert isinstance(path, LegPath)
-    assert len(path.pieces) == len(free.pieces) + 2  # both corners of 90°
+    assert len(path.pieces) == len(free.pieces) + 4  # two corners of the cut, and where links lead into it and out
     assert not path.dwells.any()

@@ -20,6 +20,8 @@ _CALM_SHARE = 0.5
 def law_knots(s: Floats, x: Floats, rows: JerkRows, marks: Floats, begin: float, end: float) -> Floats:
     """Return inner knots (K,) from begin to end: even in the time of the law x, at marks, ever closer to the rests.
 
+    There is a rest where the spline does not reach to the path's end.
+
     Where that law keeps its speed and no other limit is near there is little to find: knots are few.
     """
     speed = np.sqrt(x)
@@ -39,13 +41,14 @@ def law_knots(s: Floats, x: Floats, rows: JerkRows, marks: Floats, begin: float,
     length = end - begin
     near = begin * _GROWTH ** np.arange(1, 200)
     far = (s[-1] - end) * _GROWTH ** np.arange(1, 200)
-    near = near[(near * (1.0 - 1.0 / _GROWTH) < np.interp(near, s, gap)) & (near < 0.45 * length)]
-    far = far[(far * (1.0 - 1.0 / _GROWTH) < np.interp(s[-1] - far, s, gap)) & (far < 0.45 * length)]
+    near = near[(near > 0.0) & (near * (1.0 - 1.0 / _GROWTH) < np.interp(near, s, gap)) & (near < 0.45 * length)]
+    far = far[(far > 0.0) & (far * (1.0 - 1.0 / _GROWTH) < np.interp(s[-1] - far, s, gap)) & (far < 0.45 * length)]
     low = near[-1] if len(near) else begin
     high = s[-1] - (far[-1] if len(far) else s[-1] - end)
     knots = np.concatenate([[begin], near, knots[(knots > low) & (knots < high)], (s[-1] - far)[::-1], [end]])
     # Knots much closer than their neighbourhood asks for add rows and no freedom.
-    least = 0.2 * np.minimum(np.interp(knots, s, gap), np.minimum(knots, s[-1] - knots))
+    rests = [away if join > 0.0 else np.inf for away, join in ((knots, begin), (s[-1] - knots, s[-1] - end))]
+    least = 0.2 * np.minimum(np.interp(knots, s, gap), np.minimum(*rests))
     kept = [begin]
     for knot, room in zip(knots[1:-1].tolist(), least[1:-1].tolist(), strict=True):
         if knot - kept[-1] > room:

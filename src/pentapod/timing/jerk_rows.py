@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Protocol
+
+import numpy as np
 
 from pentapod.arrays import Floats
 
@@ -20,6 +22,10 @@ class JerkRows:
     offset: Floats
     jerks: Floats
     ceiling: Floats
+
+
+NO_ROWS = JerkRows(*(np.zeros((0, 0)) for _ in range(3)), np.zeros((0, 0, 3)), np.zeros(0))
+ROW_NAMES = tuple(field.name for field in fields(JerkRows))
 
 
 class RowsAt(Protocol):
