@@ -104,7 +104,7 @@ class _Parted:
             if k + 1 < len(runs):
                 segments += self._between(b, runs[k + 1][0])
         segments += self._tail(runs[-1][1], last)
-        return Toolpath(tuple(segments), self.whole.pivot)
+        return replace(self.whole, segments=tuple(segments))
 
     def _stretch(self, a: int, b: int) -> list[Segment]:
         """Return what the whole does from waypoint a to waypoint b."""
@@ -114,7 +114,8 @@ class _Parted:
             low, high = max(a, start) - start, min(b, end) - start
             if high > low:
                 tips, axes = segment.tips[low : high + 1], segment.axes[low : high + 1]
-                found.append(replace(segment, tips=tips, axes=axes))
+                dwell = segment.dwell if high == end - start else None
+                found.append(replace(segment, tips=tips, axes=axes, dwell=dwell))
         return found
 
     def _lead(self, a: int) -> list[Segment]:

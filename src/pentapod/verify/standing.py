@@ -7,7 +7,7 @@ import numpy as np
 from pentapod.arrays import Bools
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length
-from pentapod.verify.claim import ALLOWANCE, Claim, Finding
+from pentapod.verify.claim import ALLOWANCE, Claim, Finding, Idle
 from pentapod.verify.replay import Replay
 
 STILL_M = 1e-9
@@ -16,11 +16,11 @@ STILL_M = 1e-9
 _SECONDS = 1e-9
 
 
-def exact_stops(replay: Replay) -> Finding | None:
-    """Judge that the robot comes to rest wherever the toolpath stops; None where it does not."""
+def exact_stops(replay: Replay) -> Finding | Idle:
+    """Judge that the robot comes to rest wherever the toolpath stops."""
     stops = _stops(replay)
     if not stops:
-        return None
+        return Idle("the toolpath asks for no stop")
     period, limit = replay.program.period, replay.machine.legs.max_acceleration
     shares = (np.abs(np.diff(replay.program.legs, axis=0)) / (limit * period**2)).max(axis=1)
     slowest = [low + int(np.argmin(shares[low:high])) for low, high, _ in stops]
@@ -36,11 +36,11 @@ def exact_stops(replay: Replay) -> Finding | None:
     return Finding(passed, 1e3 * value, 1e3 * bound, "mm/s", replay.place(2 * worst), method)
 
 
-def dwells(replay: Replay) -> Finding | None:
-    """Judge that the robot stands as long as the toolpath asks; None where it asks for none."""
+def dwells(replay: Replay) -> Finding | Idle:
+    """Judge that the robot stands as long as the toolpath asks."""
     asked = [stop for stop in _stops(replay) if stop[2] > 0.0]
     if not asked:
-        return None
+        return Idle("the toolpath asks for no dwell")
     still = np.abs(np.diff(replay.program.legs, axis=0)).max(axis=1) <= STILL_M
     stood = [_longest_run(still[low:high]) * replay.program.period for low, high, _ in asked]
     worst = int(np.argmin(np.array(stood) - [seconds for _, _, seconds in asked]))
@@ -83,6 +83,6 @@ def _longest_run(flags: Bools) -> int:
 
 
 CLAIMS = (
-    Claim("exact stops", exact_stops, idle="the toolpath asks for no stop"),
-    Claim("dwells", dwells, idle="the toolpath asks for no dwell"),
+    Claim("exact stops", exact_stops),
+    Claim("dwells", dwells),
 )
