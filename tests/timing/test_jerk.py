@@ -133,8 +133,9 @@ def test_lowered_limits_are_met_by_solving_about_their_places_alone():
     assert law_of(before).duration < law_of(again).duration
     assert law_of(again).duration == pytest.approx(law_of(whole).duration, rel=1e-3)
     assert (again.x[1:-1] <= lowered(again.s[1:-1]).ceiling * (1 + 1e-6)).all()
-    v = again.problem.values(again.y)
-    jerk = np.sqrt(v[:, :1]) * np.einsum("nkd,nd->nk", lowered(again.problem.s).jerks, v)
+    (part,) = again.parts
+    v = part.problem.values(part.y)
+    jerk = np.sqrt(v[:, :1]) * np.einsum("nkd,nd->nk", lowered(part.problem.s).jerks, v)
     assert np.abs(jerk).max() < 1.0 + 1e-6
     assert limited_again(before, s, x, lambda at: lowered(at + 0.09)) is None  # the rests are touched
 

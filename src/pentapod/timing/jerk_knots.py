@@ -47,8 +47,9 @@ def law_knots(s: Floats, x: Floats, rows: JerkRows, marks: Floats, begin: float,
     high = s[-1] - (far[-1] if len(far) else s[-1] - end)
     knots = np.concatenate([[begin], near, knots[(knots > low) & (knots < high)], (s[-1] - far)[::-1], [end]])
     # Knots much closer than their neighbourhood asks for add rows and no freedom.
-    rests = [away if join > 0.0 else np.inf for away, join in ((knots, begin), (s[-1] - knots, s[-1] - end))]
-    least = 0.2 * np.minimum(np.interp(knots, s, gap), np.minimum(*rests))
+    least = 0.2 * np.interp(knots, s, gap)
+    least = np.minimum(least, 0.2 * knots) if begin > 0.0 else least
+    least = np.minimum(least, 0.2 * (s[-1] - knots)) if end < s[-1] else least
     kept = [begin]
     for knot, room in zip(knots[1:-1].tolist(), least[1:-1].tolist(), strict=True):
         if knot - kept[-1] > room:

@@ -24,7 +24,8 @@ class JerkRows:
     ceiling: Floats
 
 
-NO_ROWS = JerkRows(*(np.zeros((0, 0)) for _ in range(3)), np.zeros((0, 0, 3)), np.zeros(0))
+_NONE = np.zeros((0, 0))
+NO_ROWS = JerkRows(_NONE, _NONE, _NONE, np.zeros((0, 0, 3)), np.zeros(0))
 ROW_NAMES = tuple(field.name for field in fields(JerkRows))
 
 

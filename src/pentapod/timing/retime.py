@@ -84,7 +84,7 @@ def _dwells(path: LegPathLike, indices: list[int], period: float) -> Floats:
     """Return the seconds (L + 1,) of standing before each moving piece and after the last, in whole periods."""
     owner = np.searchsorted(indices, np.arange(len(path.pieces) + 1), side="left")
     periods = np.bincount(owner, np.ceil(np.asarray(path.dwells) / period - 1e-9), len(indices) + 1)
-    return periods * period
+    return np.asarray(periods * period, dtype=np.float64)
 
 
 def _profile(

@@ -36,8 +36,14 @@ class Profile:
             rows, times = np.append(0, rows), np.append(start, times)
         if end > times[-1]:
             rows, times = np.append(rows, rows[-1]), np.append(times, end)
-        columns = (y[rows] for y in (self.stations, self.speeds, self.active, self.shares))
-        return Profile(times, *columns, constraint_names=self.constraint_names)
+        return Profile(
+            times,
+            self.stations[rows],
+            self.speeds[rows],
+            self.active[rows],
+            self.shares[rows],
+            self.constraint_names,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,19 +55,15 @@ def dwells(replay: Replay) -> Finding | Idle:
 def _stops(replay: Replay) -> list[tuple[int, int, float]]:
     """Return the steps from row to row, from and to before, near each stop of the toolpath, and its seconds."""
     path, match, count = replay.toolpath, replay.match, len(replay.program.legs) - 1
-    arcs = arc_length(path.pivots)
-    rows = slice(None, None, 2)
-    low, high = (
-        np.searchsorted(match.arcs[rows], arcs[path.starts] + side * replay.path_tolerance, where)
-        for side, where in ((-1.0, "left"), (1.0, "right"))
-    )
     # Where the tool turns on the spot its way does not tell one waypoint from the next.
-    turned = np.append(0.0, np.cumsum(angle_between(path.axes[:-1], path.axes[1:])))[path.starts]
-    first, last = (
-        np.searchsorted(match.turned[rows], turned + side * replay.axis_tolerance, where)
-        for side, where in ((-1.0, "left"), (1.0, "right"))
-    )
-    low, high = np.maximum(low, first), np.minimum(high, last)
+    turns = np.append(0.0, np.cumsum(angle_between(path.axes[:-1], path.axes[1:])))
+    low, high = np.zeros(len(path.starts), np.intp), np.full(len(path.starts), count + 1)
+    for course, places, within in (
+        (match.arcs[::2], arc_length(path.pivots)[path.starts], replay.path_tolerance),
+        (match.turned[::2], turns[path.starts], replay.axis_tolerance),
+    ):
+        low = np.maximum(low, np.searchsorted(course, places - within, "left"))
+        high = np.minimum(high, np.searchsorted(course, places + within, "right"))
     return [
         # A program that jumps over the place altogether is judged by the step that does.
         (min(a, count - 1), min(max(b, a + 1), count), seconds)
