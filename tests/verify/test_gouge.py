@@ -172,6 +172,8 @@ def test_a_cutter_that_begins_inside_is_caught(cubic):
     found = judged(cubic, cutting)
     assert not found[CUTS].passed
     assert found[CUTS].method == "the cutter begins inside the part"
+    assert found[CUTS].bound == pytest.approx(0.07)
+    assert found[CUTS].where.row == 0
 
 
 def test_nothing_that_cuts_and_nothing_to_cut(cubic):

@@ -90,5 +90,6 @@ def _layout(titles: Sequence[str]) -> dict[str, Any]:
     for row, title in enumerate(titles, start=1):
         top = 1.0 - (row - 1) * (height + gap)
         axis = {"title": {"text": title}, "domain": [max(top - height, 0.0), top], "anchor": "x", "zeroline": False}
+        axis["exponentformat"] = "e"  # "80µ" of a millimetre is nothing that anybody says
         layout["yaxis" if row == 1 else f"yaxis{row}"] = axis
     return layout
