@@ -12,7 +12,8 @@ from pentapod.geometry.interpolant import Interpolant
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.toolpath.tools import BallCutter, FlatEnd, StandOff
 from pentapod.verify import Cutting, Replay, verify
-from pentapod.verify.gouge import _rapid
+from pentapod.verify.claim import Idle
+from pentapod.verify.gouge import _rapid, gouge
 from pentapod.verify.immersion import _runs, _strays, _Stretches
 
 CUTS, RAPIDS = "gouge on cuts and links", "gouge on rapids"
@@ -221,6 +222,16 @@ def test_rapids_are_the_chords_that_meet_rapids_alone(replay):
     found = marked[::3][known]
     assert np.array_equal(found, np.array(expected)[known].astype(bool))
     assert 0.1 < found.mean() < 0.9
+
+
+@pytest.mark.parametrize(("kind", "missing"), [(SegmentKind.CUT, "a rapid"), (SegmentKind.RAPID, "a cut or a link")])
+def test_a_kind_that_is_missing_is_not_judged(replay, kind, missing):
+    segments = tuple(replace(s, kind=kind, feed=cases.FEED) for s in replay.toolpath.segments)
+    other = replace(replay, toolpath=replace(replay.toolpath, segments=segments))
+    _ = replay.match
+    other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"survey", "match"}})
+    assert gouge(other, rapid=kind is SegmentKind.CUT) == Idle(f"no moment belongs to {missing}")
+    assert _rapid(other).all() == (kind is SegmentKind.RAPID)
 
 
 def test_what_the_claims_say_is_allowed(cubic):

@@ -55,10 +55,9 @@ def _rapid(replay: Replay) -> Bools:
     ends = np.concatenate([[0.0], np.cumsum(lengths)])[toolpath.starts]
     other = np.array([segment.kind is not SegmentKind.RAPID for segment in toolpath.segments])
     before = np.concatenate([[0], np.cumsum(other)])
-    last = len(other) - 1
-    low = np.searchsorted(ends[1:], arcs[:-1] - replay.path_tolerance, side="left").clip(max=last)
-    high = (np.searchsorted(ends, arcs[1:] + replay.path_tolerance, side="right") - 1).clip(0, last)
-    return np.asarray(before[high + 1] == before[low])
+    first = np.searchsorted(ends[1:], arcs[:-1] - replay.path_tolerance, side="left")
+    behind = np.minimum(np.searchsorted(ends, arcs[1:] + replay.path_tolerance, side="right"), len(other))
+    return np.asarray(before[behind] == before[first])
 
 
 def _enclosed(replay: Replay, cutting: Cutting) -> bool:
