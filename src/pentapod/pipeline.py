@@ -31,13 +31,7 @@ from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
 from pentapod.strategy_tables import FileTable
 from pentapod.timing import Explanation, Trajectory, certify, explain, retime, unheld
-from pentapod.toolpath import (
-    Mesh,
-    Tool,
-    Toolpath,
-    load_mesh,
-    toolpath_with_report,
-)
+from pentapod.toolpath import Mesh, Tool, Toolpath, load_mesh, toolpath_with_report
 from pentapod.toolpath.formats import read_toolpath
 from pentapod.toolpath.links import LinkStyle
 from pentapod.toolpath.parting import Piece, cutting_intervals, part_of
