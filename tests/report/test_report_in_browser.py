@@ -202,6 +202,16 @@ def test_the_path_is_coloured_by(opened, kind):
     assert opened.errors() == []
 
 
+def test_a_dark_screen_prints_black_on_white(opened):
+    page = opened.page
+    ink = "() => ['scene', 'time'].map(id => document.getElementById(id).layout.font.color)"
+    before = page.evaluate(ink)
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.evaluate(ink) == ["#000000", "#000000"]
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.evaluate(ink) == before
+
+
 def test_prints_on_a4(chromium, report, tmp_path):
     opened = Opened(chromium, report[0])
     opened.page.emulate_media(media="print")

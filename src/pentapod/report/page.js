@@ -7,8 +7,9 @@
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
   // Colours of text and grid follow the page; the rest of a figure is the same on light and dark.
-  function theme(layout) {
-    const ink = css("--ink"), line = css("--line"), sheet = css("--sheet");
+  const PAPER = { "--ink": "#000000", "--line": "#cccccc", "--sheet": "#ffffff" };
+  function theme(layout, look = css) {
+    const ink = look("--ink"), line = look("--line"), sheet = look("--sheet");
     const change = {
       "font.color": ink, "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)",
       "modebar.bgcolor": "rgba(0,0,0,0)", "modebar.color": line, "modebar.activecolor": ink,
@@ -32,8 +33,8 @@
     drawn[id] = Plotly.newPlot(holder, data, layout, config).then(() => Plotly.relayout(holder, theme(layout)));
   }
 
-  function retheme() {
-    for (const id of Object.keys(drawn)) Plotly.relayout(id, theme(figures[id].layout));
+  function retheme(look = css) {
+    for (const id of Object.keys(drawn)) Plotly.relayout(id, theme(figures[id].layout, look));
   }
 
   // Figures keep the pixels that they were drawn with: on paper they are scaled to its width (A4 less its margins).
@@ -49,16 +50,16 @@
   draw("scene");
   draw("time");
   for (const holder of document.querySelectorAll(".figure")) scaling.observe(holder);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", retheme);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => retheme());
   // Paper cannot be opened: what is folded on the screen is printed whole.
   let folded = [];
   addEventListener("beforeprint", () => {
     folded = [...document.querySelectorAll("details:not([open])")];
     for (const details of folded) details.open = true;
-    retheme();
+    retheme((name) => PAPER[name]);  // also from a dark screen
   });
   addEventListener("afterprint", () => { for (const details of folded) details.open = false; });
-  addEventListener("afterprint", retheme);
+  addEventListener("afterprint", () => retheme());
 
   const poses = machine.poses;
   if (!poses.length) return;
@@ -110,7 +111,9 @@
   near.addEventListener("click", () => {
     const on = near.getAttribute("aria-pressed") !== "true";
     near.setAttribute("aria-pressed", on);
-    const change = {};
+    // The part alone fills the view: from further back.
+    const { x, y, z } = figures.scene.layout.scene.camera.eye, back = on ? 1.6 : 1.0;
+    const change = { "scene.camera.eye": { x: back * x, y: back * y, z: back * z } };
     ["x", "y", "z"].forEach((name, k) => {
       change[`scene.${name}axis.${on ? "range" : "autorange"}`] = on ? machine.around[k] : true;
     });
