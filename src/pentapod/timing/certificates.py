@@ -8,7 +8,8 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.geometry.interpolant import Interpolant, largest_length
-from pentapod.machine.machine import Interpolation, Machine
+from pentapod.machine.machine import Machine
+from pentapod.timing.run_in import run_in
 from pentapod.timing.trajectory import Trajectory
 
 
@@ -63,8 +64,19 @@ def certify(
     count = max(1, round(trajectory.duration / period)) if legs is None else len(legs) - 1
     times = np.minimum(np.arange(count + 1) * period, trajectory.duration)
     stations, segments = trajectory.station(times), trajectory.segment(times)
-    motion = Interpolant.through(trajectory(times) if legs is None else legs, period, interpolation)
-    tip = Interpolant.through(stations[:, None] if tips is None else tips, period, interpolation)
+    # A motion that starts or ends at a speed is part of a longer one, which the controller's spline goes through.
+    limits = machine.tool_limits.given()
+    before, after = _run_ins(trajectory, period, tool=tips is not None or bool(limits))
+
+    def joined(rows: Floats, columns: slice) -> Interpolant:
+        parts = [y[:, columns] for y in (before,) if len(y)] + [rows] + [y[:, columns] for y in (after,) if len(y)]
+        return Interpolant.through(np.concatenate(parts), period, interpolation)
+
+    def own(values: Floats) -> Floats:
+        return values[len(before) : len(values) - len(after)]
+
+    motion = joined(trajectory(times) if legs is None else legs, slice(5))
+    tip = joined(stations[:, None], slice(5, 6)) if tips is None else joined(tips, slice(6, 9))
 
     def use(quantity: str, unit: str, value: float, bound: float, row: int, leg: int | None = None) -> LimitUse:
         where = (float(times[row]), float(stations[row]), int(segments[row]))
@@ -75,12 +87,12 @@ def certify(
         return use(quantity, unit, float(values[row, leg]), float(limit[leg]), int(row), int(leg) + 1)
 
     uses = [
-        of_legs("leg velocity", "m/s", motion.rates, machine.legs.max_velocity),
-        of_legs("leg acceleration", "m/s²", motion.accelerations, machine.legs.max_acceleration),
-        of_legs("leg jerk", "m/s³", motion.jerks, machine.legs.max_jerk),
+        of_legs("leg velocity", "m/s", own(motion.rates), machine.legs.max_velocity),
+        of_legs("leg acceleration", "m/s²", own(motion.accelerations), machine.legs.max_acceleration),
+        of_legs("leg jerk", "m/s³", own(motion.jerks), machine.legs.max_jerk),
     ]
     feeds = _slower(trajectory.feeds(times), machine.rapid_velocity)
-    steps = tip.steps
+    steps = own(tip.steps)
     if tips is None:
         rates = trajectory.feed_rates(times)
         steps = steps * np.maximum(rates[:-1], rates[1:])[:, None, None]
@@ -90,11 +102,11 @@ def certify(
         steps = np.where((on_feed[:-1] | on_feed[1:])[:, None, None], spot.steps, steps)
     share, row = largest_length(steps / feeds[:, None, None])
     uses.append(use("feed", "m/s", share * float(feeds[row]), float(feeds[row]), row))
-    limits = machine.tool_limits.given()
     if limits:
         posed = trajectory.pose(times) if tips is None or axes is None else (tips, axes)
-        for name, unit, values in _of_tool(*posed, period, interpolation):
+        for name, unit, values in _of_tool(joined(posed[0], slice(6, 9)), joined(posed[1], slice(9, 12))):
             if name in limits:
+                values = own(values)  # noqa: PLW2901 (without the run-ins from here on)
                 row = int(np.argmax(values))
                 uses.append(use(_TOOL[name], unit, float(values[row]), limits[name], row))
     return tuple(uses)
@@ -114,11 +126,18 @@ _TOOL = {
 }
 
 
-def _of_tool(
-    tips: Floats, axes: Floats, period: float, interpolation: Interpolation
-) -> tuple[tuple[str, str, Floats], ...]:
-    """Return name, unit and values (N or N − 1,) of what may be limited in the motion of tips and axes (N, 3)."""
-    tip, axis = (Interpolant.through(rows, period, interpolation) for rows in (tips, axes))
+def _run_ins(trajectory: Trajectory, period: float, *, tool: bool) -> tuple[Floats, Floats]:
+    """Return the rows (n, 6 or 12) before the start and after the end, none where these are rests."""
+    pieces = [trajectory.path.pieces[k] for k in (trajectory.indices[0], trajectory.indices[-1])]
+    speeds = trajectory.laws[0].speeds[0], trajectory.laws[-1].speeds[-1]
+    none = np.zeros((0, 12))
+    before = run_in(pieces[0], speeds[0], period, start=True, tool=tool)[:-1] if speeds[0] > 0.0 else none
+    after = run_in(pieces[1], speeds[1], period, start=False, tool=tool)[1:] if speeds[1] > 0.0 else none
+    return before, after
+
+
+def _of_tool(tip: Interpolant, axis: Interpolant) -> tuple[tuple[str, str, Floats], ...]:
+    """Return name, unit and values (N or N − 1,) of what may be limited in the motion of tips and axes."""
     fastest, row = largest_length(axis.steps)
     speeds = np.zeros(len(axis.steps))
     speeds[row] = fastest

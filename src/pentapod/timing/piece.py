@@ -35,7 +35,8 @@ class PieceProfile:
     """Squared speeds x (N + 1,) in m²/s² at stations s (N + 1,) in metres of a piece, linear in s between.
 
     ease_acceleration, ease_speed and ease_jerk (N + 1,): factors ≤ 1 on the limits at each gridpoint, where a plan at
-    full limits was measured to exceed them. before: what was found for the limits before these were eased.
+    full limits was measured to exceed them. before: what was found for the limits before these were eased. x_start,
+    x_end: x that is given at the ends, 0 at rests.
     """
 
     piece: PieceLike
@@ -47,6 +48,13 @@ class PieceProfile:
     ease_jerk: Floats
     engine: Engine = "core"
     before: SmoothProfile | None = None
+    x_start: float = 0.0
+    x_end: float = 0.0
+
+    @property
+    def moving(self) -> bool:
+        """Whether one of its ends is no rest."""
+        return max(self.x_start, self.x_end) > 0.0
 
     @cached_property
     def course(self) -> Course:
@@ -60,7 +68,7 @@ class PieceProfile:
 
     def solved(self) -> PieceProfile | Failure:
         """Return the fastest profile on this grid with these easings."""
-        x = fastest(self.s, *self.rows(), self.ceiling(), engine=self.engine)
+        x = fastest(self.s, *self.rows(), self.ceiling(), x_start=self.x_start, x_end=self.x_end, engine=self.engine)
         if not isinstance(x, Failure):
             return self.with_(x=x)
         names = self.limits.row_names
@@ -127,7 +135,9 @@ class PieceProfile:
         added += [(self.s[:-1] + between * np.diff(self.s))[exceeding] for between in _BETWEEN]
         s = np.unique(np.concatenate([self.s, *added]))
         x, *eases = (np.interp(s, self.s, y) for y in (self.x, self.ease_acceleration, self.ease_speed, self.ease_jerk))
-        return PieceProfile(self.piece, self.limits, s, x, *eases, engine=self.engine)
+        return PieceProfile(
+            self.piece, self.limits, s, x, *eases, engine=self.engine, x_start=self.x_start, x_end=self.x_end
+        )
 
     def path_accelerations(self) -> Floats:
         """Return s̈ (N,) of each stage, m/s²."""
@@ -199,15 +209,23 @@ class PieceProfile:
 
 
 def time_piece(
-    piece: PieceLike, limits: Limits, velocity_slack: float, acceleration_slack: float, engine: Engine = "core"
+    piece: PieceLike,
+    limits: Limits,
+    velocity_slack: float,
+    acceleration_slack: float,
+    engine: Engine = "core",
+    speeds: tuple[float, float] = (0.0, 0.0),
 ) -> PieceProfile | Failure:
     """Return the fastest profile of a piece that keeps the limits between gridpoints as well.
 
     The slacks are the shares above 1 that are let pass, part of the margins. Stages that exceed them are
-    halved, those that still do are eased; what is left after that is run slower as a whole.
+    halved, those that still do are eased; what is left after that is run slower as a whole. speeds: m/s, at the start
+    and at the end.
     """
     s = first_grid(piece, limits)
-    problem = PieceProfile(piece, limits, s, np.zeros_like(s), *(np.ones_like(s) for _ in range(3)), engine=engine)
+    x_start, x_end = speeds[0] ** 2, speeds[1] ** 2
+    ones = (np.ones_like(s) for _ in range(3))
+    problem = PieceProfile(piece, limits, s, np.zeros_like(s), *ones, engine=engine, x_start=x_start, x_end=x_end)
     profile = problem.solved()
     for attempt in range(_REFINEMENTS + _EASINGS):
         if isinstance(profile, Failure):
@@ -232,6 +250,9 @@ def _at_ends(shares: Floats, bad: Bools) -> Floats:
     return np.minimum(np.append(factor, 1.0), np.append(1.0, factor))
 
 
-def _slowed(profile: PieceProfile) -> PieceProfile:
+def _slowed(profile: PieceProfile) -> PieceProfile | Failure:
     rates, accelerations = profile.shares_between()
-    return profile.with_(x=profile.x / max(1.0, float(rates.max()) ** 2, float(accelerations.max())))
+    slower = max(1.0, float(rates.max()) ** 2, float(accelerations.max()))
+    if slower > 1.0 and profile.moving:
+        return Failure(-1, "the limits do not hold between the gridpoints with the speeds that are given at the ends")
+    return profile.with_(x=profile.x / slower)

@@ -15,7 +15,7 @@ from pentapod.timing.law import MotionLaw
 from pentapod.timing.paths import LegPathLike
 from pentapod.timing.piece import PieceProfile, time_piece
 from pentapod.timing.refusals import STILL_M, refusal, unfit
-from pentapod.timing.sampled import WINDOW_PERIODS, Unmended, sampled_laws, whole_periods
+from pentapod.timing.sampled import WINDOW_PERIODS, Unmended, law_between, sampled_laws, whole_periods
 from pentapod.timing.stages import Failure
 from pentapod.timing.trajectory import Profile, Trajectory
 
@@ -29,6 +29,8 @@ def retime(
     acceleration_margin: float = 0.005,
     engine: Engine = "core",
     limit_jerk: bool = True,
+    start_speed: float = 0.0,
+    end_speed: float = 0.0,
 ) -> Trajectory | Refusal:
     """Return the fastest trajectory along a path, or the named cause why there is none.
 
@@ -40,12 +42,25 @@ def retime(
     Method: TOPP-RA (Pham and Pham 2018), by a compiled core; engine "toppra" takes the reference instead, "numpy" the
     form that needs no compiler.
 
-    Raises InputError where a margin is not in (0, 0.5), or for an unknown engine.
+    start_speed, end_speed: ṡ in m/s at the path's start and end, where the motion is part of a longer one; with
+    limit_jerk there is no acceleration there. They must be below what the limits less the margins leave; where
+    they cannot be kept the refusal says so.
+
+    Raises InputError where a margin is not in (0, 0.5), for an unknown engine, for a speed below 0 or next to a dwell,
+    or for a speed with a cubic controller whose jerks are not limited.
     """
+    for name, speed, dwell in (("start_speed", start_speed, path.dwells[0]), ("end_speed", end_speed, path.dwells[-1])):
+        if not 0.0 <= speed < np.inf or (speed > 0.0 and dwell > 0.0):
+            raise InputError("must be a speed", key=name, value=speed, expected="m/s, 0 or more; 0 where a dwell is")
     for name, margin in (("velocity_margin", velocity_margin), ("acceleration_margin", acceleration_margin)):
         if not 0.0 < margin < 0.5:
             raise InputError("a margin is a fraction of a limit", key=name, value=margin, expected="0 < margin < 0.5")
     cubic = machine.controller.interpolation == "cubic"
+    if cubic and not limit_jerk and max(start_speed, end_speed) > 0.0:
+        raise InputError(
+            "given speeds need limited jerks where the controller joins setpoints by cubics, which ring where "
+            "accelerations jump", key="limit_jerk", value=limit_jerk, expected="true",
+        )  # fmt: skip
     period = machine.controller.period
     limits = Limits.of(
         machine,
@@ -61,7 +76,9 @@ def retime(
     profiles: list[PieceProfile] = []
     done = 0.0
     for k in indices:
-        profile = time_piece(path.pieces[k], limits, 0.5 * velocity_margin, 0.7 * acceleration_margin, engine)
+        speeds = (start_speed if k == indices[0] else 0.0, end_speed if k == indices[-1] else 0.0)
+        slacks = (0.5 * velocity_margin, 0.7 * acceleration_margin)
+        profile = time_piece(path.pieces[k], limits, *slacks, engine, speeds)
         if isinstance(profile, Failure):
             return refusal(path, k, profile)
         profiles.append(profile)
@@ -74,10 +91,17 @@ def retime(
             return refusal(path, indices[smoothed.index], smoothed.failure)
         profiles, laws = smoothed
     else:
-        laws = [MotionLaw.from_profile(p.s, p.x) for p in profiles]
-        laws = [law.stretched(whole_periods(law.duration, period)) for law in laws]
+        laws = [_plain_law(p, period) for p in profiles]
     profile = _profile(path, indices, profiles, laws, dwells, smooth=limit_jerk)
     return Trajectory(path, tuple(indices), tuple(laws), profile, dwells)
+
+
+def _plain_law(profile: PieceProfile, period: float) -> MotionLaw:
+    """Return the law of a profile as it is, in whole periods."""
+    if profile.moving:
+        return law_between(profile, 1.0, period, smooth=False)
+    law = MotionLaw.from_profile(profile.s, profile.x)
+    return law.stretched(whole_periods(law.duration, period))
 
 
 def _dwells(path: LegPathLike, indices: list[int], period: float) -> Floats:

@@ -15,12 +15,14 @@ from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
+from scipy.optimize import brentq
 
 from pentapod.arrays import Floats
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine.machine import Machine
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.piece import PieceProfile
+from pentapod.timing.run_in import run_in
 from pentapod.timing.stages import Failure
 
 WINDOW_PERIODS = 4
@@ -68,6 +70,8 @@ class _Timed:
 
         Where the passes find no law that keeps the jerk limits, the averaged one is run as slowly as they ask.
         """
+        if self.profile.moving:
+            return law_between(self.profile, self.slower, self.period, smooth=self.smooth)
         law = self.profile.smooth_law() if self.smooth else None
         if not isinstance(law, MotionLaw):
             law = MotionLaw.from_profile(self.profile.s, self.profile.x).smoothed(WINDOW_PERIODS * self.period)
@@ -86,6 +90,12 @@ class _Timed:
         s[-1] = law.length
         tool = piece.pose(s) if self.profile.limits.tool.given() else ()
         return np.column_stack([piece(s, 0), s, *tool])
+
+    def run_in(self, *, start: bool) -> Floats:
+        """Return rows (n, 6 or 12) that come to the start, or leave the end, at the speed that is given there."""
+        profile = self.profile
+        speed = (profile.x_start if start else profile.x_end) ** 0.5
+        return run_in(profile.piece, speed, self.period, start=start, tool=bool(profile.limits.tool.given()))
 
     def stations(self, count: int, phase: float = 0.0) -> Floats:
         """Return the stations (count,) of the rows, `phase` periods later."""
@@ -120,6 +130,39 @@ class _Use:
         )
 
 
+def law_between(profile: PieceProfile, slower: float, period: float, *, smooth: bool) -> MotionLaw:
+    """Return the law of a profile with given speeds at its ends, `slower` times slower, in whole periods.
+
+    What has to be slower is so by a share of x = ṡ² that rises from 0 at the ends that move, with two vanishing
+    derivatives: so these speeds stay, and no limit of speed is exceeded. smooth: the law limited in jerk, which exists.
+    """
+    found = profile.smooth if smooth else None
+    smoothed = None if found is None or isinstance(found, Failure) else found
+    s, x = (profile.s, profile.x) if smoothed is None else (smoothed.s, smoothed.x)
+    far = np.minimum(
+        s / s[-1] if profile.x_start > 0.0 else np.ones_like(s),
+        1.0 - s / s[-1] if profile.x_end > 0.0 else np.ones_like(s),
+    )
+    both = 2.0 if profile.x_start > 0.0 and profile.x_end > 0.0 else 1.0
+    u = both * far
+    share = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    uphill = np.where(2.0 * s < s[-1], 1.0, -1.0) if both == 2.0 else (1.0 if profile.x_start > 0.0 else -1.0)
+    rise = 30.0 * (u * (1.0 - u)) ** 2 * uphill * both / s[-1]
+
+    def law(less: float) -> MotionLaw:
+        kept = 1.0 - less * share
+        if smoothed is None:
+            return MotionLaw.from_profile(s, x * kept)
+        return MotionLaw.through(s, x * kept, smoothed.slope * kept - less * rise * x)
+
+    goal = whole_periods(law(0.0).duration * slower, period)
+    most = 0.9
+    if law(most).duration <= goal:
+        return law(most).stretched(goal)
+    less = float(brentq(lambda less: law(less).duration - goal, 0.0, most, xtol=1e-15))
+    return law(less).stretched(goal)
+
+
 def whole_periods(duration: float, period: float) -> float:
     """Return the duration rounded up to a whole number of periods, at least one."""
     return max(1.0, float(np.ceil(duration / period - 1e-9))) * period
@@ -141,6 +184,9 @@ def sampled_laws(
     uses: list[_Use | None] = [None] * len(timed)
     exceeding: list[int] = []
     for attempt in range(_EASINGS + _SLOWINGS):
+        for k, piece in enumerate(timed):
+            if smooth and piece.profile.moving and isinstance(piece.profile.smooth, Failure):
+                return Unmended(k, piece.profile.smooth)
         measured = _uses(timed, machine, smooth, uses)
         exceeding = [k for k, use in enumerate(measured) if use.exceeds]
         if not exceeding:
@@ -170,6 +216,11 @@ def _uses(timed: list[_Timed], machine: Machine, smooth: bool, known: list[_Use 
             uses.append(same)
         else:
             before, after = _last_rows(timed[:k]), _first_rows(timed[k + 1 :])
+            if k == 0 and piece.profile.x_start > 0.0:
+                before = piece.run_in(start=True)
+            if k == len(timed) - 1 and piece.profile.x_end > 0.0:
+                after = piece.run_in(start=False)
+                after[:, 5] -= piece.law.length
             if len(before):
                 before[:, 5] -= before[-1, 5]
             if len(after):

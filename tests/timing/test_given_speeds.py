@@ -1,0 +1,65 @@
+"""Given speeds at the start and the end of a motion: kept exactly, within the limits, or refused by name."""
+
+import numpy as np
+import pytest
+from timing_paths import Path, Piece, by_tip, circle, machine, straight
+
+from pentapod.errors import InputError
+from pentapod.refusal import Refusal
+from pentapod.timing import Trajectory, certify, retime
+
+PERIOD = 1e-3
+
+
+def arc():
+    return Path((Piece(by_tip(circle()), 0.1, 0.1, inner_knots=tuple(np.linspace(0, 0.1, 22)[1:-1])),))
+
+
+@pytest.mark.parametrize(("interpolation", "limit_jerk"), [("linear", True), ("linear", False), ("cubic", True)])
+@pytest.mark.parametrize(("v", "w"), [(0.05, 0.0), (0.0, 0.08), (0.09, 0.05)])
+def test_speeds_are_kept_within_the_limits(interpolation, limit_jerk, v, w):
+    m = machine(interpolation=interpolation)
+    motion = retime(arc(), m, limit_jerk=limit_jerk, start_speed=v, end_speed=w)
+    assert isinstance(motion, Trajectory), str(motion)
+    ends = np.array([0.0, motion.duration])
+    np.testing.assert_allclose(motion.station(ends, 1), [v, w], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(motion.station(ends), [0.0, 0.1], atol=1e-15)
+    assert motion.duration / PERIOD == pytest.approx(round(motion.duration / PERIOD), abs=1e-6)
+    shares = {use.quantity: use.share for use in certify(motion, m)}
+    assert max(shares["leg velocity"], shares["leg acceleration"], shares["feed"]) <= 1.01
+    if limit_jerk:
+        assert shares["leg jerk"] <= 1.05
+        np.testing.assert_allclose(motion.station(ends[:1], 2), 0.0, atol=1e-3)
+    rest = retime(arc(), m, limit_jerk=limit_jerk)
+    assert isinstance(rest, Trajectory)
+    assert motion.duration < rest.duration
+
+
+@pytest.mark.parametrize(("v", "w", "why"), [(0.2, 0.0, "faster than any speed"), (0.0, 0.2, "above a limit")])
+def test_speeds_above_the_limits_are_refused(v, w, why):
+    refused = retime(arc(), machine(), start_speed=v, end_speed=w)
+    assert isinstance(refused, Refusal)
+    assert why in str(refused)
+
+
+def test_a_speed_from_which_nothing_stops_in_time_is_refused():
+    short = Path((straight([0.0, 1.0, 0.0, 0.0, 0.0], 1e-4, 0.2),))
+    refused = retime(short, machine(), start_speed=0.15)
+    assert isinstance(refused, Refusal)
+    assert "the end can be reached" in str(refused)
+
+
+@pytest.mark.parametrize("speeds", [{"start_speed": -0.1}, {"end_speed": np.inf}, {"start_speed": np.nan}])
+def test_no_speeds(speeds):
+    with pytest.raises(InputError):
+        retime(arc(), machine(), **speeds)
+
+
+def test_cubics_ring_where_accelerations_jump():
+    with pytest.raises(InputError, match="limit_jerk"):
+        retime(arc(), machine(interpolation="cubic"), limit_jerk=False, start_speed=0.05)
+
+
+def test_who_stands_first_starts_at_rest():
+    with pytest.raises(InputError):
+        retime(Path(arc().pieces, (0.1, 0.0)), machine(), start_speed=0.05)
