@@ -32,4 +32,4 @@ def run_in(piece: PieceLike, speed: float, period: float, *, start: bool, tool: 
     columns = [beyond(lambda order: piece(at, order)), (station + way)[:, None]]
     if tool:
         columns += [beyond(lambda order, k=k: piece.pose(at, order)[k]) for k in (0, 1)]
-    return np.concatenate(columns, axis=1)
+    return np.asarray(np.concatenate(columns, axis=1), dtype=np.float64)

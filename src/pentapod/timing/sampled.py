@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -159,7 +160,7 @@ def law_between(profile: PieceProfile, slower: float, period: float, *, smooth: 
     most = 0.9
     if law(most).duration <= goal:
         return law(most).stretched(goal)
-    less = float(brentq(lambda less: law(less).duration - goal, 0.0, most, xtol=1e-15))
+    less = cast("float", brentq(lambda less: law(less).duration - goal, 0.0, most, xtol=1e-15))
     return law(less).stretched(goal)
 
 
