@@ -63,8 +63,8 @@ OPERATORS = (
     *(f"ReplaceComparisonOperator_{a}_{b}" for a, b in (("Eq", "NotEq"), ("Is", "IsNot"), ("IsNot", "Is"))),
     *(f"ReplaceBinaryOperator_{a}_{b}" for a, b in (("Add", "Sub"), ("Sub", "Add"), ("Mul", "Div"), ("Div", "Mul"))),
 )
-_HOW_MANY_AT_ONCE = re.compile(r"[+-]_(BLOCK|AT_ONCE|CHUNK|LOOKED_AT)\b")
-"""Constants that decide how much is done in one go, and nothing else: changing them means nothing."""
+_MEANINGLESS = re.compile(r"[+-]_(BLOCK|AT_ONCE|CHUNK|LOOKED_AT)\b|\+.*[(\s]/,")
+"""Constants that decide how much is done in one go, and nothing else; the star before arguments by name, divided."""
 _CPU_SECONDS = 120  # a mutant that runs longer than this never ends: killed
 
 
@@ -76,7 +76,7 @@ def mutants(file: Path) -> Iterator[tuple[str, str, str]]:
         while (mutated := mutate_code(source, operator, occurrence)) is not None:
             changed = difflib.unified_diff(source.splitlines(), mutated.splitlines(), lineterm="", n=0)
             lines = [line for line in changed if line[:1] in "+-@" and line[:3] not in ("+++", "---")]
-            if not any(_HOW_MANY_AT_ONCE.match(line) for line in lines):
+            if not any(_MEANINGLESS.match(line) for line in lines):
                 yield name, "  ".join(lines), mutated
             occurrence += 1
 

@@ -8,6 +8,7 @@ from scipy.optimize import least_squares
 
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine import clearances
+from pentapod.program.resolution import QUANTA_PER_M
 from pentapod.verify import Replay, verify
 
 
@@ -171,3 +172,13 @@ def test_places_are_in_the_program_and_on_the_toolpath(good, found):
             assert abs(where.time_s - where.row * good.program.period) <= good.program.period
             assert where.segment is not None
             assert 0 <= where.segment < len(good.toolpath.segments)
+
+
+def test_accelerations_and_jerks_say_how_the_rows_are_joined(good, found):
+    """What rounding may add to a jerk: half a quantum in each row, by the weights of a third difference, or thrice."""
+    linear = good.program.interpolation == "linear"
+    words, weights = ("difference of the rows", 1 + 3 + 3 + 1) if linear else ("derivative of the spline", 24)
+    assert words in found["leg accelerations"].method
+    assert words in found["leg jerks"].method
+    rounding = 1e3 * 0.5 * weights / QUANTA_PER_M / good.program.period**3
+    assert f"and {rounding:.3g} mm/s³ for the rounding" in found["leg jerks"].method
