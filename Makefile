@@ -13,7 +13,7 @@ demo: $(READY)  ## plan a dome and judge the program
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
 
 test: $(READY)  ## the fast suite
-	$(BIN)/pytest -n 2 -m "not slow"
+	$(BIN)/pytest -n 2 -m "not slow" --durations=25
 
 test-all: $(READY)  ## everything, the long forms too
 	$(BIN)/pytest -n 2
