@@ -54,8 +54,8 @@ class IpoptSolver:
     patience: float = 1e6
     _solvers: dict[Any, Any] = field(default_factory=dict[Any, Any])
 
-    def raise_margin(self, start: Candidate) -> Candidate:
-        """Return a candidate with the largest smallest margin near `start`; never a worse one."""
+    def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
+        """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one."""
         best, (rows, kinds), reach = start, self._first(start), 1.0
         touching = bool(start.margins.surroundings.obstacles)
         for _ in range(_ROUNDS):
@@ -71,7 +71,7 @@ class IpoptSolver:
                 reach *= _NEARER
             elif not touching and len(more[0]) == len(rows) and len(more[1]) == len(kinds):
                 break
-            if reach < _NEAREST:
+            if reach < _NEAREST or best.smallest >= enough:
                 break
             rows, kinds = more
         return best

@@ -139,7 +139,7 @@ def _refusal(
         values = best.margins(*poses, best.transform)
 
     def improve(other: Setting, start: Candidate) -> Candidate:
-        return improves(other, True).raise_margin(start)
+        return improves(other, True).raise_margin(start, NEEDED_MARGIN)
 
     found, fixed = remedies(setting, best, improve, NEEDED_MARGIN), not setting.freedom.moves
     attempt = _path(toolpath, setting, best, leans, "best attempt")

@@ -11,7 +11,7 @@ from pentapod.planning.setting import Candidate, Setting
 from pentapod.planning.task import Task
 
 Raise = Callable[[Setting, Candidate], Candidate]
-"""Improves a candidate of a setting with its placement free."""
+"""Improves a candidate of a setting, its placement free, until it fits."""
 
 _WIDER = np.radians([5.0, 10.0, 20.0])
 _WIDEST = np.radians(45.0)
@@ -48,9 +48,13 @@ def _cone(setting: Setting, best: Candidate, improve: Raise, needed: float) -> s
         )
         return improve(there, there.first_candidate(best.margins, best.transform)).smallest >= needed
 
-    if not wider or not fits(wider[-1]):
+    enough = 0.0
+    for tilt in reversed(wider):
+        if not fits(tilt):
+            break
+        enough = tilt
+    if enough == 0.0:
         return ""
-    enough = next((tilt for tilt in wider[:-1] if fits(tilt)), wider[-1])
     return f"allow a tilt of {np.degrees(enough):.0f}°, which is enough"
 
 

@@ -32,14 +32,17 @@ REFINED = 4
 TRIED = 10
 """How many are improved at most, while none is good enough."""
 
+BEYOND_REACH = -0.1
+"""A best smallest margin, after the first few, from which no other start is expected to lead to one that fits."""
+
 Start = tuple[Margins, RigidTransform]
 
 
 class Solver(Protocol):
     """What improves candidates: `sequential`, the default, and `ipopt`, the reference."""
 
-    def raise_margin(self, start: Candidate) -> Candidate:
-        """Return a candidate near `start` with the largest smallest margin; never a worse one."""
+    def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
+        """Return a candidate near `start` with the largest smallest margin, or with `enough`; never a worse one."""
         ...
 
     def calm(self, start: Candidate, keep: float) -> Floats | None:
@@ -104,7 +107,7 @@ def search(
         count = min(len(starts), TRIED) if freedom.moves else len(starts)
         improver = SOLVERS[solver](setting, freedom.moves)
         for margins, transform in starts[:count]:
-            if freedom.moves and tried >= REFINED and best is not None and best.smallest >= NEEDED_MARGIN:
+            if freedom.moves and tried >= REFINED and best is not None and _is_decided(best):
                 break
             found = improver.raise_margin(setting.first_candidate(margins, transform))
             best = found if best is None or found.smallest > best.smallest else best
@@ -119,6 +122,10 @@ def search(
     if best is None:  # there are components, and first_guesses returns some for each
         raise RuntimeError("no first guess was made")
     return Search(best, tried, count, interrupted, freedom)
+
+
+def _is_decided(best: Candidate) -> bool:
+    return best.smallest >= NEEDED_MARGIN or best.smallest < BEYOND_REACH
 
 
 def _starts(

@@ -45,11 +45,11 @@ class SequentialSolver:
     def _curvature(self) -> Curvature:
         return Curvature(self.setting)
 
-    def raise_margin(self, start: Candidate) -> Candidate:
-        """Return a candidate with the largest smallest margin near `start`; never a worse one."""
+    def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
+        """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one."""
         rows, best = self._considered(), start
         for _ in range(_ROUNDS):
-            found = self._climb(best, rows)
+            found = self._climb(best, rows, enough + _ENOUGH)
             values = self.setting.values(found.margins, found.transform, found.coefficients)
             smallest = float(values.min())
             if smallest > best.smallest:
@@ -67,13 +67,15 @@ class SequentialSolver:
         count = len(self.setting.task.pivots)
         return np.unique(np.linspace(0, count - 1, min(count, _CONSIDERED)).astype(np.intp))
 
-    def _climb(self, start: Candidate, rows: Ints) -> Candidate:
+    def _climb(self, start: Candidate, rows: Ints, enough: float) -> Candidate:
         """Return the candidate that a trust-region method reaches, with its smallest margin over `rows`."""
         setting, reach, extra = self.setting, 0.5, _NO_ROWS
         smallest = float(setting.values(start.margins, start.transform, start.coefficients, rows).min())
         best = Candidate(start.margins, start.transform, start.coefficients, smallest)
         model = self.model(best, rows, best.smallest)
         for _ in range(_STEPS):
+            if best.smallest >= enough:
+                break
             step, change, promise = self._curvature.best_step(model, best, reach)
             if promise < _LEAST:
                 break
