@@ -58,9 +58,12 @@ def serve_and_interrupt(words):
     """Run `pentapod view`, where no browser opens, until it says its address; then press Ctrl-C."""
     command = [sys.executable, "-c", "from pentapod.cli.main import main; main()", *words, "--no-open"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as serving:
-        assert serving.stdout.readline().startswith("http://127.0.0.1:")
-        serving.send_signal(signal.SIGINT)
-        assert serving.wait(60) == 0
+        try:
+            assert serving.stdout.readline().startswith("http://127.0.0.1:")
+            serving.send_signal(signal.SIGINT)
+            assert serving.wait(60) == 0
+        finally:
+            serving.kill()
 
 
 @pytest.mark.parametrize("page", GUIDES, ids=lambda page: page.stem)

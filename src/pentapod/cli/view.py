@@ -35,13 +35,13 @@ def view(folder: Path, job: Path | None, host: str, port: int, opens: bool, as_j
     with progress_bar(quiet=quiet or as_json) as progress:
         run = open_run(folder, job, progress)
     with Viewer(run, host=host, port=port) as viewer:
-        if as_json:
-            echo_json({"url": viewer.url})
-        elif not quiet:
-            click.echo(f"{viewer.url} (Ctrl-C ends)")
-        if opens:
-            webbrowser.open(viewer.url)
         try:
+            if as_json:
+                echo_json({"url": viewer.url})
+            elif not quiet:
+                click.echo(f"{viewer.url} (Ctrl-C ends)")
+            if opens:
+                webbrowser.open(viewer.url)
             threading.Event().wait()
         except KeyboardInterrupt:
             return 0
