@@ -195,16 +195,19 @@ def test_the_command_serves_until_it_is_interrupted(planned):
     command = "from pentapod.cli.main import main; main()"
     arguments = ["view", str(planned[0] / "out"), "--no-open", "--json", "--port", "18200"]
     with subprocess.Popen([sys.executable, "-c", command, *arguments], stdout=subprocess.PIPE, text=True) as serving:
-        said = ""
-        while "}" not in said:
-            line = serving.stdout.readline()
-            assert line, "it ended by itself"
-            said += line
-        with urllib.request.urlopen(json.loads(said)["url"], timeout=PATIENCE_S) as page:
-            assert page.status == 200
-            assert b"<canvas" in (content := page.read()) or b"<div" in content
-        serving.send_signal(signal.SIGINT)
-        assert serving.wait(PATIENCE_S) == 0
+        try:
+            said = ""
+            while "}" not in said:
+                line = serving.stdout.readline()
+                assert line, "it ended by itself"
+                said += line
+            with urllib.request.urlopen(json.loads(said)["url"], timeout=PATIENCE_S) as page:
+                assert page.status == 200
+                assert b"<canvas" in (content := page.read()) or b"<div" in content
+            serving.send_signal(signal.SIGINT)
+            assert serving.wait(PATIENCE_S) == 0
+        finally:
+            serving.kill()
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium; PENTAPOD_CHROMIUM may name one")
