@@ -41,7 +41,9 @@ def test_the_reference_is_what_the_code_says():
         assert written == text, f"docs/reference/{name} is out of date: run `make reference`"
 
 
-@pytest.mark.parametrize("page", GUIDES, ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page", [pytest.param(p, marks=[pytest.mark.slow] * (p.stem == "setups"), id=p.stem) for p in GUIDES]
+)
 def test_every_command_runs_as_written(page, tmp_path, monkeypatch):
     shutil.copytree(ROOT / "toolpaths", tmp_path / "toolpaths")
     monkeypatch.chdir(tmp_path)
