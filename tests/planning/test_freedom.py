@@ -16,7 +16,7 @@ from pentapod.planning.freedom import FREE
 from pentapod.planning.plan import NEEDED_MARGIN
 
 TILT = np.radians(15.0)
-SOLVERS = ("sequential", "ipopt")
+SOLVERS = ("sequential", pytest.param("ipopt", marks=pytest.mark.slow))
 
 
 def turn_between(a: RigidTransform, b: RigidTransform) -> float:

@@ -18,7 +18,7 @@ from pentapod.refusal import Refusal
 from pentapod.timing import Trajectory, retime
 from pentapod.verify import verify
 
-FEW, MANY = instances(6), instances(300)
+FEW, MANY = instances(3), instances(300)
 CLEARLY_FEASIBLE = 0.05
 AXIS_TOLERANCE = np.radians(0.5)
 
