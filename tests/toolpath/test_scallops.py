@@ -74,7 +74,7 @@ def ridges(kind, mesh, toolpath):
     return low
 
 
-QUICK = {("torus", RasterOptions), ("cylinder", RasterOptions), ("sphere", OffsetOptions), ("sphere", SpiralOptions)}
+QUICK = {("torus", RasterOptions), ("cylinder", RasterOptions), ("sphere", OffsetOptions)}
 
 
 @pytest.mark.parametrize(
