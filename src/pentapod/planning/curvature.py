@@ -103,4 +103,4 @@ class Curvature:
 def _positive(matrix: Floats) -> Floats:
     """Return the symmetric matrix without its negative eigenvalues: its directions are left to the trust region."""
     values, vectors = np.linalg.eigh(matrix)
-    return (vectors * np.maximum(values, 0.0)) @ vectors.T
+    return np.einsum("ik,jk->ij", vectors * np.maximum(values, 0.0), vectors)
