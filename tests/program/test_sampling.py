@@ -23,7 +23,7 @@ def swinging(duration):
 
 
 def sampled(duration, period, interpolation="linear"):
-    machine = SimpleNamespace(controller=ControllerSettings(period, interpolation))
+    machine = SimpleNamespace(guides=None, controller=ControllerSettings(period, interpolation))
     source = Provenance("m", "d", "j", "v")
     return sample(swinging(duration), machine, RigidTransform.identity(), COMPONENTS[2], source)
 
