@@ -8,15 +8,13 @@ from collections.abc import Callable
 from importlib.util import find_spec
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, vstack
 
-from pentapod.timing.engine import fastest
+from pentapod.refusal import Refusal
 from pentapod.timing.jerk_problem import Problem
 from pentapod.timing.jerk_rows import RowsAt
-from pentapod.timing.law import MotionLaw
-from pentapod.timing.stages import Failure
+from pentapod.timing.waypoints import through_waypoints
 
 FAR = 1e3
 """A limit that is none, for the coordinate whose velocity is the feed."""
@@ -128,13 +126,9 @@ def our_chain(s: np.ndarray, legs: np.ndarray, velocity: float, acceleration: fl
     """Return our way from waypoints to samples every period, through the same cubic spline."""
 
     def chain():
-        path = CubicSpline(s, legs)
-        first, second = (np.vstack([k * path.c[3 - k], path(s[-1:], k)]) for k in (1, 2))
-        ceiling = np.square((velocity / np.abs(first)).min(axis=1))
-        x = fastest(s, first / acceleration, second / acceleration, ceiling)
-        if isinstance(x, Failure):
-            raise SystemExit(str(x))
-        law = MotionLaw.from_profile(s, x)
-        return path(law(np.arange(0.0, law.duration, period)))
+        motion = through_waypoints(s, legs, velocity=velocity, acceleration=acceleration, period=period)
+        if isinstance(motion, Refusal):
+            raise SystemExit(str(motion))
+        return motion.rows
 
     return chain

@@ -9,6 +9,7 @@ from pentapod.timing.paths import LegPathLike, PieceLike
 from pentapod.timing.process import Unheld, unheld
 from pentapod.timing.retime import retime
 from pentapod.timing.trajectory import Profile, Trajectory
+from pentapod.timing.waypoints import WaypointMotion, through_waypoints
 
 __all__ = [
     "CONSTRAINTS",
@@ -22,9 +23,11 @@ __all__ = [
     "Profile",
     "Trajectory",
     "Unheld",
+    "WaypointMotion",
     "certify",
     "explain",
     "override",
     "retime",
+    "through_waypoints",
     "unheld",
 ]

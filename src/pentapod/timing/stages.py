@@ -70,9 +70,9 @@ class Stages:
 
     def fault(self) -> Failure | None:
         """Return the first gridpoint whose coefficients are no numbers."""
-        unfit = ~(np.isfinite(self.first) & np.isfinite(self.second)).all(axis=1) | ~(self.ceiling >= 0.0)
-        if not unfit.any():
+        if np.isfinite(self.first).all() and np.isfinite(self.second).all() and (self.ceiling >= 0.0).all():
             return None
+        unfit = ~(np.isfinite(self.first) & np.isfinite(self.second)).all(axis=1) | ~(self.ceiling >= 0.0)
         return Failure(int(np.argmax(unfit)), "a limit or a derivative of the path is not a number")
 
     def __len__(self) -> int:
