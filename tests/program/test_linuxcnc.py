@@ -72,6 +72,9 @@ def streamed(tmp_path, **changes):
     what = given(**changes)
     write_post(what, "linuxcnc", tmp_path)
     table = play(tmp_path / "stream")
+    said = (tmp_path / "stream" / "test.log").read_text()
+    changed = float(re.search(r"the limits changed the lengths by at most (\S+) mm", said)[1])
+    assert changed == pytest.approx(np.abs(table[:, :5] - table[:, 5:]).max(), rel=1e-5)
     return MM * what.program.legs, table[:, :5], table[:, 5:]
 
 
@@ -105,10 +108,22 @@ def test_the_legs_as_axes_keep_path_and_time(tmp_path):
     joints = table[table[:, 0] > 1.0]  # homing comes before
     moving = np.flatnonzero(joints[:, 5] > 0)
     assert abs(len(moving) * what.program.period - what.program.duration) < 0.005 * what.program.duration
+    said = (tmp_path / "trivkins" / "test.log").read_text()
+    told = float(re.search(r"the legs moved for (\S+) s", said)[1])
+    assert told == pytest.approx(len(moving) * what.program.period, abs=1e-9)
     curve = MM * lengths_at(what.program, np.linspace(0.0, what.program.duration, 150_001))
     away, _ = cKDTree(curve).query(joints[moving[0] : moving[-1] + 1, :5])
     assert away.max() < 0.02
     assert np.abs(joints[-1, :5] - curve[-1]).max() < 1e-6
+
+
+@real
+def test_what_linuxcnc_refuses_is_said(tmp_path):
+    write_post(given(duration=0.5), "linuxcnc", tmp_path)
+    program = tmp_path / "trivkins" / "program.ngc"
+    program.write_text(program.read_text().replace("\nG64\n", "\nG64 Q\n"))
+    with pytest.raises(AssertionError, match=r"FAILED: .*No characters found"):
+        play(tmp_path / "trivkins")
 
 
 @real

@@ -29,6 +29,7 @@ from pentapod.program.posts import (
     write_post,
 )
 from pentapod.toolpath.formats.npz import toolpath_arrays
+from pentapod.toolpath.parting import Piece
 
 
 def available(name):
@@ -41,6 +42,15 @@ def available(name):
 @pytest.mark.parametrize("name", POSTS)
 def test_round_trip(name, interpolation, tmp_path):
     round_trip(given(interpolation=interpolation, duration=0.3), available(name), tmp_path)
+
+
+@pytest.mark.parametrize("name", POSTS)
+def test_where_the_guides_stand_and_which_set_up_it_is_come_back(name, tmp_path):
+    what = given(duration=0.1)
+    piece = Piece(3, 17, (-np.inf, 0.1, -0.0123456789), (0.2, np.inf, 1.0 / 3.0))
+    source = dataclasses.replace(what.program.provenance, piece=piece)
+    program = dataclasses.replace(what.program, slides=(0.0123456789, -1.0 / 300.0, 0.0, -0.0, 0.04), provenance=source)
+    round_trip(dataclasses.replace(what, program=program), available(name), tmp_path)
 
 
 @pytest.mark.parametrize("name", POSTS)

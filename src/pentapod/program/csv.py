@@ -46,15 +46,7 @@ def read_csv(path: str | Path) -> Program:
     with _opened(file) as source:
         header, first_line = _header(source, file)
         legs = read_rows(source, header.rows, times_of(header.period), first_line, file)
-    return Program(
-        period=header.period,
-        legs=legs,
-        interpolation=header.interpolation,
-        component=header.component,
-        placement=header.placement,
-        provenance=header.provenance,
-        slides=header.slides,
-    )
+    return header.program(legs)
 
 
 def read_header(path: str | Path) -> Header:

@@ -52,6 +52,18 @@ class Header:
     slides: tuple[float, ...] | None = None
     unknown: tuple[str, ...] = ()
 
+    def program(self, legs: Floats) -> Program:
+        """Return the program of this header and its rows (N, 5), metres."""
+        return Program(
+            period=self.period,
+            legs=legs,
+            interpolation=self.interpolation,
+            component=self.component,
+            placement=self.placement,
+            provenance=self.provenance,
+            slides=self.slides,
+        )
+
 
 def header_text(program: Program) -> str:
     """Return the header lines of a program, each ended by a newline."""

@@ -7,6 +7,7 @@ from the upper end of what cuts.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -49,7 +50,7 @@ class Tool(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Mounted:
+class _Mounted(ABC):
     """shank, holder: what follows on the cutting part, from the tip towards the spindle; heights in metres."""
 
     shank: tuple[Cone, ...] = field(default=())
@@ -58,14 +59,18 @@ class _Mounted:
     @property
     def solids(self) -> tuple[Solid, ...]:
         """The convex bodies that make up cutter, shank and holder."""
-        own = self._cutter()
-        flute = getattr(self, "flute", None)
-        base = max((solid.top for solid in own), default=0.0) if flute is None else float(flute)
+        base = self._base()
         shank = stacked("shank", self.shank, base)
-        return (*own, *shank, *stacked("holder", self.holder, max([base, *(s.high for s in shank)])))
+        holder = stacked("holder", self.holder, max([base, *(s.high for s in shank)]))
+        return (*self._cutter(), *shank, *holder)
 
+    @abstractmethod
     def _cutter(self) -> tuple[Solid, ...]:
-        raise NotImplementedError
+        """Return the bodies below shank and holder."""
+
+    def _base(self) -> float:
+        """Return the height at which the shank begins: on top of what cuts."""
+        return max((solid.top for solid in self._cutter()), default=0.0)
 
 
 @dataclass(frozen=True)
@@ -110,6 +115,9 @@ class BallCutter(_Balled):
     def _cutter(self) -> tuple[Solid, ...]:
         return _rounded_end(self.radius, self.radius, self.flute)
 
+    def _base(self) -> float:
+        return super()._base() if self.flute is None else self.flute
+
 
 @dataclass(frozen=True)
 class Lollipop(_Balled):
@@ -129,13 +137,12 @@ class Lollipop(_Balled):
         if not 2.0 * self.radius < self.reach < np.inf:
             raise _wrong("reach", self.reach, f"more than the ball's diameter, {2.0 * self.radius} m")
 
-    @property
-    def solids(self) -> tuple[Solid, ...]:
-        """The ball, the neck from its centre on, shank and holder above the neck."""
+    def _cutter(self) -> tuple[Solid, ...]:
         ball = Solid("cutter", self.radius, self.radius, 0.0, 0.0, self.radius)
-        neck = Solid("shank", self.radius, self.reach, self.neck_radius, self.neck_radius)
-        shank = stacked("shank", self.shank, self.reach)
-        return (ball, neck, *shank, *stacked("holder", self.holder, max([self.reach, *(s.high for s in shank)])))
+        return (ball, Solid("shank", self.radius, self.reach, self.neck_radius, self.neck_radius))
+
+    def _base(self) -> float:
+        return self.reach
 
 
 @dataclass(frozen=True)
@@ -182,6 +189,9 @@ class BullNose(_Mounted):
         if self.corner == 0.0:
             return (Solid("cutter", 0.0, self.flute or self.radius, self.radius, self.radius),)
         return _rounded_end(self.radius, self.corner, self.flute)
+
+    def _base(self) -> float:
+        return super()._base() if self.flute is None else self.flute
 
 
 @dataclass(frozen=True)

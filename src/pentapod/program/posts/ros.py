@@ -19,7 +19,7 @@ from pentapod.errors import ProgramError
 from pentapod.program.header import Header, header_text
 from pentapod.program.posts.motion import accelerations, velocities
 from pentapod.program.posts.registry import Post, PostInput, read_file, register
-from pentapod.program.posts.rows import check_legs, check_rows, header_of, made_of
+from pentapod.program.posts.rows import check_legs, check_rows, header_of
 from pentapod.program.posts.tables import SIDECAR
 from pentapod.program.program import Program
 
@@ -94,7 +94,7 @@ def _program(message: Any, header: Header, file: Path) -> Program:
     legs = np.array([point["positions"] for point in points], dtype=np.float64)
     if legs.shape != (len(points), 5):
         raise ProgramError("not five positions a point", file=file, key="positions", value=legs.shape)
-    return made_of(header, check_legs(legs, file))
+    return header.program(check_legs(legs, file))
 
 
 JSON = register(

@@ -52,16 +52,4 @@ def of_archive(header: str, legs_mm: Floats, file: Path) -> Program:
     if legs_mm.ndim != 2 or legs_mm.shape[1] != 5:
         raise ProgramError("wrong shape", file=file, key="legs_mm", value=legs_mm.shape, expected="(rows, 5)")
     check_rows(len(legs_mm), found, file)
-    return made_of(found, check_legs(legs_mm / 1e3, file))
-
-
-def made_of(header: Header, legs: Floats) -> Program:
-    """Return the program of a header and its rows (N, 5), metres."""
-    return Program(
-        period=header.period,
-        legs=legs,
-        interpolation=header.interpolation,
-        component=header.component,
-        placement=header.placement,
-        provenance=header.provenance,
-    )
+    return found.program(check_legs(legs_mm / 1e3, file))

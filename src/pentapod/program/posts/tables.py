@@ -24,7 +24,7 @@ from pentapod.errors import InputError, ProgramError
 from pentapod.program.header import Header, header_text
 from pentapod.program.posts.motion import velocities
 from pentapod.program.posts.registry import Post, PostInput, read_file
-from pentapod.program.posts.rows import check_legs, check_rows, header_of, made_of
+from pentapod.program.posts.rows import check_legs, check_rows, header_of
 from pentapod.program.program import Program
 from pentapod.program.resolution import QUANTA_PER_M
 
@@ -157,7 +157,7 @@ def _read(folder: Path, table: Table) -> Program:
                 rates.append((file, column, values))
     if header is None:
         raise ProgramError("there is no header", file=folder)
-    program = made_of(header, check_legs(np.column_stack([legs[leg] for leg in range(1, 6)]), folder))
+    program = header.program(check_legs(np.column_stack([legs[leg] for leg in range(1, 6)]), folder))
     for file, column, values in rates:
         _check_rates(values, column, program, file)
     return program

@@ -2,6 +2,7 @@
 # Plays legs.halstream in simulation; writes played.txt: number, five lengths streamed, five after the limits.
 set -eu
 cd "$(dirname "$0")"
+command -v halcmd >/dev/null || { echo "play.sh needs LinuxCNC: the package linuxcnc-uspace" >&2; exit 1; }
 if [ "${1:-}" != inside ]; then
   # Its own shared memory and no network: other LinuxCNCs on this host are not disturbed.
   if unshare --net --ipc true 2>/dev/null; then exec unshare --net --ipc sh play.sh inside; fi
@@ -13,6 +14,8 @@ trap 'halrun -U >/dev/null 2>&1 || true; rm -rf "$scratch"' EXIT
 # Root may not run real-time parts as itself; for anyone else RTAPI_UID has no meaning.
 export RTAPI_UID=65534 RTAPI_FIFO_PATH="$scratch/fifo" HOME="$scratch"
 rows=$(grep -vc '^#' legs.halstream)
+seconds=$(awk -v rows="$rows" '$2 == "period_s" { print rows * $4 }' legs.halstream)
+echo "playing $rows setpoints, which takes $seconds s"
 halcmd -f stream.hal
 # The legs stand at the first row: it passes without limits, then the limits hold.
 for leg in 1 2 3 4 5; do halcmd setp leg$leg.load 1; done
@@ -33,3 +36,5 @@ halcmd setp streamer.0.enable 1
 wait $feeder
 wait $sampler
 halcmd stop
+awk '{ for (k = 2; k <= 6; k++) { d = $k - $(k + 5); if (d < 0) d = -d; if (d > most) most = d } }
+END { printf "played: the limits changed the lengths by at most %g mm\n", most }' played.txt
