@@ -169,8 +169,11 @@ _MODE_KEYS: dict[str, tuple[str, ...]] = {
 class GougeTable(Table):
     """What is done where cutter, shank or holder would cut into the part."""
 
-    remedy: tuple[Literal["tilt", "lift", "drop", "report"], ...] = Field(
-        default=("report",), min_length=1, description='tried in this order: "tilt", "lift", "drop"; or "report" alone'
+    remedy: tuple[Literal["tilt", "lift", "drop", "report"], ...] | None = Field(
+        default=None,
+        min_length=1,
+        description='tried in this order: "tilt", "lift", "drop"; or "report" alone, and the verdict fails where it'
+        ' gouges; when left out "drop", for a toolpath from a file "report"',
     )
     tolerance_mm: Positive = Field(default=0.05, description="depth that counts as none")
     cone_deg: float = Field(default=30.0, gt=0.0, lt=90.0, description="tilt: most that an axis may turn")

@@ -106,7 +106,8 @@ def finished_as_asked(
         toolpath = stepped(oriented(toolpath, tool, job_orientation(job)), axis_step)
     table = job.gouge
     options = GougeOptions(
-        tuple(Remedy(name) for name in table.remedy),
+        # A toolpath from a file is somebody's: nothing is taken out of it unasked.
+        tuple(Remedy(name) for name in table.remedy or ("report" if isinstance(job.toolpath, FileTable) else "drop",)),
         # What is engraved is meant to be below the surface.
         tolerance=_MM * (table.tolerance_mm + sunk_mm(job.toolpath)),
         cone=float(np.radians(table.cone_deg)),
