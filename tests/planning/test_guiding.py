@@ -11,9 +11,11 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.kinematics.guides import ReconfigurablePentapod
 from pentapod.planning import plan
-from pentapod.planning.formulation import guide_function, stepped
+from pentapod.planning.curvature import Curvature
+from pentapod.planning.formulation import guide_function, step_slopes, stepped
 from pentapod.planning.freedom import FREE, Freedom
 from pentapod.planning.guiding import at_slides, guided
+from pentapod.planning.linear_model import LinearModel
 from pentapod.planning.margins import Margins
 from pentapod.planning.search import search
 from pentapod.planning.setting import Setting
@@ -67,6 +69,35 @@ def test_derivatives_are_those_of_the_machine_with_its_guides_moved(sliding, her
     steps = 1e-6 * np.eye(len(x))
     differences = np.stack([(values(x + h) - values(x - h)) / 2e-6 for h in steps], axis=1)
     np.testing.assert_allclose(slopes[rows], differences[rows], atol=1e-6)
+
+
+def test_curvature_is_that_of_the_machine_with_its_guides_moved(sliding, here):
+    """Second differences, along a line of placement, slides and tilt field, of machines built anew at each slide."""
+    start = setting_of(sliding, here, tilt=0.2)
+    machine = sliding.at([0.01, -0.02, 0.0, 0.015, -0.005])
+    setting = dataclasses.replace(start, machine=machine)
+    at = setting.candidate(Margins.of(machine, COMPONENT), here, setting.upright + 0.05)
+    rows, moves, none = np.arange(len(setting.task.pivots)), 0.1 * np.eye(11), np.zeros(0, dtype=np.intp)
+    slopes = step_slopes(start, Margins.of(sliding, COMPONENT), guides=True)
+    model = LinearModel.of(setting, at, rows, np.inf, none, slopes, (np.zeros(0), np.zeros((0, 11))), moves)
+    rng = np.random.default_rng(5)
+    strokes = np.flatnonzero(["too" in at.margins.limits[k].name for k in model.kinds])  # smooth everywhere
+    multipliers = np.zeros(len(model.values) + len(model.steep))
+    multipliers[rng.choice(strokes, 8, replace=False)] = rng.uniform(0.1, 1.0, 8)
+    bent = Curvature(start, guides=True).hessian(model, at, multipliers)
+    values, vectors = np.linalg.eigh(bent)
+
+    def weighed(x):
+        step, change = model.step_of(x)
+        there = sliding.at(machine.slides + step[6:])
+        found = setting.values(Margins.of(there, COMPONENT), stepped(here, step[:6]), at.coefficients + change)
+        return multipliers[: len(model.values)] @ found[model.points, model.kinds]
+
+    assert values[0] > -1e-9 * values[-1]
+    for x in vectors[:, -3:].T:  # where it bends most, nothing was left out
+        h = 1e-3 * x
+        second = (weighed(h) - 2.0 * weighed(0.0 * x) + weighed(-h)) / 1e-6
+        assert -x @ bent @ x == pytest.approx(second, rel=1e-3)
 
 
 def test_slides_as_good_as_those_of_another_method(sliding, here):

@@ -15,7 +15,7 @@ import numpy as np
 from pentapod.arrays import Floats
 from pentapod.planning.dense_program import dense_program
 from pentapod.planning.formulation import curvature_function
-from pentapod.planning.linear_model import REACH, LinearModel, by_field
+from pentapod.planning.linear_model import LinearModel, by_field
 from pentapod.planning.setting import Candidate, Setting
 
 _BINDING = 1e-6
@@ -26,13 +26,14 @@ _MOST_GAIN = 0.1
 
 @dataclass(eq=False)
 class Curvature:
-    """The curvature of a climb's problem, with the multipliers of its latest program."""
+    """The curvature of a climb's problem; guides: whether the slides are among its unknowns."""
 
     setting: Setting
+    guides: bool = False
     _functions: dict[Any, Any] = field(default_factory=dict[Any, Any])
 
     def best_step(self, model: LinearModel, at: Candidate, reach: float) -> tuple[Floats, Floats, float]:
-        """Return the placement step (6,), the change of coefficients (size, 2), and how much margin they promise."""
+        """Return the model's step (p,), the change of coefficients (size, 2), and how much margin they promise."""
         matrix, upper = model.inequalities()
         count = matrix.shape[1]
         box = np.append(np.full(count - 1, reach), _MOST_GAIN)
@@ -49,7 +50,7 @@ class Curvature:
             hessian[:-1, :-1] = self.hessian(model, at, multipliers)
             answer = dense_program(hessian, gradient, matrix, upper)
         if answer is None:
-            return np.zeros(6), np.zeros_like(at.coefficients), 0.0
+            return np.zeros(len(model.moves)), np.zeros_like(at.coefficients), 0.0
         x = answer[0]
         return *model.step_of(x[:-1]), float(x[-1] - 0.5 * x @ hessian @ x)
 
@@ -61,42 +62,47 @@ class Curvature:
     def _of_margins(self, model: LinearModel, at: Candidate, multipliers: Floats) -> Floats:
         setting, key = self.setting, at.margins.component
         if key not in self._functions:
-            self._functions[key] = curvature_function(setting, at.margins)
+            self._functions[key] = (
+                curvature_function(setting, at.margins, guides=self.guides),
+                at.margins.machine.slides,
+            )
+        function, stood = self._functions[key]
         binding = multipliers > _BINDING
         rows, inverse = np.unique(model.points[binding], return_inverse=True)
         weights = np.zeros((len(rows), len(at.margins.limits)))
         weights[inverse, model.kinds[binding]] = multipliers[binding]
-        task, size, moving = setting.task, 2 * setting.basis.shape[1], model.motion.shape[1]
-        total = np.zeros((moving + size, moving + size))
+        task, size, (length, count) = setting.task, 2 * setting.basis.shape[1], model.moves.shape
+        total = np.zeros((count + size, count + size))
         if not len(rows):
             return total
         leans = setting.basis[rows] @ at.coefficients if size else np.zeros((len(rows), 2))
         touching = setting.contacts(at.margins, at.transform, setting.leans(at.coefficients, rows), rows)
+        slid = [at.margins.machine.slides - stood] if self.guides else []
         for k, row in enumerate(rows):
             bent = np.asarray(
-                self._functions[key](
-                    np.zeros(6), leans[k], task.pivots[row], task.nominal[row], setting.domain.lean_plane.T,
+                function(
+                    *slid, np.zeros(6), leans[k], task.pivots[row], task.nominal[row], setting.domain.lean_plane.T,
                     at.transform.rotation, at.transform.translation, touching[k], weights[k],
                 )
             )  # fmt: skip
-            by_unknowns = np.zeros((8, moving + size))
-            by_unknowns[:6, :moving] = REACH[:, None] * model.motion
-            by_unknowns[6:, moving:] = setting.cone * np.kron(setting.basis[row], np.eye(2))
+            by_unknowns = np.zeros((length + 2, count + size))
+            by_unknowns[:length, :count] = model.moves
+            by_unknowns[length:, count:] = setting.cone * np.kron(setting.basis[row], np.eye(2))
             total -= by_unknowns.T @ bent @ by_unknowns
         return total
 
     def _of_cone(self, model: LinearModel, at: Candidate, multipliers: Floats) -> Floats:
         """Return how leans on the cone's edge bend: a lean of length r turns with 1/r."""
-        setting, moving = self.setting, model.motion.shape[1]
+        setting, count = self.setting, model.moves.shape[1]
         size = 2 * setting.basis.shape[1]
-        total = np.zeros((moving + size, moving + size))
+        total = np.zeros((count + size, count + size))
         binding = np.flatnonzero(multipliers > _BINDING)
         rows = model.steep[binding]
         length = setting.steepness(at.coefficients, rows)
         aside = np.cross(setting.task.nominal[rows], setting.leans(at.coefficients, rows))
         aside /= np.maximum(length * setting.cone, 1e-12)[:, None]
         by_unknowns = by_field(setting.basis[rows], aside @ setting.domain.lean_plane.T)
-        total[moving:, moving:] = (by_unknowns.T * (multipliers[binding] / np.maximum(length, 1e-3))) @ by_unknowns
+        total[count:, count:] = (by_unknowns.T * (multipliers[binding] / np.maximum(length, 1e-3))) @ by_unknowns
         return total
 
 

@@ -21,6 +21,8 @@ from pentapod.planning.vectorised import Vectorised
 from pentapod.planning.weights import weighed
 
 Slopes = Callable[[Floats, Floats, Ints], Floats]
+StepSlopes = Callable[[Margins, RigidTransform, Floats, Ints], Floats]
+Room = Callable[[RigidTransform], tuple[Floats, Floats]]
 
 
 By = Literal["nothing", "lean", "step and lean"]
@@ -45,7 +47,7 @@ def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, 
 def guide_function(setting: Setting, margins: Margins) -> Any:
     """Return the casadi function of one waypoint with the guides free: all margins, and their derivatives M × 13.
 
-    Of slides 5 from where the guides of the setting's machine stand, and then as `point_function`; the derivatives are
+    Of slides 5 from where the guides of the margins' machine stand, and then as `point_function`; the derivatives are
     by (step, slides, a).
     """
     import casadi as ca  # noqa: PLC0415
@@ -87,19 +89,19 @@ def _slid(setting: Setting, margins: Margins, slides: Any) -> Joints:
     return moved, [z + delta * slides[k] * ways[k, 0] for k, z in enumerate(offsets)]
 
 
-def curvature_function(setting: Setting, margins: Margins) -> Any:
+def curvature_function(setting: Setting, margins: Margins, *, guides: bool = False) -> Any:
     """Return the casadi function of one waypoint: second derivatives, 8 × 8 by (step, a), of weights · margins.
 
-    Of the arguments of `point_function`, and the weights M, one for each margin.
+    Of the arguments of `point_function`, and the weights M, one for each margin. With the guides free: of the arguments
+    of `guide_function` and the weights, 13 × 13 by (step, slides, a).
     """
     import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
-    point = point_function(setting, margins, range(len(margins.limits)))
-    step, a, weights = ca.SX.sym("step", 6), ca.SX.sym("a", 2), ca.SX.sym("weights", len(margins.limits))
-    rest = [ca.SX.sym(point.name_in(k), point.sparsity_in(k)) for k in range(2, point.n_in())]
-    values, _ = point(step, a, *rest)
-    bent, _ = ca.hessian(ca.dot(weights, values), ca.vertcat(step, a))
-    return ca.Function("curvature", [step, a, *rest, weights], [ca.densify(bent)], {"cse": True})
+    slides, weights = ca.SX.sym("slides", 5), ca.SX.sym("weights", len(margins.limits))
+    inputs, values, _ = _point(setting, margins, range(len(margins.limits)), slides if guides else None)
+    free = [slides] if guides else []
+    bent, _ = ca.hessian(ca.dot(weights, values), ca.vertcat(inputs[0], *free, inputs[1]))
+    return ca.Function("curvature", [*free, *inputs, weights], [ca.densify(bent)], {"cse": True})
 
 
 def room_function(freedom: Freedom) -> Any:
@@ -112,6 +114,19 @@ def room_function(freedom: Freedom) -> Any:
     step, rotation, translation = ca.SX.sym("step", 6), ca.SX.sym("R", 3, 3), ca.SX.sym("t", 3)
     room = ca.vertcat(*freedom.room(ca.mtimes(rotation, _cayley(step[3:])), translation + step[:3]))
     return ca.Function("room", [step, rotation, translation], [room, ca.densify(ca.jacobian(room, step))])
+
+
+def placement_room(freedom: Freedom, *, free: bool = True) -> Room:
+    """Return the function placement → its room (L,) and derivatives (L, 6) by a step; L = 0 where nothing bounds it."""
+    function = room_function(freedom) if free and freedom.is_bounded else None
+
+    def room(transform: RigidTransform) -> tuple[Floats, Floats]:
+        if function is None:
+            return np.zeros(0), np.zeros((0, 6))
+        found, slopes = function(np.zeros(6), transform.rotation, transform.translation)
+        return np.asarray(found).ravel(), np.asarray(slopes)
+
+    return room
 
 
 def lean_slopes(setting: Setting, margins: Margins, transform: RigidTransform, kinds: Sequence[int]) -> Slopes:
@@ -133,6 +148,36 @@ def lean_slopes(setting: Setting, margins: Margins, transform: RigidTransform, k
             touching.T,
         )
         return found.reshape(2, len(kinds), len(rows)).transpose(2, 1, 0)
+
+    return slopes
+
+
+def step_slopes(setting: Setting, margins: Margins, *, guides: bool = False) -> StepSlopes:
+    """Return the function (margins, placement, coefficients, waypoints (n,)) → their derivatives (n, M, 8 or 13).
+
+    By the placement's step and the lean; with the guides free by step, slides and lean, for margins of the setting's
+    machine with its guides anywhere.
+    """
+    function = guide_function(setting, margins) if guides else None
+    kinds, task = range(len(margins.limits)), setting.task
+    point = Vectorised(function or point_function(setting, margins, kinds, by="step and lean"))
+
+    def slopes(there: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints) -> Floats:
+        slid = [(there.machine.slides - margins.machine.slides)[:, None]] if guides else []
+        leans = (setting.basis[rows] @ coefficients).T if task.tilt > 0.0 else np.zeros((2, 1))
+        touching = setting.contacts(there, transform, setting.leans(coefficients, rows), rows)
+        found = point(
+            *slid,
+            np.zeros((6, 1)),
+            leans,
+            task.pivots[rows].T,
+            task.nominal[rows].T,
+            setting.domain.lean_plane.reshape(-1, 1),
+            transform.rotation.T.reshape(-1, 1),
+            transform.translation[:, None],
+            touching.T,
+        )[-1]
+        return found.reshape(-1, len(kinds), len(rows)).transpose(2, 1, 0)
 
     return slopes
 

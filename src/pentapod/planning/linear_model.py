@@ -1,4 +1,4 @@
-"""LinearModel: margins and leans around a candidate, to first order."""
+"""LinearModel: margins and leans around a candidate, to first order, by placement, slides of guides and tilt field."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pentapod.planning.margins import Margins
 from pentapod.planning.setting import Candidate, Setting
 
 REACH = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
-"""The unit of a placement step: metres, and tan(angle / 2). The unit of a coefficient is the cone."""
+"""The unit of a placement step: metres, and tan(angle / 2)."""
 
 _NEAR = 0.4
 """Margins within this much of the level enter the model."""
@@ -25,8 +25,9 @@ Slopes = Callable[[Margins, RigidTransform, Floats, Ints], Floats]
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """Unknowns x: placement step along motion (6, k), and change of coefficients (2·size); units: REACH and the cone.
+    """Unknowns x: along moves (p, q), in their units, and the change of coefficients (2·size), in units of the cone.
 
+    moves: columns of a placement step (p = 6), or of one and of the guides' slides (p = 11).
     Margins ≈ values + matrix @ x, (R,), of the margins that come near the level, kinds (R,) at waypoints points (R,);
     leans as shares of the cone ≈ steepness + steep_matrix @ x, several rows for each waypoint of steep; the room of the
     placement (L,) ≈ room + room_matrix @ x.
@@ -34,7 +35,7 @@ class LinearModel:
 
     setting: Setting
     at: Candidate
-    motion: Floats
+    moves: Floats
     points: Ints
     kinds: Ints
     values: Floats
@@ -55,33 +56,39 @@ class LinearModel:
         extra: Ints,
         slopes: Slopes,
         room: tuple[Floats, Floats],
-        motion: Floats,
+        moves: Floats,
     ) -> LinearModel:
         """Return the model of what comes near `level` among waypoints `rows`, and of rows[extra] in any case.
 
-        room: of the placement, (L,), with its derivatives (L, 6) by the step. motion (6, k): how it may step.
+        room (L,) of the placement and the slides, with its derivatives (L, p). slopes: the margins' (n, M, p + 2) by
+        step, slides and lean.
         """
+        length, count = moves.shape
         values = setting.values(at.margins, at.transform, at.coefficients, rows)
         chosen = np.union1d(valleys(values, _WORST_OF_KIND), extra)
         chosen = chosen[values[chosen].min(axis=1) < level + _NEAR]
         point, kinds = np.nonzero(values[chosen] < level + _NEAR)
         few = rows[chosen]
-        slope = slopes(at.margins, at.transform, at.coefficients, few)[point, kinds] if len(few) else np.zeros((0, 8))
-        field = by_field(setting.basis[few][point], slope[:, 6:]) * setting.cone
+        slope = (
+            slopes(at.margins, at.transform, at.coefficients, few)[point, kinds]
+            if len(few)
+            else np.zeros((0, length + 2))
+        )
+        field = by_field(setting.basis[few][point], slope[:, length:]) * setting.cone
         steep, share, steep_by_field = _cone_tangents(setting, at, rows, extra)
         return cls(
             setting,
             at,
-            motion,
+            moves,
             few[point],
             kinds,
             values[chosen][point, kinds],
-            np.hstack([slope[:, :6] * REACH @ motion, field]),
+            np.hstack([slope[:, :length] @ moves, field]),
             steep,
             share,
-            np.hstack([np.zeros((len(share), motion.shape[1])), steep_by_field]),
+            np.hstack([np.zeros((len(share), count)), steep_by_field]),
             room[0],
-            np.hstack([room[1] * REACH @ motion, np.zeros((len(room[0]), field.shape[1]))]),
+            np.hstack([room[1] @ moves, np.zeros((len(room[0]), field.shape[1]))]),
         )
 
     def inequalities(self) -> tuple[Floats, Floats]:
@@ -93,9 +100,9 @@ class LinearModel:
         return np.vstack([rising, kept]), np.concatenate([self.values - self.values.min(), spare])
 
     def step_of(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return the placement step (6,) and the change of coefficients (size, 2) of unknowns x."""
-        moving = self.motion.shape[1]
-        return REACH * (self.motion @ x[:moving]), (x[moving:] * self.setting.cone).reshape(-1, 2)
+        """Return the step (p,) of placement and slides, and the change of coefficients (size, 2), of unknowns x."""
+        count = self.moves.shape[1]
+        return self.moves @ x[:count], (x[count:] * self.setting.cone).reshape(-1, 2)
 
 
 def valleys(values: Floats, count: int = _WORST_OF_KIND) -> Ints:

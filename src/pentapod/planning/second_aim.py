@@ -18,7 +18,7 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.forces import tip_force_amplification
 from pentapod.machine.machine import Machine
 from pentapod.planning.formulation import stepped
-from pentapod.planning.linear_model import REACH, LinearModel, valleys
+from pentapod.planning.linear_model import LinearModel, by_field, valleys
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Candidate, Setting
 from pentapod.planning.tilt import lean
@@ -68,7 +68,7 @@ class LeastForce:
         def amplification(poses: Poses) -> Floats:
             return _amplification(machine, poses)[:, None]
 
-        by_motion, by_lean = _partials(self.setting, at, rows, model.motion, amplification)
+        by_motion, by_lean = _partials(self.setting, at, rows, model.moves, amplification)
         return values[rows], _by_unknowns(self.setting, rows, by_motion[:, 0], by_lean[:, 0])
 
     def _at_all(self, at: Candidate) -> Floats:
@@ -100,7 +100,7 @@ class LeastTime:
             tips, axes = poses
             return np.hstack([robot.leg_lengths(tips + length * axes, -axes), tips])
 
-        by_motion, by_lean = _partials(setting, at, rows, model.motion, legs_and_tips)
+        by_motion, by_lean = _partials(setting, at, rows, model.moves, legs_and_tips)
         by_motion = np.einsum("ni,nik->nk", weights[rows], by_motion)
         by_lean = np.einsum("ni,nik->nk", weights[rows], by_lean)
         slope = np.concatenate([by_motion.sum(axis=0), (setting.basis[rows].T @ by_lean * setting.cone).ravel()])
@@ -148,7 +148,7 @@ def improved(solver: SequentialSolver, start: Candidate, aim: Aim, keep: float) 
         if step is not None:
             motion, change, promise = step
             promise += value - float(pieces[0].max())
-            transform = stepped(best.transform, motion) if model.motion.size else best.transform
+            transform = stepped(best.transform, motion) if model.moves.size else best.transform
             transform = setting.freedom.nearest_to(transform)
             trial = setting.candidate(best.margins, transform, setting.within_cone(best.coefficients + change))
         gain = value - aim.value(trial) if trial is not None else 0.0
@@ -194,17 +194,16 @@ def _lowest(
         bounds=[(-reach, reach)] * count + [(None, None)],
         method="highs-ds",
     )  # fmt: skip
-    if answer.x is None:
+    if answer.status != 0:
         return None
-    x, moving = np.asarray(answer.x, dtype=np.float64), model.motion.shape[1]
-    change = (x[moving:-1] * model.setting.cone).reshape(-1, 2)
-    return REACH * (model.motion @ x[:moving]), change, now - float(x[-1]) * unit
+    x = np.asarray(answer.x, dtype=np.float64)
+    return *model.step_of(x[:-1]), now - float(x[-1]) * unit
 
 
 def _partials(
-    setting: Setting, at: Candidate, rows: Ints, motion: Floats, ingredient: Callable[[Poses], Floats]
+    setting: Setting, at: Candidate, rows: Ints, moves: Floats, ingredient: Callable[[Poses], Floats]
 ) -> tuple[Floats, Floats]:
-    """Return central differences of ingredients (n, I) by the motion in units of REACH, (n, I, k), and the lean."""
+    """Return central differences of ingredients (n, I) by the moves (6, k), (n, I, k), and the lean."""
     still = np.zeros(2)
 
     def at_offset(step: Floats, tilt: Floats) -> Floats:
@@ -212,7 +211,7 @@ def _partials(
         transform: RigidTransform = stepped(at.transform, step)
         return ingredient(setting.task.machine_poses(transform, lean(setting.task.nominal[rows], b), rows))
 
-    steps = _STEP * REACH[:, None] * motion
+    steps = _STEP * moves
     by_motion = [at_offset(step, still) - at_offset(-step, still) for step in steps.T]
     by_lean = [at_offset(np.zeros(6), _STEP * u) - at_offset(np.zeros(6), -_STEP * u) for u in np.eye(2)]
     shape = (*by_lean[0].shape, 0)
@@ -222,9 +221,7 @@ def _partials(
 
 def _by_unknowns(setting: Setting, rows: Ints, by_motion: Floats, by_lean: Floats) -> Floats:
     """Return derivatives (n, k + 2·size) by motion and field of those by motion (n, k) and lean (n, 2)."""
-    basis = setting.basis[rows]
-    by_field = (basis[:, :, None] * by_lean[:, None, :]).reshape(len(rows), -1) * setting.cone
-    return np.hstack([by_motion, by_field])
+    return np.hstack([by_motion, by_field(setting.basis[rows], by_lean) * setting.cone])
 
 
 def _amplification(machine: Machine, poses: Poses) -> Floats:

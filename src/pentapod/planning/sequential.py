@@ -9,19 +9,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import Component
 from pentapod.planning.calming import calmed
 from pentapod.planning.curvature import Curvature
-from pentapod.planning.formulation import point_function, room_function, stepped
-from pentapod.planning.linear_model import LinearModel, valleys
+from pentapod.planning.formulation import Room, StepSlopes, placement_room, step_slopes, stepped
+from pentapod.planning.linear_model import REACH, LinearModel, valleys
 from pentapod.planning.margins import Margins
 from pentapod.planning.setting import Candidate, Setting
-from pentapod.planning.vectorised import Vectorised
 
 _CONSIDERED = 4000
 """Waypoints whose margins are looked at in every step; all are looked at when the steps have ended."""
@@ -39,7 +38,7 @@ class SequentialSolver:
 
     setting: Setting
     free: bool
-    _functions: dict[Any, Any] = field(default_factory=dict[Any, Any])
+    _slopes: dict[Component, StepSlopes] = field(default_factory=dict[Component, StepSlopes])
 
     @cached_property
     def _curvature(self) -> Curvature:
@@ -99,34 +98,20 @@ class SequentialSolver:
 
         extra: indices into rows that enter in any case.
         """
-        return LinearModel.of(self.setting, at, rows, level, extra, self.slopes, self._room(at.transform), self._motion)
+        return LinearModel.of(self.setting, at, rows, level, extra, self.slopes, self._room(at.transform), self._moves)
 
     @property
-    def _motion(self) -> Floats:
-        motion = self.setting.freedom.motion
-        return motion if self.free else motion[:, :0]
+    def _moves(self) -> Floats:
+        moves = REACH[:, None] * self.setting.freedom.motion
+        return moves if self.free else moves[:, :0]
 
-    def _room(self, transform: RigidTransform) -> tuple[Floats, Floats]:
-        """Return the room (L,) of a placement, and its derivatives (L, 6) by a step."""
-        if not self.setting.freedom.is_bounded or not self.free:
-            return np.zeros(0), np.zeros((0, 6))
-        if "room" not in self._functions:
-            self._functions["room"] = room_function(self.setting.freedom)
-        room, slopes = self._functions["room"](np.zeros(6), transform.rotation, transform.translation)
-        return np.asarray(room).ravel(), np.asarray(slopes)
+    @cached_property
+    def _room(self) -> Room:
+        return placement_room(self.setting.freedom, free=self.free)
 
     def slopes(self, margins: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints) -> Floats:
         """Return the Jacobian (n, M, 8) of the margins by placement step and lean at waypoints `rows`."""
         key = margins.component
-        if key not in self._functions:
-            kinds = range(len(margins.limits))
-            self._functions[key] = Vectorised(point_function(self.setting, margins, kinds, by="step and lean"))
-        task = self.setting.task
-        leans = (self.setting.basis[rows] @ coefficients).T if task.tilt > 0.0 else np.zeros((2, 1))
-        touching = self.setting.contacts(margins, transform, self.setting.leans(coefficients, rows), rows)
-        _, _, slopes = self._functions[key](
-            np.zeros((6, 1)), leans, task.pivots[rows].T, task.nominal[rows].T,
-            self.setting.domain.lean_plane.reshape(-1, 1),
-            transform.rotation.T.reshape(-1, 1), transform.translation[:, None], touching.T,
-        )  # fmt: skip
-        return slopes.reshape(8, len(margins.limits), len(rows)).transpose(2, 1, 0)
+        if key not in self._slopes:
+            self._slopes[key] = step_slopes(self.setting, margins)
+        return self._slopes[key](margins, transform, coefficients, rows)
