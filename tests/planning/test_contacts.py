@@ -11,7 +11,7 @@ from pentapod.machine.clearance import clearances
 from pentapod.machine.surroundings import Obstacle, Surroundings
 from pentapod.planning.blame import blame
 from pentapod.planning.contacts import comforts, names
-from pentapod.planning.formulation import stepped
+from pentapod.planning.formulation import step_slopes, stepped
 from pentapod.planning.ipopt import IpoptSolver
 from pentapod.planning.margins import TOOL_COMFORTABLE_M, Margins
 from pentapod.planning.sampling import first_guesses
@@ -194,7 +194,7 @@ def test_the_linear_model_knows_contacts(desk, cap, setting, free):
     crowded = Surroundings((beside(desk, setting, free, 1, -0.09),), TOOL)
     margins = Margins.of(desk, PLUS, crowded)
     rows = np.arange(0, len(cap), 8)
-    slopes = SequentialSolver(setting, True).slopes(margins, free.transform, free.coefficients, rows)
+    slopes = step_slopes(setting, margins)(margins, free.transform, free.coefficients, rows)
     step = 1e-5 * np.random.default_rng(5).normal(size=6)
 
     def values(sign):

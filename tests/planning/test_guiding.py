@@ -84,7 +84,7 @@ def test_curvature_is_that_of_the_machine_with_its_guides_moved(sliding, here):
     strokes = np.flatnonzero(["too" in at.margins.limits[k].name for k in model.kinds])  # smooth everywhere
     multipliers = np.zeros(len(model.values) + len(model.steep))
     multipliers[rng.choice(strokes, 8, replace=False)] = rng.uniform(0.1, 1.0, 8)
-    bent = Curvature(start, guides=True).hessian(model, at, multipliers)
+    bent = Curvature(start, Margins.of(sliding, COMPONENT), guides=True).hessian(model, at, multipliers)
     values, vectors = np.linalg.eigh(bent)
 
     def weighed(x):

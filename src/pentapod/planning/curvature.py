@@ -7,8 +7,7 @@ towards it. Quadratic programs with the curvature of the binding margins and lea
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from pentapod.arrays import Floats
 from pentapod.planning.dense_program import dense_program
 from pentapod.planning.formulation import curvature_function
 from pentapod.planning.linear_model import LinearModel, by_field
+from pentapod.planning.margins import Margins
 from pentapod.planning.setting import Candidate, Setting
 
 _BINDING = 1e-6
@@ -24,13 +24,13 @@ _MOST_GAIN = 0.1
 """The most margin that a step is looked for."""
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Curvature:
-    """The curvature of a climb's problem; guides: whether the slides are among its unknowns."""
+    """The curvature of a climb's problem, whose margins are these or, with guides, these with the guides elsewhere."""
 
     setting: Setting
+    margins: Margins
     guides: bool = False
-    _functions: dict[Any, Any] = field(default_factory=dict[Any, Any])
 
     def best_step(self, model: LinearModel, at: Candidate, reach: float) -> tuple[Floats, Floats, float]:
         """Return the model's step (p,), the change of coefficients (size, 2), and how much margin they promise."""
@@ -60,13 +60,7 @@ class Curvature:
         return _positive(self._of_margins(model, at, margins) + self._of_cone(model, at, leans))
 
     def _of_margins(self, model: LinearModel, at: Candidate, multipliers: Floats) -> Floats:
-        setting, key = self.setting, at.margins.component
-        if key not in self._functions:
-            self._functions[key] = (
-                curvature_function(setting, at.margins, guides=self.guides),
-                at.margins.machine.slides,
-            )
-        function, stood = self._functions[key]
+        setting, function = self.setting, curvature_function(self.setting, self.margins, guides=self.guides)
         binding = multipliers > _BINDING
         rows, inverse = np.unique(model.points[binding], return_inverse=True)
         weights = np.zeros((len(rows), len(at.margins.limits)))
@@ -77,7 +71,7 @@ class Curvature:
             return total
         leans = setting.basis[rows] @ at.coefficients if size else np.zeros((len(rows), 2))
         touching = setting.contacts(at.margins, at.transform, setting.leans(at.coefficients, rows), rows)
-        slid = [at.margins.machine.slides - stood] if self.guides else []
+        slid = [at.margins.machine.slides - self.margins.machine.slides] if self.guides else []
         for k, row in enumerate(rows):
             bent = np.asarray(
                 function(
@@ -109,4 +103,4 @@ class Curvature:
 def _positive(matrix: Floats) -> Floats:
     """Return the symmetric matrix without its negative eigenvalues: its directions are left to the trust region."""
     values, vectors = np.linalg.eigh(matrix)
-    return np.einsum("ik,jk->ij", vectors * np.maximum(values, 0.0), vectors)
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T

@@ -28,11 +28,11 @@ def dense_program(hessian: Floats, gradient: Floats, matrix: Floats, upper: Floa
     x, z = np.zeros(len(gradient)), np.full(len(upper), 1e-2)
     s = np.maximum(upper, 1e-2)
     for _ in range(_ITERATIONS):
-        dual, off, gap = hessian @ x + gradient + _sums(matrix, z), np.einsum("ri,i->r", matrix, x) + s - upper, s * z
+        dual, off, gap = hessian @ x + gradient + matrix.T @ z, matrix @ x + s - upper, s * z
         if max(1e3 * gap.mean(), np.abs(dual).max(), np.abs(off).max()) < 1e3 * _GOOD:
             return x, z
         try:
-            factor = cho_factor(hessian + np.einsum("ri,rj->ij", (z / s)[:, None] * matrix, matrix), check_finite=False)
+            factor = cho_factor(hessian + (matrix.T * (z / s)) @ matrix, check_finite=False)
         except LinAlgError:
             return None
         _, ds, dz = _newton(factor, matrix, s, z, dual, off, -gap)
@@ -50,12 +50,7 @@ def _newton(
     factor: Any, matrix: Floats, s: Floats, z: Floats, dual: Floats, off: Floats, change: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Return the step of x, slacks s and multipliers z that changes their products by `change`."""
-    right = -dual - _sums(matrix, (change + z * off) / s)
+    right = -dual - matrix.T @ ((change + z * off) / s)
     dx = np.asarray(cho_solve(factor, right, check_finite=False), dtype=np.float64)
-    ds = -off - np.einsum("ri,i->r", matrix, dx)
+    ds = -off - matrix @ dx
     return dx, ds, (change - z * ds) / s
-
-
-def _sums(matrix: Floats, y: Floats) -> Floats:
-    """Return matrixᵀ y: by NumPy's own loops, which give the same bits on any number of threads."""
-    return np.asarray(np.einsum("ri,r->i", matrix, y), dtype=np.float64)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -27,9 +28,12 @@ Room = Callable[[RigidTransform], tuple[Floats, Floats]]
 
 By = Literal["nothing", "lean", "step and lean"]
 
+_MADE: WeakKeyDictionary[Margins, dict[tuple[Any, ...], Any]] = WeakKeyDictionary()
+"""Making a function takes a good part of a second; settings that differ in their path or cone alone share them."""
+
 
 def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, by: By = "nothing") -> Any:
-    """Return the casadi function of one waypoint: margins K, and the square of the share of the cone that is used.
+    """Return the casadi function of one waypoint: margins K, and the square of the lean (of the tangent of its angle).
 
     Of step 6, lean a 2, pivot 3, nominal 3, pair 3×2, R 3×3, t 3, contacts. The margins are weighed; kinds: which.
     pair: columns, the directions of the lean's two numbers; what of them lies along the nominal axis does not count.
@@ -37,11 +41,11 @@ def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, 
     """
     import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
-    inputs, values, used = _point(setting, margins, kinds, None)
+    inputs, values, square = _point(setting, margins, kinds, None)
     step, a = inputs[:2]
     unknowns = {"nothing": [], "lean": [a], "step and lean": [ca.vertcat(step, a)]}[by]
     slopes = [ca.densify(ca.jacobian(values, x)) for x in unknowns]
-    return ca.Function("point", inputs, [values, used, *slopes], {"cse": True})
+    return ca.Function("point", inputs, [values, square, *slopes], {"cse": True})
 
 
 def guide_function(setting: Setting, margins: Margins) -> Any:
@@ -59,7 +63,7 @@ def guide_function(setting: Setting, margins: Margins) -> Any:
 
 
 def _point(setting: Setting, margins: Margins, kinds: Sequence[int], slides: Any) -> tuple[list[Any], Any, Any]:
-    """Return the symbols of a waypoint, its weighed margins, and the square of the share of the cone; see above."""
+    """Return the symbols of a waypoint, its weighed margins, and the square of the lean; see above."""
     import casadi as ca  # noqa: PLC0415
 
     step, a = ca.SX.sym("step", 6), ca.SX.sym("a", 2)
@@ -76,8 +80,15 @@ def _point(setting: Setting, margins: Margins, kinds: Sequence[int], slides: Any
     values = margins.symbolic(tip, turned, turn, translation + step[:3], numbers, joints)[list(kinds)]
     if not setting.weights.are_even:
         values = weighed(values, ca.DM(setting.weights.of(margins.limits)[list(kinds)]))
-    used = square / setting.cone**2 if setting.task.tilt > 0.0 else ca.SX(0.0)
-    return [step, a, pivot, nominal, pair, rotation, translation, numbers], values, used
+    return [step, a, pivot, nominal, pair, rotation, translation, numbers], values, square
+
+
+def _once(margins: Margins, name: tuple[Any, ...], setting: Setting, make: Callable[[], Any]) -> Any:
+    """Return what `make` returned for these margins, pivot and weights before, or returns now."""
+    made, key = _MADE.setdefault(margins, {}), (*name, setting.task.pivot, setting.weights)
+    if key not in made:
+        made[key] = make()
+    return made[key]
 
 
 def _slid(setting: Setting, margins: Margins, slides: Any) -> Joints:
@@ -95,6 +106,10 @@ def curvature_function(setting: Setting, margins: Margins, *, guides: bool = Fal
     Of the arguments of `point_function`, and the weights M, one for each margin. With the guides free: of the arguments
     of `guide_function` and the weights, 13 × 13 by (step, slides, a).
     """
+    return _once(margins, ("curvature", guides), setting, lambda: _curvature(setting, margins, guides))
+
+
+def _curvature(setting: Setting, margins: Margins, guides: bool) -> Any:
     import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
     slides, weights = ca.SX.sym("slides", 5), ca.SX.sym("weights", len(margins.limits))
@@ -158,9 +173,14 @@ def step_slopes(setting: Setting, margins: Margins, *, guides: bool = False) -> 
     By the placement's step and the lean; with the guides free by step, slides and lean, for margins of the setting's
     machine with its guides anywhere.
     """
-    function = guide_function(setting, margins) if guides else None
     kinds, task = range(len(margins.limits)), setting.task
-    point = Vectorised(function or point_function(setting, margins, kinds, by="step and lean"))
+
+    def made() -> Vectorised:
+        if guides:
+            return Vectorised(guide_function(setting, margins))
+        return Vectorised(point_function(setting, margins, kinds, by="step and lean"))
+
+    point = _once(margins, ("slopes", guides), setting, made)
 
     def slopes(there: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints) -> Floats:
         slid = [(there.machine.slides - margins.machine.slides)[:, None]] if guides else []

@@ -134,7 +134,8 @@ class _Climb:
     def climbed(self, start: Candidate) -> tuple[Setting, Candidate]:
         """Return the setting and the candidate that a trust-region method reaches; never a worse one."""
         freedom, setting, best, reach = self.setting.freedom, self.setting, start, 0.5
-        slopes, curvature = step_slopes(setting, start.margins, guides=True), Curvature(setting, guides=True)
+        slopes = step_slopes(setting, start.margins, guides=True)
+        curvature = Curvature(setting, start.margins, guides=True)
         room = placement_room(freedom)
         for _ in range(_STEPS):
             step, change, promise = curvature.best_step(self._model(setting, best, slopes, room), best, reach)

@@ -193,7 +193,7 @@ class IpoptSolver:
         points, basis = ca.MX.sym("points", 6, count), ca.MX.sym("basis", size, count)
         rotation, translation = ca.MX.sym("R", 3, 3), ca.MX.sym("t", 3)
         touching = ca.MX.sym("contacts", at.margins.contact_numbers, count)
-        margins, used = point_function(setting, at.margins, kinds).map(count)(
+        margins, square = point_function(setting, at.margins, kinds).map(count)(
             ca.repmat(step, 1, count), leans, points[:3, :], points[3:, :],
             np.tile(setting.domain.lean_plane.T, (1, count)),
             ca.repmat(rotation, 1, count), ca.repmat(translation, 1, count), touching,
@@ -205,7 +205,8 @@ class IpoptSolver:
             c = ca.vec(coefficients)
             lean = ca.sumsqr(c) / setting.cone**2
             unknowns += [c, ca.vec(leans)]
-            constraints = [ca.vec(leans - ca.mtimes(coefficients, basis)), *constraints, 1.0 - used.T]
+            left = 1.0 - square.T / setting.cone**2
+            constraints = [ca.vec(leans - ca.mtimes(coefficients, basis)), *constraints, left]
         problem = {
             "x": ca.vertcat(*unknowns),
             "p": ca.vertcat(ca.vec(points), ca.vec(basis), ca.vec(rotation), translation, ca.vec(touching)),

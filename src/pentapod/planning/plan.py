@@ -21,6 +21,7 @@ from pentapod.planning.second_aim import SecondAim, aim_of, improved
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Candidate, Setting
 from pentapod.planning.task import Task
+from pentapod.planning.threads import on_one_thread
 from pentapod.planning.tilt import lean
 from pentapod.planning.weights import EVEN, NEEDED_MARGIN, Weights
 from pentapod.progress import Progress, silent
@@ -42,6 +43,7 @@ class Wishes(TypedDict):
     solver: SolverName
 
 
+@on_one_thread
 def plan(
     toolpath: Toolpath,
     machine: Machine,
@@ -84,6 +86,7 @@ def plan(
     return _path(toolpath, setting, best, leans, found.choice)
 
 
+@on_one_thread
 def fits(
     toolpath: Toolpath,
     machine: Machine,

@@ -137,5 +137,6 @@ def _starts(
         return [(Margins.of(machine, c, surroundings), pose) for pose in freedom.poses for c in components], np.inf
     progress("placement", 0.0, "sampling")
     guesses = first_guesses(setting.task, machine, components, seed, freedom=freedom, surroundings=surroundings)
-    starts = [(Margins.of(machine, g.component, surroundings), g.transform) for g in guesses]
+    margins = {c: Margins.of(machine, c, surroundings) for c in components}
+    starts = [(margins[guess.component], guess.transform) for guess in guesses]
     return starts, max(g.margin for g in guesses)

@@ -7,19 +7,16 @@ Every step is judged by the margins themselves, so a poor model costs a step, ne
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
-from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.component import Component
 from pentapod.planning.calming import calmed
 from pentapod.planning.curvature import Curvature
-from pentapod.planning.formulation import Room, StepSlopes, placement_room, step_slopes, stepped
+from pentapod.planning.formulation import Room, placement_room, step_slopes, stepped
 from pentapod.planning.linear_model import REACH, LinearModel, valleys
-from pentapod.planning.margins import Margins
 from pentapod.planning.setting import Candidate, Setting
 
 _CONSIDERED = 4000
@@ -38,11 +35,6 @@ class SequentialSolver:
 
     setting: Setting
     free: bool
-    _slopes: dict[Component, StepSlopes] = field(default_factory=dict[Component, StepSlopes])
-
-    @cached_property
-    def _curvature(self) -> Curvature:
-        return Curvature(self.setting)
 
     def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
         """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one."""
@@ -71,11 +63,11 @@ class SequentialSolver:
         setting, reach, extra = self.setting, 0.5, _NO_ROWS
         smallest = float(setting.values(start.margins, start.transform, start.coefficients, rows).min())
         best = Candidate(start.margins, start.transform, start.coefficients, smallest)
-        model = self.model(best, rows, best.smallest)
+        model, curvature = self.model(best, rows, best.smallest), Curvature(setting, start.margins)
         for _ in range(_STEPS):
             if best.smallest >= enough:
                 break
-            step, change, promise = self._curvature.best_step(model, best, reach)
+            step, change, promise = curvature.best_step(model, best, reach)
             if promise < _LEAST:
                 break
             transform = setting.freedom.nearest_to(stepped(best.transform, step)) if self.free else best.transform
@@ -98,7 +90,8 @@ class SequentialSolver:
 
         extra: indices into rows that enter in any case.
         """
-        return LinearModel.of(self.setting, at, rows, level, extra, self.slopes, self._room(at.transform), self._moves)
+        slopes = step_slopes(self.setting, at.margins)
+        return LinearModel.of(self.setting, at, rows, level, extra, slopes, self._room(at.transform), self._moves)
 
     @property
     def _moves(self) -> Floats:
@@ -108,10 +101,3 @@ class SequentialSolver:
     @cached_property
     def _room(self) -> Room:
         return placement_room(self.setting.freedom, free=self.free)
-
-    def slopes(self, margins: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints) -> Floats:
-        """Return the Jacobian (n, M, 8) of the margins by placement step and lean at waypoints `rows`."""
-        key = margins.component
-        if key not in self._slopes:
-            self._slopes[key] = step_slopes(self.setting, margins)
-        return self._slopes[key](margins, transform, coefficients, rows)

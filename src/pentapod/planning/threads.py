@@ -1,0 +1,26 @@
+"""on_one_thread: linear algebra that gives the same bits whatever the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+def on_one_thread(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Return the function with BLAS on one thread: on several it adds in another order, and last bits differ.
+
+    The matrices of a plan are small; more threads gain nothing on them.
+    """
+
+    @wraps(function)
+    def limited(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        from threadpoolctl import threadpool_limits  # noqa: PLC0415  only when planning
+
+        with threadpool_limits(limits=1, user_api="blas"):
+            return function(*args, **kwargs)
+
+    return limited
