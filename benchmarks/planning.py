@@ -2,7 +2,8 @@
 
 Smallest margin and time of both from the same start; the cost and the time of the calmest axes at the same placement;
 the same against plain IPOPT, on all waypoints and all margins at once. Then what a tilt cone gains over strict
-normals, how fast the axes turn beside strict normals, and how time and memory grow with the number of waypoints.
+normals, how fast the axes turn beside strict normals, how long refusals take beside plans, and how time and memory grow
+with the number of waypoints.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import resource
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TypeVar
@@ -29,12 +31,14 @@ from pentapod.planning.leg_path import leg_path
 from pentapod.planning.margins import Margins
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.planning.placement import Placement
+from pentapod.planning.plan import plan
 from pentapod.planning.sampling import first_guesses
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Candidate, Setting
 from pentapod.planning.task import Task
 from pentapod.planning.tilt import lean
 from pentapod.refusal import Refusal
+from pentapod.toolpath.toolpath import Toolpath
 
 CALM_SHARE = 0.9
 PATIENCE_S = 600.0
@@ -194,6 +198,29 @@ def dense_dome(count: int) -> Task:
     return Task(np.column_stack([xy, z - radius]) + 0.003 * axes, axes, 0.003, np.radians(15.0))
 
 
+def refusals(tasks: list[Instance], machine: Machine) -> None:
+    """Print how long the refusals of enlarged parts take beside the plans of the parts themselves."""
+    print(f"{'task':58s} {'plan, s':>8s} {'enlarged':>9s} {'refusal, s':>11s} {'times':>6s}")
+    ratios: list[float] = []
+    for task in tasks:
+        placed, usual = timed(lambda t=task: plan(t.toolpath, machine, tilt=t.tilt))
+        if isinstance(placed, Refusal):
+            continue
+        for factor in (1.5, 2.0, 3.0, 5.0):
+            larger = enlarged(task.toolpath, factor)
+            answer, seconds = timed(lambda path=larger, t=task: plan(path, machine, tilt=t.tilt))
+            if isinstance(answer, Refusal):
+                ratios.append(seconds / usual)
+                print(f"{task.name:58s} {usual:8.2f} {factor:9.1f} {seconds:11.2f} {ratios[-1]:6.2f}", flush=True)
+    print(f"refusals: {np.median(ratios):.2f} times a plan in the median, {min(ratios):.2f} to {max(ratios):.2f}\n")
+
+
+def enlarged(toolpath: Toolpath, factor: float) -> Toolpath:
+    """Return the toolpath of a part that is larger in all directions."""
+    segments = [replace(each, tips=factor * each.tips) for each in toolpath.segments]
+    return replace(toolpath, segments=tuple(segments))
+
+
 def growth(machine: Machine) -> None:
     """Print seconds and memory by the number of waypoints, of one part under ever more passes."""
     print("waypoints   raise, s   calm, s   waypoints a second of calm   peak memory, kB a waypoint")
@@ -223,6 +250,7 @@ def main() -> None:
     against_plain_ipopt(tasks, machine)
     tilt_gain(tasks, machine)
     rates(tasks, machine)
+    refusals(tasks[:8], machine)
     growth(machine)
 
 
