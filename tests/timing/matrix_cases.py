@@ -52,11 +52,11 @@ def waypoints(kind, rng):
     return np.repeat(corners, 2, axis=0) if kind == "duplicates" else corners
 
 
-def legs_of(kind, rng):
+def legs_of(kind, rng, finer=1):
     """Return s (N,) and q', q'' (N, 5), for a path about 1 in size; s without unit."""
     mix = rng.normal(size=(3, 5))
     if kind == "sine":
-        s = np.linspace(0.0, 1.0, 241)
+        s = np.linspace(0.0, 1.0, 240 * finer + 1)
         wave, phase = rng.uniform(2.0, 30.0, 5), rng.uniform(0.0, 6.0, 5)
         return s, np.cos(wave * s[:, None] + phase), -wave * np.sin(wave * s[:, None] + phase)
     points = waypoints(kind, rng)
@@ -65,19 +65,20 @@ def legs_of(kind, rng):
     keep = np.concatenate([[True], steps > 0.0])
     curve = rounded(u[keep], points[keep], lambda off, _: np.linalg.norm(off, axis=1).max(axis=1) > 1e-2)
     knots = np.unique(curve.t)
-    s = np.unique(np.concatenate([knots[:-1] + k / 4 * np.diff(knots) for k in range(4)] + [knots[-1:]]))
+    fractions = np.arange(4 * finer) / (4 * finer)
+    s = np.unique(np.append(knots[:-1, None] + fractions * np.diff(knots)[:, None], knots[-1]))
     if kind == "duplicates":  # gridpoints that come twice
         s = np.sort(np.concatenate([s, rng.choice(s[1:-1], 5)]))
     return s, curve(s, 1) @ mix, curve(s, 2) @ mix
 
 
-def arrays(case):
-    """Return s, first, second and ceiling of a case in its own units, and how many of them make a second.
+def arrays(case, finer=1):
+    """Return s, first, second and ceiling of a case in its own units, on a grid `finer` times as fine as usual.
 
     Leg lengths and limits in metres (millimetres for "millimetre"); the path parameter in the case's unit.
     """
     rng = np.random.default_rng([case.seed, MATRIX["kinds"].index(case.kind)])
-    s, q1, q2 = legs_of(case.kind, rng)
+    s, q1, q2 = legs_of(case.kind, rng, finer)
     velocity, acceleration, feed = (
         np.exp(rng.uniform(*np.log(MATRIX["limits"][name]))) for name in ("velocity", "acceleration", "feed")
     )

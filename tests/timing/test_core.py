@@ -6,8 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pentapod.errors import InputError
+from pentapod.timing import lockstep
+from pentapod.timing.chains import by_chains
 from pentapod.timing.engine import fastest
-from pentapod.timing.stages import Failure
+from pentapod.timing.stage_rows import StageRows
+from pentapod.timing.stages import Failure, Stages
 
 
 def problem(seed, n=120, rows=5, lively=3.0, cap=1.0, offset=True):
@@ -74,6 +77,28 @@ def test_numpy_form_gives_the_same(seed, n, cap, x_end):
         assert (one.gridpoint, one.reason) == (other.gridpoint, other.reason)
     else:
         assert np.allclose(one, other, rtol=1e-9, atol=1e-12 * one.max())
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    n=st.sampled_from([2, 3, 40, 900]),
+    lively=st.sampled_from([0.0, 3.0, 300.0]),
+    cap=st.sampled_from([1e-3, 1.0, 1e3]),
+    offset=st.booleans(),
+)
+def test_chains_and_windows_give_what_the_core_gives(seed, n, lively, cap, offset):
+    """Both forms for NumPy, to a rest; curvature so strong that rows ask for less the faster the gridpoint before."""
+    p = problem(seed, n=n, lively=lively, cap=cap, offset=offset)
+    expected = fastest(**p)
+    stages = Stages.of(**p)
+    with np.errstate(all="ignore"):
+        x = by_chains(StageRows.of(stages), 0.0)
+    assert isinstance(x, np.ndarray)
+    assert np.allclose(x, expected, rtol=1e-9, atol=1e-12 * x.max())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lockstep, "by_chains", lambda rows, x_start: None)
+        assert np.allclose(lockstep.solve(stages, 0.0, 0.0), expected, rtol=1e-9, atol=1e-12 * x.max())
 
 
 @pytest.mark.parametrize("engine", ["core", "numpy"])

@@ -26,8 +26,20 @@ def used(s, first, second, x):
     return max(np.abs(a + b).max() for a, b in ends) - 1.0, max(np.abs(a).max() for a, _ in ends) + 1.0
 
 
-def check(case, *, oracle, rel=1e-5):
-    """Return whether toppra had an answer; everything about ours is asserted. rel: agreement of the durations."""
+def apart(case, finer=1):
+    """Return by which share the duration is above toppra's on a grid `finer` times as fine, None where it has none."""
+    s, first, second, ceiling = arrays(case, finer)
+    x, reference = (fastest(s, first, second, ceiling, engine=engine) for engine in ("core", "toppra"))
+    return None if isinstance(reference, Failure) else duration(s, x) / duration(s, reference) - 1.0
+
+
+def check(case, *, oracle):
+    """Return whether toppra had an answer; everything about ours is asserted.
+
+    The passes are greedy: where x all but vanishes in a corner between coarse gridpoints, what is reached next may fall
+    a thousand times as fast as x grows, and what toppra gives up by its tolerance decides which of two feasible
+    profiles follows. About one case of a thousand; a finer grid has no such corner.
+    """
     s, first, second, ceiling = arrays(case)
     x = fastest(s, first, second, ceiling)
     assert not isinstance(x, Failure), f"{case}: {x}"
@@ -39,16 +51,34 @@ def check(case, *, oracle, rel=1e-5):
     assert excess <= 1e-9 * rounding, str(case)
     if not oracle or not moves.all():  # toppra does not take a gridpoint twice
         return False
-    reference = fastest(s, first, second, ceiling, engine="toppra")
-    if isinstance(reference, Failure):
+    by = apart(case)
+    if by is None:
         return False
-    assert duration(s, x) == pytest.approx(duration(s, reference), rel=rel), str(case)
+    if abs(by) > 1e-5:
+        by = min((b for b in (apart(case, 2), apart(case, 4)) if b is not None), key=abs)
+    assert abs(by) <= 1e-5, str(case)
     return True
 
 
 @pytest.mark.parametrize("case", CASES[:: MATRIX["fast_stride"]], ids=str)
 def test_matrix_reduced(case):
     check(case, oracle=True)
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        Case("polyline", "unit interval", 1.14564e-06, 3936838375),
+        Case("raster", "millimetre", 0.00109168, 1341107991),
+        Case("raster", "metre", 4.98538e-06, 2686532027),
+    ],
+    ids=str,
+)
+def test_what_tells_the_durations_apart_is_the_coarse_grid(case):
+    """The worst of some 5,000: on a grid 4 times as fine the durations agree, on a finer one toppra's are longer."""
+    assert apart(case) > 1.9e-5
+    assert abs(apart(case, 4)) < 5e-6
+    assert -2e-5 < apart(case, 16) < -5e-6
 
 
 @pytest.mark.slow
@@ -78,10 +108,7 @@ def test_matrix_by_hypothesis_reduced(case):
 @settings(max_examples=2000, deadline=None)
 @given(any_case())
 def test_matrix_by_hypothesis(case):
-    """To 1e-4: the passes are greedy, and where x all but vanishes in a corner between coarse gridpoints a push that
-    differs in the eighth digit can decide which of two feasible profiles follows. Seen: 1.4e-5, in about one of 1000.
-    """
-    check(case, oracle=True, rel=1e-4)
+    check(case, oracle=True)
 
 
 @pytest.mark.parametrize("unit", MATRIX["units"])

@@ -1,9 +1,9 @@
 """The two passes without a compiler: the path cut into windows through which NumPy moves side by side.
 
-Where most gridpoints run at their ceilings, `by_runs` is done sooner and is tried first. A window starts its pass a
-lead too early, from rest; after the lead it has forgotten that. It has for certain where its value at the seam is its
-neighbour's, bit for bit: then the windows together are the pass over the whole. Where a seam differs the lead is
-doubled, until at last there is one window, which is the whole.
+Towards a rest `by_chains` is done sooner and is tried first. A window starts its pass a lead too early, from rest;
+after the lead it has forgotten that. It has for certain where its value at the seam is its neighbour's, bit for bit:
+then the windows together are the pass over the whole. Where a seam differs the lead is doubled, until at last there is
+one window, which is the whole.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.arrays import Bools, Floats
-from pentapod.timing.runs import by_runs
+from pentapod.timing.chains import by_chains
 from pentapod.timing.stage_rows import StageRows, least_reach, left_root, right_root
 from pentapod.timing.stages import NOT_CONTROLLABLE, TOO_FAST_END, UNBOUNDED, Failure, Stages, admitted
 
@@ -28,7 +28,7 @@ def solve(stages: Stages, x_start: float, x_end: float) -> Floats | Failure:
         return Failure(len(stages) - 1, TOO_FAST_END)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         rows = StageRows.of(stages)
-        x = by_runs(rows, x_start) if x_end == 0.0 else None
+        x = by_chains(rows, x_start) if x_end == 0.0 else None
         lead = _LEAD
         while x is None:
             x = _Windows.of(rows, lead).solve(x_start, x_end)
