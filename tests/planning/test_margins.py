@@ -1,5 +1,7 @@
 """Margins: zero exactly at the limits, the same in NumPy and casadi, and true to geometry that shares no formula."""
 
+import dataclasses
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -48,6 +50,22 @@ def test_signs_are_those_of_the_limits_themselves(desk):
     platform = np.arccos(np.einsum("nij,nj->ni", -legs, axes) / length)
     np.testing.assert_array_equal(values[:, 17:27:2] > 0, platform < desk.joints.platform_range[:, 1])
     np.testing.assert_array_equal(values[:, 18:27:2] > 0, platform > desk.joints.platform_range[:, 0])
+
+
+def test_what_cannot_be_exceeded_is_no_limit(desk):
+    """A platform joint that may close or open wholly: a leg along the tool axis does not come near a limit."""
+    free = dataclasses.replace(desk, joints=dataclasses.replace(desk.joints, platform_range=np.array([0.0, np.pi])))
+    foot, tip = np.array([*desk.pentapod.base[2], 0.0]), desk.work.centre
+    for axis in (tip - foot, foot - tip):
+        axis = axis / np.linalg.norm(axis)
+        along = np.repeat(axis[None], 50, axis=0) + np.random.default_rng(4).normal(0.0, 0.05, (50, 3))
+        axes = along / np.linalg.norm(along, axis=1, keepdims=True)
+        margins = Margins.of(free, PLUS)
+        values, limits = margins(np.tile(tip, (50, 1)), axes), margins.limits
+        angles = [k for k, limit in enumerate(limits) if limit.name.startswith("platform joint 3")]
+        assert len(angles) == 2
+        assert values[:, angles].min() >= 1.0
+        assert all(limits[k].shortfall(1.5) >= 0.0 for k in angles)
 
 
 def test_gaps_between_legs_match_a_numerical_search(desk):

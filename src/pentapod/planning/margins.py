@@ -196,10 +196,10 @@ class Margins:
             edge = float(np.cos(cone))
             rows.append((dot(d, a) / length - edge) / (1.0 - edge))
         for k, (least_angle, most_angle) in enumerate(cones.platform_range.tolist()):
-            scale = 0.5 * (np.cos(least_angle) - np.cos(most_angle))
+            widest, narrowest, scale = _platform_edges(least_angle, most_angle)
             cosine = dot(vectors[k], direction) / lengths[k]
-            rows.append((cosine - float(np.cos(most_angle))) / scale)
-            rows.append((float(np.cos(least_angle)) - cosine) / scale)
+            rows.append((cosine - widest) / scale)
+            rows.append((narrowest - cosine) / scale)
 
         for (j, k), side in zip(_PAIRS, self.sides, strict=True):
             offset = [b - a for a, b in zip(bases[j], bases[k], strict=True)]
@@ -212,6 +212,16 @@ class Margins:
             gaps = [leg_tool_gap(m, tool, k, cosines[k], lengths[k], do) for k in range(5)]
             rows += [gap / TOOL_COMFORTABLE_M for gap in gaps]
         return rows
+
+
+def _platform_edges(least: float, most: float) -> tuple[float, float, float]:
+    """Return the cosines at which a platform joint's angle is too large and too small, and what counts as margin 1.
+
+    An angle cannot be below 0° nor above 180°: such an end is no limit, and its margin is 1 at least.
+    """
+    low, high = float(np.cos(most)), float(np.cos(least))
+    scale = 0.5 * (high - low)
+    return (low if most < np.pi else low - scale), (high if least > 0.0 else high + scale), scale
 
 
 def _home_sides(machine: Machine, component: Component) -> tuple[float, ...]:
@@ -234,7 +244,7 @@ def _limits(machine: Machine, surroundings: Surroundings) -> tuple[Limit, ...]:
         return lambda margin: -margin * half_stroke * 1e3
 
     def cone(edge: float, scale: float, sign: float) -> Callable[[float], float]:
-        at_limit = float(np.arccos(edge))
+        at_limit = float(np.arccos(np.clip(edge, -1.0, 1.0)))
         return lambda margin: float(
             abs(np.degrees(np.arccos(np.clip(edge + sign * margin * scale, -1.0, 1.0)) - at_limit))
         )
@@ -255,12 +265,12 @@ def _limits(machine: Machine, surroundings: Surroundings) -> tuple[Limit, ...]:
         edge = float(np.cos(angle))
         rows.append(Limit(f"base joint {k + 1} beyond its cone", "deg", cone(edge, 1.0 - edge, 1.0), "joints"))
     for k, (least, most) in enumerate(joints.platform_range.tolist()):
-        scale = 0.5 * float(np.cos(least) - np.cos(most))
+        widest, narrowest, scale = _platform_edges(least, most)
         rows.append(
             Limit(
                 f"platform joint {k + 1} beyond its largest angle",
                 "deg",
-                cone(float(np.cos(most)), scale, 1.0),
+                cone(widest, scale, 1.0),
                 "joints",
             )
         )
@@ -268,7 +278,7 @@ def _limits(machine: Machine, surroundings: Surroundings) -> tuple[Limit, ...]:
             Limit(
                 f"platform joint {k + 1} below its least angle",
                 "deg",
-                cone(float(np.cos(least)), scale, -1.0),
+                cone(narrowest, scale, -1.0),
                 "joints",
             )
         )
