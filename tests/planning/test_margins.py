@@ -56,9 +56,10 @@ def test_what_cannot_be_exceeded_is_no_limit(desk):
     """A platform joint that may close or open wholly: a leg along the tool axis does not come near a limit."""
     free = dataclasses.replace(desk, joints=dataclasses.replace(desk.joints, platform_range=np.array([0.0, np.pi])))
     foot, tip = np.array([*desk.pentapod.base[2], 0.0]), desk.work.centre
-    for axis in (tip - foot, foot - tip):
-        axis = axis / np.linalg.norm(axis)
-        along = np.repeat(axis[None], 50, axis=0) + np.random.default_rng(4).normal(0.0, 0.05, (50, 3))
+    for way in (tip - foot, foot - tip):
+        along = np.repeat(way[None] / np.linalg.norm(way), 50, axis=0) + np.random.default_rng(4).normal(
+            0.0, 0.05, (50, 3)
+        )
         axes = along / np.linalg.norm(along, axis=1, keepdims=True)
         margins = Margins.of(free, PLUS)
         values, limits = margins(np.tile(tip, (50, 1)), axes), margins.limits
