@@ -300,8 +300,8 @@ class _Task:
         # A beam or a spray works at a rate: it wants constant speed on the surface. A cutter only wants no more.
         beam, period = self.toolpath.pivot < 0.0, self.machine.controller.period
         slow = unheld(trajectory, period, path.surface_rate) if beam else ()
-        spots = tips - self.toolpath.pivot * direction if beam else None
-        uses = certify(trajectory, self.machine, legs=program.legs, tips=tips, axes=-direction, spots=spots)
+        spot = self.toolpath.pivot if beam else 0.0
+        uses = certify(trajectory, self.machine, legs=program.legs, tips=tips, axes=-direction, spot=spot)
         return explain(trajectory, self.machine, uses, slow)
 
 

@@ -74,6 +74,39 @@ def test_the_tip_itself_is_judged_where_it_is_given():
     assert found["feed"].value == pytest.approx(dense, rel=1e-7)
 
 
+def leaning():
+    return Piece(by_tip(line(), nodding()), 0.05, 0.2, inner_knots=tuple(np.linspace(0, 0.05, 52)[1:-1]))
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+@pytest.mark.parametrize("speeds", [(0.05, 0.0), (0.0, 0.05)])
+def test_an_axis_is_judged_where_the_motion_begins_at_a_speed(interpolation, speeds):
+    """By the path's own derivative of the axis, at dense times; what comes before and after is not the motion's."""
+    m, piece = machine(interpolation=interpolation), leaning()
+    trajectory = retime(Path((piece,)), m, start_speed=speeds[0], end_speed=speeds[1])
+    assert isinstance(trajectory, Trajectory), str(trajectory)
+    t = np.linspace(0.0, trajectory.duration, 20_001)
+    s, v = trajectory.station(t), trajectory.station(t, 1)
+    turning = np.linalg.norm(piece.pose(s, 1)[1], axis=1) * v
+    found = shares(certify(trajectory, limited(m, max_axis_velocity=3.0)))["axis velocity"]
+    assert found.value == pytest.approx(turning.max(), rel=1e-3)
+    assert 0.0 <= found.time <= trajectory.duration
+
+
+def test_a_spot_is_judged_where_the_motion_begins_at_a_speed():
+    """20 mm beyond the tip, as far as the axis leads it: by the path's own derivatives."""
+    m, piece, beyond = machine(interpolation="cubic"), leaning(), -0.02
+    trajectory = retime(Path((piece,)), m, start_speed=0.05, end_speed=0.05)
+    assert isinstance(trajectory, Trajectory), str(trajectory)
+    rows = np.arange(round(trajectory.duration / 1e-3) + 1) * 1e-3
+    tips, axes = trajectory.pose(rows)
+    t = np.linspace(0.0, trajectory.duration, 20_001)
+    (tip, axis), v = piece.pose(trajectory.station(t), 1), trajectory.station(t, 1)
+    speeds = np.linalg.norm(tip + beyond * axis, axis=1) * v
+    found = shares(certify(trajectory, m, legs=trajectory(rows), tips=tips, axes=axes, spot=beyond))["feed"]
+    assert found.value == pytest.approx(speeds.max(), rel=1e-3)
+
+
 def test_place_and_leg_are_named():
     """Leg 4 is the one that moves most, and the second section is the fast one."""
     m = machine(a=50.0)
@@ -89,9 +122,7 @@ def test_place_and_leg_are_named():
 
 def test_a_program_that_exceeds_says_where():
     m = machine()
-    trajectory = timed(
-        Piece(by_tip(line(), nodding()), 0.05, 0.2, inner_knots=tuple(np.linspace(0, 0.05, 52)[1:-1])), m
-    )
+    trajectory = timed(leaning(), m)
     legs = trajectory(np.arange(round(trajectory.duration / 1e-3) + 1) * 1e-3)
     legs[40, 2] += 1e-4
     found = shares(certify(trajectory, m, legs=legs))

@@ -137,6 +137,20 @@ BAD = {
         lambda _: PLY_HEAD % 3 + PLY_FACES % 1 + PLY_POINTS.replace(b"1 0", b"l 0") + b"3 0 1 2\n",
         "letter.ply:11: cannot be read as PLY: not numbers .*l 0 0",
     ),
+    # Each of these takes for ever where a number can be read in more ways than one.
+    "digits.ply": (
+        lambda _: PLY_HEAD % 3 + PLY_FACES % 1 + PLY_POINTS.replace(b"1 0", b"1" * 60 + b" x") + b"3 0 1 2\n",
+        "digits.ply:11: cannot be read as PLY: not numbers",
+    ),
+    "polygon.ply": (
+        lambda _: PLY_HEAD % 3 + PLY_FACES % 1 + PLY_POINTS + b"30" + b" 1234567" * 30 + b" x\n",
+        "polygon.ply:13: cannot be read as PLY: not numbers",
+    ),
+    "digits.obj": (
+        lambda _: OBJ_POINTS + b"v" + 8 * b" 123456789012" + b" x\n",
+        "digits.obj:4: v: .*not three numbers",
+    ),
+    "goes_on.obj": (lambda _: b"v 0 \\\r\n 0 \\\n0\n" + OBJ_POINTS + b"f 1 2 9\n", "goes_on.obj:7: f: .*not there"),
     "head.ply": (lambda _: PLY_HEAD.replace(b"float y", b"flo.at y") % 3 + PLY_FACES % 1, "head.ply:5: .*of a header"),
     "end.ply": (lambda _: PLY_HEAD % 3, 'end.ply:7: .*"end_header" is missing'),
     "part.step": (lambda _: b"ISO-10303-21;", "not a mesh format"),
@@ -200,6 +214,15 @@ def test_obj_as_others_write_it(tmp_path):
     assert mesh.diagnosis.facets == 3
     assert mesh.diagnosis.area == pytest.approx(1e-4 + 0.5 * 10e-3 * np.hypot(5e-3, 9e-3))
     assert "1 of 6 vertices belong to no facet" in str(mesh.diagnosis)
+
+
+def test_a_backslash_does_not_carry_a_comment_on(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_bytes(b"# from C:\\parts\\\nv 0 0 0\nv 1 0 0 # in D:\\\r\nv 0 1 0\nf 1 2 3\n")
+    vertices, faces, notes = read_obj(path, path.read_bytes())
+    np.testing.assert_array_equal(vertices, [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    np.testing.assert_array_equal(faces, [[0, 1, 2]])
+    assert not notes
 
 
 def test_obj_reads_what_another_reader_reads(tmp_path, ball):

@@ -1,6 +1,7 @@
 """Claims about gouges: proven depths are never below what dense samples find, and each corruption is caught."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -267,6 +268,18 @@ def test_strays_are_never_less_than_at_dense_moments(replay, cubic, lever):
         turn = lever * np.linalg.norm(end[1] - start[1])
         assert found[k] >= worst - 1e-6 * (np.linalg.norm(end[0] - start[0]) + turn) - 1e-10
         assert found[k] <= 1.5 * worst + 1e-7 + 0.1 * turn
+
+
+@pytest.mark.parametrize(("swing", "bounded"), [(0.8, True), (2.0, False), (3.1, False)])
+def test_an_axis_that_swings_out_and_back_is_bounded_or_said_not_to_be(swing, bounded):
+    """A stretch that ends as it began, the axis far away in between: a body's end is off by the chord of that swing."""
+    lean = swing * np.array([0.0, 0.5, 1.0, 0.5, 0.0])
+    axes = np.stack([np.sin(lean), 0.0 * lean, np.cos(lean)], axis=1)
+    survey = SimpleNamespace(away=np.zeros(4), turned=np.zeros(4))
+    swung = SimpleNamespace(pivots=np.zeros((5, 3)), axes=axes, survey=survey)
+    found = _strays(swung, _Stretches(np.array([0]), np.array([4])), 0.03)[0]
+    assert np.isfinite(found) == bounded
+    assert found >= 0.06 * np.sin(0.5 * swing)
 
 
 def test_stretches_are_cut_without_gaps():

@@ -58,3 +58,16 @@ def test_a_program_that_passes_on_has_no_exact_stop(linear):
     assert judged(linear, toolpath, program)["exact stops"].passed
     gap = replace(program, legs=np.delete(program.legs, np.arange(before - 200, before + 200), axis=0))
     assert not judged(linear, toolpath, gap)["exact stops"].passed
+
+
+def test_a_stop_behind_the_place_is_none(linear):
+    """At full speed over the place, and standing only where the path tolerance has been left."""
+    toolpath, program, before = stood(linear, 1, 0, 0.020)
+    tips = linear.tips
+    beyond = before + int(np.argmax(np.linalg.norm(tips[before:] - tips[before], axis=1) > 1e-4))
+    legs = program.legs
+    late = np.concatenate([legs[: before - 200], np.repeat(legs[beyond : beyond + 1], 60, axis=0), legs[beyond:]])
+    found = judged(linear, toolpath, replace(program, legs=late))
+    assert not found["exact stops"].passed
+    assert found["exact stops"].value > 10.0 * found["exact stops"].bound
+    assert not found["dwells"].passed

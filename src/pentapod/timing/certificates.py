@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,15 +51,16 @@ def certify(
     legs: Floats | None = None,
     tips: Floats | None = None,
     axes: Floats | None = None,
-    spots: Floats | None = None,
+    spot: float = 0.0,
 ) -> tuple[LimitUse, ...]:
     """Return the largest share of leg velocity, acceleration and jerk, of feed, and of the tool's limits where set.
 
     Of the setpoints as the controller joins them: every polynomial's exact extrema, no samples between. legs (N, 5) m,
     tips (N, 3) m and axes (N, 3): the program's rows, at the controller's period; without them the trajectory is
-    sampled, and for the feed its station stands for the tip, which is never faster. spots (N, 3) m: where a tool with a
-    stand-off meets the surface, whose speed the feed is; rapids are judged by the tip. Jerk counts the step of
-    acceleration at either end over one period. An interval that two sections share is judged by the slower feed.
+    sampled, and for the feed its station stands for the tip, which is never faster. spot: metres from the given tips
+    along the given axes to where a tool with a stand-off meets the surface, whose speed the feed is; rapids are judged
+    by the tip. Jerk counts the step of acceleration at either end over one period. An interval that two sections share
+    is judged by the slower feed.
     """
     period, interpolation = machine.controller.period, machine.controller.interpolation
     count = max(1, round(trajectory.duration / period)) if legs is None else len(legs) - 1
@@ -96,17 +98,16 @@ def certify(
     if tips is None:
         rates = trajectory.feed_rates(times)
         steps = steps * np.maximum(rates[:-1], rates[1:])[:, None, None]
-    elif spots is not None:
+    elif axes is not None and spot != 0.0:
         on_feed = np.isfinite(trajectory.feeds(times))
-        spot = Interpolant.through(spots, period, interpolation)
-        steps = np.where((on_feed[:-1] | on_feed[1:])[:, None, None], spot.steps, steps)
+        of_spot = own(tip.steps + spot * joined(axes, slice(9, 12)).steps)
+        steps = np.where((on_feed[:-1] | on_feed[1:])[:, None, None], of_spot, steps)
     share, row = largest_length(steps / feeds[:, None, None])
     uses.append(use("feed", "m/s", share * float(feeds[row]), float(feeds[row]), row))
     if limits:
         posed = trajectory.pose(times) if tips is None or axes is None else (tips, axes)
-        for name, unit, values in _of_tool(joined(posed[0], slice(6, 9)), joined(posed[1], slice(9, 12))):
+        for name, unit, values in _of_tool(joined(posed[0], slice(6, 9)), joined(posed[1], slice(9, 12)), own):
             if name in limits:
-                values = own(values)  # noqa: PLW2901 (without the run-ins from here on)
                 row = int(np.argmax(values))
                 uses.append(use(_TOOL[name], unit, float(values[row]), limits[name], row))
     return tuple(uses)
@@ -136,14 +137,20 @@ def _run_ins(trajectory: Trajectory, period: float, *, tool: bool) -> tuple[Floa
     return before, after
 
 
-def _of_tool(tip: Interpolant, axis: Interpolant) -> tuple[tuple[str, str, Floats], ...]:
-    """Return name, unit and values (N or N − 1,) of what may be limited in the motion of tips and axes."""
-    fastest, row = largest_length(axis.steps)
-    speeds = np.zeros(len(axis.steps))
+def _of_tool(
+    tip: Interpolant, axis: Interpolant, own: Callable[[Floats], Floats]
+) -> tuple[tuple[str, str, Floats], ...]:
+    """Return name, unit and values (N or N − 1,) of what may be limited in the motion of tips and axes.
+
+    own: takes the values of run-ins away.
+    """
+    steps = own(axis.steps)
+    fastest, row = largest_length(steps)
+    speeds = np.zeros(len(steps))
     speeds[row] = fastest
     return (
-        ("max_tip_acceleration", "m/s²", np.linalg.norm(tip.second, axis=1)),
-        ("max_tip_jerk", "m/s³", tip.jerk_lengths),
+        ("max_tip_acceleration", "m/s²", own(np.linalg.norm(tip.second, axis=1))),
+        ("max_tip_jerk", "m/s³", own(tip.jerk_lengths)),
         ("max_axis_velocity", "rad/s", speeds),
-        ("max_axis_acceleration", "rad/s²", axis.turn_accelerations),
+        ("max_axis_acceleration", "rad/s²", own(axis.turn_accelerations)),
     )

@@ -20,7 +20,7 @@ def stepped(toolpath: Toolpath, axis_step: float) -> Toolpath:
     """
     segments = tuple(_divided(segment, toolpath.pivot, axis_step) for segment in toolpath.segments)
     same = all(new is old for new, old in zip(segments, toolpath.segments, strict=True))
-    return toolpath if same else Toolpath(segments, toolpath.pivot)
+    return toolpath if same else replace(toolpath, segments=segments)
 
 
 def fastest_turn(toolpath: Toolpath) -> float:

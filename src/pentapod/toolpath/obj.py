@@ -34,38 +34,54 @@ _STRANGE = re.compile(
 _VERTEX = re.compile(rb"^[ \t]*v" + 3 * (_GAP + rb"(" + NUMBER + rb")"), re.MULTILINE)
 _FACET = re.compile(rb"^[ \t]*f((?:" + _GAP + _CORNER + rb")+)", re.MULTILINE)
 _REST_OF_CORNER = re.compile(rb"/\S*")
+_COMMENT_OR_GOES_ON = re.compile(rb"(#[^\n]*)|\\\r?\n")
 
 
 def read_obj(path: Path, data: bytes) -> tuple[Floats, Ints, tuple[str, ...]]:
     """Return vertices (V, 3) in the file's own numbers, facets (F, 3), and notes. Raises MeshError naming the line."""
-    data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ") if b"\\" in data else data
-    if strange := _STRANGE.search(data):
+    text = _whole_lines(data)
+    if strange := _STRANGE.search(text):
         word = strange[1].decode("utf-8", "replace")[:20]
         what = {"v": "a vertex is not three numbers", "f": "a facet is not three corners or more"}
-        text = strange[0].decode("utf-8", "replace").strip()[:40]
+        value = strange[0].decode("utf-8", "replace").strip()[:40]
         raise MeshError(
             f"cannot be read as OBJ: {what.get(word, 'an unknown word')}",
-            file=path, line=line_of(data, strange.start()), key=word, value=text, remedy=AGAIN,
+            file=path, line=line_of(data, strange.start()), key=word, value=value, remedy=AGAIN,
         )  # fmt: skip
     check_last_line(path, data)
-    vertices, places = _vertices(data)
-    faces = _facets(path, data, places)
+    vertices, places = _vertices(text)
+    faces = _facets(path, data, text, places)
     return vertices, faces, _unused(len(vertices), faces)
 
 
-def _vertices(data: bytes) -> tuple[Floats, Ints]:
+def _whole_lines(data: bytes) -> bytes:
+    """Return the file with spaces for what ends lines that go on in the next: every byte stays at its place.
+
+    A comment ends with its line, even on a backslash: directories of Windows do.
+    """
+
+    def blank(found: re.Match[bytes]) -> bytes:
+        return found[0] if found[1] is not None else b" " * len(found[0])
+
+    return _COMMENT_OR_GOES_ON.sub(blank, data) if b"\\" in data else data
+
+
+def _vertices(text: bytes) -> tuple[Floats, Ints]:
     """Return vertices (V, 3), and where (V,) in the file each stands."""
     parts, places = [np.zeros((0, 3))], [np.zeros(0, dtype=np.intp)]
-    for matches in _batches(_VERTEX.finditer(data)):
+    for matches in _batches(_VERTEX.finditer(text)):
         parts.append(np.array([match.groups() for match in matches], dtype=np.bytes_).astype(np.float64))
         places.append(np.array([match.start() for match in matches]))
     return np.concatenate(parts), np.concatenate(places)
 
 
-def _facets(path: Path, data: bytes, places: Ints) -> Ints:
-    """Return triangles (F, 3) of vertex indices from 0. Raises MeshError for a corner that is not there (yet)."""
+def _facets(path: Path, data: bytes, text: bytes, places: Ints) -> Ints:
+    """Return triangles (F, 3) of vertex indices from 0. Raises MeshError for a corner that is not there.
+
+    text: the file with its lines whole.
+    """
     parts = [np.zeros((0, 3), dtype=np.intp)]
-    for matches in _batches(_FACET.finditer(data)):
+    for matches in _batches(_FACET.finditer(text)):
         corners = [_REST_OF_CORNER.sub(b"", match[1]).split() for match in matches]
         count = np.array([len(words) for words in corners])
         index = np.array([int(word) for words in corners for word in words], dtype=np.intp)

@@ -18,7 +18,10 @@ _HEADER_LINE = re.compile(
     rb"ply|format (?:ascii|binary_little_endian|binary_big_endian) 1\.0|(?:comment|obj_info)\b.*|element \w+ \d+"
     rb"|property (?:list \w+ )?\w+ \w+|end_header"
 )
-_STRANGE = re.compile(rb"^(?!(?:[ \t]*" + NUMBER + rb")*[ \t\r]*$)(.*)$", re.MULTILINE)
+_STRANGE = re.compile(
+    rb"^(?![ \t]*(?:" + NUMBER + rb"(?:[ \t]+" + NUMBER + rb")*)?[ \t\r]*$)(.*)$", re.MULTILINE
+)  # fmt: skip
+_ELEMENT = re.compile(rb"^[ \t]*element[ \t]+(\w+)[ \t]+(\d+)", re.MULTILINE)
 
 
 def read_ply(path: Path, data: bytes) -> tuple[Floats, Ints]:
@@ -67,7 +70,7 @@ def _through_trimesh(path: Path, data: bytes) -> tuple[Floats, Ints]:
 
 def _check_counts(path: Path, header: bytes, vertices: int, faces: int) -> None:
     """Raise MeshError where the header announces more than was read."""
-    announced = {m[1]: int(m[2]) for m in re.finditer(rb"element\s+(\w+)\s+(\d+)", header)}
+    announced = {m[1]: int(m[2]) for m in _ELEMENT.finditer(header)}
     for name, found in ((b"face", faces), (b"vertex", vertices)):
         # Of a cloud of points, which has no facets at all, something better is said later.
         if announced.get(name, 0) > found and announced.get(b"face", 0):

@@ -6,8 +6,11 @@ from pathlib import Path
 
 from pentapod.errors import MeshError
 
-NUMBER = rb"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[nN][aA][nN]|[iI][nN][fF](?:[iI][nN][iI][tT][yY])?)"
-"""A number as a pattern; nan and inf are told from words, for the mesh says which facet has them."""
+NUMBER = rb"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|[nN][aA][nN]|[iI][nN][fF](?:[iI][nN][iI][tT][yY])?)"
+"""A number as a pattern; nan and inf are told from words, for the mesh says which facet has them.
+
+No text matches it in two ways: else a line that is not understood could take for ever.
+"""
 
 AGAIN = "export the mesh again; the file may have been cut off on its way"
 

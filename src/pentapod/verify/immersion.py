@@ -145,9 +145,10 @@ def _swept(
 def _strays(replay: Replay, stretches: _Stretches, lever: float) -> Floats:
     """Return by how much (n,) points of the tool are at most off the straight stretch, at any time, metres.
 
-    lever: how far they are from the pivot at most. A moment is compared with the place of the stretch that is nearest
-    to it. Between two samples that place goes evenly, and unit vectors on an arc θ are off the line through two of
-    them by no more than θ²/8.
+    Infinite where the tool turns too far for that to be said. lever: how far they are from the pivot at most.
+
+    A moment is compared with the place of the stretch that is nearest to it. Between two samples that place goes
+    evenly, and unit vectors on an arc θ are off the line through two of them by no more than θ²/8.
     """
     found = np.empty(len(stretches.starts))
     counts = stretches.ends - stretches.starts + 1
@@ -179,7 +180,8 @@ def _stray(replay: Replay, of: _Stretches, counts: Ints, lever: float) -> Floats
     swung = replay.axes[sample] - _on_arc(first, last, angle, owner, share)
     apart = np.maximum.reduceat(np.linalg.norm(swung, axis=1), begins) + 0.125 * angle**2
     tilt = np.arcsin(np.minimum(apart, 1.0)) + np.maximum.reduceat(replay.survey.turned[chord], begins)
-    return np.where(angle < _WIDEST, aside + away + lever * tilt, np.inf)
+    # An axis as far as a radius from the arc may point anywhere.
+    return np.where((angle < _WIDEST) & (apart < 1.0), aside + away + lever * tilt, np.inf)
 
 
 def _on_arc(first: Floats, last: Floats, angle: Floats, owner: Ints, share: Floats) -> Floats:

@@ -53,7 +53,7 @@ def dwells(replay: Replay) -> Finding | Idle:
 
 
 def _stops(replay: Replay) -> list[tuple[int, int, float]]:
-    """Return the steps from row to row, from and to before, near each stop of the toolpath, and its seconds."""
+    """Return for each stop of the toolpath the steps from row to row, from and to before, near it; and its seconds."""
     path, match, count = replay.toolpath, replay.match, len(replay.program.legs) - 1
     # Where the tool turns on the spot its way does not tell one waypoint from the next.
     turns = np.append(0.0, np.cumsum(angle_between(path.axes[:-1], path.axes[1:])))
@@ -64,10 +64,13 @@ def _stops(replay: Replay) -> list[tuple[int, int, float]]:
     ):
         low = np.maximum(low, np.searchsorted(course, places - within, "left"))
         high = np.minimum(high, np.searchsorted(course, places + within, "right"))
+    # Where fewer than two rows are near, as where a program jumps over the place, all steps that touch it count.
+    few = high - low < 2
+    first = np.clip(np.where(few, np.minimum(low, high) - 1, low), 0, count - 1)
+    behind = np.clip(np.where(few, np.maximum(low, high), high - 1), first + 1, count)
     return [
-        # A program that jumps over the place altogether is judged by the step that does.
-        (min(a, count - 1), min(max(b, a + 1), count), seconds)
-        for a, b, seconds in zip(low.tolist(), (high - 1).tolist(), path.dwells, strict=True)
+        (a, b, seconds)
+        for a, b, seconds in zip(first.tolist(), behind.tolist(), path.dwells, strict=True)
         if seconds is not None
     ]
 
