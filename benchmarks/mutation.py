@@ -42,6 +42,7 @@ TESTS = {
     "origin.py": (BY_HAND, CATCHES),
     "replay.py": (BY_HAND, ORACLES, CATCHES),
     "speed.py": (BY_HAND, "test_standoff_feed.py", CATCHES, ORACLES),
+    "standing.py": ("test_standing.py",),
     "survey.py": (BY_HAND, ORACLES, CATCHES),
     "tool.py": ("test_tool_claims.py", CATCHES),
     "tracking.py": (BY_HAND, CATCHES, ORACLES),
@@ -129,6 +130,9 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0, help="the first of those")
     parser.add_argument("--least", type=float, default=0.9, help="share that has to be killed")
     given = parser.parse_args()
+    untested = {file.name for file in VERIFY.glob("*.py")} - {*TESTS, "__init__.py"}
+    if untested:
+        raise SystemExit(f"no tests are named for {', '.join(sorted(untested))}")
     os.chdir(ROOT)
     warm()
     todo = [(VERIFY / name, *mutant) for name in given.files for mutant in mutants(VERIFY / name)]

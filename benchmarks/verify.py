@@ -128,8 +128,8 @@ def main() -> None:
         if not certificate.passed:
             print(f"  FAIL {certificate.claim}: {certificate.value} ({certificate.bound}) {certificate.method}")
     memory = f"peak {peak / 1024:.0f} MB (before it {before / 1024:.0f} MB)"
-    gouge = [c for c in verdict.certificates if c.claim == "gouge on cuts and links"]
-    print(f"gouge: {[c.value for c in gouge]} mm of {[c.bound for c in gouge]} mm, {2 * given.cells**2:,} facets")
+    gouge = next(c for c in verdict.certificates if c.claim == "gouge on cuts and links")
+    print(f"gouge: {gouge.value:.4g} mm of {gouge.bound:.4g} mm, {2 * given.cells**2:,} facets")
     print(f"verify: {seconds:.1f} s, {1e6 * seconds / rows:.1f} µs/row, {memory}")
     print(f"reading: {reading:.2f} s; numpy.loadtxt takes {loading / reading:.2f} × that")
     print(f"the whole verdict takes {seconds / loading:.1f} × what numpy.loadtxt takes to load the file")

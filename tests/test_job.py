@@ -17,7 +17,7 @@ MISTAKES = {  # what is replaced, and the pieces that the message must hold
     "unknown strategy": ((STEP, f'{STEP}\nstrategy = "rastr"'), ("toolpath.strategy", "got 'rastr'", '"raster"')),
     "a key of another strategy": (
         (STEP, f'{STEP}\nstrategy = "waterline"\npattern = "zigzag"'),
-        ("job.toml:15", "toolpath.pattern", "unknown key"),
+        ("job.toml:15", "toolpath.pattern", 'the strategy "waterline" has no such key', "take it out; known: "),
     ),
     "no text": ((STEP, 'strategy = "text"'), ("toolpath.text", "missing", "what is written")),
     "no such drawing": (
@@ -87,7 +87,7 @@ def test_files_that_are_no_job(content, piece, tmp_path):
         Job.load(path)
     with pytest.raises(JobError, match="no such job file"):
         Job.load(tmp_path / "other.toml")
-    with pytest.raises(JobError, match="cannot be read"):
+    with pytest.raises(JobError, match="this is a folder"):
         Job.load(tmp_path)
 
 

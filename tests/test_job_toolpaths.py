@@ -129,7 +129,7 @@ def test_the_cap_on_steps_holds_in_every_axis_mode(make_job, lead):
         (("tilt_deg = 0", 'tilt_deg = 0\nmode = "fixed"'), r"axis\.direction: missing for axis mode"),
         (("tilt_deg = 0", "tilt_deg = 0\npoint_mm = [0, 0, 1]"), r"axis\.point_mm: means nothing"),
         ((STRATEGY, 'strategy = "file"'), r"toolpath\.file: the key is missing"),
-        ((STRATEGY, STRATEGY + '\nfile = "part.stl"'), r"toolpath\.file: unknown key"),
+        ((STRATEGY, STRATEGY + '\nfile = "part.stl"'), r'toolpath\.file: the strategy "raster" has no such key'),
         ((STRATEGY, 'strategy = "file"\nfile = "none.apt"'), r"toolpath\.file: no such file"),
         (("[feed]", '[gouge]\nremedy = ["pray"]\n\n[feed]'), r"gouge\.remedy"),
     ],

@@ -119,7 +119,9 @@ def test_artefacts_agree_with_each_other(make_job, tmp_path):
     verdict = json.loads((out / "verdict.json").read_text())
     assert verdict == outcome.to_dict()
     assert verdict["passed"] is True
-    assert set(verdict["certificates"][0]) == {"claim", "passed", "value", "bound", "unit", "where", "method"}
+    assert set(verdict["certificates"][0]) == {
+        "claim", "passed", "value", "bound", "unit", "where", "method", "allowed"
+    }  # fmt: skip
     with np.load(out / "plan.npz") as arrays:
         assert np.array_equal(arrays["program.legs_mm"], program.legs * 1e3)
         count = len(arrays["toolpath.tips_mm"])

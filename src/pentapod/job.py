@@ -172,6 +172,8 @@ def _read(path: Path) -> str:
         raise JobError("no such job file", file=path, remedy='"pentapod new DIR" writes one to start from') from error
     except UnicodeDecodeError as error:
         raise JobError("not a text file in UTF-8", file=path, expected="a job file in TOML") from error
+    except IsADirectoryError as error:
+        raise JobError("this is a folder", file=path, expected="a job file", remedy="name the one in it") from error
     except OSError as error:
         raise JobError(f"cannot be read: {error.strerror}", file=path) from error
     if not text.strip():
@@ -224,10 +226,7 @@ def _details(error: ErrorDetails, where: tuple[str, ...], strategy: str) -> dict
     """Return what, value, expected and remedy of one error of pydantic."""
     context = error.get("ctx", {})
     if error["type"] == "extra_forbidden":
-        owner = _model(where[:-1], strategy)
-        kind = "table" if len(where) == 1 else "key"
-        known = list(owner.model_fields) if owner is not None else []
-        return {"what": f"unknown {kind}", "remedy": nearest(where[-1], known)}
+        return _unknown(where, strategy)
     if error["type"] == "rule":
         return {"what": context["what"], "expected": context["expected"], "key": context["key"]}
     if error["type"] == "union_tag_invalid":
@@ -244,6 +243,16 @@ def _details(error: ErrorDetails, where: tuple[str, ...], strategy: str) -> dict
     message = error["msg"].removeprefix("Input should be ").removeprefix("a ").removeprefix("valid ")
     what = "out of range" if set(context) & {"gt", "ge", "lt", "le"} else "wrong value"
     return {"what": what, "value": error["input"], "expected": f"{message} ({_description(where, strategy)})"}
+
+
+def _unknown(where: tuple[str, ...], strategy: str) -> dict[str, Any]:
+    """Return what and remedy of a table or key that is not known, or not with this strategy."""
+    owner = _model(where[:-1], strategy)
+    known = list(owner.model_fields) if owner is not None else []
+    if len(where) == 2 and where[0] == "toolpath" and any(where[1] in table.model_fields for table in TABLES.values()):
+        rest = ", ".join(sorted(known))
+        return {"what": f'the strategy "{strategy}" has no such key', "remedy": f"take it out; known: {rest}"}
+    return {"what": f"unknown {'table' if len(where) == 1 else 'key'}", "remedy": nearest(where[-1], known)}
 
 
 def _model(where: tuple[str, ...], strategy: str) -> type[BaseModel] | None:

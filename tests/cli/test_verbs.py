@@ -168,12 +168,29 @@ def test_folder_that_cannot_be_written(make_job, tmp_path, capsys):
         ["fk", "1", "2", "3", "4", "5", "-c", "+"],
         ["fk", "1", "2", "3", "4", "x"],
         ["machine", "check", "nowhere"],
+        ["plan", "."],
         ["toolpath", "nowhere.toml", "-o", "x.npz"],
     ],
 )
 def test_bad_arguments(arguments, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     bad_input(arguments, tmp_path, capsys)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["plna", "x"], 'no such verb: "plna"; did you mean "plan"? (pentapod --help)'),
+        (["plan"], "JOB"),
+        (["plan"], "(pentapod plan --help)"),
+        (["post", "x.csv", "--to", "pvt"], "(pentapod post --help)"),
+        (["machine", "chek"], "(pentapod machine --help)"),
+        (["plan", "."], ".: this is a folder; expected a job file"),
+    ],
+)
+def test_what_was_meant_is_told(arguments, words, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert words in bad_input(arguments, tmp_path, capsys)
 
 
 def bad_input(arguments: list[str], folder: Path, capsys: pytest.CaptureFixture[str]) -> str:

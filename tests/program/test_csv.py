@@ -177,6 +177,7 @@ BAD = {
     "blank": (lambda _: b"\n \n", "empty", None),
     "no program": (lambda _: b"solid part\nfacet\n", "not a pentapod program", 1),
     "another csv": (lambda d: d[d.index(b"time_s") :], "not a pentapod program", 1),
+    "a job file": (lambda _: b"# A pentapod job: its keys\n[part]\n", "not a pentapod program", 1),
     "another header": (lambda d: b"# exported = 3\n" + d, "not a pentapod program", 1),
     "binary": (lambda _: b"# \xff\xfe\x00\n" * 9, "not a pentapod program", 1),
     "comment": (lambda d: d.replace(b"# rows", b"# these rows", 1), "cannot read this header line", 10),

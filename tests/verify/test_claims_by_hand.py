@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import replay_cases as cases
 
+from pentapod.cli.output import verdict_text
 from pentapod.kinematics.certificate import certify_component
 from pentapod.program import quantised
 from pentapod.verify import CLAIMS, Certificate, Claim, Place, Replay, Verdict, verify, write_verdict
@@ -181,6 +182,14 @@ def test_a_claim_gives_plain_numbers(replay):
     certificate = claim_of(HELD)(replay)
     assert certificate == Certificate("a claim", True, 0.333333333333, None, "mm", Place(), "by hand")
     assert type(certificate.passed) is bool
+    allowed = replace(HELD, value=2.0 / 3.0, bound=0.5, allowed=2.0 / 3.0)
+    certificate = claim_of(allowed)(replay)
+    assert (certificate.bound, certificate.allowed) == (0.5, 0.666666666667)
+    assert certificate.is_lenient
+    assert "(bound 0.5, 0.666667 allowed)" in verdict_text(Verdict((certificate,)))
+    for other in (replace(allowed, value=0.5), replace(allowed, passed=False), replace(allowed, allowed=None)):
+        assert not claim_of(other)(replay).is_lenient
+        assert "allowed" not in verdict_text(Verdict((claim_of(other)(replay),)))
     assert claim_of(Idle("nothing there"))(replay) == Idle("nothing there")
 
 

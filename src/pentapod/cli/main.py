@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from pentapod.errors import InputError
+from pentapod.errors import InputError, nearest
 
 EXIT_FAILED, EXIT_INPUT, EXIT_BUG, EXIT_INTERRUPTED = 1, 2, 3, 130
 
@@ -46,6 +46,14 @@ class LazyGroup(click.Group):
         module, name = VERBS[cmd_name].split(":")
         command: click.Command = getattr(import_module(module), name)
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that the first argument names. Raises UsageError that tells the nearest verb."""
+        if args[0] not in VERBS:
+            raise click.UsageError(f'no such verb: "{args[0]}"; {nearest(args[0], VERBS)}', ctx)
+        return super().resolve_command(ctx, args)
 
 
 def _print_version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -109,7 +117,9 @@ def _answer(error: BaseException) -> tuple[int, str]:
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         return EXIT_INPUT, error.format_message()
     if isinstance(error, click.ClickException):
-        return EXIT_INPUT, _line(error.format_message())
+        context = error.ctx if isinstance(error, click.UsageError) else None
+        remedy = "" if context is None else f" ({context.command_path} --help)"
+        return EXIT_INPUT, _line(error.format_message() + remedy)
     if isinstance(error, InputError):
         return EXIT_INPUT, _line(str(error))
     if isinstance(error, OSError):

@@ -110,7 +110,8 @@ def _claim(certificate: Certificate) -> str:
     if certificate.value is not None:
         text += f": {certificate.value:.6g} {certificate.unit}".rstrip()
     if certificate.bound is not None:
-        text += f" (bound {certificate.bound:.6g})"
+        allowed = f", {certificate.allowed:.6g} allowed" if certificate.is_lenient else ""
+        text += f" (bound {certificate.bound:.6g}{allowed})"
     if not certificate.passed and certificate.where.time_s is not None:
         text += f" at {certificate.where.time_s:.3f} s"
     if not certificate.passed and certificate.value is None:

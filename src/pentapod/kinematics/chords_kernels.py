@@ -85,14 +85,16 @@ def chords(
         sine += np.sqrt(z[3] ** 2 + z[4] ** 2 + z[5] ** 2)
         turned[h] = np.arcsin(min(1.0, sine * (1.0 + ROUND)))
         swing = np.sqrt(bound[3] ** 2 + bound[4] ** 2 + bound[5] ** 2)
+        start_i, end_i = start[h, 3:], end[h, 3:]
         for j in range(5):
-            shortest = legs[h, j].min()
+            own, one, two = legs[h, j], first[j], second[j]
+            shortest = own.min()
             shift, rounding = _joined(bound, abs(geometry[j, 2])), 4.0 * ROUND * size / shortest
-            base = _base_cosine(first[j], second[j], towards[j], legs[h, j], lines_up)
+            base = _base_cosine(one, two, towards[j], own, lines_up)
             base_cosines[h, j] = base - shift / shortest - rounding
-            least, most = _platform_cosine(first[j], second[j], start[h, 3:], end[h, 3:], legs[h, j], cosines_up)
+            least, most = _platform_cosine(one, two, start_i, end_i, own, cosines_up)
             # On the line the vector is no longer than the leg and its shift.
-            loose = ((legs[h, j].max() + shift) * swing + shift) / shortest + rounding
+            loose = ((own.max() + shift) * swing + shift) / shortest + rounding
             platform_cosines[h, j, 0], platform_cosines[h, j, 1] = least - loose, most + loose
 
 
@@ -175,15 +177,16 @@ def _derived(
     and |f + e'| ≤ |q| + |1 − C J| |f|.
     """
     size, degree = geometry[5, 2], de.shape[1]
-    least, q = np.empty(6), np.empty(6)
+    least, q, moved = np.empty(6), np.empty(6), np.zeros(6)
+    for n in range(3):
+        moved[5] += bound[3 + n] * (abs(step[3 + n]) + ROUND)
+        for j in range(5):
+            reach = bound[n] + abs(geometry[j, 2]) * bound[3 + n]
+            moved[j] += reach * (abs(change[j, n]) + ROUND * size)
     for r in range(6):
         q[r] = 4.0 * degree * slack[r]
-        for j in range(5):
-            for n in range(3):
-                moved = bound[n] + abs(geometry[j, 2]) * bound[3 + n]
-                q[r] += abs(inverse[r, j]) * moved * (abs(change[j, n]) + ROUND * size)
-        for n in range(3):
-            q[r] += abs(inverse[r, 5]) * bound[3 + n] * (abs(step[3 + n]) + ROUND)
+        for j in range(6):
+            q[r] += abs(inverse[r, j]) * moved[j]
         largest = 0.0
         for m in range(degree):
             de[r, m] = degree * (e[r, m + 1] - e[r, m])

@@ -135,17 +135,19 @@ def mapped(
     rest: Floats, inverse: Floats, geometry: Floats, spread: Floats, spread_i: Floats, v: Floats, out: Floats
 ) -> None:
     """Fill an upper bound (6,) of |1 − C J| v for all Jacobians within the spread, v (6,) ≥ 0."""
+    across_i = spread_i[0] * v[3] + spread_i[1] * v[4] + spread_i[2] * v[5]
     for r in range(6):
-        total = 0.0
+        out[r] = abs(inverse[r, 5]) * across_i
         for c in range(6):
-            total += rest[r, c] * v[c]
-        for j in range(5):
-            across = 0.0
-            for n in range(3):
-                across += spread[j, n] * (v[n] + abs(geometry[j, 2]) * v[3 + n])
-            total += abs(inverse[r, j]) * across
-        total += abs(inverse[r, 5]) * (spread_i[0] * v[3] + spread_i[1] * v[4] + spread_i[2] * v[5])
-        out[r] = total * (1.0 + ROUND)
+            out[r] += rest[r, c] * v[c]
+    for j in range(5):
+        across, offset = 0.0, abs(geometry[j, 2])
+        for n in range(3):
+            across += spread[j, n] * (v[n] + offset * v[3 + n])
+        for r in range(6):
+            out[r] += abs(inverse[r, j]) * across
+    for r in range(6):
+        out[r] *= 1.0 + ROUND
 
 
 @kernel

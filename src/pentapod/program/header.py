@@ -97,6 +97,8 @@ def parse_header(lines: list[str], file: Path) -> Header:
             # Decimals, so that placements come back from millimetres bit for bit.
             entry = tomllib.loads(line[1:].strip(), parse_float=Decimal)
         except tomllib.TOMLDecodeError as error:
+            if number == 1:
+                _reject_first_line(values, file)
             raise ProgramError(
                 "cannot read this header line",
                 file=file,

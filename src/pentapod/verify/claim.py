@@ -24,6 +24,7 @@ class Finding:
     unit: str
     where: Place
     method: str
+    allowed: float | None = None
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,8 @@ class Claim:
         found = self.judge(replay)
         if isinstance(found, Idle):
             return found
-        value, bound = _plain(found.value), _plain(found.bound)
-        return Certificate(self.name, bool(found.passed), value, bound, found.unit, found.where, found.method)
+        value, bound, allowed = _plain(found.value), _plain(found.bound), _plain(found.allowed)
+        return Certificate(self.name, bool(found.passed), value, bound, found.unit, found.where, found.method, allowed)
 
     def unjudged(self, idle: Idle) -> Certificate:
         """Return the certificate that stands in a strict verdict where the claim was not judged."""

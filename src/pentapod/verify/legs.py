@@ -67,26 +67,32 @@ def jerk(replay: Replay) -> Finding:
         "a step of acceleration at either end counts over one period; "
         f"{JERK_ALLOWANCE:.0%} allowed, and {1e3 * rounding:.3g} mm/s³ for the rounding of the rows"
     )
-    passed = value <= bound * (1.0 + JERK_ALLOWANCE) + rounding
-    return _finding(replay, passed, (value, bound, "mm/s³"), (int(found.at[leg]), leg), method)
+    allowed = bound * (1.0 + JERK_ALLOWANCE) + rounding
+    return _finding(replay, value <= allowed, (value, bound, "mm/s³"), (int(found.at[leg]), leg), method, allowed)
 
 
 def _below(replay: Replay, found: Extreme, limit: Floats, unit: str, method: str) -> Finding:
     """Judge the largest of each leg against limits (5,), both SI."""
     leg = int(np.argmax(found.values / limit))
     value, bound = float(found.values[leg]), float(limit[leg])
-    passed = value <= bound * (1.0 + ALLOWANCE)
+    allowed = bound * (1.0 + ALLOWANCE)
     method += f"; {ALLOWANCE:.1%} allowed"
-    return _finding(replay, passed, (value, bound, unit), (int(found.at[leg]), leg), method)
+    return _finding(replay, value <= allowed, (value, bound, unit), (int(found.at[leg]), leg), method, allowed)
 
 
 def _finding(
-    replay: Replay, passed: bool, found: tuple[float, float, str], at: tuple[int, int], method: str
+    replay: Replay,
+    passed: bool,
+    found: tuple[float, float, str],
+    at: tuple[int, int],
+    method: str,
+    allowed: float | None = None,
 ) -> Finding:
-    """Return the finding on (value, bound, unit), lengths in metres, at (row, leg)."""
+    """Return the finding on (value, bound, unit), lengths in metres as in allowed, at (row, leg)."""
     (value, bound, unit), (row, leg) = found, at
+    allowed = None if allowed is None else 1e3 * allowed
     method = f"leg {leg + 1} is closest to its limit; {method}"
-    return Finding(passed, 1e3 * value, 1e3 * bound, unit, replay.place(2 * row), method)
+    return Finding(passed, 1e3 * value, 1e3 * bound, unit, replay.place(2 * row), method, allowed)
 
 
 CLAIMS = (

@@ -34,13 +34,14 @@ def feed(replay: Replay, kind: SegmentKind) -> Finding | Idle:
     worst = int(np.argmax(speed / limit[chords]))
     value, bound = float(speed[worst]), float(limit[chords[worst]])
     whose = "the spot that the program's tool meets on the surface" if spot else "the program's own tip"
-    where = "on every segment" if standoff and rapid else f"where the matched place is on a {kind}"
+    which = "on every segment" if standoff and rapid else f"where the matched place is on a {kind}"
     method = (
-        f"speed of {whose}, {'from row to row' if linear else 'proven bound for all times'}, {where}; within the path "
+        f"speed of {whose}, {'from row to row' if linear else 'proven bound for all times'}, {which}; within the path "
         f"tolerance of a segment's end the faster of both feeds counts; {ALLOWANCE:.1%} allowed"
     )
-    passed = value <= bound * (1.0 + ALLOWANCE)
-    return Finding(passed, _MM_MIN * value, _MM_MIN * bound, "mm/min", replay.place(int(chords[worst])), method)
+    allowed, where = bound * (1.0 + ALLOWANCE), replay.place(int(chords[worst]))
+    told = (_MM_MIN * value, _MM_MIN * bound, "mm/min", where, method, _MM_MIN * allowed)
+    return Finding(value <= allowed, *told)
 
 
 def _between_rows(replay: Replay, *, spot: bool) -> Floats:
@@ -89,7 +90,8 @@ def rest(replay: Replay, *, at_end: bool) -> Finding:
         f"greatest acceleration changes in one period; {ALLOWANCE:.1%} allowed"
     )
     where = replay.place(2 * len(rows) - 2 if at_end else 0)
-    return Finding(value <= bound * (1.0 + ALLOWANCE), 1e3 * value, 1e3 * bound, "mm/s", where, method)
+    allowed = bound * (1.0 + ALLOWANCE)
+    return Finding(value <= allowed, 1e3 * value, 1e3 * bound, "mm/s", where, method, 1e3 * allowed)
 
 
 CLAIMS = (

@@ -32,8 +32,9 @@ def exact_stops(replay: Replay) -> Finding | Idle:
         f"of {len(stops)} stops the one where most is left of the legs' speed, over the slowest period within the path "
         f"tolerance of it; the bound is what leg {leg + 1}'s greatest acceleration changes in one period"
     )
-    passed = value <= bound * (1.0 + ALLOWANCE)
-    return Finding(passed, 1e3 * value, 1e3 * bound, "mm/s", replay.place(2 * worst), method)
+    allowed = bound * (1.0 + ALLOWANCE)
+    place = replay.place(2 * worst)
+    return Finding(value <= allowed, 1e3 * value, 1e3 * bound, "mm/s", place, method, 1e3 * allowed)
 
 
 def dwells(replay: Replay) -> Finding | Idle:

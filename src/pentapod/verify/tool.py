@@ -76,7 +76,9 @@ def _below(replay: Replay, values: Floats, limit: float, told: tuple[float, str,
     factor, unit, allowed = told
     row = int(np.argmax(values))
     value = float(values[row])
-    return Finding(value <= allowed, factor * value, factor * limit, unit, replay.place(2 * row), method)
+    return Finding(
+        value <= allowed, factor * value, factor * limit, unit, replay.place(2 * row), method, factor * allowed
+    )
 
 
 def _where_limited(replay: Replay, *, name: str, judge: Callable[[Replay], Finding]) -> Finding | Idle:

@@ -82,8 +82,9 @@ def axis_deviation(replay: Replay) -> Finding:
         "waypoints): at the rows, halfway between and at the waypoints, with what both turn in between; allowed: tilt "
         f"cone {np.degrees(replay.tilt):g} deg and tolerance {np.degrees(replay.axis_tolerance):g} deg"
     )
-    passed = value <= bound + ALLOWANCE * replay.axis_tolerance
-    return Finding(passed, np.degrees(value), np.degrees(bound), "deg", replay.place(sample), method)
+    allowed = bound + ALLOWANCE * replay.axis_tolerance
+    told = (np.degrees(value), np.degrees(bound), "deg", replay.place(sample), method, np.degrees(allowed))
+    return Finding(value <= allowed, *told)
 
 
 def start(replay: Replay) -> Finding:
@@ -115,8 +116,8 @@ def _raised(angles: Floats, rise: Floats, stray: Floats) -> Floats:
 
 def _within(replay: Replay, value: float, sample: float, method: str) -> Finding:
     bound = replay.path_tolerance
-    passed = value <= bound * (1.0 + ALLOWANCE)
-    return Finding(passed, 1e3 * value, 1e3 * bound, "mm", replay.place(sample), method)
+    allowed = bound * (1.0 + ALLOWANCE)
+    return Finding(value <= allowed, 1e3 * value, 1e3 * bound, "mm", replay.place(sample), method, 1e3 * allowed)
 
 
 CLAIMS = (

@@ -20,7 +20,8 @@ class Certificate:
     """One claim: what was measured, what it must not exceed (or fall below), where, and by which method.
 
     unit is as in files: mm, deg, mm/s, ...; method says in words how value was computed, and what it
-    covers (at the rows, between the rows, proven or sampled).
+    covers (at the rows, between the rows, proven or sampled). allowed: up to where a value beyond its bound passes all
+    the same, for the reason that method gives; None where it does not.
     """
 
     claim: str
@@ -30,6 +31,14 @@ class Certificate:
     unit: str
     where: Place
     method: str
+    allowed: float | None = None
+
+    @property
+    def is_lenient(self) -> bool:
+        """Whether the value is beyond its bound, and passed by what is allowed."""
+        if self.value is None or self.bound is None or self.allowed is None or not self.passed:
+            return False
+        return self.bound < self.value <= self.allowed
 
 
 @dataclass(frozen=True)
