@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test test-all lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify reference pictures site clean
+.PHONY: demo test test-all lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view reference pictures site clean
 
 demo: $(READY)  ## plan a dome and judge the program
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
@@ -44,6 +44,9 @@ bench-gouge: $(READY)  ## contact points and gouge check against another library
 
 bench-verify: $(READY)  ## the verdict on a million rows: seconds, memory, against numpy.loadtxt and ball arithmetic
 	$(BIN)/python benchmarks/verify.py
+
+bench-view: demo  ## how often a second the viewer judges a part that is dragged, against pose by pose
+	$(BIN)/python benchmarks/view.py
 
 reference: $(READY)  ## the pages of docs/reference, from the code
 	$(BIN)/python docs/make_reference.py

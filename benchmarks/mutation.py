@@ -20,6 +20,7 @@ from pathlib import Path
 from types import CodeType
 
 import pytest
+from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator
 
@@ -69,17 +70,23 @@ _MEANINGLESS = re.compile(r"[+-]_(BLOCK|AT_ONCE|CHUNK|LOOKED_AT)\b|\+.*[(\s]/,")
 _CPU_SECONDS = 120  # a mutant that runs longer than this never ends: killed
 
 
-def mutants(file: Path) -> Iterator[tuple[str, str, str]]:
-    """Yield (operator, what changed, source) for every mutant of a file."""
-    source = file.read_text(encoding="utf-8")
+def places(file: Path) -> Iterator[tuple[str, int]]:
+    """Yield operator and occurrence of every mutant of a file."""
+    nodes = list(ast_nodes(get_ast(file.read_text(encoding="utf-8"))))
     for name in OPERATORS:
-        operator, occurrence = get_operator(f"core/{name}")(), 0
-        while (mutated := mutate_code(source, operator, occurrence)) is not None:
-            changed = difflib.unified_diff(source.splitlines(), mutated.splitlines(), lineterm="", n=0)
-            lines = [line for line in changed if line[:1] in "+-@" and line[:3] not in ("+++", "---")]
-            if not any(_MEANINGLESS.match(line) for line in lines):
-                yield name, "  ".join(lines), mutated
-            occurrence += 1
+        operator = get_operator(f"core/{name}")()
+        yield from ((name, k) for k in range(sum(len(list(operator.mutation_positions(node))) for node in nodes)))
+
+
+def mutant(file: Path, name: str, occurrence: int) -> tuple[str, str] | None:
+    """Return what changed and the source of a mutant; None where the change means nothing."""
+    source = file.read_text(encoding="utf-8")
+    mutated = mutate_code(source, get_operator(f"core/{name}")(), occurrence)
+    if mutated is None:
+        raise SystemExit(f"{file.name} has no mutant {name} {occurrence}")
+    changed = difflib.unified_diff(source.splitlines(), mutated.splitlines(), lineterm="", n=0)
+    lines = [line for line in changed if line[:1] in "+-@" and line[:3] not in ("+++", "---")]
+    return None if any(_MEANINGLESS.match(line) for line in lines) else ("  ".join(lines), mutated)
 
 
 def survives(file: Path, mutated: str) -> bool:
@@ -135,9 +142,10 @@ def main() -> int:
         raise SystemExit(f"no tests are named for {', '.join(sorted(untested))}")
     os.chdir(ROOT)
     warm()
-    todo = [(VERIFY / name, *mutant) for name in given.files for mutant in mutants(VERIFY / name)]
-    total = len(todo)
-    todo = todo[given.first :: given.every]
+    sites = [(VERIFY / name, *place) for name in given.files for place in places(VERIFY / name)]
+    total = len(sites)
+    found = [(*site[:2], mutant(*site)) for site in sites[given.first :: given.every]]
+    todo = [(file, operator, *made) for file, operator, made in found if made is not None]
     start, killed = time.perf_counter(), 0
     for number, (file, operator, changed, source) in enumerate(todo, start=1):
         if survives(file, source):
