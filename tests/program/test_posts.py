@@ -116,6 +116,16 @@ def test_linear_programs_have_no_velocities_in_ros(tmp_path):
     }
 
 
+@pytest.mark.parametrize("name", ["ros2-json", "ros2-yaml"])
+def test_a_ros_point_at_another_time_is_refused(name, tmp_path):
+    entry = write_post(given(duration=0.1), name, tmp_path)[0]
+    text = entry.read_text()
+    assert '"nanosec": 7000000}' in text
+    entry.write_text(text.replace('"nanosec": 7000000}', '"nanosec": 7000001}'))
+    with pytest.raises(ProgramError, match="not a multiple of the period"):
+        read_post(tmp_path, name)
+
+
 def test_hdf5_says_its_units(tmp_path):
     h5py = pytest.importorskip("h5py")
     what = given(duration=0.1)
@@ -134,6 +144,7 @@ def test_hdf5_says_its_units(tmp_path):
         ("\n0.003000000,", "\n0.003000000,1,", "columns"),
         ("\n0.003000000,", "\n0.003000000,x", "finite"),
         ("# rows = 301", "# rows = 302", "number of rows"),
+        ("# rows = 301", "# rows = 300", "number of rows"),
         ("# interpolation", "# interpretation", "header lacks"),
     ],
 )
@@ -253,6 +264,9 @@ def test_the_command_refuses(tmp_path, capsys):
     legs = program.legs.copy()
     legs[3] += 1e-6
     write_csv(dataclasses.replace(program, legs=legs), source)
+    assert run(["post", source, "--to", "apt", "-o", str(out)]) == 2
+    assert "not that of this plan" in capsys.readouterr().err
+    write_csv(dataclasses.replace(program, legs=program.legs[:-1]), source)
     assert run(["post", source, "--to", "apt", "-o", str(out)]) == 2
     assert "not that of this plan" in capsys.readouterr().err
     (tmp_path / "plan.npz").write_bytes(b"PK nonsense")

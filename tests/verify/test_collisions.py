@@ -8,13 +8,15 @@ import replay_cases as cases
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.interpolate import BPoly, CubicSpline
 
 from pentapod.machine.surroundings import Obstacle, Surroundings
 from pentapod.program.program import Program
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.solids import Solid
-from pentapod.verify import verify
+from pentapod.verify import Replay, verify
+from pentapod.verify.approach import _controls
 
 LARGE = 1e4  # trimesh counts in units of about this many to the metre
 TOOL = (Solid("shank", 6e-3, 0.03, 2e-3, 2e-3), Solid("holder", 0.03, 0.05, 8e-3, 8e-3))
@@ -125,6 +127,21 @@ def test_a_post_moved_into_a_leg_is_caught(cubic, leg):
     assert "legs clear of the fixture" in {name for name, c in found.items() if not c.passed}
     assert found["legs clear of the fixture"].where.row is not None
     assert found["legs clear of the fixture"].value <= 0.0
+
+
+def test_the_hull_of_a_stretch_is_of_bernstein_coefficients(short):
+    """Against scipy's, which makes them of values and slopes."""
+    legs, period = short.program.legs, short.program.period
+    slopes = CubicSpline(np.arange(len(legs)), legs, bc_type="clamped")(np.arange(len(legs)), 1)
+    replay = Replay(short.program, short.machine, short.toolpath, **cases.TOLERANCES)
+    intervals = np.array([[0, 1, 2], [40, 41, 42]])
+    found = _controls(replay, intervals)
+    for row, (first, *_, last) in zip(found, intervals, strict=True):
+        knots = np.arange(first, last + 2)
+        wanted = BPoly.from_derivatives(knots * period, np.stack([legs[knots], slopes[knots] / period], axis=1)).c
+        for k in range(3):
+            np.testing.assert_allclose(row[[k, 3 + k, 6 + k]], wanted[:3, k], atol=1e-13)
+        np.testing.assert_allclose(row[-1], wanted[3, -1], atol=1e-13)
 
 
 def test_a_clamped_fixture_moves_with_the_part(short):

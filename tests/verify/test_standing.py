@@ -46,6 +46,17 @@ def test_a_dwell_is_held_to_its_time(linear, stroke, rows, passed):
     assert judged(linear, toolpath, program)["exact stops"].passed
 
 
+def test_of_several_dwells_the_one_that_falls_short_is_named(linear):
+    toolpath, program, _ = stood(linear, 1, 60, 0.040)
+    both, _, before = stood(linear, 4, 0, 0.040)
+    segments = [b if a.dwell is None else a for a, b in zip(toolpath.segments, both.segments, strict=True)]
+    legs = np.insert(program.legs, before + 60, np.repeat(program.legs[before + 60 : before + 61], 20, 0), axis=0)
+    found = judged(linear, replace(toolpath, segments=tuple(segments)), replace(program, legs=legs))["dwells"]
+    assert not found.passed
+    assert found.value == pytest.approx(0.020, abs=3e-3)
+    assert abs(found.where.row - before - 60) < 100
+
+
 def test_a_dwell_elsewhere_does_not_count(linear):
     _, program, _ = stood(linear, 4, 60, None)
     toolpath, _, _ = stood(linear, 1, 0, 0.040)
@@ -60,11 +71,12 @@ def test_a_program_that_passes_on_has_no_exact_stop(linear):
     assert not judged(linear, toolpath, gap)["exact stops"].passed
 
 
-def test_a_stop_behind_the_place_is_none(linear):
+@pytest.mark.parametrize("tolerances", [1.5, 5.0])
+def test_a_stop_behind_the_place_is_none(linear, tolerances):
     """At full speed over the place, and standing only where the path tolerance has been left."""
     toolpath, program, before = stood(linear, 1, 0, 0.020)
-    tips = linear.tips
-    beyond = before + int(np.argmax(np.linalg.norm(tips[before:] - tips[before], axis=1) > 1e-4))
+    away = np.linalg.norm(linear.tips[before:] - linear.tips[before], axis=1)
+    beyond = before + int(np.argmax(away > tolerances * cases.TOLERANCES["path_tolerance"]))
     legs = program.legs
     late = np.concatenate([legs[: before - 200], np.repeat(legs[beyond : beyond + 1], 60, axis=0), legs[beyond:]])
     found = judged(linear, toolpath, replace(program, legs=late))
