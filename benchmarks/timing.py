@@ -1,8 +1,9 @@
 """Time laws against toppra and copp-py in one run, on one core: `make bench-timing`.
 
 Figures are processor time a gridpoint, the best of a few runs, and ratios; peers that are not installed are left out
-(pip install copp-py). Paths: "raster", a 0.1 mm zigzag with 1 mm turns and a pentapod's legs, feed 0.1 m/s (for copp-py
-the velocity of a sixth axis); "sine", smooth, limited by legs alone. Limits of each leg: 0.5 m/s, 5 m/s², 200 m/s³.
+(pip install copp-py drake ruckig). Paths: "raster", a 0.1 mm zigzag with 1 mm turns and a pentapod's legs, feed 0.1 m/s
+(for copp-py the velocity of a sixth axis; none for Drake and in the chain); "sine", smooth, limited by legs alone.
+Limits of each leg: 0.5 m/s, 5 m/s², 200 m/s³.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 from scipy.interpolate import make_interp_spline
 from timing_peers import copp_robot, highs, our_chain, socp, toppra_chain
+from timing_robots import drake_solver, ruckig_line
 
 from pentapod.timing.engine import fastest
 from pentapod.timing.jerk import PASSES, jerk_limited
@@ -206,6 +208,64 @@ def chain(n: int) -> None:
         )
 
 
+def largest(s: np.ndarray, rows: tuple[np.ndarray, np.ndarray], x: np.ndarray) -> float:
+    """Return the largest share of an acceleration limit at the ends of stages."""
+    u = (np.diff(x) / (2.0 * np.diff(s)))[:, None]
+    ends = (slice(None, -1), slice(1, None))
+    return max(float(np.abs(rows[0][at] * u + rows[1][at] * x[at, None]).max()) for at in ends)
+
+
+def drake(n: int) -> None:
+    """Velocities and accelerations by Drake's TOPP-RA, on Drake's own spline through the waypoints."""
+    for kind in ("raster", "sine"):
+        p = Problem(kind, n)
+        if not (peer := drake_solver(p.s, p.legs, VELOCITY, ACCELERATION)):
+            print("Drake: not installed")
+            return
+        solve, (first, second) = peer
+        ceiling = np.square((VELOCITY / np.abs(first)).min(axis=1))
+        rows = first / ACCELERATION, second / ACCELERATION
+        ours, x = best(lambda s=p.s, rows=rows, ceiling=ceiling: fastest(s, *rows, ceiling))
+        if isinstance(x, Failure):
+            raise SystemExit(str(x))
+        theirs, y = best(solve, 2)
+        line = f"{kind:7s} {n:8d} gridpoints: core {1e6 * ours / n:.3f} µs, Drake {1e6 * theirs / n:.0f} µs: "
+        line += f"{theirs / ours:.0f} times; "
+        if isinstance(y, np.ndarray):
+            line += f"durations differ by {p.duration(y) / p.duration(x) - 1.0:.1e}; largest share of an acceleration "
+            line += f"limit: core {largest(p.s, rows, x):.4f}, Drake {largest(p.s, rows, y):.4f}"
+        else:
+            line += "it finds no law"
+        print(line, flush=True)
+
+
+def line(n: int) -> None:
+    """Time a straight line from rest to rest with jerk limits, where ruckig's answer is the optimum."""
+    way = np.array([0.3, -0.2, 0.12, 0.05, 0.25])
+    if not (peer := ruckig_line(way, (VELOCITY, ACCELERATION, JERK))):
+        print("ruckig: not installed")
+        return
+    solve, optimum = peer
+    theirs, _ = best(solve, 20)
+    s = np.linspace(0.0, 1.0, n)
+    first = np.broadcast_to(way, (n, 5))
+    bound = np.square((VELOCITY / np.abs(first)).min(axis=1))
+    x = fastest(s, first / ACCELERATION, 0.0 * first, bound)
+
+    def rows(s: np.ndarray) -> JerkRows:
+        q1 = np.broadcast_to(way, (len(s), 5))
+        jerks = np.stack([0.0 * q1, 0.0 * q1, 0.5 * q1], axis=-1) / JERK
+        return JerkRows(q1 / ACCELERATION, 0.0 * q1, np.zeros((1, 5)), jerks, np.full(len(s), bound[0]))
+
+    ours, profile = best(lambda: jerk_limited(s, x, rows, NO_MARKS), 3)
+    seconds = MotionLaw.through(profile.s, profile.x, profile.slope).duration
+    print(
+        f"line    {len(profile.s):8d} gridpoints with jerk limits, from rest to rest: {seconds:.5f} s in "
+        f"{1e3 * ours:.1f} ms; the optimum, by ruckig without a path: {optimum:.5f} s in {1e3 * theirs:.3f} ms; "
+        f"ours is longer by {seconds / optimum - 1:.1e}"
+    )
+
+
 def million(n: int) -> None:
     """Time a long path: feed, leg velocities, accelerations and jerks, from the path to a law."""
     p = Problem("raster", n)
@@ -226,7 +286,7 @@ def million(n: int) -> None:
 def versions() -> str:
     """Return what runs here."""
     names = []
-    for name in ("numpy", "numba", "toppra", "copp-py"):
+    for name in ("numpy", "numba", "toppra", "copp-py", "drake", "ruckig"):
         try:
             names.append(f"{name} {version(name)}")
         except PackageNotFoundError:
@@ -240,6 +300,7 @@ def main() -> None:
     parser.add_argument("--sizes", type=int, nargs="+", default=[10_000, 100_000, 1_000_000])
     parser.add_argument("--jerk", type=int, default=10_000)
     parser.add_argument("--peers", type=int, default=2_000)
+    parser.add_argument("--drake", type=int, default=1_000)
     parser.add_argument("--chain", type=int, default=10_000)
     parser.add_argument("--long", type=int, default=1_000_000)
     arguments = parser.parse_args()
@@ -247,6 +308,8 @@ def main() -> None:
     core(arguments.sizes)
     jerk(arguments.jerk)
     jerk_peers(arguments.peers)
+    drake(arguments.drake)
+    line(arguments.drake)
     chain(arguments.chain)
     million(arguments.long)
 
