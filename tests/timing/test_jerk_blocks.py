@@ -1,7 +1,7 @@
 """Jerk limits block by block: near the law of the whole, within its limits, the same bits from disk, by processes."""
 
 import tracemalloc
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -103,16 +103,30 @@ def test_from_disk_and_by_processes_the_same_bits(whole, small, tmp_path, proces
     assert sorted(file.name for file in tmp_path.iterdir()) == ["law.npy", "s.npy", "x.npy"]
 
 
-def test_where_blocks_do_not_agree_leads_get_longer(whole, monkeypatch):
+@pytest.mark.parametrize("answer", ["none", "another"])
+def test_where_blocks_do_not_agree_leads_get_longer(whole, monkeypatch, answer):
+    """Blocks that know too little of what is beyond their cuts, here by decree: no law, or one that is slower."""
     s, x, law = whole
     monkeypatch.setattr(jerk, "BLOCK", 2500)
     monkeypatch.setattr(jerk, "LEAD", 8)
     monkeypatch.setattr(jerk, "_PASSAGE", 4)
+    solved = jerk.solved
+
+    def short_sighted(*arguments):
+        block, found = arguments[-1], solved(*arguments)
+        if block.low == 0 or block.begin - block.low >= 32:
+            return found
+        return replace(found, y=0.99 * found.y) if answer == "another" else Failure(-1, jerk.NOT_LIMITED)
+
+    monkeypatch.setattr(jerk, "solved", short_sighted)
     blocked = jerk_limited(s, x, Waves(), NO_MARKS)
-    assert blocked.lead > 8
+    assert blocked.lead == 32
     assert duration(blocked) == pytest.approx(duration(law), rel=1e-3)
+
+
+def test_blocks_that_never_agree_have_no_law(whole, small, monkeypatch):
     monkeypatch.setattr(jerk, "_AGREED", 0.0)
-    assert jerk_limited(s, x, Waves(), NO_MARKS) == Failure(-1, jerk.APART)
+    assert jerk_limited(*whole[:2], Waves(), NO_MARKS) == Failure(-1, jerk.APART)
 
 
 def test_lowered_limits_are_solved_anew_in_their_blocks_alone(whole, small):

@@ -50,6 +50,9 @@ class Piece:
     def __call__(self, s, order=0):
         return self.derivative(self.legs, np.asarray(s, float), order)
 
+    def derivatives(self, s, order):
+        return [self(s, k) for k in range(order + 1)]
+
     def pose(self, s, order=0):
         return tuple(self.derivative(function, np.asarray(s, float), order) for function in self.legs.tool)
 

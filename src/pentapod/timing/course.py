@@ -29,7 +29,7 @@ class Course:
 
 def legs_along(piece: PieceLike, s: Floats, order: int) -> tuple[Floats, ...]:
     """Return the derivatives of the legs (n, 5) by s, order 1 to `order`."""
-    return tuple(piece(s, k) for k in range(1, order + 1))
+    return tuple(piece.derivatives(s, order)[1:])
 
 
 def tip_along(piece: PieceLike, s: Floats, order: int) -> tuple[Floats, ...]:

@@ -22,7 +22,9 @@ WINDOW = 256
 LEAD = 64
 """Coefficients on either side of a seam, beyond which the path has no say in what happens there."""
 
-_COLD, _WARM = 0.1, 0.01
+_COLD, _WARM = (1.0, 0.1), (0.01,)
+"""Levels of slacks and multipliers to start from, one after the other until one leads to an answer: those of rows of
+order 1, and of an answer that is nearly right."""
 _ITERATIONS = 60
 _MOST_AGAIN = 0.6
 """Share of the coefficients up to which solving only what was lowered is worth it."""
@@ -153,6 +155,13 @@ class Problem:
         self, y: Floats, around: Floats, number: int, low: int, high: int, held: tuple[int, int]
     ) -> Floats | None:
         """Return y with the coefficients from low to before high improved; those `held` at either end stay."""
+        levels = _COLD if number == 0 else _WARM
+        answers = (self._solved(y, around, level, low, high, held) for level in levels)
+        return next((answer for answer in answers if answer is not None), None)
+
+    def _solved(
+        self, y: Floats, around: Floats, level: float, low: int, high: int, held: tuple[int, int]
+    ) -> Floats | None:
         here = slice(int(np.searchsorted(self.first, low)), int(np.searchsorted(self.first, high - 4, "right")))
         fixed = np.zeros(high - low, dtype=np.int64)
         fixed[: held[0]] = 1
@@ -171,7 +180,7 @@ class Problem:
             self.top[here],
             self.weight[here],
             fixed,
-            _COLD if number == 0 else _WARM,
+            level,
             _ITERATIONS,
             _GAP,
             part,

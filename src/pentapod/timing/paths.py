@@ -15,8 +15,9 @@ class PieceLike(Protocol):
     knots (K,): where the third derivative may jump. section_ends (M,): s where each section ends, the last
     is `length`; section_feeds (M,): m/s, infinite on rapids; section_kinds and section_segments (M,): kind
     and index of the toolpath's segment. waypoint_stations, waypoints (W,): s of the toolpath's waypoints, not
-    falling, and their indices. `piece(s, order)` gives legs (n, 5) in metres and their
-    derivatives d^order/ds^order, order 0 to 3, the second continuous; the third is asked for where jerk is limited.
+    falling, and their indices. `piece(s, order)` gives legs (n, 5) in metres or their derivatives d^order/ds^order,
+    `derivatives(s, order)` all of them up to an order: 0 to 3, the second continuous, the third asked for where jerk is
+    limited.
     `feed_rate(s)` tells how far (n,) the point whose speed the feed is moves for each metre of s: 1 for cutters, whose
     tip is never faster; less or more for the spot on the surface that a beam or a spray meets from a stand-off.
     `pose(s, order)` gives tips and tool axes (n, 3) or their derivatives, order 0 to 3; it is asked for only where the
@@ -41,6 +42,7 @@ class PieceLike(Protocol):
     def waypoints(self) -> Ints: ...  # noqa: D102
     def feed_rate(self, s: Floats) -> Floats: ...  # noqa: D102
     def pose(self, s: Floats, order: int = 0) -> tuple[Floats, Floats]: ...  # noqa: D102
+    def derivatives(self, s: Floats, order: int) -> list[Floats]: ...  # noqa: D102
     def __call__(self, s: Floats, order: int = 0) -> Floats: ...  # noqa: D102
 
 

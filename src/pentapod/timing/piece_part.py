@@ -81,15 +81,22 @@ class PiecePart:
 
     def feed_rate(self, s: Floats) -> Floats:
         """Return how far (n,) the feed's point moves for each metre of s, at stations (n,) from the part's start."""
-        return self.piece.feed_rate(np.minimum(np.asarray(s, dtype=np.float64) + self.start, self.piece.length))
+        return self.piece.feed_rate(self._along(s))
 
     def pose(self, s: Floats, order: int = 0) -> tuple[Floats, Floats]:
         """Return tips and tool axes (n, 3) or their derivatives at stations s (n,) from the part's own start."""
-        return self.piece.pose(np.minimum(np.asarray(s, dtype=np.float64) + self.start, self.piece.length), order)
+        return self.piece.pose(self._along(s), order)
 
     def __call__(self, s: Floats, order: int = 0) -> Floats:
         """Return legs (n, 5) or their derivatives at stations s (n,) from the part's own start."""
-        return self.piece(np.minimum(np.asarray(s, dtype=np.float64) + self.start, self.piece.length), order)
+        return self.piece(self._along(s), order)
+
+    def derivatives(self, s: Floats, order: int) -> list[Floats]:
+        """Return legs and their derivatives (n, 5) up to `order` at stations s (n,) from the part's own start."""
+        return self.piece.derivatives(self._along(s), order)
+
+    def _along(self, s: Floats) -> Floats:
+        return np.minimum(np.asarray(s, dtype=np.float64) + self.start, self.piece.length)
 
 
 @dataclass(frozen=True, eq=False)
