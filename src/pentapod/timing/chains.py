@@ -11,7 +11,7 @@ times.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg.lapack import dtbtrs
+from scipy.linalg import get_lapack_funcs
 
 from pentapod.arrays import Floats
 from pentapod.timing.stage_rows import StageRows, right_root
@@ -60,7 +60,8 @@ def _caps(rows: StageRows) -> Floats | None:
     low[:, -1] = 0.0  # u may brake to a rest at the next gridpoint, no further
     t = slopes * caps[:, None]
     tight = np.flatnonzero((low - t).max(axis=1) > (highs - t).min(axis=1))
-    x, lost = right_root(*(np.ascontiguousarray(y[tight].T) for y in (low, highs, slopes)), caps[tight])
+    low, highs, slopes = (np.ascontiguousarray(y[tight].T) for y in (low, highs, slopes))
+    x, lost = right_root(low, highs, slopes, caps[tight])
     caps = caps.copy()
     caps[tight] = x
     return None if lost.any() else caps
@@ -71,6 +72,7 @@ def _least(caps: Floats, offsets: Floats, gains: Floats, last: float) -> Floats 
 
     caps (N,); offsets, gains (N, J).
     """
+    (solve_triangular_band,) = get_lapack_funcs(("tbtrs",), (caps,))
     x = np.append(caps, last)
     policy = np.full(len(caps), -1)  # the row that holds, −1 for the cap
     offset, gain = caps.copy(), np.zeros(len(caps))
@@ -94,7 +96,7 @@ def _least(caps: Floats, offsets: Floats, gains: Floats, last: float) -> Floats 
         band = np.zeros((2, len(solve) + 1))
         band[0, 1:] = -gain[solve]
         right = np.append(offset[solve], x[solve[-1] + 1])
-        found = dtbtrs(band, right, uplo="U", diag="U")[0][:-1]
+        found = solve_triangular_band(band, right, uplo="U", diag="U")[0][:-1]
         moved = found != x[solve]
         x[solve] = found
         at = solve[moved]
