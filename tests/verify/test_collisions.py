@@ -94,6 +94,7 @@ def test_a_good_program_is_clear_of_its_part(good):
         certificate = found[name]
         assert certificate.passed, certificate
         assert certificate.value > certificate.bound
+        assert certificate.bound == pytest.approx(-0.05 if name == "tool body clear of the part" else 0.0)
         assert certificate.unit == "mm"
         assert "for all times" in certificate.method
 

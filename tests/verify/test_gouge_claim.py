@@ -7,15 +7,18 @@ import numpy as np
 import pytest
 import replay_cases as cases
 import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pentapod.errors import ArrayError
 from pentapod.geometry.interpolant import Interpolant
+from pentapod.toolpath.sweep import RESOLUTION_M
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.toolpath.tools import BallCutter, FlatEnd, StandOff
 from pentapod.verify import Cutting, Replay, verify
 from pentapod.verify.claim import Idle
 from pentapod.verify.gouge import _rapid, gouge
-from pentapod.verify.immersion import _on_arc, _runs, _strays, _Stretches
+from pentapod.verify.immersion import _on_arc, _runs, _strays, _Stretches, _unresolved
 
 CUTS, RAPIDS = "gouge on cuts and links", "gouge on rapids"
 LARGE = 1e3  # trimesh counts in units of about this many to the metre
@@ -85,6 +88,13 @@ def test_the_depth_of_a_ball_is_proven_and_close(good, rise):
     assert deepest <= 1e-3 * most <= deepest + 5e-6 + 0.03 * (7e-5 - deepest)
     assert "proven bound for all times" in found[CUTS].method
     assert ("gap" in found[CUTS].method) == (rise < 0.0)
+
+
+@given(st.floats(-1e-3, 1e-2))
+def test_what_the_sweep_leaves_open_is_added(told):
+    """A sweep is exact to its resolution and 1 %: no true depth may be above what is claimed of it."""
+    true = told + RESOLUTION_M + 0.01 * max(told, 0.0)
+    assert told + float(_unresolved(told)) == pytest.approx(true, rel=1e-12)
 
 
 @pytest.mark.parametrize("rise", [8e-5, 1e-3])

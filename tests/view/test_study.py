@@ -59,6 +59,16 @@ def test_strokes_are_told_in_millimetres(opened, study, shift):
         assert reach.worst.room == pytest.approx(1e3 * own, abs=1e-6)
 
 
+def test_of_fewer_places_the_worst_is_named_by_its_waypoint(opened, study):
+    few = dataclasses.replace(study, shown=np.arange(2, len(opened.toolpath), 7))
+    for shift in ((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, -0.2, 0.1)):
+        placement = shifted(opened, shift)
+        some, every = few.at(placement), study.at(placement, thorough=True)
+        assert some.worst.waypoint in few.shown
+        assert every.margins[some.worst.waypoint] == pytest.approx(some.worst.margin, abs=1e-12)
+        assert some.worst.margin == some.margins.min()
+
+
 def test_the_best_lean_is_no_worse_than_none(opened, study):
     """Moved to the edge of its reach, with nominal axes against a cone about them."""
     upright = dataclasses.replace(study, axes=opened.toolpath.axes)
