@@ -1,5 +1,6 @@
 """LimitUse: the largest share of each limit on the sampled program, against dense samples of scipy's splines."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +9,7 @@ from scipy.interpolate import CubicSpline, make_interp_spline
 from timing_paths import Path, Piece, by_tip, line, machine, nodding, raster, straight
 
 from pentapod.machine.tool_limits import ToolLimits
-from pentapod.timing import Trajectory, certify, retime
+from pentapod.timing import LimitUse, Trajectory, certify, retime
 from pentapod.toolpath.toolpath import SegmentKind
 
 
@@ -25,6 +26,13 @@ def limited(m, **tool):
 
 def shares(uses):
     return {use.quantity: use for use in uses}
+
+
+def test_a_jerk_beyond_its_limit_says_why():
+    use = LimitUse("leg jerk", 207.4, 200.0, "m/s³", 4, 8.387, 0.2, 7)
+    assert str(use).startswith("leg jerk 103.70 % (leg 4: 207.4 of 200 m/s³) at 8.387 s, segment 7: the spline")
+    assert str(replace(use, value=199.0)).endswith("segment 7")
+    assert str(replace(use, quantity="leg velocity")).endswith("segment 7")
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])

@@ -38,9 +38,11 @@ class LimitUse:
 
     def __str__(self) -> str:
         whose = f"leg {self.leg}: " if self.leg else ""
+        over = self.share > 1.0 and self.quantity.endswith("jerk")
+        why = ": the spline through the setpoints overshoots where the law's jerk steps" if over else ""
         return (
             f"{self.quantity} {100.0 * self.share:.2f} % ({whose}{self.value:.4g} of {self.bound:.4g} {self.unit}) "
-            f"at {self.time:.3f} s, segment {self.segment}"
+            f"at {self.time:.3f} s, segment {self.segment}{why}"
         )
 
 
