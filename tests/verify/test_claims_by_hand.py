@@ -2,6 +2,7 @@
 
 from copy import copy
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from pentapod.kinematics.certificate import certify_component
 from pentapod.program import quantised
 from pentapod.verify import CLAIMS, Certificate, Claim, Place, Replay, Verdict, verify, write_verdict
 from pentapod.verify.claim import Finding, Idle
+from pentapod.verify.origin import guides
 from pentapod.verify.survey import ComponentFindings, Extreme
 from pentapod.verify.tracking import _raised, at_samples
 
@@ -423,3 +425,18 @@ def test_what_the_legs_alone_tell_is_judged_without_a_pose(linear):
     assert judged_anyway >= {"legs not too long", "leg rates", "leg accelerations", "leg jerks"}
     assert judged_anyway >= {"starts at rest", "ends at rest"}
     assert not judged_anyway & {"tip deviation", "axis deviation", "toolpath covered", "rapid rate", "base joint cones"}
+
+
+def test_speeds_say_how_they_were_bounded(linear, cubic):
+    for case, words in ((linear, "from row to row"), (cubic, "proven bound for all times")):
+        verdict = verify(case.program, case.machine, case.toolpath, **cases.TOLERANCES)
+        methods = [c.method for c in verdict.certificates if c.claim in ("feed on cuts", "rapid rate")]
+        assert len(methods) == 2
+        assert all(words in method for method in methods)
+
+
+def test_a_header_that_does_not_say_where_the_guides_stand():
+    silent = SimpleNamespace(machine=SimpleNamespace(guides=object()), program=SimpleNamespace(slides=None))
+    found = guides(silent)
+    assert (found.passed, found.value, found.bound, found.unit) == (False, None, 0.0, "mm")
+    assert "does not say" in found.method

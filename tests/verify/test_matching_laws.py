@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pentapod.verify.matching import match
+from pentapod.verify.matching import _at, match
 from pentapod.verify.visits import Course
 
 
@@ -166,6 +166,16 @@ def test_turn_on_the_spot_is_matched_by_the_axis(pause):
     still = match(course(np.concatenate([before, spot, after]), np.repeat(up, len(axes), axis=0)), path, 1e-3)
     assert worst(still) <= 1e-3
     assert max(still.angles.max(), still.waypoint_angles.max()) == pytest.approx(np.radians(40.0), rel=0.02)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-8, 0.9])
+def test_between_waypoints_points_are_on_the_line_and_axes_on_the_arc(angle):
+    share = np.linspace(0.0, 1.0, 11)
+    axes = np.array([[0.0, 0.0, 1.0], [np.sin(angle), 0.0, np.cos(angle)]])
+    points, found = _at(course(np.array([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]]), axes), np.array([angle]), share)
+    np.testing.assert_allclose(points, np.stack([1.0 + 2.0 * share, 0.0 * share, 0.0 * share], axis=1), atol=1e-15)
+    expected = np.stack([np.sin(share * angle), 0.0 * share, np.cos(share * angle)], axis=1)
+    np.testing.assert_allclose(found, expected, atol=1e-15)
 
 
 def test_skipped_waypoints_are_named():
