@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pentapod.verify.matching import _at, match
-from pentapod.verify.visits import Course
+from pentapod.verify.visits import Course, _closest
 
 
 def course(points, axes=None):
@@ -176,6 +176,21 @@ def test_between_waypoints_points_are_on_the_line_and_axes_on_the_arc(angle):
     np.testing.assert_allclose(points, np.stack([1.0 + 2.0 * share, 0.0 * share, 0.0 * share], axis=1), atol=1e-15)
     expected = np.stack([np.sin(share * angle), 0.0 * share, np.cos(share * angle)], axis=1)
     np.testing.assert_allclose(found, expected, atol=1e-15)
+
+
+def test_the_closest_place_of_a_chord_counts_point_and_axis():
+    """Against a search over ten thousand places."""
+    rng = np.random.default_rng(3)
+    motion = course(rng.normal(size=(9, 3)), rng.normal(size=(9, 3)))
+    path = course(rng.normal(size=(8, 3)), rng.normal(size=(8, 3)))
+    weight, each, share = rng.uniform(0.1, 4.0, 8), np.arange(8), np.linspace(0.0, 1.0, 10_001)[:, None]
+    t, cost = _closest(motion, path, weight, each, each)
+    for k in range(8):
+        points, axes = ((1.0 - share) * x[k] + share * x[k + 1] for x in (motion.points, motion.axes))
+        costs = ((points - path.points[k]) ** 2).sum(axis=1) + weight[k] * ((axes - path.axes[k]) ** 2).sum(axis=1)
+        assert t[k] == pytest.approx(share[costs.argmin(), 0], abs=1e-4)
+        assert cost[k] == pytest.approx(costs.min(), rel=1e-6)
+    assert ((t > 0.0) & (t < 1.0)).sum() > 2
 
 
 def test_skipped_waypoints_are_named():
