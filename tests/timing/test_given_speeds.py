@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from timing_paths import Path, Piece, by_tip, circle, machine, straight
+from timing_paths import Path, Piece, by_tip, circle, machine, raster, straight
 
 from pentapod.errors import InputError
 from pentapod.refusal import Refusal
@@ -33,6 +33,27 @@ def test_speeds_are_kept_within_the_limits(interpolation, limit_jerk, v, w):
     rest = retime(arc(), m, limit_jerk=limit_jerk)
     assert isinstance(rest, Trajectory)
     assert motion.duration < rest.duration
+
+
+@pytest.mark.parametrize(("interpolation", "v", "w"), [("linear", 0.05, 0.05), ("cubic", 0.0, 0.05)])
+def test_a_plan_that_is_eased_keeps_its_speeds(interpolation, v, w):
+    """A raster whose corners are eased after they were measured; its ends go on, and are not eased as stops."""
+    path, m = Path((raster(lines=3, feed=0.2),)), machine(interpolation=interpolation)
+    motion, rest = retime(path, m, start_speed=v, end_speed=w), retime(path, m)
+    assert isinstance(motion, Trajectory), str(motion)
+    assert isinstance(rest, Trajectory)
+    np.testing.assert_allclose(motion.station([0.0, motion.duration], 1), [v, w], rtol=1e-9, atol=1e-12)
+    assert motion.duration < rest.duration
+    assert max(use.share for use in certify(motion, m) if use.quantity != "leg jerk") <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("length", [2e-5, 1.02e-4])
+def test_a_way_that_takes_no_whole_periods_at_its_speeds_is_refused(length):
+    """A fifth of a period, and a little more than one: the next whole one would need another speed at the ends."""
+    short = Path((straight([0.0, 1.0, 0.0, 0.0, 0.0], length, 0.2),))
+    refused = retime(short, machine(), limit_jerk=False, start_speed=0.1, end_speed=0.1)
+    assert isinstance(refused, Refusal)
+    assert "whole periods" in str(refused)
 
 
 @pytest.mark.parametrize(("v", "w", "why"), [(0.2, 0.0, "faster than any speed"), (0.0, 0.2, "above a limit")])

@@ -15,7 +15,7 @@ from pentapod.timing.law import MotionLaw
 from pentapod.timing.paths import LegPathLike
 from pentapod.timing.piece import PieceProfile, time_piece
 from pentapod.timing.refusals import STILL_M, refusal, unfit
-from pentapod.timing.sampled import WINDOW_PERIODS, Unmended, law_between, sampled_laws, whole_periods
+from pentapod.timing.sampled import WINDOW_PERIODS, Unmended, sampled_laws, whole_periods
 from pentapod.timing.stages import Failure
 from pentapod.timing.trajectory import Profile, Trajectory
 
@@ -85,7 +85,7 @@ def retime(
         done += path.pieces[k].length
         progress("timing", done / total, f"piece {len(profiles)} of {len(indices)}")
     dwells = _dwells(path, indices, period)
-    if cubic or limit_jerk:
+    if cubic or limit_jerk or max(start_speed, end_speed) > 0.0:
         smoothed = sampled_laws(profiles, machine, dwells, smooth=limit_jerk)
         if isinstance(smoothed, Unmended):
             return refusal(path, indices[smoothed.index], smoothed.failure)
@@ -98,8 +98,6 @@ def retime(
 
 def _plain_law(profile: PieceProfile, period: float) -> MotionLaw:
     """Return the law of a profile as it is, in whole periods."""
-    if profile.moving:
-        return law_between(profile, 1.0, period, smooth=False)
     law = MotionLaw.from_profile(profile.s, profile.x)
     return law.stretched(whole_periods(law.duration, period))
 

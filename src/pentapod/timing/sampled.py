@@ -56,6 +56,7 @@ class _Timed:
     """A piece's profile, by which factor its law is run slower, and whether its jerk is limited.
 
     before, after: periods for which the machine stands at its ends; between two pieces they count with the first.
+    window: periods over which a law with steps of acceleration is averaged.
     """
 
     profile: PieceProfile
@@ -64,19 +65,26 @@ class _Timed:
     period: float
     before: int
     after: int
+    window: int
 
     @cached_property
-    def law(self) -> MotionLaw:
-        """The law of the piece, in whole periods.
+    def found(self) -> MotionLaw | Failure:
+        """The law of the piece, in whole periods; a Failure where it cannot have the speeds that are given at its ends.
 
         Where the passes find no law that keeps the jerk limits, the averaged one is run as slowly as they ask.
         """
         if self.profile.moving:
-            return law_between(self.profile, self.slower, self.period, smooth=self.smooth)
+            return _law_between(self.profile, self.slower, self.period, smooth=self.smooth)
         law = self.profile.smooth_law() if self.smooth else None
         if not isinstance(law, MotionLaw):
-            law = MotionLaw.from_profile(self.profile.s, self.profile.x).smoothed(WINDOW_PERIODS * self.period)
+            law = MotionLaw.from_profile(self.profile.s, self.profile.x)
+            law = law.smoothed(self.window * self.period) if self.window else law
         return law.stretched(whole_periods(law.duration * self.slower, self.period))
+
+    @property
+    def law(self) -> MotionLaw:
+        """The law, where it was found."""
+        return cast("MotionLaw", self.found)
 
     @cached_property
     def whole_rows(self) -> Floats:
@@ -131,14 +139,16 @@ class _Use:
         )
 
 
-def law_between(profile: PieceProfile, slower: float, period: float, *, smooth: bool) -> MotionLaw:
+def _law_between(profile: PieceProfile, slower: float, period: float, *, smooth: bool) -> MotionLaw | Failure:
     """Return the law of a profile with given speeds at its ends, `slower` times slower, in whole periods.
 
     What has to be slower is so by a share of x = ṡ² that rises from 0 at the ends that move, with two vanishing
-    derivatives: so these speeds stay, and no limit of speed is exceeded. smooth: the law limited in jerk, which exists.
+    derivatives: so these speeds stay, and no limit of speed is exceeded. smooth: the law limited in jerk. A Failure
+    where there is none, or where a tenth of x is still too fast.
     """
-    found = profile.smooth if smooth else None
-    smoothed = None if found is None or isinstance(found, Failure) else found
+    smoothed = profile.smooth if smooth else None
+    if isinstance(smoothed, Failure):
+        return smoothed
     s, x = (profile.s, profile.x) if smoothed is None else (smoothed.s, smoothed.x)
     far = np.minimum(
         s / s[-1] if profile.x_start > 0.0 else np.ones_like(s),
@@ -158,8 +168,8 @@ def law_between(profile: PieceProfile, slower: float, period: float, *, smooth: 
 
     goal = whole_periods(law(0.0).duration * slower, period)
     most = 0.9
-    if law(most).duration <= goal:
-        return law(most).stretched(goal)
+    if law(most).duration < goal * (1.0 - 1e-12):
+        return Failure(-1, "no whole periods are filled without leaving the speeds that are given at the ends")
     less = cast("float", brentq(lambda less: law(less).duration - goal, 0.0, most, xtol=1e-15))
     return law(less).stretched(goal)
 
@@ -178,16 +188,17 @@ def sampled_laws(
     """
     period = machine.controller.period
     stood = np.rint(dwells / period).astype(int).tolist()
+    window = WINDOW_PERIODS if smooth or machine.controller.interpolation == "cubic" else 0
     timed = [
-        _Timed(profile, 1.0, smooth, period, stood[0] if k == 0 else 0, stood[k + 1])
+        _Timed(profile, 1.0, smooth, period, stood[0] if k == 0 else 0, stood[k + 1], window)
         for k, profile in enumerate(profiles)
     ]
     uses: list[_Use | None] = [None] * len(timed)
     exceeding: list[int] = []
     for attempt in range(_EASINGS + _SLOWINGS):
         for k, piece in enumerate(timed):
-            if smooth and piece.profile.moving and isinstance(piece.profile.smooth, Failure):
-                return Unmended(k, piece.profile.smooth)
+            if isinstance(piece.found, Failure):
+                return Unmended(k, piece.found)
         measured = _uses(timed, machine, smooth, uses)
         exceeding = [k for k, use in enumerate(measured) if use.exceeds]
         if not exceeding:
@@ -197,7 +208,7 @@ def sampled_laws(
             use = measured[k]
             if attempt < _EASINGS:
                 # Easing shifts all later setpoints against the path: ease for the rows between as well.
-                use = use.worst(_use(timed[k], timed[k].rows(0.5), machine, smooth))
+                use = use.worst(_use_between(timed[k], machine, smooth))
                 eased = _eased(
                     timed[k].profile, timed[k].stations(len(use.speed)), use, _EXTRA - attempt * _EXTRA_PER_ROUND
                 )
@@ -253,6 +264,17 @@ def _use(piece: _Timed, rows: Floats, machine: Machine, smooth: bool, first: int
         fast = np.maximum(fast, np.linalg.norm(axis.steps, axis=1).max(axis=1)[here] / tool.max_axis_velocity)
         jolt = np.maximum(jolt, tip.jerk_lengths[here] / tool.max_tip_jerk * float(smooth))
     return _Use(_at_rows(fast), hard, _at_rows(jolt))
+
+
+def _use_between(piece: _Timed, machine: Machine, smooth: bool) -> _Use:
+    """Return what a piece would use by rows halfway between its own; nothing near ends that move, for there it goes on.
+
+    Those rows begin and end at rest.
+    """
+    use, ends = _use(piece, piece.rows(0.5), machine, smooth), (piece.profile.x_start, piece.profile.x_end)
+    rows = np.arange(len(use.speed))
+    known = ((rows >= _EDGE) | (ends[0] == 0.0)) & ((rows < len(rows) - _EDGE) | (ends[1] == 0.0))
+    return _Use(*(np.where(known, shares, 0.0) for shares in (use.speed, use.acceleration, use.jerk)))
 
 
 def _last_rows(timed: list[_Timed]) -> Floats:

@@ -48,7 +48,7 @@ class Profile:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Legs as functions of time, at rest at both ends and at each stop between pieces.
+    """Legs as functions of time, at rest at each stop between pieces, and at the ends unless these have given speeds.
 
     path: the leg path; indices: those of its pieces that move; laws: their motion laws, one after the other.
     Each lasts a whole number of the controller's periods, so that exact stops fall on setpoints. dwells (L + 1,):
