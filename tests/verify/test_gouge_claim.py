@@ -113,6 +113,15 @@ def test_what_is_engraved_is_no_gouge(good):
     assert judged(good, raised(-1e-4, depth=0.0))[CUTS].passed
 
 
+def test_what_no_depth_can_break_is_not_claimed(cubic):
+    """No point is deeper in a ball than its radius: a claim that allows as much says nothing, and is not made."""
+    deep = judged(cubic, raised(2e-4, depth=cases.BALL), strict=True)[CUTS]
+    assert not deep.passed
+    assert deep.method == "unknown: 3.02 mm are allowed, and nothing is deeper in a cutter this thin"
+    assert CUTS not in judged(cubic, raised(2e-4, depth=cases.BALL))
+    assert judged(cubic, raised(2e-4, depth=cases.BALL - 3e-5))[CUTS].bound == pytest.approx(2.99)
+
+
 def pushed(case, depth):
     """The tool pushed into the part along its axis, smoothly, in the middle of the first cut."""
     start, stop = case.toolpath.starts[1:3]

@@ -45,6 +45,11 @@ class Solid:
         return self.high + self.rounding
 
     @property
+    def thickness(self) -> float:
+        """A depth, metres, that no point within reaches: at least the radius of the largest ball that fits in."""
+        return min(max(self.low_radius, self.high_radius), 0.5 * (self.high - self.low)) + self.rounding
+
+    @property
     def is_ball(self) -> bool:
         """Whether it is a point, thickened."""
         return self.low == self.high and self.low_radius == self.high_radius == 0.0

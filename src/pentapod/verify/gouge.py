@@ -26,6 +26,9 @@ def gouge(replay: Replay, *, rapid: bool) -> Finding | Idle:
         return Idle(f"no moment belongs to {'a rapid' if rapid else 'a cut or a link'}")
     allowed = 0.0 if rapid else cutting.depth
     bound = allowed + replay.path_tolerance
+    thickness = max(solid.thickness for solid in cutting.cutter)
+    if bound >= thickness:
+        return Idle(f"{1e3 * bound:g} mm are allowed, and nothing is deeper in a cutter this thin", unknown=True)
     found = immersion(replay, cutting.surface, cutting.cutter, chords, bound=bound)
     passed, inside = found.most <= bound, _enclosed(replay, cutting)
     if passed and inside:
