@@ -18,6 +18,7 @@ from pentapod.planning import PlacedPath
 from pentapod.program import read_csv
 from pentapod.program.posts import PostInput
 from pentapod.report import write_report
+from pentapod.view import Motion, open_run
 
 DESK = (resources.files("pentapod.machine") / "library" / "desk.toml").read_text(encoding="utf-8")
 GUIDES = "[guides]\nleast_mm = -40\ngreatest_mm = [40, 40, 40, 0, 40]\n\n[legs]"
@@ -59,6 +60,11 @@ def test_guides_from_the_plan_to_the_verdict(job, tmp_path):
     assert f"guides 1 to 5 at {1e3 * slides[0]:.3f}" in outcome.stages[2].said
     # Other programs that need the machine get it with its guides there.
     np.testing.assert_array_equal(PostInput(program, job_machine(job)).the_machine().slides, slides)
+
+    opened = open_run(tmp_path)
+    np.testing.assert_array_equal(opened.machine.slides, slides)
+    stance = Motion.of(opened).stance(program.times[40], opened.machine, opened.placement)
+    assert stance.legs == pytest.approx(program.legs[40], abs=1e-9)
 
     text = (tmp_path / "program.csv").read_text()
     line = re.search(r"# guides_mm = \[.*\]\n", text)[0]

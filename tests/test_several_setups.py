@@ -11,7 +11,7 @@ import pytest
 from pentapod import pipeline
 from pentapod.cli.main import run as command
 from pentapod.cli.new import dome_stl
-from pentapod.errors import JobError
+from pentapod.errors import InputError, JobError
 from pentapod.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.outcome import SetUps
@@ -20,6 +20,7 @@ from pentapod.program import read_csv
 from pentapod.report import write_report
 from pentapod.toolpath import Toolpath
 from pentapod.toolpath.parting import cutting_intervals
+from pentapod.view import open_run
 from usual_job import job_text
 
 EACH = {"program.csv", "plan.npz", "verdict.json"}
@@ -63,6 +64,14 @@ def test_each_set_up_has_its_files(done):
         assert part.duration == read_csv(out / part.folder / "program.csv").duration
         assert part.outcome.passed
     assert len({part.outcome.find(pipeline.PlacedPath).placement.chosen_by for part in setups.parts}) == 2
+
+
+def test_each_set_up_is_looked_at_by_itself(done):
+    out, outcome = done
+    with pytest.raises(InputError, match=r"several set-ups.*pentapod view .*setup-1"):
+        open_run(out)
+    second = outcome.find(SetUps).parts[1]
+    assert open_run(out / second.folder).program.duration == second.duration
 
 
 def test_every_cut_is_made_once(done):

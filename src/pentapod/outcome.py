@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
+from pentapod.artefacts import setup_folder
 from pentapod.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.planning.placed_path import PlacedPath
@@ -80,7 +81,7 @@ class SetUp:
     @property
     def folder(self) -> str:
         """The folder of its files, within the job's."""
-        return f"setup-{self.number}"
+        return setup_folder(self.number)
 
     @property
     def answer(self) -> str:

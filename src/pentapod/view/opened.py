@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pentapod.arrays import Floats
-from pentapod.artefacts import ARRAYS, PROGRAM
+from pentapod.artefacts import ARRAYS, PROGRAM, setup_folder
 from pentapod.errors import InputError
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
@@ -36,6 +36,7 @@ from pentapod.toolpath.tools import Tool
 class Opened:
     """A run. placement: workpiece → machine. axes (N, 3): the chosen tool axes, workpiece frame.
 
+    machine: as the program wants it.
     program: None where the job was refused; then the part stands in the middle of the work volume with nominal axes,
     unless a placement was found. same_job: whether the job is still what the program was made from.
     """
@@ -57,13 +58,17 @@ class Opened:
 def open_run(folder: str | Path, job: str | Path | None = None, progress: Progress = silent) -> Opened:
     """Return the run of a folder; its job is found by what the run says, or given.
 
-    Raises InputError: no run in the folder, its job is not there any more, or one of its files is broken.
+    Raises InputError: no run in the folder, or one in several set-ups; its job is not there any more, or one of its
+    files is broken.
     """
     folder = Path(folder)
     file = folder / ARRAYS
     if not file.is_file():
         what = "there is no run in this folder" if folder.is_dir() else "no such folder"
         raise InputError(what, file=folder, expected=f"a folder with {ARRAYS}", remedy="pentapod plan JOB.toml -o DIR")
+    if (first := folder / setup_folder(1)).is_dir():
+        what = "this job is done in several set-ups, each of which is a run"
+        raise InputError(what, file=folder, expected="the folder of one of them", remedy=f"pentapod view {first}")
     progress("open", 0.0, "arrays")
     toolpath = read_toolpath(file, "npz")
     arrays = _arrays(file)
@@ -72,9 +77,10 @@ def open_run(folder: str | Path, job: str | Path | None = None, progress: Progre
     machine, mesh = job_machine(loaded), job_mesh(loaded)
     progress("open", 0.7, "program")
     program = read_csv(folder / PROGRAM) if (folder / PROGRAM).is_file() else None
+    machine = machine if program is None else program.machine(machine)
     wanted = loaded.placement.component
-    first = COMPONENTS[0] if wanted is None else Component.parse(wanted)
-    placement, component, axes = _placed(arrays, toolpath, machine, first)
+    asked = COMPONENTS[0] if wanted is None else Component.parse(wanted)
+    placement, component, axes = _placed(arrays, toolpath, machine, asked)
     return Opened(
         folder, loaded, machine, mesh, job_tool(loaded), toolpath, job_surroundings(loaded, machine, mesh), placement,
         component, axes, program, program is None or program.provenance.job_digest == loaded.digest,
