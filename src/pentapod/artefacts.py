@@ -25,11 +25,6 @@ SETUPS = "setup-[1-9]*"
 _UNFINISHED = ".unfinished-"
 
 
-def setup_folder(number: int) -> str:
-    """Return the name of the folder of a set-up's files, within the job's; number: from 1."""
-    return f"setup-{number}"
-
-
 def check_folder(folder: Path) -> None:
     """Raise InputError where the folder cannot be made or written; makes nothing that stays."""
     existing = folder

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from pentapod.artefacts import setup_folder
 from pentapod.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.planning.placed_path import PlacedPath
@@ -78,10 +77,15 @@ class SetUp:
     piece: Piece
     outcome: Outcome
 
+    @staticmethod
+    def folder_of(number: int) -> str:
+        """Return the name of the folder of a set-up's files, within the job's."""
+        return f"setup-{number}"
+
     @property
     def folder(self) -> str:
         """The folder of its files, within the job's."""
-        return setup_folder(self.number)
+        return self.folder_of(self.number)
 
     @property
     def answer(self) -> str:

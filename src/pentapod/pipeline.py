@@ -8,17 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.artefacts import (
-    ARRAYS,
-    PROGRAM,
-    VERDICT,
-    check_folder,
-    setup_folder,
-    staged,
-    unstaged,
-    write_arrays,
-    write_json,
-)
+from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, unstaged, write_arrays, write_json
 from pentapod.clock import Clock
 from pentapod.errors import InputError, MachineError, MeshError
 from pentapod.job import Job
@@ -124,7 +114,7 @@ def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, write
         clock.progress("set-ups", (number - 1) / len(found), f"planning {number} of {len(found)}")
         own, part = Clock(clock.progress), part_of(toolpath, piece, style)
         own.stages += [*before, Stage("toolpath", 0.0, part, f"set-up {number} of {len(found)}: {piece}")]
-        folder = staging / setup_folder(number)
+        folder = staging / SetUp.folder_of(number)
         folder.mkdir()
         own_task = dataclasses.replace(task, toolpath=part, clock=own, piece=piece)
         parts.append(SetUp(number, piece, _reached(own_task, folder, writers)))

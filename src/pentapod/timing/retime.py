@@ -11,11 +11,12 @@ from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
 from pentapod.timing.constraints import CONSTRAINTS, Limits
 from pentapod.timing.engine import Engine
+from pentapod.timing.given_speeds import whole_periods
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.paths import LegPathLike
 from pentapod.timing.piece import PieceProfile, time_piece
 from pentapod.timing.refusals import STILL_M, refusal, unfit
-from pentapod.timing.sampled import WINDOW_PERIODS, Unmended, sampled_laws, whole_periods
+from pentapod.timing.sampled import WINDOW_PERIODS, Unmended, sampled_laws
 from pentapod.timing.stages import Failure
 from pentapod.timing.trajectory import Profile, Trajectory
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pentapod.arrays import Floats
-from pentapod.artefacts import ARRAYS, PROGRAM, setup_folder
+from pentapod.artefacts import ARRAYS, PROGRAM
 from pentapod.errors import InputError
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
@@ -20,7 +20,7 @@ from pentapod.job_tool import job_tool
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import Surroundings
-from pentapod.outcome import Outcome
+from pentapod.outcome import Outcome, SetUp
 from pentapod.pipeline import job_machine, job_mesh
 from pentapod.plan_arrays import JOB_FILE
 from pentapod.planning import PlacedPath
@@ -66,7 +66,7 @@ def open_run(folder: str | Path, job: str | Path | None = None, progress: Progre
     if not file.is_file():
         what = "there is no run in this folder" if folder.is_dir() else "no such folder"
         raise InputError(what, file=folder, expected=f"a folder with {ARRAYS}", remedy="pentapod plan JOB.toml -o DIR")
-    if (first := folder / setup_folder(1)).is_dir():
+    if (first := folder / SetUp.folder_of(1)).is_dir():
         what = "this job is done in several set-ups, each of which is a run"
         raise InputError(what, file=folder, expected="the folder of one of them", remedy=f"pentapod view {first}")
     progress("open", 0.0, "arrays")
