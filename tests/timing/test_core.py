@@ -141,8 +141,7 @@ def test_failures_name_the_gridpoint_and_the_rows(engine):
     free = np.full(11, np.inf)
     fast_end = fastest(s, rows, 0 * rows, np.where(s == 1, 9.0, 0.5), x_end=8.0, engine=engine)
     assert (fast_end.gridpoint, fast_end.reason[:8]) == (9, "from her")
-    if engine == "core":
-        assert fast_end.conflict == (0,)
+    assert fast_end.conflict == (0,)
     assert fastest(s, rows, 0 * rows, free, x_start=2.5, engine=engine).reason.startswith("the start is faster")
     assert fastest(s, rows, 0 * rows, free, x_end=2.5, engine=engine).reason.startswith("the start is slower")
     assert fastest(s, rows, 0 * rows, np.ones(11), x_end=2.0, engine=engine).gridpoint == 10

@@ -14,7 +14,7 @@ import numpy as np
 
 from pentapod.arrays import Bools, Floats
 from pentapod.timing.chains import by_chains
-from pentapod.timing.stage_rows import StageRows, least_reach, left_root, right_root
+from pentapod.timing.stage_rows import StageRows, clash, least_reach, left_root, right_root
 from pentapod.timing.stages import NOT_CONTROLLABLE, TOO_FAST_END, UNBOUNDED, Failure, Stages, admitted
 
 _LEAD = 32
@@ -83,16 +83,14 @@ class _Windows:
             for k in range(min(self.lead, width - 1) - 1, -1, -1):
                 state, _ = self._before(k, slice(1, None), state)
             seam[:, :-1] = state
-        state, failed = seam, -1
-        why = NOT_CONTROLLABLE
+        state, failure = seam, None
         for k in range(width - 1, -1, -1):
             state, lost = self._before(k, slice(None), state)
-            if lost.any() and failed < 0:
-                failed = int(np.flatnonzero(lost)[-1]) * width + k
-                why = UNBOUNDED if np.isinf(state[1, lost][-1]) else NOT_CONTROLLABLE
+            if lost.any() and failure is None:
+                failure = self._failure(k, int(np.flatnonzero(lost)[-1]), state)
             low[k], high[k] = state
-        if failed >= 0:
-            return Failure(failed, why)
+        if failure is not None:
+            return failure
         same = (seam[0, :-1] == low[0, 1:]) & (seam[1, :-1] == high[0, 1:])
         return (low, high) if same.all() else None
 
@@ -122,6 +120,16 @@ class _Windows:
         if len(must):
             low[must], lost[must] = left_root(lows[:, must], highs[:, must], slopes[:, must], x[must])
         return np.stack([low, x]), lost
+
+    def _failure(self, k: int, window: int, state: Floats) -> Failure:
+        """Return why there is no controllable x at a stage, of whose window `_before` has returned the state."""
+        at = window * len(self.ceiling) + k
+        if np.isinf(state[1, window]):
+            return Failure(at, UNBOUNDED)
+        if self.twice[k, window] == 0.0:
+            return Failure(at, NOT_CONTROLLABLE)
+        lows, highs, slopes = (y[k][:, window] for y in (self.lows, self.highs, self.slopes))
+        return Failure(at, NOT_CONTROLLABLE, clash(lows, highs, slopes, float(self.ceiling[k, window])))
 
     def _forward(self, low: Floats, high: Floats, x_start: float) -> Floats | None:
         """Return the largest x (count,), None where a seam differs."""

@@ -60,6 +60,26 @@ def least_reach(lows: Floats, highs: Floats, slopes: Floats) -> Floats:
     return 1.01 * np.where((tilt != 0.0) & np.isfinite(bound), bound, np.inf).min(axis=0)
 
 
+def clash(lows: Floats, highs: Floats, slopes: Floats, top: float) -> tuple[int, ...]:
+    """Return which of the R limits leave no u at any x up to top, of one stage's rows (2R + 1,): one or two of them.
+
+    Where the way that they leave closes, seen from x = 0 on.
+    """
+    x, pair = 0.0, (-1, -1)
+    for _ in range(_STEPS):
+        least, most = lows - slopes * x, highs - slopes * x
+        below, above = int(least.argmax()), int(most.argmin())
+        gap, slope = float(least[below] - most[above]), float(slopes[above] - slopes[below])
+        if gap <= 0.0:
+            break
+        pair = below, above
+        if slope >= 0.0 or x - gap / slope > top:
+            break
+        x -= gap / slope
+    limits = len(lows) // 2
+    return tuple(sorted({row % limits for row in pair if 0 <= row < 2 * limits}))
+
+
 def right_root(lows: Floats, highs: Floats, slopes: Floats, cap: Floats) -> tuple[Floats, Bools]:
     """Return the largest x (w,) up to cap that leaves an interval of u, and where there is none."""
     result, bad = cap.copy(), np.zeros(len(cap), dtype=bool)
