@@ -103,6 +103,26 @@ def test_from_disk_and_by_processes_the_same_bits(whole, small, tmp_path, proces
     assert sorted(file.name for file in tmp_path.iterdir()) == ["law.npy", "s.npy", "x.npy"]
 
 
+def test_an_interruption_leaves_no_part_of_a_law(tmp_path, monkeypatch):
+    s, x = profile(0.5)
+    np.save(tmp_path / "s.npy", s)
+    np.save(tmp_path / "x.npy", x)
+    (tmp_path / "law.npy").write_bytes(b"the law before")
+    load = np.lib.format.open_memmap
+
+    def interrupted(file, mode="r+", *rest, **options):
+        table = load(file, mode, *rest, **options)
+        if mode == "w+":
+            raise KeyboardInterrupt
+        return table
+
+    monkeypatch.setattr(np.lib.format, "open_memmap", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        limit_stored(StoredProfile(tmp_path), Waves(), NO_MARKS, tmp_path / "law.npy")
+    assert (tmp_path / "law.npy").read_bytes() == b"the law before"
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["law.npy", "s.npy", "x.npy"]
+
+
 @pytest.mark.parametrize("answer", ["none", "another"])
 def test_where_blocks_do_not_agree_leads_get_longer(whole, monkeypatch, answer):
     """Blocks that know too little of what is beyond their cuts, here by decree: no law, or one that is slower."""

@@ -67,7 +67,9 @@ def limit_stored(
             work = partial(_solved, stored, rows_at, marks, passes)
             reason = _write(raw, runs_of(stored.s, count, lead, _each(work, blocks(count, lead), processes)))
             if reason is None:
-                _as_table(raw, out)
+                whole = Path(scratch) / "law.npy"
+                _as_table(raw, whole)
+                whole.replace(out)  # at once: whatever stops this leaves no part of a law
                 return None
     return reason
 
