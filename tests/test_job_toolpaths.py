@@ -100,6 +100,22 @@ def test_axes_and_remedies_of_the_job_are_used(make_job):
     assert any(segment.kind is SegmentKind.CUT for segment in path.segments)
 
 
+def test_what_gouges_is_dropped_but_never_out_of_somebody_elses_toolpath(make_job, tmp_path):
+    """A job that says nothing of gouges: of its own path the cuts in the way of the holder go, from a file none."""
+    fixed = ("tilt_deg = 0", 'tilt_deg = 0\nmode = "fixed"\ndirection = [0, 0, 1]')
+    wide = (BALL, BALL + "\nflute_mm = 5.1\nholder_mm = [[20, 40, 40]]")
+    job = Job.load(make_job(fixed, wide))
+    _, report = job_toolpath(job, job_mesh(job))
+    assert "motions dropped" in str(report)
+    assert "motions gouge by" not in str(report)
+    assert run_cli(["toolpath", str(make_job(fixed)), "-o", str(tmp_path / "path.csv"), "-q"]) == 0
+    given = read_toolpath(tmp_path / "path.csv")
+    job = Job.load(make_job(fixed, wide, (STRATEGY, 'strategy = "file"\nfile = "path.csv"')))
+    path, report = job_toolpath(job, job_mesh(job))
+    assert "motions gouge by" in str(report)
+    np.testing.assert_array_equal(path.tips, given.tips)
+
+
 def test_a_tilt_that_breaks_the_cap_on_turning_is_told(make_job):
     """A holder just over the ball meets the dome; tilting clear turns the axis fast, the cap is slow."""
     fixed = ("tilt_deg = 0", 'tilt_deg = 0\nmode = "fixed"\ndirection = [0, 0, 1]\nrate_deg_mm = 0.1')

@@ -1,4 +1,4 @@
-"""on_one_thread: linear algebra that gives the same bits whatever the machine."""
+"""on_one_thread: linear algebra that gives the same bits however many threads there are."""
 
 from __future__ import annotations
 
