@@ -44,7 +44,7 @@ def _method(found: Immersion, bound: float) -> str:
         return "this deep is the cutter in the part at this moment; others may be worse"
     if not np.isfinite(found.most):
         return "not proven: the tool turns too far within half a period"
-    what = "deepest mesh point inside the cutter" if found.most > 0.0 else "smallest gap of the cutter, negative,"
+    what = "deepest mesh point inside the cutter" if found.most > 0.0 else "smallest gap of the cutter (negative)"
     return (
         f"proven bound for all times of the {what}: swept exactly along straight stretches of the replayed motion, "
         "with what that strays from them"
