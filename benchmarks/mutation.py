@@ -1,161 +1,259 @@
 """Would the tests notice? Mutants of verify/ by cosmic-ray's operators, each run against the tests of the verdict.
 
 Run ``make mutation``; ``--every 10`` takes each tenth of the mutants, ``--files legs.py speed.py`` those of some files.
-A mutant lives in a child process that is forked once everything else is loaded and compiled, and dies with the first
-test that fails. What survives is listed with its line: each is a test that is missing, or a change that means nothing.
+The tests are collected once, and each runs once alone to see which lines it executes. Then every mutant lives in a
+forked child, meets the tests that execute its statement, first those that kill most per second, and dies with the
+first that fails. What survives is listed with its line: a test that is missing, or a change that means nothing.
 """
 
 from __future__ import annotations
 
 import argparse
-import difflib
+import functools
+import importlib
 import importlib.machinery
 import os
-import re
+import pickle
 import resource
 import sys
 import time
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from types import CodeType
+from types import CodeType, FrameType
+from typing import Any, BinaryIO
 
 import pytest
-from cosmic_ray.ast import ast_nodes, get_ast
-from cosmic_ray.mutating import mutate_code
-from cosmic_ray.plugins import get_operator
+from _pytest.runner import runtestprotocol
+from mutants import Mutant, mutant, places, put
 
 ROOT = Path(__file__).resolve().parents[1]
 VERIFY = ROOT / "src" / "pentapod" / "verify"
-BY_HAND, CATCHES, ORACLES = "test_claims_by_hand.py", "test_verdict_catches.py", "test_replay_oracles.py"
-TESTS = {
-    "approach.py": ("test_collisions.py",),
-    "bodies.py": (BY_HAND, CATCHES, ORACLES),
-    "claim.py": (BY_HAND, CATCHES),
-    "collisions.py": ("test_collisions.py",),
-    "component.py": (BY_HAND, CATCHES, ORACLES),
-    "cutting.py": ("test_gouge_claim.py",),
-    "gouge.py": ("test_gouge_claim.py", BY_HAND),
-    "immersion.py": ("test_gouge_claim.py",),
-    "joints.py": (BY_HAND, CATCHES, ORACLES),
-    "judge.py": (BY_HAND, CATCHES),
-    "legs.py": (BY_HAND, CATCHES, ORACLES),
-    "matching.py": ("test_matching_laws.py", BY_HAND, CATCHES),
-    "origin.py": (BY_HAND, CATCHES),
-    "replay.py": (BY_HAND, ORACLES, CATCHES),
-    "speed.py": (BY_HAND, "test_standoff_feed.py", CATCHES, ORACLES),
-    "standing.py": ("test_standing.py",),
-    "survey.py": (BY_HAND, ORACLES, CATCHES),
-    "tool.py": ("test_tool_claims.py", CATCHES),
-    "tracking.py": (BY_HAND, CATCHES, ORACLES),
-    "verdict.py": (BY_HAND, CATCHES),
-    "visits.py": ("test_matching_laws.py", CATCHES),
-}
-"""Which tests have to notice, the quickest first."""
-OPERATORS = (
-    "NumberReplacer",
-    "AddNot",
-    "ReplaceAndWithOr",
-    "ReplaceOrWithAnd",
-    "ReplaceTrueWithFalse",
-    "ReplaceFalseWithTrue",
-    "ReplaceUnaryOperator_Delete_Not",
-    "ReplaceUnaryOperator_Delete_USub",
-    "ZeroIterationForLoop",
-    *(f"ReplaceComparisonOperator_{a}_{b}" for a, b in (("Lt", "GtE"), ("LtE", "Gt"), ("Gt", "LtE"), ("GtE", "Lt"))),
-    *(f"ReplaceComparisonOperator_{a}_{b}" for a, b in (("Eq", "NotEq"), ("Is", "IsNot"), ("IsNot", "Is"))),
-    *(f"ReplaceBinaryOperator_{a}_{b}" for a, b in (("Add", "Sub"), ("Sub", "Add"), ("Mul", "Div"), ("Div", "Mul"))),
-)
-_MEANINGLESS = re.compile(r"[+-]_(BLOCK|AT_ONCE|CHUNK|LOOKED_AT)\b|\+.*[(\s]/,")
-"""Constants that decide how much is done in one go, and nothing else; the star before arguments by name, divided."""
-_CPU_SECONDS = 120  # a mutant that runs longer than this never ends: killed
+TESTS = ROOT / "tests" / "verify"
+_OPTIONS = ("-x", "-q", "-s", "-p", "no:cacheprovider", "-p", "no:xdist")
+_MEMORY = 4 << 30  # bytes that a mutant may ask for
 
 
-def places(file: Path) -> Iterator[tuple[str, int]]:
-    """Yield operator and occurrence of every mutant of a file."""
-    nodes = list(ast_nodes(get_ast(file.read_text(encoding="utf-8"))))
-    for name in OPERATORS:
-        operator = get_operator(f"core/{name}")()
-        yield from ((name, k) for k in range(sum(len(list(operator.mutation_positions(node))) for node in nodes)))
+@dataclass(frozen=True)
+class Look:
+    """What a test does when it runs alone: seconds it takes, lines of verify/ that it executes."""
+
+    seconds: float
+    lines: frozenset[tuple[str, int]]
 
 
-def mutant(file: Path, name: str, occurrence: int) -> tuple[str, str] | None:
-    """Return what changed and the source of a mutant; None where the change means nothing."""
-    source = file.read_text(encoding="utf-8")
-    mutated = mutate_code(source, get_operator(f"core/{name}")(), occurrence)
-    if mutated is None:
-        raise SystemExit(f"{file.name} has no mutant {name} {occurrence}")
-    changed = difflib.unified_diff(source.splitlines(), mutated.splitlines(), lineterm="", n=0)
-    lines = [line for line in changed if line[:1] in "+-@" and line[:3] not in ("+++", "---")]
-    return None if any(_MEANINGLESS.match(line) for line in lines) else ("  ".join(lines), mutated)
+@dataclass
+class Record:
+    """How often each test ran on mutants of a file, and killed."""
+
+    runs: Counter[str] = field(default_factory=Counter)
+    kills: Counter[str] = field(default_factory=Counter)
 
 
-def survives(file: Path, mutated: str) -> bool:
-    """Return whether all tests pass with this source in place of the file's; in a child process."""
-    child = os.fork()
-    if child:
-        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
-    resource.setrlimit(resource.RLIMIT_CPU, (_CPU_SECONDS, _CPU_SECONDS))
+# Children.
+
+
+def child(work: Callable[[BinaryIO], int]) -> tuple[int, BinaryIO]:
+    """Return the number of a silent child process that does the work, and what it writes."""
+    read, write = os.pipe()
+    number = os.fork()
+    if number:
+        os.close(write)
+        return number, os.fdopen(read, "rb")
+    os.close(read)
     silence = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silence, 1)
     os.dup2(silence, 2)
-    for name in [name for name in sys.modules if name.startswith(("pentapod.verify", "replay_cases"))]:
-        del sys.modules[name]
-    usual = importlib.machinery.SourceFileLoader.get_code
+    resource.setrlimit(resource.RLIMIT_DATA, (_MEMORY, _MEMORY))
+    code = 1
+    try:
+        with os.fdopen(write, "wb") as out:
+            code = work(out)
+    finally:
+        os._exit(code)
+
+
+def hurry(seconds: float) -> None:
+    """End this process where it goes on for much longer than these seconds: what never ends counts as noticed."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    limit = int(used.ru_utime + used.ru_stime + 10.0 + 5.0 * seconds)
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, resource.RLIM_INFINITY))
+
+
+def passes(item: pytest.Item, following: pytest.Item | None) -> bool:
+    """Run a test; return whether it passed."""
+    return all(report.passed for report in runtestprotocol(item, log=False, nextitem=following))
+
+
+def look(item: pytest.Item, out: BinaryIO) -> int:
+    """Run a test alone and write what it does."""
+    lines: set[tuple[str, int]] = set()
+    folder = f"{VERIFY}{os.sep}"
+
+    def inside(frame: FrameType, event: str, _: object) -> Any:
+        if event == "line":
+            lines.add((frame.f_code.co_filename, frame.f_lineno))
+        return inside
+
+    def calls(frame: FrameType, _: str, __: object) -> Any:
+        return inside if frame.f_code.co_filename.startswith(folder) else None
+
+    start = time.process_time()
+    sys.settrace(calls)
+    passed = passes(item, None)
+    sys.settrace(None)
+    names = frozenset((Path(file).name, line) for file, line in lines)
+    pickle.dump(Look(time.process_time() - start, names), out)
+    return 0 if passed else 1
+
+
+def meet(it: Mutant, tests: Sequence[tuple[pytest.Item, float]], out: BinaryIO) -> int:
+    """Run tests, with the seconds they take, on a mutant until one fails; write the number of each before it runs."""
+    if not put(it):
+        return _meet_anew(it, tests, out)
+    for k, (item, seconds) in enumerate(tests):
+        _begin(k, seconds, out)
+        if not passes(item, tests[k + 1][0] if k + 1 < len(tests) else None):
+            return 1
+    return 0
+
+
+def _begin(number: int, seconds: float, out: BinaryIO) -> None:
+    out.write(b"%d\n" % number)
+    out.flush()
+    hurry(seconds)
+
+
+def _meet_anew(it: Mutant, tests: Sequence[tuple[pytest.Item, float]], out: BinaryIO) -> int:
+    """Do the same where the change is none of a function: load all that comes from the file once more."""
+    names = {item.nodeid: k for k, (item, _) in enumerate(tests)}
+
+    class Chosen:
+        @pytest.hookimpl(trylast=True)
+        def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+            items[:] = sorted((item for item in items if item.nodeid in names), key=lambda item: names[item.nodeid])
+
+        def pytest_runtest_logstart(self, nodeid: str) -> None:
+            _begin(names[nodeid], tests[names[nodeid]][1], out)
+
+    usual, good_case = importlib.machinery.SourceFileLoader.get_code, sys.modules["replay_cases"].good_case
+    for name in list(sys.modules):
+        if name.startswith(("pentapod.verify", "replay_cases", "test_")):
+            del sys.modules[name]
 
     def get_code(self: importlib.machinery.SourceFileLoader, fullname: str) -> CodeType | None:
-        if Path(self.path) == file:
-            return compile(mutated, self.path, "exec", dont_inherit=True)
+        if Path(self.path) == it.file:
+            return compile(it.source, self.path, "exec", dont_inherit=True)
         return usual(self, fullname)
 
     importlib.machinery.SourceFileLoader.get_code = get_code
-    try:
-        tests = [str(ROOT / "tests" / "verify" / test) for test in TESTS[file.name]]
-        code = pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-k", "not cubic", *tests])
-    except BaseException:
-        code = 1
-    os._exit(int(code))
+    hurry(20.0)
+    importlib.import_module("replay_cases").good_case = good_case
+    return int(pytest.main([*_OPTIONS, *{str(item.path) for item, _ in tests}], plugins=[Chosen()]))
 
 
-def warm() -> None:
-    """Load and compile what mutants share."""
-    sys.path.insert(0, str(ROOT / "tests" / "verify"))
-    import replay_cases as cases  # noqa: PLC0415 - found by the line above
+# The run.
 
-    from pentapod.verify import verify  # noqa: PLC0415 - the children load it anew
 
-    for interpolation in ("linear", "cubic"):
-        case = cases.good_case(interpolation=interpolation)
-        if not verify(case.program, case.machine, case.toolpath, **cases.TOLERANCES).passed:
-            raise SystemExit("the good program does not pass")
+class Run:
+    """Takes the place of pytest's own loop over the tests that it collected."""
+
+    def __init__(self, given: argparse.Namespace) -> None:
+        self.given = given
+        self.killed = self.count = 0
+
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Run all mutants."""
+        session.config._tmp_path_factory.getbasetemp()  # pyright: ignore[reportAttributeAccessIssue]
+        cases = sys.modules["replay_cases"]
+        cases.good_case = functools.cache(cases.good_case)
+        start = time.perf_counter()
+        for item, following in zip(session.items, [*session.items[1:], None], strict=True):
+            if not passes(item, following):
+                raise SystemExit(f"{item.nodeid} fails without any change")
+        print(f"{len(session.items)} tests pass, {time.perf_counter() - start:.0f} s", flush=True)
+        self._looks = {item: self._look(item) for item in session.items}
+        print(f"each seen alone, {time.perf_counter() - start:.0f} s", flush=True)
+        sites = [(VERIFY / name, *place) for name in self.given.files for place in places(VERIFY / name)]
+        todo = [made for site in sites[self.given.first :: self.given.every] if (made := mutant(*site)) is not None]
+        self._all(todo)
+        print(f"{self.killed} of {self.count} mutants killed: {self.killed / self.count:.1%}")
+        return True
+
+    def _look(self, item: pytest.Item) -> Look:
+        number, out = child(lambda to: look(item, to))
+        with out:
+            found = pickle.load(out)
+        if os.waitpid(number, 0)[1]:
+            raise SystemExit(f"{item.nodeid} fails alone")
+        return found
+
+    def _all(self, todo: list[Mutant]) -> None:
+        records: dict[str, Record] = {}
+        running: dict[int, tuple[Mutant, list[tuple[pytest.Item, float]], BinaryIO]] = {}
+        start, waiting = time.perf_counter(), iter(todo)
+        per_file: dict[str, list[int]] = {it.file.name: [0, 0] for it in todo}
+        while True:
+            while len(running) < self.given.processes and (it := next(waiting, None)) is not None:
+                tests = self._chosen(it, records.setdefault(it.file.name, Record()))
+                number, out = child(lambda to, it=it, tests=tests: meet(it, tests, to))
+                running[number] = it, tests, out
+            if not running:
+                break
+            number, status = os.wait()
+            it, tests, out = running.pop(number)
+            with out:
+                ran = [tests[int(k)][0].nodeid for k in out.read().split()]
+            record = records[it.file.name]
+            record.runs.update(ran)
+            record.kills.update(ran[-1:] if status else ())
+            self.count += 1
+            self.killed += status != 0
+            tally = per_file[it.file.name]
+            tally[0] += 1
+            tally[1] += status != 0
+            if not status:
+                print(f"survived {len(ran)} tests: {it.told}", flush=True)
+            if self.count % 20 == 0:
+                seconds = time.perf_counter() - start
+                print(f"{self.count} of {len(todo)} mutants, {self.killed} killed, {seconds:.0f} s", flush=True)
+        for name, (count, killed) in per_file.items():
+            print(f"{name}: {killed} of {count} killed, {killed / count:.1%}")
+
+    def _chosen(self, it: Mutant, record: Record) -> list[tuple[pytest.Item, float]]:
+        """Return the tests that a mutant has to meet, and their seconds: first what kills most in a second."""
+        statement = {(it.file.name, line) for line in it.lines}
+        of_file = [item for item, seen in self._looks.items() if any(name == it.file.name for name, _ in seen.lines)]
+        tests = [item for item in of_file if not statement.isdisjoint(self._looks[item].lines)] or of_file
+
+        def worth(item: pytest.Item) -> float:
+            share = (record.kills[item.nodeid] + 0.1) / (record.runs[item.nodeid] + 1.0)
+            return share / (self._looks[item].seconds + 0.01)
+
+        chosen, left = list[tuple[pytest.Item, float]](), self.given.seconds
+        for item in sorted(tests, key=worth, reverse=True):
+            if (left := left - self._looks[item].seconds) < 0.0 and chosen:
+                break
+            chosen.append((item, self._looks[item].seconds))
+        return chosen
 
 
 def main() -> int:
     """Print what survives, and the share that is killed."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--files", nargs="*", default=tuple(TESTS))
+    files = sorted(file.name for file in VERIFY.glob("*.py") if file.name != "__init__.py")
+    parser.add_argument("--files", nargs="*", default=files)
     parser.add_argument("--every", type=int, default=1, help="only each n-th mutant")
     parser.add_argument("--first", type=int, default=0, help="the first of those")
     parser.add_argument("--least", type=float, default=0.9, help="share that has to be killed")
+    parser.add_argument("--seconds", type=float, default=30.0, help="of tests until a mutant counts as a survivor")
+    parser.add_argument("--processes", type=int, default=1, help="mutants that run at the same time")
     given = parser.parse_args()
-    untested = {file.name for file in VERIFY.glob("*.py")} - {*TESTS, "__init__.py"}
-    if untested:
-        raise SystemExit(f"no tests are named for {', '.join(sorted(untested))}")
     os.chdir(ROOT)
-    warm()
-    sites = [(VERIFY / name, *place) for name in given.files for place in places(VERIFY / name)]
-    total = len(sites)
-    found = [(*site[:2], mutant(*site)) for site in sites[given.first :: given.every]]
-    todo = [(file, operator, *made) for file, operator, made in found if made is not None]
-    start, killed = time.perf_counter(), 0
-    for number, (file, operator, changed, source) in enumerate(todo, start=1):
-        if survives(file, source):
-            print(f"survived: {file.name} {operator}: {changed}", flush=True)
-        else:
-            killed += 1
-        if number % 5 == 0:
-            print(f"{number} of {len(todo)} mutants, {killed} killed, {time.perf_counter() - start:.0f} s", flush=True)
-    print(f"{killed} of {len(todo)} mutants killed: {killed / len(todo):.1%} (of {total} that there are)")
-    return 0 if killed >= given.least * len(todo) else 1
+    run = Run(given)
+    code = pytest.main([*_OPTIONS, str(TESTS)], plugins=[run])
+    return int(code) or (0 if run.killed >= given.least * run.count else 1)
 
 
 if __name__ == "__main__":
