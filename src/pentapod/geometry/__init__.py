@@ -18,6 +18,7 @@ from pentapod.geometry.level_set import enclosed_volume, zero_surface
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.positivity import Positivity, positivity
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.geometry.runs import equal_runs, marked_runs, run_starts
 
 __all__ = [
     "Positivity",
@@ -28,13 +29,16 @@ __all__ = [
     "derivative",
     "elevate",
     "enclosed_volume",
+    "equal_runs",
     "evaluate",
     "from_power",
     "hull",
+    "marked_runs",
     "multiply",
     "normalised",
     "partway",
     "positivity",
+    "run_starts",
     "scaled",
     "split",
     "tangent_frame",

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from pentapod.arrays import Bools, Floats
+from pentapod.geometry.runs import marked_runs
 from pentapod.planning.margins import Margins
 from pentapod.planning.placed_path import PlacedPath, UnplacedPath
 from pentapod.refusal import Blame
@@ -22,8 +21,7 @@ def blame(values: Floats, margins: Margins, needed: float) -> tuple[Blame, ...]:
 
 def ranges(mask: Bools) -> tuple[tuple[int, int], ...]:
     """Return the inclusive index ranges in which mask (N,) is true."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
-    return tuple((int(a), int(b) - 1) for a, b in edges.reshape(-1, 2))
+    return tuple((a, b - 1) for a, b in marked_runs(mask).tolist())
 
 
 def refusal(

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from pentapod.arrays import Bools, Floats
-from pentapod.planning.blame import ranges
+from pentapod.geometry.runs import marked_runs
 from pentapod.progress import Progress, silent
 from pentapod.refusal import Blame, Refusal
 from pentapod.toolpath.links import LinkStyle
@@ -166,7 +166,7 @@ def _bounded(piece: Piece, along: int, low: float, high: float) -> Piece:
 
 def _refusal(search: _Search, most: int, whole: Refusal) -> Refusal:
     """Return the refusal of a path in set-ups: what was left over, and what was in the way of the whole."""
-    left = tuple((a, b + 1) for a, b in ranges(search.cutting & ~search.reached))
+    left = tuple((a, b) for a, b in marked_runs(search.cutting & ~search.reached).tolist())
     share = 100.0 * float(search.reached.sum() / search.cutting.sum())
     reached = f"the best split found reaches {share:.0f} % of the cuts"
     cause = f"{most} set-ups are not enough: {reached}; in one set-up {whole.cause}"

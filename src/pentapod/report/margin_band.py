@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from pentapod.geometry.polyline import arc_length
+from pentapod.geometry.runs import equal_runs
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.report.figure import LIMIT_COLOUR, QUIET_COLOUR
 
@@ -37,20 +38,17 @@ def margin_band(placed: PlacedPath) -> str:
         return 8.0 + (_HEIGHT - _BOTTOM - 8.0) * (top - value) / (top - low)
 
     limits = nearest[worst]
-    breaks = np.flatnonzero(np.diff(limits)) + 1
     parts: list[str] = []
-    for run in np.split(np.arange(len(worst)), breaks):
-        a, b = int(edges[run[0]]), int(edges[run[-1] + 1]) - 1
+    for first, end in equal_runs(limits).tolist():
+        a, b = int(edges[first]), int(edges[end]) - 1
         left, right = x(float(way[a])), x(float(way[min(b + 1, len(way) - 1)]))
-        corners = [(left, y(0.0)), (left, y(float(smallest[worst[run[0]]])))]
-        corners += [(x(float(way[w])), y(float(smallest[w]))) for w in worst[run]]
-        corners += [(right, y(float(smallest[worst[run[-1]]]))), (right, y(0.0))]
+        corners = [(left, y(0.0)), (left, y(float(smallest[worst[first]])))]
+        corners += [(x(float(way[w])), y(float(smallest[w]))) for w in worst[first:end]]
+        corners += [(right, y(float(smallest[worst[end - 1]]))), (right, y(0.0))]
         points = " ".join(f"{px:.1f},{py:.1f}" for px, py in corners)
-        name = escape(placed.margin_names[int(limits[run[0]])])
+        name = escape(placed.margin_names[int(limits[first])])
         told = f"{name}: waypoints {a} to {b}, smallest margin {float(smallest[a : b + 1].min()):.3f}"
-        parts.append(
-            f'<polygon points="{points}" fill="{colours[int(limits[run[0]])]}"><title>{told}</title></polygon>'
-        )
+        parts.append(f'<polygon points="{points}" fill="{colours[int(limits[first])]}"><title>{told}</title></polygon>')
     zero = f'<line x1="{_LEFT}" x2="{_WIDTH}" y1="{y(0.0):.1f}" y2="{y(0.0):.1f}" stroke="{LIMIT_COLOUR}"/>'
     ticks = "".join(
         f'<text x="{_LEFT - 6}" y="{y(v) + 4:.1f}" text-anchor="end">{v:.2f}</text>' for v in (0.0, 0.5 * top, top)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.arrays import Bools, Floats
+from pentapod.geometry.runs import marked_runs
 from pentapod.machine.machine import Machine
 from pentapod.report.signals import Signals
 from pentapod.report.words import number
@@ -80,8 +81,7 @@ def _longest(signals: Signals, slow: Bools) -> tuple[str, int | None]:
     """Return where the longest slow run is, in words and as the row in its middle."""
     if not slow.any():
         return "", None
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(np.int8)))
-    starts, ends = edges[::2], edges[1::2]
-    k = int((ends - starts).argmax())
-    words = f"longest from {signals.times[starts[k]]:.3f} s to {signals.times[ends[k] - 1]:.3f} s"
-    return words, int(starts[k] + ends[k]) // 2
+    runs = marked_runs(slow)
+    start, end = runs[np.diff(runs)[:, 0].argmax()].tolist()
+    words = f"longest from {signals.times[start]:.3f} s to {signals.times[end - 1]:.3f} s"
+    return words, (start + end) // 2

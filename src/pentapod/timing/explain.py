@@ -162,9 +162,9 @@ def _places(
     if not len(rows):
         return []
     far = stations[rows[1:]] - stations[rows[:-1] + 1] > _NEAR * (stations[-1] - stations[0])
-    first = np.concatenate([[0], np.flatnonzero(far | (np.diff(segments[rows]) > _NEIGHBOURS)) + 1])
+    breaks = np.flatnonzero(far | (np.diff(segments[rows]) > _NEIGHBOURS)) + 1
     places: list[CostlyPlace] = []
-    for run in np.split(rows, first[1:]):
+    for run in np.split(rows, breaks):
         total, worst = float(cost[run].sum()), int(run[np.argmax(cost[run])])
         if total > worth:
             reach = (float(stations[run[0]]), float(stations[run[-1] + 1]))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from pentapod.arrays import Floats
+from pentapod.geometry.runs import equal_runs, marked_runs
 from pentapod.timing.trajectory import Trajectory
 from pentapod.toolpath.toolpath import SegmentKind
 
@@ -66,10 +66,8 @@ def unheld(
     }
     slow = (share < held) & np.isin(segments, sorted(cuts))
     found: list[Unheld] = []
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]])))
-    for start, stop in edges.reshape(-1, 2):
-        inner = np.flatnonzero(np.diff(segments[start:stop])) + start + 1
-        for a, b in pairwise([int(start), *inner.tolist(), int(stop)]):
+    for start, stop in marked_runs(slow).tolist():
+        for a, b in (start + equal_runs(segments[start:stop])).tolist():
             worst = a + int(np.argmin(share[a:b]))
             gridpoint = min(int(np.searchsorted(profile.times, times[worst])), len(profile.times) - 1)
             found.append(

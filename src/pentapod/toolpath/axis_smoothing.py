@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.spatial import KDTree
 
-from pentapod.arrays import Floats
+from pentapod.arrays import Floats, Ints
 from pentapod.errors import ToolpathError
 from pentapod.geometry.directions import angle_between, partway
 
@@ -107,14 +106,14 @@ def _mean(place: Floats, axes: Floats, width: float) -> Floats | None:
     return None if (length < 1e-3).any() else mean / length
 
 
-def tangents(points: Floats, starts: Sequence[int] | Floats) -> Floats:
+def tangents(points: Floats, starts: Ints) -> Floats:
     """Return unit directions of travel (N, 3) along passes; pass k holds points starts[k] to starts[k + 1] − 1."""
     result = np.empty_like(points)
-    for a, b in pairwise(starts):
-        rows = points[int(a) : int(b)]
+    for a, b in pairwise(starts.tolist()):
+        rows = points[a:b]
         ahead = np.empty_like(rows)
         ahead[1:-1] = rows[2:] - rows[:-2]
         ahead[0], ahead[-1] = rows[1] - rows[0], rows[-1] - rows[-2]
-        result[int(a) : int(b)] = ahead
+        result[a:b] = ahead
     length = np.linalg.norm(result, axis=1, keepdims=True)
     return result / np.where(length > 0.0, length, 1.0)

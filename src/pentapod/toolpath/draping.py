@@ -8,6 +8,7 @@ import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import normalised
+from pentapod.geometry.runs import marked_runs
 from pentapod.toolpath.links import spaced
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.passes import Passes
@@ -53,8 +54,9 @@ def draped(
     stretch, bridge = (_STRETCH, _ROUGH * spacing) if wrapped else (steepest, options.chordal)
     near = gaps <= (stretch + slope) * steps + bridge + swing
     whole = (owner[1:] == owner[:-1]) & landed[1:] & landed[:-1] & near
-    runs = _runs(whole)
-    passes = Passes.of([(points[a : b + 1], normals[a : b + 1]) for a, b in runs], owner[[a for a, _ in runs]])
+    runs = marked_runs(whole)
+    # A run's end is the point that its last step leads to.
+    passes = Passes.of([(points[a : b + 1], normals[a : b + 1]) for a, b in runs], owner[runs[:, 0]])
     length = float(steps.sum())
     lost = 1.0 - float(steps[whole].sum()) / length if length > 0.0 else 1.0
     return passes, (f"{100.0 * lost:.2g} % of the lines lie beside the region and are left out",) if lost > 1e-6 else ()
@@ -99,9 +101,3 @@ def _refined(
         passed[rows] = np.where(split, 0, passed[rows] + 1)
         passed = np.insert(passed, at, 0)
     return plane, owner, points, normals, landed
-
-
-def _runs(whole: Bools) -> list[tuple[int, int]]:
-    """Return first and last point of each run of steps marked in `whole`."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]]).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import tangent_frame
+from pentapod.geometry.runs import equal_runs, marked_runs
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.facet_tree import FacetTree
 from pentapod.toolpath.gouge_report import GougeOptions, GougeReport, Remedy
@@ -83,7 +83,7 @@ def _standing(path: Toolpath, work: _Work) -> tuple[Floats, Bools]:
 
 def _begins(marked: Bools) -> tuple[int, ...]:
     """Return where each run of marked motions (N − 1,) begins."""
-    return tuple(int(k) for k in np.flatnonzero(marked & ~np.concatenate([[False], marked[:-1]])))
+    return tuple(marked_runs(marked)[:, 0].tolist())
 
 
 class _Work:
@@ -221,8 +221,7 @@ class _Work:
         segments: list[Segment] = []
         for k, old in enumerate(self.path.segments):
             a, b = int(self.path.starts[k]), int(self.path.starts[k + 1])
-            breaks = [a, *(a + 1 + np.flatnonzero(np.diff(self.dropped[a:b].astype(np.int8)))).tolist(), b]
-            for p, q in pairwise(breaks):
+            for p, q in (a + equal_runs(self.dropped[a:b])).tolist():
                 dwell = old.dwell if q == b else None
                 if self.dropped[p]:
                     feed = link_feeds[0] if link_feeds else old.feed

@@ -9,8 +9,9 @@ from itertools import pairwise
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from pentapod.arrays import Bools, Floats, Ints, frozen, set_frozen
+from pentapod.arrays import Bools, Floats, frozen, set_frozen
 from pentapod.errors import ToolpathError
+from pentapod.geometry.runs import equal_runs, marked_runs
 from pentapod.toolpath.curves import CurveOptions, Laying, flat_turn, projection, wrapping
 from pentapod.toolpath.draping import draped, sunk
 from pentapod.toolpath.drawing import Drawing, Order
@@ -139,10 +140,9 @@ def _dark_runs(dark: Bools, steps: Floats | None) -> list[tuple[int, int]]:
 
     What is split goes on from pixel to pixel; a run of one pixel borrows the next, or is left out at the rim.
     """
-    change = np.flatnonzero(np.diff(np.concatenate([[False], dark, [False]]).astype(np.int8)))
     runs: list[tuple[int, int]] = []
-    for a, b in change.reshape(-1, 2):
-        cuts: Ints = np.zeros(0, dtype=np.intp) if steps is None else np.flatnonzero(np.diff(steps[a:b])) + a + 1
-        ends = [int(a), *cuts.tolist(), min(max(int(b) - 1, int(a) + 1), len(dark) - 1)]
+    for a, b in marked_runs(dark).tolist():
+        starts = [a] if steps is None else (a + equal_runs(steps[a:b])[:, 0]).tolist()
+        ends = [*starts, min(max(b - 1, a + 1), len(dark) - 1)]
         runs += [(p, q) for p, q in pairwise(ends) if q > p]
     return runs

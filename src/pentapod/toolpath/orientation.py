@@ -9,6 +9,7 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.errors import ToolpathError
+from pentapod.geometry.runs import run_starts
 from pentapod.toolpath.axis_modes import AxisMode, Normal, leaned
 from pentapod.toolpath.axis_smoothing import rate_capped, smoothed, tangents
 
@@ -45,7 +46,7 @@ class Orientation:
         """
         if not runs:
             return []
-        starts = np.concatenate([[0], np.cumsum([len(contacts) for contacts, _ in runs])])
+        starts = run_starts([len(contacts) for contacts, _ in runs])
         contacts, normals = (np.concatenate([run[k] for run in runs]) for k in range(2))
         axes = self.mode.axes(contacts, normals)
         if self.lead or self.tilt:

@@ -8,6 +8,7 @@ import numpy as np
 
 from pentapod.arrays import Bools, Ints
 from pentapod.errors import ToolpathError
+from pentapod.geometry.runs import marked_runs
 from pentapod.toolpath import links
 from pentapod.toolpath.links import LinkStyle
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
@@ -69,8 +70,7 @@ def cutting_intervals(toolpath: Toolpath) -> Bools:
 
 def pass_ends(toolpath: Toolpath) -> Ints:
     """Return the waypoint (P,) at which each pass ends: the last of each run of cutting intervals."""
-    cutting = cutting_intervals(toolpath)
-    return np.flatnonzero(cutting & ~np.append(cutting[1:], False)) + 1
+    return marked_runs(cutting_intervals(toolpath))[:, 1]
 
 
 def part_of(toolpath: Toolpath, piece: Piece, style: LinkStyle) -> Toolpath:
@@ -83,20 +83,15 @@ def part_of(toolpath: Toolpath, piece: Piece, style: LinkStyle) -> Toolpath:
     chosen = piece.cuts(toolpath)
     if not chosen.any():
         raise ToolpathError("there is no cut in this piece", value=str(piece))
-    return _Parted(toolpath, style).joined(_runs(chosen))
-
-
-def _runs(chosen: Bools) -> list[tuple[int, int]]:
-    """Return the first and last waypoint of each run of chosen intervals (N − 1,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]))).reshape(-1, 2)
-    return [(int(a), int(b)) for a, b in edges]
+    return _Parted(toolpath, style).joined(marked_runs(chosen).tolist())
 
 
 class _Parted:
     def __init__(self, toolpath: Toolpath, style: LinkStyle) -> None:
         self.whole, self.style, self.cutting = toolpath, style, cutting_intervals(toolpath)
 
-    def joined(self, runs: list[tuple[int, int]]) -> Toolpath:
+    def joined(self, runs: list[list[int]]) -> Toolpath:
+        """Return what is made of runs of intervals, of which a run's end is its last waypoint."""
         last = len(self.whole) - 1
         segments = self._lead(runs[0][0])
         for k, (a, b) in enumerate(runs):

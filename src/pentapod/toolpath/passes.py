@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints, set_frozen
+from pentapod.geometry.runs import run_starts
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,7 @@ class Passes:
         """Return the passes (P,) marked in `keep`."""
         points = keep[self.pass_of_point]
         counts = np.diff(self.starts)[keep]
-        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+        starts = run_starts(counts)
         return Passes(self.points[points], self.normals[points], starts, self.levels[keep])
 
     def split(self, keep: Bools) -> Passes:
@@ -75,7 +76,7 @@ class Passes:
         long = counts >= 2
         points = keep.copy()
         points[keep] = long[run[keep]]
-        starts = np.concatenate([[0], np.cumsum(counts[long])]).astype(np.intp)
+        starts = run_starts(counts[long])
         levels = self.levels[self.pass_of_point[begins]][long]
         return Passes(self.points[points], self.normals[points], starts, levels)
 
@@ -86,7 +87,7 @@ class Passes:
     @classmethod
     def of(cls, lines: list[tuple[Floats, Floats]], levels: Ints | None = None) -> Passes:
         """Return the passes of lines, each points and normals (n, 3), n ≥ 2; by default each its own level."""
-        starts = np.concatenate([[0], np.cumsum([len(points) for points, _ in lines])]).astype(np.intp)
+        starts = run_starts([len(points) for points, _ in lines])
         points, normals = (np.concatenate([line[k] for line in lines] or [np.zeros((0, 3))]) for k in range(2))
         return cls(points, normals, starts, np.arange(len(lines)) if levels is None else levels)
 
@@ -101,13 +102,13 @@ class Passes:
         for part in parts:
             levels.append(part.levels + first)
             first += int(part.levels.max(initial=-1)) + 1
-        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+        starts = run_starts(counts)
         return cls(points, normals, starts, np.concatenate(levels))
 
     def slices(self, begins: Ints, ends: Ints) -> Passes:
         """Return runs of points begins[k] to ends[k], both included, as passes; runs may share their ends."""
         counts = ends - begins + 1
-        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+        starts = run_starts(counts)
         index = np.repeat(begins - starts[:-1], counts) + np.arange(int(counts.sum()))
         levels = self.levels[self.pass_of_point[begins]]
         return Passes(self.points[index], self.normals[index], starts, levels)

@@ -13,6 +13,7 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.directions import angle_between
+from pentapod.geometry.runs import run_starts
 from pentapod.toolpath.passes import Passes
 
 _MAX_ROUNDS = 64
@@ -65,7 +66,7 @@ def without_duplicates(passes: Passes, closest: float) -> Passes:
         if not drop.any():
             break
         counts = np.bincount(passes.pass_of_point[~drop], minlength=len(passes))
-        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+        starts = run_starts(counts)
         passes = Passes(passes.points[~drop], passes.normals[~drop], starts, passes.levels)
     return passes
 

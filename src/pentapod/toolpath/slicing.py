@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints
+from pentapod.geometry.runs import run_starts
 from pentapod.toolpath.passes import Passes
 from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.topology import components
@@ -71,7 +72,7 @@ class LevelSet:
             here, after = np.where(swap, after, here), np.where(swap, here, after)
             second = second + self.turns.ravel()[after] - self.turns.ravel()[here]
         between = np.abs(second - first)
-        return np.minimum(first, second), np.concatenate([[0], np.cumsum(between)])
+        return np.minimum(first, second), run_starts(between)
 
     def lines(self) -> Passes:
         """Return the lines, ordered by level.
@@ -181,6 +182,6 @@ def _assembled(tails: list[Floats], heads: list[Floats], chain: Ints, level: Int
 def _by_level(passes: Passes) -> Passes:
     order = np.argsort(passes.levels, kind="stable")
     counts = np.diff(passes.starts)[order]
-    starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+    starts = run_starts(counts)
     index = np.repeat(passes.starts[order] - starts[:-1], counts) + np.arange(len(passes.points))
     return Passes(passes.points[index], passes.normals[index], starts, passes.levels[order])

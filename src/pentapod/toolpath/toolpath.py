@@ -12,6 +12,7 @@ import numpy as np
 from pentapod.arrays import Floats, Ints, frozen, set_frozen
 from pentapod.errors import ToolpathError
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.geometry.runs import run_starts
 
 JOIN_TOLERANCE_M = 1e-9
 
@@ -100,7 +101,7 @@ class Toolpath:
     @cached_property
     def starts(self) -> Ints:
         """Index (S + 1,) of each segment's first waypoint, and of the last waypoint."""
-        return np.concatenate([[0], np.cumsum([len(s.tips) - 1 for s in self.segments])]).astype(np.intp)
+        return run_starts([len(s.tips) - 1 for s in self.segments])
 
     @cached_property
     def segment_of_interval(self) -> Ints:

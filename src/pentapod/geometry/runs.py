@@ -1,0 +1,27 @@
+"""Runs of neighbours in an array: where they begin and end. A run is told as Python's ranges are, its end excluded."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.arrays import Bools, Ints
+
+
+def equal_runs(values: ArrayLike) -> Ints:
+    """Return the runs (R, 2) of equal neighbours in values (N,), first and end of each: together all of 0 … N."""
+    v = np.asarray(values)
+    edges = np.concatenate([[True], v[1:] != v[:-1], [True]])
+    # Nothing has one edge only.
+    at = np.flatnonzero(edges[: len(v) + 1])
+    return np.stack([at[:-1], at[1:]], axis=1)
+
+
+def marked_runs(marked: Bools) -> Ints:
+    """Return the runs (R, 2) in which marked (N,) is true, first and end of each."""
+    return np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]))).reshape(-1, 2)
+
+
+def run_starts(counts: ArrayLike) -> Ints:
+    """Return where (R + 1,) runs of `counts` (R,) members begin that lie one behind the other, and the last ends."""
+    return np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)

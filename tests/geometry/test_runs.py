@@ -1,0 +1,38 @@
+"""Runs, against plain loops."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pentapod.geometry.runs import equal_runs, marked_runs, run_starts
+
+
+def plain_runs(values: list[int]) -> list[list[int]]:
+    """Return what a reader would do: walk along, and note where the value changes."""
+    runs: list[list[int]] = []
+    for k, value in enumerate(values):
+        if k == 0 or value != values[k - 1]:
+            runs.append([k, k])
+        runs[-1][1] = k + 1
+    return runs
+
+
+@given(st.lists(st.booleans(), max_size=30))
+def test_marked_runs(flags: list[bool]) -> None:
+    found = marked_runs(np.array(flags, dtype=np.bool_))
+    assert found.shape[1] == 2
+    assert found.tolist() == [run for run in plain_runs([int(f) for f in flags]) if flags[run[0]]]
+
+
+@given(st.lists(st.integers(0, 2), max_size=30))
+def test_equal_runs(values: list[int]) -> None:
+    found = equal_runs(np.array(values, dtype=np.intp))
+    assert found.shape[1] == 2
+    assert found.tolist() == plain_runs(values)
+
+
+@given(st.lists(st.integers(0, 4), max_size=20))
+def test_run_starts(counts: list[int]) -> None:
+    starts = run_starts(counts)
+    assert starts.dtype == np.intp
+    assert starts.tolist() == [sum(counts[:k]) for k in range(len(counts) + 1)]
