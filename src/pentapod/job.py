@@ -6,8 +6,6 @@ import hashlib
 import json
 import os
 import re
-import tomllib
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -30,9 +28,8 @@ from pentapod.job_tables import (
 )
 from pentapod.placement_table import FixtureTable, PlacementTable
 from pentapod.strategy_tables import FILE_KEYS, TABLES, ToolpathTable
+from pentapod.toml_files import first_of, line_of, parsed, read_toml, wrong_value
 
-_PLACE = re.compile(r"\(at line (\d+), column (\d+)\)")
-_START = '"pentapod new DIR" writes one to start from'
 _VARIABLE = re.compile(r"\$\{(\w+)\}")
 
 
@@ -55,14 +52,8 @@ class Job:
     def load(cls, path: str | Path) -> Job:
         """Return the job of a TOML file. Raises JobError: one line with file, key, value and remedy."""
         path = Path(path)
-        text = _read(path)
-        try:
-            content = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            place = _PLACE.search(str(error))
-            line, column = (int(place[1]), int(place[2])) if place else (len(text.splitlines()), None)
-            what = str(error).split(" (at ")[0]
-            raise JobError(f"not TOML: {what}", file=path, line=line, column=column) from error
+        text = read_toml(path, "job", JobError, start='"pentapod new DIR" writes one to start from')
+        content = parsed(text, path, JobError)
         try:
             tables = JobTables.model_validate(_tuples(content))
         except ValidationError as error:
@@ -164,23 +155,6 @@ def _sha(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _read(path: Path) -> str:
-    """Return the file's text. Raises JobError where it is missing, not readable, not text, or empty."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise JobError("no such job file", file=path, remedy='"pentapod new DIR" writes one to start from') from error
-    except UnicodeDecodeError as error:
-        raise JobError("not a text file in UTF-8", file=path, expected="a job file in TOML") from error
-    except IsADirectoryError as error:
-        raise JobError("this is a folder", file=path, expected="a job file", remedy="name the one in it") from error
-    except OSError as error:
-        raise JobError(f"cannot be read: {error.strerror}", file=path) from error
-    if not text.strip():
-        raise JobError("the job file is empty", file=path, remedy='"pentapod new DIR" writes one to start from')
-    return text
-
-
 def _tuples(value: Any) -> Any:
     """Return TOML content with its arrays as tuples, which is what the strict tables take."""
     if isinstance(value, dict):
@@ -195,7 +169,7 @@ def _resolve(job: Path, text: str, where: tuple[str, str], name: str) -> Path:
     table, key = where
 
     def wrong(what: str, **details: Any) -> JobError:
-        line = _line_of(text, (table, key))
+        line = line_of(text, (table, key))
         return JobError(what, file=job, line=line, key=f"{table}.{key}", value=name, **details)
 
     for variable in _VARIABLE.findall(name):
@@ -209,9 +183,7 @@ def _resolve(job: Path, text: str, where: tuple[str, str], name: str) -> Path:
 
 
 def _job_error(path: Path, text: str, error: ValidationError) -> JobError:
-    """Return the one JobError to show: an unknown key first, since a misspelling is also a missing key."""
-    errors = error.errors(include_url=False)
-    first = min(errors, key=lambda e: e["type"] != "extra_forbidden")
+    first = first_of(error)
     place = tuple(str(part) for part in first["loc"])
     # A place within [toolpath] is told with the strategy whose table it is; the file does not nest so.
     strategy = place[1] if len(place) > 1 and place[0] == "toolpath" and place[1] in TABLES else "raster"
@@ -219,7 +191,7 @@ def _job_error(path: Path, text: str, error: ValidationError) -> JobError:
     details = _details(first, where, strategy)
     where = (*where, details.pop("key")) if "key" in details else where
     key = ".".join(where[:2]) + "".join(f"[{index}]" for index in where[2:])
-    return JobError(file=path, line=_line_of(text, where), key=key, **details)
+    return JobError(file=path, line=line_of(text, where), key=key, **details)
 
 
 def _details(error: ErrorDetails, where: tuple[str, ...], strategy: str) -> dict[str, Any]:
@@ -240,9 +212,7 @@ def _details(error: ErrorDetails, where: tuple[str, ...], strategy: str) -> dict
             "what": f"the {kind} is missing",
             "expected": _description(where, strategy),
         }
-    message = error["msg"].removeprefix("Input should be ").removeprefix("a ").removeprefix("valid ")
-    what = "out of range" if set(context) & {"gt", "ge", "lt", "le"} else "wrong value"
-    return {"what": what, "value": error["input"], "expected": f"{message} ({_description(where, strategy)})"}
+    return wrong_value(error, _description(where, strategy))
 
 
 def _unknown(where: tuple[str, ...], strategy: str) -> dict[str, Any]:
@@ -274,16 +244,3 @@ def _description(where: tuple[str, ...], strategy: str) -> str:
         needed = [name for name, field in model.model_fields.items() if field.is_required()]
         return f"[{where[0]}]" + (" with " + ", ".join(needed) if needed else "")
     return model.model_fields[where[1]].description or ""
-
-
-def _line_of(text: str, where: Sequence[str]) -> int | None:
-    """Return the line of a key, or of its table's header: for messages, so a plain search is enough."""
-    table, header = "", None
-    for number, line in enumerate(text.splitlines(), start=1):
-        if match := re.match(r"\s*\[\s*(\w+)\s*\]", line):
-            table = match[1]
-            if table == where[0]:
-                header = number
-        elif len(where) > 1 and table == where[0] and re.match(rf"\s*{re.escape(where[1])}\s*=", line):
-            return number
-    return header

@@ -119,7 +119,7 @@ def test_missing_file_lists_what_is_shipped(tmp_path):
         Machine.load(tmp_path / "nothing.toml")
     with pytest.raises(MachineError, match='did you mean "desk"'):
         Machine.load("dsk")
-    with pytest.raises(MachineError, match="cannot be read"):
+    with pytest.raises(MachineError, match="this is a folder"):
         Machine.load(tmp_path)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import tomllib
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -21,10 +19,10 @@ from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.machine import Bodies, ControllerSettings, JointLimits, LegLimits, Machine, WorkVolume
 from pentapod.machine.tables import DrivesTable, GeometryTable, GuidesTable, MachineTables, MassesTable
 from pentapod.machine.tool_limits import ToolLimits
+from pentapod.toml_files import first_of, line_of, parsed, read_toml, wrong_value
 
 OFFSET_TOLERANCE_M = 1e-6  # offsets in a file are rounded; beyond a micrometre they mean another machine
 
-_PLACE = re.compile(r"\(at line (\d+), column (\d+)\)")
 # The key of the file that a field of the SI types comes from, where the names differ.
 _FILE_KEYS = {
     "min_length": "legs.min_length_mm",
@@ -73,25 +71,13 @@ def load_machine(name_or_path: str | Path) -> Machine:
         hint = nearest(name, shipped_machines()) if name else ""
         remedy = f"shipped machines: {known}" + (f"; {hint}" if hint.startswith("did") else "")
         raise MachineError("no such machine or machine file", file=name or '""', remedy=remedy)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise MachineError("not a text file in UTF-8", file=path, expected="a machine file in TOML") from error
-    except OSError as error:
-        raise MachineError(f"cannot be read: {error.strerror}", file=path) from error
-    if not text.strip():
-        raise MachineError("the machine file is empty", file=path)
+    text = read_toml(path, "machine", MachineError, start='"pentapod machine list" names those that ship')
     return read_machine(text, path)
 
 
 def read_machine(text: str, file: str | Path) -> Machine:
     """Return the machine that TOML text describes; `file` is named in errors. Raises MachineError."""
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        place = _PLACE.search(str(error))
-        line, column = (int(place[1]), int(place[2])) if place else (len(text.splitlines()), None)
-        raise MachineError(f"not TOML: {str(error).split(' (at ')[0]}", file=file, line=line, column=column) from error
+    content = parsed(text, file, MachineError)
     try:
         return _build(MachineTables.model_validate(content))
     except ValidationError as error:
@@ -102,7 +88,7 @@ def read_machine(text: str, file: str | Path) -> Machine:
             error.what,
             file=file,
             key=key,
-            line=_line_of(text, (key or "").split(".")),
+            line=line_of(text, (key or "").split(".")),
             value=error.value,
             expected=error.expected,
             remedy=error.remedy,
@@ -222,10 +208,9 @@ def _geometry(table: GeometryTable) -> LinearPentapod:
 
 
 def _from_pydantic(error: ValidationError, text: str, file: str | Path) -> MachineError:
-    """Return the one error to show: an unknown key first, since a misspelling is also a missing key."""
-    first = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
+    first = first_of(error)
     where = [str(part) for part in first["loc"]]
-    return MachineError(file=file, key=".".join(where[:2]), line=_line_of(text, where), **_details(first, where))
+    return MachineError(file=file, key=".".join(where[:2]), line=line_of(text, where), **_details(first, where))
 
 
 def _details(error: ErrorDetails, where: list[str]) -> dict[str, Any]:
@@ -256,25 +241,8 @@ def _details(error: ErrorDetails, where: list[str]) -> dict[str, Any]:
             "value": error["input"],
             "expected": f"{context['expected']} ({meaning})",
         }
-    message = error["msg"].removeprefix("Input should be ").removeprefix("a ").removeprefix("valid ")
-    what = "out of range" if set(context) & {"gt", "ge", "lt", "le"} else "wrong value"
-    return {"what": what, "value": error["input"], "expected": f"{message} ({meaning})"}
+    return wrong_value(error, meaning)
 
 
 def _table(name: str) -> type[BaseModel]:
     return cast("type[BaseModel]", MachineTables.model_fields[name].annotation)
-
-
-def _line_of(text: str, where: list[str]) -> int | None:
-    """Return the line of a key, or of its table's header: for messages, so a plain search is enough."""
-    table, header = "", None
-    for number, line in enumerate(text.splitlines(), start=1):
-        if match := re.match(r"\s*\[\s*(\w+)\s*\]", line):
-            table = match[1]
-            if table == where[0]:
-                header = number
-            continue
-        wanted = where[1:2] if table == where[0] else [] if table else where[:1]
-        if wanted and re.match(rf"\s*{re.escape(wanted[0])}\s*=", line):
-            return number
-    return header
