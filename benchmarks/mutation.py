@@ -32,14 +32,16 @@ ROOT = Path(__file__).resolve().parents[1]
 VERIFY = ROOT / "src" / "pentapod" / "verify"
 TESTS = ROOT / "tests" / "verify"
 _OPTIONS = ("-x", "-q", "-s", "-p", "no:cacheprovider", "-p", "no:xdist")
+_SINGLE = 10  # tests that come first from wherever they are
 _MEMORY = 4 << 30  # bytes that a mutant may ask for
 
 
 @dataclass(frozen=True)
 class Look:
-    """What a test does when it runs alone: seconds it takes, lines of verify/ that it executes."""
+    """What a test does when it runs alone: seconds of it and of its fixtures, lines of verify/ that both execute."""
 
     seconds: float
+    fixtures: float
     lines: frozenset[tuple[str, int]]
 
 
@@ -86,6 +88,11 @@ def passes(item: pytest.Item, following: pytest.Item | None) -> bool:
     return all(report.passed for report in runtestprotocol(item, log=False, nextitem=following))
 
 
+def grouped(tests: list[pytest.Item]) -> list[pytest.Item]:
+    """Return the tests with all but the first few file by file, so that the fixtures of a file are made once."""
+    return [*tests[:_SINGLE], *sorted(tests[_SINGLE:], key=lambda item: item.path)]
+
+
 def look(item: pytest.Item, out: BinaryIO) -> int:
     """Run a test alone and write what it does."""
     lines: set[tuple[str, int]] = set()
@@ -101,11 +108,12 @@ def look(item: pytest.Item, out: BinaryIO) -> int:
 
     start = time.process_time()
     sys.settrace(calls)
-    passed = passes(item, None)
+    reports = runtestprotocol(item, log=False, nextitem=None)
     sys.settrace(None)
-    names = frozenset((Path(file).name, line) for file, line in lines)
-    pickle.dump(Look(time.process_time() - start, names), out)
-    return 0 if passed else 1
+    busy = (time.process_time() - start) / sum(report.duration for report in reports)
+    fixtures, call = (busy * sum(r.duration for r in reports if r.when == when) for when in ("setup", "call"))
+    pickle.dump(Look(call, fixtures, frozenset((Path(file).name, line) for file, line in lines)), out)
+    return 0 if all(report.passed for report in reports) else 1
 
 
 def meet(it: Mutant, tests: Sequence[tuple[pytest.Item, float]], out: BinaryIO) -> int:
@@ -222,21 +230,28 @@ class Run:
             print(f"{name}: {killed} of {count} killed, {killed / count:.1%}")
 
     def _chosen(self, it: Mutant, record: Record) -> list[tuple[pytest.Item, float]]:
-        """Return the tests that a mutant has to meet, and their seconds: first what kills most in a second."""
-        statement = {(it.file.name, line) for line in it.lines}
-        of_file = [item for item, seen in self._looks.items() if any(name == it.file.name for name, _ in seen.lines)]
-        tests = [item for item in of_file if not statement.isdisjoint(self._looks[item].lines)] or of_file
+        """Return the tests that a mutant has to meet, and their seconds: first what kills most in a second.
+
+        A statement that no test executes stands outside all functions: then those that execute some of its file, and
+        those that execute nothing and look at what is there.
+        """
+        statement, looks = {(it.file.name, line) for line in it.lines}, self._looks.items()
+        tests = [item for item, seen in looks if not statement.isdisjoint(seen.lines)] or [
+            item for item, seen in looks if not seen.lines or any(name == it.file.name for name, _ in seen.lines)
+        ]
 
         def worth(item: pytest.Item) -> float:
             share = (record.kills[item.nodeid] + 0.1) / (record.runs[item.nodeid] + 1.0)
-            return share / (self._looks[item].seconds + 0.01)
+            return share / (self._looks[item].seconds + self._looks[item].fixtures + 0.01)
 
-        chosen, left = list[tuple[pytest.Item, float]](), self.given.seconds
+        chosen, begun, left = list[pytest.Item](), set[Path](), self.given.seconds
         for item in sorted(tests, key=worth, reverse=True):
-            if (left := left - self._looks[item].seconds) < 0.0 and chosen:
+            left -= self._looks[item].seconds + (0.0 if item.path in begun else self._looks[item].fixtures)
+            if left < 0.0 and chosen:
                 break
-            chosen.append((item, self._looks[item].seconds))
-        return chosen
+            begun.add(item.path)
+            chosen.append(item)
+        return [(item, self._looks[item].seconds + self._looks[item].fixtures) for item in grouped(chosen)]
 
 
 def main() -> int:
@@ -244,6 +259,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     files = sorted(file.name for file in VERIFY.glob("*.py") if file.name != "__init__.py")
     parser.add_argument("--files", nargs="*", default=files)
+    parser.add_argument("--tests", nargs="*", default=[""], help="only those of these files of tests/verify")
     parser.add_argument("--every", type=int, default=1, help="only each n-th mutant")
     parser.add_argument("--first", type=int, default=0, help="the first of those")
     parser.add_argument("--least", type=float, default=0.9, help="share that has to be killed")
@@ -252,7 +268,7 @@ def main() -> int:
     given = parser.parse_args()
     os.chdir(ROOT)
     run = Run(given)
-    code = pytest.main([*_OPTIONS, str(TESTS)], plugins=[run])
+    code = pytest.main([*_OPTIONS, *(str(TESTS / name) for name in given.tests)], plugins=[run])
     return int(code) or (0 if run.killed >= given.least * run.count else 1)
 
 

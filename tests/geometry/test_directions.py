@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pentapod.errors import ArrayError
-from pentapod.geometry import angle_between, normalised, partway, tangent_frame
+from pentapod.geometry import angle_between, arc_weights, normalised, partway, tangent_frame
 
 numbers = st.floats(-1.0, 1.0, allow_subnormal=False)
 
@@ -43,6 +43,17 @@ def test_partway_divides_the_turn_evenly_even_between_opposites() -> None:
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=1e-15)
     np.testing.assert_allclose(angle_between(a, found), share * angle_between(a, b), atol=1e-8)
     np.testing.assert_allclose(angle_between(found, b), (1 - share) * angle_between(a, b), atol=1e-8)
+
+
+def test_weights_of_an_arc_give_what_is_partway() -> None:
+    rng = np.random.default_rng(4)
+    a, share = normalised(rng.normal(size=(40, 3))), rng.uniform(0, 1, 40)
+    angle = np.concatenate([[0.0, 1e-12, 1e-8, 1e-3], rng.uniform(0.0, 3.0, 36)])[:, None]
+    b = np.cos(angle) * a + np.sin(angle) * tangent_frame(a)[0]
+    first, second = arc_weights(angle[:, 0], share)
+    np.testing.assert_allclose(first[:, None] * a + second[:, None] * b, partway(a, b, share), atol=1e-15)
+    opposite = arc_weights(np.array([np.pi]), np.array([0.25]))
+    np.testing.assert_allclose(np.concatenate(opposite), [0.75, 0.25], atol=1e-6)
 
 
 def test_small_angles_keep_their_digits() -> None:

@@ -18,7 +18,7 @@ from pentapod.toolpath.tools import BallCutter, FlatEnd, StandOff
 from pentapod.verify import Cutting, Replay, verify
 from pentapod.verify.claim import Idle
 from pentapod.verify.gouge import _rapid, gouge
-from pentapod.verify.immersion import _on_arc, _runs, _strays, _Stretches, _unresolved
+from pentapod.verify.immersion import _runs, _strays, _Stretches, _unresolved
 
 CUTS, RAPIDS = "gouge on cuts and links", "gouge on rapids"
 LARGE = 1e3  # trimesh counts in units of about this many to the metre
@@ -310,15 +310,6 @@ def test_stretches_are_cut_without_gaps():
     again = pieces.where(np.array([1, 3])).cut(8)
     assert again.starts.tolist() == [*range(67, 131, 8), 290, 298]
     assert again.ends.tolist() == [*range(75, 132, 8), 298, 300]
-
-
-@pytest.mark.parametrize("angle", [0.0, 1e-3, 0.9])
-def test_places_on_an_arc_are_unit_vectors_at_their_share_of_the_angle(angle):
-    first, last = np.array([[0.0, 0.0, 1.0]]), np.array([[np.sin(angle), 0.0, np.cos(angle)]])
-    share = np.linspace(0.0, 1.0, 11)
-    found = _on_arc(first, last, np.array([angle]), np.zeros(11, dtype=int), share[:, None])
-    expected = np.stack([np.sin(share * angle), 0.0 * share, np.cos(share * angle)], axis=1)
-    np.testing.assert_allclose(found, expected, atol=1e-15)
 
 
 def test_what_is_far_away_counts_as_a_millimetre(cubic):

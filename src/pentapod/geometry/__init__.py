@@ -13,7 +13,7 @@ from pentapod.geometry.bernstein import (
     to_power,
     unscaled,
 )
-from pentapod.geometry.directions import angle_between, normalised, partway, tangent_frame
+from pentapod.geometry.directions import angle_between, arc_weights, normalised, partway, tangent_frame
 from pentapod.geometry.level_set import enclosed_volume, zero_surface
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.positivity import Positivity, positivity
@@ -25,6 +25,7 @@ __all__ = [
     "RigidTransform",
     "angle_between",
     "arc_length",
+    "arc_weights",
     "convolve",
     "derivative",
     "elevate",

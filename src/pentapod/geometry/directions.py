@@ -43,6 +43,18 @@ def partway(start: Floats, end: Floats, share: Floats) -> Floats:
     return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
 
 
+def arc_weights(angle: Floats, share: Floats) -> tuple[Floats, Floats]:
+    """Return a and b, so that a·start + b·end lies `share`, 0 to 1, of the way on the arc of this angle between them.
+
+    angle, share: of one shape. The arc of two unit vectors, evenly; equal or opposite ones have none, and are joined by
+    the straight line.
+    """
+    sine = np.sin(angle)
+    bent = sine > 1e-9
+    a = np.divide(np.sin((1.0 - share) * angle), sine, out=1.0 - share, where=bent)
+    return a, np.divide(np.sin(share * angle), sine, out=share.copy(), where=bent)
+
+
 def tangent_frame(directions: ArrayLike) -> tuple[Floats, Floats]:
     """Return unit t1, t2 (..., 3) with (t1, t2, direction) right-handed. Directions are unit.
 

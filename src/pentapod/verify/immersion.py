@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.arrays import Bools, Floats, Ints
-from pentapod.geometry.directions import angle_between
+from pentapod.geometry.directions import angle_between, arc_weights
 from pentapod.kinematics.blocks import blocks
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.solids import Solid
@@ -177,19 +177,9 @@ def _stray(replay: Replay, of: _Stretches, counts: Ints, lever: float) -> Floats
     if lever == 0.0:
         return aside + away
     angle = angle_between(first, last)
-    swung = replay.axes[sample] - _on_arc(first, last, angle, owner, share)
+    a, b = arc_weights(angle[owner, None], share)
+    swung = replay.axes[sample] - (a * first[owner] + b * last[owner])
     apart = np.maximum.reduceat(np.linalg.norm(swung, axis=1), begins) + 0.125 * angle**2
     tilt = np.arcsin(np.minimum(apart, 1.0)) + np.maximum.reduceat(replay.survey.turned[chord], begins)
     # An axis as far as a radius from the arc may point anywhere.
     return np.where((angle < _WIDEST) & (apart < 1.0), aside + away + lever * tilt, np.inf)
-
-
-def _on_arc(first: Floats, last: Floats, angle: Floats, owner: Ints, share: Floats) -> Floats:
-    """Return unit vectors at a share (K, 1) of the arcs from first to last (n, 3), of angles (n,)."""
-    sine = np.sin(angle)
-    arc = (sine > 1e-9)[owner, None]
-    safe = np.where(sine > 1e-9, sine, 1.0)[owner, None]
-    wide = angle[owner, None]
-    a = np.where(arc, np.sin((1.0 - share) * wide) / safe, 1.0 - share)
-    b = np.where(arc, np.sin(share * wide) / safe, share)
-    return a * first[owner] + b * last[owner]

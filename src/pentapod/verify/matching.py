@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints
-from pentapod.geometry.directions import angle_between
+from pentapod.geometry.directions import angle_between, arc_weights
 from pentapod.geometry.polyline import arc_length
 from pentapod.kinematics.blocks import blocks
 from pentapod.verify.visits import Course, Visits, find_visits
@@ -66,10 +66,10 @@ def match(motion: Course, path: Course, tolerance: float) -> Match:
             continue
         found = _measure(motion, path, visits, _places(motion, path, turning, tolerance, visits.times))
         distances = np.concatenate([found.distances, found.waypoint_distances])
-        badness = (float((distances > tolerance).sum()), float(distances.max()))
-        if badness < least:
-            best, least = found, badness
-        if not badness[0]:
+        farther = int((distances > tolerance).sum())
+        if (farther, float(distances.max())) < least:
+            best, least = found, (farther, float(distances.max()))
+        if not farther:
             break
     if best is None:
         visits = Visits(_by_arc_length(motion.points, arc), np.ones(len(arc), dtype=np.bool_))
@@ -101,7 +101,7 @@ def _turning(path: Course, tolerance: float) -> Bools:
 def _by_arc_length(samples: Floats, arc: Floats) -> Floats:
     """Return visits (n,) by the fraction of the way: for motions that no search can match."""
     way = arc_length(samples)
-    return np.interp(arc / max(arc[-1], 1e-300), way / max(way[-1], 1e-300), np.arange(len(way), dtype=np.float64))
+    return np.interp(arc * way[-1], way * arc[-1], np.arange(len(way), dtype=np.float64))
 
 
 def _measure(motion: Course, path: Course, visits: Visits, places: Floats) -> Match:
@@ -136,8 +136,8 @@ def _fractions(motion: Course, path: Course, turning: Bools, tolerance: float, i
     step = np.diff(path.points, axis=0)
     square = np.einsum("ij,ij->i", step, step)
     off = motion.points - path.points[interval]
-    along = np.einsum("ij,ij->i", off, step[interval]) / np.where(square > 0.0, square, 1.0)[interval]
-    along = np.clip(along, 0.0, 1.0)
+    along, length = np.einsum("ij,ij->i", off, step[interval]), square[interval]
+    along = np.clip(np.divide(along, length, out=np.zeros_like(along), where=length > 0.0), 0.0, 1.0)
     spot = np.flatnonzero(turning[interval])
     if len(spot):
         k = interval[spot]
@@ -165,10 +165,5 @@ def _at(path: Course, turns: Floats, places: Floats) -> tuple[Floats, Floats]:
     k = np.minimum(places.astype(np.intp), len(path.points) - 2)
     f = places - k
     points = path.points[k] * (1.0 - f)[:, None] + path.points[k + 1] * f[:, None]
-    angle = turns[k]
-    sine = np.sin(angle)
-    arc = sine > 1e-6
-    safe = np.where(arc, sine, 1.0)
-    a = np.where(arc, np.sin((1.0 - f) * angle) / safe, 1.0 - f)
-    b = np.where(arc, np.sin(f * angle) / safe, f)
+    a, b = arc_weights(turns[k], f)
     return points, a[:, None] * path.axes[k] + b[:, None] * path.axes[k + 1]

@@ -14,7 +14,6 @@ from scipy.spatial import KDTree
 from pentapod.arrays import Bools, Floats, Ints
 
 _MAX_PAIRS = 6_000_000  # chord–waypoint pairs that one search may hold in memory
-_CLASSES = 24  # chord lengths are sorted into classes that double twice each, from the radius up
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,21 +49,20 @@ def find_visits(motion: Course, path: Course, arc: Floats, radius: float, axis_w
     n, last = len(path.points), len(motion.points) - 1
     passes = _passes(motion, path, axis_weight, radius, pairs)
     chosen = _in_order(passes, n)
-    seen = chosen >= 0
+    missed = chosen < 0
+    seen = ~missed
     low, high, best = np.zeros(n), np.full(n, float(last)), np.zeros(n)
-    low[seen], high[seen] = passes.enter[chosen[seen]], passes.leave[chosen[seen]]
-    best[seen] = passes.best[chosen[seen]]
-    # Whatever else is seen, both begin together and end together.
+    for times, of in ((low, passes.enter), (high, passes.leave), (best, passes.best)):
+        times[seen] = of[chosen[seen]]
+        # Whatever else is seen, both begin together and end together.
+        times[[0, -1]] = 0.0, last
     seen[[0, -1]] = True
-    low[0] = high[0] = best[0] = 0.0
-    low[-1] = high[-1] = best[-1] = last
     # The earliest and the latest times that keep the order, and the closest moments squeezed between them.
     best = _settled(motion, path, axis_weight, chosen, passes, best)
     low, best = np.maximum.accumulate(low), np.maximum.accumulate(best)
     high = np.minimum.accumulate(high[::-1])[::-1]
     times = np.minimum(np.maximum(best, low), high)
-    times = np.maximum.accumulate(np.where(seen, times, np.interp(arc, arc[seen], times[seen])))
-    return Visits(np.clip(times, 0.0, last), chosen < 0)
+    return Visits(np.maximum.accumulate(np.where(seen, times, np.interp(arc, arc[seen], times[seen]))), missed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,16 +78,16 @@ class _Passes:
 def _pairs(samples: Floats, waypoints: Floats, radius: float) -> tuple[Ints, Ints] | None:
     """Return waypoints and chords (P,) that may come within the radius, sorted by waypoint, then chord."""
     middles, lengths = 0.5 * (samples[:-1] + samples[1:]), np.linalg.norm(np.diff(samples, axis=0), axis=1)
-    # Long chords would widen the search for all: each class has a tree of its own.
-    classes = np.clip(np.ceil(np.log2(np.maximum(lengths / radius, 1.0)) / 2.0), 0, _CLASSES).astype(np.intp)
-    tree, found = _tree(waypoints), list[tuple[Ints, Ints]]()
-    total = 0
+    # Long chords would widen the search for all: each class has a tree of its own, and is twice as long as the last.
+    classes = np.ceil(np.log2(np.maximum(lengths / radius, 1.0)))
+    searches: list[tuple[Ints, KDTree, float]] = []
     for k in np.unique(classes):
         members = np.flatnonzero(classes == k)
-        reach, other = radius + 0.5 * float(lengths[members].max()), _tree(middles[members])
-        total += int(tree.count_neighbors(other, reach))
-        if total > _MAX_PAIRS:
-            return None
+        searches.append((members, _tree(middles[members]), radius + 0.5 * float(lengths[members].max())))
+    tree, found = _tree(waypoints), list[tuple[Ints, Ints]]()
+    if sum(int(tree.count_neighbors(other, reach)) for _, other, reach in searches) > _MAX_PAIRS:
+        return None
+    for members, other, reach in searches:
         close = tree.sparse_distance_matrix(other, reach, output_type="ndarray")
         found.append((close["i"].astype(np.intp), members[close["j"].astype(np.intp)]))
     waypoint = np.concatenate([w for w, _ in found])
@@ -109,20 +107,19 @@ def _passes(motion: Course, path: Course, axis_weight: Floats, radius: float, pa
     step, away = _differences(motion.points, path.points, chord, waypoint)
     # |away − t step|² ≤ radius²: one stretch of each chord, by a quadratic in t.
     a, b, c = _dot(step, step), _dot(step, away), _dot(away, away) - radius * radius
-    moving = a > 0.0
-    safe = np.where(moving, a, 1.0)
-    discriminant = np.where(moving, b * b - a * c, np.where(c <= 0.0, 0.0, -1.0))
+    moving, discriminant = a > 0.0, b * b - a * c
     root = np.sqrt(np.maximum(discriminant, 0.0))
-    enter = np.where(moving, np.clip((b - root) / safe, 0.0, 1.0), 0.0)
-    leave = np.where(moving, np.clip((b + root) / safe, 0.0, 1.0), 1.0)
-    inside = (discriminant >= 0.0) & np.where(moving, (b - root <= a) & (b + root >= 0.0), True)
+    enter = np.maximum(np.divide(b - root, a, out=np.zeros_like(a), where=moving), 0.0)
+    leave = np.minimum(np.divide(b + root, a, out=np.ones_like(a), where=moving), 1.0)
+    # Where the motion stands a and b are 0, and so is the discriminant.
+    inside = (discriminant >= 0.0) & (b - root <= a) & (b + root >= 0.0) & (moving | (c <= 0.0))
     waypoint, chord, enter, leave = waypoint[inside], chord[inside], enter[inside], leave[inside]
     if not len(waypoint):
-        return _Passes(waypoint, *np.zeros((3, 0)))
+        return _Passes(waypoint, *np.zeros((3, len(waypoint))))
     closest, cost = _closest(motion, path, axis_weight, waypoint, chord)
     # A stay goes on over consecutive chords as long as the sample between them is inside.
     new = np.ones(len(waypoint), dtype=np.bool_)
-    new[1:] = (np.diff(waypoint) != 0) | (np.diff(chord) != 1) | (leave[:-1] < 1.0) | (enter[1:] > 0.0)
+    new[1:] = (np.diff(waypoint * len(motion.points) + chord) != 1) | (leave[:-1] < 1.0)
     first = np.flatnonzero(new)
     last = np.append(first[1:], len(new)) - 1
     order = np.lexsort((cost, np.cumsum(new)))
@@ -136,8 +133,8 @@ def _closest(motion: Course, path: Course, axis_weight: Floats, waypoint: Ints, 
     turn, apart = _differences(motion.axes, path.axes, chord, waypoint)
     weight = axis_weight[waypoint]
     square = _dot(step, step) + weight * _dot(turn, turn)
-    t = (_dot(step, away) + weight * _dot(turn, apart)) / np.where(square > 0.0, square, 1.0)
-    t = np.clip(np.where(square > 0.0, t, 0.0), 0.0, 1.0)
+    along = _dot(step, away) + weight * _dot(turn, apart)
+    t = np.clip(np.divide(along, square, out=np.zeros_like(square), where=square > 0.0), 0.0, 1.0)
     off, turned = away - t[:, None] * step, apart - t[:, None] * turn
     return t, _dot(off, off) + weight * _dot(turned, turned)
 
@@ -148,11 +145,11 @@ def _in_order(passes: _Passes, n: int) -> Ints:
     Taking the earliest is optimal: any other choice leaves the later waypoints less time. The choice for a
     waypoint depends on the one before, so this is a loop, over plain numbers: 0.3 µs a waypoint.
     """
-    first = np.searchsorted(passes.waypoint, np.arange(n + 1)).tolist()
+    first, behind = (np.searchsorted(passes.waypoint, np.arange(n), side).tolist() for side in ("left", "right"))
     enter, leave = passes.enter.tolist(), passes.leave.tolist()
-    chosen, now = [-1] * n, 0.0
+    chosen, now = [-1] * n, -np.inf
     for k in range(n):
-        c, end = first[k], first[k + 1]
+        c, end = first[k], behind[k]
         while c < end and leave[c] < now:
             c += 1
         if c < end:
@@ -170,26 +167,25 @@ def _settled(motion: Course, path: Course, axis_weight: Floats, chosen: Ints, pa
     """
     late = np.maximum.accumulate(best) > best
     early = np.minimum.accumulate(best[::-1])[::-1] < best
-    doubtful = (chosen >= 0) & (late | early | (axis_weight > 0.0))
+    doubtful = (chosen >= 0) & (late | early | axis_weight.astype(np.bool_))
     doubtful[[0, -1]] = False
     edges = np.flatnonzero(np.diff(np.concatenate([[False], doubtful, [False]])))
     settled = best.copy()
-    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for start, stop in edges.reshape(-1, 2).tolist():
         stays: list[tuple[int, Floats, Floats]] = []
         for k in range(start, stop):
-            first = int(passes.enter[chosen[k]])
-            last = min(int(passes.leave[chosen[k]]), len(motion.points) - 2)
+            first, last = (min(int(x[chosen[k]]), len(motion.points) - 2) for x in (passes.enter, passes.leave))
             chords = np.arange(first, last + 1)
             place, cost = _closest(motion, path, axis_weight, np.full(len(chords), k), chords)
             if stays:
                 before, _, sums = stays[-1]
-                reach = np.minimum(chords - before, len(sums) - 1)
-                cost = cost + np.where(reach >= 0, np.minimum.accumulate(sums)[np.maximum(reach, 0)], np.inf)
+                reached = np.minimum.accumulate(sums).take(chords - before, mode="clip")
+                cost = cost + np.where(chords >= before, reached, np.inf)
             stays.append((first, place, cost))
-        limit = np.inf
+        limit = len(motion.points)
         for k in range(stop - 1, start - 1, -1):
             first, place, cost = stays[k - start]
-            at = int(np.argmin(cost[: max(1, int(min(limit - first + 1, len(cost))))]))
+            at = int(np.argmin(cost[: limit - first + 1]))
             limit, settled[k] = first + at, first + at + place[at]
     return settled
 
