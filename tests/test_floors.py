@@ -33,6 +33,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
             "job_strategy",
             "job_surroundings",
             "job_tool",
+            "job_values",
             "outcome",
             "clock",
             "plan_arrays",

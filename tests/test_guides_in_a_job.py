@@ -9,14 +9,17 @@ from importlib import resources
 import numpy as np
 import pytest
 
+from pentapod import pipeline
 from pentapod.errors import InputError, MachineError, ProgramError
 from pentapod.job import Job
 from pentapod.job_surroundings import job_surroundings
+from pentapod.job_values import job_machine, job_mesh, program_toolpath
 from pentapod.machine.machine import Machine
-from pentapod.pipeline import job_machine, job_mesh, judge, program_toolpath, run
+from pentapod.pipeline import judge, run
 from pentapod.planning import PlacedPath
 from pentapod.program import read_csv
 from pentapod.program.posts import PostInput
+from pentapod.refusal import Refusal
 from pentapod.report import write_report
 from pentapod.view import Motion, open_run
 
@@ -83,6 +86,19 @@ def test_guides_from_the_plan_to_the_verdict(job, tmp_path):
         changed.write_text(text.replace(line, f"# guides_mm = {stand}\n"))
         with pytest.raises(ProgramError, match="five numbers of mm"):
             read_csv(changed)
+
+
+def test_where_guides_were_to_stand_is_kept_of_a_job_without_a_program(job, tmp_path, monkeypatch):
+    """A time law that is refused leaves a placement, which is looked at with the guides where it wants them."""
+    monkeypatch.setattr(pipeline, "retime", lambda *_, **__: Refusal("timing", "no law"))
+    outcome = run(job, tmp_path)
+    assert outcome.refusal.cause == "no law"
+    assert not (tmp_path / "program.csv").exists()
+    slides = outcome.find(PlacedPath).placement.slides
+    assert any(slides)
+    with np.load(tmp_path / "plan.npz") as archive:
+        np.testing.assert_allclose(archive["placed.guides_mm"], 1e3 * np.array(slides), atol=1e-9)
+    np.testing.assert_array_equal(open_run(tmp_path).machine.slides, slides)
 
 
 def test_machine_files_with_guides(machine_file):

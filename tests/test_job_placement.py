@@ -8,7 +8,7 @@ import pytest
 from pentapod.errors import JobError
 from pentapod.job import Job
 from pentapod.job_placement import job_freedom
-from pentapod.pipeline import job_machine, job_mesh
+from pentapod.job_values import job_machine, job_mesh
 from pentapod.planning import Freedom
 from pentapod.planning.freedom import FREE
 

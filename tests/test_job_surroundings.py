@@ -8,7 +8,8 @@ import trimesh
 from pentapod.errors import JobError, MeshError
 from pentapod.job import Job
 from pentapod.job_surroundings import job_surroundings
-from pentapod.pipeline import job_machine, job_mesh, job_toolpath, judge, run
+from pentapod.job_values import job_machine, job_mesh, job_toolpath
+from pentapod.pipeline import judge, run
 from pentapod.toolpath.stl import write_stl
 
 HELD = "diameter_mm = 10\nshank_mm = [[20, 8, 8]]\nholder_mm = [[25, 20, 30]]"

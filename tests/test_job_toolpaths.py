@@ -13,7 +13,8 @@ from pentapod.cli.main import run as run_cli
 from pentapod.errors import JobError
 from pentapod.geometry import angle_between
 from pentapod.job import Job
-from pentapod.pipeline import job_mesh, job_toolpath, run
+from pentapod.job_values import job_mesh, job_toolpath
+from pentapod.pipeline import run
 from pentapod.toolpath import SegmentKind
 from pentapod.toolpath.formats import read_toolpath
 

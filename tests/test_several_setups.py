@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from pentapod import pipeline
 from pentapod.cli.main import run as command
 from pentapod.cli.new import dome_stl
 from pentapod.errors import InputError, JobError
+from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.outcome import SetUps
@@ -21,6 +23,8 @@ from pentapod.report import write_report
 from pentapod.toolpath import Toolpath
 from pentapod.toolpath.parting import cutting_intervals
 from pentapod.view import open_run
+from pentapod.view.panel import run_words
+from pentapod.view.replan import replanned
 from usual_job import job_text
 
 EACH = {"program.csv", "plan.npz", "verdict.json"}
@@ -72,6 +76,30 @@ def test_each_set_up_is_looked_at_by_itself(done):
         open_run(out)
     second = outcome.find(SetUps).parts[1]
     assert open_run(out / second.folder).program.duration == second.duration
+
+
+def test_a_set_up_is_planned_anew_by_itself(done, job, tmp_path, capsys):
+    """Elsewhere, and without its program: the piece is known from the arrays as well."""
+    whole, outcome = done
+    second = outcome.find(SetUps).parts[1]
+    shutil.copytree(job.parent, tmp_path / "copy")
+    folder = tmp_path / "copy" / whole.name / second.folder
+    (folder / "program.csv").unlink()
+    before = open_run(folder)
+    assert before.piece == second.piece
+    assert "One of several set-ups" in run_words(before)
+    shifted = RigidTransform(before.placement.rotation, before.placement.translation + np.array([0.002, 0.0, 0.0]))
+    anew = replanned(before, shifted)
+    assert anew.outcome.passed
+    assert anew.run.piece == second.piece
+    made, planned = anew.run.toolpath, second.outcome.find(Toolpath)
+    np.testing.assert_array_equal(made.tips, planned.tips)
+    assert not (anew.folder / "setup-1").exists()
+    head = job.read_text().split("[placement]")[0]
+    (tmp_path / "copy" / "second.toml").write_text(f"{head}{anew.table}\n")
+    program = anew.folder / "program.csv"
+    assert command(["verify", str(program), "--job", str(tmp_path / "copy" / "second.toml"), "--strict", "-q"]) == 0
+    assert capsys.readouterr().err == ""
 
 
 def test_every_cut_is_made_once(done):

@@ -16,7 +16,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 
 from pentapod.arrays import Floats
 from pentapod.job import Job
-from pentapod.pipeline import job_mesh, job_toolpath
+from pentapod.job_values import job_mesh, job_toolpath
 from pentapod.toolpath import Mesh, PathReport, SegmentKind, Toolpath
 
 FOLDER = Path(__file__).parent

@@ -35,7 +35,7 @@ _VARIABLE = re.compile(r"\$\{(\w+)\}")
 
 @dataclass(frozen=True)
 class Job:
-    """What a job file says. Units are as in the file; `pentapod.pipeline` turns them into SI values.
+    """What a job file says. Units are as in the file; `pentapod.job_values` and its neighbours turn them into SI.
 
     path: the job file. mesh_path, fixture_mesh, machine_file and files, by their keys in [toolpath]: resolved against
     the job file's folder.

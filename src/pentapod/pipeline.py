@@ -10,37 +10,31 @@ import numpy as np
 
 from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, unstaged, write_arrays, write_json
 from pentapod.clock import Clock
-from pentapod.errors import InputError, MachineError, MeshError
 from pentapod.job import Job
 from pentapod.job_cutting import job_cutting
 from pentapod.job_placement import job_freedom, job_weights
-from pentapod.job_strategy import job_options
 from pentapod.job_surroundings import job_surroundings
-from pentapod.job_tool import FileReport, Reports, finished_as_asked, job_link_style, job_tool
+from pentapod.job_tool import job_link_style
+from pentapod.job_values import job_machine, job_mesh, job_piece, job_toolpath
 from pentapod.kinematics.component import Component
-from pentapod.machine.machine import ControllerSettings, Machine
+from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import Surroundings
-from pentapod.machine.tool_limits import ToolLimits
 from pentapod.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
 from pentapod.plan_arrays import arrays_of
 from pentapod.planning import Freedom, LegPath, PlacedPath, Placement, leg_path, plan
 from pentapod.planning.plan import Wishes, fits
 from pentapod.planning.setups import setups
-from pentapod.program import Program, Provenance, read_header, sample, write_csv
+from pentapod.program import Program, Provenance, sample, write_csv
 from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
-from pentapod.strategy_tables import FileTable
 from pentapod.timing import Explanation, Trajectory, certify, explain, retime, unheld
-from pentapod.toolpath import Mesh, Tool, Toolpath, load_mesh, toolpath_with_report
-from pentapod.toolpath.formats import read_toolpath
+from pentapod.toolpath import Toolpath
 from pentapod.toolpath.links import LinkStyle
 from pentapod.toolpath.parting import Piece, cutting_intervals, part_of
 from pentapod.verify import Verdict, verify
 from pentapod.version import __version__
 
 _MM = 1e-3
-_MM_MIN = 1e-3 / 60.0
-_LARGEST_TOLERANCE = 0.1  # of the part's largest extent
 
 Writer = Callable[[Outcome, Path], object]
 
@@ -50,11 +44,13 @@ def run(
     out: str | Path,
     progress: Progress = silent,
     *,
+    piece: Piece | None = None,
     writers: Mapping[str, Writer] | None = None,
 ) -> Outcome:
     """Plan a job, write program.csv, plan.npz and verdict.json into `out`, and return what was reached.
 
-    writers: further files, by name, each made from the outcome (the report, which stands above this floor).
+    piece: of the job's toolpath, where only that is to be planned, in one set-up. writers: further files, by name,
+    each made from the outcome (the report, which stands above this floor).
     The program is judged from the file, as it was written. What cannot be done ends in an outcome with a
     refusal: verdict.json says so, and there is no program. The folder changes when the run ends: an
     error or an interruption leaves it as it was. Raises InputError for a bad job, mesh, machine or folder.
@@ -65,13 +61,18 @@ def run(
     machine = job_machine(job)
     mesh = clock.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
     freedom, surroundings = job_freedom(job, machine, mesh), job_surroundings(job, machine, mesh)
-    toolpath, _ = clock.time("toolpath", lambda: job_toolpath(job, mesh, progress), says=lambda made: str(made[1]))
-    task = _Task(job, machine, toolpath, freedom, surroundings, clock)
+    if piece is None:
+        toolpath, _ = clock.time("toolpath", lambda: job_toolpath(job, mesh, progress), says=lambda made: str(made[1]))
+    else:
+        made = clock.time("toolpath", lambda: (job_piece(job, mesh, piece, progress), piece), says=lambda _: str(piece))
+        toolpath = made[0]
+    task = _Task(job, machine, toolpath, freedom, surroundings, clock, piece)
     with staged(folder) as staging:
         outcome = _reached(task, staging, writers or {})
-        if outcome.refusal is not None and outcome.refusal.stage == "placement" and job.placement.setups > 1:
+        refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
+        if refusal is not None and refusal.stage == "placement" and splits:
             style = job_link_style(job, mesh, toolpath)
-            outcome = _split(task, style, outcome.refusal, staging, writers or {})
+            outcome = _split(task, style, refusal, staging, writers or {})
     return outcome
 
 
@@ -113,7 +114,7 @@ def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, write
     for number, piece in enumerate(found, start=1):
         clock.progress("set-ups", (number - 1) / len(found), f"planning {number} of {len(found)}")
         own, part = Clock(clock.progress), part_of(toolpath, piece, style)
-        own.stages += [*before, Stage("toolpath", 0.0, part, f"set-up {number} of {len(found)}: {piece}")]
+        own.stages += [*before, Stage("toolpath", 0.0, (part, piece), f"set-up {number} of {len(found)}: {piece}")]
         folder = staging / SetUp.folder_of(number)
         folder.mkdir()
         own_task = dataclasses.replace(task, toolpath=part, clock=own, piece=piece)
@@ -123,77 +124,6 @@ def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, write
     done = SetUps(tuple(parts), int(cutting.sum()), int((times != cutting).sum()))
     clock.stages.append(Stage("set-ups planned", sum(part.seconds for part in parts), done, str(done)))
     return _written(Outcome(job, task.machine, tuple(clock.stages), done.verdict), staging, writers, clock.progress)
-
-
-def job_machine(job: Job) -> Machine:
-    """Return the job's machine, with its tool length, controller settings and tool limits. Raises MachineError."""
-    machine = Machine.load(job.machine_file or str(job.machine.name))
-    controller = ControllerSettings(
-        period=machine.controller.period if job.output.period_ms is None else job.output.period_ms * 1e-3,
-        interpolation=job.output.interpolation or machine.controller.interpolation,
-    )
-    length = machine.tool_length if job.tool.length_mm is None else job.tool.length_mm * _MM
-    limits = machine.tool_limits.and_(ToolLimits.of(job.feed))
-    try:
-        return dataclasses.replace(machine, controller=controller, tool_length=length, tool_limits=limits)
-    except MachineError as error:
-        raise job.error("tool", "length_mm", error.what) from error
-
-
-def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
-    """Return the job's mesh. Raises MeshError, or JobError where unit or tolerances do not go with it."""
-    part = job.part
-    try:
-        mesh = load_mesh(job.mesh_path, part.unit, scale=part.scale, repair=part.repair, progress=progress)
-    except MeshError as error:
-        if error.key != "unit":
-            raise
-        raise job.error("part", "unit", error.what, expected=error.expected, remedy=error.remedy) from error
-    extent = float(np.ptp(mesh.bounds, axis=0).max())
-    for key in ("chordal_mm", "path_mm"):
-        if getattr(job.tolerance, key) * _MM > _LARGEST_TOLERANCE * extent:
-            raise job.error(
-                "tolerance",
-                key,
-                f"the tolerance is too large for the part, whose largest extent is {extent / _MM:.4g} mm",
-                expected=f"at most {_LARGEST_TOLERANCE * extent / _MM:.3g}",
-                remedy="check part.unit and part.scale",
-            )
-    return mesh
-
-
-def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Toolpath, Reports]:
-    """Return the job's toolpath, workpiece frame, and what it came to.
-
-    Raises ToolpathError where nothing is there to machine, or the toolpath file cannot be read.
-    """
-    tool = job_tool(job)
-    toolpath, report = _drawn(job, mesh, tool)
-    toolpath, gouges = finished_as_asked(job, mesh, tool, toolpath, progress)
-    if job.feed.dwell_s is not None:
-        toolpath = toolpath.stopping(job.feed.dwell_s)
-    return toolpath, Reports((report, gouges))
-
-
-def program_toolpath(job: Job, mesh: Mesh, program: Path, progress: Progress = silent) -> Toolpath:
-    """Return the toolpath that a program file is about: the job's, or its set-up's piece of it."""
-    toolpath, _ = job_toolpath(job, mesh, progress)
-    try:
-        piece = read_header(program).provenance.piece
-    except InputError:  # the verdict says what is wrong with the file
-        return toolpath
-    return toolpath if piece is None else part_of(toolpath, piece, job_link_style(job, mesh, toolpath))
-
-
-def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
-    """Return the toolpath as a strategy lays it or a file tells it, and what that came to."""
-    if isinstance(job.toolpath, FileTable):
-        file = job.file("file")
-        read = read_toolpath(file, job.toolpath.format, pivot=tool.pivot, feed=job.feed.cut_mm_min * _MM_MIN)
-        # Whatever the file says of its tool, this job's is the one that moves.
-        read = dataclasses.replace(read, pivot=tool.pivot)
-        return read, FileReport(file.name, len(read), len(read.segments))
-    return toolpath_with_report(mesh, tool, job_options(job))
 
 
 def judge(

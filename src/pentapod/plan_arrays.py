@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +18,20 @@ from pentapod.planning.placed_path import PlacedPath
 from pentapod.program.program import Program
 from pentapod.timing.trajectory import Trajectory
 from pentapod.toolpath.formats.npz import toolpath_arrays
+from pentapod.toolpath.parting import Piece
 from pentapod.toolpath.toolpath import Toolpath
 
 Arrays = dict[str, NDArray[Any]]
 _MM = 1e3
 
-
 JOB_FILE = "job.file"
 """The job file that the run was made from: relative to the run's folder where there is such a way."""
+
+GUIDES = "placed.guides_mm"
+"""Where the guides of a reconfigurable machine are to stand, slides (5,) along them."""
+
+WAYPOINTS, BOX = "setup.waypoints", "setup.box_mm"
+"""Of one of several set-ups: its piece of the job's toolpath, first and last waypoint (2,) and corners (2, 3)."""
 
 
 def arrays_of(outcome: Outcome, folder: Path) -> Arrays:
@@ -35,6 +42,8 @@ def arrays_of(outcome: Outcome, folder: Path) -> Arrays:
     arrays: Arrays = {JOB_FILE: np.array(_way(outcome.job.path, folder))}
     if (toolpath := outcome.find(Toolpath)) is not None:
         arrays |= toolpath_arrays(toolpath)
+    if (piece := outcome.find(Piece)) is not None:
+        arrays |= _set_up(piece)
     if (placed := outcome.find(PlacedPath)) is not None:
         arrays |= _placed(placed)
     if (path := outcome.find(LegPath)) is not None:
@@ -60,8 +69,32 @@ def matrix_mm(transform: RigidTransform) -> Floats:
     return matrix
 
 
+def piece_in(arrays: Mapping[str, NDArray[Any]]) -> Piece | None:
+    """Return the piece of the job's toolpath that a run is about; None where it is about all of it."""
+    if WAYPOINTS not in arrays:
+        return None
+    first, last = arrays[WAYPOINTS].tolist()
+    (x, y, z), (far_x, far_y, far_z) = (_metres(corner) for corner in arrays[BOX])
+    return Piece(first, last, (x, y, z), (far_x, far_y, far_z))
+
+
+def guides_in(arrays: Mapping[str, NDArray[Any]]) -> list[float] | None:
+    """Return where the placement wants the guides, slides (5,) in metres; None where there are none."""
+    return _metres(arrays[GUIDES]) if GUIDES in arrays else None
+
+
+def _metres(values_mm: Floats) -> list[float]:
+    """Return metres to the nanometre: those of whole micrometres, as the planner sets them, come back bit for bit."""
+    return [round(value / _MM, 9) for value in values_mm.tolist()]
+
+
+def _set_up(piece: Piece) -> Arrays:
+    return {WAYPOINTS: np.array([piece.first, piece.last]), BOX: np.array([piece.low, piece.high]) * _MM}
+
+
 def _placed(placed: PlacedPath) -> Arrays:
-    return {
+    slides = placed.placement.slides
+    return ({} if slides is None else {GUIDES: np.array(slides) * _MM}) | {
         "placed.placement_mm": matrix_mm(placed.placement.transform),
         "placed.component": np.array(placed.component, dtype=np.int8),
         "placed.tips_mm": placed.tips * _MM,

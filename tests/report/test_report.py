@@ -19,8 +19,9 @@ from pentapod.geometry import RigidTransform
 from pentapod.job import Job
 from pentapod.job_placement import job_freedom, rotation_angles_deg
 from pentapod.job_surroundings import job_surroundings
+from pentapod.job_values import job_machine, job_mesh
 from pentapod.outcome import Outcome
-from pentapod.pipeline import job_machine, job_mesh, run
+from pentapod.pipeline import run
 from pentapod.planning import PlacedPath
 from pentapod.program import Program
 from pentapod.report import write_report

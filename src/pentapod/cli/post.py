@@ -86,8 +86,8 @@ def _machine(program: Program, job: Path | None, machine: str | None) -> Machine
     """Return the machine that was named, or the shipped one of the program's name; None where there is none."""
     from pentapod.errors import MachineError
     from pentapod.job import Job
+    from pentapod.job_values import job_machine
     from pentapod.machine import Machine
-    from pentapod.pipeline import job_machine
 
     if job is not None:
         return job_machine(Job.load(job))

@@ -50,7 +50,7 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
     modelled.
     """
     from pentapod.job import Job
-    from pentapod.pipeline import job_machine, job_mesh, program_toolpath
+    from pentapod.job_values import job_machine, job_mesh, program_toolpath
     from pentapod.program import read_csv
     from pentapod.program.posts import PostInput
     from pentapod.refusal import Refusal

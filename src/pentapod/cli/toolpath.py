@@ -28,7 +28,7 @@ def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet
     """
     from pentapod.geometry import arc_length
     from pentapod.job import Job
-    from pentapod.pipeline import job_mesh, job_toolpath
+    from pentapod.job_values import job_mesh, job_toolpath
     from pentapod.toolpath.formats import format_of, write_toolpath
 
     format_of(out, format_name)  # an unknown one is said at once

@@ -27,7 +27,8 @@ def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -
     """
     from pentapod.job import Job
     from pentapod.job_surroundings import job_surroundings
-    from pentapod.pipeline import job_machine, job_mesh, judge, program_toolpath
+    from pentapod.job_values import job_machine, job_mesh, program_toolpath
+    from pentapod.pipeline import judge
 
     loaded = Job.load(job)
     machine = job_machine(loaded)

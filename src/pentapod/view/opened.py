@@ -17,17 +17,18 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import Job
 from pentapod.job_surroundings import job_surroundings
 from pentapod.job_tool import job_tool
+from pentapod.job_values import job_machine, job_mesh
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import Surroundings
 from pentapod.outcome import Outcome, SetUp
-from pentapod.pipeline import job_machine, job_mesh
-from pentapod.plan_arrays import JOB_FILE
+from pentapod.plan_arrays import BOX, GUIDES, JOB_FILE, WAYPOINTS, guides_in, piece_in
 from pentapod.planning import PlacedPath
 from pentapod.program import Program, read_csv
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.formats import read_toolpath
 from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.parting import Piece
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.toolpath.tools import Tool
 
@@ -37,6 +38,7 @@ class Opened:
     """A run. placement: workpiece → machine. axes (N, 3): the chosen tool axes, workpiece frame.
 
     machine: as the program wants it.
+    piece: of the job's toolpath, where the run is one of several set-ups.
     program: None where the job was refused; then the part stands in the middle of the work volume with nominal axes,
     unless a placement was found. same_job: whether the job is still what the program was made from.
     """
@@ -53,6 +55,7 @@ class Opened:
     axes: Floats
     program: Program | None
     same_job: bool
+    piece: Piece | None = None
 
 
 def open_run(folder: str | Path, job: str | Path | None = None, progress: Progress = silent) -> Opened:
@@ -77,13 +80,15 @@ def open_run(folder: str | Path, job: str | Path | None = None, progress: Progre
     machine, mesh = job_machine(loaded), job_mesh(loaded)
     progress("open", 0.7, "program")
     program = read_csv(folder / PROGRAM) if (folder / PROGRAM).is_file() else None
-    machine = machine if program is None else program.machine(machine)
+    slides = guides_in(arrays) if program is None else program.slides
+    machine = machine if slides is None or machine.guides is None else machine.at(slides)
     wanted = loaded.placement.component
     asked = COMPONENTS[0] if wanted is None else Component.parse(wanted)
     placement, component, axes = _placed(arrays, toolpath, machine, asked)
     return Opened(
         folder, loaded, machine, mesh, job_tool(loaded), toolpath, job_surroundings(loaded, machine, mesh), placement,
         component, axes, program, program is None or program.provenance.job_digest == loaded.digest,
+        piece_in(arrays),
     )  # fmt: skip
 
 
@@ -96,13 +101,13 @@ def run_of(outcome: Outcome, folder: Path) -> Opened | None:
     job, machine, placement = outcome.job, outcome.machine, placed.placement.transform
     return Opened(
         folder, job, machine, mesh, job_tool(job), toolpath, job_surroundings(job, machine, mesh), placement,
-        placed.component, placement.inverse().rotate(placed.axes), program, same_job=True,
+        placed.component, placement.inverse().rotate(placed.axes), program, same_job=True, piece=outcome.find(Piece),
     )  # fmt: skip
 
 
 def _arrays(file: Path) -> dict[str, NDArray[Any]]:
-    """Return the arrays of the placement, as far as there are any, and of the job's file."""
-    wanted = (JOB_FILE, "placed.placement_mm", "placed.component", "placed.axes")
+    """Return the arrays of the placement and of the set-up, as far as there are any, and of the job's file."""
+    wanted = (JOB_FILE, WAYPOINTS, BOX, GUIDES, "placed.placement_mm", "placed.component", "placed.axes")
     with np.load(file, allow_pickle=False) as archive:
         return {name: np.asarray(archive[name]) for name in wanted if name in archive}
 

@@ -53,9 +53,10 @@ class Panel:
 
 def run_words(run: Opened) -> str:
     """Return what is looked at."""
+    whole = "" if run.piece is None else f"One of several set-ups, {run.piece}. "
     if run.program is None:
-        return "**Refused**: no program. Drag the part until it can be reached."
-    lines = [f"Component {run.component}, {duration(run.program.duration)}, {len(run.toolpath):,} waypoints."]
+        return f"{whole}**Refused**: no program. Drag the part until it can be reached."
+    lines = [f"{whole}Component {run.component}, {duration(run.program.duration)}, {len(run.toolpath):,} waypoints."]
     if not run.same_job:
         lines.append("The job was changed since: the program is that of an earlier one.")
     return " ".join(lines)

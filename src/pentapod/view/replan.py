@@ -20,7 +20,10 @@ FOLDER = "replanned"
 
 @dataclass(frozen=True, eq=False)
 class Replanned:
-    """What planning anew came to. run: to be looked at, None where it was refused. table: for the job file."""
+    """What planning anew came to. run: to be looked at, None where it was refused.
+
+    table: for the job file; of one of several set-ups for a copy of it, for the others stand elsewhere.
+    """
 
     outcome: Outcome
     run: Opened | None
@@ -29,11 +32,11 @@ class Replanned:
 
 
 def replanned(run: Opened, placement: RigidTransform, progress: Progress = silent) -> Replanned:
-    """Plan the run's job with its part fixed at a placement, all artefacts included.
+    """Plan the run's job, or its set-up's piece of it, with the part fixed at a placement, all artefacts included.
 
     The program's job is the run's with `table` as its [placement]: with that in the job file, `verify` knows it.
     """
     job = job_at(run.job, placement)
     folder = run.folder if run.folder.name == FOLDER else run.folder / FOLDER
-    outcome = run_job(job, folder, progress, writers={REPORT: write_report})
+    outcome = run_job(job, folder, progress, piece=run.piece, writers={REPORT: write_report})
     return Replanned(outcome, run_of(outcome, folder), folder, placement_toml(job.placement))

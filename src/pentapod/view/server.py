@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from pentapod.errors import InputError, PentapodError
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.toolpath.parting import Piece
 from pentapod.view.motion import Motion
 from pentapod.view.opened import Opened
 from pentapod.view.panel import Panel, place_words, reach_words, stance_words
@@ -175,4 +176,5 @@ def _came_to(done: Replanned) -> str:
     if refusal is not None:
         return f"**Refused**: {refusal}"
     answer = "The verdict passed" if done.outcome.passed else "**The verdict failed**"
-    return f"{answer}. Files: `{done.folder}`. For the job file:\n```toml\n{done.table}\n```"
+    where = "the job file" if done.outcome.find(Piece) is None else "a copy of the job file, for this set-up alone"
+    return f"{answer}. Files: `{done.folder}`. For {where}:\n```toml\n{done.table}\n```"
