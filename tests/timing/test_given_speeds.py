@@ -81,6 +81,21 @@ def test_cubics_ring_where_accelerations_jump():
         retime(arc(), machine(interpolation="cubic"), limit_jerk=False, start_speed=0.05)
 
 
-def test_who_stands_first_starts_at_rest():
-    with pytest.raises(InputError):
-        retime(Path(arc().pieces, (0.1, 0.0)), machine(), start_speed=0.05)
+@pytest.mark.parametrize(("before", "after"), [(0, 0), (1, 0), (0, 1), (2, 2)])
+def test_who_stands_at_an_end_is_at_rest_there(before, after):
+    """Also where the dwell stands beyond pieces of no length, which are passed over."""
+    spot = straight([0.0] * 5, 0.0, start=arc().pieces[0](np.array([0.0]), 0)[0])
+    there = straight([0.0] * 5, 0.0, start=arc().pieces[0](np.array([0.1]), 0)[0])
+    pieces = (spot,) * before + arc().pieces + (there,) * after
+    standing = np.zeros(len(pieces) + 1)
+    for at in range(before + 1):
+        path = Path(pieces, tuple(standing + 0.1 * (np.arange(len(standing)) == at)))
+        with pytest.raises(InputError, match=r"start_speed: the path stands there for 0\.1 s"):
+            retime(path, machine(), start_speed=0.05)
+        assert isinstance(retime(path, machine(), end_speed=0.05), Trajectory)
+    for at in range(before + 1, len(standing)):
+        path = Path(pieces, tuple(standing + 0.1 * (np.arange(len(standing)) == at)))
+        with pytest.raises(InputError, match="end_speed: the path stands there"):
+            retime(path, machine(), end_speed=0.05)
+        motion = retime(path, machine(), start_speed=0.05)
+        assert motion.station(0.0, 1) == pytest.approx(0.05, rel=1e-9)

@@ -238,6 +238,21 @@ def test_obj_reads_what_another_reader_reads(tmp_path, ball):
     assert not notes
 
 
+def test_what_a_comment_of_a_ply_announces_is_not_counted(tmp_path, ball):
+    """A comment, or an obj_info line, may hold any words, those of an element too; what is announced is counted."""
+    told = b"comment element vertex 999\nobj_info element face 7\ncomment\n  comment property float x\n"
+    head = PLY_HEAD % 3 + PLY_FACES % 1
+    path = tmp_path / "told.ply"
+    for place in (b"element vertex", b"element face", b"end_header"):
+        path.write_bytes(head.replace(place, told + place) + PLY_POINTS + b"3 0 1 2\n")
+        mesh = load_mesh(path, "mm")
+        assert (len(mesh.vertices), len(mesh.faces)) == (3, 1)
+    short = (PLY_HEAD % 3 + PLY_FACES % 2).replace(b"element face", told + b"element face")
+    path.write_bytes(short + PLY_POINTS + b"3 0 1 2\n")
+    with pytest.raises(MeshError, match="announces 2 facets, the file holds 1"):
+        load_mesh(path, "mm")
+
+
 def test_bytes_after_the_last_facet_are_noted(tmp_path, ball):
     path = tmp_path / "ball.stl"
     path.write_bytes(write_stl(ball, "ball") + b"\0\0")

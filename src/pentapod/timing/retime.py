@@ -50,14 +50,9 @@ def retime(
     Raises InputError where a margin is not in (0, 0.5), for an unknown engine, for a speed below 0 or next to a dwell,
     or for a speed with a cubic controller whose jerks are not limited.
     """
-    for name, speed, dwell in (("start_speed", start_speed, path.dwells[0]), ("end_speed", end_speed, path.dwells[-1])):
-        if not 0.0 <= speed < np.inf or (speed > 0.0 and dwell > 0.0):
-            raise InputError("must be a speed", key=name, value=speed, expected="m/s, 0 or more; 0 where a dwell is")
-    for name, margin in (("velocity_margin", velocity_margin), ("acceleration_margin", acceleration_margin)):
-        if not 0.0 < margin < 0.5:
-            raise InputError("a margin is a fraction of a limit", key=name, value=margin, expected="0 < margin < 0.5")
-    cubic = machine.controller.interpolation == "cubic"
-    if cubic and not limit_jerk and max(start_speed, end_speed) > 0.0:
+    _check_margins(velocity_margin, acceleration_margin)
+    cubic, goes_on = machine.controller.interpolation == "cubic", _goes_on(start_speed, end_speed)
+    if cubic and goes_on and not limit_jerk:
         raise InputError(
             "given speeds need limited jerks where the controller joins setpoints by cubics, which ring where "
             "accelerations jump", key="limit_jerk", value=limit_jerk, expected="true",
@@ -73,6 +68,8 @@ def retime(
     if wrong is not None:
         return wrong
     indices = [k for k, piece in enumerate(path.pieces) if piece.length > STILL_M]
+    dwells = _dwells(path, indices, period)
+    _check_standing(start_speed, end_speed, dwells)
     total = sum(path.pieces[k].length for k in indices)
     profiles: list[PieceProfile] = []
     done = 0.0
@@ -85,8 +82,7 @@ def retime(
         profiles.append(profile)
         done += path.pieces[k].length
         progress("timing", done / total, f"piece {len(profiles)} of {len(indices)}")
-    dwells = _dwells(path, indices, period)
-    if cubic or limit_jerk or max(start_speed, end_speed) > 0.0:
+    if cubic or limit_jerk or goes_on:
         smoothed = sampled_laws(profiles, machine, dwells, smooth=limit_jerk)
         if isinstance(smoothed, Unmended):
             return refusal(path, indices[smoothed.index], smoothed.failure)
@@ -95,6 +91,28 @@ def retime(
         laws = [_plain_law(p, period) for p in profiles]
     profile = _profile(path, indices, profiles, laws, dwells, smooth=limit_jerk)
     return Trajectory(path, tuple(indices), tuple(laws), profile, dwells)
+
+
+def _check_margins(velocity: float, acceleration: float) -> None:
+    for name, margin in (("velocity_margin", velocity), ("acceleration_margin", acceleration)):
+        if not 0.0 < margin < 0.5:
+            raise InputError("a margin is a fraction of a limit", key=name, value=margin, expected="0 < margin < 0.5")
+
+
+def _goes_on(start: float, end: float) -> bool:
+    """Return whether the motion is part of a longer one. Raises InputError for speeds that are none."""
+    for name, speed in (("start_speed", start), ("end_speed", end)):
+        if not 0.0 <= speed < np.inf:
+            raise InputError("must be a speed", key=name, value=speed, expected="m/s, 0 or more")
+    return max(start, end) > 0.0
+
+
+def _check_standing(start: float, end: float, dwells: Floats) -> None:
+    """Raise InputError where there is a speed before the first of the dwells (L + 1,) or after the last."""
+    for name, speed, dwell in (("start_speed", start, dwells[0]), ("end_speed", end, dwells[-1])):
+        if speed > 0.0 and dwell > 0.0:
+            what = f"the path stands there for {dwell:.6g} s"
+            raise InputError(what, key=name, value=speed, expected="0 m/s", remedy="or take the dwell out of the path")
 
 
 def _plain_law(profile: PieceProfile, period: float) -> MotionLaw:

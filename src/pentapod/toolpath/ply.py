@@ -71,11 +71,11 @@ def _through_trimesh(path: Path, data: bytes) -> tuple[Floats, Ints]:
 def _check_counts(path: Path, header: bytes, vertices: int, faces: int) -> None:
     """Raise MeshError where the header announces more than was read."""
     announced = {m[1]: int(m[2]) for m in _ELEMENT.finditer(header)}
-    for name, found in ((b"face", faces), (b"vertex", vertices)):
+    for name, what, found in ((b"face", "facets", faces), (b"vertex", "vertices", vertices)):
         # Of a cloud of points, which has no facets at all, something better is said later.
         if announced.get(name, 0) > found and announced.get(b"face", 0):
             raise MeshError(
-                f"truncated: the header announces {announced[name]:,} {name.decode()}, the file holds {found:,}",
+                f"truncated: the header announces {announced[name]:,} {what}, the file holds {found:,}",
                 file=path,
                 remedy="export the mesh again",
             )
