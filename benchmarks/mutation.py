@@ -32,7 +32,7 @@ ROOT = Path(__file__).resolve().parents[1]
 VERIFY = ROOT / "src" / "pentapod" / "verify"
 TESTS = ROOT / "tests" / "verify"
 _OPTIONS = ("-x", "-q", "-s", "-p", "no:cacheprovider", "-p", "no:xdist")
-_SINGLE = 10  # tests that come first from wherever they are
+_SINGLE = 3  # tests that come first from wherever they are
 _MEMORY = 4 << 30  # bytes that a mutant may ask for
 
 
@@ -185,6 +185,9 @@ class Run:
         print(f"each seen alone, {time.perf_counter() - start:.0f} s", flush=True)
         sites = [(VERIFY / name, *place) for name in self.given.files for place in places(VERIFY / name)]
         todo = [made for site in sites[self.given.first :: self.given.every] if (made := mutant(*site)) is not None]
+        if self.given.among is not None:
+            named = self.given.among.read_text(encoding="utf-8")
+            todo = [it for it in todo if it.told in named]
         self._all(todo)
         print(f"{self.killed} of {self.count} mutants killed: {self.killed / self.count:.1%}")
         return True
@@ -240,9 +243,11 @@ class Run:
             item for item, seen in looks if not seen.lines or any(name == it.file.name for name, _ in seen.lines)
         ]
 
+        sharing = Counter(item.path for item in tests)
+
         def worth(item: pytest.Item) -> float:
             share = (record.kills[item.nodeid] + 0.1) / (record.runs[item.nodeid] + 1.0)
-            return share / (self._looks[item].seconds + self._looks[item].fixtures + 0.01)
+            return share / (self._looks[item].seconds + self._looks[item].fixtures / sharing[item.path] + 0.01)
 
         chosen, begun, left = list[pytest.Item](), set[Path](), self.given.seconds
         for item in sorted(tests, key=worth, reverse=True):
@@ -262,6 +267,7 @@ def main() -> int:
     parser.add_argument("--tests", nargs="*", default=[""], help="only those of these files of tests/verify")
     parser.add_argument("--every", type=int, default=1, help="only each n-th mutant")
     parser.add_argument("--first", type=int, default=0, help="the first of those")
+    parser.add_argument("--among", type=Path, help="only those named in this file: the survivors of another run, say")
     parser.add_argument("--least", type=float, default=0.9, help="share that has to be killed")
     parser.add_argument("--seconds", type=float, default=30.0, help="of tests until a mutant counts as a survivor")
     parser.add_argument("--processes", type=int, default=1, help="mutants that run at the same time")

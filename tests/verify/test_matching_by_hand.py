@@ -98,20 +98,20 @@ def test_axes_are_compared_where_a_waypoint_is_visited():
 
 
 def crowd(x, stands=0):
-    """Motion and path so dense, for a tolerance of 10 m, that the search would fill the memory."""
+    """Motion and path of 2 m so dense, for a tolerance of 20 m, that the search would fill the memory."""
     motion = course(np.concatenate([np.full(stands, x[0]), x]))
-    return match(motion, course(np.linspace(0.0, 1.0, 3001) ** 2), 10.0)
+    return match(motion, course(2.0 * np.linspace(0.0, 1.0, 3001) ** 2), 20.0)
 
 
 def test_what_no_search_can_match_is_matched_by_the_way_gone():
-    found = crowd(np.linspace(0.0, 2.0, 3001))
+    found = crowd(np.linspace(0.0, 3.0, 3001))
     np.testing.assert_allclose(found.times, 3000.0 * np.linspace(0.0, 1.0, 3001) ** 2, atol=1e-6)
-    np.testing.assert_allclose(found.arcs, np.linspace(0.0, 1.0, 3001), atol=1e-3)
+    np.testing.assert_allclose(found.arcs, np.linspace(0.0, 2.0, 3001), atol=2e-3)
     assert found.missed.all()
-    assert found.distances.max() <= 1.0 + 1e-9
+    assert found.distances.max() == pytest.approx(1.0)
 
 
 def test_while_it_stands_at_the_start_it_is_at_the_start():
-    found = crowd(np.linspace(0.0, 1.0, 3001), stands=100)
+    found = crowd(np.linspace(0.0, 2.0, 3001), stands=100)
     assert (found.places[:100] == 0.0).all()
-    assert found.distances.max() <= 1e-3
+    assert found.distances.max() <= 2e-3

@@ -7,7 +7,7 @@ import numpy as np
 from pentapod.arrays import Floats
 from pentapod.kinematics.blocks import blocks
 from pentapod.machine.clearance import clearances, pair_names
-from pentapod.verify.claim import Claim, Finding
+from pentapod.verify.claim import MM, Claim, Finding
 from pentapod.verify.replay import Replay
 
 _BLOCK = 32  # samples
@@ -44,7 +44,7 @@ def clearance(replay: Replay) -> Finding:
         f"{pair_names(machine)[pair]} come closest; proven bound for all times, surface to surface: at the rows and "
         "halfway between, less the largest approach possible on the way to the next sample"
     )
-    return Finding(least > 0.0, 1e3 * least, 0.0, "mm", replay.place(at), method)
+    return Finding(least > 0.0, MM * least, 0.0, "mm", replay.place(at), method)
 
 
 def _around(chords: Floats) -> Floats:

@@ -13,6 +13,13 @@ from pentapod.verify.verdict import Certificate, Place
 ALLOWANCE = 1e-3
 """Relative allowance on deviations, feeds, leg rates and accelerations: rounding, and limits met exactly."""
 
+MM = 1e3  # in a metre: verdicts are told in millimetres
+
+
+def with_allowance(bound: float) -> float:
+    """Return up to where a value passes that should not exceed a bound."""
+    return bound * (1.0 + ALLOWANCE)
+
 
 @dataclass(frozen=True)
 class Finding:

@@ -13,7 +13,7 @@ from pentapod.machine.surroundings import LEGS, TOOL_BODY, MovingBodies, Obstacl
 from pentapod.machine.tool_clearance import leg_tool_gaps
 from pentapod.toolpath.solids import Solid
 from pentapod.verify.approach import Stray, approach
-from pentapod.verify.claim import Claim, Finding
+from pentapod.verify.claim import MM, Claim, Finding
 from pentapod.verify.replay import Replay
 
 _FAR_M, _TOOL_FAR_M = 0.1, 0.01
@@ -64,16 +64,16 @@ def _clear(replay: Replay, *, obstacle: Obstacle, surroundings: Surroundings, co
     found = approach(replay, gaps, lambda stray: _moves(stray, surroundings.tool)[:, columns], offsets, bound=bound)
     name, most = surroundings.names[columns[found.column]], _TOOL_FAR_M if tool else _FAR_M
     if found.least > bound and _enclosed(replay, obstacle, frame, columns):
-        return Finding(False, None, 1e3 * bound, "mm", replay.place(0), f"{name} is inside the {obstacle.name}")
+        return Finding(False, None, MM * bound, "mm", replay.place(0), f"{name} is inside the {obstacle.name}")
     method = f"{name} comes closest; exact distance of its body from the mesh's facets, {_PROVEN}"
     if not found.proven:
         method = f"{name}: not proven; {method}"
     elif found.least <= bound:
         method = f"{name} is in the {obstacle.name}; exact at this moment, others may be worse"
     elif found.least >= 0.5 * most:
-        method = f"nothing comes near; distances were looked at up to {1e3 * most:g} mm; {_PROVEN}"
-    value = 1e3 * found.least
-    return Finding(found.least > bound, value, 1e3 * bound, "mm", replay.place(found.sample), method)
+        method = f"nothing comes near; distances were looked at up to {MM * most:g} mm; {_PROVEN}"
+    value = MM * found.least
+    return Finding(found.least > bound, value, MM * bound, "mm", replay.place(found.sample), method)
 
 
 def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
@@ -93,7 +93,7 @@ def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
         f"leg {found.column + 1} comes closest; distance of its body from shank and holder in the plane of leg and "
         f"tool axis, {_PROVEN}"
     )
-    return Finding(found.least > 0.0, 1e3 * found.least, 0.0, "mm", replay.place(found.sample), method)
+    return Finding(found.least > 0.0, MM * found.least, 0.0, "mm", replay.place(found.sample), method)
 
 
 def _offsets(machine: Machine, tool: tuple[Solid, ...]) -> Floats:

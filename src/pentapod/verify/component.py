@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pentapod.verify.claim import Claim, Finding
+from pentapod.verify.claim import MM, Claim, Finding
 from pentapod.verify.replay import Replay
 
 _METHOD = (
@@ -25,7 +25,7 @@ def off_singular_plane(replay: Replay) -> Finding:
     """Judge that S keeps the sign of the component: no configuration with det J = 0 because of S = 0."""
     found = replay.survey.component.away
     # |S| / √(δ²w² + (1 − δu)²) is the distance to S = 0 at fixed orientation; the root is ≤ 1 + |δ|.
-    least = -1e3 * float(found.values[0]) / (1.0 + abs(replay.machine.pentapod.delta))
+    least = -MM * float(found.values[0]) / (1.0 + abs(replay.machine.pentapod.delta))
     what = "lower bound of the position's distance to S = 0,"
     return _finding(replay, least, int(found.at[0]), "mm", what)
 
@@ -42,7 +42,7 @@ def _finding(replay: Replay, least: float, interval: int, unit: str, what: str) 
             answer += f", first from {(interval + start) * period:.6f} to {(interval + stop) * period:.6f} s"
             answer += f"; {found.refuted} intervals refuted, {found.undecided} undecided"
     method = _METHOD.format(
-        answer=answer, component=replay.program.component, what=what, error=1e3 * replay.path_tolerance
+        answer=answer, component=replay.program.component, what=what, error=MM * replay.path_tolerance
     )
     return Finding(passed, least, 0.0, unit, replay.place(2 * interval), method)
 

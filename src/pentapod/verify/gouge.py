@@ -8,7 +8,7 @@ import numpy as np
 
 from pentapod.arrays import Bools
 from pentapod.toolpath.toolpath import SegmentKind
-from pentapod.verify.claim import Claim, Finding, Idle
+from pentapod.verify.claim import MM, Claim, Finding, Idle
 from pentapod.verify.cutting import Cutting
 from pentapod.verify.immersion import Immersion, immersion
 from pentapod.verify.replay import Replay
@@ -28,15 +28,15 @@ def gouge(replay: Replay, *, rapid: bool) -> Finding | Idle:
     bound = allowed + replay.path_tolerance
     thickness = max(solid.thickness for solid in cutting.cutter)
     if bound >= thickness:
-        return Idle(f"{1e3 * bound:g} mm are allowed, and nothing is deeper in a cutter this thin", unknown=True)
+        return Idle(f"{MM * bound:g} mm are allowed, and nothing is deeper in a cutter this thin", unknown=True)
     found = immersion(replay, cutting.surface, cutting.cutter, chords, bound=bound)
     passed, inside = found.most <= bound, _enclosed(replay, cutting)
     if passed and inside:
-        return Finding(False, None, 1e3 * bound, "mm", replay.place(0), "the cutter begins inside the part")
-    method = _method(found, bound) + f"; allowed: {1e3 * replay.path_tolerance:g} mm off the toolpath"
+        return Finding(False, None, MM * bound, "mm", replay.place(0), "the cutter begins inside the part")
+    method = _method(found, bound) + f"; allowed: {MM * replay.path_tolerance:g} mm off the toolpath"
     if not rapid:
-        method += f", and {1e3 * cutting.depth:g} mm that count as none or are engraved"
-    return Finding(passed, 1e3 * found.most, 1e3 * bound, "mm", replay.place(found.sample), method)
+        method += f", and {MM * cutting.depth:g} mm that count as none or are engraved"
+    return Finding(passed, MM * found.most, MM * bound, "mm", replay.place(found.sample), method)
 
 
 def _method(found: Immersion, bound: float) -> str:

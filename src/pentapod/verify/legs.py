@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.arrays import Floats
+from pentapod.program.program import Program
 from pentapod.program.resolution import QUANTA_PER_M
-from pentapod.verify.claim import ALLOWANCE, Claim, Finding
+from pentapod.verify.claim import ALLOWANCE, MM, Claim, Finding, with_allowance
 from pentapod.verify.replay import Replay
 from pentapod.verify.survey import Extreme
 
@@ -55,7 +56,7 @@ def acceleration(replay: Replay) -> Finding:
 def jerk(replay: Replay) -> Finding:
     """Judge the jerk of every leg, with rest before the first row and after the last."""
     found, limit, program = replay.survey.jerks, replay.machine.legs.max_jerk, replay.program
-    rounding = _ROUNDED[program.interpolation] / QUANTA_PER_M / program.period**3
+    rounding = jerk_of_rounding(program)
     leg = int(np.argmax(found.values / limit))
     value, bound = float(found.values[leg]), float(limit[leg])
     method = (
@@ -65,17 +66,22 @@ def jerk(replay: Replay) -> Finding:
     )
     method += (
         "a step of acceleration at either end counts over one period; "
-        f"{JERK_ALLOWANCE:.0%} allowed, and {1e3 * rounding:.3g} mm/s³ for the rounding of the rows"
+        f"{JERK_ALLOWANCE:.0%} allowed, and {MM * rounding:.3g} mm/s³ for the rounding of the rows"
     )
     allowed = bound * (1.0 + JERK_ALLOWANCE) + rounding
     return _finding(replay, value <= allowed, (value, bound, "mm/s³"), (int(found.at[leg]), leg), method, allowed)
+
+
+def jerk_of_rounding(program: Program) -> float:
+    """Return the jerk, m/s³, that rounding the rows of a program can add to a leg's."""
+    return _ROUNDED[program.interpolation] / QUANTA_PER_M / program.period**3
 
 
 def _below(replay: Replay, found: Extreme, limit: Floats, unit: str, method: str) -> Finding:
     """Judge the largest of each leg against limits (5,), both SI."""
     leg = int(np.argmax(found.values / limit))
     value, bound = float(found.values[leg]), float(limit[leg])
-    allowed = bound * (1.0 + ALLOWANCE)
+    allowed = with_allowance(bound)
     method += f"; {ALLOWANCE:.1%} allowed"
     return _finding(replay, value <= allowed, (value, bound, unit), (int(found.at[leg]), leg), method, allowed)
 
@@ -90,9 +96,9 @@ def _finding(
 ) -> Finding:
     """Return the finding on (value, bound, unit), lengths in metres as in allowed, at (row, leg)."""
     (value, bound, unit), (row, leg) = found, at
-    allowed = None if allowed is None else 1e3 * allowed
+    allowed = None if allowed is None else MM * allowed
     method = f"leg {leg + 1} is closest to its limit; {method}"
-    return Finding(passed, 1e3 * value, 1e3 * bound, unit, replay.place(2 * row), method, allowed)
+    return Finding(passed, MM * value, MM * bound, unit, replay.place(2 * row), method, allowed)
 
 
 CLAIMS = (

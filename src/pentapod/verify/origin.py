@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.verify.claim import Claim, Finding, Idle
+from pentapod.verify.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay import Replay
 from pentapod.verify.verdict import Place
 
@@ -38,8 +38,8 @@ def guides(replay: Replay) -> Finding | Idle:
     if slides is None:
         return Finding(False, None, 0.0, "mm", Place(), "the header does not say where the guides stand")
     least, greatest = machine.guides.travel.T
-    rooms = 1e3 * np.minimum(np.array(slides) - least, greatest - np.array(slides))
-    stand = ", ".join(f"{1e3 * slide:.6g}" for slide in slides)
+    rooms = MM * np.minimum(np.array(slides) - least, greatest - np.array(slides))
+    stand = ", ".join(f"{MM * slide:.6g}" for slide in slides)
     method = f"header: guides at {stand} mm; the least room to an end of their travel"
     return Finding(bool(rooms.min() >= 0.0), float(rooms.min()), 0.0, "mm", Place(), method)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.toolpath.toolpath import SegmentKind
-from pentapod.verify.claim import ALLOWANCE, Claim, Finding, Idle
+from pentapod.verify.claim import ALLOWANCE, MM, Claim, Finding, Idle, with_allowance
 from pentapod.verify.replay import Replay
 
 _MM_MIN = 60e3  # mm/min in 1 m/s
@@ -39,7 +39,7 @@ def feed(replay: Replay, kind: SegmentKind) -> Finding | Idle:
         f"speed of {whose}, {'from row to row' if linear else 'proven bound for all times'}, {which}; within the path "
         f"tolerance of a segment's end the faster of both feeds counts; {ALLOWANCE:.1%} allowed"
     )
-    allowed, where = bound * (1.0 + ALLOWANCE), replay.place(int(chords[worst]))
+    allowed, where = with_allowance(bound), replay.place(int(chords[worst]))
     told = (_MM_MIN * value, _MM_MIN * bound, "mm/min", where, method, _MM_MIN * allowed)
     return Finding(value <= allowed, *told)
 
@@ -90,8 +90,8 @@ def rest(replay: Replay, *, at_end: bool) -> Finding:
         f"greatest acceleration changes in one period; {ALLOWANCE:.1%} allowed"
     )
     where = replay.place(2 * len(rows) - 2 if at_end else 0)
-    allowed = bound * (1.0 + ALLOWANCE)
-    return Finding(value <= allowed, 1e3 * value, 1e3 * bound, "mm/s", where, method, 1e3 * allowed)
+    allowed = with_allowance(bound)
+    return Finding(value <= allowed, MM * value, MM * bound, "mm/s", where, method, MM * allowed)
 
 
 CLAIMS = (

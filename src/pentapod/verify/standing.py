@@ -7,7 +7,7 @@ import numpy as np
 from pentapod.arrays import Bools
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length
-from pentapod.verify.claim import ALLOWANCE, Claim, Finding, Idle
+from pentapod.verify.claim import MM, Claim, Finding, Idle, with_allowance
 from pentapod.verify.replay import Replay
 
 STILL_M = 1e-9
@@ -32,9 +32,9 @@ def exact_stops(replay: Replay) -> Finding | Idle:
         f"of {len(stops)} stops the one where most is left of the legs' speed, over the slowest period within the path "
         f"tolerance of it; the bound is what leg {leg + 1}'s greatest acceleration changes in one period"
     )
-    allowed = bound * (1.0 + ALLOWANCE)
+    allowed = with_allowance(bound)
     place = replay.place(2 * worst)
-    return Finding(value <= allowed, 1e3 * value, 1e3 * bound, "mm/s", place, method, 1e3 * allowed)
+    return Finding(value <= allowed, MM * value, MM * bound, "mm/s", place, method, MM * allowed)
 
 
 def dwells(replay: Replay) -> Finding | Idle:
@@ -48,7 +48,7 @@ def dwells(replay: Replay) -> Finding | Idle:
     value, bound = stood[worst], asked[worst][2]
     method = (
         f"of {len(asked)} dwells the one that falls short most, or is exceeded least: the longest time without a leg "
-        f"moving more than {1e3 * STILL_M:g} mm from row to row, within the path tolerance of the place"
+        f"moving more than {MM * STILL_M:g} mm from row to row, within the path tolerance of the place"
     )
     return Finding(value >= bound - _SECONDS, value, bound, "s", replay.place(2 * asked[worst][0]), method)
 

@@ -9,51 +9,47 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.geometry.interpolant import Interpolant, largest_length
-from pentapod.program.resolution import QUANTA_PER_M
-from pentapod.verify.claim import ALLOWANCE, Claim, Finding, Idle
-from pentapod.verify.legs import JERK_ALLOWANCE
+from pentapod.verify.claim import ALLOWANCE, MM, Claim, Finding, Idle, with_allowance
+from pentapod.verify.legs import JERK_ALLOWANCE, jerk_of_rounding
 from pentapod.verify.replay import Replay
 
-_ROUNDED = {"linear": 40.0, "cubic": 120.0}
-"""Quanta by the period cubed that rounding the rows may add to the tip's jerk: tenfold what it may add to a leg's."""
+_DEG = 180.0 / np.pi  # in a radian
+_ROUNDED = 10.0
+"""What rounding the rows may add to the tip's jerk, by what it may add to a leg's."""
 
 
 def acceleration(replay: Replay) -> Finding:
     """Judge the tip's acceleration."""
     limit = replay.machine.tool_limits.max_tip_acceleration
-    values = np.linalg.norm(_tip(replay).second, axis=1)
+    largest = _largest(np.linalg.norm(_tip(replay).second, axis=1))
     method = f"second derivative of what joins the program's tips, at its rows; {ALLOWANCE:.1%} allowed"
-    return _below(replay, values, limit, (1e3, "mm/s²", limit * (1.0 + ALLOWANCE)), method)
+    return _below(replay, largest, limit, (MM, "mm/s²", with_allowance(limit)), method)
 
 
 def jerk(replay: Replay) -> Finding:
     """Judge the tip's jerk."""
-    limit, period = replay.machine.tool_limits.max_tip_jerk, replay.program.period
-    rounding = _ROUNDED[replay.program.interpolation] / QUANTA_PER_M / period**3
+    limit, rounding = replay.machine.tool_limits.max_tip_jerk, _ROUNDED * jerk_of_rounding(replay.program)
     method = (
         "third derivative of what joins the program's tips, between its rows; "
-        f"{JERK_ALLOWANCE:.0%} allowed, and {1e3 * rounding:.3g} mm/s³ for the rounding of the rows"
+        f"{JERK_ALLOWANCE:.0%} allowed, and {MM * rounding:.3g} mm/s³ for the rounding of the rows"
     )
     allowed = limit * (1.0 + JERK_ALLOWANCE) + rounding
-    return _below(replay, _tip(replay).jerk_lengths, limit, (1e3, "mm/s³", allowed), method)
+    return _below(replay, _largest(_tip(replay).jerk_lengths), limit, (MM, "mm/s³", allowed), method)
 
 
 def axis_velocity(replay: Replay) -> Finding:
     """Judge how fast the tool axis turns."""
     limit = replay.machine.tool_limits.max_axis_velocity
-    steps = _axis(replay).steps
-    fastest, row = largest_length(steps)
-    values = np.where(np.arange(len(steps)) == row, fastest, 0.0)
     method = f"largest rate of what joins the program's tool axes, rows and between; {ALLOWANCE:.1%} allowed"
-    return _below(replay, values, limit, (float(np.degrees(1.0)), "deg/s", limit * (1.0 + ALLOWANCE)), method)
+    return _below(replay, largest_length(_axis(replay).steps), limit, (_DEG, "deg/s", with_allowance(limit)), method)
 
 
 def axis_acceleration(replay: Replay) -> Finding:
     """Judge the angular acceleration of the tool axis."""
     limit = replay.machine.tool_limits.max_axis_acceleration
     method = f"angular acceleration of what joins the program's tool axes, at its rows; {ALLOWANCE:.1%} allowed"
-    values = _axis(replay).turn_accelerations
-    return _below(replay, values, limit, (float(np.degrees(1.0)), "deg/s²", limit * (1.0 + ALLOWANCE)), method)
+    largest = _largest(_axis(replay).turn_accelerations)
+    return _below(replay, largest, limit, (_DEG, "deg/s²", with_allowance(limit)), method)
 
 
 def _tip(replay: Replay) -> Interpolant:
@@ -71,11 +67,17 @@ def _joined(replay: Replay, rows: Floats) -> Interpolant:
     return Interpolant.through(rows, replay.program.period, replay.program.interpolation)
 
 
-def _below(replay: Replay, values: Floats, limit: float, told: tuple[float, str, float], method: str) -> Finding:
-    """Judge values (N or N − 1,) against a limit; told: factor and unit in which to tell them, and what is allowed."""
-    factor, unit, allowed = told
+def _largest(values: Floats) -> tuple[float, int]:
+    """Return the largest of values (N or N − 1,) and its row."""
     row = int(np.argmax(values))
-    value = float(values[row])
+    return float(values[row]), row
+
+
+def _below(
+    replay: Replay, found: tuple[float, int], limit: float, told: tuple[float, str, float], method: str
+) -> Finding:
+    """Judge a value and its row against a limit; told: factor and unit in which to tell both, and what is allowed."""
+    (value, row), (factor, unit, allowed) = found, told
     return Finding(
         value <= allowed, factor * value, factor * limit, unit, replay.place(2 * row), method, factor * allowed
     )

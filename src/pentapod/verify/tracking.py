@@ -14,7 +14,7 @@ import numpy as np
 from pentapod.arrays import Floats
 from pentapod.geometry.directions import angle_between
 from pentapod.kinematics.blocks import blocks
-from pentapod.verify.claim import ALLOWANCE, Claim, Finding
+from pentapod.verify.claim import ALLOWANCE, MM, Claim, Finding, with_allowance
 from pentapod.verify.replay import Replay
 
 _BLOCK = 1 << 15  # samples
@@ -31,7 +31,7 @@ def tip_deviation(replay: Replay) -> Finding:
     worst = int(np.argmax(deviation))
     method = (
         "proven bound for all times, of the point "
-        f"{1e3 * replay.toolpath.pivot:g} mm from the tip along the axis, about which the tool may tilt: the "
+        f"{MM * replay.toolpath.pivot:g} mm from the tip along the axis, about which the tool may tilt: the "
         "tip's deviation once the tool is turned back to the nominal axis; closed-form forward kinematics at the rows "
         "and halfway between, against the matched place of the toolpath, in order; how far the motion strays from the "
         f"chord in between is proven by Krawczyk's operator (here {1e6 * stray[worst]:.2g} µm); at the toolpath's "
@@ -46,7 +46,7 @@ def coverage(replay: Replay) -> Finding:
     chord = np.minimum(match.times.astype(np.intp), len(away) - 1)
     distance = match.waypoint_distances + away[chord]
     worst = int(np.argmax(distance))
-    far = int((distance > replay.path_tolerance * (1.0 + ALLOWANCE)).sum())
+    far = int((distance > with_allowance(replay.path_tolerance)).sum())
     method = (
         f"proven bound of the distance of each of the {len(distance)} waypoints' pivots to the program at the time it "
         f"is visited, times in order; farthest: waypoint {worst}"
@@ -60,10 +60,10 @@ def coverage(replay: Replay) -> Finding:
 
 def axis_deviation(replay: Replay) -> Finding:
     """Judge the angle between the tool and the nominal axis of the toolpath."""
-    match, axes = replay.match, replay.axes
-    own = np.empty(len(axes) - 1)
+    match, before, after = replay.match, replay.axes[:-1], replay.axes[1:]
+    own = np.empty(len(before))
     for part in blocks(len(own), _BLOCK):
-        own[part] = angle_between(axes[part], axes[part.start + 1 : part.stop + 1])
+        own[part] = angle_between(before[part], after[part])
     # Vectors that go straight from end to end are farthest apart at an end, and as far off the arc of unit vectors as
     # it is high: an eighth of the angle squared. At a waypoint's visit the motion's own is off the arc already.
     # Along the arc they lag behind by less than a sixtieth of the angle cubed.
@@ -116,8 +116,8 @@ def _raised(angles: Floats, rise: Floats, stray: Floats) -> Floats:
 
 def _within(replay: Replay, value: float, sample: float, method: str) -> Finding:
     bound = replay.path_tolerance
-    allowed = bound * (1.0 + ALLOWANCE)
-    return Finding(value <= allowed, 1e3 * value, 1e3 * bound, "mm", replay.place(sample), method, 1e3 * allowed)
+    allowed = with_allowance(bound)
+    return Finding(value <= allowed, MM * value, MM * bound, "mm", replay.place(sample), method, MM * allowed)
 
 
 CLAIMS = (
