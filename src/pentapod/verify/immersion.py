@@ -8,7 +8,7 @@ known are cut into eight, down to single chords; most programs are decided long 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -85,7 +85,7 @@ def immersion(
         for part in blocks(len(order), _AT_ONCE):
             rows = order[part]
             own, off = todo.where(rows), stray[rows]
-            target = met.most + max(_NEAR_M, _NEAR * (bound - met.most))
+            target = _target(met, bound)
             enough = target - float(_unresolved(target)) - float(off[-1])
             depth, known = _swept(replay, surface, body, own, max(enough, -_FAR_M))
             upper = depth + _unresolved(depth) + off
@@ -102,7 +102,13 @@ def immersion(
                 most = Immersion(float(kept[worst]), int(own.starts[worst]))
         size //= _CUT
         todo = todo.where(again).cut(size) if again.any() else todo.where(again)
-    return most
+    # What was not looked into is not known to be the deepest: then the place of the deepest that is.
+    return most if most.most > _target(met, bound) else replace(most, sample=met.sample)
+
+
+def _target(met: Immersion, bound: float) -> float:
+    """Return up to where a proven depth is not improved on."""
+    return met.most + max(_NEAR_M, _NEAR * (bound - met.most))
 
 
 def _unresolved(depth: ArrayLike) -> Floats:
