@@ -17,9 +17,9 @@ from pentapod.errors import ToolpathError, nearest
 from pentapod.toolpath.formats.moves import Moves, plain, poses, stands
 from pentapod.toolpath.formats.reading import number, read_lines, seconds
 from pentapod.toolpath.formats.registry import Defaults, Format, register
+from pentapod.toolpath.formats.remarks import Remarks, kind_remark, pivot_remark
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
-_REMARK = "pentapod "
 _MM = {"MM": 1.0, "INCHES": 25.4, "INCH": 25.4}
 _PER_MINUTE = {"MMPM": 1.0, "IPM": 25.4}
 _NAMED = ("PARTNO", "PPRINT", "REMARK", "TITLE", "INSERT")  # a text follows, with or without a slash
@@ -45,16 +45,15 @@ class _Reader:
     file: Path
     defaults: Defaults
     moves: Moves = field(init=False)
+    remarks: Remarks = field(init=False)
     unit: float | None = None
     five_axis: bool = False
     feed: float | None = None
     rapid: bool = False
-    kind: SegmentKind = SegmentKind.CUT
-    pivot: float | None = None
     finished: int | None = None
 
     def __post_init__(self) -> None:
-        self.moves = Moves(self.file)
+        self.moves, self.remarks = Moves(self.file), Remarks(self.file)
 
     def wrong(self, what: str, line: int, word: str, **details: object) -> ToolpathError:
         return ToolpathError(what, file=self.file, line=line, key=word, **details)  # type: ignore[arg-type]
@@ -63,7 +62,7 @@ class _Reader:
         line, pending, lines = 0, "", read_lines(self.file)
         for line, raw in enumerate(lines, start=1):
             text, _, remark = raw.partition("$$")
-            self._remark(remark, line)
+            self.remarks.read(remark, line)
             text = text.strip()
             if text.endswith("$"):
                 pending += text[:-1]
@@ -75,17 +74,7 @@ class _Reader:
             raise self.wrong("the file ends within a statement", line, pending.split("/")[0].strip())
         if self.finished is None:
             raise self.wrong("FINI is missing: the file was cut off", line, "FINI", expected="FINI as the last word")
-        pivot = self.defaults.pivot if self.pivot is None else self.pivot
-        return self.moves.toolpath(pivot)
-
-    def _remark(self, text: str, line: int) -> None:
-        text = text.strip()
-        if text.startswith(_REMARK):
-            name, _, value = text.removeprefix(_REMARK).partition(" ")
-            if name in ("cut", "link"):
-                self.kind = SegmentKind(name)
-            elif name == "pivot_mm":
-                self.pivot = 1e-3 * number(value, self.file, line, name)
+        return self.moves.toolpath(self.defaults.pivot if self.remarks.pivot is None else self.remarks.pivot)
 
     def _statement(self, text: str, line: int) -> None:
         head, _, tail = text.partition("/")
@@ -135,7 +124,8 @@ class _Reader:
         if self.unit is None:
             raise self.wrong("the unit is missing", line, "CUTTER", expected="UNITS/MM or UNITS/INCHES before it")
         ball = len(numbers) > 1 and abs(numbers[1] - 0.5 * numbers[0]) <= 1e-6 * numbers[0]
-        self.pivot = numbers[1] * self.unit * 1e-3 if ball else 0.0
+        # Of CUTTER and a remark the one that comes last counts.
+        self.remarks.pivot = numbers[1] * self.unit * 1e-3 if ball else 0.0
 
     def _delay(self, words: list[str], line: int) -> None:
         if len(words) != 1:
@@ -163,7 +153,7 @@ class _Reader:
         feed = self.defaults.feed if self.feed is None else self.feed / 6e4
         if feed is None and not self.rapid:
             raise self.wrong("the feed is missing", line, name, expected="FEDRAT before it")
-        kind = SegmentKind.RAPID if self.rapid else self.kind
+        kind = SegmentKind.RAPID if self.rapid else self.remarks.kind
         speed = float("inf") if self.rapid or feed is None else feed * 6e4
         self.moves.add([v * self.unit for v in values[:3]], axis, kind, speed, line, name)
         self.rapid = False
@@ -181,7 +171,7 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
 def _write(toolpath: Toolpath) -> bytes:
     tips, axes, kinds, feeds = poses(toolpath)
     dwells = stands(toolpath)
-    lines = ["PARTNO PENTAPOD", "UNITS/MM", f"$$ {_REMARK}pivot_mm {1e3 * toolpath.pivot!r}", "MULTAX/ON"]
+    lines = ["PARTNO PENTAPOD", "UNITS/MM", f"$$ {pivot_remark(toolpath.pivot)}", "MULTAX/ON"]
     kind, feed = SegmentKind.CUT, np.nan
     for k in range(len(tips)):
         move = kinds[k - 1] if k else SegmentKind.RAPID
@@ -191,7 +181,7 @@ def _write(toolpath: Toolpath) -> bytes:
             feed = np.nan
         else:
             if move != kind:
-                lines.append(f"$$ {_REMARK}{move}")
+                lines.append(f"$$ {kind_remark(move)}")
                 kind = move
             if feeds[k - 1] != feed:
                 feed = float(feeds[k - 1])

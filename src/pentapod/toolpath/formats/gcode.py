@@ -21,14 +21,14 @@ import numpy as np
 
 from pentapod.errors import ToolpathError
 from pentapod.toolpath.formats.moves import Moves, plain, poses, stands
-from pentapod.toolpath.formats.reading import number, read_lines
+from pentapod.toolpath.formats.reading import read_lines
 from pentapod.toolpath.formats.registry import Defaults, Format, register
+from pentapod.toolpath.formats.remarks import Remarks, kind_remark, pivot_remark
 from pentapod.toolpath.formats.rotary import AB, BC, Rotary
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 _WORD = re.compile(r"([A-Z])([+-]?(?:\d+\.?\d*|\.\d+))")
 _COMMENT = re.compile(r"\(([^()]*)\)|;(.*)$")
-_REMARK = "pentapod "
 _IDLE_G = frozenset({17.0, 18.0, 19.0, 40.0, 49.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 80.0})
 _PATH_MODES = frozenset({61.0, 61.1, 64.0})
 _DWELL, _STOP = ("G", 4.0), ("G", 9.0)
@@ -46,20 +46,19 @@ class _Reader:
     rotary: Rotary
     needs_tcp: bool
     moves: Moves = field(init=False)
+    remarks: Remarks = field(init=False)
     scale: float | None = None
     absolute: bool = True
     inverse: bool = False
     motion: float | None = None
     tcp: bool = False
     feed: float | None = None
-    kind: SegmentKind = SegmentKind.CUT
-    pivot: float | None = None
     stopping: bool = False
     place: dict[str, float] = field(default_factory=dict[str, float])
     ended: int | None = None
 
     def __post_init__(self) -> None:
-        self.moves = Moves(self.file)
+        self.moves, self.remarks = Moves(self.file), Remarks(self.file)
 
     def wrong(self, what: str, line: int, word: str, **details: object) -> ToolpathError:
         return ToolpathError(what, file=self.file, line=line, key=word, **details)  # type: ignore[arg-type]
@@ -68,7 +67,7 @@ class _Reader:
         lines = read_lines(self.file)
         for line, text in enumerate(lines, start=1):
             for comment in _COMMENT.finditer(text):
-                self._remark((comment[1] or comment[2] or "").strip(), line)
+                self.remarks.read(comment[1] or comment[2] or "", line)
             block = _COMMENT.sub("", text).strip().upper()
             if block.startswith("%"):
                 continue
@@ -77,15 +76,7 @@ class _Reader:
             self._block(block, line)
         if self.ended is None:
             raise self.wrong("M2 or M30 is missing: the file was cut off", len(lines), "M", expected="M2 or M30")
-        return self.moves.toolpath(self.defaults.pivot if self.pivot is None else self.pivot)
-
-    def _remark(self, text: str, line: int) -> None:
-        if text.startswith(_REMARK):
-            name, _, value = text.removeprefix(_REMARK).partition(" ")
-            if name in ("cut", "link"):
-                self.kind = SegmentKind(name)
-            elif name == "pivot_mm":
-                self.pivot = 1e-3 * number(value, self.file, line, name)
+        return self.moves.toolpath(self.defaults.pivot if self.remarks.pivot is None else self.remarks.pivot)
 
     def _words(self, block: str, line: int) -> list[tuple[str, float]]:
         words, position = [], 0
@@ -190,7 +181,7 @@ class _Reader:
         tip = [self.place[letter] for letter in _LINEAR]
         axis = self.rotary.axis(np.array([self.place[letter] for letter in self.rotary.words]))
         feed = math.inf if self.motion == 0.0 else self._feed(tip, line, own_feed=own_feed)
-        kind = SegmentKind.RAPID if self.motion == 0.0 else self.kind
+        kind = SegmentKind.RAPID if self.motion == 0.0 else self.remarks.kind
         self.moves.add(tip, axis.tolist(), kind, feed, line, first)
 
     def _feed(self, tip: list[float], line: int, *, own_feed: bool) -> float:
@@ -218,14 +209,14 @@ def _write(toolpath: Toolpath, rotary: Rotary, *, needs_tcp: bool, inverse_time:
     tips, axes, kinds, feeds = poses(toolpath)
     dwells = stands(toolpath)
     angles = rotary.angles(axes)
-    lines = ["%", f"(pentapod pivot_mm {1e3 * toolpath.pivot!r})", f"G21 G90 G{93 if inverse_time else 94}"]
+    lines = ["%", f"({pivot_remark(toolpath.pivot)})", f"G21 G90 G{93 if inverse_time else 94}"]
     lines += ["G43.4 H1"] if needs_tcp else []
     kind, feed, motion = SegmentKind.CUT, np.nan, ""
     letters = (*_LINEAR, *rotary.words)
     for k in range(len(tips)):
         move = kinds[k - 1] if k else SegmentKind.RAPID
         if move not in (SegmentKind.RAPID, kind):
-            lines.append(f"({_REMARK}{move})")
+            lines.append(f"({kind_remark(move)})")
             kind = move
         values = [*(plain(v, 7) for v in tips[k]), *(plain(v, 10) for v in angles[k])]
         words = [letter + value for letter, value in zip(letters, values, strict=True)]

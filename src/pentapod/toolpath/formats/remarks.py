@@ -1,0 +1,43 @@
+"""Remarks: what pentapod says in a file's comments, for its own readers: what the language has no word for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pentapod.toolpath.formats.reading import number
+from pentapod.toolpath.toolpath import SegmentKind
+
+_MARK = "pentapod "
+_PIVOT = "pivot_mm"
+_KINDS = (SegmentKind.CUT, SegmentKind.LINK)
+
+
+@dataclass
+class Remarks:
+    """What a file's remarks have said so far. kind: of moves on feed from here on; pivot: metres, None if not told."""
+
+    file: Path
+    kind: SegmentKind = SegmentKind.CUT
+    pivot: float | None = None
+
+    def read(self, comment: str, line: int) -> None:
+        """Take in a comment; most are of no account. Raises ToolpathError where ours holds no number."""
+        text = comment.strip()
+        if not text.startswith(_MARK):
+            return
+        name, _, value = text.removeprefix(_MARK).partition(" ")
+        if name in _KINDS:
+            self.kind = SegmentKind(name)
+        elif name == _PIVOT:
+            self.pivot = 1e-3 * number(value, self.file, line, name)
+
+
+def kind_remark(kind: SegmentKind) -> str:
+    """Return the comment before moves on feed of a kind."""
+    return f"{_MARK}{kind}"
+
+
+def pivot_remark(pivot: float) -> str:
+    """Return the comment that tells the pivot, metres."""
+    return f"{_MARK}{_PIVOT} {1e3 * pivot!r}"
