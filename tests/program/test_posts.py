@@ -158,6 +158,20 @@ def test_what_is_wrong_with_a_table_is_said(old, new, what, tmp_path):
     assert "program.pvt.csv" in str(caught.value)
 
 
+def test_files_of_two_programs_are_not_mixed(tmp_path):
+    """Each leg's file has a header of its own; those of one folder are one program's."""
+    columns = leg_columns("L{leg}", "length", "mm", 8)
+    post = table_post("each", "", Table({f"leg{column.leg}.txt": (column,) for column in columns}))
+    what = given(duration=0.3)
+    other = dataclasses.replace(what.program, provenance=dataclasses.replace(what.program.provenance, job_digest="1"))
+    for name, content in post.write(what).items():
+        (tmp_path / name).write_bytes(content)
+    assert post.read(tmp_path).legs.tobytes() == what.program.legs.tobytes()
+    (tmp_path / "leg4.txt").write_bytes(post.write(PostInput(other))["leg4.txt"])
+    with pytest.raises(ProgramError, match=r"leg4\.txt.*the header is not that of leg1\.txt"):
+        post.read(tmp_path)
+
+
 def test_a_velocity_that_is_not_the_splines_is_refused(tmp_path):
     (file,) = write_post(given(duration=0.3), "pvt", tmp_path)
     lines = file.read_text().splitlines()
@@ -272,6 +286,9 @@ def test_the_command_refuses(tmp_path, capsys):
     (tmp_path / "plan.npz").write_bytes(b"PK nonsense")
     assert run(["post", source, "--to", "apt", "-o", str(out)]) == 2
     assert "plan.npz" in capsys.readouterr().err
+    # What has no use for the toolpath does not look at it.
+    assert run(["post", source, "--to", "pvt", "-o", str(tmp_path / "elsewhere")]) == 0
+    assert capsys.readouterr().err == ""
     (tmp_path / "plan.npz").unlink()
     stranger = dataclasses.replace(program.provenance, machine="shed", machine_digest="0")
     write_csv(dataclasses.replace(program, provenance=stranger), source)

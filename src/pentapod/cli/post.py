@@ -64,12 +64,12 @@ def post(
     from pentapod.program import read_csv
     from pentapod.program.posts import PostInput, find_post, placed_toolpath, write_post
 
-    find_post(name)  # an unknown one is said at once
+    takes_toolpath = find_post(name).takes_toolpath  # an unknown one is said at once
     with progress_bar(quiet=quiet or as_json) as progress:
         progress("reading", 0.0, program.name)
         read = read_csv(program)
         beside = program.with_name("plan.npz")
-        plan = beside if plan is None and beside.exists() else plan
+        plan = beside if plan is None and takes_toolpath and beside.exists() else plan
         toolpath = None if plan is None else placed_toolpath(plan, read)
         progress("reading", 1.0, program.name)
         progress("writing", 0.0, name)

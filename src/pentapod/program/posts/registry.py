@@ -56,7 +56,7 @@ class Post:
     content that starts with "#!" becomes an executable file.
     read: the folder → the program, or the toolpath where it is that what the post writes. Raises ProgramError
     or ToolpathError with file and line.
-    loses: what cannot be read back, in words.
+    loses: what cannot be read back, in words. takes_toolpath: whether the toolpath is looked for, beside the program.
     """
 
     name: str
@@ -64,6 +64,7 @@ class Post:
     write: Callable[[PostInput], dict[str, bytes]]
     read: Callable[[Path], Program | Toolpath]
     loses: frozenset[str] = field(default=frozenset())
+    takes_toolpath: bool = False
 
 
 POSTS: dict[str, Post] = {}
@@ -94,8 +95,9 @@ def find_post(name: str) -> Post:
         post = loaded if isinstance(loaded, Post) else cast(Callable[[], object], loaded)()
     except Exception as error:
         raise InputError(
-            f"this post cannot be loaded: {type(error).__name__}: {error}", key=name, value=entry.value
-        ) from error
+            f"this post cannot be loaded: {type(error).__name__}: {error}", key=name, value=entry.value,
+            remedy="mend or remove the package that names it",
+        ) from error  # fmt: skip
     if not isinstance(post, Post):
         raise InputError("the entry point names no post", key=name, value=entry.value, expected="a pentapod Post")
     return post
@@ -114,7 +116,9 @@ def write_post(given: PostInput, name: str, folder: str | Path) -> list[Path]:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
-            raise InputError(f"the folder cannot be made: {reason}", file=path.parent) from error
+            raise InputError(
+                f"the folder cannot be made: {reason}", file=path.parent, remedy="choose another"
+            ) from error
         with atomic_write(path) as temporary:
             temporary.write_bytes(content)
             if content.startswith(b"#!"):

@@ -74,7 +74,9 @@ def _read(folder: Path, style: Style) -> Program:
     except (KeyError, TypeError, ValueError) as error:
         if isinstance(error, ProgramError):
             raise
-        raise ProgramError("not a JointTrajectory", file=file, value=str(error)[:80]) from error
+        raise ProgramError(
+            "not a JointTrajectory", file=file, value=str(error)[:80], remedy="write it anew: pentapod post"
+        ) from error
 
 
 def _program(message: Any, header: Header, file: Path) -> Program:
@@ -89,11 +91,13 @@ def _program(message: Any, header: Header, file: Path) -> Program:
         row = int(np.argmax(wrong))
         raise ProgramError(
             f"the time is not a multiple of the period (point {row + 1})", file=file, key="time_from_start",
-            value=times[row] / _NANO,
+            value=times[row] / _NANO, expected=f"{row * header.period:.9g} s",
         )  # fmt: skip
     legs = np.array([point["positions"] for point in points], dtype=np.float64)
     if legs.shape != (len(points), 5):
-        raise ProgramError("not five positions a point", file=file, key="positions", value=legs.shape)
+        raise ProgramError(
+            "not five positions a point", file=file, key="positions", value=legs.shape, expected="(points, 5)"
+        )
     return header.program(check_legs(legs, file))
 
 

@@ -14,6 +14,7 @@ import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, Literal
 
@@ -45,7 +46,7 @@ SIDECAR = "program.header"
 class Column:
     """A column: title, kind, unit, decimals; leg 1 to 5 for lengths and velocities.
 
-    Raises InputError for a unit that the kind does not have, or a leg missing or too much.
+    Raises InputError for an unknown kind, a unit that the kind does not have, or a leg missing or too much.
     """
 
     title: str
@@ -55,7 +56,9 @@ class Column:
     leg: int | None = None
 
     def __post_init__(self) -> None:
-        if self.unit not in UNITS.get(self.kind, {}):
+        if self.kind not in UNITS:
+            raise InputError("unknown kind", key=self.title, value=self.kind, expected=", ".join(UNITS))
+        if self.unit not in UNITS[self.kind]:
             raise InputError("unknown unit", key=self.title, value=self.unit, expected=", ".join(UNITS[self.kind]))
         if (self.leg is None) != (self.kind == "time") or self.leg not in (None, 1, 2, 3, 4, 5):
             raise InputError("which leg?", key=self.title, value=self.leg, expected="1 to 5, none for time")
@@ -98,7 +101,10 @@ class Table:
     def __post_init__(self) -> None:
         legs = {c.leg for columns in self.files.values() for c in columns if c.kind == "length"}
         if legs != {1, 2, 3, 4, 5}:
-            raise InputError("a leg's length is in none of the files", value=sorted(x for x in legs if x))
+            raise InputError(
+                "a leg's length is in none of the files", key="files", value=sorted(x for x in legs if x),
+                expected="a column of length for each of the legs 1 to 5",
+            )  # fmt: skip
 
 
 def leg_columns(title: str, kind: Kind, unit: str, decimals: int) -> tuple[Column, ...]:
@@ -131,22 +137,12 @@ def _write(given: PostInput, table: Table) -> dict[str, bytes]:
 
 
 def _read(folder: Path, table: Table) -> Program:
-    header: Header | None = None
-    if table.comment is None:
-        sidecar = folder / SIDECAR
-        header = header_of(read_file(sidecar).decode(errors="replace").splitlines(), sidecar)
+    texts = {folder / name: read_file(folder / name).decode(errors="replace").splitlines() for name in table.files}
+    header, above = _header(folder, texts, table)
     legs: dict[int, Floats] = {}
     rates: list[tuple[Path, Column, Floats]] = []
-    for name, columns in table.files.items():
-        file = folder / name
-        lines = read_file(file).decode(errors="replace").splitlines()
-        count = 0
-        if table.comment is not None:
-            count = next((k for k, text in enumerate(lines) if not text.startswith(table.comment)), len(lines))
-            header = header_of(["#" + line.removeprefix(table.comment) for line in lines[:count]], file)
-        if header is None:
-            raise ProgramError("there is no header", file=file)
-        numbers = _numbers(lines[count:], columns, table, file, count + 1)
+    for (file, lines), columns in zip(texts.items(), table.files.values(), strict=True):
+        numbers = _numbers(lines[above:], columns, table, file, above + 1)
         check_rows(len(numbers), header, file)
         for column, values in zip(columns, numbers.T, strict=True):
             if column.leg is None:
@@ -155,12 +151,27 @@ def _read(folder: Path, table: Table) -> Program:
                 legs[column.leg] = values / column.factor
             else:
                 rates.append((file, column, values))
-    if header is None:
-        raise ProgramError("there is no header", file=folder)
     program = header.program(check_legs(np.column_stack([legs[leg] for leg in range(1, 6)]), folder))
     for file, column, values in rates:
         _check_rates(values, column, program, file)
     return program
+
+
+def _header(folder: Path, texts: Mapping[Path, list[str]], table: Table) -> tuple[Header, int]:
+    """Return the header, and how many lines of comments stand above the rows of each file.
+
+    Raises ProgramError where the files are not of one program.
+    """
+    if table.comment is None:
+        sidecar = folder / SIDECAR
+        return header_of(read_file(sidecar).decode(errors="replace").splitlines(), sidecar), 0
+    mark = table.comment
+    told = {file: list(takewhile(lambda text: text.startswith(mark), lines)) for file, lines in texts.items()}
+    first, above = next(iter(told.items()))
+    for file, lines in told.items():
+        if lines != above:
+            raise ProgramError(f"the header is not that of {first.name}", file=file, remedy="write them anew together")
+    return header_of(["#" + line.removeprefix(mark) for line in above], first), len(above)
 
 
 def _marked(header: str, comment: str) -> str:

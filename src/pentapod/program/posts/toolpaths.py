@@ -30,7 +30,8 @@ def placed_toolpath(plan: str | Path, program: Program) -> Toolpath:
             tips, axes = archive["placed.tips_mm"] / 1e3, archive["placed.axes"]
             legs = archive["program.legs_mm"] / 1e3
     except KeyError as error:
-        raise InputError("an array is missing", file=file, key=str(error.args[0])[:80]) from error
+        key, expected = str(error.args[0])[:80], "the plan.npz of a run with a program"
+        raise InputError("an array is missing", file=file, key=key, expected=expected) from error
     if legs.shape != program.legs.shape or np.abs(legs - program.legs).max() > _SAME_M:
         raise ProgramError(
             "the program is not that of this plan", file=file, key="program.legs_mm",
@@ -52,7 +53,7 @@ def _read(folder: Path, form: str, file: str) -> Toolpath:
 
 def _post(form: str, file: str, about: str) -> Post:
     write, read = partial(_write, form=form, file=file), partial(_read, form=form, file=file)
-    return register(Post(form, about, write, read, FORMATS[form].loses))
+    return register(Post(form, about, write, read, FORMATS[form].loses, takes_toolpath=True))
 
 
 APT = _post("apt", "placed.apt", "APT, the toolpath as placed, machine frame")

@@ -27,5 +27,11 @@ def _read(folder: Path) -> Program | Toolpath:
 
 
 LINUXCNC = register(
-    Post("linuxcnc", "LinuxCNC: setpoints with HAL, G-code of the legs, tool path for pentakins", _write, _read)
+    Post(
+        "linuxcnc",
+        "LinuxCNC: setpoints with HAL, G-code of the legs, tool path for pentakins",
+        _write,
+        _read,
+        takes_toolpath=True,
+    )
 )

@@ -43,7 +43,10 @@ def pentakins_files(given: PostInput) -> dict[str, bytes]:
     path = given.the_toolpath().transformed(frame)
     angles = AB.angles(path.axes)
     if np.abs(angles).max() > 90.0:
-        raise InputError("a tool axis is beyond the horizontal", key="toolpath", value=float(np.abs(angles).max()))
+        raise InputError(
+            "a tool axis is beyond the horizontal, where pentakins cannot follow", key="toolpath",
+            value=float(np.abs(angles).max()), expected="A and B within ±90°", remedy="play the setpoints instead",
+        )  # fmt: skip
     limits = machine.legs
     upright = frame.inverse().rotate([0.0, 0.0, 1.0])
     tip = frame.inverse().apply([0.0, 0.0, 0.0])
