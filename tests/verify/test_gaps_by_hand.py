@@ -6,14 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import replay_cases as cases
+from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
 
+from pentapod.machine.clearance import pair_names
 from pentapod.machine.surroundings import Obstacle, Surroundings
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.solids import Solid
 from pentapod.verify import Replay
-from pentapod.verify.approach import Stray, approach
+from pentapod.verify.approach import Stray, _stray, approach
 from pentapod.verify.bodies import clearance
 from pentapod.verify.collisions import _moves, _offsets, claims
 
@@ -147,8 +149,9 @@ def test_which_points_bodies_move_by(still):
 # The search for the smallest gap, on a replay whose gaps are given.
 
 
-def searched(gaps, moved, monkeypatch, bound=0.0):
+def searched(gaps, moved, monkeypatch, **bound):
     """What `approach` finds of gaps (M,) at the samples, where nothing moves by more than `moved` in a row's time."""
+    gaps = np.asarray(gaps).reshape(len(gaps), -1)
     count = (len(gaps) - 1) // 2
     asked = []
 
@@ -159,7 +162,7 @@ def searched(gaps, moved, monkeypatch, bound=0.0):
 
     monkeypatch.setattr("pentapod.verify.approach._stray", stray)
     replay = SimpleNamespace(program=SimpleNamespace(legs=np.zeros((count + 1, 5))), shared={})
-    found = approach(replay, lambda at: np.asarray(gaps)[at][:, None], lambda s: s.line, np.zeros(1), bound=bound)
+    found = approach(replay, lambda at: gaps[at], lambda s: s.line, np.zeros(1), **bound)
     return found, asked
 
 
@@ -186,9 +189,47 @@ def test_a_search_ends_where_a_gap_is_met(monkeypatch):
     found, asked = searched(gaps, 1e-7, monkeypatch)
     assert (found.least, found.sample, found.proven) == (-1e-5, 64, True)
     assert asked == []
+    other = np.stack([np.full(401, 2e-3), gaps, np.full(401, 3e-3)], axis=1)
+    found, asked = searched(other, 1e-7, monkeypatch)
+    assert (found.least, found.column, found.sample, found.proven) == (-1e-5, 1, 64, True)
     found, _ = searched(gaps, 1e-7, monkeypatch, bound=-2e-5)
     assert found.least == pytest.approx(-1e-5, abs=1e-5)
     assert found.least > -2e-5
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+def test_stretches_are_seen_from_their_middle_by_all_their_legs(cubic, interpolation, monkeypatch):
+    """Seventy rows: two stretches of up to 64 intervals, the second one of five; the hull of each is of its curve."""
+    legs, seen = cubic.program.legs[200:270], []
+    replay = SimpleNamespace(
+        program=SimpleNamespace(legs=legs),
+        slopes=None
+        if interpolation == "linear"
+        else CubicSpline(np.arange(70), legs, bc_type="clamped").derivative()(np.arange(70)),
+        pose=(np.arange(139.0)[:, None] * [1.0, 0.0, 0.0], np.arange(139.0)[:, None] * [0.0, 0.0, 1.0]),
+        machine=SimpleNamespace(pentapod="robot"),
+    )
+
+    def told(*given):
+        seen.append(given)
+        return np.ones((2, 1)), np.zeros(2)
+
+    monkeypatch.setattr("pentapod.verify.approach.roaming", told)
+    found = _stray(replay, np.array([0, 64]), 64, np.zeros(1))
+    assert (found.line.tolist(), found.turn.tolist()) == ([[1.0], [1.0]], [0.0, 0.0])
+    ((robot, position, direction, lengths, offsets),) = seen
+    assert (robot, position[:, 0].tolist(), direction[:, 2].tolist()) == ("robot", [64.0, 133.0], [64.0, 133.0])
+    assert offsets.tolist() == [0.0]
+    curve = CubicSpline(np.arange(70), legs, bc_type="clamped")
+    for own, (first, last) in zip(lengths, ((0, 64), (64, 69)), strict=True):
+        if interpolation == "linear":
+            assert {tuple(row) for row in own} == {tuple(row) for row in legs[first : last + 1]}
+            continue
+        ends = {tuple(np.round(row, 12)) for row in own}
+        assert ends >= {tuple(np.round(row, 12)) for row in legs[first : last + 1]}
+        thirds = [legs[k] + curve(k, 1) / 3.0 for k in range(first, last)]
+        thirds += [legs[k] - curve(k, 1) / 3.0 for k in range(first + 1, last + 1)]
+        assert ends == {tuple(np.round(row, 12)) for row in [*legs[first : last + 1], *thirds]}
 
 
 def test_a_motion_of_which_nothing_is_known_is_not_proven(monkeypatch):
@@ -203,3 +244,32 @@ def test_the_clearance_of_a_machine_that_stands_is_that_of_its_rows(still, pose)
     least = clearances(still.machine, pose[0][None], pose[1][None]).min()
     assert found.value == pytest.approx(1e3 * least, rel=1e-6)
     assert (found.passed, found.bound, found.unit, found.where.row) == (True, 0.0, "mm", 0)
+
+
+@pytest.mark.parametrize("rows", [4973, 1000, 33, 17])
+def test_what_is_not_looked_into_is_not_the_closest(cubic, rows):
+    """Against all samples, each less the way to the next that any point can go meanwhile."""
+    from pentapod.machine import clearances
+
+    program = replace(cubic.program, legs=cubic.program.legs[:rows])
+    replay = Replay(program, cubic.machine, cubic.toolpath, **cases.TOLERANCES)
+    ways = 0.5 * cases.PERIOD * replay.survey.speeds.max(axis=1)
+    gaps = clearances(cubic.machine, *replay.pose) - np.maximum([0.0, *ways], [*ways, 0.0])[:, None]
+    found = clearance(replay)
+    assert found.value == pytest.approx(1e3 * gaps.min(), rel=1e-9)
+    assert found.where.row == int(gaps.min(axis=1).argmin()) // 2
+    assert found.method.startswith(pair_names(cubic.machine)[int(gaps.min(axis=0).argmin())])
+
+
+def test_a_machine_within_something_is_inside_it(still, pose):
+    """Nothing of its surface comes near: the corners of a tetrahedron of ten metres."""
+    points = np.array([[0.0, 0.0, 10.0], [10.0, 0.0, -5.0], [-5.0, 9.0, -5.0], [-5.0, -9.0, -5.0]]) + pose[0]
+    mesh = Mesh.of(points, np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]))
+    around = Obstacle("fixture", MeshDistance.of(mesh), clamped=False, allowance=2e-3)
+    found = judged(still, around, (SHANK, HOLDER))
+    for name in ("legs", "spindle", "tool body"):
+        certificate = found[f"{name} clear of the fixture"]
+        assert (certificate.passed, certificate.value, certificate.unit) == (False, None, "mm")
+        assert certificate.bound == pytest.approx(-2.0 if name == "tool body" else 0.0)
+        assert certificate.method.endswith(" is inside the fixture")
+        assert (certificate.where.row, certificate.where.time_s) == (0, 0.0)

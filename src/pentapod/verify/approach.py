@@ -58,7 +58,7 @@ def approach(replay: Replay, gaps: Gaps, moves: Moves, offsets: Floats, *, bound
     """
     count = len(replay.program.legs) - 1
     size, starts = _LONGEST, np.arange(0, count, _LONGEST)
-    met, found = np.inf, Approach(np.inf, 0, 0, True)
+    met, found = np.inf, list[Approach]()
     while True:
         ends = np.minimum(starts + size, count)
         samples = starts + ends
@@ -76,11 +76,11 @@ def approach(replay: Replay, gaps: Gaps, moves: Moves, offsets: Floats, *, bound
         target = met - max(_NEAR_M, _NEAR * (met - bound))
         again = (lower.min(axis=1) < target) if size > 1 else np.zeros(len(starts), dtype=np.bool_)
         kept = np.where(again[:, None], np.inf, lower)
-        if (least := float(kept.min())) < found.least:
-            row, column = np.unravel_index(int(kept.argmin()), kept.shape)
-            found = Approach(least, int(column), int(samples[row]), bool(np.isfinite(least)))
+        row, column = np.unravel_index(int(kept.argmin()), kept.shape)
+        least = float(kept[row, column])
+        found.append(Approach(least, int(column), int(samples[row]), bool(np.isfinite(least))))
         if not again.any():
-            return found
+            return min(found, key=lambda approach: approach.least)
         size //= _CUT
         starts = (starts[again, None] + size * np.arange(_CUT)).ravel()
         starts = starts[starts < count]

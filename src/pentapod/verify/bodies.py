@@ -25,13 +25,13 @@ def clearance(replay: Replay) -> Finding:
     chords = 0.5 * replay.program.period * replay.survey.speeds[:, 2]
     way = np.concatenate([[0.0], np.cumsum(chords)])
 
-    middles = np.minimum(np.arange(_BLOCK // 2, len(way) + _BLOCK // 2, _BLOCK), len(way) - 1)
-    edges = np.append(np.maximum(middles - _BLOCK // 2, 0), len(way) - 1)
-    edges[-2] = min(edges[-2], len(way) - 1)
+    starts = np.arange(0, len(way), _BLOCK)
+    ends = np.append(starts[1:], len(chords))
+    middles = (starts + ends) // 2
     at_middle = clearances(machine, position[middles], direction[middles]).min(axis=1)
-    travel = np.maximum(way[middles] - way[edges[:-1]], way[edges[1:]] - way[middles])
+    travel = np.maximum(way[middles] - way[starts], way[ends] - way[middles])
     close = np.flatnonzero(at_middle - 2.0 * travel <= at_middle.min())
-    samples = np.unique((edges[close, None] + np.arange(_BLOCK + 1)).clip(max=len(way) - 1))
+    samples = np.unique((starts[close, None] + np.arange(_BLOCK)).clip(max=len(chords)))
     around, least, at, pair = _around(chords), np.inf, 0, 0
     for part in blocks(len(samples), _AT_ONCE):
         own = samples[part]

@@ -29,7 +29,7 @@ _NEAR_M, _NEAR = 2e-6, 0.03
 _WIDEST = 1.0
 """Radians: arcs that turn farther are not taken for one stretch."""
 _LOOKED_AT, _AT_ONCE = 512, 4096
-_BLOCK = 1 << 16
+_BLOCK = 1 << 10  # stretches
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def immersion(
     met = _met(replay, surface, body, chords)
     if met.most > bound:
         return met
-    most = Immersion(-np.inf, 0)
+    most = replace(met, most=-np.inf, met=False)
     size, todo = _LONGEST, _runs(chords).cut(_LONGEST)
     while len(todo.starts):
         stray = _strays(replay, todo, lever)
@@ -157,15 +157,14 @@ def _strays(replay: Replay, stretches: _Stretches, lever: float) -> Floats:
     evenly, and unit vectors on an arc θ are off the line through two of them by no more than θ²/8.
     """
     found = np.empty(len(stretches.starts))
-    counts = stretches.ends - stretches.starts + 1
-    bounds = np.searchsorted(np.cumsum(counts), np.arange(0, counts.sum(), _BLOCK))
-    for first, last in zip(bounds, np.append(bounds[1:], len(counts)), strict=True):
-        if last > first:
-            found[first:last] = _stray(replay, stretches.where(slice(first, last)), counts[first:last], lever)
+    for part in blocks(len(found), _BLOCK):
+        found[part] = _stray(replay, stretches.where(part), lever)
     return found
 
 
-def _stray(replay: Replay, of: _Stretches, counts: Ints, lever: float) -> Floats:
+def _stray(replay: Replay, of: _Stretches, lever: float) -> Floats:
+    # Samples and the chords that they begin; the last sample of a stretch is where it ends.
+    counts = of.ends - of.starts
     begins = np.cumsum(counts) - counts
     sample = np.repeat(of.starts - begins, counts) + np.arange(counts.sum())
     start, end = replay.pivots[of.starts], replay.pivots[of.ends]
@@ -175,17 +174,16 @@ def _stray(replay: Replay, of: _Stretches, counts: Ints, lever: float) -> Floats
     owner = np.repeat(np.arange(len(counts)), counts)
     off, turned = replay.pivots[sample] - start[owner], replay.axes[sample] - first[owner]
     along = np.einsum("ij,ij->i", off, way[owner]) + lever**2 * np.einsum("ij,ij->i", turned, turn[owner])
-    share = np.clip(along / np.where(square > 0.0, square, 1.0)[owner], 0.0, 1.0)[:, None]
+    share = np.divide(along, square[owner], out=np.zeros_like(along), where=square[owner] > 0.0)
+    share = np.clip(share, 0.0, 1.0)[:, None]
     aside = np.maximum.reduceat(np.linalg.norm(off - share * way[owner], axis=1), begins)
-    # The last sample of a stretch begins no chord of it.
-    chord = np.minimum(sample, (of.ends - 1)[owner])
-    away = np.maximum.reduceat(replay.survey.away[chord], begins)
+    away = np.maximum.reduceat(replay.survey.away[sample], begins)
     if lever == 0.0:
         return aside + away
     angle = angle_between(first, last)
     a, b = arc_weights(angle[owner, None], share)
     swung = replay.axes[sample] - (a * first[owner] + b * last[owner])
     apart = np.maximum.reduceat(np.linalg.norm(swung, axis=1), begins) + 0.125 * angle**2
-    tilt = np.arcsin(np.minimum(apart, 1.0)) + np.maximum.reduceat(replay.survey.turned[chord], begins)
+    tilt = np.arcsin(np.minimum(apart, 1.0)) + np.maximum.reduceat(replay.survey.turned[sample], begins)
     # An axis as far as a radius from the arc may point anywhere.
     return np.where((angle < _WIDEST) & (apart < 1.0), aside + away + lever * tilt, np.inf)
