@@ -27,6 +27,7 @@ def test_random_spline_extrema():
     np.testing.assert_allclose(high, values.max(axis=1), atol=1e-5)
     np.testing.assert_allclose(motion.rates, np.abs(rates).max(axis=1), rtol=1e-3, atol=1e-4)
     np.testing.assert_allclose(motion.accelerations.max(axis=0), np.abs(accelerations).max(axis=(0, 1)), rtol=1e-6)
+    np.testing.assert_allclose(motion.first, spline(np.arange(40) * PERIOD, 1), atol=1e-12)
     np.testing.assert_allclose(motion.second, spline(np.arange(40) * PERIOD, 2), atol=1e-9)
     middle = np.abs(spline((np.arange(39) + 0.5) * PERIOD, 3))
     np.testing.assert_allclose(motion.jerks[1:-1], middle[1:-1], rtol=1e-9)
@@ -45,6 +46,7 @@ def test_linear_by_hand():
     motion = Interpolant.through(rows, 1e-3, "linear")
     # Steps 0 | 1, 2, 0 | 0 micrometres.
     np.testing.assert_allclose(motion.rates[:, 2], [1e-3, 2e-3, 0.0], atol=1e-12)
+    np.testing.assert_allclose(motion.first[:, 2], [0.0, 1e-3, 2e-3, 0.0], atol=1e-12)
     np.testing.assert_allclose(motion.accelerations[:, 2], [1.0, 1.0, 2.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(motion.second[:, 2], [1.0, 1.0, -2.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(motion.jerks[:, 2], [1e3, 3e3, 2e3], atol=1e-5)

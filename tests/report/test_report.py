@@ -272,6 +272,8 @@ def test_words():
     sentences = placement_sentences(upside)
     assert "500.00 mm below the base plane" in sentences[0]
     assert "straight up" in sentences[1]
+    high = RigidTransform(np.eye(3), np.array([0.0, 0.0, -0.05]))
+    assert "50.00 mm above the base plane" in placement_sentences(high)[0]
     leaning = RigidTransform(np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]]), np.zeros(3))
     assert "leans 90.00°" in placement_sentences(leaning)[1]
     assert "towards 0.0°" in placement_sentences(leaning)[1]

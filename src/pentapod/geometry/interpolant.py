@@ -84,6 +84,16 @@ class Interpolant:
         return speed
 
     @cached_property
+    def first(self) -> Floats:
+        """Rates (N, d) at the rows with their signs, per second.
+
+        Linear: of the way that leads to the row, for at the row itself the rate jumps; none at the first row.
+        """
+        if self.degree == 1:
+            return np.concatenate([np.zeros((1, self.bernstein.shape[1])), self.steps[..., 0]])
+        return np.concatenate([self.steps[..., 0], self.steps[-1:, :, -1]])
+
+    @cached_property
     def accelerations(self) -> Floats:
         """Largest |acceleration| (N, d) at each row, per s²; nothing between the rows exceeds it.
 

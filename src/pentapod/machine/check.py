@@ -78,81 +78,119 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = 5
     rings, around, levels: density of the sample, see `sample_work_volume`. Never raises for a weak machine:
     that is a finding.
     """
-    tips, axes = sample_work_volume(machine.work, rings=rings, around=around, levels=levels)
-    position, direction = tips + machine.tool_length * axes, -axes
-    robot, joints = machine.pentapod, machine.joints
-    vectors = robot.leg_vectors(position, direction)
-    lengths = np.linalg.norm(vectors, axis=-1)
-    base = angle_between(vectors, joints.base_axes)
-    platform = angle_between(-vectors, axes[:, None, :])
-    w, s = singularity_values(robot, position, direction)
-    s_distance = position_distance(robot, position, direction)
-    turn = orientation_distance(robot, position, direction, about=machine.tool_length)
-    force = tip_force_amplification(robot, position, direction, machine.tool_length)
-    gaps = clearances(machine, position, direction)
-    names = pair_names(machine)
+    met = _Met.at(machine, *sample_work_volume(machine.work, rings=rings, around=around, levels=levels))
+    signs = met.signs
+    one = next(iter(signs)) if len(signs) == 1 else (0, 0)
+    return MachineReport(
+        machine=machine,
+        poses=len(met.tips),
+        length_range=np.stack([met.lengths.min(axis=0), met.lengths.max(axis=0)], axis=1),
+        base_angle=met.base.max(axis=0),
+        platform_range=np.stack([met.platform.min(axis=0), met.platform.max(axis=0)], axis=1),
+        least_w=float(np.abs(met.w).min()),
+        least_s=float(met.s_distance.min()),
+        least_turn=float(met.turn.min()),
+        amplification=float(met.force.max()),
+        clearance=float(met.gaps.min()),
+        clearance_pair=met.nearest_pair,
+        component=Component(*one) if 0 not in one else None,
+        findings=tuple(_of_strokes(met) + _of_joints(met) + _of_the_whole(met)),
+    )
 
-    def where(values: Floats) -> str:
-        tip, axis = tips[np.argmin(values)] * 1e3, axes[np.argmin(values)]
+
+@dataclass(frozen=True, eq=False)
+class _Met:
+    """What a machine meets at N poses: tips, axes (N, 3); SI units.
+
+    lengths (N, 5) of the legs; base, platform (N, 5): angles in the joints; w, s, s_distance, turn (N,): how near
+    singularities are; force (N,): N of the legs for each at the tip; gaps (N, pairs) between bodies.
+    """
+
+    machine: Machine
+    tips: Floats
+    axes: Floats
+    lengths: Floats
+    base: Floats
+    platform: Floats
+    w: Floats
+    s: Floats
+    s_distance: Floats
+    turn: Floats
+    force: Floats
+    gaps: Floats
+
+    @classmethod
+    def at(cls, machine: Machine, tips: Floats, axes: Floats) -> _Met:
+        position, direction = tips + machine.tool_length * axes, -axes
+        robot = machine.pentapod
+        vectors = robot.leg_vectors(position, direction)
+        w, s = singularity_values(robot, position, direction)
+        return cls(
+            machine,
+            tips,
+            axes,
+            np.linalg.norm(vectors, axis=-1),
+            angle_between(vectors, machine.joints.base_axes),
+            angle_between(-vectors, axes[:, None, :]),
+            w,
+            s,
+            position_distance(robot, position, direction),
+            orientation_distance(robot, position, direction, about=machine.tool_length),
+            tip_force_amplification(robot, position, direction, machine.tool_length),
+            clearances(machine, position, direction),
+        )
+
+    @property
+    def signs(self) -> set[tuple[int, int]]:
+        """The signs of w and S that occur; 0 on a singularity."""
+        return {(int(a), int(b)) for a, b in zip(np.sign(self.w), np.sign(self.s), strict=True)}
+
+    @property
+    def nearest_pair(self) -> str:
+        """The bodies that come nearest to each other, by name."""
+        return pair_names(self.machine)[int(np.argmin(self.gaps.min(axis=0)))]
+
+    def where(self, values: Floats) -> str:
+        """Return in words at which pose values (N,) are least."""
+        tip, axis = self.tips[np.argmin(values)] * 1e3, self.axes[np.argmin(values)]
         at, along = ", ".join(f"{x:.0f}" for x in tip), ", ".join(f"{x:+.2f}" for x in axis)
         return f"tip ({at}) mm, axis ({along})"
 
-    signs = {(int(a), int(b)) for a, b in zip(np.sign(w), np.sign(s), strict=True)}
-    one = next(iter(signs)) if len(signs) == 1 else (0, 0)
-    component = Component(*one) if 0 not in one else None
-    pair = int(np.argmin(gaps.min(axis=0)))
-    limits = machine.legs
-    short, long = lengths - limits.min_length, limits.max_length - lengths
-    findings: list[Finding] = []
+
+def _of_strokes(met: _Met) -> list[Finding]:
+    limits, found = met.machine.legs, list[Finding]()
     for k in range(5):
-        low, high = 1e3 * limits.min_length[k], 1e3 * limits.max_length[k]
-        findings += [
-            Finding(f"leg {k + 1} shortest", 1e3 * lengths[:, k].min(), "at least", low, "mm", where(short[:, k])),
-            Finding(f"leg {k + 1} longest", 1e3 * lengths[:, k].max(), "at most", high, "mm", where(long[:, k])),
+        lengths, low, high = 1e3 * met.lengths[:, k], 1e3 * limits.min_length[k], 1e3 * limits.max_length[k]
+        found += [
+            Finding(f"leg {k + 1} shortest", lengths.min(), "at least", low, "mm", met.where(lengths)),
+            Finding(f"leg {k + 1} longest", lengths.max(), "at most", high, "mm", met.where(-lengths)),
         ]
+    return found
+
+
+def _of_joints(met: _Met) -> list[Finding]:
+    joints, found = met.machine.joints, list[Finding]()
     for k in range(5):
         cone, (least, most) = np.degrees(joints.base_cone[k]), np.degrees(joints.platform_range[k])
-        seen = np.degrees(platform[:, k])
-        findings += [
-            Finding(
-                f"leg {k + 1} base joint",
-                np.degrees(base[:, k].max()),
-                "at most",
-                cone,
-                "deg",
-                where(-base[:, k]),
-            ),
-            Finding(f"leg {k + 1} platform joint, least", seen.min(), "at least", least, "deg", where(seen)),
-            Finding(f"leg {k + 1} platform joint, most", seen.max(), "at most", most, "deg", where(-seen)),
+        base, seen = np.degrees(met.base[:, k]), np.degrees(met.platform[:, k])
+        found += [
+            Finding(f"leg {k + 1} base joint", base.max(), "at most", cone, "deg", met.where(-base)),
+            Finding(f"leg {k + 1} platform joint, least", seen.min(), "at least", least, "deg", met.where(seen)),
+            Finding(f"leg {k + 1} platform joint, most", seen.max(), "at most", most, "deg", met.where(-seen)),
         ]
-    findings += [
-        Finding("components met", len(signs), "at most", 1, "", where(np.minimum(np.abs(w), np.abs(s_distance)))),
-        Finding("|w|", np.abs(w).min(), "more than", 0.0, "", where(np.abs(w))),
-        Finding("distance to S = 0", 1e3 * s_distance.min(), "more than", 0.0, "mm", where(s_distance)),
-        Finding(
-            "turn about the tip to a singularity",
-            np.degrees(turn.min()),
-            "more than",
-            0.0,
-            "deg",
-            where(turn),
-        ),
+    return found
+
+
+def _of_the_whole(met: _Met) -> list[Finding]:
+    w, distance, turn, gaps = np.abs(met.w), 1e3 * met.s_distance, np.degrees(met.turn), 1e3 * met.gaps.min(axis=1)
+    either, where = np.minimum(w, np.abs(met.s_distance)), met.where
+    force, pair, measure = met.force, met.nearest_pair, met.machine.architecture
+    return [
+        Finding("components met", len(met.signs), "at most", 1, "", where(either)),
+        Finding("|w|", w.min(), "more than", 0.0, "", where(w)),
+        Finding("distance to S = 0", distance.min(), "more than", 0.0, "mm", where(distance)),
+        Finding("turn about the tip to a singularity", turn.min(), "more than", 0.0, "deg", where(turn)),
         Finding("tip force to leg forces", force.max(), "at most", AMPLIFICATION_LIMIT, "N/N", where(-force)),
-        Finding(f"clearance, {names[pair]}", 1e3 * gaps.min(), "more than", 0.0, "mm", where(gaps.min(axis=1))),
-        Finding("architectural measure", machine.architecture, "at least", ARCHITECTURAL_LIMIT, ""),
+        Finding(f"clearance, {pair}", gaps.min(), "more than", 0.0, "mm", where(gaps)),
+        Finding("architectural measure", measure, "at least", ARCHITECTURAL_LIMIT, ""),
     ]
-    return MachineReport(
-        machine=machine,
-        poses=len(tips),
-        length_range=np.stack([lengths.min(axis=0), lengths.max(axis=0)], axis=1),
-        base_angle=base.max(axis=0),
-        platform_range=np.stack([platform.min(axis=0), platform.max(axis=0)], axis=1),
-        least_w=float(np.abs(w).min()),
-        least_s=float(s_distance.min()),
-        least_turn=float(turn.min()),
-        amplification=float(force.max()),
-        clearance=float(gaps.min()),
-        clearance_pair=names[pair],
-        component=component,
-        findings=tuple(findings),
-    )

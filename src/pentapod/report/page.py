@@ -16,6 +16,7 @@ from pentapod.job_placement import job_at, placement_toml
 from pentapod.job_surroundings import job_surroundings
 from pentapod.machine.surroundings import NOTHING, Surroundings
 from pentapod.outcome import Outcome, SetUps
+from pentapod.plan_arrays import matrix_mm
 from pentapod.planning.placed_path import PlacedPath, UnplacedPath
 from pentapod.program.program import Program
 from pentapod.report import plots, scene, words
@@ -27,6 +28,7 @@ from pentapod.report.worst import worst_places
 from pentapod.timing.explain import Explanation
 from pentapod.timing.trajectory import Trajectory
 from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.parting import Piece
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 from pentapod.version import __version__
 
@@ -80,9 +82,10 @@ def _context(outcome: Outcome) -> dict[str, Any]:
         "facts": _facts(outcome, signals),
         "worst": [] if signals is None else worst_places(signals, outcome.machine),
         "story": outcome.find(Explanation),
-        "sheet": _setup_sheet(outcome, signals),
+        "sheet": _to_prepare(outcome, signals),
         "placement": None if placed is None else _placement(outcome.job, placed.placement.transform),
         "setups": outcome.find(SetUps),
+        "one_of_several": outcome.find(Piece) is not None,
         "setup_sheet": setup_sheet(outcome),
         "chosen_by": "" if placed is None else placed.placement.chosen_by,
         "component": "" if placed is None else str(placed.component),
@@ -192,16 +195,15 @@ def _around(signals: Signals) -> list[list[float]]:
 
 
 def _placement(job: Job, transform: RigidTransform) -> dict[str, Any]:
-    matrix = transform.matrix
-    matrix[:3, 3] *= 1e3
+    rows = matrix_mm(transform).tolist()
     return {
         "sentences": words.placement_sentences(transform),
-        "matrix": [[f"{round(value, 6) + 0.0:.6f}".replace("-", "−") for value in row] for row in matrix.tolist()],
+        "matrix": [[f"{round(value, 6) + 0.0:.6f}".replace("-", "−") for value in row] for row in rows],
         "toml": placement_toml(job_at(job, transform).placement),
     }
 
 
-def _setup_sheet(outcome: Outcome, signals: Signals | None) -> list[tuple[str, str]]:
+def _to_prepare(outcome: Outcome, signals: Signals | None) -> list[tuple[str, str]]:
     """Return what someone in front of the machine has to prepare: name and value."""
     job, machine, toolpath = outcome.job, outcome.machine, outcome.find(Toolpath)
     sheet = [

@@ -80,6 +80,63 @@ def _subject(
     return _Subject(facets, tips, base, joints, far, tip, origin, hangs, table, around, name)
 
 
+@dataclass(frozen=True, eq=False)
+class _Paper:
+    """Where points (..., 2), mm, to the right and up, come to lie in a drawing that holds those from low to high."""
+
+    low: Floats
+    high: Floats
+
+    @property
+    def room(self) -> float:
+        """Width of the rim, mm."""
+        return 0.07 * float((self.high - self.low).max())
+
+    @property
+    def size(self) -> Floats:
+        """Width and height (2,), mm, with the rim."""
+        return self.high - self.low + 2.0 * self.room
+
+    @property
+    def unit(self) -> float:
+        """What lines and letters are measured in, mm: the drawing looks the same whatever the machine's size."""
+        return float(self.size.max()) / 500.0
+
+    def at(self, points: Floats) -> Floats:
+        """Return the places (..., 2): to the right and down, as SVG has it."""
+        right, up = points[..., 0], points[..., 1]
+        return np.stack([right - self.low[0] + self.room, self.high[1] + self.room - up], axis=-1)
+
+    def _words(self, points: Floats) -> str:
+        return " ".join(f"{x:.1f},{y:.1f}" for x, y in self.at(points).reshape(-1, 2))
+
+    def line(self, points: Floats, colour: str, width: float, more: str = "") -> str:
+        """Return a polyline, `width` units wide."""
+        pen = f'stroke="{colour}" stroke-width="{width * self.unit:.2f}"'
+        return f'<polyline points="{self._words(points)}" fill="none" {pen} {more}/>'
+
+    def filled(self, facets: Floats, colour: str, name: str) -> str:
+        """Return facets (F, 3, 2) as one shape that tells its name."""
+        shape = "".join(f"M{self._words(facet)}Z" for facet in facets)
+        return f'<path d="{shape}" fill="{colour}" fill-opacity="0.45"><title>{name}</title></path>'
+
+    def numbered(self, point: Floats, number: int, colour: str) -> str:
+        """Return a dot with its number."""
+        (x, y), u = self.at(point), self.unit
+        return (
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{5 * u:.2f}" fill="{colour}"/><text x="{x + 8.0 * u:.1f}" '
+            f'y="{y - 6.0 * u:.1f}" font-size="{_LETTER * u:.1f}" fill="currentColor">{number}</text>'
+        )
+
+    def cross(self, point: Floats, name: str) -> str:
+        """Return a cross that tells its name."""
+        (x, y), arm = self.at(point), 8.0 * self.unit
+        return (
+            f'<path d="M{x - arm:.1f},{y:.1f}h{2 * arm:.1f}M{x:.1f},{y - arm:.1f}v{2 * arm:.1f}" '
+            f'stroke="currentColor" stroke-width="{1.2 * self.unit:.2f}"><title>{name}</title></path>'
+        )
+
+
 def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool = False) -> str:
     """Return one view as a <figure>. axes: of the machine, to the right and along the page; close: the part alone."""
     up = -1.0 if subject.hangs else 1.0
@@ -90,56 +147,32 @@ def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool =
     seen = [flat(subject.tips), flat(subject.facets).reshape(-1, 2)]
     seen += [] if close else [flat(subject.base), flat(subject.joints), flat(subject.around).reshape(-1, 2)]
     shown = np.concatenate(seen)
-    low, high = shown.min(axis=0), shown.max(axis=0)
-    room = 0.07 * float((high - low).max())
-    size = high - low + 2.0 * room
-    unit = float(size.max()) / 500.0  # of line widths and letters, whatever the machine's size
-
-    def at(points: Floats) -> str:
-        shifted = np.stack([points[..., 0] - low[0] + room, high[1] + room - points[..., 1]], axis=-1)
-        return " ".join(f"{x:.1f},{y:.1f}" for x, y in shifted.reshape(-1, 2))
-
-    def line(points: Floats, colour: str, width: float, more: str = "") -> str:
-        return (
-            f'<polyline points="{at(points)}" fill="none" stroke="{colour}" stroke-width="{width * unit:.2f}" {more}/>'
-        )
-
-    def filled(facets: Floats, colour: str, name: str) -> str:
-        shape = "".join(f"M{at(facet)}Z" for facet in flat(facets))
-        return f'<path d="{shape}" fill="{colour}" fill-opacity="0.45"><title>{name}</title></path>'
-
-    parts = [filled(subject.around, HELD_COLOUR, subject.holder)] if len(subject.around) else []
-    parts.append(filled(subject.facets, QUIET_COLOUR, "part"))
+    paper = _Paper(shown.min(axis=0), shown.max(axis=0))
+    parts = [paper.filled(flat(subject.around), HELD_COLOUR, subject.holder)] if len(subject.around) else []
+    parts.append(paper.filled(flat(subject.facets), QUIET_COLOUR, "part"))
     if axes[1] == 2:
-        ends = np.array([low[0], high[0]])
-        parts.append(line(np.column_stack([ends, np.zeros(2)]), QUIET_COLOUR, 1.0, 'stroke-dasharray="4 3"'))
-        if subject.table is not None:
-            level = np.full(2, 1e3 * up * subject.table)
-            parts.append(line(np.column_stack([ends, level]), "currentColor", 1.6))
-    parts.append(line(flat(subject.tips), LIMIT_COLOUR, 0.6))
+        parts += _levels(paper, None if subject.table is None else 1e3 * up * subject.table)
+    parts.append(paper.line(flat(subject.tips), LIMIT_COLOUR, 0.6))
     if not close:
-        parts += [line(flat(np.stack([subject.base[k], subject.joints[k]])), LEG_COLOURS[k], 2.4) for k in range(5)]
-        for k in range(5):
-            x, y = (float(value) for value in at(flat(subject.base[k])).split(","))
-            parts.append(f'<circle cx="{x}" cy="{y}" r="{5 * unit:.2f}" fill="{LEG_COLOURS[k]}"/>')
-            parts.append(_text(f"{k + 1}", x + 8.0 * unit, y - 6.0 * unit, unit))
-        parts.append(line(flat(np.stack([subject.far, subject.tip])), "currentColor", 3.0))
-    x, y = (float(value) for value in at(flat(subject.origin)).split(","))
-    cross = 8.0 * unit
-    parts.append(
-        f'<path d="M{x - cross:.1f},{y}h{2 * cross:.1f}M{x},{y - cross:.1f}v{2 * cross:.1f}" '
-        f'stroke="currentColor" stroke-width="{1.2 * unit:.2f}"><title>origin of the mesh</title></path>'
-    )
+        base, legs = flat(subject.base), flat(np.stack([subject.base, subject.joints], axis=1))
+        parts += [paper.line(legs[k], LEG_COLOURS[k], 2.4) for k in range(5)]
+        parts += [paper.numbered(base[k], k + 1, LEG_COLOURS[k]) for k in range(5)]
+        parts.append(paper.line(flat(np.stack([subject.far, subject.tip])), "currentColor", 3.0))
+    parts.append(paper.cross(flat(subject.origin), "origin of the mesh"))
+    (width, height), extent = paper.size, paper.high - paper.low
     origin = ", ".join(f"{'xyz'[k]} = {round(1e3 * float(subject.origin[k]), 2) + 0.0:.2f}" for k in axes)
-    origin = origin.replace("-", "−")
-    legs = "" if close else " Legs as at the smallest margin."
-    extent = high - low
+    as_at = "" if close else " Legs as at the smallest margin."
     return (
-        f'<figure><svg viewBox="0 0 {size[0]:.1f} {size[1]:.1f}" role="img" aria-label="{title}">{"".join(parts)}'
+        f'<figure><svg viewBox="0 0 {width:.1f} {height:.1f}" role="img" aria-label="{title}">{"".join(parts)}'
         f'</svg><figcaption class="caption">{title}; {extent[0]:.0f} × {extent[1]:.0f} mm. The cross, origin of the '
-        f"mesh: {origin.replace('-', '−')} mm.{legs}</figcaption></figure>"
+        f"mesh: {origin.replace('-', '−')} mm.{as_at}</figcaption></figure>"
     )
 
 
-def _text(words: str, x: float, y: float, unit: float) -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" font-size="{_LETTER * unit:.1f}" fill="currentColor">{words}</text>'
+def _levels(paper: _Paper, table: float | None) -> list[str]:
+    """Return the base plane as a dashed line, and the table's surface at its height, mm, where there is one."""
+    ends = np.array([paper.low[0], paper.high[0]])
+    base = paper.line(np.column_stack([ends, np.zeros(2)]), QUIET_COLOUR, 1.0, 'stroke-dasharray="4 3"')
+    if table is None:
+        return [base]
+    return [base, paper.line(np.column_stack([ends, np.full(2, table)]), "currentColor", 1.6)]

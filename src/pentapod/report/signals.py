@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from pentapod.arrays import Floats, Ints, set_frozen
+from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import NOTHING, Surroundings
 from pentapod.planning.margins import Margins
@@ -61,7 +61,7 @@ class Signals:
         surroundings: what legs, spindle and tool must not touch; the gaps to it are margins, too.
         """
         times = program.times
-        rates, accelerations = _derivatives(program)
+        joined = Interpolant.through(program.legs, program.period, program.interpolation)
         tips, axes = _poses(program, machine)
         segments = trajectory.segment(np.minimum(times, trajectory.duration))
         speeds = np.linalg.norm(np.gradient(tips, program.period, axis=0), axis=1)
@@ -80,7 +80,7 @@ class Signals:
         profile = trajectory.profile
         at = np.clip(np.searchsorted(profile.times, times, side="right") - 1, 0, len(profile.active) - 1)
         return cls(
-            times, program.legs, rates, accelerations, tips, axes, speeds, feeds[segments], segments,
+            times, program.legs, joined.first, joined.second, tips, axes, speeds, feeds[segments], segments,
             kinds[segments], profile.active[at], tuple(profile.constraint_names), np.concatenate(values), rows, names,
         )  # fmt: skip
 
@@ -91,17 +91,6 @@ class Signals:
     def smallest_margins(self) -> Floats:
         """The smallest margin (K,) at each of `margin_rows`."""
         return self.margins.min(axis=1)
-
-
-def _derivatives(program: Program) -> tuple[Floats, Floats]:
-    """Return leg rates and accelerations (N, 5) at the rows, as the controller interpolates."""
-    if program.interpolation == "cubic" and len(program.legs) > 2:
-        spline = CubicSpline(program.times, program.legs, bc_type="clamped")
-        return spline(program.times, 1), spline(program.times, 2)
-    steps = np.diff(program.legs, axis=0) / program.period
-    still = np.zeros((1, 5))
-    rates = np.concatenate([still, steps])
-    return rates, np.diff(np.concatenate([rates, still]), axis=0) / program.period
 
 
 def _poses(program: Program, machine: Machine) -> tuple[Floats, Floats]:

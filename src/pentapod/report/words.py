@@ -49,9 +49,8 @@ def placement_sentences(transform: RigidTransform) -> list[str]:
     up = transform.rotation[:, 2]
     lean = float(np.degrees(np.arccos(np.clip(-up[2], -1.0, 1.0))))
     sentences = [
-        f"The origin of the mesh stands {z:.2f} mm below the base plane, at x = {x:.2f} mm, y = {y:.2f} mm.".replace(
-            "-", "−"
-        )
+        f"The origin of the mesh stands {abs(z):.2f} mm {'below' if z >= 0.0 else 'above'} the base plane, "
+        f"at x = {x:.2f} mm, y = {y:.2f} mm.".replace("-", "−")
     ]
     if lean < 0.005:
         sentences.append("Its z axis points straight up to the base.")

@@ -16,8 +16,7 @@ def velocities(program: Program) -> Floats:
     Drives that join positions and velocities by cubics follow that spline. Where the controller of the
     machine joins the rows by straight lines there is no velocity at a row; the spline is the smooth curve nearest by.
     """
-    steps = _spline(program).steps
-    return np.concatenate([steps[..., 0], steps[-1:, :, -1]])
+    return _spline(program).first
 
 
 def accelerations(program: Program) -> Floats:
