@@ -7,6 +7,7 @@ import pytest
 from pentapod.errors import JobError
 from pentapod.job import Job
 from pentapod.job_tables import JobTables
+from pentapod.job_values import job_mesh
 from pentapod.strategy_tables import TABLES
 
 FEED = "cut_mm_min = 3000"
@@ -57,6 +58,10 @@ MISTAKES = {  # what is replaced, and the pieces that the message must hold
     "unknown component": (('"++"', '"+"'), ("placement.component", "'--'")),
     "tolerance of zero": (("path_mm = 0.05", "path_mm = 0"), ("tolerance.path_mm", "greater than 0")),
     "flat region": (('unit = "mm"', 'unit = "mm"\nregion_box_mm = [[0,0,0],[1,1,0]]'), ("part.region_box_mm", "flat")),
+    "key outside the tables": (
+        ("[part]", "tilt_deg = 3\n[part]"),
+        ("job.toml:1: tilt_deg", 'did you mean "axis.tilt_deg"'),
+    ),
     "not TOML": (("[feed]", "[feed"), ("job.toml:19:6", "not TOML")),
     "key twice": ((FEED, f"{FEED}\n{FEED}"), ("job.toml:21", "not TOML")),
     "no such mesh": (('"part.stl"', '"prat.stl"'), ("job.toml:2", "part.mesh", "prat.stl", "no such file")),
@@ -89,6 +94,18 @@ def test_files_that_are_no_job(content, piece, tmp_path):
         Job.load(tmp_path / "other.toml")
     with pytest.raises(JobError, match="this is a folder"):
         Job.load(tmp_path)
+
+
+def test_what_only_shows_later_is_told_with_its_line(make_job):
+    leaning = make_job(('type = "ball"', 'type = "flat"'), ("tilt_deg = 0", "tilt_deg = 5"))
+    with pytest.raises(JobError, match=r"job\.toml:17: axis\.tilt_deg: .*cannot lean"):
+        Job.load(leaning)
+    job = Job.load(make_job(("path_mm = 0.05", "path_mm = 50")))
+    with pytest.raises(JobError, match=r"job\.toml:23: tolerance\.path_mm: the tolerance is too large"):
+        job_mesh(job)
+    job.path.unlink()
+    with pytest.raises(JobError, match=r"job\.toml: tolerance\.path_mm: the tolerance is too large"):
+        job_mesh(job)
 
 
 def test_paths_are_relative_to_the_job_and_variables_expand(make_job, tmp_path, monkeypatch):

@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import re
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -147,8 +148,10 @@ class Job:
 
     def error(self, table: str, key: str, what: str, **details: Any) -> JobError:
         """Return the JobError about a key of this job that only shows once the mesh or machine is known."""
-        value = getattr(getattr(self.tables, table), key)
-        return JobError(what, file=self.path, key=f"{table}.{key}", value=value, **details)
+        value, line = getattr(getattr(self.tables, table), key), None
+        with suppress(OSError, UnicodeDecodeError):  # the file may have changed since: then its line is left out
+            line = line_of(self.path.read_text(encoding="utf-8-sig"), (table, key))
+        return JobError(what, file=self.path, line=line, key=f"{table}.{key}", value=value, **details)
 
 
 def _sha(path: Path) -> str:
@@ -189,7 +192,7 @@ def _job_error(path: Path, text: str, error: ValidationError) -> JobError:
     strategy = place[1] if len(place) > 1 and place[0] == "toolpath" and place[1] in TABLES else "raster"
     where = (place[0], *place[2:]) if len(place) > 1 and place[:2] == ("toolpath", strategy) else place
     details = _details(first, where, strategy)
-    where = (*where, details.pop("key")) if "key" in details else where
+    where = (*where, *details.pop("key").split(".")) if "key" in details else where
     key = ".".join(where[:2]) + "".join(f"[{index}]" for index in where[2:])
     return JobError(file=path, line=line_of(text, where), key=key, **details)
 
@@ -198,7 +201,7 @@ def _details(error: ErrorDetails, where: tuple[str, ...], strategy: str) -> dict
     """Return what, value, expected and remedy of one error of pydantic."""
     context = error.get("ctx", {})
     if error["type"] == "extra_forbidden":
-        return _unknown(where, strategy)
+        return _unknown(where, strategy, is_table=isinstance(error["input"], dict))
     if error["type"] == "rule":
         return {"what": context["what"], "expected": context["expected"], "key": context["key"]}
     if error["type"] == "union_tag_invalid":
@@ -215,13 +218,16 @@ def _details(error: ErrorDetails, where: tuple[str, ...], strategy: str) -> dict
     return wrong_value(error, _description(where, strategy))
 
 
-def _unknown(where: tuple[str, ...], strategy: str) -> dict[str, Any]:
+def _unknown(where: tuple[str, ...], strategy: str, *, is_table: bool) -> dict[str, Any]:
     """Return what and remedy of a table or key that is not known, or not with this strategy."""
     owner = _model(where[:-1], strategy)
     known = list(owner.model_fields) if owner is not None else []
     if len(where) == 2 and where[0] == "toolpath" and any(where[1] in table.model_fields for table in TABLES.values()):
         rest = ", ".join(sorted(known))
         return {"what": f'the strategy "{strategy}" has no such key', "remedy": f"take it out; known: {rest}"}
+    if len(where) == 1 and not is_table:
+        keys = [f"{table}.{key}" for table in known for key in getattr(_model((table,), strategy), "model_fields", ())]
+        return {"what": "a key outside the tables", "remedy": nearest(where[0], [*known, *keys])}
     return {"what": f"unknown {'table' if len(where) == 1 else 'key'}", "remedy": nearest(where[-1], known)}
 
 

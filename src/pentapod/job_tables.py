@@ -211,7 +211,10 @@ class ToleranceTable(Table):
     """How far the motion may stray from the surface and from the chosen axis."""
 
     chordal_mm: Positive = Field(default=0.01, description="between the waypoints' chords and the mesh")
-    path_mm: Positive = Field(default=0.02, description="between the tool tip's motion and the toolpath")
+    path_mm: Positive = Field(
+        default=0.02,
+        description="between the motion of the tool's pivot (a ball's centre, a beam's spot) and the toolpath",
+    )
     axis_deg: float = Field(
         default=0.5, gt=0.0, le=10.0, description="by which the axis may leave the tilt cone on the way"
     )

@@ -83,8 +83,11 @@ def _opened(file: Path) -> Generator[BufferedReader]:
     try:
         with file.open("rb") as source:
             yield source
+    except FileNotFoundError as error:
+        raise ProgramError("no such file", file=file, expected="a program file") from error
     except OSError as error:
-        raise ProgramError(f"cannot be read: {(error.strerror or str(error)).lower()}", file=file) from error
+        reason = (error.strerror or str(error)).lower()
+        raise ProgramError(f"cannot be read: {reason}", file=file, expected="a program file") from error
 
 
 def _header(source: BufferedReader, file: Path) -> tuple[Header, int]:

@@ -69,7 +69,7 @@ def _read(path: Path) -> tuple[Floats, Ints, tuple[str, ...]]:
     suffix = path.suffix.lower()
     head, size = _head(path)
     if suffix not in FORMATS:
-        raise MeshError("not a mesh format I read", file=path, value=suffix, expected=", ".join(FORMATS))
+        raise MeshError("not a mesh format that is read", file=path, value=suffix, expected=", ".join(FORMATS))
     _check_head(path, suffix, head, size)
     data = path.read_bytes()
     if not data.strip():
