@@ -2,7 +2,7 @@
 
 Files named `*_kernels.py` hold them, each function marked with `kernel`; they are imported where they are first used,
 so that `import pentapod` stays light. The machine code is cached on disk, beside the file or in the user's
-cache folder: only the first run on a machine compiles, and says so to the log `pentapod`.
+cache folder: only the first run of a version on a machine compiles, and says so to the log `pentapod`.
 
 Loading numba takes about as long as NumPy needs for ten million poses. So work that NumPy can do as well, to the
 last bit, asks `kernels_pay` before it loads kernels: like a skier who rents until the rents add up to a pair of skis,
@@ -12,6 +12,7 @@ told from the result.
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import os
 import sys
@@ -20,7 +21,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
 from importlib.util import find_spec
-from typing import Literal, TypeVar, cast
+from pathlib import Path
+from typing import Any, Literal, TypeVar, cast
 
 _log = logging.getLogger("pentapod")
 
@@ -67,7 +69,19 @@ def kernel(function: _Function) -> _Function:
     from numba import njit  # noqa: PLC0415  heavy: only where kernels are used
 
     _announce_compiling()
-    return cast("_Function", njit(cache=True, error_model="numpy", fastmath=False)(function))
+    compiled: Any = njit(cache=True, error_model="numpy", fastmath=False)(function)
+    # A kernel holds the machine code of those it calls, but numba looks for changes in the kernel's own file only. With
+    # the others in its stamp, what was compiled for an older version is never taken for that of a newer one.
+    stored = compiled._cache._cache_file
+    stored._source_stamp = (stored._source_stamp, _digest())
+    return cast("_Function", compiled)
+
+
+@cache
+def _digest() -> str:
+    """Return a digest of all files with kernels."""
+    files = sorted(Path(__file__).parent.rglob("*_kernels.py"))
+    return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
 
 
 @cache

@@ -20,20 +20,8 @@ from pentapod.refusal import Refusal
 from pentapod.simulate import Reference, contour_errors, simulate_servo
 
 sys.path.append(str(Path(__file__).parents[1] / "program"))
+from servo_runs import LINEAR, played
 from short_motion import motion
-
-LINEAR = {"encoder_step": 0.0, "ripple_force": 0.0, "dead_time": 0.0}
-
-
-def played(duration=1.2, interpolation="cubic", correct=False, seed=0, **drives):
-    program, machine = motion(duration, interpolation)
-    reference = Reference(program, replace(machine, drives=replace(machine.drives, **drives)))
-    return simulate_servo(reference, seed=seed, correct=correct), reference
-
-
-def contour(result, reference):
-    rows = 2 * np.arange(len(result.tips))
-    return contour_errors(result.tips, result.directions, reference.tips, reference.directions, rows, 60)
 
 
 @pytest.mark.parametrize(("delay", "shares"), [(0, (1.0, 1.0)), (2, (1.0, 1.0)), (3, (0.0, 0.0)), (1, (0.7, 0.4))])
@@ -119,35 +107,6 @@ def test_encoders_hold_within_a_few_steps():
     assert np.abs(smooth.legs - reference.program.legs).max() < 3e-5
 
 
-@pytest.mark.parametrize(
-    "drives",
-    [
-        {},
-        {"velocity_feedforward": 0.0},
-        {"position_gain": [80, 70, 80, 90, 75], "velocity_feedforward": 0.0, "ripple_force": 0.0},
-        {"dead_time": 1e-3},
-    ],
-    ids=["as shipped", "no feed-forward", "unequal gains", "late"],
-)
-def test_correction_by_pose_lowers_the_contour_error_threefold(drives):
-    """At feeds of cutting: 2000 mm/min at most. What is faster than the loops, or finer than the encoders, stays."""
-    for seed in range(2):
-        (plain, reference), (corrected, _) = (played(8.0, correct=c, seed=seed, **drives) for c in (False, True))
-        before, after = contour(plain, reference), contour(corrected, reference)
-        assert before[0].max() > 5e-6
-        assert before[0].max() >= 3.0 * after[0].max()
-        assert np.sqrt(np.mean(before[0] ** 2)) >= 3.0 * np.sqrt(np.mean(after[0] ** 2))
-        assert before[1].max() >= 3.0 * after[1].max()
-
-
-def test_correction_leaves_the_lag_along_the_path_alone():
-    drives = {"velocity_feedforward": 0.0, "ripple_force": 0.0}
-    (plain, reference), (corrected, _) = (played(6.0, correct=c, **drives) for c in (False, True))
-    late = [np.linalg.norm(r.tips - reference.tips[::2], axis=1).max() for r in (plain, corrected)]
-    assert late[0] > 5e-4
-    assert late[1] == pytest.approx(late[0], rel=0.1)
-
-
 def test_the_seed_decides():
     same, other = (played(0.3, seed=3)[0] for _ in range(2)), played(0.3, seed=4)[0]
     first, second = same
@@ -160,7 +119,7 @@ def test_the_seed_decides():
 def test_without_numba_the_same(tmp_path):
     code = (
         f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
-        "from test_servo import played\n"
+        "from servo_runs import played\n"
         "import json; print(json.dumps([played(0.2, correct=c)[0].legs[::40].tolist() for c in (False, True)]))"
     )
     env = {**os.environ, "PENTAPOD_NUMPY_ONLY": "1"}

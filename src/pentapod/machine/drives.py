@@ -24,10 +24,11 @@ class Drives:
     up and down once in ripple_pitch metres of travel. The others hold for all legs. velocity_feedforward,
     acceleration_feedforward and load_feedforward: shares, 1 is full; the load is that of the `Masses`. encoder_step:
     metres, 0 for none. dead_time: seconds from reading the encoder to the force. period: seconds of the drive's own
-    loop. contour_gain and contour_rate (1/s): proportional and integral share of the correction by pose, where it is
-    asked for.
+    loop. contour_margin: what is faster than the correction by pose can answer, this correction may enlarge so many
+    times; the less, the slower it is.
 
-    Raises MachineError: numbers that are negative or not finite, gains, masses, pitch or period that are 0.
+    Raises MachineError: numbers that are negative or not finite, gains, masses, pitch or period that are 0, a margin
+    below 1.1.
     """
 
     position_gain: Floats = field(default_factory=lambda: np.full(5, 80.0))
@@ -42,24 +43,16 @@ class Drives:
     encoder_step: float = 1e-7
     dead_time: float = 2.5e-4
     period: float = 1.25e-4
-    contour_gain: float = 4.0
-    contour_rate: float = 400.0
+    contour_margin: float = 2.0
 
     def __post_init__(self) -> None:
         gains = ("position_gain", "velocity_gain", "moving_mass", "ripple_pitch")
         per_leg(self, *gains, "velocity_integral", "ripple_force")
         positive(self, *gains, "period")
         shares = ("velocity_feedforward", "acceleration_feedforward", "load_feedforward")
-        not_negative(
-            self,
-            "velocity_integral",
-            "ripple_force",
-            *shares,
-            "encoder_step",
-            "dead_time",
-            "contour_gain",
-            "contour_rate",
-        )
+        not_negative(self, "velocity_integral", "ripple_force", *shares, "encoder_step", "dead_time")
+        if not 1.1 <= self.contour_margin < np.inf:
+            raise MachineError("too small", key="contour_margin", value=self.contour_margin, expected="1.1 or more")
 
 
 @dataclass(frozen=True, eq=False)

@@ -172,8 +172,7 @@ def _drives(table: DrivesTable) -> Drives:
         encoder_step=table.encoder_step_mm / 1000.0,
         dead_time=table.dead_time_ms / 1000.0,
         period=table.period_ms / 1000.0,
-        contour_gain=table.contour_gain,
-        contour_rate=table.contour_rate_per_s,
+        contour_margin=table.contour_margin,
     )
 
 

@@ -193,11 +193,10 @@ class DrivesTable(Table):
         default=1e3 * _DRIVES.dead_time, description="from reading the scale to the force"
     )
     period_ms: Positive = Field(default=1e3 * _DRIVES.period, description="of the drive's own loop")
-    contour_gain: NotNegative = Field(
-        default=_DRIVES.contour_gain, description="proportional share of the correction by pose"
-    )
-    contour_rate_per_s: NotNegative = Field(
-        default=_DRIVES.contour_rate, description="integral share of the correction by pose"
+    contour_margin: float = Field(
+        default=_DRIVES.contour_margin,
+        ge=1.1,
+        description="the correction by pose may enlarge what is too fast for it so many times; less is slower",
     )
 
 

@@ -13,6 +13,7 @@ from pentapod.arrays import Floats
 from pentapod.errors import InputError
 from pentapod.kinematics.quadratic import NEAR_W_SQUARED
 from pentapod.refusal import Refusal
+from pentapod.simulate.correction import NO_CORRECTION, correction_for
 from pentapod.simulate.played import Played
 from pentapod.simulate.reference import Reference
 
@@ -23,8 +24,9 @@ _LARGEST = 100.0  # legs that are off by a hundred metres are beyond control
 def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False) -> Played | Refusal:
     """Return how five servo drives play a program; the same for the same seed, which gives the ripple's phases.
 
-    correct: correct the leg commands by the pose. A Refusal says that the loops are unstable, or that the legs come to
-    lengths without a pose. Raises InputError for a negative seed.
+    correct: correct the leg commands by the pose. A Refusal says that the loops are unstable, that there is no
+    correction with the margin asked for, or that the legs come to lengths without a pose. Raises InputError for a
+    negative seed.
     """
     from pentapod.simulate.servo_kernels import drive  # noqa: PLC0415  kernels are loaded where they are used
 
@@ -34,6 +36,14 @@ def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False
     drives, robot = machine.drives, machine.pentapod
     parts = max(1, round(program.period / drives.period))
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 5)
+    delay = round(drives.dead_time * parts / program.period)
+    correction = correction_for(drives, program.period, parts, delay) if correct else NO_CORRECTION
+    if correction is None:
+        return Refusal(
+            "simulation",
+            "no correction by the pose keeps its margin with these drives",
+            remedy="lower the gains or the dead time in [drives], or raise its contour_margin",
+        )
     rest = int(np.ceil(_REST_S / program.period))
     lengths, accelerations = _after_rest(reference.lengths, rest), _after_rest(reference.accelerations, rest)
     lengths[:rest, :, 0], lengths[:rest, :, 1:], accelerations[:rest] = program.legs[0], 0.0, 0.0
@@ -46,12 +56,13 @@ def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False
             accelerations,
             program.period,
             parts,
-            round(drives.dead_time * parts / program.period),
+            delay,
             np.stack([drives.position_gain, drives.velocity_gain, drives.velocity_integral]),
             np.array([drives.velocity_feedforward, drives.acceleration_feedforward]),
             drives.encoder_step,
             np.stack([drives.ripple_force / drives.moving_mass, drives.ripple_pitch, phases]),
-            np.array([drives.contour_gain, drives.contour_rate]) * float(correct),
+            correct,
+            correction.feedback,
             (
                 robot.linear_part.linear_map,
                 robot.linear_part.constant,
@@ -59,8 +70,8 @@ def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False
                 np.array([program.component], dtype=np.float64),
                 robot.base,
                 robot.offsets,
-                _after_rest(reference.tips[::2], rest),
-                _after_rest(reference.directions[::2], rest),
+                _after_rest(reference.tips, 2 * rest),
+                _after_rest(reference.directions, 2 * rest),
             ),
             legs,
             efforts,
