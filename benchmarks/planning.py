@@ -26,6 +26,7 @@ from planning_instances import Instance, instances
 
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine.machine import Machine
+from pentapod.planning.axis_cost import AxisCost
 from pentapod.planning.ipopt import IpoptSolver
 from pentapod.planning.leg_path import leg_path
 from pentapod.planning.margins import Margins
@@ -37,10 +38,12 @@ from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Candidate, Setting
 from pentapod.planning.task import Task
 from pentapod.planning.tilt import lean
+from pentapod.planning.weights import NEEDED_MARGIN
 from pentapod.refusal import Refusal
 from pentapod.toolpath.toolpath import Toolpath
 
 CALM_SHARE = 0.9
+EVEN_PLACES = 4_000
 PATIENCE_S = 600.0
 """Processor seconds after which plain IPOPT is given up."""
 Value = TypeVar("Value")
@@ -81,7 +84,8 @@ def calm_against(setting: Setting, at: Candidate, *, whole: bool) -> str:
     keep = CALM_SHARE * at.smallest
     ours, seconds = timed(lambda: SequentialSolver(setting, False).calm(at, keep))
     theirs, their_seconds = timed(lambda: IpoptSolver(setting, False, whole).calm(at, keep))
-    costs = [f"{'none':>9s}" if c is None else f"{setting.course.cost_of(c):9.6f}" for c in (ours, theirs)]
+    cost = AxisCost(setting, at)
+    costs = [f"{'none':>9s}" if c is None else f"{cost.of(c):9.6f}" for c in (ours, theirs)]
     return f" {' '.join(costs)} {their_seconds / seconds:6.1f}x"
 
 
@@ -135,8 +139,8 @@ def rates(tasks: list[Instance], machine: Machine) -> None:
             continue
         found = [along_path(task, setting, at, axes) for axes in (setting.task.nominal, calm_axes(setting, calm))]
         row: list[float] = []
-        for strict, turned in zip(*found, strict=True):
-            above = (turned > 1.1 * strict + 0.01 * strict.max()).mean()
+        for strict, turned, fits in zip(*found, strict_fits(setting, at), strict=True):
+            above = (fits & (turned > 1.1 * strict + 0.01 * strict.max())).mean()
             row += [float(np.median(turned) / np.median(strict)), float(turned.max() / strict.max()), float(above)]
         columns.append(row)
         cells = [f"{v:6.2f}x" if k % 3 < 2 else f"{100.0 * v:6.1f}%" for k, v in enumerate(row)]
@@ -145,12 +149,22 @@ def rates(tasks: list[Instance], machine: Machine) -> None:
     print(
         f"{'median':58s} " + " ".join(f"{v:6.2f}x" if k % 3 < 2 else f"{100.0 * v:6.1f}%" for k, v in enumerate(middle))
     )
-    print("above: share of the path where it is over the strict normal's by 10 % and by 1 % of its peak\n")
+    print("above: share of the path where strict normals fit and theirs is exceeded by 10 % and by 1 % of its peak\n")
 
 
 def calm_axes(setting: Setting, calm: np.ndarray) -> np.ndarray:
     """Return the axes (N, 3) of a course, workpiece frame."""
     return lean(setting.task.nominal, setting.course.leans(calm))
+
+
+def strict_fits(setting: Setting, at: Candidate) -> tuple[np.ndarray, np.ndarray]:
+    """Return where strict normals are within all limits: for each interval of waypoints, and each even place."""
+    task = setting.task
+    fits = at.margins(*task.machine_poses(at.transform, task.nominal), at.transform).min(axis=1) >= NEEDED_MARGIN
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(task.pivots, axis=0), axis=1))])
+    between = fits[1:] & fits[:-1]
+    even = np.linspace(0.0, way[-1], EVEN_PLACES)[1:-1]
+    return between, between[np.clip(np.searchsorted(way, even) - 1, 0, len(between) - 1)]
 
 
 def along_path(task: Instance, setting: Setting, at: Candidate, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -167,7 +181,7 @@ def along_path(task: Instance, setting: Setting, at: Candidate, axes: np.ndarray
     parameter = np.linspace(0.0, path.length, 20_000)
     tip, axis = path.pose(parameter)
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip + setting.task.pivot * axis, axis=0), axis=1))])
-    even = np.linspace(0.0, way[-1], 4_000)
+    even = np.linspace(0.0, way[-1], EVEN_PLACES)
     legs = np.stack([np.interp(even, way, leg) for leg in path(parameter).T], axis=1)
     return rate, np.abs(np.diff(legs, 2, axis=0)).max(axis=1) / even[1] ** 2
 

@@ -1,13 +1,14 @@
 """AxisCourse: the lean of the tool along a path as one spline, and the cost that a calm course makes small.
 
 The lean is a vector across the nominal axis, told in a pair of directions that is carried along the path; its two
-numbers are a cubic spline over the way of the pivot, a few knots for each centimetre. The spline stays within the
+numbers are a cubic spline over the way of the pivot, with knots at waypoints. The spline stays within the
 convex hull of its coefficients, so a course whose coefficients keep the cone keeps it everywhere, and turns nowhere
 faster than they do.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,10 +19,12 @@ from scipy.linalg import solveh_banded
 
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.transport import carried_frames
+from pentapod.planning.banded import banded, banded_product
+from pentapod.planning.divided import as_matrix, divided_differences
 from pentapod.planning.task import Task
 
 KNOT_SPACING_M = 2e-3
-"""Longest way between knots; shorter on small parts."""
+"""Shortest way between knots; shorter on small parts. Where waypoints are farther apart there is a knot at each."""
 LEVER_M = 10e-3
 """How much way one radian of the nominal axis counts for, so that a turn on the spot has knots too."""
 FORESIGHT_M = 20e-3
@@ -30,8 +33,9 @@ UPRIGHT_WEIGHT = 1e-2
 """Of the lean itself beside its rates: a lean that serves nothing fades."""
 
 _DEGREE = 3
-_MARKS = 4  # a knot interval
+_NODES = 2  # at most, a knot interval
 _INTERVALS_PER_EXTENT = 50
+_LEAST_CURVATURE = 1e-10  # of coefficients that the cost does not see
 BANDS = 10
 """Diagonals of the cost, main one and below: a second difference reaches over five coefficients of two numbers."""
 
@@ -40,8 +44,9 @@ BANDS = 10
 class AxisCourse:
     """Leans along a task's path: those at its waypoints are cone · basis @ c, for coefficients c in the unit disc.
 
-    c (K, 2); basis (N, K) sparse; frames (N, 2, 3): the pair at each waypoint, workpiece frame.
-    marks: waypoints that stand for all, as many as the spline can tell apart.
+    c (K, 2); basis (N, K) sparse, four neighbours a row; frames (N, 2, 3): the pair at each waypoint, workpiece frame.
+    nodes (n,): waypoints that stand for all, as many as the spline can tell apart; there the cost takes derivatives.
+    way (n,): how far along they are, metres.
     The cost of c is cᵀHc/2 + gᵀc + constant, hessian (BANDS, 2K) in SciPy's lower banded form, in the order of
     c.ravel().
     """
@@ -49,7 +54,8 @@ class AxisCourse:
     cone: float
     basis: Any
     frames: Floats
-    marks: Ints
+    nodes: Ints
+    way: Floats
     hessian: Floats
     gradient: Floats
     constant: float
@@ -60,27 +66,18 @@ class AxisCourse:
         way = _way(task)
         extent = float(np.linalg.norm(np.ptp(task.pivots, axis=0)))
         spacing = min(KNOT_SPACING_M, max(extent, LEVER_M) / _INTERVALS_PER_EXTENT)
-        count = int(np.clip(np.ceil(way[-1] / spacing), 4, 2 * len(way) + 8))
-        step = max(float(way[-1]), 1e-9) / count
-        knots = step * np.arange(-_DEGREE, count + _DEGREE + 1.0)
-        # Two nodes an interval: at the knots alone the cost would not see coefficients that alternate.
-        nodes = 0.5 * step * np.arange(2.0 * count + 1.0)
-        # Waypoints and nodes in one sequence, so that both are told in the same carried pairs.
-        order = np.argsort(np.concatenate([way, nodes]), kind="stable")
-        places = np.empty_like(order)
-        places[order] = np.arange(len(order))
-        nominal = np.concatenate([task.nominal, _between(way, task.nominal, nodes)])
-        frames = carried_frames(nominal[order])[places]
-        basis = BSpline.design_matrix(np.clip(way, 0.0, nodes[-1]), knots, _DEGREE)
-        at_nodes = BSpline.design_matrix(nodes, knots, _DEGREE)
-        cost = _cost(nominal[len(way) :], cone * frames[len(way) :], at_nodes, 0.5 * step)
-        marks = np.unique(np.floor(_MARKS * way / step), return_index=True)[1]
-        return cls(cone, sparse.csr_matrix(basis), frames[: len(way)], marks, *cost)
+        # Between waypoints the tool moves straight on, so derivatives are differences of waypoints. Two nodes for
+        # each knot where there are as many: at the knots alone the cost hardly sees coefficients that alternate.
+        nodes = _apart(way, spacing / _NODES)
+        basis = sparse.csr_matrix(BSpline.design_matrix(way, _knots(way[nodes], spacing), _DEGREE))
+        frames = carried_frames(task.nominal)
+        cost = _cost(task.nominal[nodes], cone * frames[nodes], basis[nodes], way[nodes])
+        return cls(cone, basis, frames, nodes, way[nodes], *cost)
 
-    def leans(self, c: Floats) -> Floats:
-        """Return the leans (N, 3) at the waypoints, across the nominal axes, workpiece frame."""
-        along: Floats = self.cone * (self.basis @ c)
-        return np.einsum("na,nak->nk", along, self.frames)
+    def leans(self, c: Floats, rows: Ints | slice = slice(None)) -> Floats:
+        """Return the leans (n, 3) at waypoints `rows`, across the nominal axes, workpiece frame."""
+        along: Floats = self.cone * (self.basis[rows] @ c)
+        return np.einsum("na,nak->nk", along, self.frames[rows])
 
     def cost_of(self, c: Floats) -> float:
         """Return the cost of coefficients c (K, 2): mean squares of second derivative, rate and lean, in rad²."""
@@ -99,22 +96,13 @@ class AxisCourse:
         size = self.hessian.shape[1] // 2
         rate, bend = _differences(size, 1), _differences(size, 2)
         normal = self.basis.T @ self.basis + 1e-6 * (bend.T @ bend) + 1e-9 * (rate.T @ rate) + 1e-12 * sparse.eye(size)
-        c = solveh_banded(_banded(normal, _DEGREE + 1), self.basis.T @ wanted, lower=True)
+        c = solveh_banded(banded(normal, _DEGREE + 1), self.basis.T @ wanted, lower=True)
         return within_discs(np.asarray(c, dtype=np.float64))
 
 
 def within_discs(c: Floats) -> Floats:
     """Return coefficients (K, 2) with those outside the unit disc brought to its edge."""
     return c / np.maximum(1.0, np.linalg.norm(c, axis=1, keepdims=True))
-
-
-def banded_product(lower: Floats, x: Floats) -> Floats:
-    """Return H x of a symmetric matrix in SciPy's lower banded form (B, n)."""
-    y = lower[0] * x
-    for k in range(1, len(lower)):
-        y[k:] += lower[k, :-k] * x[:-k]
-        y[:-k] += lower[k, :-k] * x[k:]
-    return y
 
 
 def _way(task: Task) -> Floats:
@@ -124,52 +112,68 @@ def _way(task: Task) -> Floats:
     return np.concatenate([[0.0], np.cumsum(moved + LEVER_M * turned)])
 
 
-def _between(way: Floats, nominal: Floats, nodes: Floats) -> Floats:
-    """Return unit axes at the nodes, linear between the waypoints'."""
-    axes = np.stack([np.interp(nodes, way, column) for column in nominal.T], axis=1)
-    length = np.linalg.norm(axes, axis=1, keepdims=True)
-    return np.where(length > 1e-6, axes / np.maximum(length, 1e-6), [0.0, 0.0, 1.0])
+def _apart(way: Floats, spacing: float) -> Ints:
+    """Return indices into an ascending way (N,) that are at least about `spacing` apart, both ends among them."""
+    places, found = way.tolist(), [0]
+    while (following := bisect_left(places, places[found[-1]] + spacing, found[-1] + 1)) < len(places):
+        found.append(following)
+    if found[-1] < len(places) - 1:
+        if len(found) > 1 and places[-1] - places[found[-1]] < 0.5 * spacing:
+            found.pop()
+        found.append(len(places) - 1)
+    return np.array(found, dtype=np.intp)
 
 
-def _cost(nominal: Floats, frames: Floats, at_nodes: Any, step: float) -> tuple[Floats, Floats, float]:
+def _knots(way: Floats, spacing: float) -> Floats:
+    """Return the knots: some of the nodes' ways (n,), and three more beyond each end."""
+    inner = way[_apart(way, spacing)]
+    if inner[-1] <= inner[0]:  # the whole path is one place
+        inner = inner[0] + spacing * np.arange(2.0)
+    beyond = np.arange(1.0, _DEGREE + 1.0)
+    return np.concatenate([
+        inner[0] - (inner[1] - inner[0]) * beyond[::-1], inner, inner[-1] + (inner[-1] - inner[-2]) * beyond
+    ])  # fmt: skip
+
+
+def _cost(nominal: Floats, frames: Floats, at_nodes: Any, way: Floats) -> tuple[Floats, Floats, float]:
     """Return Hessian, gradient and constant of the mean square of the axes' derivatives and leans over the nodes.
 
-    nominal (n, 3); frames (n, 2, 3), the pairs times the cone; at_nodes (n, K): the basis there. The axes are taken
-    as nominal plus lean, not normalised, which makes the cost a quadratic.
+    nominal (n, 3); frames (n, 2, 3), the pairs times the cone; at_nodes (n, K): the basis there; way (n,).
     """
-    count, size = at_nodes.shape
-    pair = sparse.kron(at_nodes, sparse.eye(2), format="csr")  # (2n, 2K): the lean's two numbers at each node
+    lean, axes = _axes_by_lean(frames, at_nodes), nominal.ravel()
+    size = lean.shape[1]
+    hessian: Any = _LEAST_CURVATURE * sparse.identity(size, format="csr")
+    gradient, constant = np.zeros(size), 0.0
+    for order, weight in ((2, FORESIGHT_M**4), (1, FORESIGHT_M**2), (0, UPRIGHT_WEIGHT)):
+        factors, shares = divided_differences(way, order)
+        derivative = sparse.kron(as_matrix(factors), sparse.identity(3), format="csr")
+        weighed = sparse.diags(2.0 * weight * np.repeat(shares, 3))
+        by_lean = sparse.csr_matrix(derivative @ lean)
+        fixed = derivative @ axes if order > 0 else np.zeros(len(axes))
+        hessian = hessian + by_lean.T @ weighed @ by_lean
+        gradient = gradient + by_lean.T @ (weighed @ fixed)
+        constant += 0.5 * float(fixed @ (weighed @ fixed))
+    return banded(hessian, BANDS), gradient, constant
+
+
+def _axes_by_lean(frames: Floats, at_nodes: Any) -> Any:
+    """Return the sparse matrix (3n, 2K) from coefficients to axes at the nodes: nominal plus lean, not normalised.
+
+    frames (n, 2, 3), the pairs times the cone; at_nodes (n, K): the basis. That it is linear makes the cost a
+    quadratic.
+    """
+    count = len(frames)
+    pair = sparse.kron(at_nodes, sparse.identity(2), format="csr")  # (2n, 2K): the lean's two numbers at each node
     node = np.arange(count)
     rows = np.broadcast_to((3 * node[:, None] + np.arange(3))[:, None, :], frames.shape)
     columns = np.broadcast_to((2 * node[:, None] + np.arange(2))[:, :, None], frames.shape)
     spread = sparse.csr_matrix((frames.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * count, 2 * count))
-    lean = sparse.csr_matrix(spread @ pair)
-    hessian: Any = sparse.csr_matrix((2 * size, 2 * size))
-    gradient, constant = np.zeros(2 * size), 0.0
-    axes = nominal.ravel()
-    terms = ((2, (FORESIGHT_M / step) ** 4), (1, (FORESIGHT_M / step) ** 2), (0, UPRIGHT_WEIGHT))
-    for order, weight in terms:
-        difference: Any = sparse.kron(_differences(count, order), sparse.eye(3), format="csr")
-        by_lean = difference @ lean
-        fixed = difference @ axes if order > 0 else np.zeros(3 * count)
-        hessian = hessian + (2.0 * weight / count) * (by_lean.T @ by_lean)
-        gradient = gradient + (2.0 * weight / count) * (by_lean.T @ fixed)
-        constant += weight / count * float(fixed @ fixed)
-    return _banded(hessian + 1e-12 * sparse.eye(2 * size), BANDS), gradient, constant
+    return sparse.csr_matrix(spread @ pair)
 
 
 def _differences(count: int, order: int) -> Any:
     """Return the sparse matrix (count − order, count) that takes values to their differences of this order."""
-    difference: Any = sparse.eye(count, format="csr")
+    difference: Any = sparse.identity(count, format="csr")
     for _ in range(order):
         difference = difference[1:] - difference[:-1]
     return difference
-
-
-def _banded(matrix: Any, bands: int) -> Floats:
-    """Return a symmetric sparse matrix in SciPy's lower banded form (bands, n)."""
-    lower = np.zeros((bands, matrix.shape[0]))
-    for k in range(bands):
-        diagonal = matrix.diagonal(-k)
-        lower[k, : len(diagonal)] = diagonal
-    return lower

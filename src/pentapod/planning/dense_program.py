@@ -12,7 +12,6 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from pentapod.arrays import Floats
-from pentapod.planning.interior_point import longest_step
 
 _ITERATIONS = 60
 _GOOD = 1e-9
@@ -25,6 +24,8 @@ def dense_program(hessian: Floats, gradient: Floats, matrix: Floats, upper: Floa
 
     None where the method does not end: for want of an interior, say.
     """
+    from pentapod.planning.interior_kernels import longest_step  # noqa: PLC0415  kernels are loaded where used
+
     x, z = np.zeros(len(gradient)), np.full(len(upper), 1e-2)
     s = np.maximum(upper, 1e-2)
     for _ in range(_ITERATIONS):

@@ -66,6 +66,19 @@ def _point(setting: Setting, margins: Margins, kinds: Sequence[int], slides: Any
     """Return the symbols of a waypoint, its weighed margins, and the square of the lean; see above."""
     import casadi as ca  # noqa: PLC0415
 
+    (step, a, *given), (tip, turned, turn, square) = _pose(setting)
+    numbers = ca.SX.sym("contacts", margins.contact_numbers)
+    joints = None if slides is None else _slid(setting, margins, slides)
+    values = margins.symbolic(tip, turned, turn, given[-1] + step[:3], numbers, joints)[list(kinds)]
+    if not setting.weights.are_even:
+        values = weighed(values, ca.DM(setting.weights.of(margins.limits)[list(kinds)]))
+    return [step, a, *given, numbers], values, square
+
+
+def _pose(setting: Setting) -> tuple[list[Any], tuple[Any, Any, Any, Any]]:
+    """Return the symbols step, a, pivot, nominal, pair, R, t of a waypoint; its tip, axis, turn, square of the lean."""
+    import casadi as ca  # noqa: PLC0415
+
     step, a = ca.SX.sym("step", 6), ca.SX.sym("a", 2)
     pivot, nominal = ca.SX.sym("pivot", 3), ca.SX.sym("nominal", 3)
     pair, rotation, translation = ca.SX.sym("pair", 3, 2), ca.SX.sym("R", 3, 3), ca.SX.sym("t", 3)
@@ -75,12 +88,29 @@ def _point(setting: Setting, margins: Margins, kinds: Sequence[int], slides: Any
     turn = ca.mtimes(rotation, _cayley(step[3:]))
     turned = ca.mtimes(turn, (nominal + across) / ca.sqrt(1.0 + square))
     tip = ca.mtimes(turn, pivot) + translation + step[:3] - setting.task.pivot * turned
-    numbers = ca.SX.sym("contacts", margins.contact_numbers)
-    joints = None if slides is None else _slid(setting, margins, slides)
-    values = margins.symbolic(tip, turned, turn, translation + step[:3], numbers, joints)[list(kinds)]
-    if not setting.weights.are_even:
-        values = weighed(values, ca.DM(setting.weights.of(margins.limits)[list(kinds)]))
-    return [step, a, pivot, nominal, pair, rotation, translation, numbers], values, square
+    return [step, a, pivot, nominal, pair, rotation, translation], (tip, turned, turn, square)
+
+
+def leg_function(setting: Setting, margins: Margins, *, slopes: bool = False) -> Any:
+    """Return the casadi function of one waypoint: its leg lengths 5, metres, for the machine of the margins.
+
+    Of a, pivot, nominal, pair, R, t as in `point_function`. slopes: also return their derivatives by a, 5 × 2.
+    """
+    return _once(margins, ("legs", slopes), setting, lambda: _legs(setting, margins, slopes))
+
+
+def _legs(setting: Setting, margins: Margins, slopes: bool) -> Any:
+    import casadi as ca  # noqa: PLC0415
+
+    (step, a, *given), (tip, turned, _, _) = _pose(setting)
+    bases, offsets = margins.joints
+    reach = [margins.machine.tool_length - z for z in offsets]
+    legs = ca.vertcat(*[
+        ca.norm_2(tip + far * turned - ca.vertcat(x, y, 0.0)) for far, (x, y) in zip(reach, bases, strict=True)
+    ])  # fmt: skip
+    wanted = [legs, ca.jacobian(legs, a)] if slopes else [legs]
+    here = ca.substitute(wanted, [step], [ca.SX.zeros(6)])
+    return ca.Function("legs", [a, *given], [ca.densify(each) for each in here], {"cse": True})
 
 
 def _once(margins: Margins, name: tuple[Any, ...], setting: Setting, make: Callable[[], Any]) -> Any:

@@ -13,6 +13,7 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.planning.axis_cost import AxisCost
 from pentapod.planning.axis_course import within_discs
 from pentapod.planning.formulation import point_function, room_function, stepped
 from pentapod.planning.linear_model import valleys
@@ -95,15 +96,20 @@ class IpoptSolver:
             np.tile(start.transform.translation[:, None], (1, count)),
             setting.contacts(start.margins, start.transform, course.leans(first), np.arange(count)).T,
         )  # fmt: skip
-        x, scale = ca.vec(c), max(course.cost_of(first), 1e-9)
+        cost = AxisCost(setting, start)
+        spent, excess, room = cost.symbolic(c)
         problem = {
-            "x": x,
-            "f": (0.5 * ca.bilin(ca.DM(course.whole_hessian()), x, x) + ca.dot(ca.DM(course.gradient), x)) / scale,
-            "g": ca.vertcat(ca.vec(margins), 1.0 - ca.sum1(c * c).T),
+            "x": ca.vertcat(ca.vec(c), excess),
+            "f": spent / max(course.cost_of(first), 1e-9),
+            "g": ca.vertcat(ca.vec(margins), 1.0 - ca.sum1(c * c).T, room),
         }
-        lower = np.concatenate([np.full(len(kinds) * count, keep), np.zeros(len(first))])
+        free, charged = first.size, excess.numel()
+        begin = np.concatenate([first.ravel(), np.ones(charged)])
+        least = np.concatenate([np.full(len(kinds) * count, keep), np.zeros(len(first) + room.numel())])
         solver = ca.nlpsol("calm", "ipopt", problem, self._options)
-        found = np.asarray(solver(x0=first.ravel(), lbg=lower, ubg=np.inf)["x"], dtype=np.float64).reshape(-1, 2)
+        lowest = np.concatenate([np.full(free, -np.inf), np.zeros(charged)])
+        found = np.asarray(solver(x0=begin, lbx=lowest, lbg=least, ubg=np.inf)["x"], dtype=np.float64)
+        found = found.ravel()[:free].reshape(-1, 2)
         found = within_discs(found)
         values = setting.values_of(start.margins, start.transform, course.leans(found))
         return found if values.min() >= keep - 1e-4 else None
