@@ -23,8 +23,9 @@ from pentapod.planning.vectorised import Vectorised
 
 EXCESS_WEIGHT = 1e4
 """Of the mean square of an excess, as a share of what the nominal axes have there, beside the cost of their rates."""
-_FREE_OF_PEAK = 0.005
-"""What is free is what the nominal axes have at the node, and this share of their largest."""
+_FREE_OF_MIDDLE = 0.01
+"""What is free is what the nominal axes have at the node, and this share of their median."""
+_UNIT_OF_MIDDLE = 0.5
 _LEAST_RATE, _LEAST_BEND = 0.1, 1e-9
 """Of an axis, rad/m, and of a leg, 1/m: nominal axes that turn less are as good as fixed."""
 _ANGLES = np.arange(12) * np.pi / 6.0
@@ -52,8 +53,8 @@ class _Charge:
     @classmethod
     def beyond(cls, nominal: Floats, least: float, price: Floats) -> _Charge:
         """Return the charge of exceeding what the nominal axes have; least: less than this is as good as nothing."""
-        middle = float(np.median(nominal)) if len(nominal) else 0.0
-        return cls(nominal + _FREE_OF_PEAK * float(nominal.max(initial=0.0)), nominal + max(middle, least), price)
+        middle = max(float(np.median(nominal)) if len(nominal) else 0.0, least)
+        return cls(nominal + _FREE_OF_MIDDLE * middle, nominal + _UNIT_OF_MIDDLE * middle, price)
 
     def of(self, values: Floats) -> float:
         """Return the charge of values (n, m)."""

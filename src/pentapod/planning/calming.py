@@ -16,13 +16,14 @@ from pentapod.planning.axis_cost import AxisCost
 from pentapod.planning.axis_course import AxisCourse, within_discs
 from pentapod.planning.formulation import Slopes, lean_slopes
 from pentapod.planning.interior_point import NO_ROWS, AxisProgram
+from pentapod.planning.linear_model import valleys
 from pentapod.planning.setting import Candidate, Setting
 
 SLACK = 1e-5
 """How far below the margin to keep calm axes may come: micrometres of a stroke."""
 
 _STEPS, _ROUNDS = 40, 8
-_NEAR, _UNREACHED = 0.3, 0.02
+_NEAR, _UNREACHED = 0.15, 0.02
 """Margins within this much of the one to keep enter a program, but for those that, in so far as they are linear, stay
 this far above it within the trust region; others when they came out short."""
 _ENOUGH = 2e-4
@@ -76,18 +77,20 @@ def calmed(setting: Setting, start: Candidate, keep: float) -> Floats | None:
 class _Calming:
     """One run. c: the coefficients so far; short: by how much they miss the margin to keep; spent: what they cost.
 
-    rows (n,): the waypoints looked at; margins (n, M): theirs, at c; late (n, M): which of them came out short before.
-    reach: the trust region; accuracy: of the next program.
+    rows (n,): the waypoints looked at; margins (n, M): theirs, at c; late (n, M): which of them came out short before;
+    kinds (M,): which have come near. reach: the trust region; accuracy: of the next program.
     """
 
     def __init__(self, setting: Setting, start: Candidate, keep: float) -> None:
         self.setting, self.course, self.start, self.keep = setting, setting.course, start, keep
         self.cost = AxisCost(setting, start)
         self.slopes: dict[tuple[int, ...], Slopes] = {}
+        self.kinds: Bools = np.zeros(len(start.margins.limits), dtype=bool)
         self.reach, self.accuracy = _WHOLE, _ROUGH
         self.c = self.course.fitted(setting.leans(start.coefficients))
         self.spent = self.cost.of(self.c)
-        self.look_at(self.course.nodes)
+        everywhere = self.values(self.c, np.arange(len(self.course.frames)))
+        self.look_at(np.union1d(self.course.nodes, valleys(everywhere)))
 
     def look_at(self, rows: Ints) -> None:
         """Look at these waypoints from now on."""
@@ -168,7 +171,8 @@ class _Calming:
         near = (self.margins < self.keep + _NEAR) | self.late
         looked = np.flatnonzero(near.any(axis=1))
         near, rows = near[looked], self.rows[looked]
-        kinds = np.flatnonzero(near.any(axis=0))
+        self.kinds |= near.any(axis=0)  # once in, always in: making their function takes longer than calling it
+        kinds = np.flatnonzero(self.kinds)
         key = tuple(kinds.tolist())
         if key not in self.slopes:
             self.slopes[key] = lean_slopes(self.setting, start.margins, start.transform, key)
