@@ -71,7 +71,7 @@ def test_charges_are_sums_over_the_nodes(made, desk):
     price = EXCESS_WEIGHT * FORESIGHT_M**2 * ((np.diff(way) * rates**2).sum() / (way[-1] - way[0]) + 0.1**2)
     charge = 0.0
     for j, row in enumerate(ours):
-        excess = np.maximum(row - worst[j] - 0.02 * np.median(worst), 0.0) / (worst[j] + np.median(worst))
+        excess = np.maximum(row - worst[j] - 0.01 * np.median(worst), 0.0) / (worst[j] + 0.5 * np.median(worst))
         charge += price * 0.5 * (way[j + 2] - way[j]) / (way[-1] - way[0]) * (excess**2).sum()
     assert cost.hard.of(np.abs(cost.bends(c))) == pytest.approx(charge, rel=1e-6)
 
