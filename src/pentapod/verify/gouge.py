@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from pentapod.arrays import Bools
+from pentapod.geometry.polyline import arc_length
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.claim import MM, Claim, Finding, Idle
 from pentapod.verify.cutting import Cutting
@@ -54,8 +55,7 @@ def _method(found: Immersion, bound: float) -> str:
 def _rapid(replay: Replay) -> Bools:
     """Return which chords (M − 1,) are rapids; within the path tolerance of a cut or a link they are not."""
     toolpath, arcs = replay.toolpath, replay.match.arcs
-    lengths = np.linalg.norm(np.diff(toolpath.pivots, axis=0), axis=1)
-    ends = np.concatenate([[0.0], np.cumsum(lengths)])[toolpath.starts]
+    ends = arc_length(toolpath.pivots)[toolpath.starts]
     other = np.array([segment.kind is not SegmentKind.RAPID for segment in toolpath.segments])
     before = np.concatenate([[0], np.cumsum(other)])
     first = np.searchsorted(ends[1:], arcs[:-1] - replay.path_tolerance, side="left")

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
+from pentapod.geometry.polyline import arc_length
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.claim import ALLOWANCE, MM, Claim, Finding, Idle, with_allowance
 from pentapod.verify.replay import Replay
@@ -65,13 +66,11 @@ def _limits(replay: Replay) -> tuple[Floats, Ints]:
     segments, arcs = replay.toolpath.segments, replay.match.arcs
     rapid = replay.machine.rapid_velocity
     limits = np.array([rapid if s.kind == SegmentKind.RAPID else min(s.feed, rapid) for s in segments])
-    lengths = np.linalg.norm(np.diff(replay.toolpath.pivots, axis=0), axis=1)
-    bounds = np.concatenate([[0.0], np.cumsum(lengths)])[replay.toolpath.starts]
-    last = len(segments) - 1
-    low = np.searchsorted(bounds[1:], arcs[:-1] - replay.path_tolerance, side="left").clip(max=last)
-    high = (np.searchsorted(bounds, arcs[1:] + replay.path_tolerance, side="right") - 1).clip(0, last)
+    bounds = arc_length(replay.toolpath.pivots)[replay.toolpath.starts]
+    low = np.searchsorted(bounds[1:], arcs[:-1] - replay.path_tolerance, side="left")
+    high = np.searchsorted(bounds[1:-1], arcs[1:] + replay.path_tolerance, side="right")
     governing = low.copy()
-    for step in range(1, int((high - low).max()) + 1):
+    for step in range(int((high - low).max()) + 1):
         other = np.minimum(low + step, high)
         governing = np.where(limits[other] > limits[governing], other, governing)
     return limits[governing], governing

@@ -58,13 +58,12 @@ def _stops(replay: Replay) -> list[tuple[int, int, float]]:
     path, match, count = replay.toolpath, replay.match, len(replay.program.legs) - 1
     # Where the tool turns on the spot its way does not tell one waypoint from the next.
     turns = np.append(0.0, np.cumsum(angle_between(path.axes[:-1], path.axes[1:])))
-    low, high = np.zeros(len(path.starts), np.intp), np.full(len(path.starts), count + 1)
-    for course, places, within in (
+    courses = (
         (match.arcs[::2], arc_length(path.pivots)[path.starts], replay.path_tolerance),
         (match.turned[::2], turns[path.starts], replay.axis_tolerance),
-    ):
-        low = np.maximum(low, np.searchsorted(course, places - within, "left"))
-        high = np.minimum(high, np.searchsorted(course, places + within, "right"))
+    )
+    low = np.maximum(*(np.searchsorted(course, places - within, "left") for course, places, within in courses))
+    high = np.minimum(*(np.searchsorted(course, places + within, "right") for course, places, within in courses))
     # Where fewer than two rows are near, as where a program jumps over the place, all steps that touch it count.
     few = high - low < 2
     first = np.clip(np.where(few, np.minimum(low, high) - 1, low), 0, count - 1)
