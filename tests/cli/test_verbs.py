@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 
 from pentapod.cli import main as entry
+from pentapod.cli.kinematics import LEGS
 from pentapod.cli.main import VERBS, run
 from pentapod.machine import Machine
 from pentapod.program import read_csv, write_csv
@@ -305,6 +307,21 @@ def test_ik_and_fk_as_a_pipe():
     bad = subprocess.run([*PENTAPOD, "ik"], input="x,y\n1,2\n", capture_output=True, text=True, check=False)
     assert bad.returncode == 2
     assert bad.stderr.startswith("error: stdin:1: wrong header")
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [("600", "wrong count of numbers (got '600')"), ("1,2,3,4", "wrong count"), ("1,2,3,4,5,6", "wrong count"),
+     ("1,2,x,4,5", "not a row of finite numbers"), ("1,2,nan,4,5", "not a row"), ("1,,3,4,5", "not a row")],
+)  # fmt: skip
+def test_bad_rows_in_a_pipe_are_told_by_line(row, words, monkeypatch, capsys):
+    """One number alone as well: it is no row of five equal legs."""
+    monkeypatch.setattr("sys.stdin", io.StringIO(f"{','.join(LEGS)}\n600,600,600,600,600\n\n{row}\n"))
+    assert run(["fk"]) == 2
+    said = capsys.readouterr()
+    assert said.err.startswith("error: stdin:4: ")
+    assert words in said.err
+    assert not said.out
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -120,20 +122,27 @@ def _rows(numbers: tuple[float, ...], names: tuple[str, ...]) -> Floats:
         return rows
     if sys.stdin.isatty():
         raise InputError("no numbers given", expected=" ".join(names), remedy="or CSV on stdin")
-    lines = [line.strip() for line in sys.stdin if line.strip()]
-    if not lines or tuple(field.strip() for field in lines[0].split(",")) != names:
-        got = lines[0][:80] if lines else "nothing"
+    # Numbered before blank ones are passed over.
+    lines = [(number, line.strip()) for number, line in enumerate(sys.stdin, start=1) if line.strip()]
+    if not lines or tuple(field.strip() for field in lines[0][1].split(",")) != names:
+        got = lines[0][1][:80] if lines else "nothing"
         raise InputError("wrong header", file="stdin", line=1, value=got, expected=",".join(names))
-    rows = np.empty((len(lines) - 1, len(names)))
-    for k, line in enumerate(lines[1:]):
-        try:
-            rows[k] = [float(field) for field in line.split(",")]
-        except ValueError as error:
-            raise InputError("not a row of numbers", file="stdin", line=k + 2, value=line[:80]) from error
-    if not np.isfinite(rows).all():
-        line = int(np.argmin(np.isfinite(rows).all(axis=1))) + 2
-        raise InputError("numbers must be finite", file="stdin", line=line)
-    return rows
+    return np.array([_row(line, number, names) for number, line in lines[1:]]).reshape(-1, len(names))
+
+
+def _row(line: str, number: int, names: tuple[str, ...]) -> list[float]:
+    """Return the numbers of a line of the CSV on stdin. Raises InputError with its number."""
+    from pentapod.errors import InputError
+
+    fields, what = line.split(","), "not a row of finite numbers"
+    if len(fields) != len(names):
+        what = "wrong count of numbers"
+    else:
+        with suppress(ValueError):
+            row = [float(field) for field in fields]
+            if all(map(math.isfinite, row)):
+                return row
+    raise InputError(what, file="stdin", line=number, value=line[:80], expected=",".join(names))
 
 
 def _print(columns: dict[str, Any], *, as_json: bool, one: bool, quiet: bool) -> None:

@@ -33,9 +33,9 @@ def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -
     loaded = Job.load(job)
     machine = job_machine(loaded)
     with progress_bar(quiet=quiet or as_json) as progress:
-        mesh = job_mesh(loaded)
+        mesh = job_mesh(loaded, progress)
         surroundings = job_surroundings(loaded, machine, mesh)
-        toolpath = program_toolpath(loaded, mesh, program)
+        toolpath = program_toolpath(loaded, mesh, program, progress)
         verdict = judge(loaded, machine, surroundings, toolpath, program, progress, strict=strict)
     if as_json:
         echo_json(verdict.to_dict())
