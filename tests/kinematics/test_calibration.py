@@ -183,6 +183,7 @@ def test_bad_input(nominal, real):
     cases = [
         (lambda: calibrate(p, i, legs[:9], nominal), r"legs has shape \(9, 5\); expected shape \(10, 5\)"),
         (lambda: calibrate(p, 2.0 * i, legs, nominal), "is not a unit vector"),
+        (lambda: calibrate(p, 0.5 * i, legs, nominal), r"is not a unit vector \(got 0\.(5|49999)"),
         (lambda: calibrate(p, i, legs, nominal, leg_sigma=-1.0), "leg_sigma must not be negative"),
         (lambda: calibrate(p, i, legs, nominal, leg_sigma=0.0), "without errors of the legs"),
         (lambda: calibrate(p, i, legs, nominal, identify=["ofsets"]), 'did you mean "offsets"'),

@@ -43,7 +43,7 @@ def rounded(parameter: Floats, points: Floats, too_far: TooFar) -> BSpline:
     not, or where no number of halvings brings the curve near enough.
     """
     if len(parameter) < 2 or not (np.diff(parameter) > 0.0).all():
-        raise ArrayError("parameters must increase strictly and be at least two")
+        raise ArrayError("parameters must increase strictly", key="parameter", expected="two or more")
     knots, changed = parameter, np.ones(len(parameter) - 1, dtype=np.bool_)
     for _ in range(HALVINGS):
         curve = schoenberg(knots, parameter, points)

@@ -278,8 +278,10 @@ def _measured(position: ArrayLike, direction: ArrayLike, legs: ArrayLike) -> tup
             expected = f"shape ({len(p)}, {width}): one row for each pose"
             raise ArrayError(f"{name} has shape {array.shape}", expected=expected)
     if len(p) == 0:
-        raise ArrayError("there are no poses to calibrate from")
-    off = np.abs(np.linalg.norm(i, axis=1) - 1.0)
-    if off.max() > 1e-6:
-        raise ArrayError(f"direction {int(off.argmax())} is not a unit vector", value=float(1.0 + off.max()))
-    return p, i / np.linalg.norm(i, axis=1)[:, None], readings
+        raise ArrayError("there are no poses to calibrate from", key="position", expected="one row for each pose")
+    lengths = np.linalg.norm(i, axis=1)
+    worst = int(np.abs(lengths - 1.0).argmax())
+    if abs(lengths[worst] - 1.0) > 1e-6:
+        what = f"direction {worst} is not a unit vector"
+        raise ArrayError(what, key="direction", value=float(lengths[worst]), expected="length 1")
+    return p, i / lengths[:, None], readings

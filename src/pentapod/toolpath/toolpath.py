@@ -48,12 +48,17 @@ class Segment:
         set_frozen(self, tips=tips, axes=axes, kind=SegmentKind(self.kind))
         if tips.ndim != 2 or tips.shape != axes.shape or len(tips) < 2:
             raise ToolpathError("a segment needs at least two poses", value=(tips.shape, axes.shape), expected="(N, 3)")
-        if np.abs(np.linalg.norm(axes, axis=1) - 1.0).max() > 1e-9:
-            raise ToolpathError("tool axes must have unit length")
+        lengths = np.linalg.norm(axes, axis=1)
+        worst = int(np.abs(lengths - 1.0).argmax())
+        if abs(lengths[worst] - 1.0) > 1e-9:
+            what = f"tool axis {worst} has not unit length"
+            raise ToolpathError(what, key="axes", value=float(lengths[worst]), expected="1")
         if not self.feed > 0.0:
-            raise ToolpathError("feed must be positive", value=self.feed)
+            raise ToolpathError(
+                "a feed is positive", key="feed", value=self.feed, expected="m/s, above 0; infinite on rapids"
+            )
         if not 0.0 <= self.power <= 1.0:
-            raise ToolpathError("power must be a share of full power", value=self.power, expected="0 to 1")
+            raise ToolpathError("power must be a share of full power", key="power", value=self.power, expected="0 to 1")
         if self.dwell is not None:
             _check_seconds("dwell", self.dwell)
 
@@ -76,7 +81,7 @@ class Toolpath:
     def __post_init__(self) -> None:
         set_frozen(self, segments=tuple(self.segments))
         if not self.segments:
-            raise ToolpathError("the toolpath is empty")
+            raise ToolpathError("the toolpath is empty", key="segments", expected="at least one")
         _check_seconds("wait", self.wait)
         for k, (a, b) in enumerate(zip(self.segments, self.segments[1:], strict=False)):
             gap = float(np.abs(a.tips[-1] - b.tips[0]).max() + np.abs(a.axes[-1] - b.axes[0]).max())
