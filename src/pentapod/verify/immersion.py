@@ -101,7 +101,7 @@ def immersion(
             if kept[worst] > most.most:
                 most = Immersion(float(kept[worst]), int(own.starts[worst]))
         size //= _CUT
-        todo = todo.where(again).cut(size) if again.any() else todo.where(again)
+        todo = todo.where(again).cut(max(size, 1))
     # What was not looked into is not known to be the deepest: then the place of the deepest that is.
     return most if most.most > _target(met, bound) else replace(most, sample=met.sample)
 

@@ -78,7 +78,7 @@ def _stops(replay: Replay) -> list[tuple[int, int, float]]:
 def _longest_run(flags: Bools) -> int:
     """Return the length of the longest run of flags that are set."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
+    return int(np.diff(edges.reshape(-1, 2)).max(initial=0))
 
 
 CLAIMS = (
