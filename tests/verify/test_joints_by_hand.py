@@ -11,8 +11,8 @@ from pentapod.verify.verdict import Place
 ANGLES = np.radians([10.0, 20.0, 30.0, 40.0, 50.0])
 
 
-def replay(limits):
-    """Extreme angles (5,) of the legs, seen at the samples 2, 4, … 10, and limits (5,) in degrees on either side."""
+def replay(limits, closed=False):
+    """Extreme angles (5,) of the legs, seen at the samples 2, 4, … 10, and limits (5,) in degrees on one side."""
     limits, at = np.radians(limits), 2 * np.arange(1, 6)
     widest = SimpleNamespace(values=-np.cos(ANGLES), at=at)
     return SimpleNamespace(
@@ -20,7 +20,9 @@ def replay(limits):
             base_widest=widest, platform_open=widest, platform_closed=SimpleNamespace(values=np.cos(ANGLES), at=at)
         ),
         machine=SimpleNamespace(
-            joints=SimpleNamespace(base_cone=limits, platform_range=np.stack([limits, limits], axis=1))
+            joints=SimpleNamespace(
+                base_cone=limits, platform_range=np.stack([limits - 9.0 * (not closed), limits + 9.0 * closed], axis=1)
+            )
         ),
         place=lambda sample: Place(None, sample // 2, None),
     )
@@ -34,7 +36,7 @@ def replay(limits):
 def test_each_joint_has_a_limit_of_its_own(judge, sign, room, leg):
     limits = np.degrees(ANGLES) + sign * 9.0
     limits[leg] = np.degrees(ANGLES[leg]) + sign * room
-    found = judge(replay(limits))
+    found = judge(replay(limits, closed=sign < 0))
     assert (found.passed, found.unit, found.where.row) == (room > 0.0, "deg", leg + 1)
     assert (found.value, found.bound) == (pytest.approx(10.0 * (leg + 1)), pytest.approx(limits[leg]))
     assert found.method.startswith(f"joint of leg {leg + 1} is closest")
