@@ -6,9 +6,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planning_instances import instances
+from scipy import sparse
 
-from pentapod.planning.axis_course import FORESIGHT_M, UPRIGHT_WEIGHT, AxisCourse
-from pentapod.planning.interior_point import AxisProgram
+from pentapod.kinematics.component import COMPONENTS
+from pentapod.planning.axis_course import BANDS, FORESIGHT_M, UPRIGHT_WEIGHT, AxisCourse
+from pentapod.planning.calming import calmed
+from pentapod.planning.interior_point import AxisProgram, SoftRows
+from pentapod.planning.margins import Margins
+from pentapod.planning.sampling import first_guesses
+from pentapod.planning.setting import Setting
 from pentapod.planning.task import Task
 
 CONE = 0.3
@@ -93,6 +99,49 @@ def test_the_banded_program_is_solved_as_ipopt_solves_it(seed):
     assert course.cost_of(found) == pytest.approx(course.cost_of(theirs), rel=1e-4)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_soft_rows_are_exceeded_where_it_pays(seed):
+    """Against IPOPT, with excesses as unknowns of its own; cheap and dear rows, the last of them at the path's end."""
+    rng = np.random.default_rng(seed)
+    _, course = course_of(seed)
+    centre = np.zeros((course.hessian.shape[1] // 2, 2))
+    starts = 2 * np.append(rng.integers(0, len(centre) - 5, 60), len(centre) - 4)
+    windows = rng.normal(size=(61, BANDS))
+    windows[-1, 8:] = 0.0
+    soft = SoftRows(windows, starts, rng.uniform(-0.3, 0.1, 61), 10.0 ** rng.uniform(-4.0, 2.0, 61))
+    none = np.zeros(0, dtype=np.intp)
+    program = AxisProgram(
+        course.hessian,
+        course.gradient,
+        0.01,
+        course.basis[none],
+        none,
+        np.zeros((0, 2)),
+        np.zeros(0),
+        centre,
+        2.0,
+        soft,
+    )
+    found = program.solved()
+
+    x, excess = ca.MX.sym("x", centre.size), ca.MX.sym("t", 61)
+    matrix = np.zeros((61, centre.size + BANDS))
+    for row, start, window in zip(matrix, starts, windows, strict=True):
+        row[start : start + BANDS] = window
+    matrix = matrix[:, : centre.size]
+    c = ca.reshape(x, 2, len(centre))
+    own = 0.5 * ca.bilin(ca.DM(course.whole_hessian()), x, x) + ca.dot(ca.DM(course.gradient), x)
+    problem = {
+        "x": ca.vertcat(x, excess),
+        "f": own + ca.dot(soft.weight, excess**2),
+        "g": ca.vertcat(soft.upper + excess - ca.mtimes(ca.DM(sparse.csc_matrix(matrix)), x), 1.0 - ca.sum1(c * c).T),
+    }
+    options = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.tol": 1e-10}
+    theirs = ca.nlpsol("s", "ipopt", problem, options)(x0=0.0, lbg=0.0)
+    assert program.cost_of(found) == pytest.approx(float(theirs["f"]), rel=1e-4)
+    assert (matrix @ found.ravel() > soft.upper + 1e-3).sum() > 5  # some are exceeded
+
+
 def test_a_program_without_interior_has_no_answer():
     _, course = course_of(0)
     centre = np.zeros((course.hessian.shape[1] // 2, 2))
@@ -101,3 +150,18 @@ def test_a_program_without_interior_has_no_answer():
         course.hessian, course.gradient, 1.0, course.basis, point, slopes, np.array([-0.2, -0.2]), centre, 2.0
     )
     assert program.solved() is None
+
+
+@pytest.mark.parametrize(
+    "moved", [[0.0, 0.0, 0.0], [0.0, 0.01], [0.0, 0.0, 0.01, 0.01], [0.0, 1e-12], [0.0, 0.01, 0.0]]
+)
+def test_short_paths_and_single_places_have_a_course(moved, desk):
+    """Down to a tool that stands still: calm axes at one place lean as little as the margin lets them."""
+    pivots = np.array(moved)[:, None] * [1.0, 0.0, 0.0]
+    task = Task(pivots, np.tile([0.0, 0.0, 1.0], (len(pivots), 1)), 0.003, 0.2)
+    setting = Setting.of(task, desk)
+    guess = first_guesses(task, desk, COMPONENTS, 0, samples=500)[0]
+    start = setting.first_candidate(Margins.of(desk, guess.component), guess.transform)
+    strict = setting.values_of(start.margins, start.transform, np.zeros_like(pivots)).min()
+    calm = calmed(setting, start, strict - 0.01)
+    assert np.linalg.norm(setting.course.leans(calm), axis=1).max() < 1e-3

@@ -23,9 +23,8 @@ from pentapod.planning.vectorised import Vectorised
 
 EXCESS_WEIGHT = 1e4
 """Of the mean square of an excess, as a share of what the nominal axes have there, beside the cost of their rates."""
-_FREE_OF_MIDDLE = 0.01
-"""What is free is what the nominal axes have at the node, and this share of their median."""
-_UNIT_OF_MIDDLE = 0.5
+_FREE_OF_MIDDLE, _UNIT_OF_MIDDLE = 0.01, 0.5
+"""Of the median that nominal axes have: free beside what they have at a node, and in the unit of excess beside it."""
 _LEAST_RATE, _LEAST_BEND = 0.1, 1e-9
 """Of an axis, rad/m, and of a leg, 1/m: nominal axes that turn less are as good as fixed."""
 _ANGLES = np.arange(12) * np.pi / 6.0
@@ -123,8 +122,8 @@ class AxisCost:
         legs = self.lengths.map(len(self.frames))(
             leans, pivots, nominal, self.frames.transpose(2, 0, 1).reshape(3, -1), rotation.reshape(3, 3).T, translation
         )
-        rates = self.nominal_rates.T + ca.mtimes(leans, ca.DM(as_matrix(self.rate).T))
-        bends = ca.mtimes(legs, ca.DM(as_matrix(self.bend).T))
+        rates = self.nominal_rates.T + ca.mtimes(leans, ca.DM(as_matrix(self.rate, len(self.frames)).T))
+        bends = ca.mtimes(legs, ca.DM(as_matrix(self.bend, len(self.frames)).T))
         x = ca.vec(c)
         own = 0.5 * ca.bilin(ca.DM(self.course.whole_hessian()), x, x) + ca.dot(ca.DM(self.course.gradient), x)
         fast, too_fast, room = self.fast.symbolic(ca.mtimes(_DIRECTIONS.T, rates))

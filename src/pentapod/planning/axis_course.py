@@ -35,6 +35,7 @@ UPRIGHT_WEIGHT = 1e-2
 _DEGREE = 3
 _NODES = 2  # at most, a knot interval
 _INTERVALS_PER_EXTENT = 50
+_NOWHERE_M = 1e-9  # as good as standing still
 _LEAST_CURVATURE = 1e-10  # of coefficients that the cost does not see
 BANDS = 10
 """Diagonals of the cost, main one and below: a second difference reaches over five coefficients of two numbers."""
@@ -113,11 +114,14 @@ def _way(task: Task) -> Floats:
 
 
 def _apart(way: Floats, spacing: float) -> Ints:
-    """Return indices into an ascending way (N,) that are at least about `spacing` apart, both ends among them."""
+    """Return indices into an ascending way (N,) that are at least about `spacing` apart, both ends among them.
+
+    Only the first where the way is of no length.
+    """
     places, found = way.tolist(), [0]
     while (following := bisect_left(places, places[found[-1]] + spacing, found[-1] + 1)) < len(places):
         found.append(following)
-    if found[-1] < len(places) - 1:
+    if places[-1] - places[found[-1]] > _NOWHERE_M:
         if len(found) > 1 and places[-1] - places[found[-1]] < 0.5 * spacing:
             found.pop()
         found.append(len(places) - 1)
@@ -146,7 +150,7 @@ def _cost(nominal: Floats, frames: Floats, at_nodes: Any, way: Floats) -> tuple[
     gradient, constant = np.zeros(size), 0.0
     for order, weight in ((2, FORESIGHT_M**4), (1, FORESIGHT_M**2), (0, UPRIGHT_WEIGHT)):
         factors, shares = divided_differences(way, order)
-        derivative = sparse.kron(as_matrix(factors), sparse.identity(3), format="csr")
+        derivative = sparse.kron(as_matrix(factors, len(way)), sparse.identity(3), format="csr")
         weighed = sparse.diags(2.0 * weight * np.repeat(shares, 3))
         by_lean = sparse.csr_matrix(derivative @ lean)
         fixed = derivative @ axes if order > 0 else np.zeros(len(axes))

@@ -35,9 +35,9 @@ def differences(factors: Floats, values: Floats) -> Floats:
     return np.asarray(sum(parts), dtype=np.float64)
 
 
-def as_matrix(factors: Floats) -> Any:
-    """Return the sparse matrix (n − order, n) that does what `differences` does."""
+def as_matrix(factors: Floats, size: int) -> Any:
+    """Return the sparse matrix (n − order, n) that does what `differences` does for n = `size` values."""
     count, reach = factors.shape
-    row, columns = np.arange(count)[:, None], np.arange(count)[:, None] + np.arange(reach)
-    rows = np.broadcast_to(row, columns.shape)
-    return sparse.csr_matrix((factors.ravel(), (rows.ravel(), columns.ravel())), shape=(count, count + reach - 1))
+    columns = np.arange(count)[:, None] + np.arange(reach)
+    rows = np.broadcast_to(np.arange(count)[:, None], columns.shape)
+    return sparse.csr_matrix((factors.ravel(), (rows.ravel(), columns.ravel())), shape=(count, size))
