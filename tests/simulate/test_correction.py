@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pentapod.errors import MachineError
+from pentapod.job import Job
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine import Machine
+from pentapod.machine.drives import Drives
 from pentapod.pipeline import run
 from pentapod.program import Program, quantised, read_csv
 from pentapod.refusal import Refusal
@@ -85,7 +88,7 @@ def test_correction_by_pose_lowers_the_contour_error_threefold(name):
 @pytest.mark.parametrize("name", ["dome", "laser", "wavy", "saddle"])
 def test_correction_by_pose_lowers_the_contour_error_of_whole_jobs_threefold(name, tmp_path):
     """Rapids included. Where the laser's spot creeps while its axis turns, 3 µm along the way are 0.2 mrad of axis."""
-    run(Path(__file__).parents[2] / "toolpaths" / f"{name}.toml", tmp_path)
+    run(Job.load(Path(__file__).parents[2] / "toolpaths" / f"{name}.toml"), tmp_path)
     reference = Reference(read_csv(tmp_path / "program.csv"), Machine.load("desk"))
     for seed in range(3):
         results = (simulate_servo(reference, seed=seed, correct=c) for c in (False, True))
@@ -184,6 +187,12 @@ def test_drives_that_do_not_hold_are_not_corrected(late):
     assert isinstance(result, Refusal)
     assert "no correction by the pose" in str(result)
     assert "[drives]" in str(result)
+
+
+@pytest.mark.parametrize("margin", [1.0, 0.0, np.nan, np.inf])
+def test_a_margin_that_no_correction_can_keep_is_bad_input(margin):
+    with pytest.raises(MachineError, match="contour_margin"):
+        Drives(contour_margin=margin)
 
 
 def test_correction_leaves_the_lag_along_the_path_alone():
