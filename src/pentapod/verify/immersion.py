@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import angle_between, arc_weights
+from pentapod.geometry.runs import marked_runs
 from pentapod.kinematics.blocks import blocks
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.solids import Solid
@@ -122,8 +123,7 @@ def _width(solid: Solid) -> float:
 
 def _runs(chords: Bools) -> _Stretches:
     """Return the runs of marked chords."""
-    edges = np.diff(np.concatenate([[0], chords.astype(np.int8), [0]]))
-    return _Stretches(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1))
+    return _Stretches(*marked_runs(chords).T)
 
 
 def _met(replay: Replay, surface: MeshDistance, body: TouchingBody, chords: Bools) -> Immersion:

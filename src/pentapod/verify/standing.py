@@ -7,6 +7,7 @@ import numpy as np
 from pentapod.arrays import Bools
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length
+from pentapod.geometry.runs import marked_runs
 from pentapod.verify.claim import MM, Claim, Finding, Idle, with_allowance
 from pentapod.verify.replay import Replay
 
@@ -77,8 +78,7 @@ def _stops(replay: Replay) -> list[tuple[int, int, float]]:
 
 def _longest_run(flags: Bools) -> int:
     """Return the length of the longest run of flags that are set."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return int(np.diff(edges.reshape(-1, 2)).max(initial=0))
+    return int(np.diff(marked_runs(flags)).max(initial=0))
 
 
 CLAIMS = (

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from pentapod.arrays import Bools, Floats, Ints
+from pentapod.geometry.runs import marked_runs
 
 _MAX_PAIRS = 6_000_000  # chord–waypoint pairs that one search may hold in memory
 
@@ -169,9 +170,8 @@ def _settled(motion: Course, path: Course, axis_weight: Floats, chosen: Ints, pa
     early = np.minimum.accumulate(best[::-1])[::-1] < best
     doubtful = (chosen >= 0) & (late | early | axis_weight.astype(np.bool_))
     doubtful[[0, -1]] = False
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], doubtful, [False]])))
     settled = best.copy()
-    for start, stop in edges.reshape(-1, 2).tolist():
+    for start, stop in marked_runs(doubtful).tolist():
         stays: list[tuple[int, Floats, Floats]] = []
         for k in range(start, stop):
             first, last = (min(int(x[chosen[k]]), len(motion.points) - 2) for x in (passes.enter, passes.leave))
