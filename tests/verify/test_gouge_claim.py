@@ -18,7 +18,7 @@ from pentapod.toolpath.tools import BallCutter, FlatEnd, StandOff
 from pentapod.verify import Cutting, Replay, verify
 from pentapod.verify.claim import Idle
 from pentapod.verify.gouge import _rapid, gouge
-from pentapod.verify.immersion import _runs, _strays, _Stretches, _unresolved
+from pentapod.verify.immersion import Immersion, _runs, _strays, _Stretches, _unresolved
 
 CUTS, RAPIDS = "gouge on cuts and links", "gouge on rapids"
 LARGE = 1e3  # trimesh counts in units of about this many to the metre
@@ -194,7 +194,22 @@ def test_a_cutter_that_begins_inside_is_caught(cubic):
     assert not found[CUTS].passed
     assert found[CUTS].method == "the cutter begins inside the part"
     assert found[CUTS].bound == pytest.approx(0.07)
-    assert found[CUTS].where.row == 0
+    assert (found[CUTS].where.row, found[CUTS].where.time_s) == (0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("most", "met", "words"),
+    [
+        (2e-4, True, "this deep is the cutter in the part at this moment; others may be worse"),
+        (np.inf, False, "not proven: the tool turns too far within half a period"),
+        (2e-4, False, "proven bound for all times of the deepest mesh point inside the cutter: swept"),
+        (-2e-4, False, "proven bound for all times of the smallest gap of the cutter (negative): swept"),
+        (0.0, False, "proven bound for all times of the smallest gap of the cutter (negative): swept"),
+    ],
+)
+def test_a_depth_is_told_for_what_it_is(monkeypatch, cubic, most, met, words):
+    monkeypatch.setattr("pentapod.verify.gouge.immersion", lambda *_, **__: Immersion(most, 0, met=met))
+    assert judged(cubic, cases.cutting_of(*cases.hill()))[CUTS].method.startswith(words)
 
 
 def test_nothing_that_cuts_and_nothing_to_cut(cubic):

@@ -8,7 +8,14 @@ import pkgutil
 import pytest
 
 import pentapod.verify
+from pentapod.verify.judge import CLAIMS, write_verdict
+from pentapod.verify.verdict import Certificate, Place, Verdict
 
+PROVEN_MOTION = {
+    *("base joint cones", "platform joints not too closed", "platform joints not too open"),
+    *("tip deviation", "axis deviation", "toolpath covered", "clearance between legs and shaft"),
+    *("feed on cuts", "feed on links", "rapid rate", "gouge on cuts and links", "gouge on rapids"),
+}
 BEING_FILLED = {"Survey", "ComponentFindings"}  # while the walk along the program goes on
 
 
@@ -18,6 +25,19 @@ def values():
         for value in vars(module).values():
             if inspect.isclass(value) and value.__module__ == module.__name__ and dataclasses.is_dataclass(value):
                 yield value
+
+
+def test_claims_about_all_times_need_a_proven_motion():
+    assert {claim.name for claim in CLAIMS if claim.needs_proof} == PROVEN_MOTION
+
+
+def test_a_written_verdict_reads_well(tmp_path):
+    """Indented by two, and signs as they are: a degree is a degree in any editor."""
+    certificate = Certificate("axis", True, 0.5, 1.0, "°", Place(), "2 ± 1 µm")
+    text = write_verdict(Verdict((certificate,)), tmp_path / "verdict.json").read_text(encoding="utf-8")
+    assert text.startswith('{\n  "')
+    assert '"°"' in text
+    assert "2 ± 1 µm" in text
 
 
 @pytest.mark.parametrize("value", list(values()), ids=lambda value: value.__name__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.arrays import Floats, Ints
 from pentapod.kinematics.blocks import blocks
 from pentapod.machine.clearance import clearances, pair_names
 from pentapod.verify.claim import MM, Claim, Finding
@@ -32,14 +32,16 @@ def clearance(replay: Replay) -> Finding:
     travel = np.maximum(way[middles] - way[starts], way[ends] - way[middles])
     close = np.flatnonzero(at_middle - 2.0 * travel <= at_middle.min())
     samples = np.unique((starts[close, None] + np.arange(_BLOCK)).clip(max=len(chords)))
-    around, least, at, pair = _around(chords), np.inf, 0, 0
-    for part in blocks(len(samples), _AT_ONCE):
-        own = samples[part]
+    around = _around(chords)
+
+    def nearest(own: Ints) -> tuple[float, int, int]:
+        """Return the least distance less what may be lost around samples `own`, its sample and its pair."""
         # Half a chord to either side is as far as any moment is from its nearest sample; twice that is a chord.
         found = clearances(machine, position[own], direction[own]) - around[own, None]
         row, column = np.unravel_index(int(np.argmin(found)), found.shape)
-        if found[row, column] < least:
-            least, at, pair = float(found[row, column]), int(own[row]), int(column)
+        return float(found[row, column]), int(own[row]), int(column)
+
+    least, at, pair = min(nearest(samples[part]) for part in blocks(len(samples), _AT_ONCE))
     method = (
         f"{pair_names(machine)[pair]} come closest; proven bound for all times, surface to surface: at the rows and "
         "halfway between, less the largest approach possible on the way to the next sample"
@@ -49,7 +51,7 @@ def clearance(replay: Replay) -> Finding:
 
 def _around(chords: Floats) -> Floats:
     """Return the longer (M,) of the chords (M − 1,) that meet at each sample."""
-    return np.maximum(np.append(chords, 0.0), np.append(0.0, chords))
+    return np.concatenate([chords[:1], np.maximum(chords[1:], chords[:-1]), chords[-1:]])
 
 
 CLAIMS = (Claim("clearance between legs and shaft", clearance, needs_proof=True),)

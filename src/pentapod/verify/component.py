@@ -16,18 +16,18 @@ _METHOD = (
 def axis_upright(replay: Replay) -> Finding:
     """Judge that w keeps the sign of the component: the platform line never falls into the base plane."""
     found = replay.survey.component.upright
-    least = math.degrees(math.asin(min(-float(found.values[0]), 1.0)))
+    least = math.degrees(math.asin(min(-float(found.values.item()), 1.0)))
     what = "least angle between platform line and base plane,"
-    return _finding(replay, least, int(found.at[0]), "deg", what)
+    return _finding(replay, least, int(found.at.item()), "deg", what)
 
 
 def off_singular_plane(replay: Replay) -> Finding:
     """Judge that S keeps the sign of the component: no configuration with det J = 0 because of S = 0."""
     found = replay.survey.component.away
     # |S| / √(δ²w² + (1 − δu)²) is the distance to S = 0 at fixed orientation; the root is ≤ 1 + |δ|.
-    least = -MM * float(found.values[0]) / (1.0 + abs(replay.machine.pentapod.delta))
+    least = -MM * float(found.values.item()) / (1.0 + abs(replay.machine.pentapod.delta))
     what = "lower bound of the position's distance to S = 0,"
-    return _finding(replay, least, int(found.at[0]), "mm", what)
+    return _finding(replay, least, int(found.at.item()), "mm", what)
 
 
 def _finding(replay: Replay, least: float, interval: int, unit: str, what: str) -> Finding:
