@@ -440,3 +440,19 @@ def test_a_header_that_does_not_say_where_the_guides_stand():
     found = guides(silent)
     assert (found.passed, found.value, found.bound, found.unit) == (False, None, 0.0, "mm")
     assert "does not say" in found.method
+
+
+@pytest.mark.parametrize(
+    ("third", "room", "passed"), [(0.05, 50.0, True), (-0.09, 10.0, True), (-0.1, 0.0, True), (-0.11, -10.0, False)]
+)
+def test_guides_stand_within_their_travel(third, room, passed):
+    travel = np.tile([-0.1, 0.15], (5, 1))
+    replay = SimpleNamespace(
+        machine=SimpleNamespace(guides=SimpleNamespace(travel=travel)),
+        program=SimpleNamespace(slides=(0.0, 0.02, third, -0.03, 0.1)),
+    )
+    found = guides(replay)
+    assert found.passed == passed
+    assert found.value == pytest.approx(room, abs=1e-9)
+    assert (found.bound, found.unit) == (0.0, "mm")
+    assert found.method.startswith(f"header: guides at 0, 20, {1e3 * third:.6g}, -30, 100 mm; the least room")

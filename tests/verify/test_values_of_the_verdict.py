@@ -16,6 +16,11 @@ PROVEN_MOTION = {
     *("tip deviation", "axis deviation", "toolpath covered", "clearance between legs and shaft"),
     *("feed on cuts", "feed on links", "rapid rate", "gouge on cuts and links", "gouge on rapids"),
 }
+WITHOUT_POSES = {
+    *("machine", "job", "guides within their travel", "component kept, w", "component kept, S"),
+    *("legs not too short", "legs not too long", "leg rates", "leg accelerations", "leg jerks"),
+    *("starts at rest", "ends at rest"),
+}
 BEING_FILLED = {"Survey", "ComponentFindings"}  # while the walk along the program goes on
 
 
@@ -29,6 +34,10 @@ def values():
 
 def test_claims_about_all_times_need_a_proven_motion():
     assert {claim.name for claim in CLAIMS if claim.needs_proof} == PROVEN_MOTION
+
+
+def test_what_is_said_of_legs_and_header_needs_no_pose():
+    assert {claim.name for claim in CLAIMS if not claim.needs_pose} == WITHOUT_POSES
 
 
 def test_a_written_verdict_reads_well(tmp_path):
