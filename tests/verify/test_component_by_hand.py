@@ -1,4 +1,4 @@
-"""What the claims about component, feed and rest say of numbers that are given, not of programs."""
+"""What the claims about component, feed, rest and dwells say of numbers that are given, not of programs."""
 
 from types import SimpleNamespace
 
@@ -9,6 +9,7 @@ from pentapod.kinematics import Component
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify.component import axis_upright, off_singular_plane
 from pentapod.verify.speed import feed, rest
+from pentapod.verify.standing import dwells
 from pentapod.verify.survey import ComponentFindings
 
 PERIOD = 0.002
@@ -126,3 +127,28 @@ def test_within_the_tolerance_of_a_corner_the_faster_feed_counts(stop, bound):
 
 def test_no_feed_is_faster_than_rapids():
     assert feed(feeds_of([0.02], [0.012, 0.018], rapid=0.03), SegmentKind.CUT).bound == pytest.approx(1800.0)
+
+
+@pytest.mark.parametrize(
+    ("pivot", "words"), [(0.003, "where the matched place is on a rapid"), (-0.1, "on every segment")]
+)
+def test_rapids_are_judged_everywhere_only_where_feeds_are_of_a_spot(pivot, words):
+    replay = feeds_of([0.02], [0.012, 0.018])
+    way = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]])
+    replay.toolpath = Toolpath((Segment(SegmentKind.RAPID, way, np.array([UP, UP]), np.inf),), pivot)
+    finding = feed(replay, SegmentKind.RAPID)
+    assert (finding.value, finding.bound) == (pytest.approx(1200.0), pytest.approx(6000.0))
+    assert f", {words}; within" in finding.method
+
+
+def test_the_dwell_that_falls_short_most_is_named(monkeypatch):
+    """Of two dwells the longer is short by more: 0.9 s of 1 s, and 0.15 s of 0.2 s."""
+    moving = np.ones(200, dtype=bool)
+    moving[10:100] = moving[150:165] = False
+    legs = np.cumsum(np.append(False, moving))[:, None] * np.ones(5) * 1e-6
+    monkeypatch.setattr("pentapod.verify.standing._stops", lambda _: [(5, 120, 1.0), (140, 190, 0.2), (0, 5, 0.0)])
+    replay = SimpleNamespace(program=SimpleNamespace(legs=legs, period=0.01), place=lambda sample: sample)
+    finding = dwells(replay)
+    assert not finding.passed
+    assert (finding.value, finding.bound, finding.where) == (pytest.approx(0.9), 1.0, 10)
+    assert finding.method.startswith("of 2 dwells the one that falls short most")

@@ -61,3 +61,18 @@ def test_values_are_frozen_and_those_with_arrays_are_equal_to_nothing_but_themse
     heavy = ("Floats", "Ints", "Bools", "Extreme", "Course", "MeshDistance", "Program")
     holds_arrays = any(part in str(field.type) for field in dataclasses.fields(value) for part in heavy)
     assert (value.__eq__ is object.__eq__) == holds_arrays
+
+
+@pytest.mark.parametrize(
+    ("passed", "value", "bound", "allowed", "told"),
+    [
+        (True, 2.0, 1.0, 3.0, True),
+        (False, 2.0, 1.0, 1.5, False),
+        (True, None, 1.0, 3.0, False),
+        (True, 2.0, None, 3.0, False),
+        (True, 2.0, 1.0, None, False),
+    ],
+)
+def test_what_is_allowed_is_told_where_a_value_beyond_its_bound_passes(passed, value, bound, allowed, told):
+    certificate = Certificate("claim", passed, value, bound, "mm", Place(), "", allowed)
+    assert certificate.is_lenient == told

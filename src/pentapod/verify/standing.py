@@ -23,7 +23,7 @@ def exact_stops(replay: Replay) -> Finding | Idle:
     if not stops:
         return Idle("the toolpath asks for no stop")
     period, limit = replay.program.period, replay.machine.legs.max_acceleration
-    shares = (np.abs(np.diff(replay.program.legs, axis=0)) / (limit * period**2)).max(axis=1)
+    shares = (np.abs(np.diff(replay.program.legs, axis=0)) / limit).max(axis=1)
     slowest = [low + int(np.argmin(shares[low:high])) for low, high, _ in stops]
     worst = slowest[int(np.argmax(shares[slowest]))]
     step = np.abs(replay.program.legs[worst + 1] - replay.program.legs[worst])
