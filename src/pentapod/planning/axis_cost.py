@@ -68,9 +68,10 @@ class _Charge:
         excess = ca.MX.sym("excess", *values.shape)
         return ca.dot(price, excess**2), ca.vec(excess), ca.vec(excess - (values - free) / unit)
 
-    def near(self, each: list[Floats]) -> Ints:
-        """Return the nodes at which one of several values (n,) comes near what is free."""
-        return np.flatnonzero(np.any([values > _NEAR * self.free for values in each], axis=0))
+    def near(self, each: list[Floats]) -> tuple[Ints, Ints]:
+        """Return the nodes and columns at which one of several values (n, m) comes near what is free."""
+        node, column = np.nonzero(np.any([values > _NEAR * self.free[:, None] for values in each], axis=0))
+        return node, column
 
 
 class AxisCost:
@@ -144,29 +145,23 @@ class AxisCost:
         others: coefficients at which it is looked at, too, whether it comes near.
         """
         legs, slopes = self._legs(c)
-        bends, rates = differences(self.bend, legs), self.rates(c)
-        all_bends, all_rates = [bends, *map(self.bends, others)], [rates, *map(self.rates, others)]
-        parts = []
-        for direction in _DIRECTIONS.T:
-            near = self.fast.near([each @ direction for each in all_rates])
-            parts.append(self._fast_rows(c, rates @ direction, direction, near))
-        for leg, sign in product(range(5), (-1.0, 1.0)):
-            near = self.hard.near([sign * each[:, leg] for each in all_bends])
-            parts.append(self._hard_rows(c, sign * bends[:, leg], sign * slopes[:, leg], near))
-        return SoftRows(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-    def _fast_rows(self, c: Floats, speeds: Floats, direction: Floats, near: Ints) -> _Rows:
-        """Return the rows that keep speeds (n − 1,) in a direction."""
-        parts = [(near + k, self.rate[near, k, None] * direction) for k in range(2)]
-        return self._rows(c, self.fast, near, speeds, parts)
-
-    def _hard_rows(self, c: Floats, bends: Floats, slopes: Floats, near: Ints) -> _Rows:
-        """Return the rows that keep a leg's second derivatives (n − 2,); slopes (n, 2) of its length."""
-        parts = [(near + k, self.bend[near, k, None] * slopes[near + k]) for k in range(3)]
-        return self._rows(c, self.hard, near, bends, parts)
+        rates, bends = self.rates(c) @ _DIRECTIONS, _both_ways(differences(self.bend, legs))
+        near, column = self.fast.near([rates, *(self.rates(x) @ _DIRECTIONS for x in others)])
+        parts = [(near + k, self.rate[near, k, None] * _DIRECTIONS.T[column]) for k in range(2)]
+        fast = self._rows(c, self.fast, near, rates[near, column], parts)
+        near, column = self.hard.near([bends, *(_both_ways(self.bends(x)) for x in others)])
+        towards = _both_ways(slopes)
+        parts = [(near + k, self.bend[near, k, None] * towards[near + k, column]) for k in range(3)]
+        hard = self._rows(c, self.hard, near, bends[near, column], parts)
+        return SoftRows(
+            np.concatenate([fast[0], hard[0]]),
+            np.concatenate([fast[1], hard[1]]),
+            np.concatenate([fast[2], hard[2]]),
+            np.concatenate([fast[3], hard[3]]),
+        )
 
     def _rows(self, c: Floats, charge: _Charge, near: Ints, values: Floats, parts: list[tuple[Ints, Floats]]) -> _Rows:
-        """Return the rows that keep values, which are sums over nodes of slopes times leans; around c.
+        """Return the rows that keep values (R,) at nodes near (R,): sums over nodes of slopes times leans; around c.
 
         parts: of nodes (R,) and slopes (R, 2), the first node of each row first.
         """
@@ -179,10 +174,15 @@ class AxisCost:
         windows = np.ascontiguousarray(windows[:, :BANDS])
         x = np.append(c.ravel(), np.zeros(BANDS))
         here = (windows * x[2 * start[:, None] + np.arange(BANDS)]).sum(axis=1)
-        room = (charge.free[near] - values[near]) / charge.unit[near]
+        room = (charge.free[near] - values) / charge.unit[near]
         return windows, 2 * start, room + here, charge.price[near]
 
     def _legs(self, c: Floats) -> tuple[Floats, Floats]:
         """Return leg lengths (n, 5) at the nodes and their derivatives (n, 5, 2) by the lean."""
         legs, slopes = self.legs(self.course.cone * (self.basis @ c).T, *self.given)
         return legs.T, slopes.reshape(2, 5, -1).transpose(2, 1, 0)
+
+
+def _both_ways(values: Floats) -> Floats:
+    """Return values (n, 5, ...) of the legs, and those of the opposite sign after them."""
+    return np.concatenate([values, -values], axis=1)
