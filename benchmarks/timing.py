@@ -122,7 +122,7 @@ def toppra_solver(p: Problem) -> Callable[[], np.ndarray]:
 
 
 def core(sizes: list[int]) -> None:
-    """Velocities and accelerations: the core, the NumPy form, toppra and copp-py."""
+    """Velocities and accelerations: the core, toppra and copp-py."""
     for kind in ("raster", "sine"):
         for n in sizes:
             p = Problem(kind, n)
@@ -130,13 +130,11 @@ def core(sizes: list[int]) -> None:
             ours, x = best(lambda p=p: p.solved("core"))
             seconds = p.duration(x)
             line = f"{kind:7s} {n:8d} gridpoints: core {1e6 * ours / n:6.3f} µs"
-            plain, _ = best(lambda p=p: p.solved("numpy"), 2)
-            line += f", NumPy {1e6 * plain / n:6.2f} µs"
             if n <= 100_000:
                 theirs, y = best(toppra_solver(p), 2)
                 same = p.duration(y) / seconds - 1.0
-                line += f", toppra {1e6 * theirs / n:6.2f} µs: {theirs / ours:5.0f} times the core, "
-                line += f"{theirs / plain:.1f} times NumPy; durations differ by {same:.1e}"
+                line += f", toppra {1e6 * theirs / n:6.2f} µs: {theirs / ours:5.0f} times the core; "
+                line += f"durations differ by {same:.1e}"
             print(line, flush=True)
             if peer := copp_robot(p.s, p.q, (VELOCITY, ACCELERATION, JERK), p.feed):
                 copp, robot = peer

@@ -8,7 +8,6 @@ from test_retime import PATHS, nod
 from timing_paths import Path, machine, straight
 
 from pentapod.timing import Trajectory, certify, retime
-from pentapod.timing import piece as piece_module
 from pentapod.timing.engine import fastest
 from pentapod.timing.jerk import jerk_limited, limited_again
 from pentapod.timing.jerk_rows import JerkRows
@@ -138,15 +137,6 @@ def test_lowered_limits_are_met_by_solving_about_their_places_alone():
     jerk = np.sqrt(v[:, :1]) * np.einsum("nkd,nd->nk", lowered(part.problem.s).jerks, v)
     assert np.abs(jerk).max() < 1.0 + 1e-6
     assert limited_again(before, s, x, lambda at: lowered(at + 0.09)) is None  # the rests are touched
-
-
-def test_without_a_compiler_the_limits_hold_too(monkeypatch):
-    monkeypatch.setattr(piece_module, "kernels_available", lambda: False)
-    m = machine(interpolation="cubic")
-    trajectory = timed(Path((PATHS["circle"](),)), m, engine="numpy")
-    use = {u.quantity: u.share for u in certify(trajectory, m)}
-    assert use["leg jerk"] < 1.05
-    assert max(use["leg velocity"], use["leg acceleration"], use["feed"]) < 1.0
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -122,8 +122,7 @@ def test_units_and_scales_do_not_change_what_is_asked(unit, scale):
 
 @pytest.mark.parametrize("spec", MATRIX["refused"], ids=lambda spec: spec["reason"])
 @pytest.mark.parametrize("scale", MATRIX["scales_m"])
-@pytest.mark.parametrize("engine", ["core", "numpy"])
-def test_what_cannot_be_done_says_so(spec, scale, engine):
+def test_what_cannot_be_done_says_so(spec, scale):
     s, first, second, ceiling = arrays(Case(spec["kind"], "metre", scale, 1))
     result = fastest(
         s,
@@ -132,7 +131,6 @@ def test_what_cannot_be_done_says_so(spec, scale, engine):
         ceiling,
         x_start=spec.get("start_share", 0.0) * ceiling[0],
         x_end=spec.get("end_share", 0.0) * ceiling[-1],
-        engine=engine,
     )
     assert isinstance(result, Failure)
     assert spec["reason"] in result.reason

@@ -1,4 +1,4 @@
-"""The largest ṡ² along a grid: one interface to the compiled core, its NumPy form and toppra, the reference."""
+"""The largest ṡ² along a grid: one interface to the compiled core and to toppra, the reference."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ from typing import Literal, get_args
 import numpy as np
 
 from pentapod.arrays import Floats
-from pentapod.compiled import kernels_available
 from pentapod.errors import InputError
 from pentapod.timing.stages import Failure, Stages
 
-Engine = Literal["core", "numpy", "toppra"]
-"""core: compiled, where numba is to be had, else numpy; numpy: the same passes, many windows at a time; toppra:
-the reference, for comparison."""
+Engine = Literal["core", "toppra"]
+"""core: our own passes, compiled; toppra: the reference, for comparison."""
 
 
 def fastest(
@@ -43,10 +41,8 @@ def fastest(
         return fault
     if engine == "toppra":
         from pentapod.timing.reference import solve  # noqa: PLC0415  (heavy: imported when asked for)
-    elif engine == "core" and kernels_available():
-        from pentapod.timing.core import solve  # noqa: PLC0415
     else:
-        from pentapod.timing.lockstep import solve  # noqa: PLC0415
+        from pentapod.timing.core import solve  # noqa: PLC0415  (compiled: loaded where it is used)
     x = solve(stages, x_start, x_end)
     if isinstance(x, Failure):
         return x

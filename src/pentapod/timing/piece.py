@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints
-from pentapod.compiled import kernels_available
 from pentapod.timing.constraints import FEED, PUSHES, RAPID, Limits
 from pentapod.timing.course import Course
 from pentapod.timing.engine import Engine, fastest
@@ -78,8 +77,6 @@ class PieceProfile:
     @cached_property
     def smooth(self) -> SmoothProfile | Failure:
         """The fastest profile below this one that keeps the jerk limits too."""
-        if not kernels_available():
-            return Failure(-1, "jerk limits need the compiled kernels")
         from pentapod.timing.jerk import jerk_limited, limited_again  # noqa: PLC0415  (compiled: loaded where it is used)
 
         again = limited_again(self.before, self.s, self.x, self._jerk_rows) if self.before else None

@@ -40,8 +40,7 @@ def retime(
     piece goes from rest to rest and lasts a whole number of periods; between them the machine stands as long as the
     path asks (`dwells`), in whole periods. The margins are fractions of the limits that the plan leaves free; the
     rounding of setpoints and what happens between gridpoints uses part of them. Pieces of no length are passed over.
-    Method: TOPP-RA (Pham and Pham 2018), by a compiled core; engine "toppra" takes the reference instead, "numpy" the
-    form that needs no compiler.
+    Method: TOPP-RA (Pham and Pham 2018), by a compiled core; engine "toppra" takes the reference instead.
 
     start_speed, end_speed: ṡ in m/s at the path's start and end, where the motion is part of a longer one; with
     limit_jerk there is no acceleration there. They must be below what the limits less the margins leave; where

@@ -8,21 +8,16 @@ between samples is `retime`'s.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.arrays import Floats, as_floats, frozen, set_frozen
-from pentapod.compiled import kernels_available
 from pentapod.errors import InputError
 from pentapod.refusal import Blame, Refusal
 from pentapod.timing.engine import Engine, fastest
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.stages import Failure
-
-if TYPE_CHECKING:
-    from scipy.interpolate import CubicSpline
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +48,7 @@ def through_waypoints(
 
     stations (n,) rise, four or more; waypoints (n, d), any units; velocity and acceleration, (d,) or one for all:
     the limits |q̇| and |q̈| in these units and seconds; period in seconds. The spline is the "not a knot" one; the law's
-    gridpoints are the waypoints. Engines are those of `retime`; all but the core take SciPy's spline.
+    gridpoints are the waypoints. Engines are those of `retime`.
 
     Raises InputError: arrays of wrong shape or not finite, stations that do not rise, limits or a period not above 0.
     """
@@ -63,7 +58,7 @@ def through_waypoints(
     fast, push = (_limits(x, name, y.shape[1]) for x, name in ((velocity, "velocity"), (acceleration, "acceleration")))
     if not 0.0 < period < np.inf:
         raise InputError("a period is a time", key="period", value=period, expected="seconds, above 0")
-    spline = _Compiled.through(s, y) if engine == "core" and kernels_available() else _Plain.through(s, y)
+    spline = _Spline.through(s, y)
     x = fastest(s, *spline.rows(fast, push), engine=engine)
     if isinstance(x, Failure):
         k = max(x.gridpoint, 0)
@@ -81,7 +76,7 @@ def _limits(given: ArrayLike, name: str, count: int) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class _Compiled:
+class _Spline:
     """The spline through waypoints y (n, d) at s (n,) by its slopes m (n, d) there."""
 
     s: Floats
@@ -89,7 +84,7 @@ class _Compiled:
     m: Floats
 
     @classmethod
-    def through(cls, s: Floats, y: Floats) -> _Compiled:
+    def through(cls, s: Floats, y: Floats) -> _Spline:
         """Return it; the arrays in the one layout for which the kernels are compiled."""
         from pentapod.timing.waypoint_kernels import not_a_knot_slopes  # noqa: PLC0415  (compiled)
 
@@ -112,30 +107,4 @@ class _Compiled:
 
         rows = np.empty((count, self.y.shape[1]))
         rows_along(self.s, self.y, self.m, law.times, law.speeds, period, rows)
-        return rows
-
-
-@dataclass(frozen=True, eq=False)
-class _Plain:
-    """The same by SciPy, for engines that are not compiled."""
-
-    s: Floats
-    y: Floats
-    curve: CubicSpline
-
-    @classmethod
-    def through(cls, s: Floats, y: Floats) -> _Plain:
-        from scipy.interpolate import CubicSpline  # noqa: PLC0415  (takes a while to import)
-
-        return cls(s, y, CubicSpline(s, y))
-
-    def rows(self, velocity: Floats, acceleration: Floats) -> tuple[Floats, Floats, Floats]:
-        first, second = (np.vstack([k * self.curve.c[3 - k], self.curve(self.s[-1:], k)]) for k in (1, 2))
-        with np.errstate(divide="ignore"):
-            ceiling = np.square(1.0 / (np.abs(first) / velocity).max(axis=1))
-        return first / acceleration, second / acceleration, ceiling
-
-    def along(self, law: MotionLaw, period: float, count: int) -> Floats:
-        rows = np.asarray(self.curve(law(np.arange(count) * period)), dtype=np.float64)
-        rows[-1] = self.y[-1]
         return rows
