@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
+from scipy.linalg import block_diag, null_space
+from scipy.optimize import least_squares, minimize_scalar
 
 from pentapod.errors import ArrayError
 from pentapod.kinematics import AsBuiltPentapod, LinearPentapod, calibrate
@@ -116,6 +117,73 @@ def test_errors_of_the_legs_are_estimated_from_the_residuals(nominal, real):
     assert found.leg_sigma == pytest.approx(2e-5, rel=0.15)
     away = np.abs(flat(found.machine) - flat(real)) / np.sqrt(np.diag(found.covariance))
     assert away.max() < 4.5
+
+
+def measured_with_errors(nominal, real, rng, ratio: float, leg_sigma: float = 5e-6, n: int = 50):
+    """One calibration from readings with errors of leg_sigma and poses whose errors are `ratio` times as large."""
+    p, i = poses(n, seed=4)
+    s_p, s_i = ratio * leg_sigma, ratio * leg_sigma / 0.4
+    seen = i + np.cross(rng.normal(size=i.shape), i) * s_i
+    legs = real.leg_lengths(p, i) + rng.normal(size=(n, 5)) * leg_sigma
+    seen, p = seen / np.linalg.norm(seen, axis=1)[:, None], p + rng.normal(size=p.shape) * s_p
+    return calibrate(p, seen, legs, nominal, position_sigma=s_p, direction_sigma=s_i), (p, seen, legs, s_p, s_i)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ratio", [0.0, 0.3, 1.0, 2.0, 3.0, 5.0, 10.0])
+def test_two_sigma_hold_what_they_should_whatever_the_errors_of_the_poses(nominal, real, ratio):
+    rng, outside, fit = np.random.default_rng(21), [], []
+    for _ in range(600):
+        found, _ = measured_with_errors(nominal, real, rng, ratio)
+        assert found.converged
+        away = np.abs(flat(found.machine) - flat(real)) / np.sqrt(np.diag(found.covariance))
+        outside.append((away > 2.0).mean())
+        fit.append(found.chi_square / found.freedom)
+    assert 0.04 <= np.mean(outside) <= 0.055
+    assert np.mean(fit) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 10.0])
+def test_residuals_are_as_large_as_the_estimated_errors_say(nominal, real, ratio):
+    rng = np.random.default_rng(22)
+    fits = [measured_with_errors(nominal, real, rng, ratio)[0] for _ in range(8)]
+    mean = np.mean([fit.chi_square / fit.freedom for fit in fits])
+    assert mean == pytest.approx(1.0, abs=3.0 * np.sqrt(2.0 / (220 * 8)))
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.5, 2.0])
+def test_estimated_errors_are_the_most_likely_ones(nominal, real, ratio):
+    """The likelihood of what the parameters cannot change, from dense matrices and finite differences."""
+    found, (p, i, legs, s_p, s_i) = measured_with_errors(nominal, real, np.random.default_rng(23), ratio, n=20)
+    theta, h = flat(found.machine), 1e-6
+    columns = [(struts(theta + d, p, i) - struts(theta - d, p, i)).ravel() / (2 * h) for d in h * np.eye(30)]
+    free = null_space(np.stack(columns, axis=1).T)
+    combined = free.T @ (legs - struts(theta, p, i)).ravel()
+    moves, start = [], flat(AsBuiltPentapod.of(nominal))  # errors of poses move the nominal machine's readings
+    for position, direction in zip(p, i, strict=True):
+        by_p = [(position + d, direction, position - d, direction) for d in h * np.eye(3)]
+        by_i = [(position, direction + d, position, direction - d) for d in h * null_space(direction[None]).T]
+        changes = [
+            struts(start, q[None], j[None])[0] - struts(start, r[None], k[None])[0] for q, j, r, k in by_p + by_i
+        ]
+        change = np.stack(changes, axis=1) / (2 * h) * ([s_p] * 3 + [s_i] * 2)
+        moves.append(change @ change.T)
+    added = free.T @ block_diag(*moves) @ free
+
+    def cost(log_sigma: float) -> float:
+        covariance = added + np.exp(2.0 * log_sigma) * np.eye(len(combined))
+        return float(np.linalg.slogdet(covariance)[1] + combined @ np.linalg.solve(covariance, combined))
+
+    best = minimize_scalar(cost, bounds=(np.log(1e-7), np.log(1e-4)), method="bounded", options={"xatol": 1e-6})
+    assert found.leg_sigma == pytest.approx(np.exp(best.x), rel=2e-3)
+
+
+def test_poses_that_explain_all_residuals_leave_no_error_to_the_legs(nominal, real):
+    p, i = poses(40, seed=24)
+    found = calibrate(p, i, real.leg_lengths(p, i), nominal, position_sigma=1e-5, direction_sigma=1e-5)
+    assert found.leg_sigma < 1e-9
+    assert found.converged
+    assert np.abs(flat(found.machine) - flat(real)).max() < 1e-9
 
 
 def test_where_the_tool_never_leans_offset_and_base_joint_slide_together(nominal):

@@ -6,8 +6,8 @@ point p on the line as equal changes of all offsets. What the measured poses can
 value, and is named.
 
 The fit is generalised least squares: errors of a measured pose enter all five readings, so they are weighed by the
-readings' 5 × 5 covariance Σ = σ_l² 1 + σ_p² J_p J_pᵀ + σ_i² J_i J_iᵀ at each pose, J = `leg_jacobian` with J_i
-restricted to changes of a unit direction.
+readings' 5 × 5 covariance Σ = σ_l² 1 + σ_p² J_p J_pᵀ + σ_i² J_i J_iᵀ at each pose, J = `leg_jacobian` of the nominal
+machine with J_i restricted to changes of a unit direction. Where σ_l is not given, `leg_noise` estimates it.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from pentapod.arrays import Floats, as_floats
 from pentapod.errors import ArrayError, nearest
 from pentapod.kinematics.as_built import AsBuiltPentapod
 from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.kinematics.leg_noise import restricted_sigma
 
 _KINDS = ("x", "y", "z", "offset", "radius", "zero")
 _GROUPS = {"base": (0, 1, 2), "offsets": (3,), "zeros": (5,), "radii": (4,)}  # who is identified first
@@ -29,6 +30,9 @@ PARAMETERS = tuple(f"leg {leg} {kind}" for leg in range(1, 6) for kind in _KINDS
 """The 30 parameters in the order of `Calibration.covariance`."""
 
 _ROUNDS = 50
+_FIRST_GUESS = 1e-6  # metres, of leg_sigma
+_NOISE_ROUNDS = 12
+_SAME_NOISE = 1e-3  # a relative change of leg_sigma that is none
 _DEPENDENT = 1e-7  # of a column's length: what is left of it beside the others counts as rounding and curvature
 
 
@@ -105,10 +109,13 @@ def calibrate(
     fit = _Fit(p, i, readings, start, position_sigma, direction_sigma)
     if leg_sigma is not None:
         return fit.run(wanted, leg_sigma, limit, known=True)
-    guess = 1e-6
-    for _ in range(3):  # the estimate weighs against the errors of the poses, and decides what is identified
-        result = fit.run(wanted, guess, limit, known=False)
-        guess = result.leg_sigma
+    guess = last = _FIRST_GUESS
+    for _ in range(_NOISE_ROUNDS):  # the estimate decides what is identified, and that changes the estimate
+        guess, last = fit.run(wanted, guess, limit, known=False).leg_sigma, guess
+        if abs(guess - last) <= _SAME_NOISE * guess:
+            break
+    else:
+        guess = max(guess, last)
     return fit.run(wanted, guess, limit, known=True)
 
 
@@ -144,7 +151,9 @@ class _Fit:
                     f"{residual.size} readings cannot tell their own errors from {len(inner)} parameters",
                     expected="more poses, or leg_sigma",
                 )
-            leg_sigma = leg_sigma * max(float(np.sqrt(chi_square / freedom)), 1e-6)
+            columns = self._whitened(self._jacobian(theta), np.eye(5)).reshape(-1, 5, 30)[..., inner]
+            longest = float(np.abs(self.readings).max())
+            leg_sigma = restricted_sigma(columns, residual, self._pose_covariances(), longest)
         covariance = np.zeros((30, 30))
         if inner:
             r = np.linalg.qr(a[:, inner], mode="r")
