@@ -12,7 +12,20 @@ SOURCE = Path(pentapod.__file__).parent
 
 FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
     # Each floor is a tuple of rooms; the modules within a room may import each other.
-    (("errors", "arrays", "refusal", "progress", "files", "toml_files", "version", "compiled"),),
+    (
+        (
+            "errors",
+            "arrays",
+            "refusal",
+            "progress",
+            "files",
+            "input_files",
+            "archives",
+            "toml_files",
+            "version",
+            "compiled",
+        ),
+    ),
     (("geometry",),),
     (("kinematics",), ("toolpath",)),
     (("machine",),),

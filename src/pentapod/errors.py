@@ -19,6 +19,9 @@ import difflib
 from collections.abc import Iterable
 from pathlib import Path
 
+LONGEST_SHOWN = 200
+"""Characters of a value that a message shows."""
+
 
 class PentapodError(Exception):
     """Base of every exception that pentapod raises on purpose."""
@@ -53,14 +56,14 @@ class InputError(PentapodError, ValueError):
         if self.line is not None:
             place += f":{self.line}" if place else f"line {self.line}"
             place += "" if self.column is None else f":{self.column}"
-        head = ": ".join(part for part in (place, self.key, self.what) if part)
+        head = ": ".join(part for part in (place, _printable(self.key or ""), self.what) if part)
         if self.value is not None:
-            head += f" (got {self.value!r})"
+            head += f" (got {_shown(self.value)})"
         if self.expected:
             head += f"; expected {self.expected}"
         if self.remedy:
             head += f"; {self.remedy}"
-        return head
+        return head if head.isprintable() else " ".join(_printable(word) for word in head.split())
 
 
 class ArrayError(InputError):
@@ -85,6 +88,21 @@ class JobError(InputError):
 
 class ProgramError(InputError):
     """A program file is malformed, or does not belong to the job or machine it is judged against."""
+
+
+def _shown(value: object) -> str:
+    """Return a value for a message, shortened; what is in a file may be of any size."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # a whole number beyond 4,300 digits, or lists in lists in lists
+        return f"{type(value).__name__} too large to show"
+    return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 1] + "…"
+
+
+def _printable(text: str) -> str:
+    """Return a text of a file, shortened and without control characters, which a terminal would obey."""
+    text = text if text.isprintable() else ascii(text)[1:-1]
+    return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 1] + "…"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

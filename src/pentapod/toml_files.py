@@ -6,15 +6,28 @@ import re
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from pentapod.errors import InputError
+from pentapod.input_files import read_bytes
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
     from pydantic_core import ErrorDetails
 
+MOST_BYTES = 1_000_000
+"""Files that people write are smaller."""
+
+DEEPEST = 16
+"""How many arrays and tables may stand in each other."""
+
 _PLACE = re.compile(r"\(at line (\d+), column (\d+)\)")
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w\"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{4 * DEEPEST}}}")
+_MANY_DIGITS = re.compile(r"\w{19,}")
+_TOO_LARGE = 2**63
+_SHALLOW = f"at most {DEEPEST} levels"
+_FEW_DIGITS = "a number that fits 64 bits"
 
 
 def read_toml(path: Path, kind: str, wrong: type[InputError], *, start: str | None = None) -> str:
@@ -24,30 +37,67 @@ def read_toml(path: Path, kind: str, wrong: type[InputError], *, start: str | No
     """
     try:
         # Some editors begin a file with a byte order mark.
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError as error:
-        raise wrong(f"no such {kind} file", file=path, remedy=start) from error
+        text = read_bytes(path, wrong, f"a {kind} file", MOST_BYTES, start).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise wrong("not a text file in UTF-8", file=path, expected=f"a {kind} file in TOML") from error
-    except IsADirectoryError as error:
-        raise wrong("this is a folder", file=path, expected=f"a {kind} file", remedy="name the one in it") from error
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise wrong(f"cannot be read: {reason}", file=path, expected=f"a {kind} file") from error
     if not text.strip():
         raise wrong(f"the {kind} file is empty", file=path, remedy=start)
     return text
 
 
 def parsed(text: str, file: str | Path, wrong: type[InputError]) -> dict[str, Any]:
-    """Return the tables of a text. Raises `wrong` with line and column where it is not TOML."""
+    """Return the tables of a text. Raises `wrong` with line and column where it is not TOML, or none that is read.
+
+    Not read are numbers beyond 4,300 digits, and tables or arrays nested deeper than `DEEPEST`: none of our files has
+    such, and Python's parser fails on them, or needs hours.
+    """
+    if deep := _LONG_KEY.search(text):
+        line = text.count("\n", 0, deep.start()) + 1
+        raise wrong("a key of too many parts", file=file, line=line, value=deep[0][:40], expected=_SHALLOW)
     try:
-        return tomllib.loads(text)
+        content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         place = _PLACE.search(str(error))
         # Only the end of the file comes without a place.
         line, column = (int(place[1]), int(place[2])) if place else (len(text.splitlines()), None)
         raise wrong(f"not TOML: {str(error).split(' (at ')[0]}", file=file, line=line, column=column) from error
+    except RecursionError as error:
+        raise wrong("nested too deep", file=file, line=_deepest_line(text), expected=_SHALLOW) from error
+    except (ValueError, ArithmeticError) as error:
+        raise wrong("a number of too many digits", file=file, line=_digits_line(text), expected=_FEW_DIGITS) from error
+    _check_values(content, text, file, wrong)
+    return content
+
+
+def _check_values(content: dict[str, Any], text: str, file: str | Path, wrong: type[InputError]) -> None:
+    """Raise `wrong` where values are nested too deep, or a whole number is too large for a computer's own numbers."""
+    level: list[Any] = [content]
+    for _ in range(DEEPEST):
+        inner: list[Any] = []
+        for value in level:
+            if isinstance(value, dict):
+                inner += cast("dict[str, Any]", value).values()
+            elif isinstance(value, list):
+                inner += cast("list[Any]", value)
+            elif isinstance(value, int) and abs(value) >= _TOO_LARGE:
+                raise wrong("a number of too many digits", file=file, line=_digits_line(text), expected=_FEW_DIGITS)
+        level = inner
+    if level:
+        raise wrong("nested too deep", file=file, line=_deepest_line(text), expected=_SHALLOW)
+
+
+def _digits_line(text: str) -> int | None:
+    """Return the line of the first number that is too long."""
+    found = _MANY_DIGITS.search(text)
+    return text.count("\n", 0, found.start()) + 1 if found else None
+
+
+def _deepest_line(text: str) -> int:
+    """Return the line where the most brackets open: for messages, so a plain count is enough."""
+    lines = text.splitlines()
+    depth = [line.count("[") + line.count("{") - line.count("]") - line.count("}") for line in lines]
+    opened = [line.count("[") + line.count("{") for line in lines]
+    return 1 + max(range(len(lines)), key=lambda k: (depth[k], opened[k]))
 
 
 def line_of(text: str, where: Sequence[str]) -> int | None:

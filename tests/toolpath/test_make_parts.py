@@ -37,7 +37,7 @@ def test_the_script_makes_the_files_that_are_kept(make_parts, tmp_path, capsys):
     for name in names:
         one, two = ((folder / name).read_bytes() for folder in folders)
         assert one == two
-        kept, made = read_stl(FOLDER / name, (FOLDER / name).read_bytes())[0], read_stl(folders[0] / name, one)[0]
+        kept, made = read_stl(FOLDER / name, (FOLDER / name).read_bytes()), read_stl(folders[0] / name, one)
         np.testing.assert_allclose(made, kept, atol=1e-4)
     assert "dome.stl" in capsys.readouterr().out
 

@@ -253,10 +253,11 @@ def test_what_a_comment_of_a_ply_announces_is_not_counted(tmp_path, ball):
         load_mesh(path, "mm")
 
 
-def test_bytes_after_the_last_facet_are_noted(tmp_path, ball):
+def test_bytes_after_the_last_facet_are_refused(tmp_path, ball):
     path = tmp_path / "ball.stl"
     path.write_bytes(write_stl(ball, "ball") + b"\0\0")
-    assert "2 bytes after the last facet ignored" in str(load_mesh(path, "mm").diagnosis)
+    with pytest.raises(MeshError, match="2 bytes stand after the last of 320 facets"):
+        load_mesh(path, "mm")
 
 
 @pytest.mark.parametrize(("unit", "scale", "doubtful"), [("mm", 1.0, False), ("m", 1.0, True), ("mm", 1e-3, True)])

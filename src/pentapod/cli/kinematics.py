@@ -4,10 +4,8 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -123,7 +121,10 @@ def _rows(numbers: tuple[float, ...], names: tuple[str, ...]) -> Floats:
     if sys.stdin.isatty():
         raise InputError("no numbers given", expected=" ".join(names), remedy="or CSV on stdin")
     # Numbered before blank ones are passed over.
-    lines = [(number, line.strip()) for number, line in enumerate(sys.stdin, start=1) if line.strip()]
+    try:
+        lines = [(number, line.strip()) for number, line in enumerate(sys.stdin, start=1) if line.strip()]
+    except UnicodeDecodeError as error:
+        raise InputError("not UTF-8 text", file="stdin", expected=",".join(names)) from error
     if not lines or tuple(field.strip() for field in lines[0][1].split(",")) != names:
         got = lines[0][1][:80] if lines else "nothing"
         raise InputError("wrong header", file="stdin", line=1, value=got, expected=",".join(names))
@@ -133,15 +134,15 @@ def _rows(numbers: tuple[float, ...], names: tuple[str, ...]) -> Floats:
 def _row(line: str, number: int, names: tuple[str, ...]) -> list[float]:
     """Return the numbers of a line of the CSV on stdin. Raises InputError with its number."""
     from pentapod.errors import InputError
+    from pentapod.input_files import number_in
 
     fields, what = line.split(","), "not a row of finite numbers"
     if len(fields) != len(names):
         what = "wrong count of numbers"
     else:
-        with suppress(ValueError):
-            row = [float(field) for field in fields]
-            if all(map(math.isfinite, row)):
-                return row
+        row = [value for field in fields if (value := number_in(field)) is not None]
+        if len(row) == len(names):
+            return row
     raise InputError(what, file="stdin", line=number, value=line[:80], expected=",".join(names))
 
 

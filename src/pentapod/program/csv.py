@@ -17,6 +17,7 @@ from pentapod.program.program import FORMAT_VERSION, Program
 from pentapod.program.resolution import MM_DECIMALS, to_millimetres
 
 _CHUNK = 20_000
+_LONGEST, _MOST_LINES = 65_536, 1_000  # bytes of a line of the header, and its lines
 
 
 def write_csv(program: Program, path: str | Path) -> Path:
@@ -93,19 +94,22 @@ def _opened(file: Path) -> Generator[BufferedReader]:
 def _header(source: BufferedReader, file: Path) -> tuple[Header, int]:
     """Return the header and the line number of the first row, where the source then stands."""
     lines: list[str] = []
-    line = source.readline()
+    line = source.readline(_LONGEST)
     if not line.startswith(b"#"):
-        if not line.strip() and not source.read().strip():
+        if not line.strip() and not source.read(_LONGEST).strip():
             raise ProgramError("the file is empty", file=file, expected="a pentapod program")
         raise ProgramError("not a pentapod program", file=file, line=1, expected=f"# {MAGIC} = {FORMAT_VERSION}")
     while line.startswith(b"#"):
+        if len(line) >= _LONGEST or len(lines) >= _MOST_LINES:
+            what = "the header is longer than any"
+            raise ProgramError(what, file=file, line=len(lines) + 1, expected=f"at most {_MOST_LINES} lines")
         if not line.endswith(b"\n"):
             raise ProgramError("the file ends within the header", file=file, line=len(lines) + 1)
         try:
             lines.append(line[:-1].decode())
         except UnicodeDecodeError as error:
             raise ProgramError("not a pentapod program: not UTF-8 text", file=file, line=len(lines) + 1) from error
-        line = source.readline()
+        line = source.readline(_LONGEST)
     header = parse_header(lines, file)
     names = line.decode(errors="replace").rstrip("\r\n")
     if names != COLUMNS:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import warnings
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.errors import ProgramError
+from pentapod.input_files import number_in
 from pentapod.program.resolution import LARGEST_M, from_millimetres
 
 COLUMNS = "time_s,leg1_mm,leg2_mm,leg3_mm,leg4_mm,leg5_mm"
@@ -41,11 +41,11 @@ class TimeCheck:
         if not wrong.any():
             return
         k = int(np.argmax(wrong))
-        before = times[k - 1] if k else expected[0] - self.period
-        steps = (times[k] - before) / self.period if row + k else np.inf
+        before = float(times[k - 1] if k else expected[0] - self.period)
+        steps = (float(times[k]) - before) / self.period if row + k else np.inf
         if row + k and steps < 0.5:
             what = "the rows are out of order"
-        elif row + k and abs(steps - round(steps)) < 1e-3:
+        elif row + k and steps < 1e9 and abs(steps - round(steps)) < 1e-3:
             what = f"{round(steps) - 1} rows are missing before this one"
         else:
             what = "the time is not a multiple of the period"
@@ -61,18 +61,21 @@ class TimeCheck:
 def read_rows(source: BufferedReader, rows: int, times: TimeCheck, first_line: int, file: Path) -> Floats:
     """Return leg lengths (rows, 5) in metres from where the source stands to its end. Raises ProgramError."""
     size = os.fstat(source.fileno()).st_size - source.tell()
-    # A header may promise more rows than there are.
-    legs = np.empty((min(rows, size // _SHORTEST + 1), 5))
+    legs = np.empty((0, 5))
     count, rest = 0, b""
     while block := source.read(_BLOCK):
         end = block.rfind(b"\n") + 1
         if not end:
-            rest += block
-            continue
+            what = f"a row of more than {len(block):,} bytes" if len(block) == _BLOCK else "the file ends within a row"
+            remedy = "it was truncated, or is no program"
+            raise ProgramError(what, file=file, line=first_line + count, remedy=remedy)
         data, rest = rest + block[:end], block[end:]
         table = _table(data, first_line + count, file)
         times.check(table[:, 0], count, first_line, file)
         _check_lengths(table, first_line + count, file)
+        if not count:
+            # A header may promise more rows than there are; a file that holds no row at all costs nothing.
+            legs = np.empty((min(rows, size // _SHORTEST + 1), 5))
         kept = max(0, min(len(table), len(legs) - count))
         legs[count : count + kept] = from_millimetres(table[:kept, 1:])
         count += len(table)
@@ -124,11 +127,8 @@ def _row_by_row(data: bytes, first_line: int, file: Path) -> Floats:
 
 def _number(field: bytes, name: str, line: int, file: Path) -> float:
     text = field.decode(errors="replace").strip()
-    try:
-        value = float(text) if "_" not in text else math.nan
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
+    value = number_in(text)
+    if value is None:
         raise ProgramError("not a finite number", file=file, line=line, key=name, value=text[:40])
     return value
 

@@ -37,6 +37,7 @@ GUIDES = "guides_mm"
 WAYPOINTS, BOX = "setup_waypoints", "setup_box_mm"
 SETUP_KEYS = (WAYPOINTS, BOX)
 """Keys that only the programs of several set-ups have."""
+_MOST_COUNTED = 2**63
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def parse_header(lines: list[str], file: Path) -> Header:
         try:
             # Decimals, so that placements come back from millimetres bit for bit.
             entry = tomllib.loads(line[1:].strip(), parse_float=Decimal)
-        except tomllib.TOMLDecodeError as error:
+        except (ValueError, ArithmeticError, RecursionError) as error:  # not TOML, a number too large, nested too deep
             if number == 1:
                 _reject_first_line(values, file)
             raise ProgramError(
@@ -195,6 +196,8 @@ class _Reader:
         pair, corners = self.values[WAYPOINTS], self.values[BOX]
         if not isinstance(pair, list) or [type(k) for k in cast("list[Any]", pair)] != [int, int]:
             raise self._wrong(WAYPOINTS, "the first and the last waypoint")
+        if max(map(abs, cast("list[int]", pair))) >= _MOST_COUNTED:
+            raise self._wrong(WAYPOINTS, "the first and the last waypoint")
         expected = "two opposite corners, [[x, y, z], [x, y, z]]"
         if not isinstance(corners, list) or [_length(c) for c in cast("list[Any]", corners)] != [3, 3]:
             raise self._wrong(BOX, expected)
@@ -206,7 +209,7 @@ class _Reader:
 
     def _rows(self) -> int:
         rows = self.values["rows"]
-        if type(rows) is not int or rows < 2:
+        if type(rows) is not int or not 2 <= rows < _MOST_COUNTED:
             raise self._wrong("rows", "a count of at least 2")
         return rows
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.errors import MeshError, nearest
+from pentapod.input_files import read_bytes
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.mesh import CREASE_ANGLE, Mesh
 from pentapod.toolpath.obj import read_obj
@@ -22,6 +23,9 @@ FORMATS = (".obj", ".ply", ".stl")
 _HEAD = 4096
 _DOUBTFUL_M = (2e-3, 2.0)
 """Largest extents outside of this are rather a mistaken unit than a part."""
+
+_MOST_DROPPED = 0.01
+"""Share of the facets that may be degenerate or doubled: a file whose bytes have slipped has more."""
 
 _USUAL_PART_M = 0.15
 """A part that is at home on a desktop machine: what "likely" means when the unit is missing."""
@@ -39,9 +43,10 @@ def load_mesh(
     """Return the mesh of an STL, PLY or OBJ file, in metres; the suffix names the format.
 
     unit: of the file's numbers, one of `UNITS`; compulsory, as no format says it. scale: factor after the
-    unit. repair: also wind facets alike (see `Mesh.of`). crease_angle: radians. Raises MeshError, always in
-    one line: no such file, a directory, empty, truncated, not a mesh, no facets, zero area, coordinates
-    that are not finite, unit missing (with the extents in each) or unknown.
+    unit. repair: also wind facets alike (see `Mesh.of`), and leave useless facets out however many they are: without
+    it more than 1 % degenerate or doubled ones are an error. crease_angle: radians. Raises MeshError, always in one
+    line: no such file, too large, a directory, empty, truncated, not a mesh, no facets, zero area, coordinates that
+    are not finite, unit missing (with the extents in each) or unknown.
     """
     path = Path(path)
     if unit is not None and unit not in UNITS:
@@ -49,11 +54,11 @@ def load_mesh(
     if not (np.isfinite(scale) and scale > 0.0):
         raise MeshError("the scale must be positive", file=path, key="scale", value=scale)
     progress("mesh", 0.0, "reading")
-    vertices, faces, notes = _read(path)
+    vertices, faces, notes = _read(path, repair=repair)
     if unit is None:
         raise _unit_missing(path, vertices)
     notes += _unit_doubtful(vertices, unit, scale)
-    return Mesh.of(
+    mesh = Mesh.of(
         vertices * (UNITS[unit] * scale),
         faces,
         repair=repair,
@@ -62,24 +67,39 @@ def load_mesh(
         notes=notes,
         progress=progress,
     )
+    if not repair:
+        _check_dropped(path, mesh, len(faces))
+    return mesh
 
 
-def _read(path: Path) -> tuple[Floats, Ints, tuple[str, ...]]:
+def _check_dropped(path: Path, mesh: Mesh, held: int) -> None:
+    """Raise MeshError where more facets of a file are of no use than a good exporter leaves."""
+    degenerate, duplicated = mesh.diagnosis.degenerate, mesh.diagnosis.duplicated
+    if degenerate + duplicated > _MOST_DROPPED * held:
+        raise MeshError(
+            f"of {held:,} facets {degenerate:,} span no surface and {duplicated:,} are there twice",
+            file=path,
+            expected=f"at most {_MOST_DROPPED:.0%}",
+            remedy="export the mesh again; where it is whole, repair = true leaves these facets out",
+        )
+
+
+def _read(path: Path, *, repair: bool) -> tuple[Floats, Ints, tuple[str, ...]]:
     """Return vertices (V, 3) in the file's numbers, facets (F, 3) and notes."""
     suffix = path.suffix.lower()
     head, size = _head(path)
     if suffix not in FORMATS:
         raise MeshError("not a mesh format that is read", file=path, value=suffix, expected=", ".join(FORMATS))
     _check_head(path, suffix, head, size)
-    data = path.read_bytes()
+    data = read_bytes(path, MeshError, "a mesh: " + ", ".join(FORMATS))
     if not data.strip():
         raise MeshError("the file is empty", file=path)
     notes: tuple[str, ...] = ()
     if suffix == ".stl":
-        triangles, notes = read_stl(path, data)
+        triangles = read_stl(path, data)
         vertices, faces = triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
     elif suffix == ".obj":
-        vertices, faces, notes = read_obj(path, data)
+        vertices, faces, notes = read_obj(path, data, loose=repair)
     else:
         vertices, faces = read_ply(path, data)
     if not len(faces):

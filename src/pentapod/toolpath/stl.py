@@ -7,29 +7,32 @@ bytes a facet (normal, three corners, an attribute). ASCII: `solid`, facets in w
 from __future__ import annotations
 
 import re
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.errors import MeshError
-from pentapod.toolpath.text_mesh import AGAIN, line_of
+from pentapod.toolpath.text_mesh import AGAIN, NUMBER, line_of
 
 _HEADER = 84
 _FACET = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-_VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
+_FLOAT = re.compile(NUMBER)
+_WORDS = (b"facet", b"endfacet", b"endsolid")
+_VERTEX = re.compile(rb"vertex[ \t]++(\S++)[ \t]++(\S++)[ \t]++(\S++)", re.IGNORECASE)
 
 
-def read_stl(path: Path, data: bytes) -> tuple[Floats, tuple[str, ...]]:
-    """Return triangles (F, 3, 3) in the file's own numbers, and notes. Raises MeshError naming the fault.
+def read_stl(path: Path, data: bytes) -> Floats:
+    """Return triangles (F, 3, 3) in the file's own numbers. Raises MeshError naming the fault.
 
     What counts is the size that a binary header announces: files that begin with `solid` may be binary.
     """
     announced = int.from_bytes(data[80:84], "little") if len(data) >= _HEADER else None
     if announced is not None and len(data) == _HEADER + _FACET.itemsize * announced:
-        return _binary(data, announced), ()
+        return _binary(data, announced)
     if data.lstrip()[:5].lower() == b"solid" and (_is_text(data[:4096]) or announced is None):
-        return _ascii(path, data), ()
+        return _ascii(path, data)
     if _is_text(data[:4096]):
         raise MeshError("a text file, not STL", file=path, expected='binary STL, or text that begins with "solid"')
     if announced is None:
@@ -44,7 +47,7 @@ def read_stl(path: Path, data: bytes) -> tuple[Floats, tuple[str, ...]]:
             remedy=AGAIN,
         )
     extra = len(data) - _HEADER - _FACET.itemsize * announced
-    return _binary(data, announced), (f"{extra:,} bytes after the last facet ignored",)
+    raise MeshError(f"{extra:,} bytes stand after the last of {announced:,} facets", file=path, remedy=AGAIN)
 
 
 def check_stl_size(path: Path, head: bytes, size: int) -> None:
@@ -87,7 +90,7 @@ def _is_text(data: bytes) -> bool:
 
 def _ascii(path: Path, data: bytes) -> Floats:
     numbers = _VERTEX.findall(data)
-    words = {word: len(re.findall(rb"^\s*" + word, data, re.IGNORECASE | re.MULTILINE)) for word in _WORDS}
+    words = {word: len(re.findall(rb"^[ \t]*+" + word, data, re.IGNORECASE | re.MULTILINE)) for word in _WORDS}
     facets = words[b"facet"]
     if not facets and not numbers and not words[b"endsolid"]:
         raise MeshError('begins with "solid", but no facet follows', file=path, expected="an STL file")
@@ -102,22 +105,21 @@ def _ascii(path: Path, data: bytes) -> Floats:
     if not numbers:
         return np.zeros((0, 3, 3))
     try:
-        return np.array(numbers, dtype=np.bytes_).astype(np.float64).reshape(-1, 3, 3)
+        values = np.fromiter(map(float, chain.from_iterable(numbers)), np.float64, 3 * len(numbers))
     except ValueError as error:
         raise _not_a_number(path, data) from error
-
-
-_WORDS = (b"facet", b"endfacet", b"endsolid")
+    # Python takes 1_0 for ten.
+    if b"_" in data and any(b"_" in word for word in chain.from_iterable(numbers)):
+        raise _not_a_number(path, data)
+    return values.reshape(-1, 3, 3)
 
 
 def _not_a_number(path: Path, data: bytes) -> MeshError:
     """Return the error about the first vertex that is not three numbers, with its line."""
     for match in _VERTEX.finditer(data):
         for word in match.groups():
-            try:
-                float(word)
-            except ValueError:
+            if not _FLOAT.fullmatch(word):
                 line = line_of(data, match.start())
-                value = word.decode("ascii", "replace")
+                value = word.decode("ascii", "replace")[:40]
                 return MeshError("a vertex is not three numbers", file=path, line=line, value=value)
     return MeshError("a vertex is not three numbers", file=path)

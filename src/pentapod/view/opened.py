@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pentapod.archives import check_array, read_arrays
 from pentapod.arrays import Floats
 from pentapod.artefacts import ARRAYS, PROGRAM
 from pentapod.errors import InputError
@@ -31,6 +32,17 @@ from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.parting import Piece
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.toolpath.tools import Tool
+
+_FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
+    JOB_FILE: ("U", ()),
+    WAYPOINTS: ("i", (2,)),
+    BOX: ("f", (2, 3)),
+    GUIDES: ("f", (5,)),
+    "placed.placement_mm": ("f", (4, 4)),
+    "placed.component": ("i", (2,)),
+    "placed.axes": ("f", (None, 3)),
+}
+"""Arrays of plan.npz: kinds of numbers, as NumPy names them, and shapes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +119,10 @@ def run_of(outcome: Outcome, folder: Path) -> Opened | None:
 
 def _arrays(file: Path) -> dict[str, NDArray[Any]]:
     """Return the arrays of the placement and of the set-up, as far as there are any, and of the job's file."""
-    wanted = (JOB_FILE, WAYPOINTS, BOX, GUIDES, "placed.placement_mm", "placed.component", "placed.axes")
-    with np.load(file, allow_pickle=False) as archive:
-        return {name: np.asarray(archive[name]) for name in wanted if name in archive}
+    arrays = read_arrays(file, (), InputError, optional=_FORMS)
+    for name, values in arrays.items():
+        check_array(values, name, file, InputError, *_FORMS[name])
+    return arrays
 
 
 def _job_file(folder: Path, arrays: dict[str, NDArray[Any]]) -> Path:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
+from pentapod.archives import read_arrays
 from pentapod.errors import ProgramError
 from pentapod.files import packed_arrays
 from pentapod.program.header import header_text
-from pentapod.program.posts.registry import Post, PostInput, read_file, register
+from pentapod.program.posts.registry import Post, PostInput, register
 from pentapod.program.posts.rows import of_archive
 from pentapod.program.program import Program
 from pentapod.program.resolution import to_millimetres
@@ -31,12 +30,8 @@ def _write(given: PostInput) -> dict[str, bytes]:
 
 def _read(folder: Path) -> Program:
     file = folder / _FILE
-    try:
-        with np.load(io.BytesIO(read_file(file)), allow_pickle=False) as archive:
-            header, legs = str(archive["header"]), np.asarray(archive["legs_mm"], dtype=np.float64)
-    except (ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise ProgramError("not a NumPy archive of a program, or a broken one", file=file) from error
-    return of_archive(header, legs, file)
+    arrays = read_arrays(file, ("header", "legs_mm"), ProgramError)
+    return of_archive(arrays["header"], arrays["legs_mm"], file)
 
 
 NPZ = register(Post("npz", "NumPy archive", _write, _read))

@@ -10,6 +10,7 @@ from typing import cast
 
 from pentapod.errors import InputError, ProgramError, nearest
 from pentapod.files import atomic_write
+from pentapod.input_files import read_bytes
 from pentapod.machine.machine import Machine
 from pentapod.program.program import Program
 from pentapod.toolpath.toolpath import Toolpath
@@ -134,10 +135,7 @@ def read_post(folder: str | Path, name: str) -> Program | Toolpath:
 
 def read_file(path: Path) -> bytes:
     """Return the bytes of a file. Raises ProgramError where it cannot be read."""
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise ProgramError(f"cannot be read: {(error.strerror or str(error)).lower()}", file=path) from error
+    return read_bytes(path, ProgramError, "a file of this post")
 
 
 def _others() -> dict[str, EntryPoint]:

@@ -71,7 +71,7 @@ def _read(folder: Path, style: Style) -> Program:
         return _program(json.loads(text), header, file)
     except json.JSONDecodeError as error:
         raise ProgramError("this is not JSON", file=file, line=error.lineno, column=error.colno) from error
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, ArithmeticError, RecursionError) as error:
         if isinstance(error, ProgramError):
             raise
         raise ProgramError(
@@ -85,6 +85,10 @@ def _program(message: Any, header: Header, file: Path) -> Program:
     points = message["points"]
     check_rows(len(points), header, file)
     stamps = [point["time_from_start"] for point in points]
+    if not all(
+        type(stamp[part]) is int and 0 <= stamp[part] < _NANO for stamp in stamps for part in ("sec", "nanosec")
+    ):
+        raise ProgramError("a time is not in whole seconds and nanoseconds", file=file, key="time_from_start")
     times = np.array([stamp["sec"] * _NANO + stamp["nanosec"] for stamp in stamps])
     wrong = np.abs(times - np.arange(len(points)) * header.period * _NANO) > 0.51
     if wrong.any():

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pentapod.archives import check_array
 from pentapod.arrays import Floats
 from pentapod.errors import ProgramError
 from pentapod.program.header import Header, parse_header
@@ -46,10 +49,10 @@ def check_legs(legs: Floats, file: Path) -> Floats:
     return quantised(legs)
 
 
-def of_archive(header: str, legs_mm: Floats, file: Path) -> Program:
+def of_archive(header: NDArray[Any], legs_mm: NDArray[Any], file: Path) -> Program:
     """Return the program of an archive: its header's text and its legs (N, 5), millimetres. Raises ProgramError."""
-    found = header_of(header.splitlines(), file)
-    if legs_mm.ndim != 2 or legs_mm.shape[1] != 5:
-        raise ProgramError("wrong shape", file=file, key="legs_mm", value=legs_mm.shape, expected="(rows, 5)")
+    check_array(header, "header", file, ProgramError, "U", ())
+    check_array(legs_mm, "legs_mm", file, ProgramError, "fi", (None, 5))
+    found = header_of(str(header).splitlines(), file)
     check_rows(len(legs_mm), found, file)
     return found.program(check_legs(legs_mm / 1e3, file))

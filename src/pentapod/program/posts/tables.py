@@ -22,6 +22,7 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.errors import InputError, ProgramError
+from pentapod.input_files import number_in
 from pentapod.program.header import Header, header_text
 from pentapod.program.posts.motion import velocities
 from pentapod.program.posts.registry import Post, PostInput, read_file
@@ -200,16 +201,9 @@ def _numbers(lines: list[str], columns: tuple[Column, ...], table: Table, file: 
                 "wrong number of columns", file=file, line=line, value=len(cells), expected=str(len(columns))
             )
         for column, cell in zip(columns, cells, strict=True):
-            if not _finite(cell):
+            if number_in(cell) is None:
                 raise ProgramError("not a finite number", file=file, line=line, key=column.title, value=cell[:40])
     raise ProgramError("there are no rows", file=file, line=first)
-
-
-def _finite(text: str) -> bool:
-    try:
-        return bool(np.isfinite(float(text)))
-    except ValueError:
-        return False
 
 
 def _check_times(values: Floats, column: Column, header: Header, file: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pentapod.archives import check_array, read_arrays
 from pentapod.errors import InputError, ProgramError
 from pentapod.program.posts.registry import Post, PostInput, read_file, register
 from pentapod.program.program import Program
@@ -23,15 +24,13 @@ def placed_toolpath(plan: str | Path, program: Program) -> Toolpath:
     Raises InputError: not such a file, or of another run than the program.
     """
     file = Path(plan)
-    read_file(file)
     given = read_toolpath(file, "npz")
-    try:
-        with np.load(file, allow_pickle=False) as archive:
-            tips, axes = archive["placed.tips_mm"] / 1e3, archive["placed.axes"]
-            legs = archive["program.legs_mm"] / 1e3
-    except KeyError as error:
-        key, expected = str(error.args[0])[:80], "the plan.npz of a run with a program"
-        raise InputError("an array is missing", file=file, key=key, expected=expected) from error
+    forms = {"placed.tips_mm": given.tips.shape, "placed.axes": given.tips.shape, "program.legs_mm": (None, 5)}
+    arrays = read_arrays(file, forms, InputError)
+    for name, shape in forms.items():
+        check_array(arrays[name], name, file, InputError, "f", shape)
+    tips, axes = arrays["placed.tips_mm"] / 1e3, arrays["placed.axes"]
+    legs = arrays["program.legs_mm"] / 1e3
     if legs.shape != program.legs.shape or np.abs(legs - program.legs).max() > _SAME_M:
         raise ProgramError(
             "the program is not that of this plan", file=file, key="program.legs_mm",

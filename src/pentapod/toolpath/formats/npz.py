@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pentapod.archives import check_array, read_arrays
 from pentapod.errors import InputError, ToolpathError
 from pentapod.files import packed_arrays
 from pentapod.toolpath.formats.reading import check_head
@@ -18,16 +17,17 @@ from pentapod.toolpath.formats.registry import Defaults, Format, register
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 _MM, _MM_MIN = 1e3, 6e4
-_NAMES = (
-    "tips_mm",
-    "axes",
-    "pivot_mm",
-    "segment_starts",
-    "segment_kinds",
-    "segment_feeds_mm_min",
-    "segment_powers",
-    "dwells_s",
-)
+_FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
+    "tips_mm": ("fi", (None, 3)),
+    "axes": ("fi", (None, 3)),
+    "pivot_mm": ("fi", ()),
+    "segment_starts": ("iu", (None,)),
+    "segment_kinds": ("U", (None,)),
+    "segment_feeds_mm_min": ("fi", (None,)),
+    "segment_powers": ("fi", (None,)),
+    "dwells_s": ("fi", (None,)),
+}
+"""Kinds of numbers, as NumPy names them, and shapes."""
 
 
 def toolpath_arrays(toolpath: Toolpath) -> dict[str, NDArray[Any]]:
@@ -45,28 +45,22 @@ def toolpath_arrays(toolpath: Toolpath) -> dict[str, NDArray[Any]]:
         np.array([s.power for s in toolpath.segments]),
         np.array([np.nan if dwell is None else dwell for dwell in toolpath.dwells]),
     )
-    return {f"toolpath.{name}": value for name, value in zip(_NAMES, values, strict=True)}
+    return {f"toolpath.{name}": value for name, value in zip(_FORMS, values, strict=True)}
 
 
 def _read(file: Path, defaults: Defaults) -> Toolpath:
     del defaults
-    if not check_head(file).startswith(b"PK"):
-        raise ToolpathError("not a NumPy archive", file=file, expected="an .npz file")
-    arrays: dict[str, NDArray[Any]] = {}
-    try:
-        with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as archive:
-            for name in _NAMES:
-                arrays[name] = np.asarray(archive[f"toolpath.{name}"])
-    except KeyError as error:
-        raise ToolpathError("an array is missing", file=file, key=str(error.args[0])[:80]) from error
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile, NotImplementedError, MemoryError) as error:
-        raise ToolpathError("a broken NumPy archive: it may have been cut off", file=file) from error
+    check_head(file)
+    found = read_arrays(file, [f"toolpath.{name}" for name in _FORMS], ToolpathError)
+    arrays = {name: found[f"toolpath.{name}"] for name in _FORMS}
+    for name, values in arrays.items():
+        check_array(values, f"toolpath.{name}", file, ToolpathError, *_FORMS[name])
     try:
         return _toolpath(arrays)
     except InputError as error:
         raise ToolpathError(error.what, file=file, key=error.key, value=error.value, expected=error.expected) from error
-    except (ValueError, TypeError, IndexError) as error:
-        raise ToolpathError("the arrays do not make a toolpath", file=file, expected=", ".join(_NAMES)) from error
+    except (ValueError, TypeError, IndexError, OverflowError) as error:
+        raise ToolpathError("the arrays do not make a toolpath", file=file, expected=", ".join(_FORMS)) from error
 
 
 def _toolpath(arrays: dict[str, NDArray[Any]]) -> Toolpath:

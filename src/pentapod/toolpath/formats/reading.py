@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 from pentapod.errors import ToolpathError
+from pentapod.input_files import number_in
 
 MOST_BYTES = 500_000_000
 """A toolpath of ten million waypoints is smaller."""
@@ -76,10 +76,7 @@ def seconds(text: str, file: Path, line: int, word: str) -> float:
 
 def number(text: str, file: Path, line: int, word: str) -> float:
     """Return a finite number. Raises ToolpathError naming the word."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value) or "_" in text:
+    value = number_in(text)
+    if value is None:
         raise ToolpathError("not a finite number", file=file, line=line, key=word, value=text.strip()[:40])
     return value

@@ -33,7 +33,7 @@ FILE = "program.ngc"
 _LEAST_DT = 0.01
 _SERVO_PERIODS = 10
 _HEADROOM = 1.25
-_BLOCK = re.compile("G1" + "".join(rf" {letter}([0-9.]+)" for letter in LETTERS) + r" F([0-9.]+)")
+_BLOCK = re.compile("G1" + "".join(rf" {letter}([0-9]+\.[0-9]+)" for letter in LETTERS) + r" F([0-9]+\.[0-9]+)")
 
 
 def trivkins_files(given: PostInput) -> dict[str, bytes]:
@@ -90,7 +90,7 @@ def read_gcode(file: Path) -> tuple[Floats, Floats]:
         if not text.startswith("G1 "):
             continue
         match = _BLOCK.fullmatch(text)
-        if match is None:
+        if match is None or float(match[6]) == 0.0:
             raise ProgramError("not a move of all five legs", file=file, line=line, value=text[:80])
         rows.append([float(value) for value in match.groups()])
     if len(rows) < 2:
