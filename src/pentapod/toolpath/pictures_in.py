@@ -12,6 +12,9 @@ from pentapod.errors import ToolpathError
 from pentapod.toolpath.drawings_in import extra, small_file
 
 _MOST_PIXELS = 20_000_000
+_DEEPEST = 65_535.0
+_FORMATS = ("PNG", "JPEG", "GIF", "BMP", "TIFF", "PPM", "WEBP")
+"""Others that pillow knows start programs, or are hardly ever met."""
 
 
 def read_darkness(path: str | Path) -> Floats:
@@ -23,7 +26,7 @@ def read_darkness(path: str | Path) -> Floats:
     pillow = extra("PIL.Image", "pillow", path)
     data = small_file(path)
     try:
-        with pillow.open(io.BytesIO(data)) as picture:
+        with pillow.open(io.BytesIO(data), formats=_FORMATS) as picture:
             if picture.width * picture.height > _MOST_PIXELS:
                 raise ToolpathError(
                     "the picture is too large",
@@ -31,11 +34,21 @@ def read_darkness(path: str | Path) -> Floats:
                     value=picture.size,
                     expected=f"at most {_MOST_PIXELS:,} pixels",
                 )
+            if picture.mode.startswith("I"):
+                # 16 bits a pixel: made eight by the library, all but the darkest levels become white.
+                deep = np.asarray(picture, dtype=np.float64)
+                if deep.min() < 0.0 or deep.max() > _DEEPEST:
+                    raise ToolpathError("more than 16 bits a pixel", file=path, remedy="save it with 8 or 16 bits")
+                return 1.0 - deep / _DEEPEST
+            if picture.mode == "F":
+                raise ToolpathError("grey levels that are no whole numbers", file=path, remedy="save it with 8 bits")
             white = pillow.new("RGBA", picture.size, "white")
             white.alpha_composite(picture.convert("RGBA"))
             grey = np.asarray(white.convert("L"), dtype=np.float64)
     except ToolpathError:
         raise
-    except (OSError, ValueError, SyntaxError, EOFError, pillow.DecompressionBombError) as error:
-        raise ToolpathError(f"cannot be read as a picture: {error}".splitlines()[0], file=path) from error
+    except Exception as error:  # of whatever kind: what is in the file decides how the parser stumbles
+        what = " ".join(str(error).replace(repr(path), "").split())[:80] or type(error).__name__
+        remedy = f"save it as one of {', '.join(_FORMATS)}"
+        raise ToolpathError(f"cannot be read as a picture: {what}", file=path, remedy=remedy) from error
     return 1.0 - grey / 255.0

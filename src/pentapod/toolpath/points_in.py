@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import csv
+import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.errors import ToolpathError, nearest
+from pentapod.input_files import number_in
 from pentapod.toolpath.drawings_in import small_file
+
+_TOLD = re.compile(r"#\s*points\s*=\s*([0-9]{1,12})")
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 25.4e-3}
 
@@ -18,8 +23,9 @@ def read_points(path: str | Path) -> list[Floats]:
     """Return the polylines (n, 3), metres, of a CSV file.
 
     The first row names the columns with their unit: x_mm, y_mm, z_mm (or cm, m, inch), and perhaps `line`, whose value
-    changes where a new polyline begins; so does an empty row. Lines that begin with # are remarks. Raises
-    ToolpathError with file and line.
+    changes where a new polyline begins; so does an empty row. Lines that begin with # are remarks; one that says
+    "# points = 120" tells how many rows there must be, so that a file that was cut off shows. Raises ToolpathError with
+    file and line.
     """
     path = Path(path)
     try:
@@ -34,9 +40,10 @@ def read_points(path: str | Path) -> list[Floats]:
         raise ToolpathError(what, file=path, line=text.count("\n") + 1, remedy=remedy)
     columns: dict[str, tuple[int, float]] | None = None
     lines: list[list[list[float]]] = [[]]
-    name = ""
-    for number, row in enumerate(csv.reader(text.splitlines()), start=1):
+    name, told = "", None
+    for number, row in _rows(path, text):
         if row and row[0].lstrip().startswith("#"):
+            told = _TOLD.fullmatch(row[0].strip()) or told
             continue
         if not any(cell.strip() for cell in row):
             lines.append([])
@@ -51,6 +58,10 @@ def read_points(path: str | Path) -> list[Floats]:
             name = row[columns["line"][0]].strip()
             lines.append([])
         lines[-1].append([_number(path, number, axis, row[columns[axis][0]]) * columns[axis][1] for axis in "xyz"])
+    count = sum(map(len, lines))
+    if told is not None and int(told[1]) != count:
+        what = "the number of rows is not that of the remark: the file was cut off or rows were added"
+        raise ToolpathError(what, file=path, key="points", value=count, expected=told[1])
     found = [np.array(line) for line in lines if len(line) > 1]
     if not found:
         raise ToolpathError("the file holds no polyline", file=path, expected="at least two rows of numbers in a line")
@@ -77,10 +88,18 @@ def _columns(path: Path, number: int, row: list[str]) -> dict[str, tuple[int, fl
 
 
 def _number(path: Path, line: int, key: str, cell: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError as error:
-        raise ToolpathError("not a number", file=path, line=line, key=key, value=cell) from error
-    if not np.isfinite(value):
-        raise ToolpathError("not a finite number", file=path, line=line, key=key, value=cell)
+    value = number_in(cell)
+    if value is None:
+        raise ToolpathError("not a finite number", file=path, line=line, key=key, value=cell.strip()[:40])
     return value
+
+
+def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield the cells of each line, with its number. Raises ToolpathError for what is no CSV."""
+    reader = csv.reader(text.split("\n")[:-1], strict=True)
+    try:
+        for row in reader:
+            yield reader.line_num, row
+    except csv.Error as error:
+        what = f"not a row of a CSV file: {error}"
+        raise ToolpathError(what, file=path, line=max(reader.line_num, 1), remedy="export it again") from error

@@ -27,7 +27,7 @@ from pentapod.toolpath.formats.remarks import Remarks, kind_remark, pivot_remark
 from pentapod.toolpath.formats.rotary import AB, BC, Rotary
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
-_WORD = re.compile(r"([A-Z])([+-]?(?:\d+\.?\d*|\.\d+))")
+_WORD = re.compile(r"([A-Z])([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
 _COMMENT = re.compile(r"\(([^()]*)\)|;(.*)$")
 _IDLE_G = frozenset({17.0, 18.0, 19.0, 40.0, 49.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 80.0})
 _PATH_MODES = frozenset({61.0, 61.1, 64.0})
@@ -68,7 +68,12 @@ class _Reader:
         for line, text in enumerate(lines, start=1):
             for comment in _COMMENT.finditer(text):
                 self.remarks.read(comment[1] or comment[2] or "", line)
-            block = _COMMENT.sub("", text).strip().upper()
+            block = _COMMENT.sub("", text).strip()
+            if not block.isascii():
+                # Some letters of other scripts become letters of commands as capitals.
+                letter = next(letter for letter in block if not letter.isascii())
+                raise self.wrong("a letter or digit that G-code does not have", line, letter)
+            block = block.upper()
             if block.startswith("%"):
                 continue
             if self.ended is not None and block:

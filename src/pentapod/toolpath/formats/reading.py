@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pentapod.errors import ToolpathError
-from pentapod.input_files import number_in
+from pentapod.input_files import number_in, read_bytes
 
 MOST_BYTES = 500_000_000
 """A toolpath of ten million waypoints is smaller."""
@@ -20,7 +20,7 @@ def read_lines(file: Path) -> list[str]:
     for the sign of a truncated file.
     """
     check_head(file)
-    data = file.read_bytes()
+    data = read_bytes(file, ToolpathError, "a toolpath", MOST_BYTES)
     if not data.strip():
         raise ToolpathError("the file is empty", file=file, expected="a toolpath")
     if b"\0" in data:
@@ -37,7 +37,10 @@ def read_lines(file: Path) -> list[str]:
             "the last line has no end: the file was cut off", file=file, line=text.count("\n") + 1,
             remedy="export it again, or end the last line",
         )  # fmt: skip
-    return text.splitlines()
+    lines = text.replace("\r\n", "\n").split("\n")[:-1]
+    if "\r" in text and (odd := next((k for k, line in enumerate(lines, start=1) if "\r" in line), None)):
+        raise ToolpathError("a carriage return within a line", file=file, line=odd, remedy="end lines with a line feed")
+    return lines
 
 
 def check_head(file: Path) -> bytes:
