@@ -16,7 +16,7 @@ from typing import Any
 import click
 from pydantic import BaseModel
 
-from pentapod.cli.main import VERBS, cli
+from pentapod.cli.verbs import VERBS, cli
 from pentapod.job_tables import JobTables
 from pentapod.machine.tables import MachineTables
 

@@ -51,6 +51,8 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
             "clock",
             "plan_arrays",
             "artefacts",
+            "manifest",
+            "run_folder",
             "pipeline",
         ),
     ),

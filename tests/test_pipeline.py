@@ -27,7 +27,7 @@ from pentapod.toolpath import SegmentKind, Toolpath
 
 TOOLPATHS = Path(__file__).parents[1] / "toolpaths"
 SHIPPED = sorted(path.stem for path in TOOLPATHS.glob("*.toml"))
-WHOLE = {"program.csv", "plan.npz", "verdict.json"}
+WHOLE = {"program.csv", "plan.npz", "verdict.json", "manifest.json"}
 TOO_FAR = ("position_mm = [", "position_mm = [1000.0, 0, 700] # [")
 
 
@@ -162,7 +162,7 @@ def test_a_refused_job_leaves_no_program_not_even_an_old_one(make_job, tmp_path)
     outcome = run(Job.load(make_job(TOO_FAR)), out)
     assert isinstance(outcome.refusal, Refusal)
     assert not outcome.passed
-    assert names(out) == {"plan.npz", "verdict.json", "notes.txt"}
+    assert names(out) == {"plan.npz", "verdict.json", "manifest.json", "notes.txt"}
     verdict = json.loads((out / "verdict.json").read_text())
     assert verdict["passed"] is False
     assert verdict["refusal"]["cause"]

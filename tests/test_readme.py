@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from pentapod.cli.main import VERBS
+from pentapod.cli.verbs import VERBS
 from pentapod.job import Job
 
 ROOT = Path(__file__).parents[1]

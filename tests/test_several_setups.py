@@ -27,7 +27,7 @@ from pentapod.view.panel import run_words
 from pentapod.view.replan import replanned
 from usual_job import job_text
 
-EACH = {"program.csv", "plan.npz", "verdict.json"}
+EACH = {"program.csv", "plan.npz", "verdict.json", "manifest.json"}
 
 
 def text(setups: int = 3, scale: float = 3.0) -> str:
@@ -61,7 +61,14 @@ def test_each_set_up_has_its_files(done):
     assert outcome.refusal is None
     setups = outcome.find(SetUps)
     assert len(setups.parts) == 2
-    assert {p.name for p in out.iterdir()} == {"setup-1", "setup-2", "plan.npz", "verdict.json", "report.html"}
+    assert {p.name for p in out.iterdir()} == {
+        "setup-1",
+        "setup-2",
+        "plan.npz",
+        "verdict.json",
+        "report.html",
+        "manifest.json",
+    }
     for part in setups.parts:
         assert {p.name for p in (out / part.folder).iterdir()} == EACH | {"report.html"}
         assert part.margin > 0.02
@@ -157,7 +164,7 @@ def test_too_few_set_ups_are_a_refusal_that_names_what_is_left(job, tmp_path):
     assert outcome.refusal.blames[0].constraint == "beyond 2 set-ups"
     assert outcome.refusal.blames[0].waypoints
     assert any("leg" in blame.constraint and blame.shortfall > 0 for blame in outcome.refusal.blames)
-    assert {p.name for p in tmp_path.iterdir()} == {"plan.npz", "verdict.json"}
+    assert {p.name for p in tmp_path.iterdir()} == {"plan.npz", "verdict.json", "manifest.json"}
     assert json.loads((tmp_path / "verdict.json").read_text())["refusal"]["cause"].startswith("2 set-ups are not")
 
 

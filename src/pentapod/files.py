@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import errno
+import hashlib
 import io
 import os
 import secrets
@@ -17,6 +19,7 @@ from pentapod.errors import InputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -26,7 +29,7 @@ def atomic_write(path: str | Path) -> Generator[Path]:
 
     The temporary name keeps the suffix, since some writers look at it. When the block raises (also on
     KeyboardInterrupt) the temporary file is removed and what stood at `path` before is untouched.
-    Raises InputError where the folder does not exist or cannot be written, or `path` is a folder.
+    Raises InputError where the folder does not exist or cannot be written, `path` is a folder, or no space is left.
 
         with atomic_write("verdict.json") as temporary:
             temporary.write_text(text)
@@ -40,19 +43,34 @@ def atomic_write(path: str | Path) -> Generator[Path]:
         with temporary.open("xb"):
             pass
     except OSError as error:
-        raise _unwritable(target, error) from error
+        raise unwritable(target, error) from error
     try:
         yield temporary
         # Without it a power cut after the rename may leave an empty file of the right name.
         with temporary.open("rb+") as written:
             os.fsync(written.fileno())
-        try:
-            temporary.replace(target)
-        except OSError as error:
-            raise _unwritable(target, error) from error
+        temporary.replace(target)
+    except OSError as error:
+        # A full disk is told by a number alone, or by a name that is gone by now.
+        if (error.errno in _FULL and error.filename is None) or error.filename in (str(temporary), temporary):
+            raise unwritable(target, error) from error
+        raise
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def unwritable(path: Path, error: OSError) -> InputError:
+    """Return the error that says why a file cannot be written."""
+    reason = (error.strerror or str(error)).lower()
+    expected = "room for it on the disk" if error.errno in _FULL else "a folder that exists and can be written"
+    return InputError(f"cannot be written: {reason}", file=path, expected=expected)
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file's bytes, as hex digits. Raises OSError."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def packed_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
@@ -66,8 +84,3 @@ def packed_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
             np.lib.format.write_array(buffer, np.asarray(array, order="C"), allow_pickle=False)
             archive.writestr(zipfile.ZipInfo(f"{name}.npy", _EPOCH), buffer.getvalue())
     return packed.getvalue()
-
-
-def _unwritable(path: Path, error: OSError) -> InputError:
-    reason = (error.strerror or str(error)).lower()
-    return InputError(f"cannot be written: {reason}", file=path, expected="a folder that exists and can be written")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, staged, unstaged, write_arrays, write_json
+from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, write_arrays, write_json
 from pentapod.clock import Clock
 from pentapod.job import Job
 from pentapod.job_cutting import job_cutting
@@ -27,6 +27,7 @@ from pentapod.planning.setups import setups
 from pentapod.program import Program, Provenance, sample, write_csv
 from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
+from pentapod.run_folder import staged, unstaged
 from pentapod.timing import Explanation, Trajectory, certify, explain, retime, unheld
 from pentapod.toolpath import Toolpath
 from pentapod.toolpath.links import LinkStyle

@@ -10,7 +10,8 @@ import time
 import click
 import pytest
 
-from pentapod.cli.main import VERBS, cli, run
+from pentapod.cli.main import run
+from pentapod.cli.verbs import VERBS, cli
 from pentapod.program.posts import post_names
 
 PENTAPOD = [sys.executable, "-c", "from pentapod.cli.main import main; main()"]

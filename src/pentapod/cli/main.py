@@ -1,98 +1,26 @@
-"""The entry point: verbs by name, loaded when used; errors become one line and an exit code."""
+"""The entry point: errors and signals become one line and an exit code.
 
-# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+What is loaded here is little, so that signals are taken care of from the first moment.
+"""
+
+# ruff: noqa: PLC0415 - loaded when signals are taken care of
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from importlib import import_module
 from typing import Any
 
-import click
+from pentapod.cli.signals import Terminated, signals_told
 
-from pentapod.errors import InputError, nearest
-
-EXIT_FAILED, EXIT_INPUT, EXIT_BUG, EXIT_INTERRUPTED = 1, 2, 3, 130
-
-VERBS = {
-    "plan": "pentapod.cli.plan:plan",
-    "verify": "pentapod.cli.verify:verify",
-    "simulate": "pentapod.cli.simulate:simulate",
-    "view": "pentapod.cli.view:view",
-    "post": "pentapod.cli.post:post",
-    "toolpath": "pentapod.cli.toolpath:toolpath",
-    "machine": "pentapod.cli.machine:machine",
-    "ik": "pentapod.cli.kinematics:ik",
-    "fk": "pentapod.cli.kinematics:fk",
-    "new": "pentapod.cli.new:new",
-}
-"""In the order of `pentapod --help`: name → module:command."""
-
-
-class LazyGroup(click.Group):
-    """A group whose commands are imported when they are asked for."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in the order of `VERBS`."""
-        del ctx
-        return list(VERBS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return the command of a verb, None where there is none of that name."""
-        del ctx
-        if cmd_name not in VERBS:
-            return None
-        module, name = VERBS[cmd_name].split(":")
-        command: click.Command = getattr(import_module(module), name)
-        return command
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command that the first argument names. Raises UsageError that tells the nearest verb."""
-        if args[0] not in VERBS:
-            raise click.UsageError(f'no such verb: "{args[0]}"; {nearest(args[0], VERBS)}', ctx)
-        return super().resolve_command(ctx, args)
-
-
-def _print_version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
-    if value:
-        from pentapod.version import __version__
-
-        click.echo(f"pentapod {__version__}")
-        ctx.exit()
-
-
-def _print_completion(ctx: click.Context, _: click.Parameter, value: str | None) -> None:
-    if value is not None:
-        from click.shell_completion import get_completion_class
-
-        kind = get_completion_class(value)
-        if kind is not None:
-            click.echo(kind(cli, {}, "pentapod", "_PENTAPOD_COMPLETE").source())
-        ctx.exit()
-
-
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
-@click.option("--version", is_flag=True, expose_value=False, is_eager=True, callback=_print_version,
-              help="Show the version and exit.")  # fmt: skip
-@click.option("--completion", type=click.Choice(["bash", "zsh", "fish"]), expose_value=False, is_eager=True,
-              callback=_print_completion, help="Print what the shell needs to complete words, and exit.")  # fmt: skip
-@click.option("--debug", is_flag=True, expose_value=False, help="With any verb: errors show their traceback.")
-def cli() -> None:
-    """From a surface mesh to a checked leg-length program for a five-legged parallel robot.
-
-    Lengths are in millimetres, angles in degrees, feeds in mm/min.
-
-    Exit code 0: done, and the verdict passed. 1: the job cannot be done, or the verdict failed; the reason is
-    named. 2: bad input, one line says what and where. 3: an error of pentapod itself. 130: interrupted.
-    """
+EXIT_FAILED, EXIT_INPUT, EXIT_BUG, EXIT_INTERRUPTED, EXIT_TERMINATED = 1, 2, 3, 130, 143
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code."""
-    sys.exit(run(sys.argv[1:] if arguments is None else arguments))
+    with signals_told():
+        code = run(sys.argv[1:] if arguments is None else arguments)
+    sys.exit(code)
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -100,9 +28,13 @@ def run(arguments: Sequence[str]) -> int:
     debug = "--debug" in arguments
     rest = [argument for argument in arguments if argument != "--debug"]
     try:
+        from pentapod.cli.verbs import cli
+
         result: Any = cli.main(args=rest, prog_name="pentapod", standalone_mode=False)
-    except (Exception, KeyboardInterrupt) as error:
-        if debug and not isinstance(error, click.ClickException):
+    except (Exception, KeyboardInterrupt, Terminated) as error:
+        import click
+
+        if debug and not isinstance(error, (click.ClickException, Terminated)):
             raise
         code, message = _answer(error)
         click.echo(message, err=True)
@@ -112,19 +44,24 @@ def run(arguments: Sequence[str]) -> int:
 
 def _answer(error: BaseException) -> tuple[int, str]:
     """Return the exit code of an error, and its one line."""
-    if isinstance(error, (KeyboardInterrupt, click.exceptions.Abort)):
-        return EXIT_INTERRUPTED, "interrupted"
+    import click
+
+    from pentapod.errors import InputError
+
+    if isinstance(error, (KeyboardInterrupt, Terminated, click.exceptions.Abort)):
+        ended = isinstance(error, Terminated)
+        return (EXIT_TERMINATED, "terminated") if ended else (EXIT_INTERRUPTED, "interrupted")
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         return EXIT_INPUT, error.format_message()
     if isinstance(error, click.ClickException):
         context = error.ctx if isinstance(error, click.UsageError) else None
         remedy = "" if context is None else f" ({context.command_path} --help)"
         return EXIT_INPUT, _line(error.format_message() + remedy)
-    if isinstance(error, InputError):
-        return EXIT_INPUT, _line(str(error))
     if isinstance(error, OSError):
         place = f"{error.filename}: " if error.filename else ""
         return EXIT_INPUT, _line(f"{place}{error.strerror or error}")
+    if isinstance(error, InputError):
+        return EXIT_INPUT, _line(str(error))
     hint = "this is an error of pentapod; --debug shows where"
     return EXIT_BUG, _line(f"{type(error).__name__}: {error} ({hint})")
 

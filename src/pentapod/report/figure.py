@@ -21,6 +21,11 @@ LIMIT_COLOUR = "#d2413a"
 QUIET_COLOUR = "#8a8f98"
 HELD_COLOUR = "#a08a6a"
 
+PLOT_CONFIG = {
+    "responsive": True, "scrollZoom": False, "displaylogo": False, "showSendToCloud": False, "plotlyServerURL": "",
+}  # fmt: skip
+"""Of every figure. plotly.js has a button that uploads the figure to a public server: no button, and no server."""
+
 
 def packed(values: ArrayLike, dtype: str = "f4") -> dict[str, str]:
     """Return an array (N,) as plotly.js takes it; f4 for floats, i4 for indices. NaN stays NaN (a gap)."""

@@ -29,8 +29,7 @@
     if (!holder || !figures[id]) return;
     const { data, layout } = figures[id];
     layout.font = { family: getComputedStyle(document.body).fontFamily, size: 12 };
-    const config = { responsive: true, displaylogo: false, scrollZoom: false };
-    drawn[id] = Plotly.newPlot(holder, data, layout, config).then(() => Plotly.relayout(holder, theme(layout)));
+    drawn[id] = Plotly.newPlot(holder, data, layout).then(() => Plotly.relayout(holder, theme(layout)));
   }
 
   function retheme(look = css) {

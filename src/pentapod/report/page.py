@@ -20,7 +20,7 @@ from pentapod.plan_arrays import matrix_mm
 from pentapod.planning.placed_path import PlacedPath, UnplacedPath
 from pentapod.program.program import Program
 from pentapod.report import plots, scene, words
-from pentapod.report.figure import Figure, as_script
+from pentapod.report.figure import PLOT_CONFIG, Figure, as_script
 from pentapod.report.held import held_mesh
 from pentapod.report.setup_sheet import setup_sheet
 from pentapod.report.signals import Signals
@@ -56,6 +56,7 @@ def render(outcome: Outcome) -> str:
         style=(folder / "style.css").read_text(encoding="utf-8"),
         script=(folder / "page.js").read_text(encoding="utf-8"),
         plotly=plotly.offline.get_plotlyjs(),
+        plot_config=as_script(PLOT_CONFIG),
         **_context(outcome),
     )
 

@@ -12,7 +12,7 @@ import numpy as np
 from pentapod.arrays import Floats
 from pentapod.files import atomic_write
 from pentapod.report.decimate import keep_extremes
-from pentapod.report.figure import LEG_COLOURS, LEG_DASHES, Figure, as_script, packed
+from pentapod.report.figure import LEG_COLOURS, LEG_DASHES, PLOT_CONFIG, Figure, as_script, packed
 from pentapod.simulate import Tracking
 
 _BUCKETS = 1000
@@ -37,6 +37,7 @@ def write_simulation(
         lines=[line.strip() for line in lines],
         style=(folder / "style.css").read_text(encoding="utf-8"),
         plotly=plotly.offline.get_plotlyjs(),
+        plot_config=as_script(PLOT_CONFIG),
         figure=as_script(simulation_figure(runs)),
     )
     with atomic_write(path) as temporary:

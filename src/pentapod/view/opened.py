@@ -27,6 +27,7 @@ from pentapod.plan_arrays import BOX, GUIDES, JOB_FILE, WAYPOINTS, guides_in, pi
 from pentapod.planning import PlacedPath
 from pentapod.program import Program, read_csv
 from pentapod.progress import Progress, silent
+from pentapod.run_folder import check_run
 from pentapod.toolpath.formats import read_toolpath
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.parting import Piece
@@ -73,8 +74,8 @@ class Opened:
 def open_run(folder: str | Path, job: str | Path | None = None, progress: Progress = silent) -> Opened:
     """Return the run of a folder; its job is found by what the run says, or given.
 
-    Raises InputError: no run in the folder, or one in several set-ups; its job is not there any more, or one of its
-    files is broken.
+    Raises InputError: no run in the folder, or one in several set-ups, or files of different runs; its job is not there
+    any more, or one of its files is broken.
     """
     folder = Path(folder)
     file = folder / ARRAYS
@@ -84,6 +85,7 @@ def open_run(folder: str | Path, job: str | Path | None = None, progress: Progre
     if (first := folder / SetUp.folder_of(1)).is_dir():
         what = "this job is done in several set-ups, each of which is a run"
         raise InputError(what, file=folder, expected="the folder of one of them", remedy=f"pentapod view {first}")
+    check_run(folder)
     progress("open", 0.0, "arrays")
     toolpath = read_toolpath(file, "npz")
     arrays = _arrays(file)

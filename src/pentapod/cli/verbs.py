@@ -1,0 +1,86 @@
+"""The verbs by name, loaded when used."""
+
+# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import click
+
+from pentapod.errors import nearest
+
+VERBS = {
+    "plan": "pentapod.cli.plan:plan",
+    "verify": "pentapod.cli.verify:verify",
+    "simulate": "pentapod.cli.simulate:simulate",
+    "view": "pentapod.cli.view:view",
+    "post": "pentapod.cli.post:post",
+    "toolpath": "pentapod.cli.toolpath:toolpath",
+    "machine": "pentapod.cli.machine:machine",
+    "ik": "pentapod.cli.kinematics:ik",
+    "fk": "pentapod.cli.kinematics:fk",
+    "new": "pentapod.cli.new:new",
+}
+"""In the order of `pentapod --help`: name → module:command."""
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported when they are asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order of `VERBS`."""
+        del ctx
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return the command of a verb, None where there is none of that name."""
+        del ctx
+        if cmd_name not in VERBS:
+            return None
+        module, name = VERBS[cmd_name].split(":")
+        command: click.Command = getattr(import_module(module), name)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that the first argument names. Raises UsageError that tells the nearest verb."""
+        if args[0] not in VERBS:
+            raise click.UsageError(f'no such verb: "{args[0]}"; {nearest(args[0], VERBS)}', ctx)
+        return super().resolve_command(ctx, args)
+
+
+def _print_version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    if value:
+        from pentapod.version import __version__
+
+        click.echo(f"pentapod {__version__}")
+        ctx.exit()
+
+
+def _print_completion(ctx: click.Context, _: click.Parameter, value: str | None) -> None:
+    if value is not None:
+        from click.shell_completion import get_completion_class
+
+        kind = get_completion_class(value)
+        if kind is not None:
+            click.echo(kind(cli, {}, "pentapod", "_PENTAPOD_COMPLETE").source())
+        ctx.exit()
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--version", is_flag=True, expose_value=False, is_eager=True, callback=_print_version,
+              help="Show the version and exit.")  # fmt: skip
+@click.option("--completion", type=click.Choice(["bash", "zsh", "fish"]), expose_value=False, is_eager=True,
+              callback=_print_completion, help="Print what the shell needs to complete words, and exit.")  # fmt: skip
+@click.option("--debug", is_flag=True, expose_value=False, help="With any verb: errors show their traceback.")
+def cli() -> None:
+    """From a surface mesh to a checked leg-length program for a five-legged parallel robot.
+
+    Lengths are in millimetres, angles in degrees, feeds in mm/min.
+
+    Exit code 0: done, and the verdict passed. 1: the job cannot be done, or the verdict failed; the reason is
+    named. 2: bad input, one line says what and where. 3: an error of pentapod itself. 130: interrupted (Ctrl-C).
+    143: terminated (SIGTERM).
+    """

@@ -1,0 +1,72 @@
+"""Ctrl-C and SIGTERM, at any moment: no traceback, the exit code of the signal, nothing half-written."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals")
+
+SIGNALS = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}
+OVERSIZE = Path(__file__).parents[2] / "toolpaths" / "oversize.toml"  # never fits: the search finds nothing to keep
+MAIN = "from pentapod.cli.main import main; main()"
+
+AT_AN_IMPORT = """
+import os, signal, sys
+from pentapod.cli.main import main
+left = [int(os.environ["IMPORTS"])]
+def hook(event, arguments):
+    if event == "import":
+        left[0] -= 1
+        if left[0] == 0:
+            os.kill(os.getpid(), int(os.environ["SIGNAL"]))
+sys.addaudithook(hook)
+main()
+"""
+
+
+@pytest.mark.parametrize("imports", [30, 400, pytest.param(1, marks=pytest.mark.slow), pytest.param(100, marks=pytest.mark.slow),
+                                     pytest.param(200, marks=pytest.mark.slow),
+                                     pytest.param(600, marks=pytest.mark.slow)])  # fmt: skip
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+def test_while_modules_are_loaded(imports, number, tmp_path):
+    environment = {**os.environ, "IMPORTS": str(imports), "SIGNAL": str(int(number))}
+    command = [sys.executable, "-c", AT_AN_IMPORT, "plan", str(OVERSIZE), "-o", str(tmp_path / "out")]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    code, word = SIGNALS[number]
+    assert done.stderr.split() == [word]
+    assert done.returncode == code
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_while_it_plans(number, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    command = [sys.executable, "-c", MAIN, "plan", str(OVERSIZE), "-o", str(tmp_path / "out")]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    for _ in range(2400):  # until work is under way
+        time.sleep(0.05)
+        if list((tmp_path / "out").glob(".unfinished-*")):
+            break
+    time.sleep(0.5)
+    process.send_signal(number)
+    _, said = process.communicate(timeout=120)
+    code, word = SIGNALS[number]
+    assert process.returncode == code
+    assert said.split() == [word]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["notes.txt"]
+
+
+def test_what_the_parent_ignores_stays_ignored(tmp_path):
+    command = [sys.executable, "-c", f"import signal; signal.raise_signal(signal.SIGTERM); {MAIN}", "--version"]
+    ignoring = lambda: signal.signal(signal.SIGTERM, signal.SIG_IGN)  # noqa: E731
+    done = subprocess.run(command, preexec_fn=ignoring, capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert done.stdout.startswith("pentapod ")
