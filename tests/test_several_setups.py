@@ -86,12 +86,15 @@ def test_each_set_up_is_looked_at_by_itself(done):
 
 
 def test_a_set_up_is_planned_anew_by_itself(done, job, tmp_path, capsys):
-    """Elsewhere, and without its program: the piece is known from the arrays as well."""
+    """Elsewhere, and without its program: the piece is known from the arrays as well. Half a run is told first."""
     whole, outcome = done
     second = outcome.find(SetUps).parts[1]
     shutil.copytree(job.parent, tmp_path / "copy")
     folder = tmp_path / "copy" / whole.name / second.folder
     (folder / "program.csv").unlink()
+    with pytest.raises(InputError, match=r"program\.csv.*manifest\.json"):
+        open_run(folder)
+    (folder / "manifest.json").unlink()
     before = open_run(folder)
     assert before.piece == second.piece
     assert "One of several set-ups" in run_words(before)

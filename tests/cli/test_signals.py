@@ -31,9 +31,7 @@ main()
 """
 
 
-@pytest.mark.parametrize("imports", [30, 400, pytest.param(1, marks=pytest.mark.slow), pytest.param(100, marks=pytest.mark.slow),
-                                     pytest.param(200, marks=pytest.mark.slow),
-                                     pytest.param(600, marks=pytest.mark.slow)])  # fmt: skip
+@pytest.mark.parametrize("imports", [30, 400, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 100, 200, 600))])
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_while_modules_are_loaded(imports, number, tmp_path):
     environment = {**os.environ, "IMPORTS": str(imports), "SIGNAL": str(int(number))}

@@ -26,10 +26,11 @@ def view(folder: Path, job: Path | None, host: str, port: int, opens: bool, as_j
     """Look at the run in DIR: machine, part and path, live in a browser, until Ctrl-C.
 
     Scrub and play the program; drag the part and see at once what its new place comes to, green to red along the
-    path; plan anew with the part there (into DIR/replanned). Needs the extra "view". --json prints the address.
+    path; plan anew with the part there (into DIR/replanned). Needs the extra "view". --json prints the address. The
+    token in the address lets your browser in; web pages of others that are open in it are refused.
     """
     from pentapod.view import Viewer, open_run
-    from pentapod.view.server import load_viser
+    from pentapod.view.doors import load_viser
 
     load_viser()  # a missing one is said at once
     with progress_bar(quiet=quiet or as_json) as progress:

@@ -7,11 +7,12 @@ import threading
 import time
 from contextlib import redirect_stdout
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from pentapod.errors import InputError, PentapodError
+from pentapod.errors import PentapodError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.toolpath.parting import Piece
+from pentapod.view.doors import Doors, open_server
 from pentapod.view.motion import Motion
 from pentapod.view.opened import Opened
 from pentapod.view.panel import Panel, place_words, reach_words, stance_words
@@ -25,25 +26,17 @@ if TYPE_CHECKING:
 _FRAME_S = 1.0 / 30.0
 
 
-def load_viser() -> Any:
-    """Return the module viser. Raises InputError where it is not installed."""
-    try:
-        import viser  # noqa: PLC0415 - an extra, and heavy
-    except ModuleNotFoundError as error:
-        raise InputError("the viewer needs viser", key="viser", remedy='pip install "pentapod[view]"') from error
-    return viser
-
-
 class Viewer:
     """A server that shows one run, until it is stopped. Also a context manager.
 
-    host, port: where it listens; the next port that is free where that one is taken. What is computed for a drag is
-    always that of the latest place: places that were passed meanwhile are left out. Raises InputError without viser.
+    host, port: where it listens; the next port that is free where that one is taken. Only who knows the token in `url`
+    is let in (`doors`). What is computed for a drag is always that of the latest place: places that were passed
+    meanwhile are left out. Raises InputError without viser, or with another version of it than was tested.
     """
 
     def __init__(self, run: Opened, *, host: str = "127.0.0.1", port: int = 8080) -> None:
-        with redirect_stdout(io.StringIO()):  # it has a word to say even when it is told not to
-            self._server: viser.ViserServer = load_viser().ViserServer(host=host, port=port, verbose=False)
+        self._doors = Doors(host)
+        self._server: viser.ViserServer = open_server(self._doors, port)
         self._stopped, self._moved = threading.Event(), threading.Event()
         self._lock, self._planning = threading.RLock(), threading.Lock()  # of what is shown; of planning anew
         self._thorough = False
@@ -56,8 +49,8 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Where to point a browser."""
-        return f"http://{self._server.get_host()}:{self._server.get_port()}"
+        """Where to point a browser, with the token that lets it in."""
+        return f"http://{self._server.get_host()}:{self._server.get_port()}/?token={self._doors.token}"
 
     @property
     def placement(self) -> RigidTransform:
