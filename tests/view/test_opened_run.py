@@ -55,6 +55,7 @@ def test_what_is_missing_is_named(planned, tmp_path):
     with np.load(tmp_path / "alone" / "plan.npz") as archive:
         arrays = {name: archive[name] for name in archive if name != "job.file"}
     np.savez(tmp_path / "alone" / "plan.npz", **arrays)
+    (tmp_path / "alone" / "manifest.json").unlink()
     with pytest.raises(InputError, match=r"does not say which job.*--job"):
         open_run(tmp_path / "alone")
 
