@@ -24,6 +24,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
             "toml_files",
             "version",
             "compiled",
+            "kernel_cache",
         ),
     ),
     (("geometry",),),

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
-from pentapod.compiled import kernels_available
 from pentapod.toolpath.mesh import Mesh
 
 _FACETS_PER_LEAF = 4
@@ -35,10 +34,7 @@ class FacetTree:
     @classmethod
     def of(cls, mesh: Mesh) -> FacetTree:
         """Return the tree of a mesh's facets."""
-        if kernels_available():
-            from pentapod.toolpath.box_kernels import fit_boxes  # noqa: PLC0415 - loads numba
-        else:
-            from pentapod.toolpath.box_arrays import fit_boxes  # noqa: PLC0415
+        from pentapod.toolpath.box_kernels import fit_boxes  # noqa: PLC0415 - loads numba
 
         low, high = mesh.bounds
         extent = float((high - low).max()) or 1.0

@@ -1,4 +1,4 @@
-"""The marching front, as plain loops: compiled by numba where it is there, run as Python where it is not."""
+"""The marching front, as plain loops."""
 
 # Every name is a plain array or number here; numba compiles what it sees.
 from __future__ import annotations
@@ -8,10 +8,11 @@ import heapq
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
-from pentapod.compiled import kernel, kernels_available
+from pentapod.compiled import kernel
 
 
-def _march(faces: Ints, sides: Floats, first: Ints, around: Ints, distance: Floats) -> None:
+@kernel
+def march(faces: Ints, sides: Floats, first: Ints, around: Ints, distance: Floats) -> None:
     """Lower distance (V,) in place from its finite entries on, over facets (F, 3) with sides (F, 3) as travelled.
 
     Side s runs from corner s to corner s + 1. around[first[v] : first[v + 1]] are the facets at vertex v. Vertices
@@ -58,6 +59,3 @@ def _march(faces: Ints, sides: Floats, first: Ints, around: Ints, distance: Floa
                 if offer < distance[free]:
                     distance[free] = offer
                     heapq.heappush(heap, (offer, free))
-
-
-march = kernel(_march) if kernels_available() else _march

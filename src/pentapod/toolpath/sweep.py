@@ -8,7 +8,6 @@ from typing import Protocol
 import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints, as_floats, set_frozen
-from pentapod.compiled import kernels_available
 from pentapod.errors import ToolpathError
 from pentapod.geometry.directions import angle_between, tangent_frame
 from pentapod.progress import Progress, silent
@@ -126,13 +125,9 @@ def _swept(
     progress: Progress,
     resolution: float = RESOLUTION_M,
 ) -> Sweep:
-    if kernels_available():
-        from pentapod.toolpath.ball_kernels import nearest_all  # noqa: PLC0415 - loads numba
-        from pentapod.toolpath.sweep_kernels import sweep_all  # noqa: PLC0415
-    else:
-        from pentapod.toolpath.sweep_arrays import sweep_all  # noqa: PLC0415
+    from pentapod.toolpath.ball_kernels import nearest_all  # noqa: PLC0415 - loads numba
+    from pentapod.toolpath.sweep_kernels import sweep_all  # noqa: PLC0415
 
-        nearest_all = None
     solids = tool.solids
     count, parts = len(tips0), len(solids)
     depths, where = np.full((parts, count), -np.inf), np.full((parts, count, 4), np.nan)
@@ -146,7 +141,7 @@ def _swept(
             progress("gouge", (k + first / count) / parts)
             found = (depths[k, rows], where[k, rows], facets[k, rows])
             place = (tree.corners, tree.boxes, tree.starts)
-            if ball and nearest_all is not None:
+            if ball:
                 way = np.ascontiguousarray(motions[rows, 6:9])
                 nearest_all(np.ascontiguousarray(motions[rows, :3]), way, *place, solid.rounding - threshold, *found)
                 depths[k, rows] = np.where(facets[k, rows] < 0, -np.inf, solid.rounding - depths[k, rows])
