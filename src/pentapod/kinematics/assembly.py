@@ -10,11 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from pentapod.arrays import Bools, Floats, as_batch
 from pentapod.kinematics.blocks import blocks
-from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.kinematics.general import GeneralPentapod
 from pentapod.kinematics.line_equations import LineEquations
 from pentapod.kinematics.line_roots import interior
+from pentapod.kinematics.pentapod import LinearPentapod
+from pentapod.kinematics.quadratic_near import self_motions
 from pentapod.kinematics.six_legs import SixLegPlatform
 from pentapod.kinematics.solution_line import SolutionLine
+
+_EPS = float(np.finfo(np.float64).eps)
 
 
 class Obstacle(IntEnum):
@@ -27,6 +31,7 @@ class Obstacle(IntEnum):
     APART = 4
     ANGLE = 5
     SIXTH_LEG = 6
+    SELF_MOTION = 7
 
     @property
     def inequality(self) -> str:
@@ -42,6 +47,7 @@ _INEQUALITIES = {
     Obstacle.APART: "u² + v² ≤ 1 and px² + py² ≤ l_3² at once: each can hold, but not both together",
     Obstacle.ANGLE: "|t − px u − py v| ≤ |pz w|: leg 3 and the line cannot include the angle",
     Obstacle.SIXTH_LEG: "|M − r| ≤ √(l_6² − h²) ≤ M + r: the sixth leg does not reach the platform about any line",
+    Obstacle.SELF_MOTION: "w = 0 and u = 1/δ: a self-motion, a whole circle of poses has these lengths",
 }
 
 
@@ -51,7 +57,8 @@ class AssemblyObstacles:
 
     The shortfall is by how much the inequality fails where it fails least, relative to its right-hand side; for
     ANGLE relative to l_3, for SIXTH_LEG by how much l_6 must change, relative to itself. 0 where a pose exists, NaN
-    for NOT_A_LENGTH. For APART it is taken in the middle of the gap.
+    for NOT_A_LENGTH and SELF_MOTION. For APART it is taken in the middle of the gap. SELF_MOTION means that to within
+    rounding the legs leave a motion free (quadratic family, |δ| ≥ 1): none of its poses is the one of a mode.
     """
 
     obstacle: NDArray[np.int8]
@@ -67,25 +74,33 @@ class AssemblyObstacles:
         obstacle, shortfall = Obstacle(int(self.obstacle[index])), float(self.shortfall[index])
         if obstacle is Obstacle.NONE:
             return "a pose exists"
+        if obstacle is Obstacle.SELF_MOTION:
+            return f"no isolated pose: {obstacle.inequality}"
         amount = "" if np.isnan(shortfall) else f" (missed by a relative {shortfall:.3g})"
         return f"no assembly: violates {obstacle.inequality}{amount}"
 
 
-def assembly_obstacles(pentapod: FiveLegs, legs: ArrayLike) -> AssemblyObstacles:
+def assembly_obstacles(pentapod: LinearPentapod | GeneralPentapod, legs: ArrayLike) -> AssemblyObstacles:
     """Return for leg lengths (..., 5), metres, whether a pose exists, and if none the inequality that fails.
 
-    For any linear pentapod, in the quadratic family or not. Rounding is forgiven as in `GeneralPentapod.pose`.
-    Raises ArrayError for a wrong shape; LinAlgError cannot occur for a pentapod that was built.
+    A pose exists exactly where the pentapod's `assembly_modes` has one. Raises ArrayError for a wrong shape;
+    LinAlgError cannot occur for a pentapod that was built.
     """
     lengths = as_batch(legs, "legs", (5,))
     flat = lengths.reshape(-1, 5)
     obstacle = np.full(len(flat), Obstacle.NOT_A_LENGTH, dtype=np.int8)
     shortfall = np.full(len(flat), np.nan)
-    known = np.flatnonzero(np.isfinite(flat).all(axis=-1) & (flat >= 0.0).all(axis=-1))
     equations = LineEquations.of(pentapod.base, pentapod.offsets)
-    for block in blocks(len(known)):
-        some = known[block]
-        obstacle[some], shortfall[some] = _judge(SolutionLine.of(equations, np.square(flat[some].T)))
+    for block in blocks(len(flat)):
+        some, missed, part = obstacle[block], shortfall[block], flat[block]
+        exists = np.isfinite(pentapod.assembly_modes(part)[0]).all(axis=(1, 2))
+        some[exists], missed[exists] = Obstacle.NONE, 0.0
+        lost = np.flatnonzero(np.isfinite(part).all(axis=-1) & (part >= 0.0).all(axis=-1) & ~exists)
+        some[lost], missed[lost] = _judge(SolutionLine.of(equations, np.square(part[lost].T)))
+        if isinstance(pentapod, LinearPentapod):
+            with np.errstate(invalid="ignore", over="ignore", under="ignore"):
+                free = lost[self_motions(part[lost].T.copy(), pentapod.linear_part, pentapod.delta)]
+            some[free], missed[free] = Obstacle.SELF_MOTION, np.nan
     return AssemblyObstacles(obstacle.reshape(lengths.shape[:-1]), shortfall.reshape(lengths.shape[:-1]))
 
 
@@ -108,7 +123,7 @@ def platform_obstacles(platform: SixLegPlatform, legs: ArrayLike) -> AssemblyObs
 
 
 def _judge(line: SolutionLine) -> tuple[NDArray[np.int8], Floats]:
-    """Return obstacle and shortfall (N,) of solution lines."""
+    """Return obstacle and shortfall (N,) of solution lines without a pose."""
     best = interior(line, thorough=True)
     (low1, high1), (low2, high2) = line.directions(), line.positions()
     reach = line.reach_squared
@@ -128,5 +143,4 @@ def _judge(line: SolutionLine) -> tuple[NDArray[np.int8], Floats]:
     failed = np.concatenate([failed, [np.maximum(low1, low2) > np.minimum(high1, high2)], [np.ones_like(best.exists)]])
     first = np.argmax(failed, axis=0)
     shortfall = np.take_along_axis(missed, first[None], axis=0)[0]
-    obstacle = np.where(best.exists, Obstacle.NONE, first + Obstacle.DIRECTION)
-    return obstacle.astype(np.int8), np.where(best.exists, 0.0, shortfall)
+    return (first + Obstacle.DIRECTION).astype(np.int8), np.maximum(shortfall, _EPS)

@@ -27,38 +27,58 @@ class Interior(NamedTuple):
 
 
 def interior(line: SolutionLine, *, thorough: bool = False) -> Interior:
-    """Return a point between the two roots of each line (N,); where none exists, the best there is.
+    """Return a point between the two roots of each line (N,); where there is none, the best there is.
 
-    thorough: where none exists, go on to the best point instead of stopping when that is known.
+    thorough: where there clearly is none, go on to the best point instead of stopping when that is known.
     The margin √(D1 E) − |g| is concave, so its slope tells on which side its maximum lies, and its tangent bounds
-    what can still be found. A maximum that is negative by no more than rounding counts as a double root:
-    the leg lengths of a singular pose, rounded, are those of no pose as often as of two.
+    what can still be found. A maximum that is negative by no more than rounding counts as a double root: the leg
+    lengths of a singular pose, rounded, are those of no pose as often as of two. Near w = 0 the discs D1 ≥ 0 and E ≥ 0
+    then have no common point to look at, so such lines are searched once more with both discs larger by rounding.
     """
+    tau, low, high = _bracket(line)
+    exists = _climb(line, tau, low, high, to_top=False, give_up=True)
+    lost = np.flatnonzero(~exists)
+    if lost.size:
+        loose = line.take(lost).loosened()
+        best, low[lost], high[lost] = _bracket(loose)
+        exists[lost] = _climb(loose, best, low[lost], high[lost], to_top=True, give_up=not thorough)
+        tau[lost] = best
+    return Interior(tau, low, high, exists)
+
+
+def _bracket(line: SolutionLine) -> tuple[Floats, Floats, Floats]:
+    """Return the middle (N,) of where both discs hold, and its ends; of the gap where the two intervals are apart."""
     (low1, high1), (low2, high2) = line.directions(), line.positions()
     low, high = np.maximum(low1, low2), np.minimum(high1, high2)
-    tau = 0.5 * (low + high)  # the middle of the gap where the intervals are apart: nothing to search there
-    active = np.flatnonzero(low < high)
+    return 0.5 * (low + high), low, high
+
+
+def _climb(line: SolutionLine, tau: Floats, low: Floats, high: Floats, *, to_top: bool, give_up: bool) -> Bools:
+    """Move tau (N,) between low and high to where the margin is positive, and these nearer; return where it is.
+
+    to_top: to its largest value, also where it is positive already. give_up: stop where none can be positive.
+    """
+    largest = np.full(len(tau), -np.inf)
+    top, active = tau.copy(), np.flatnonzero(low < high)
     for _ in range(_ROUNDS):
-        part = line.take(active)
-        margin, slope = part.factors(tau[active]).margin()
-        running = ~(margin > 0.0)
-        if not thorough:
-            ahead = np.where(slope > 0.0, high[active] - tau[active], low[active] - tau[active])
-            running &= margin + slope * ahead >= -_CLEARLY * np.sqrt(part.reach_squared)
-        active, rising = active[running], slope[running] > 0.0
+        part, at = line.take(active), tau[active]
+        margin, slope = part.factors(at).margin()
+        better = margin > largest[active]
+        largest[active[better]], top[active[better]] = margin[better], at[better]
+        running = np.isfinite(margin) & (to_top | ~(margin > 0.0))
+        if give_up:
+            ahead = np.where(slope > 0.0, high[active] - at, low[active] - at)
+            with np.errstate(invalid="ignore"):  # an endless slope, and no way ahead
+                running &= ~(margin + slope * ahead < -_CLEARLY * np.sqrt(part.reach_squared))
+        rising = slope > 0.0
+        low[active] = np.where(running & rising, at, low[active])
+        high[active] = np.where(running & ~rising, at, high[active])
+        tau[active] = np.where(running, 0.5 * (low[active] + high[active]), at)
+        active = active[running & (tau[active] != at)]
         if not active.size:
             break
-        low[active] = np.where(rising, tau[active], low[active])
-        high[active] = np.where(rising, high[active], tau[active])
-        tau[active] = 0.5 * (low[active] + high[active])
-    return Interior(tau, low, high, _holds(line, tau))
-
-
-def _holds(line: SolutionLine, tau: Floats) -> Bools:
-    """Return whether D1, E and f are ≥ 0 at tau (N,), rounding forgiven."""
-    values = line.factors(tau)
-    in_d1, in_e, in_f = line.doubt(tau)
-    return (values.d1 >= -in_d1) & (values.e >= -in_e) & (values.f()[0] >= -in_f)
+    tau[:] = top
+    return largest > 0.0
 
 
 def root(line: SolutionLine, outside: Floats, inside: Floats) -> Floats:

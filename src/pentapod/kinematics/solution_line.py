@@ -46,26 +46,61 @@ class Factors(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SolutionLine:
-    """Solution lines of N leg vectors. start, rounding (5, N); step (5,); reach_squared (N,) = l_3², m².
+    """Solution lines of N leg vectors. start, rounding (5, N); step (5,); reach_squared (N,) = l_3², m²; unit_squared.
 
-    rounding bounds how far the rounding of the leg lengths and of the map may have moved `start`.
+    rounding bounds how far the rounding of the leg lengths and of the map may have moved `start`. unit_squared (N,):
+    the square of the direction's length, 1 but for `loosened`.
     """
 
     start: Floats
     rounding: Floats
     step: Floats
     reach_squared: Floats
+    unit_squared: Floats
 
     @classmethod
     def of(cls, equations: LineEquations, squared_legs: Floats) -> SolutionLine:
         """Build the lines of squared leg lengths (5, N)."""
-        linear, constant = equations.linear_map, equations.constant[:, None]
-        rounding = 4.0 * _EPS * (np.abs(linear) @ squared_legs + np.abs(constant))
-        return cls(linear @ squared_legs + constant, rounding, equations.null_vector, squared_legs[2])
+        start = np.repeat(equations.constant[:, None], squared_legs.shape[1], axis=1)
+        rounding = np.abs(start)
+        for column, squared in zip(equations.linear_map.T, squared_legs, strict=True):
+            # Leg by leg: in a matrix product the order, and so the last bit, would depend on the size of the batch.
+            term = column[:, None] * squared
+            start += term
+            rounding += np.abs(term)
+        reach = squared_legs[2]
+        return cls(start, 4.0 * _EPS * rounding, equations.null_vector, reach, np.ones_like(reach))
 
     def take(self, index: Ints | Bools) -> SolutionLine:
         """Return the chosen lines."""
-        return SolutionLine(self.start[:, index], self.rounding[:, index], self.step, self.reach_squared[index])
+        return SolutionLine(
+            self.start[:, index],
+            self.rounding[:, index],
+            self.step,
+            self.reach_squared[index],
+            self.unit_squared[index],
+        )
+
+    def loosened(self) -> SolutionLine:
+        """Return the lines with l_3 and the direction a little longer: by what rounding may take.
+
+        If the exact lengths have a pose, then D1 E − g² of these is positive there, whatever rounding did to D1, E
+        and g: √((D1 + a)(E + b)) ≥ √(D1 E) + √(a b), and a, b are so large that √(a b) exceeds the error of g.
+        """
+        reach = np.sqrt(self.reach_squared)
+        # At a pose no coordinate exceeds l_3 or 1, so neither does the term τ · step exceed that and `start`.
+        most = np.stack([reach, reach, reach, np.ones_like(reach), np.ones_like(reach)])
+        et, ex, ey, eu, ev = self.rounding + 4.0 * _EPS * (np.abs(self.start) + most)
+        in_g = et + ex + ey + reach * (eu + ev + 16.0 * _EPS)
+        in_d1, in_e = 2.0 * (eu + ev) + 8.0 * _EPS, 2.0 * reach * (ex + ey) + 8.0 * _EPS * self.reach_squared
+        share = in_g / np.where(reach > 0.0, reach, 1.0)
+        return SolutionLine(
+            self.start,
+            self.rounding,
+            self.step,
+            self.reach_squared + 2.0 * (in_e + in_g * reach),
+            self.unit_squared + 2.0 * (in_d1 + share),
+        )
 
     def at(self, tau: Floats) -> Floats:
         """Return (t, px, py, u, v), (5, N), at the parameters (N,)."""
@@ -76,7 +111,7 @@ class SolutionLine:
         t, px, py, u, v = self.at(tau)
         nt, nx, ny, nu, nv = self.step
         return Factors(
-            1.0 - (u * u + v * v),
+            self.unit_squared - (u * u + v * v),
             self.reach_squared - (px * px + py * py),
             t - (px * u + py * v),
             -2.0 * (nu * u + nv * v),
@@ -84,22 +119,12 @@ class SolutionLine:
             nt - (nx * u + ny * v) - (nu * px + nv * py),
         )
 
-    def doubt(self, tau: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return bounds (N,) on the rounding errors of D1, E and f at the parameters (N,)."""
-        t, px, py, u, v = np.abs(self.at(tau))
-        et, ex, ey, eu, ev = self.rounding + 2.0 * _EPS * np.abs(tau * self.step[:, None])
-        d1, e, g, *_ = self.factors(tau)
-        in_d1 = 2.0 * (u * eu + v * ev) + 4.0 * _EPS
-        in_e = 2.0 * (px * ex + py * ey) + 4.0 * _EPS * self.reach_squared
-        in_g = et + px * eu + u * ex + py * ev + v * ey + 4.0 * _EPS * (t + px * u + py * v)
-        return in_d1, in_e, np.abs(e) * in_d1 + np.abs(d1) * in_e + 2.0 * np.abs(g) * in_g + in_g * in_g
-
     def directions(self) -> tuple[Floats, Floats]:
         """Return the interval (N,), (N,) of τ with u² + v² ≤ 1; (c, c) with the nearest c where there is none.
 
         In the quadratic family u and v do not depend on τ: all of (−∞, ∞), whether they fulfil it or not.
         """
-        return _ball(self.start[3], self.start[4], self.step[3], self.step[4], np.ones_like(self.reach_squared))
+        return _ball(self.start[3], self.start[4], self.step[3], self.step[4], self.unit_squared)
 
     def positions(self) -> tuple[Floats, Floats]:
         """Return the interval (N,), (N,) of τ with px² + py² ≤ l_3²; (c, c) with the nearest c where there is none."""
