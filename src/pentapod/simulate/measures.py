@@ -14,8 +14,8 @@ from pentapod.simulate.contour import contour_errors
 from pentapod.simulate.played import Played
 from pentapod.simulate.reference import Reference
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
-from pentapod.verify.matching import Match, match
-from pentapod.verify.visits import Course
+from pentapod.verify.free_space import PosedPolyline
+from pentapod.verify.path_matching import PathMatch, match
 
 _MM = 1e3
 _TIME_CONSTANTS = 3.0  # of the position loop: so much later than due the tool is looked for
@@ -125,8 +125,8 @@ class Tracking:
         return lines
 
     @cached_property
-    def _match(self) -> Match:
+    def _match(self) -> PathMatch:
         home = self.reference.program.placement.inverse()
         axes = home.rotate(-self.played.directions)
-        course = Course(home.apply(self.played.tips) + self.toolpath.pivot * axes, axes)
-        return match(course, Course(self.toolpath.pivots, self.toolpath.axes), self.tolerance)
+        course = PosedPolyline(home.apply(self.played.tips) + self.toolpath.pivot * axes, axes)
+        return match(course, PosedPolyline(self.toolpath.pivots, self.toolpath.axes), self.tolerance)

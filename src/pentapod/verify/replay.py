@@ -17,10 +17,10 @@ from pentapod.program.program import Program
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify.cutting import Cutting
-from pentapod.verify.matching import Match, match
+from pentapod.verify.free_space import PosedPolyline
+from pentapod.verify.path_matching import PathMatch, match
 from pentapod.verify.survey import Survey, survey
 from pentapod.verify.verdict import Place
-from pentapod.verify.visits import Course
 
 _BLOCK = 1 << 15  # samples
 
@@ -106,10 +106,11 @@ class Replay:
         return np.diff(self.match.turned)
 
     @cached_property
-    def match(self) -> Match:
+    def match(self) -> PathMatch:
         """Which place of the toolpath each sample belongs to. Needs a pose at every sample."""
-        program, path = Course(self.pivots, self.axes), Course(self.toolpath.pivots, self.toolpath.axes)
-        return match(program, path, self.path_tolerance)
+        program, path = PosedPolyline(self.pivots, self.axes), PosedPolyline(self.toolpath.pivots, self.toolpath.axes)
+        bound = self.tilt + self.axis_tolerance
+        return match(program, path, self.path_tolerance, axis_bound=bound, away=self.survey.away)
 
     def place(self, sample: float) -> Place:
         """Return the place of a sample (or of a moment between samples)."""
