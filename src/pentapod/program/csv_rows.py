@@ -25,7 +25,7 @@ _TO_COMMAS = bytes.maketrans(b"\n", b",")
 
 @dataclass(frozen=True)
 class TimeCheck:
-    """Row k is due at k · period seconds, written with so many decimals."""
+    """Row k is due at k · period seconds, written with so many decimals and no more."""
 
     period: float
     decimals: int
@@ -37,13 +37,17 @@ class TimeCheck:
         """
         expected = np.arange(row, row + len(times)) * self.period
         tolerance = 0.51 * 10.0**-self.decimals + 1e-12 * expected
-        wrong = np.abs(times - expected) > tolerance
+        # More digits than are written would hide another period behind the rounding.
+        units = times * 10.0**self.decimals
+        wrong = (np.abs(times - expected) > tolerance) | (np.abs(units - np.rint(units)) > 1e-6 + 1e-15 * np.abs(units))
         if not wrong.any():
             return
         k = int(np.argmax(wrong))
         before = float(times[k - 1] if k else expected[0] - self.period)
         steps = (float(times[k]) - before) / self.period if row + k else np.inf
-        if row + k and steps < 0.5:
+        if abs(times[k] - expected[k]) <= tolerance[k]:
+            what = f"the time is not a multiple of the period in {self.decimals} decimals"
+        elif row + k and steps < 0.5:
             what = "the rows are out of order"
         elif row + k and steps < 1e9 and abs(steps - round(steps)) < 1e-3:
             what = f"{round(steps) - 1} rows are missing before this one"

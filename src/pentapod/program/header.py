@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import tomllib
 from dataclasses import dataclass
 from decimal import Decimal
@@ -38,11 +39,13 @@ WAYPOINTS, BOX = "setup_waypoints", "setup_box_mm"
 SETUP_KEYS = (WAYPOINTS, BOX)
 """Keys that only the programs of several set-ups have."""
 _MOST_COUNTED = 2**63
+OPTIONAL_KEYS = (GUIDES, *SETUP_KEYS)
+_LINE = re.compile(r"# ([a-z0-9_]+) = (\S.*)")
 
 
 @dataclass(frozen=True)
 class Header:
-    """What stands in front of the rows. unknown: keys that this version of the format has no meaning for."""
+    """What stands in front of the rows."""
 
     period: float
     interpolation: Any
@@ -51,7 +54,6 @@ class Header:
     provenance: Provenance
     rows: int
     slides: tuple[float, ...] | None = None
-    unknown: tuple[str, ...] = ()
 
     def program(self, legs: Floats) -> Program:
         """Return the program of this header and its rows (N, 5), metres."""
@@ -94,42 +96,42 @@ def parse_header(lines: list[str], file: Path) -> Header:
     values: dict[str, Any] = {}
     places: dict[str, int] = {}
     for number, line in enumerate(lines, start=1):
-        try:
-            # Decimals, so that placements come back from millimetres bit for bit.
-            entry = tomllib.loads(line[1:].strip(), parse_float=Decimal)
-        except (ValueError, ArithmeticError, RecursionError) as error:  # not TOML, a number too large, nested too deep
-            if number == 1:
-                _reject_first_line(values, file)
-            raise ProgramError(
-                "cannot read this header line",
-                file=file,
-                line=number,
-                value=line.strip()[:80],
-                expected="# key = value",
-            ) from error
-        for key, value in entry.items():
-            if key in values:
-                raise ProgramError("this key stands in the header twice", file=file, line=number, key=key)
-            values[key], places[key] = value, number
-        if number == 1 and values.get(MAGIC) != FORMAT_VERSION:
-            _reject_first_line(values, file)
+        entry = _entry(line)
+        if number == 1 and (entry is None or entry[0] != MAGIC):
+            raise ProgramError("not a pentapod program", file=file, line=1, expected=f"# {MAGIC} = {FORMAT_VERSION}")
+        if entry is None:
+            value = line.strip()[:80]
+            expected = "# key = value, with one key and nothing else"
+            raise ProgramError("cannot read this header line", file=file, line=number, value=value, expected=expected)
+        key, value = entry
+        if key in values:
+            raise ProgramError("this key stands in the header twice", file=file, line=number, key=key)
+        values[key], places[key] = value, number
+        # True and 1.0 equal 1, but no version is written like that.
+        if key == MAGIC and (type(value) is not int or value != FORMAT_VERSION):
+            shown, known = str(value)[:80], str(FORMAT_VERSION)
+            raise ProgramError("unknown format version", file=file, line=number, key=key, value=shown, expected=known)
+        if key not in (*KEYS, *OPTIONAL_KEYS):
+            remedy = "it is no key of this format version: a newer pentapod wrote the file, or it was edited"
+            raise ProgramError("unknown key in the header", file=file, line=number, key=key, remedy=remedy)
     for key in KEYS:
         if key not in values:
             raise ProgramError("the header lacks this key", file=file, key=key, remedy="plan the job again")
     return _Reader(values, places, file).header()
 
 
-def _reject_first_line(values: dict[str, Any], file: Path) -> None:
-    if MAGIC in values:
-        raise ProgramError(
-            "unknown format version",
-            file=file,
-            line=1,
-            key=MAGIC,
-            value=values[MAGIC],
-            expected=str(FORMAT_VERSION),
-        )
-    raise ProgramError("not a pentapod program", file=file, line=1, expected=f"# {MAGIC} = {FORMAT_VERSION}")
+def _entry(line: str) -> tuple[str, Any] | None:
+    """Return key and value of a header line; None where it is not `# key = value`, one plain key and one value."""
+    parts = _LINE.fullmatch(line.rstrip("\r"))
+    if not parts:
+        return None
+    try:
+        # In brackets that end behind it a second key, a comment and a second value do not pass for a part of the value.
+        alone = tomllib.loads(f"x = {parts[2]}", parse_float=Decimal)
+        between = tomllib.loads(f"x = [{parts[2]}]", parse_float=Decimal)["x"]
+    except (ValueError, ArithmeticError, RecursionError):  # not TOML, a number too large, nested too deep
+        return None
+    return (parts[1], alone["x"]) if len(between) == 1 else None
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,6 @@ class _Reader:
             ),
             rows=self._rows(),
             slides=self._slides(),
-            unknown=tuple(key for key in self.values if key not in (*KEYS, GUIDES, *SETUP_KEYS)),
         )
 
     def _wrong(self, key: str, expected: str) -> ProgramError:

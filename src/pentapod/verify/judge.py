@@ -11,7 +11,7 @@ from pentapod.errors import ArrayError, InputError, MachineError, ProgramError
 from pentapod.files import atomic_write
 from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import Surroundings
-from pentapod.program.csv import read_csv, read_header
+from pentapod.program.csv import read_csv
 from pentapod.program.program import Program
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
@@ -21,7 +21,7 @@ from pentapod.verify.cutting import Cutting
 from pentapod.verify.replay import SURVEY_SHARE, Replay
 from pentapod.verify.verdict import Certificate, Place, Verdict
 
-READABLE, HEADER = "readable", "no unknown keys in the header"
+READABLE = "readable"
 CLAIMS: tuple[Claim, ...] = (
     *origin.CLAIMS,
     *component.CLAIMS,
@@ -62,7 +62,7 @@ def verify(
     job_digest: of the job that the header must name, None to leave that out. surroundings: what must not be touched.
     cutting: what cuts, and into which part; without it gouges are unknown.
     strict: every claim stands in the verdict, also those that do not apply, with the reason; it fails where a claim
-    could not be judged for want of something, and where the header has keys that nobody here knows the meaning of.
+    could not be judged for want of something.
     A malformed file gives a failed verdict with the one claim "readable". Raises ProgramError where there is
     no such file, ArrayError where a tolerance is not a sensible number.
     """
@@ -85,8 +85,6 @@ def verify(
             return Verdict((Certificate(READABLE, False, None, None, "", Place(), str(error)),))
         method = f"{len(program.legs)} rows, {program.duration:.6g} s, {program.interpolation} between rows"
         read = [Certificate(READABLE, True, None, None, "", Place(), method)]
-        if strict:
-            read.append(_known(read_header(path).unknown))
     try:
         machine = program.machine(machine)
     except MachineError as error:
@@ -103,11 +101,6 @@ def verify(
             read.append(claim.unjudged(answer))
     progress("verify", 1.0)
     return Verdict(tuple(read))
-
-
-def _known(unknown: tuple[str, ...]) -> Certificate:
-    method = f"unknown: {', '.join(unknown)}" if unknown else "every key has a meaning in this version of the format"
-    return Certificate(HEADER, not unknown, None, None, "", Place(), method)
 
 
 def write_verdict(verdict: Verdict, path: str | Path) -> Path:
