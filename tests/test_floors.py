@@ -44,6 +44,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
             "job",
             "job_cutting",
             "job_placement",
+            "job_specification",
             "job_strategy",
             "job_surroundings",
             "job_tool",

@@ -12,8 +12,7 @@ import pytest
 from pentapod import pipeline
 from pentapod.errors import InputError, MachineError, ProgramError
 from pentapod.job import Job
-from pentapod.job_surroundings import job_surroundings
-from pentapod.job_values import job_machine, job_mesh, program_toolpath
+from pentapod.job_values import job_machine
 from pentapod.machine.machine import Machine
 from pentapod.pipeline import judge, run
 from pentapod.planning import PlacedPath
@@ -40,9 +39,7 @@ def job(make_job, machine_file):
 
 
 def verdict_of(job, program):
-    machine, mesh = job_machine(job), job_mesh(job)
-    verdict = judge(job, machine, job_surroundings(job, machine, mesh), program_toolpath(job, mesh, program), program)
-    return {certificate.claim: certificate.passed for certificate in verdict.certificates}
+    return {certificate.claim: certificate.passed for certificate in judge(job, program).certificates}
 
 
 def test_guides_from_the_plan_to_the_verdict(job, tmp_path):

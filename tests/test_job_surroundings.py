@@ -8,7 +8,7 @@ import trimesh
 from pentapod.errors import JobError, MeshError
 from pentapod.job import Job
 from pentapod.job_surroundings import job_surroundings
-from pentapod.job_values import job_machine, job_mesh, job_toolpath
+from pentapod.job_values import job_machine, job_mesh
 from pentapod.pipeline import judge, run
 from pentapod.toolpath.stl import write_stl
 
@@ -47,11 +47,7 @@ def test_a_job_with_holder_and_vise_is_done_and_judged(make_job, meshes):
         (with_fixture("plate"), {"spindle clear of the fixture"}),
         (with_fixture("column"), {"tool body clear of the fixture"}),
     ):
-        job = Job.load(make_job(*change, name="other.toml"))
-        machine, mesh = job_machine(job), job_mesh(job)
-        verdict = judge(
-            job, machine, job_surroundings(job, machine, mesh), job_toolpath(job, mesh)[0], out / "program.csv"
-        )
+        verdict = judge(Job.load(make_job(*change, name="other.toml")), out / "program.csv")
         wrong = {c.claim for c in verdict.certificates if not c.passed}
         assert wrong >= caught, wrong
 

@@ -14,7 +14,6 @@ from pentapod.errors import InputError, JobError, MeshError, ToolpathError
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job
 from pentapod.job_placement import job_freedom
-from pentapod.job_surroundings import job_surroundings
 from pentapod.job_values import job_machine, job_mesh, job_toolpath
 from pentapod.outcome import SetUps
 from pentapod.pipeline import judge, run
@@ -292,14 +291,7 @@ def test_a_dwell_after_each_cut_by_job_key(make_job, tmp_path):
     taken = [outcome.find(Trajectory).duration for outcome in outcomes.values()]
     assert taken[1] - taken[0] > 0.25 * count
     job = Job.load(make_job(("cut_mm_min = 3000", "cut_mm_min = 3000\ndwell_s = 0.25")))
-    mesh = job_mesh(job)
-    judged = judge(
-        job,
-        job_machine(job),
-        job_surroundings(job, job_machine(job), mesh),
-        toolpath,
-        tmp_path / "plain" / "program.csv",
-    )
+    judged = judge(job, tmp_path / "plain" / "program.csv")
     assert not {c.claim: c for c in judged.certificates}["dwells"].passed
 
 

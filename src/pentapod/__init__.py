@@ -16,8 +16,11 @@ if TYPE_CHECKING:
     from pentapod.kinematics import Component as Component
     from pentapod.kinematics import LinearPentapod as LinearPentapod
     from pentapod.machine import Machine as Machine
+    from pentapod.machine import Surroundings as Surroundings
     from pentapod.outcome import Outcome as Outcome
+    from pentapod.pipeline import judge as judge
     from pentapod.pipeline import run as run
+    from pentapod.planning import Freedom as Freedom
     from pentapod.planning import LegPath as LegPath
     from pentapod.planning import PlacedPath as PlacedPath
     from pentapod.planning import Placement as Placement
@@ -40,12 +43,15 @@ if TYPE_CHECKING:
     from pentapod.toolpath import load_mesh as load_mesh
     from pentapod.toolpath import make_toolpath as make_toolpath
     from pentapod.verify import Certificate as Certificate
+    from pentapod.verify import Cutting as Cutting
+    from pentapod.verify import NotJudged as NotJudged
     from pentapod.verify import Verdict as Verdict
     from pentapod.version import __version__ as __version__
 
 # `verify` is the one verb that is missing: it has the name of its package. `from pentapod.verify import verify`.
 _HOMES = {
     "Machine": "machine",
+    "Surroundings": "machine",
     "LinearPentapod": "kinematics",
     "Component": "kinematics",
     "RigidTransform": "geometry",
@@ -57,6 +63,7 @@ _HOMES = {
     "make_toolpath": "toolpath",
     "Toolpath": "toolpath",
     "plan": "planning",
+    "Freedom": "planning",
     "Placement": "planning",
     "PlacedPath": "planning",
     "leg_path": "planning",
@@ -69,10 +76,13 @@ _HOMES = {
     "write_csv": "program",
     "read_csv": "program",
     "Certificate": "verify",
+    "NotJudged": "verify",
+    "Cutting": "verify",
     "Verdict": "verify",
     "Refusal": "refusal",
     "Job": "job",
     "run": "pipeline",
+    "judge": "pipeline",
     "Outcome": "outcome",
     "write_report": "report",
     "__version__": "version",
@@ -80,6 +90,7 @@ _HOMES = {
 
 __all__ = [  # noqa: RUF022 - in the order of the flow
     "Machine",
+    "Surroundings",
     "LinearPentapod",
     "Component",
     "RigidTransform",
@@ -91,6 +102,7 @@ __all__ = [  # noqa: RUF022 - in the order of the flow
     "make_toolpath",
     "Toolpath",
     "plan",
+    "Freedom",
     "Placement",
     "PlacedPath",
     "leg_path",
@@ -103,10 +115,13 @@ __all__ = [  # noqa: RUF022 - in the order of the flow
     "write_csv",
     "read_csv",
     "Certificate",
+    "NotJudged",
+    "Cutting",
     "Verdict",
     "Refusal",
     "Job",
     "run",
+    "judge",
     "Outcome",
     "write_report",
     "__version__",

@@ -26,6 +26,7 @@ from pentapod.job_tables import (
     PartTable,
     ToleranceTable,
     ToolTable,
+    VerifyTable,
 )
 from pentapod.placement_table import FixtureTable, PlacementTable
 from pentapod.strategy_tables import FILE_KEYS, TABLES, ToolpathTable
@@ -66,7 +67,19 @@ class Job:
         files = {key: _resolve(path, text, ("toolpath", key), name) for key, name in names.items() if name is not None}
         held = tables.fixture.mesh
         fixture = None if held is None else _resolve(path, text, ("fixture", "mesh"), held)
-        return cls(path, tables, mesh, machine, files, fixture)
+        job = cls(path, tables, mesh, machine, files, fixture)
+        job._check_waived()
+        return job
+
+    def _check_waived(self) -> None:
+        """Raise JobError where [verify] waives a claim that does not exist."""
+        if not self.verify.waive:
+            return
+        from pentapod.verify.judge import CLAIM_NAMES  # noqa: PLC0415  most jobs waive nothing, and it is heavy
+
+        for name in self.verify.waive:
+            if name not in CLAIM_NAMES:
+                raise self.error("verify", "waive", "no such claim", remedy=nearest(name, CLAIM_NAMES))
 
     @property
     def part(self) -> PartTable:
@@ -127,13 +140,19 @@ class Job:
         """The table [output]."""
         return self.tables.output
 
+    @property
+    def verify(self) -> VerifyTable:
+        """The table [verify]."""
+        return self.tables.verify
+
     @cached_property
     def digest(self) -> str:
         """16 hexadecimal digits over the meaning of the job: defaults filled in, files by their bytes.
 
-        Comments, the order of keys and the folders where files lie do not change it.
+        Comments, the order of keys and the folders where files lie do not change it; nor does [verify], which says
+        nothing of the program.
         """
-        content = self.tables.model_dump(mode="json")
+        content = self.tables.model_dump(mode="json", exclude={"verify"})
         content["part"]["mesh"] = [self.mesh_path.suffix.lower(), _sha(self.mesh_path)]
         if self.machine_file is not None:
             content["machine"]["file"] = _sha(self.machine_file)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from pentapod.errors import MachineError
 from pentapod.job import Job
 from pentapod.job_tool import job_tool
 from pentapod.machine.machine import Machine
-from pentapod.machine.surroundings import Obstacle, Surroundings, mounted
+from pentapod.machine.surroundings import Surroundings
 from pentapod.toolpath.load import load_mesh
 from pentapod.toolpath.mesh import Mesh
-from pentapod.toolpath.mesh_distance import MeshDistance
 
 _MM = 1e-3
 
@@ -18,24 +18,14 @@ def job_surroundings(job: Job, machine: Machine, mesh: Mesh) -> Surroundings:
 
     Raises JobError where the tool does not go with the machine.
     """
-    tool = mounted(job_tool(job).solids, machine)
-    room = machine.tool_length - float(machine.pentapod.offsets.max())
-    if tool and max(solid.high for solid in tool) > room:
-        raise job.error(
-            "tool",
-            "holder_mm",
-            "the tool stands above the lowest platform joint",
-            expected=f"at most {room / _MM:.4g} mm from the tip to the holder's end",
-            remedy="a longer tool.length_mm, or a shorter holder",
-        )
-    part = Obstacle("part", MeshDistance.of(mesh), clamped=True, allowance=job.gouge.tolerance_mm * _MM)
     held = job_fixture(job)
-    if held is None:
-        return Surroundings((part,), tool)
-    clamped = job.fixture.frame == "part"
-    return Surroundings(
-        (part, Obstacle("fixture" if clamped else "table", MeshDistance.of(held), clamped=clamped)), tool
-    )
+    name = "fixture" if job.fixture.frame == "part" else "table"
+    around = {} if held is None else {name: held}
+    try:
+        return Surroundings.of(machine, job_tool(job), mesh, **around, allowance=job.gouge.tolerance_mm * _MM)
+    except MachineError as error:
+        remedy = "a longer tool.length_mm, or a shorter holder"
+        raise job.error("tool", "holder_mm", error.what, expected=error.expected, remedy=remedy) from error
 
 
 def job_fixture(job: Job) -> Mesh | None:

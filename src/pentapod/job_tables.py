@@ -229,6 +229,14 @@ class OutputTable(Table):
     )
 
 
+class VerifyTable(Table):
+    """What the verdict may leave out."""
+
+    waive: tuple[str, ...] = Field(
+        default=(), description="names of claims without which the verdict passes where they cannot be judged"
+    )
+
+
 class JobTables(Table):
     """All tables of a job file, in the order of the flow."""
 
@@ -243,6 +251,7 @@ class JobTables(Table):
     placement: PlacementTable = Field(default=PlacementTable())
     fixture: FixtureTable = Field(default=FixtureTable())
     output: OutputTable = Field(default=OutputTable())
+    verify: VerifyTable = Field(default=VerifyTable())
 
     @model_validator(mode="before")
     @classmethod

@@ -142,14 +142,10 @@ class SetUps:
         """All claims about all set-ups, and that they are the whole work."""
         words = f"{self.cuts} intervals between waypoints are cut; the set-ups' pieces were counted against them"
         whole = Certificate("every cut is made in one set-up", self.missed == 0, self.missed, 0.0, "", Place(), words)
-        return Verdict((
-            whole,
-            *(
-                replace(certificate, claim=f"set-up {part.number}: {certificate.claim}")
-                for part in self.parts
-                for certificate in part.outcome.verdict.certificates
-            ),
-        ))  # fmt: skip
+        parts = [(f"set-up {part.number}: ", part.outcome.verdict) for part in self.parts]
+        certificates = (replace(c, claim=before + c.claim) for before, verdict in parts for c in verdict.certificates)
+        unjudged = (replace(n, claim=before + n.claim) for before, verdict in parts for n in verdict.not_judged)
+        return Verdict((whole, *certificates), tuple(unjudged))
 
 
 def refusal_verdict(refusal: Refusal) -> Verdict:

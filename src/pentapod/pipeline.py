@@ -11,17 +11,16 @@ import numpy as np
 from pentapod.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, write_arrays, write_json
 from pentapod.clock import Clock
 from pentapod.job import Job
-from pentapod.job_cutting import job_cutting
-from pentapod.job_placement import job_freedom, job_weights
-from pentapod.job_surroundings import job_surroundings
+from pentapod.job_placement import job_weights
+from pentapod.job_specification import job_specification
 from pentapod.job_tool import job_link_style
-from pentapod.job_values import job_machine, job_mesh, job_piece, job_toolpath
-from pentapod.kinematics.component import Component
+from pentapod.job_values import job_machine, job_mesh, job_piece, job_toolpath, program_toolpath
 from pentapod.machine.machine import Machine
-from pentapod.machine.surroundings import Surroundings
+from pentapod.machine.surroundings import NOTHING
 from pentapod.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
 from pentapod.plan_arrays import arrays_of
-from pentapod.planning import Freedom, LegPath, PlacedPath, Placement, leg_path, plan
+from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
+from pentapod.planning.freedom import FREE
 from pentapod.planning.plan import Wishes, fits
 from pentapod.planning.setups import setups
 from pentapod.program import Program, Provenance, sample, write_csv
@@ -29,13 +28,11 @@ from pentapod.progress import Progress, silent
 from pentapod.refusal import Refusal
 from pentapod.run_folder import staged, unstaged
 from pentapod.timing import Explanation, Trajectory, certify, explain, retime, unheld
-from pentapod.toolpath import Toolpath
+from pentapod.toolpath import Mesh, Toolpath
 from pentapod.toolpath.links import LinkStyle
 from pentapod.toolpath.parting import Piece, cutting_intervals, part_of
-from pentapod.verify import Verdict, verify
+from pentapod.verify import Specification, Verdict, judged
 from pentapod.version import __version__
-
-_MM = 1e-3
 
 Writer = Callable[[Outcome, Path], object]
 
@@ -61,20 +58,25 @@ def run(
     clock = Clock(progress)
     machine = job_machine(job)
     mesh = clock.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
-    freedom, surroundings = job_freedom(job, machine, mesh), job_surroundings(job, machine, mesh)
-    if piece is None:
-        toolpath, _ = clock.time("toolpath", lambda: job_toolpath(job, mesh, progress), says=lambda made: str(made[1]))
-    else:
-        made = clock.time("toolpath", lambda: (job_piece(job, mesh, piece, progress), piece), says=lambda _: str(piece))
-        toolpath = made[0]
-    task = _Task(job, machine, toolpath, freedom, surroundings, clock, piece)
+
+    task = _Task(job, job_specification(job, machine, mesh, lambda: _toolpath(job, mesh, piece, clock)), clock, piece)
     with staged(folder) as staging:
         outcome = _reached(task, staging, writers or {})
         refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
         if refusal is not None and refusal.stage == "placement" and splits:
-            style = job_link_style(job, mesh, toolpath)
+            style = job_link_style(job, mesh, task.toolpath)
             outcome = _split(task, style, refusal, staging, writers or {})
     return outcome
+
+
+def _toolpath(job: Job, mesh: Mesh, piece: Piece | None, clock: Clock) -> Toolpath:
+    """Return the job's toolpath, or a piece of it, as a stage of the run."""
+    if piece is None:
+        return clock.time("toolpath", lambda: job_toolpath(job, mesh, clock.progress), says=lambda it: str(it[1]))[0]
+    made = clock.time(
+        "toolpath", lambda: (job_piece(job, mesh, piece, clock.progress), piece), says=lambda _: str(piece)
+    )
+    return made[0]
 
 
 def _reached(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
@@ -83,8 +85,8 @@ def _reached(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outco
     if isinstance(program, Refusal):
         verdict = refusal_verdict(program)
     else:
-        judged = (task.job, task.machine, task.surroundings, task.toolpath, staging / PROGRAM, clock.progress)
-        verdict = clock.time("verify", lambda: judge(*judged))
+        file = staging / PROGRAM
+        verdict = clock.time("verify", lambda: judged(file, task.asked, progress=clock.progress))
     outcome = Outcome(task.job, task.machine, tuple(clock.stages), verdict)
     if (placed := outcome.find(PlacedPath)) is not None:
         outcome = dataclasses.replace(outcome, machine=task.on(placed.placement).machine)
@@ -118,7 +120,9 @@ def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, write
         own.stages += [*before, Stage("toolpath", 0.0, (part, piece), f"set-up {number} of {len(found)}: {piece}")]
         folder = staging / SetUp.folder_of(number)
         folder.mkdir()
-        own_task = dataclasses.replace(task, toolpath=part, clock=own, piece=piece)
+        own_task = dataclasses.replace(
+            task, asked=dataclasses.replace(task.asked, toolpath=part), clock=own, piece=piece
+        )
         parts.append(SetUp(number, piece, _reached(own_task, folder, writers)))
     times = np.sum([piece.cuts(toolpath) for piece in found], axis=0)
     cutting = cutting_intervals(toolpath)
@@ -127,43 +131,32 @@ def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, write
     return _written(Outcome(job, task.machine, tuple(clock.stages), done.verdict), staging, writers, clock.progress)
 
 
-def judge(
-    job: Job,
-    machine: Machine,
-    surroundings: Surroundings,
-    toolpath: Toolpath,
-    program: Path,
-    progress: Progress = silent,
-    *,
-    strict: bool = False,
-) -> Verdict:
-    """Return the verdict on a program file, by what the job asks; strict as in `verify`. Raises ProgramError."""
-    return verify(
-        program,
-        machine,
-        toolpath,
-        tilt=float(np.radians(job.axis.tilt_deg)),
-        path_tolerance=job.tolerance.path_mm * _MM,
-        axis_tolerance=float(np.radians(job.tolerance.axis_deg)),
-        job_digest=job.digest,
-        surroundings=surroundings,
-        cutting=job_cutting(job, surroundings),
-        strict=strict,
-        progress=progress,
-    )
+def judge(job: Job, program: str | Path, progress: Progress = silent, *, strict: bool = False) -> Verdict:
+    """Return the verdict on a program file, by all that the job implies; strict as in `verify`.
+
+    Raises InputError for a bad job, mesh or machine, and where there is no such program.
+    """
+    machine, mesh = job_machine(job), job_mesh(job, progress)
+    asked = job_specification(job, machine, mesh, lambda: program_toolpath(job, mesh, Path(program), progress))
+    return judged(program, asked, strict=strict, progress=progress)
 
 
 @dataclasses.dataclass(frozen=True)
 class _Task:
-    """What the stages after the toolpath need."""
+    """What the stages after the toolpath need. asked: all that the job asks, of the plan as of the program."""
 
     job: Job
-    machine: Machine
-    toolpath: Toolpath
-    freedom: Freedom
-    surroundings: Surroundings
+    asked: Specification
     clock: Clock
     piece: Piece | None = None
+
+    @property
+    def machine(self) -> Machine:
+        return self.asked.machine
+
+    @property
+    def toolpath(self) -> Toolpath:
+        return self.asked.toolpath
 
     def program(self, file: Path) -> Program | Refusal:
         """Plan, write the program to `file` and return it; or return the first refusal."""
@@ -176,7 +169,8 @@ class _Task:
         """Return the task with the machine's guides where a placement wants them."""
         if placement.slides is None:
             return self
-        return dataclasses.replace(self, machine=self.machine.at(placement.slides))
+        machine = self.machine.at(placement.slides)
+        return dataclasses.replace(self, asked=dataclasses.replace(self.asked, machine=machine))
 
     def written(self, placed: PlacedPath, file: Path) -> Program | Refusal:
         """Write the program of a placed path to `file` and return it; or return the first refusal."""
@@ -199,23 +193,21 @@ class _Task:
         return plan(self.toolpath, self.machine, **self._wishes(), then=then, progress=progress)
 
     def _wishes(self) -> Wishes:
-        wanted = self.job.placement.component
         return {
-            "tilt": float(np.radians(self.job.axis.tilt_deg)),
-            "freedom": self.freedom,
-            "component": None if wanted is None else Component.parse(wanted),
-            "surroundings": self.surroundings,
+            "tilt": self.asked.tilt,
+            "freedom": self.asked.freedom or FREE,
+            "component": self.asked.component,
+            "surroundings": self.asked.surroundings or NOTHING,
             "weights": job_weights(self.job),
             "solver": self.job.placement.solver,
         }
 
     def _path(self, placed: PlacedPath) -> LegPath | Refusal:
-        tolerance = self.job.tolerance
         return leg_path(
             placed,
             self.machine,
-            path_tolerance=tolerance.path_mm * _MM,
-            axis_tolerance=float(np.radians(tolerance.axis_deg)),
+            path_tolerance=self.asked.path_tolerance,
+            axis_tolerance=self.asked.axis_tolerance,
             stop_angle=float(np.radians(self.job.feed.stop_angle_deg)),
         )
 

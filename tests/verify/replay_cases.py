@@ -10,12 +10,14 @@ import numpy as np
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics import Component
 from pentapod.machine import load_machine
+from pentapod.machine.surroundings import NOTHING
+from pentapod.planning.freedom import FREE
 from pentapod.program import Program, Provenance, quantised
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.toolpath.tools import BallCutter
-from pentapod.verify import Cutting
+from pentapod.verify import Cutting, Replay, Specification
 
 BALL = 3e-3
 FEED = 0.03
@@ -23,6 +25,8 @@ LINK_FEED = 0.02
 RAPID = 0.08
 TILT = np.radians(5.0)
 TOLERANCES = {"tilt": TILT, "path_tolerance": 20e-6, "axis_tolerance": np.radians(0.1)}
+ASKED = {**TOLERANCES, "job_digest": "job-1", "freedom": FREE, "surroundings": NOTHING}
+"""All that a verdict asks of a program, but for what is cut: the part may stand anywhere, with nothing around it."""
 PERIOD = 1e-3
 TURN_RATE = 0.5
 ACCELERATION = 2.5
@@ -197,3 +201,9 @@ def good_case(lean=0.0, interpolation="cubic"):
         tips,
         axes,
     )
+
+
+def replay_of(case, program=None, toolpath=None, **changes):
+    """The replay of a case's program, or of another, with some of what is asked of it changed."""
+    asked = Specification(case.machine, toolpath or case.toolpath, **{**ASKED, **changes})
+    return Replay(program or case.program, asked)

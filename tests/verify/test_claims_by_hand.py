@@ -11,7 +11,7 @@ import replay_cases as cases
 from pentapod.cli.output import verdict_text
 from pentapod.kinematics.certificate import certify_component
 from pentapod.program import quantised
-from pentapod.verify import CLAIMS, Certificate, Claim, Place, Replay, Verdict, verify, write_verdict
+from pentapod.verify import CLAIMS, Certificate, Claim, NotJudged, Place, Verdict, verify, write_verdict
 from pentapod.verify.claim import Finding, Idle
 from pentapod.verify.origin import guides
 from pentapod.verify.survey import ComponentFindings, Extreme
@@ -20,8 +20,7 @@ from pentapod.verify.tracking import _raised, at_samples
 
 @pytest.fixture(scope="module")
 def replay(linear):
-    given = (*cases.TOLERANCES.values(), "job-1")
-    return Replay(linear.program, linear.machine, linear.toolpath, *given, cutting=cases.cutting_of(*cases.hill()))
+    return cases.replay_of(linear, cutting=cases.cutting_of(*cases.hill()))
 
 
 @pytest.fixture(scope="module")
@@ -196,19 +195,30 @@ def test_a_claim_gives_plain_numbers(replay):
 
 
 def test_what_a_strict_verdict_says_of_an_idle_claim():
-    claim, where = claim_of(HELD), Place()
-    idle = claim.unjudged(Idle("nothing there"))
-    assert idle == Certificate("a claim", True, None, None, "", where, "does not apply: nothing there")
-    unknown = claim.unjudged(Idle("nobody says", unknown=True))
-    assert unknown == Certificate("a claim", False, None, None, "", where, "unknown: nobody says")
+    idle = claim_of(HELD).inapplicable(Idle("nothing there"))
+    assert idle == Certificate("a claim", True, None, None, "", Place(), "does not apply: nothing there")
+
+
+def test_what_was_not_judged_is_told_beside_the_claims():
+    good, unknown = Certificate("a", True, None, None, "", Place(), ""), NotJudged("b", "nobody told")
+    for waived, words in ((False, "FAILED: 1 not judged"), (True, "passed (1 waived)")):
+        verdict = Verdict((good,), (replace(unknown, waived=waived),))
+        assert verdict.passed == waived
+        assert verdict.answer == words
+        text = verdict_text(verdict).splitlines()
+        assert text[-1] == f"verdict: {words}"
+        assert text[-2].endswith("b: not judged: nobody told")
+        assert ("waived" in text[-2]) == waived
+        assert verdict.to_dict()["not_judged"] == [{"claim": "b", "why": "nobody told", "waived": waived}]
+    failing = replace(good, passed=False)
+    assert Verdict((good, failing), (unknown,)).answer == "FAILED: 1 of 2 claims, 1 not judged"
+    assert Verdict((good, failing), (replace(unknown, waived=True),)).answer == "FAILED: 1 of 2 claims, 1 waived"
 
 
 def test_claims_that_need_a_pose_or_a_proof_fail_without(linear):
     legs = linear.program.legs.copy()
     legs[1000] = 0.02
-    broken = Replay(
-        replace(linear.program, legs=quantised(legs)), linear.machine, linear.toolpath, *cases.TOLERANCES.values()
-    )
+    broken = cases.replay_of(linear, replace(linear.program, legs=quantised(legs)))
     certificate = claim_of(HELD)(broken)
     assert not certificate.passed
     assert certificate.method == "not judged: the leg lengths have no pose at 3 of the samples"
@@ -278,7 +288,8 @@ def test_either_name_or_digest_of_the_machine_is_enough_to_refuse(linear, name):
 
 def test_zero_is_a_tolerance_of_angles_but_not_of_lengths(linear):
     given = {**cases.TOLERANCES, "tilt": 0.0, "axis_tolerance": 0.0}
-    assert not verify(linear.program, linear.machine, linear.toolpath, **given).passed
+    verdict = verify(linear.program, linear.machine, linear.toolpath, **given)
+    assert "axis deviation" in {c.claim for c in verdict.certificates if not c.passed}
     with pytest.raises(Exception, match="path_tolerance"):
         verify(linear.program, linear.machine, linear.toolpath, **{**cases.TOLERANCES, "path_tolerance": 0.0})
 

@@ -15,7 +15,7 @@ from pentapod.program.program import Program
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.solids import Solid
-from pentapod.verify import Replay, verify
+from pentapod.verify import verify
 from pentapod.verify.approach import _controls
 
 LARGE = 1e4  # trimesh counts in units of about this many to the metre
@@ -134,7 +134,7 @@ def test_the_hull_of_a_stretch_is_of_bernstein_coefficients(short):
     """Against scipy's, which makes them of values and slopes."""
     legs, period = short.program.legs, short.program.period
     slopes = CubicSpline(np.arange(len(legs)), legs, bc_type="clamped")(np.arange(len(legs)), 1)
-    replay = Replay(short.program, short.machine, short.toolpath, **cases.TOLERANCES)
+    replay = cases.replay_of(short)
     intervals = np.array([[0, 1, 2], [40, 41, 42]])
     found = _controls(replay, intervals)
     for row, (first, *_, last) in zip(found, intervals, strict=True):

@@ -14,7 +14,6 @@ from pentapod.machine.surroundings import Obstacle, Surroundings
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.solids import Solid
-from pentapod.verify import Replay
 from pentapod.verify.approach import Stray, _stray, approach
 from pentapod.verify.bodies import clearance
 from pentapod.verify.collisions import _moves, _offsets, claims
@@ -27,7 +26,7 @@ ROWS = 130  # more than one stretch
 @pytest.fixture(scope="module")
 def still(cubic):
     legs = np.repeat(cubic.program.legs[:1], ROWS, axis=0)
-    return Replay(replace(cubic.program, legs=legs), cubic.machine, cubic.toolpath, **cases.TOLERANCES)
+    return cases.replay_of(cubic, replace(cubic.program, legs=legs))
 
 
 @pytest.fixture(scope="module")
@@ -252,7 +251,7 @@ def test_what_is_not_looked_into_is_not_the_closest(cubic, rows):
     from pentapod.machine import clearances
 
     program = replace(cubic.program, legs=cubic.program.legs[:rows])
-    replay = Replay(program, cubic.machine, cubic.toolpath, **cases.TOLERANCES)
+    replay = cases.replay_of(cubic, program)
     ways = 0.5 * cases.PERIOD * replay.survey.speeds.max(axis=1)
     gaps = clearances(cubic.machine, *replay.pose) - np.maximum([0.0, *ways], [*ways, 0.0])[:, None]
     found = clearance(replay)

@@ -15,7 +15,7 @@ from pentapod.geometry.interpolant import Interpolant
 from pentapod.toolpath.sweep import RESOLUTION_M
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.toolpath.tools import BallCutter, FlatEnd, StandOff
-from pentapod.verify import Cutting, Replay, verify
+from pentapod.verify import Cutting, verify
 from pentapod.verify.claim import Idle
 from pentapod.verify.gouge import _rapid, gouge
 from pentapod.verify.immersion import Immersion, _runs, _strays, _Stretches, _unresolved
@@ -234,8 +234,7 @@ def test_a_negative_depth_is_bad_input():
 
 @pytest.fixture(scope="module")
 def replay(cubic):
-    given = (*cases.TOLERANCES.values(), "job-1")
-    return Replay(cubic.program, cubic.machine, cubic.toolpath, *given, cutting=raised(0.0))
+    return cases.replay_of(cubic, cutting=raised(0.0))
 
 
 def test_rapids_are_the_chords_that_meet_rapids_alone(replay):

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine import clearances
 from pentapod.program.resolution import QUANTA_PER_M
-from pentapod.verify import Replay, verify
+from pentapod.verify import verify
 
 
 @pytest.fixture(params=["cubic", "linear"])
@@ -70,7 +70,7 @@ def test_extrema_of_the_legs(good, found):
 
 def test_poses_and_deviation_by_newton(good, found):
     """Poses at 150 times between the rows, by Newton; distance to the whole toolpath, order ignored."""
-    replay = Replay(good.program, good.machine, good.toolpath, *cases.TOLERANCES.values())
+    replay = cases.replay_of(good)
     random = np.random.default_rng(3)
     times = np.sort(random.uniform(0.0, good.program.duration, 150))
     legs = interpolant(good.program)(times)
@@ -114,7 +114,7 @@ def test_axis_deviation_is_the_lean(found):
 
 def test_fastest_moment_by_finite_differences(good, found):
     """The proven speeds are no less than any momentary speed, and little more than the largest."""
-    replay = Replay(good.program, good.machine, good.toolpath, *cases.TOLERANCES.values())
+    replay = cases.replay_of(good)
     bounds = replay.survey.speeds[:, 0]
     spline, step = interpolant(good.program), 1e-6
     moments = (np.arange(len(bounds)) + np.linspace(0.01, 0.99, 7)[:, None]) * 0.5 * good.program.period

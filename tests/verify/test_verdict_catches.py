@@ -16,16 +16,18 @@ from pentapod.verify import CLAIMS, verify, write_verdict
 
 GEOMETRY = {"tip deviation", "toolpath covered"}
 CUTTING = cases.cutting_of(*cases.hill())
+AROUND = {"legs, spindle and tool clear of the surroundings"}  # one claim where nobody told what is there
 FEEDS = {"feed on cuts", "feed on links", "rapid rate"}
 
 
 def judge(case, **changes):
-    given = {"job_digest": "job-1", "cutting": CUTTING, **cases.TOLERANCES, **changes}
+    given = {**cases.ASKED, "cutting": CUTTING, **changes}
     return verify(case.program, case.machine, case.toolpath, **given)
 
 
 def failed(verdict):
-    assert verdict.passed == all(c.passed for c in verdict.certificates)
+    judged = all(c.passed for c in verdict.certificates)
+    assert verdict.passed == (judged and all(entry.waived for entry in verdict.not_judged))
     return {c.claim for c in verdict.certificates if not c.passed}
 
 
@@ -64,7 +66,7 @@ def test_good_program_passes_every_claim(good):
     assert failed(verdict) == set()
     of_the_tool = {"tip acceleration", "tip jerk", "axis velocity", "axis acceleration"}  # this machine limits none
     # It has no guides either, and the path nowhere stops.
-    idle = of_the_tool | {"guides within their travel", "exact stops", "dwells"}
+    idle = of_the_tool | {"guides within their travel", "exact stops", "dwells", *AROUND}
     assert {c.claim for c in verdict.certificates} == {claim.name for claim in CLAIMS} - idle
     assert all(c.method for c in verdict.certificates)
 
@@ -122,8 +124,55 @@ def test_wrong_job(good):
     assert failed(judge(good, job_digest="job-2")) == {"job"}
 
 
-def test_job_is_not_asked_without_a_digest(good):
-    assert "job" not in {c.claim for c in judge(good, job_digest=None).certificates}
+def unjudged(verdict):
+    return {entry.claim for entry in verdict.not_judged}
+
+
+def test_program_of_a_job_is_not_judged_without_one(good):
+    verdict = judge(good, job_digest=None)
+    assert "job" not in {c.claim for c in verdict.certificates}
+    assert unjudged(verdict) == {"job"}
+    assert not verdict.passed
+    assert verdict.answer == "FAILED: 1 not judged"
+
+
+def test_program_without_a_job_is_asked_for_none(good):
+    source = replace(good.program.provenance, job_digest="")
+    verdict = judge(replace(good, program=replace(good.program, provenance=source)), job_digest=None)
+    assert verdict.passed
+    assert verdict.not_judged == ()
+
+
+@pytest.mark.parametrize(
+    ("untold", "claims"),
+    [
+        ({"cutting": None}, {"gouge on cuts and links", "gouge on rapids"}),
+        ({"surroundings": None}, {"legs, spindle and tool clear of the surroundings"}),
+    ],
+)
+def test_what_was_not_told_is_not_judged_and_does_not_pass(good, untold, claims):
+    verdict = judge(good, **untold)
+    assert failed(verdict) == set()
+    assert unjudged(verdict) == claims
+    assert not verdict.passed
+    waived = judge(good, **untold, waived=tuple(claims))
+    assert waived.passed
+    assert waived.not_judged == tuple(replace(entry, waived=True) for entry in verdict.not_judged)
+    assert waived.answer == f"passed ({len(claims)} waived)"
+
+
+def test_a_waiver_does_not_excuse_what_was_judged(good):
+    assert failed(judge(good, job_digest="job-2", waived=("job",))) == {"job"}
+
+
+def test_waiving_a_claim_that_does_not_exist_is_bad_input(good):
+    with pytest.raises(InputError, match='did you mean "leg jerks"'):
+        judge(good, waived=("leg jerk",))
+
+
+def test_guides_for_a_machine_that_has_none(good):
+    guided = replace(good.program, slides=(0.0, 0.0, 0.0, 0.0, 0.0))
+    assert failed(judge(replace(good, program=guided))) == {"guides within their travel"}
 
 
 def test_feed_5_percent_over_everywhere(good):
@@ -370,7 +419,7 @@ def test_bodies_touch(good):
 
 def test_file_passes_like_the_program(good, tmp_path):
     path = write_csv(good.program, tmp_path / "program.csv")
-    verdict = verify(path, good.machine, good.toolpath, **cases.TOLERANCES, job_digest="job-1", cutting=CUTTING)
+    verdict = verify(path, good.machine, good.toolpath, **cases.ASKED, cutting=CUTTING)
     assert verdict.passed
     assert verdict.certificates[0].claim == "readable"
     assert verdict.certificates[1:] == judge(good).certificates
@@ -408,18 +457,15 @@ def test_malformed_file_is_a_verdict(linear, tmp_path, name):
 def test_unknown_keys_of_the_header_are_refused_by_name(linear, tmp_path):
     path = write_csv(linear.program, tmp_path / "program.csv")
 
-    def strict(**changes):
-        given = {**cases.TOLERANCES, "job_digest": "job-1", "cutting": CUTTING, **changes}
-        return verify(path, linear.machine, linear.toolpath, strict=True, **given)
+    def verdict(**options):
+        return verify(path, linear.machine, linear.toolpath, **cases.ASKED, cutting=CUTTING, **options)
 
-    assert strict().passed
-    assert failed(strict(job_digest=None)) == {"job"}
-    assert failed(strict(cutting=None)) == {"gouge on cuts and links", "gouge on rapids"}
+    assert verdict(strict=True).passed
     path.write_bytes(path.read_bytes().replace(b"# rows", b"# spindle_rpm = 3\n# coolant = true\n# rows", 1))
-    for verdict in (strict(), verify(path, linear.machine, linear.toolpath, **cases.TOLERANCES)):
-        assert failed(verdict) == {"readable"}
-        assert "line 10" in verdict.certificates[0].method
-        assert "spindle_rpm: unknown key in the header" in verdict.certificates[0].method
+    for refused in (verdict(strict=True), verdict()):
+        assert failed(refused) == {"readable"}
+        assert "line 10" in refused.certificates[0].method
+        assert "spindle_rpm: unknown key in the header" in refused.certificates[0].method
 
 
 def test_strict_verdict_says_what_does_not_apply(good):

@@ -16,7 +16,7 @@ import click
 
 if TYPE_CHECKING:
     from pentapod.progress import Progress
-    from pentapod.verify.verdict import Certificate, Verdict
+    from pentapod.verify.verdict import Certificate, NotJudged, Verdict
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -97,11 +97,14 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
 
 
 def verdict_text(verdict: Verdict) -> str:
-    """Return a verdict as lines of text: every claim with value and bound, then the answer."""
+    """Return a verdict as lines of text: every claim with value and bound, what was not judged, and the answer."""
     lines = [_claim(certificate) for certificate in verdict.certificates]
-    failed = sum(not certificate.passed for certificate in verdict.certificates)
-    answer = "passed" if verdict.passed else f"FAILED: {failed} of {len(verdict.certificates)} claims"
-    return "\n".join([*lines, f"verdict: {answer}"])
+    lines += [_unjudged(entry) for entry in verdict.not_judged]
+    return "\n".join([*lines, f"verdict: {verdict.answer}"])
+
+
+def _unjudged(entry: NotJudged) -> str:
+    return f"  {'waived' if entry.waived else '??  '}  {entry.claim}: not judged: {entry.why}"
 
 
 def _claim(certificate: Certificate) -> str:

@@ -15,7 +15,7 @@ from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_opti
 @click.argument("program", type=click.Path(path_type=Path))
 @click.option("--job", required=True, type=click.Path(path_type=Path), help="The job it was made from.")
 @click.option(
-    "--strict", is_flag=True, help="Refuse what is unknown: keys of the header, claims that cannot be judged."
+    "--strict", is_flag=True, help="List also the claims that do not apply, with the reason."
 )
 @json_option
 @quiet_option
@@ -26,17 +26,11 @@ def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -
     compared with the toolpath that the job asks for.
     """
     from pentapod.job import Job
-    from pentapod.job_surroundings import job_surroundings
-    from pentapod.job_values import job_machine, job_mesh, program_toolpath
     from pentapod.pipeline import judge
 
     loaded = Job.load(job)
-    machine = job_machine(loaded)
     with progress_bar(quiet=quiet or as_json) as progress:
-        mesh = job_mesh(loaded, progress)
-        surroundings = job_surroundings(loaded, machine, mesh)
-        toolpath = program_toolpath(loaded, mesh, program, progress)
-        verdict = judge(loaded, machine, surroundings, toolpath, program, progress, strict=strict)
+        verdict = judge(loaded, program, progress, strict=strict)
     if as_json:
         echo_json(verdict.to_dict())
     elif not quiet:

@@ -15,12 +15,14 @@ from pentapod.machine.machine import (
 )
 from pentapod.machine.reader import load_machine, read_machine, shipped_machines
 from pentapod.machine.segments import segment_distance
+from pentapod.machine.surroundings import NOTHING, Obstacle, Surroundings
 from pentapod.machine.tool_limits import ToolLimits
 from pentapod.machine.work_volume import sample_work_volume
 
 __all__ = [
     "AMPLIFICATION_LIMIT",
     "ARCHITECTURAL_LIMIT",
+    "NOTHING",
     "Bodies",
     "ControllerSettings",
     "Drives",
@@ -30,6 +32,8 @@ __all__ = [
     "Machine",
     "MachineReport",
     "Masses",
+    "Obstacle",
+    "Surroundings",
     "ToolLimits",
     "WorkVolume",
     "check",

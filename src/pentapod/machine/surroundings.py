@@ -8,10 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.arrays import Floats
+from pentapod.errors import MachineError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.machine import Machine
+from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import Gap, MeshDistance
 from pentapod.toolpath.solids import Solid
+from pentapod.toolpath.tools import Tool
 
 TOOL_BODY = "tool body"
 """How shank and holder are called in claims and margins."""
@@ -39,6 +42,37 @@ class Surroundings:
 
     obstacles: tuple[Obstacle, ...] = ()
     tool: tuple[Solid, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        machine: Machine,
+        tool: Tool,
+        part: Mesh,
+        *,
+        fixture: Mesh | None = None,
+        table: Mesh | None = None,
+        allowance: float = 50e-6,
+    ) -> Surroundings:
+        """Return what is in the way on a machine: the part, what holds it, what stands in the machine.
+
+        part, fixture: workpiece frame; table: machine frame. allowance: metres by which the tool's shank and holder may
+        be in the part and still count as clear. Raises MachineError where the tool is too long for the machine.
+        """
+        body = mounted(tool.solids, machine)
+        room = machine.tool_length - float(machine.pentapod.offsets.max())
+        if body and max(solid.high for solid in body) > room:
+            raise MachineError(
+                "the tool stands above the lowest platform joint",
+                key="tool",
+                expected=f"at most {1e3 * room:.4g} mm from the tip to the holder's end",
+                remedy="a longer tool length, or a shorter holder",
+            )
+        found = [Obstacle("part", MeshDistance.of(part), clamped=True, allowance=allowance)]
+        for name, mesh in (("fixture", fixture), ("table", table)):
+            if mesh is not None:
+                found.append(Obstacle(name, MeshDistance.of(mesh), clamped=name == "fixture"))
+        return cls(tuple(found), body)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -2,8 +2,23 @@
 
 from pentapod.verify.claim import Claim
 from pentapod.verify.cutting import Cutting
-from pentapod.verify.judge import CLAIMS, verify, write_verdict
+from pentapod.verify.judge import CLAIM_NAMES, CLAIMS, judged, verify, write_verdict
 from pentapod.verify.replay import Replay
-from pentapod.verify.verdict import Certificate, Place, Verdict
+from pentapod.verify.specification import Specification
+from pentapod.verify.verdict import Certificate, NotJudged, Place, Verdict
 
-__all__ = ["CLAIMS", "Certificate", "Claim", "Cutting", "Place", "Replay", "Verdict", "verify", "write_verdict"]
+__all__ = [
+    "CLAIMS",
+    "CLAIM_NAMES",
+    "Certificate",
+    "Claim",
+    "Cutting",
+    "NotJudged",
+    "Place",
+    "Replay",
+    "Specification",
+    "Verdict",
+    "judged",
+    "verify",
+    "write_verdict",
+]

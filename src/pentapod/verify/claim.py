@@ -36,7 +36,10 @@ class Finding:
 
 @dataclass(frozen=True)
 class Idle:
-    """A claim was not judged, and why. unknown: it should have been: a strict verdict refuses that."""
+    """A claim was not judged, and why. unknown: it should have been; a verdict passes then only if that is waived.
+
+    A claim that does not apply to the program (unknown is False) is not listed, but for a strict verdict.
+    """
 
     why: str
     unknown: bool = False
@@ -72,10 +75,9 @@ class Claim:
         value, bound, allowed = _plain(found.value), _plain(found.bound), _plain(found.allowed)
         return Certificate(self.name, bool(found.passed), value, bound, found.unit, found.where, found.method, allowed)
 
-    def unjudged(self, idle: Idle) -> Certificate:
-        """Return the certificate that stands in a strict verdict where the claim was not judged."""
-        method = f"{'unknown' if idle.unknown else 'does not apply'}: {idle.why}"
-        return Certificate(self.name, not idle.unknown, None, None, "", Place(), method)
+    def inapplicable(self, idle: Idle) -> Certificate:
+        """Return the certificate that stands in a strict verdict where the claim does not apply."""
+        return Certificate(self.name, True, None, None, "", Place(), f"does not apply: {idle.why}")
 
 
 def _plain(number: float | None) -> float | None:

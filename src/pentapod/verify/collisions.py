@@ -13,7 +13,7 @@ from pentapod.machine.surroundings import LEGS, TOOL_BODY, MovingBodies, Obstacl
 from pentapod.machine.tool_clearance import leg_tool_gaps
 from pentapod.toolpath.solids import Solid
 from pentapod.verify.approach import Stray, approach
-from pentapod.verify.claim import MM, Claim, Finding
+from pentapod.verify.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay import Replay
 
 _FAR_M, _TOOL_FAR_M = 0.1, 0.01
@@ -25,8 +25,10 @@ _PROVEN = (
 )
 
 
-def claims(surroundings: Surroundings) -> tuple[Claim, ...]:
-    """Return the claims about these surroundings, in the order of a verdict."""
+def claims(surroundings: Surroundings | None) -> tuple[Claim, ...]:
+    """Return the claims about these surroundings, in the order of a verdict; none where nobody told them."""
+    if surroundings is None:
+        return ()
     made: list[Claim] = []
     if surroundings.tool:
         made.append(Claim(f"legs clear of the {TOOL_BODY}", partial(_legs_and_tool, tool=surroundings.tool)))
@@ -35,6 +37,12 @@ def claims(surroundings: Surroundings) -> tuple[Claim, ...]:
             judge = partial(_clear, obstacle=obstacle, surroundings=surroundings, columns=columns)
             made.append(Claim(f"{title} clear of the {obstacle.name}", judge))
     return tuple(made)
+
+
+def told(replay: Replay) -> Idle:
+    """Judge nothing but whether the surroundings are known: each of them has claims of its own."""
+    known = replay.specification.surroundings is not None
+    return Idle("there is nothing more") if known else Idle("nobody told what is there", unknown=True)
 
 
 def _groups(surroundings: Surroundings) -> tuple[tuple[str, list[int]], ...]:
@@ -118,3 +126,7 @@ def _enclosed(replay: Replay, obstacle: Obstacle, frame: RigidTransform | None, 
     bodies = MovingBodies.at(replay.machine, position, direction, frame)
     points = np.concatenate([bodies.starts[0], bodies.tips])[columns]
     return bool(obstacle.surface.contains(points).any())
+
+
+CLAIMS = (Claim("legs, spindle and tool clear of the surroundings", told, needs_pose=False),)
+"""One that stands for all where nobody told the surroundings; `claims` makes the others."""

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.errors import ArrayError
+from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.solids import Solid
+from pentapod.toolpath.tools import Tool
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +28,11 @@ class Cutting:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.depth) and self.depth >= 0.0):
             raise ArrayError("must not be negative", key="depth", value=self.depth)
+
+    @classmethod
+    def of(cls, part: Mesh, tool: Tool, depth: float = 50e-6) -> Cutting:
+        """Return what a tool cuts into a part, whose mesh is in the workpiece frame."""
+        return cls(MeshDistance.of(part), tool.solids, depth)
 
     @property
     def cutter(self) -> tuple[Solid, ...]:

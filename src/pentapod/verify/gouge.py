@@ -17,7 +17,7 @@ from pentapod.verify.replay import Replay
 
 def gouge(replay: Replay, *, rapid: bool) -> Finding | Idle:
     """Judge how deep the cutter is in the part: on rapids, or on cuts and links."""
-    cutting = replay.cutting
+    cutting = replay.specification.cutting
     if cutting is None:
         return Idle("no part's mesh to compare with", unknown=True)
     if not cutting.cutter:

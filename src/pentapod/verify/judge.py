@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Unpack
 
-import numpy as np
-
-from pentapod.errors import ArrayError, InputError, MachineError, ProgramError
+from pentapod.errors import InputError, MachineError, ProgramError, nearest
 from pentapod.files import atomic_write
 from pentapod.machine.machine import Machine
-from pentapod.machine.surroundings import Surroundings
 from pentapod.program.csv import read_csv
 from pentapod.program.program import Program
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify import bodies, collisions, component, gouge, joints, legs, origin, speed, standing, tool, tracking
 from pentapod.verify.claim import Claim
-from pentapod.verify.cutting import Cutting
 from pentapod.verify.replay import SURVEY_SHARE, Replay
-from pentapod.verify.verdict import Certificate, Place, Verdict
+from pentapod.verify.specification import Asked, Specification
+from pentapod.verify.verdict import Certificate, NotJudged, Place, Verdict
 
 READABLE = "readable"
 CLAIMS: tuple[Claim, ...] = (
@@ -33,6 +32,7 @@ CLAIMS: tuple[Claim, ...] = (
     *speed.CLAIMS,
     *standing.CLAIMS,
     *tool.CLAIMS,
+    *collisions.CLAIMS,
 )
 """Every claim that a verdict makes, in its order; "readable" comes before them where a file is judged.
 
@@ -40,39 +40,38 @@ After them come those about the surroundings, where there are any (`collisions`)
 with its claims in CLAIMS: a new one is added here and nowhere else.
 """
 
+CLAIM_NAMES = tuple(claim.name for claim in CLAIMS)
+"""What may be waived."""
+
 
 def verify(
     program: Program | str | Path,
     machine: Machine,
     toolpath: Toolpath,
     *,
-    tilt: float,
-    path_tolerance: float,
-    axis_tolerance: float,
-    job_digest: str | None = None,
-    surroundings: Surroundings | None = None,
-    cutting: Cutting | None = None,
     strict: bool = False,
     progress: Progress = silent,
+    **asked: Unpack[Asked],
 ) -> Verdict:
     """Return the verdict on a program, or on a program file, from its rows alone.
 
-    toolpath: in the workpiece frame, as the job asks for it. tilt: half angle in radians of the cone about
-    the nominal axis in which the tool may stand; axis_tolerance: radians beyond that; path_tolerance: metres.
-    job_digest: of the job that the header must name, None to leave that out. surroundings: what must not be touched.
-    cutting: what cuts, and into which part; without it gouges are unknown.
-    strict: every claim stands in the verdict, also those that do not apply, with the reason; it fails where a claim
-    could not be judged for want of something.
-    A malformed file gives a failed verdict with the one claim "readable". Raises ProgramError where there is
-    no such file, ArrayError where a tolerance is not a sensible number.
+    asked: the other fields of `Specification`, which says what they mean: tilt, path_tolerance and axis_tolerance, and
+    what else the program is judged against: freedom, component, surroundings, cutting, job_digest. A claim that needs
+    what was not told is listed as "not judged"; the verdict fails then, unless the claim's name is among `waived`.
+    strict: claims that do not apply are listed too, with the reason. A malformed file gives a failed verdict with the
+    one claim "readable". Raises ProgramError where there is no such file, ArrayError where a tolerance is not a
+    sensible number, InputError where a waived claim is not known.
     """
-    for name, value in (
-        ("tilt", tilt),
-        ("path_tolerance", path_tolerance),
-        ("axis_tolerance", axis_tolerance),
-    ):
-        if not (np.isfinite(value) and (value >= 0.0 if name != "path_tolerance" else value > 0.0)):
-            raise ArrayError("must be a positive number", key=name, value=value)
+    return judged(program, Specification(machine, toolpath, **asked), strict=strict, progress=progress)
+
+
+def judged(
+    program: Program | str | Path, specification: Specification, *, strict: bool = False, progress: Progress = silent
+) -> Verdict:
+    """Return the verdict on a program, or on a program file, against a specification, as `verify`."""
+    for name in specification.waived:
+        if name not in CLAIM_NAMES:
+            raise InputError("no such claim", key="waived", value=name, remedy=nearest(name, CLAIM_NAMES))
     read: list[Certificate] = []
     if not isinstance(program, Program):
         path = Path(program)
@@ -86,21 +85,23 @@ def verify(
         method = f"{len(program.legs)} rows, {program.duration:.6g} s, {program.interpolation} between rows"
         read = [Certificate(READABLE, True, None, None, "", Place(), method)]
     try:
-        machine = program.machine(machine)
+        specification = replace(specification, machine=program.machine(specification.machine))
     except MachineError as error:
         return Verdict((*read, Certificate(origin.GUIDES, False, None, None, "", Place(), str(error))))
-    replay = Replay(program, machine, toolpath, tilt, path_tolerance, axis_tolerance, job_digest, progress, cutting)
+    replay, unjudged = Replay(program, specification, progress), list[NotJudged]()
     _ = replay.survey
-    claims = (*CLAIMS, *collisions.claims(surroundings or Surroundings()))
+    claims = (*CLAIMS, *collisions.claims(specification.surroundings))
     for k, claim in enumerate(claims):
         progress("verify", SURVEY_SHARE + (1.0 - SURVEY_SHARE) * k / len(claims), claim.name)
         answer = claim(replay)
         if isinstance(answer, Certificate):
             read.append(answer)
+        elif answer.unknown:
+            unjudged.append(NotJudged(claim.name, answer.why, claim.name in specification.waived))
         elif strict:
-            read.append(claim.unjudged(answer))
+            read.append(claim.inapplicable(answer))
     progress("verify", 1.0)
-    return Verdict(tuple(read))
+    return Verdict(tuple(read), tuple(unjudged))
 
 
 def write_verdict(verdict: Verdict, path: str | Path) -> Path:

@@ -22,17 +22,21 @@ def machine(replay: Replay) -> Finding:
 
 
 def job(replay: Replay) -> Finding | Idle:
-    """Judge that the program was made from this job, by digest; not asked where no digest is given."""
-    if replay.job_digest is None:
-        return Idle("no job is given to compare with", unknown=True)
-    made_from = replay.program.provenance.job_digest
-    method = f"header: made from job {made_from}, judged for job {replay.job_digest}"
-    return Finding(made_from == replay.job_digest, None, None, "", Place(), method)
+    """Judge that the program was made from this job, by digest; not asked where there is none on either side."""
+    made_from, asked = replay.program.provenance.job_digest, replay.specification.job_digest
+    if asked is None and not made_from:
+        return Idle("the program was made without a job, and none is asked for")
+    if asked is None:
+        return Idle(f"the program was made from job {made_from}; no job is given to compare with", unknown=True)
+    method = f"header: made from job {made_from or 'none'}, judged for job {asked}"
+    return Finding(made_from == asked, None, None, "", Place(), method)
 
 
 def guides(replay: Replay) -> Finding | Idle:
     """Judge that the guides of a reconfigurable machine stand within their travel; not asked of other machines."""
     machine, slides = replay.machine, replay.program.slides
+    if machine.guides is None and slides is not None:
+        return Finding(False, None, None, "", Place(), "the header tells where guides stand; this machine has none")
     if machine.guides is None:
         return Idle("the machine has no guides")
     if slides is None:

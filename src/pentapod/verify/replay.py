@@ -16,9 +16,9 @@ from pentapod.machine.machine import Machine
 from pentapod.program.program import Program
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.verify.cutting import Cutting
 from pentapod.verify.free_space import PosedPolyline
 from pentapod.verify.path_matching import PathMatch, match
+from pentapod.verify.specification import Specification
 from pentapod.verify.survey import Survey, survey
 from pentapod.verify.verdict import Place
 
@@ -32,21 +32,39 @@ SURVEY_SHARE = 0.6
 class Replay:
     """What the claims look at. Derived values are computed when first asked for, and kept.
 
-    tilt and axis_tolerance in radians, path_tolerance in metres. job_digest: of the job that the program
-    should belong to, None where that is not asked. cutting: what cuts into which part, None where nobody says.
+    specification: what the program is judged against; its machine's guides stand where the program wants them.
     *Samples* are the rows and the moments halfway between them: M = 2N − 1, sample 2k is row k. *Chords* are the M − 1
     stretches of time between them.
     """
 
     program: Program
-    machine: Machine
-    toolpath: Toolpath
-    tilt: float
-    path_tolerance: float
-    axis_tolerance: float
-    job_digest: str | None = None
+    specification: Specification
     progress: Progress = silent
-    cutting: Cutting | None = None
+
+    @property
+    def machine(self) -> Machine:
+        """The machine that the program is judged on."""
+        return self.specification.machine
+
+    @property
+    def toolpath(self) -> Toolpath:
+        """The toolpath that the program should follow, workpiece frame."""
+        return self.specification.toolpath
+
+    @property
+    def tilt(self) -> float:
+        """Half angle of the cone in which the tool may stand, radians."""
+        return self.specification.tilt
+
+    @property
+    def path_tolerance(self) -> float:
+        """How far the program may be off the toolpath, metres."""
+        return self.specification.path_tolerance
+
+    @property
+    def axis_tolerance(self) -> float:
+        """By how much the axis may leave the cone, radians."""
+        return self.specification.axis_tolerance
 
     @cached_property
     def survey(self) -> Survey:

@@ -42,16 +42,46 @@ class Certificate:
 
 
 @dataclass(frozen=True)
+class NotJudged:
+    """A claim that the job implies and that could not be judged, and why. waived: the job lets it go unjudged."""
+
+    claim: str
+    why: str
+    waived: bool = False
+
+
+@dataclass(frozen=True)
 class Verdict:
-    """All certificates of a program; passed when each of them is."""
+    """All certificates of a program, and what was not judged.
+
+    passed: there is at least one claim, every claim holds, and what was not judged is waived.
+    """
 
     certificates: tuple[Certificate, ...]
+    not_judged: tuple[NotJudged, ...] = ()
 
     @property
     def passed(self) -> bool:
-        """True when there is at least one claim and every claim holds."""
-        return bool(self.certificates) and all(c.passed for c in self.certificates)
+        """Whether the program is as the job asks, as far as nobody waived it."""
+        judged = bool(self.certificates) and all(c.passed for c in self.certificates)
+        return judged and all(entry.waived for entry in self.not_judged)
+
+    @property
+    def answer(self) -> str:
+        """The verdict in words: passed or not, and how many claims failed, were not judged, or were waived."""
+        failed = sum(not c.passed for c in self.certificates)
+        waived = sum(entry.waived for entry in self.not_judged)
+        counts = [f"{failed} of {len(self.certificates)} claims"] if failed else []
+        counts += [f"{len(self.not_judged) - waived} not judged"] if waived < len(self.not_judged) else []
+        counts += [f"{waived} waived"] if waived else []
+        if not self.passed:
+            return f"FAILED: {', '.join(counts) or 'there is no claim'}"
+        return f"passed ({', '.join(counts)})" if counts else "passed"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of verdict.json."""
-        return {"passed": self.passed, "certificates": [asdict(c) for c in self.certificates]}
+        return {
+            "passed": self.passed,
+            "certificates": [asdict(c) for c in self.certificates],
+            "not_judged": [asdict(entry) for entry in self.not_judged],
+        }

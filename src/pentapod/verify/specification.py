@@ -1,0 +1,63 @@
+"""Specification: everything that a program is judged against."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Required, TypedDict
+
+import numpy as np
+
+from pentapod.errors import ArrayError
+from pentapod.machine.machine import Machine
+from pentapod.toolpath.toolpath import Toolpath
+from pentapod.verify.cutting import Cutting
+
+if TYPE_CHECKING:
+    from pentapod.kinematics.component import Component
+    from pentapod.machine.surroundings import Surroundings
+    from pentapod.planning.freedom import Freedom
+
+
+@dataclass(frozen=True, eq=False)
+class Specification:
+    """What a program is judged against. A field that is None was told by nobody: what needs it is not judged.
+
+    machine: with its tool length and controller. toolpath: in the workpiece frame, as the job asks for it.
+    tilt: half angle in radians of the cone about the nominal axis in which the tool may stand; axis_tolerance:
+    radians beyond that; path_tolerance: metres. job_digest: of the job that the header must name. surroundings: what
+    legs, spindle and tool must not touch. cutting: what cuts, and into which part. freedom: where the part may be
+    placed. component: in which the program must be, None where any will do. waived: names of claims without which the
+    verdict may pass where they cannot be judged. Raises ArrayError where a tolerance is not a sensible number.
+    """
+
+    machine: Machine
+    toolpath: Toolpath
+    tilt: float
+    path_tolerance: float
+    axis_tolerance: float
+    job_digest: str | None = None
+    surroundings: Surroundings | None = None
+    cutting: Cutting | None = None
+    freedom: Freedom | None = None
+    component: Component | None = None
+    waived: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("tilt", "path_tolerance", "axis_tolerance"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and (value >= 0.0 if name != "path_tolerance" else value > 0.0)):
+                raise ArrayError("must be a positive number", key=name, value=value)
+
+
+class Asked(TypedDict, total=False):
+    """The fields of a `Specification` after machine and toolpath, as keywords."""
+
+    tilt: Required[float]
+    path_tolerance: Required[float]
+    axis_tolerance: Required[float]
+    job_digest: str | None
+    surroundings: Surroundings | None
+    cutting: Cutting | None
+    freedom: Freedom | None
+    component: Component | None
+    waived: tuple[str, ...]
