@@ -203,6 +203,11 @@ def good_case(lean=0.0, interpolation="cubic"):
     )
 
 
+def asked_anew(replay, **changes):
+    """The same program, with some of what is asked of it changed."""
+    return replace(replay, specification=replace(replay.specification, **changes))
+
+
 def replay_of(case, program=None, toolpath=None, **changes):
     """The replay of a case's program, or of another, with some of what is asked of it changed."""
     asked = Specification(case.machine, toolpath or case.toolpath, **{**ASKED, **changes})

@@ -299,7 +299,7 @@ def test_zero_is_a_tolerance_of_angles_but_not_of_lengths(linear):
 
 def judged(replay, name, machine=None, **changes):
     """Whether a claim holds on the same motion, judged on another machine or with other tolerances."""
-    other = replace(replay, machine=machine or replay.machine, **changes)
+    other = cases.asked_anew(replay, machine=machine or replay.machine, **changes)
     _ = replay.match
     other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"survey", "match", "pivots", "axes"}})
     (claim,) = (claim for claim in CLAIMS if claim.name == name)
@@ -363,7 +363,7 @@ def test_each_leg_is_held_to_its_own_limit(replay, claim, name, extreme, leg):
     limit = needed * (0.5 if least else 2.0)
     limit[leg] = needed[leg] * (1.08 if least else 1.0 / 1.08)
     machine = replace(replay.machine, legs=replace(replay.machine.legs, **{name: limit}))
-    other = replace(replay, machine=machine)
+    other = cases.asked_anew(replay, machine=machine)
     _ = replay.match
     other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"survey", "match"}})
     (found,) = (claim_ for claim_ in CLAIMS if claim_.name == claim)

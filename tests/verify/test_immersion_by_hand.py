@@ -209,7 +209,8 @@ def gouging(depth, *kinds):
     replay.toolpath = Toolpath(segments, pivot=RADIUS)
     replay.match = SimpleNamespace(arcs=np.linspace(0.0, 0.03, CHORDS + 1))
     replay.path_tolerance = 2e-5
-    replay.cutting = Cutting(corner(5e-3, -RADIUS + depth), BallCutter(RADIUS).solids, 5e-5)
+    cutting = Cutting(corner(5e-3, -RADIUS + depth), BallCutter(RADIUS).solids, 5e-5)
+    replay.specification = SimpleNamespace(cutting=cutting)
     replay.place = lambda sample: Place(sample, int(sample), 0)
     return replay
 
