@@ -14,9 +14,7 @@ from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_opti
 @click.command()
 @click.argument("program", type=click.Path(path_type=Path))
 @click.option("--job", required=True, type=click.Path(path_type=Path), help="The job it was made from.")
-@click.option(
-    "--strict", is_flag=True, help="List also the claims that do not apply, with the reason."
-)
+@click.option("--strict", is_flag=True, help="List also the claims that do not apply, with the reason.")
 @json_option
 @quiet_option
 def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -> int:
