@@ -1,10 +1,14 @@
-"""The same job gives the same files, bit for bit, however many threads the linear algebra runs on."""
+"""The same job gives the same files, bit for bit, on one machine, however many threads the linear algebra runs on."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+from importlib.metadata import version
+
+from pentapod.program import read_csv
+from pentapod.version import processor_kind
 
 VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 COMMAND = [sys.executable, "-c", "from pentapod.cli.main import main; main()", "plan"]
@@ -20,3 +24,7 @@ def test_one_thread_or_two(make_job, tmp_path):
         subprocess.run([*COMMAND, str(path), "-o", str(out), "--quiet"], env=environment, check=True)
         files.append({name: (out / name).read_bytes() for name in ("program.csv", "plan.npz", "verdict.json")})
     assert files[0] == files[1]
+    source = read_csv(tmp_path / "1" / "program.csv").provenance
+    assert source.processor == processor_kind() != ""
+    for name in ("numpy", "scipy", "casadi", "numba"):
+        assert f"{name} {version(name)}" in source.libraries.split(", ")

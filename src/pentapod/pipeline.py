@@ -32,7 +32,7 @@ from pentapod.toolpath import Mesh, Toolpath
 from pentapod.toolpath.links import LinkStyle
 from pentapod.toolpath.parting import Piece, cutting_intervals, part_of
 from pentapod.verify import Specification, Verdict, judged
-from pentapod.version import __version__
+from pentapod.version import __version__, library_versions, processor_kind
 
 Writer = Callable[[Outcome, Path], object]
 
@@ -212,7 +212,8 @@ class _Task:
         )
 
     def _program(self, placed: PlacedPath, trajectory: Trajectory, file: Path) -> Program:
-        source = Provenance(self.machine.name, self.machine.digest, self.job.digest, __version__, self.piece)
+        made_on = (processor_kind(), library_versions())
+        source = Provenance(self.machine.name, self.machine.digest, self.job.digest, __version__, self.piece, *made_on)
         program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
         write_csv(program, file)
         return program

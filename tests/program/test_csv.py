@@ -1,4 +1,5 @@
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -201,6 +202,7 @@ BAD = {
     "time in finer digits": (in_row(20, field(0, b"0.0200000002")), "not a multiple of the period in 6 decimals", 32),
     "key lost": (edit(lambda lines: [x for x in lines if b"period_s" not in x]), "period_s: the header lacks", None),
     "key twice": (header(b"# rows", b"# period_s = 0.002\n# rows"), "twice", 10),
+    "processor in numbers": (header(b"# rows", b"# processor = 3\n# rows"), "processor: bad value", 10),
     "period zero": (header(b"0.001", b"0.0"), "period_s: bad value", 6),
     "period nan": (header(b"0.001", b"nan"), "period_s: bad value", 6),
     "period text": (header(b"0.001", b'"1 ms"'), "period_s: bad value", 6),
@@ -340,6 +342,17 @@ def test_a_piece_comes_back_bit_for_bit(tmp_path_factory, first, count, low, hig
     piece = Piece(first, first + count, low, (-high[0], -high[1], -high[2]))
     write_csv(program(rows=2, provenance=Provenance("desk", "m", "j", "v", piece)), path)
     assert read_csv(path).provenance.piece == piece
+
+
+def test_processor_and_libraries_come_back_and_older_files_lack_them(tmp_path):
+    source = replace(SOURCE, processor="x86_64 znver4", libraries='python 3.12.1, numpy 2.4.0 "µ"')
+    path = write_csv(program(provenance=source), tmp_path / "program.csv")
+    assert '# processor = "x86_64 znver4"\n# libraries = "python' in path.read_text(encoding="utf-8")
+    assert read_csv(path).provenance == source
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    older = [line for line in lines if not line.startswith(("# processor =", "# libraries ="))]
+    path.write_text("".join(older), encoding="utf-8")
+    assert read_csv(path).provenance == SOURCE
 
 
 @pytest.mark.parametrize(

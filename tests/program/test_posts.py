@@ -145,7 +145,7 @@ def test_hdf5_says_its_units(tmp_path):
         ("\n0.003000000,", "\n0.003000000,x", "finite"),
         ("# rows = 301", "# rows = 302", "number of rows"),
         ("# rows = 301", "# rows = 300", "number of rows"),
-        ("# interpolation", "# interpretation", "header lacks"),
+        ("# interpolation", "# interpretation", "interpretation: unknown key"),
     ],
 )
 def test_what_is_wrong_with_a_table_is_said(old, new, what, tmp_path):

@@ -2,8 +2,8 @@
 
 For the few places where an ordinary double has lost its digits by cancellation. Sources: D. E. Knuth, The Art of
 Computer Programming, vol. 2, section 4.2.2 (two_sum); T. J. Dekker, "A floating-point technique for extending
-the available precision", Numerische Mathematik 18 (1971) (two_product). No fused multiply-add is needed, and every
-machine gives the same bits.
+the available precision", Numerische Mathematik 18 (1971) (two_product). No fused multiply-add is needed: sums and
+products of doubles are the same on every machine.
 """
 
 from __future__ import annotations

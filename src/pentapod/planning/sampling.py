@@ -45,8 +45,9 @@ def first_guesses(
     freedom: Freedom = FREE,
     surroundings: Surroundings = NOTHING,
 ) -> list[Guess]:
-    """Return the best few of the allowed placements for each component, best first; deterministic for a seed.
+    """Return the best few of the allowed placements for each component, best first.
 
+    The same for a seed, on one kind of processor and with one set of libraries.
     Each placement is judged on a dozen representatives with their nominal axes, the best again with a cone of tilts and
     with the surroundings.
     """

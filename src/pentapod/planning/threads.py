@@ -1,4 +1,7 @@
-"""on_one_thread: linear algebra that gives the same bits however many threads there are."""
+"""on_one_thread: linear algebra that gives the same bits however many threads there are.
+
+On one kind of processor and with one set of libraries, that is: they choose the order of sums too.
+"""
 
 from __future__ import annotations
 

@@ -38,8 +38,10 @@ GUIDES = "guides_mm"
 WAYPOINTS, BOX = "setup_waypoints", "setup_box_mm"
 SETUP_KEYS = (WAYPOINTS, BOX)
 """Keys that only the programs of several set-ups have."""
+MADE_ON = ("processor", "libraries")
+"""Keys that a program has which was planned: on another kind of processor or with other libraries bits may differ."""
+OPTIONAL_KEYS = (GUIDES, *SETUP_KEYS, *MADE_ON)
 _MOST_COUNTED = 2**63
-OPTIONAL_KEYS = (GUIDES, *SETUP_KEYS)
 _LINE = re.compile(r"# ([a-z0-9_]+) = (\S.*)")
 
 
@@ -88,6 +90,8 @@ def header_text(program: Program) -> str:
         lines.append(f"# {GUIDES} = [{', '.join(_decimal(x, 3) for x in program.slides)}]\n")
     if source.piece is not None:
         lines += [f"# {WAYPOINTS} = [{source.piece.first}, {source.piece.last}]\n", f"# {BOX} = {_box(source.piece)}\n"]
+    made_on = zip(MADE_ON, (source.processor, source.libraries), strict=True)
+    lines += [f"# {key} = {_string(value)}\n" for key, value in made_on if value]
     return "".join(lines)
 
 
@@ -152,6 +156,7 @@ class _Reader:
                 job_digest=self._text("job_digest"),
                 pentapod_version=self._text("pentapod_version"),
                 piece=self._piece(),
+                **{key: self._text(key) for key in MADE_ON if key in self.values},
             ),
             rows=self._rows(),
             slides=self._slides(),

@@ -22,7 +22,8 @@ FORMAT_VERSION = 1
 class Provenance:
     """What a program was made from: names and hashes, as they stand in its header.
 
-    piece: of the toolpath, where the program is one of several set-ups.
+    piece: of the toolpath, where the program is one of several set-ups. processor, libraries: on which it was made; the
+    same of both give the same bits.
     """
 
     machine: str
@@ -30,6 +31,8 @@ class Provenance:
     job_digest: str
     pentapod_version: str
     piece: Piece | None = None
+    processor: str = ""
+    libraries: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from pentapod.machine.machine import Machine
 from pentapod.program.program import Program, Provenance
 from pentapod.program.resolution import quantised
 from pentapod.timing.trajectory import Trajectory
-from pentapod.version import __version__
+from pentapod.version import __version__, library_versions, processor_kind
 
 _CHUNK = 100_000
 
@@ -36,12 +36,13 @@ def sample(
     times = np.minimum(np.arange(count + 1) * period, trajectory.duration)
     times[-1] = trajectory.duration
     legs: list[Floats] = [trajectory(times[k : k + _CHUNK]) for k in range(0, len(times), _CHUNK)]
+    made_on = (processor_kind(), library_versions())
     return Program(
         period=period,
         legs=quantised(np.concatenate(legs)),
         interpolation=machine.controller.interpolation,
         component=component,
         placement=placement,
-        provenance=provenance or Provenance(machine.name, machine.digest, "", __version__),
+        provenance=provenance or Provenance(machine.name, machine.digest, "", __version__, None, *made_on),
         slides=None if machine.guides is None else tuple(machine.slides.tolist()),
     )

@@ -1,7 +1,8 @@
 """Jerk limits on long profiles from disk to disk: block by block in constant memory; several processes on request.
 
 The blocks are those of `jerk_limited`, and what a block finds depends on its own gridpoints alone. So the law is the
-same, bit for bit, whether it is made in memory, from disk, or by several processes.
+same, bit for bit, whether it is made in memory, from disk, or by several processes, on one
+kind of processor and with one set of libraries.
 """
 
 from __future__ import annotations
