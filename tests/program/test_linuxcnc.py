@@ -18,11 +18,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from short_motion import given, motion
+from short_motion import given, motion, post
 
 from pentapod.errors import InputError, ProgramError
 from pentapod.program import Program
-from pentapod.program.posts import PostInput, write_post
+from pentapod.program.posts import PostInput
 from pentapod.program.posts.linuxcnc.trivkins import read_gcode
 from pentapod.program.posts.motion import lengths_at
 
@@ -70,7 +70,7 @@ def ini_of(file: Path) -> configparser.ConfigParser:
 
 def streamed(tmp_path, **changes):
     what = given(**changes)
-    write_post(what, "linuxcnc", tmp_path)
+    post(what, "linuxcnc", tmp_path)
     table = play(tmp_path / "stream")
     said = (tmp_path / "stream" / "test.log").read_text()
     changed = float(re.search(r"the limits changed the lengths by at most (\S+) mm", said)[1])
@@ -103,7 +103,7 @@ def test_hal_clips_a_program_beyond_the_limits(tmp_path):
 @real
 def test_the_legs_as_axes_keep_path_and_time(tmp_path):
     what = given(duration=3.0)
-    write_post(what, "linuxcnc", tmp_path)
+    post(what, "linuxcnc", tmp_path)
     table = play(tmp_path / "trivkins")
     joints = table[table[:, 0] > 1.0]  # homing comes before
     moving = np.flatnonzero(joints[:, 5] > 0)
@@ -119,7 +119,7 @@ def test_the_legs_as_axes_keep_path_and_time(tmp_path):
 
 @real
 def test_what_linuxcnc_refuses_is_said(tmp_path):
-    write_post(given(duration=0.5), "linuxcnc", tmp_path)
+    post(given(duration=0.5), "linuxcnc", tmp_path)
     program = tmp_path / "trivkins" / "program.ngc"
     program.write_text(program.read_text().replace("\nG64\n", "\nG64 Q\n"))
     with pytest.raises(AssertionError, match=r"FAILED: .*No characters found"):
@@ -129,7 +129,7 @@ def test_what_linuxcnc_refuses_is_said(tmp_path):
 @real
 def test_pentakins_leads_the_tool_along_the_toolpath(tmp_path):
     what = given(duration=1.0)
-    write_post(what, "linuxcnc", tmp_path)
+    post(what, "linuxcnc", tmp_path)
     table = play(tmp_path / "pentakins")
     joints = table[table[:, 0] > 1.0]
     moving = np.flatnonzero(joints[:, 5] > 0)
@@ -152,7 +152,7 @@ def test_pentakins_leads_the_tool_along_the_toolpath(tmp_path):
 @real
 def test_the_interpreter_takes_all_g_code(tmp_path):
     what = given(duration=1.0)
-    write_post(what, "linuxcnc", tmp_path)
+    post(what, "linuxcnc", tmp_path)
     run = subprocess.run(
         ["rs274", "-g", str(tmp_path / "pentakins/toolpath.ngc")],
         cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60, check=False,
@@ -205,7 +205,7 @@ def interpreted(file, folder):
 
 def test_g_code_of_the_legs_reads_back(tmp_path):
     what = given(duration=0.505)
-    write_post(what, "linuxcnc", tmp_path)
+    post(what, "linuxcnc", tmp_path)
     times, legs = read_gcode(tmp_path / "trivkins/program.ngc")
     assert len(times) == 51
     assert times[-1] == pytest.approx(0.505, abs=1e-9)
@@ -226,7 +226,7 @@ def test_the_planner_has_the_headroom_that_it_needs(period_ms, tmp_path):
     source = dataclasses.replace(program.provenance, machine_digest=machine.digest)
     legs = lengths_at(program, np.arange(0.0, 0.6 + 1e-9, 1e-3 * period_ms))
     again = Program(1e-3 * period_ms, legs, "cubic", program.component, program.placement, source)
-    write_post(PostInput(again, machine), "linuxcnc", tmp_path)
+    post(PostInput(again, machine), "linuxcnc", tmp_path)
     assert not (tmp_path / "pentakins").exists()
     ini = ini_of(tmp_path / "trivkins/pentapod.ini")
     feed = float(re.search(r"F([0-9.]+)", (tmp_path / "trivkins/program.ngc").read_text())[1])
@@ -243,7 +243,7 @@ def test_the_planner_has_the_headroom_that_it_needs(period_ms, tmp_path):
 
 def test_what_pentakins_is_told(tmp_path):
     what = given(duration=0.2)
-    write_post(what, "linuxcnc", tmp_path)
+    post(what, "linuxcnc", tmp_path)
     hal = (tmp_path / "pentakins/pentapod.hal").read_text()
     told = dict(re.findall(r"setp pentakins\.(\S+) (\S+)", hal))
     assert float(told["max-error"]) == 1e6
@@ -261,7 +261,7 @@ def test_what_pentakins_is_told(tmp_path):
 def test_the_machine_must_be_the_programs(tmp_path):
     program, machine = motion(0.2)
     with pytest.raises(InputError, match="needs the machine"):
-        write_post(PostInput(program), "linuxcnc", tmp_path)
+        post(PostInput(program), "linuxcnc", tmp_path)
     with pytest.raises(InputError, match="not the machine"):
-        write_post(PostInput(program, machine.with_tool(0.25)), "linuxcnc", tmp_path)
+        post(PostInput(program, machine.with_tool(0.25)), "linuxcnc", tmp_path)
     assert not list(tmp_path.iterdir())

@@ -10,12 +10,12 @@ from importlib.metadata import EntryPoint
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
-from short_motion import given, round_trip
+from short_motion import given, passed, post, round_trip
 
 from pentapod.cli.main import run
 from pentapod.errors import InputError, ProgramError
 from pentapod.files import packed_arrays
-from pentapod.program import Program, write_csv
+from pentapod.program import Program, read_csv, write_csv
 from pentapod.program.posts import (
     POSTS,
     Column,
@@ -26,7 +26,6 @@ from pentapod.program.posts import (
     post_names,
     read_post,
     table_post,
-    write_post,
 )
 from pentapod.toolpath.formats.npz import toolpath_arrays
 from pentapod.toolpath.parting import Piece
@@ -55,7 +54,7 @@ def test_where_the_guides_stand_and_which_set_up_it_is_come_back(name, tmp_path)
 
 @pytest.mark.parametrize("name", POSTS)
 def test_a_file_that_is_missing_or_cut_off_is_refused(name, tmp_path):
-    files = write_post(given(duration=0.3), available(name), tmp_path)
+    files = post(given(duration=0.3), available(name), tmp_path)
     read_post(tmp_path, name)
     entry = max(files, key=lambda file: file.stat().st_size)
     content = entry.read_bytes()
@@ -69,7 +68,7 @@ def test_a_file_that_is_missing_or_cut_off_is_refused(name, tmp_path):
 
 def test_cubic_segments_are_the_controllers_spline(tmp_path):
     what = given()
-    write_post(what, "pvt", tmp_path)
+    post(what, "pvt", tmp_path)
     lines = [x for x in (tmp_path / "program.pvt.csv").read_text().splitlines() if not x.startswith("#")]
     assert lines[0].startswith("time_s,leg1_mm,leg1_mm_s,leg2_mm")
     table = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
@@ -82,7 +81,7 @@ def test_cubic_segments_are_the_controllers_spline(tmp_path):
 
 def test_cam_tables_are_numbers_alone(tmp_path):
     what = given()
-    write_post(what, "cam", tmp_path)
+    post(what, "cam", tmp_path)
     for leg in range(5):
         table = np.loadtxt(tmp_path / f"cam_leg{leg + 1}.txt")
         assert table.shape == (len(what.program.legs), 2)
@@ -93,8 +92,8 @@ def test_cam_tables_are_numbers_alone(tmp_path):
 def test_ros_messages_are_yaml_and_their_quintics_are_our_cubics(tmp_path):
     yaml = pytest.importorskip("yaml")
     what = given(duration=0.4)
-    write_post(what, "ros2-yaml", tmp_path)
-    write_post(what, "ros2-json", tmp_path)
+    post(what, "ros2-yaml", tmp_path)
+    post(what, "ros2-json", tmp_path)
     message = yaml.safe_load((tmp_path / "joint_trajectory.yaml").read_text())
     assert message == json.loads((tmp_path / "joint_trajectory.json").read_text())
     assert message["joint_names"] == ["leg1", "leg2", "leg3", "leg4", "leg5"]
@@ -109,7 +108,7 @@ def test_ros_messages_are_yaml_and_their_quintics_are_our_cubics(tmp_path):
 
 
 def test_linear_programs_have_no_velocities_in_ros(tmp_path):
-    write_post(given(duration=0.1, interpolation="linear"), "ros2-json", tmp_path)
+    post(given(duration=0.1, interpolation="linear"), "ros2-json", tmp_path)
     assert set(json.loads((tmp_path / "joint_trajectory.json").read_text())["points"][3]) == {
         "positions",
         "time_from_start",
@@ -118,7 +117,7 @@ def test_linear_programs_have_no_velocities_in_ros(tmp_path):
 
 @pytest.mark.parametrize("name", ["ros2-json", "ros2-yaml"])
 def test_a_ros_point_at_another_time_is_refused(name, tmp_path):
-    entry = write_post(given(duration=0.1), name, tmp_path)[0]
+    entry = post(given(duration=0.1), name, tmp_path)[0]
     text = entry.read_text()
     assert '"nanosec": 7000000}' in text
     entry.write_text(text.replace('"nanosec": 7000000}', '"nanosec": 7000001}'))
@@ -129,7 +128,7 @@ def test_a_ros_point_at_another_time_is_refused(name, tmp_path):
 def test_hdf5_says_its_units(tmp_path):
     h5py = pytest.importorskip("h5py")
     what = given(duration=0.1)
-    write_post(what, "hdf5", tmp_path)
+    post(what, "hdf5", tmp_path)
     with h5py.File(tmp_path / "program.h5") as archive:
         assert archive["legs_mm"].attrs["unit"] == "mm"
         assert np.abs(archive["legs_mm"][:] - 1e3 * what.program.legs).max() < 1e-9
@@ -149,7 +148,7 @@ def test_hdf5_says_its_units(tmp_path):
     ],
 )
 def test_what_is_wrong_with_a_table_is_said(old, new, what, tmp_path):
-    (file,) = write_post(given(duration=0.3), "pvt", tmp_path)
+    (file,) = post(given(duration=0.3), "pvt", tmp_path)
     text = file.read_text()
     assert old in text
     file.write_text(text.replace(old, new, 1))
@@ -161,19 +160,19 @@ def test_what_is_wrong_with_a_table_is_said(old, new, what, tmp_path):
 def test_files_of_two_programs_are_not_mixed(tmp_path):
     """Each leg's file has a header of its own; those of one folder are one program's."""
     columns = leg_columns("L{leg}", "length", "mm", 8)
-    post = table_post("each", "", Table({f"leg{column.leg}.txt": (column,) for column in columns}))
+    each = table_post("each", "", Table({f"leg{column.leg}.txt": (column,) for column in columns}))
     what = given(duration=0.3)
     other = dataclasses.replace(what.program, provenance=dataclasses.replace(what.program.provenance, job_digest="1"))
-    for name, content in post.write(what).items():
+    for name, content in each.write(what).items():
         (tmp_path / name).write_bytes(content)
-    assert post.read(tmp_path).legs.tobytes() == what.program.legs.tobytes()
-    (tmp_path / "leg4.txt").write_bytes(post.write(PostInput(other))["leg4.txt"])
+    assert each.read(tmp_path).legs.tobytes() == what.program.legs.tobytes()
+    (tmp_path / "leg4.txt").write_bytes(each.write(PostInput(other))["leg4.txt"])
     with pytest.raises(ProgramError, match=r"leg4\.txt.*the header is not that of leg1\.txt"):
-        post.read(tmp_path)
+        each.read(tmp_path)
 
 
 def test_a_velocity_that_is_not_the_splines_is_refused(tmp_path):
-    (file,) = write_post(given(duration=0.3), "pvt", tmp_path)
+    (file,) = post(given(duration=0.3), "pvt", tmp_path)
     lines = file.read_text().splitlines()
     cells = lines[100].split(",")
     cells[2] = f"{float(cells[2]) + 1e-6:.8f}"
@@ -235,7 +234,7 @@ def test_a_coarse_table_says_what_it_loses(tmp_path):
 
 def test_a_post_without_what_it_needs(tmp_path):
     with pytest.raises(InputError, match=r"plan\.npz"):
-        write_post(PostInput(given(duration=0.1).program), "apt", tmp_path / "x")
+        post(PostInput(given(duration=0.1).program), "apt", tmp_path / "x")
     assert not (tmp_path / "x").exists()
 
 
@@ -250,7 +249,15 @@ def planned(folder):
         "program.legs_mm": 1e3 * program.legs,
     }
     (folder / "plan.npz").write_bytes(packed_arrays(arrays))
+    judged(folder)
     return what
+
+
+def judged(folder, *, failed=()):
+    """Write a verdict on the program as it is now, that passed but for these claims."""
+    content = passed(read_csv(folder / "program.csv")) | {"passed": not failed}
+    content["certificates"] = [{"claim": claim, "passed": False} for claim in failed]
+    (folder / "verdict.json").write_text(json.dumps(content), encoding="utf-8")
 
 
 def test_the_command(tmp_path, capsys):
@@ -278,9 +285,11 @@ def test_the_command_refuses(tmp_path, capsys):
     legs = program.legs.copy()
     legs[3] += 1e-6
     write_csv(dataclasses.replace(program, legs=legs), source)
+    judged(tmp_path)
     assert run(["post", source, "--to", "apt", "-o", str(out)]) == 2
     assert "not that of this plan" in capsys.readouterr().err
     write_csv(dataclasses.replace(program, legs=program.legs[:-1]), source)
+    judged(tmp_path)
     assert run(["post", source, "--to", "apt", "-o", str(out)]) == 2
     assert "not that of this plan" in capsys.readouterr().err
     (tmp_path / "plan.npz").write_bytes(b"PK nonsense")
@@ -292,6 +301,7 @@ def test_the_command_refuses(tmp_path, capsys):
     (tmp_path / "plan.npz").unlink()
     stranger = dataclasses.replace(program.provenance, machine="shed", machine_digest="0")
     write_csv(dataclasses.replace(program, provenance=stranger), source)
+    judged(tmp_path)
     assert run(["post", source, "--to", "linuxcnc", "-o", str(out)]) == 2
     assert "--machine" in capsys.readouterr().err
     assert run(["post", source, "--to", "linuxcnc", "-o", str(out), "--machine", "desk"]) == 2

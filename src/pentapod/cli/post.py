@@ -41,6 +41,9 @@ def _complete_format(ctx: click.Context, param: click.Parameter, incomplete: str
 @click.option("--machine", help="The machine's name or file, where there is no job.")
 @click.option("--plan", type=click.Path(path_type=Path),
               help="The run's plan.npz, for formats that hold the toolpath  [default: beside PROGRAM]")  # fmt: skip
+@click.option("--verdict", type=click.Path(path_type=Path),
+              help="What judged exactly this file, and passed  [default: verdict.json beside PROGRAM]")  # fmt: skip
+@click.option("--unverified", is_flag=True, help="Write it without a passed verdict; every file then says so.")
 @click.option("--formats", is_flag=True, expose_value=False, is_eager=True, callback=_print_formats,
               help="List the formats and exit.")  # fmt: skip
 @json_option
@@ -52,30 +55,39 @@ def post(
     job: Path | None,
     machine: str | None,
     plan: Path | None,
+    verdict: Path | None,
+    unverified: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Write PROGRAM.csv in another format.
+    """Write PROGRAM.csv in another format, if a verdict has passed for exactly this file.
 
     A machine that pentapod ships is found by the name in the program; another one, or a shipped one with another
     tool or period, by --job or --machine. Formats of your own are found by entry points of the group
     pentapod.posts.
     """
+    from pentapod.artefacts import ARRAYS, VERDICT
+    from pentapod.files import sha256_of
     from pentapod.program import read_csv
+    from pentapod.program.judged import check_passed
     from pentapod.program.posts import PostInput, find_post, placed_toolpath, write_post
 
     takes_toolpath = find_post(name).takes_toolpath  # an unknown one is said at once
     with progress_bar(quiet=quiet or as_json) as progress:
         progress("reading", 0.0, program.name)
-        read = read_csv(program)
-        beside = program.with_name("plan.npz")
+        read, digest = read_csv(program), sha256_of(program)
+        if not unverified:
+            verdict = program.with_name(VERDICT) if verdict is None else verdict
+            check_passed(verdict, digest, program)
+        beside = program.with_name(ARRAYS)
         plan = beside if plan is None and takes_toolpath and beside.exists() else plan
         toolpath = None if plan is None else placed_toolpath(plan, read)
         progress("reading", 1.0, program.name)
         progress("writing", 0.0, name)
-        files = write_post(PostInput(read, _machine(read, job, machine), toolpath), name, out)
+        given = PostInput(read, _machine(read, job, machine), toolpath, digest)
+        files = write_post(given, name, out, verdict=verdict, unverified=unverified)
     if as_json:
-        echo_json({"format": name, "files": [str(file) for file in files]})
+        echo_json({"format": name, "verified": not unverified, "files": [str(file) for file in files]})
     elif not quiet:
         for file in files:
             click.echo(str(file))

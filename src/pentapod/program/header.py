@@ -36,6 +36,8 @@ KEYS = (
 GUIDES = "guides_mm"
 """A key that only the programs of reconfigurable machines have."""
 WAYPOINTS, BOX = "setup_waypoints", "setup_box_mm"
+UNVERIFIED = "UNVERIFIED: no verdict has passed this program"
+"""The first line, behind the mark of a comment, of what was written for a controller without a passed verdict."""
 SETUP_KEYS = (WAYPOINTS, BOX)
 """Keys that only the programs of several set-ups have."""
 MADE_ON = ("processor", "libraries")
@@ -85,7 +87,8 @@ def header_text(program: Program) -> str:
         _matrix(program.placement),
         str(len(program.legs)),
     )
-    lines = [f"# {key} = {value}\n" for key, value in zip(KEYS, values, strict=True)]
+    lines = [f"# {UNVERIFIED}\n"] if source.unverified else []
+    lines += [f"# {key} = {value}\n" for key, value in zip(KEYS, values, strict=True)]
     if program.slides is not None:
         lines.append(f"# {GUIDES} = [{', '.join(_decimal(x, 3) for x in program.slides)}]\n")
     if source.piece is not None:
@@ -99,10 +102,14 @@ def parse_header(lines: list[str], file: Path) -> Header:
     """Return the header from its lines, which all begin with "#". Raises ProgramError with file and line."""
     values: dict[str, Any] = {}
     places: dict[str, int] = {}
-    for number, line in enumerate(lines, start=1):
+    unverified = lines[:1] == [f"# {UNVERIFIED}"]
+    first = 2 if unverified else 1
+    for number, line in enumerate(lines[first - 1 :], start=first):
         entry = _entry(line)
-        if number == 1 and (entry is None or entry[0] != MAGIC):
-            raise ProgramError("not a pentapod program", file=file, line=1, expected=f"# {MAGIC} = {FORMAT_VERSION}")
+        if number == first and (entry is None or entry[0] != MAGIC):
+            raise ProgramError(
+                "not a pentapod program", file=file, line=number, expected=f"# {MAGIC} = {FORMAT_VERSION}"
+            )
         if entry is None:
             value = line.strip()[:80]
             expected = "# key = value, with one key and nothing else"
@@ -121,7 +128,7 @@ def parse_header(lines: list[str], file: Path) -> Header:
     for key in KEYS:
         if key not in values:
             raise ProgramError("the header lacks this key", file=file, key=key, remedy="plan the job again")
-    return _Reader(values, places, file).header()
+    return _Reader(values, places, file, unverified).header()
 
 
 def _entry(line: str) -> tuple[str, Any] | None:
@@ -143,6 +150,7 @@ class _Reader:
     values: dict[str, Any]
     places: dict[str, int]
     file: Path
+    unverified: bool
 
     def header(self) -> Header:
         return Header(
@@ -156,6 +164,7 @@ class _Reader:
                 job_digest=self._text("job_digest"),
                 pentapod_version=self._text("pentapod_version"),
                 piece=self._piece(),
+                unverified=self.unverified,
                 **{key: self._text(key) for key in MADE_ON if key in self.values},
             ),
             rows=self._rows(),

@@ -24,6 +24,7 @@ class Provenance:
 
     piece: of the toolpath, where the program is one of several set-ups. processor, libraries: on which it was made; the
     same of both give the same bits.
+    unverified: it was written for a controller though no verdict has passed it.
     """
 
     machine: str
@@ -33,6 +34,7 @@ class Provenance:
     piece: Piece | None = None
     processor: str = ""
     libraries: str = ""
+    unverified: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import cast
@@ -12,20 +13,29 @@ from pentapod.errors import InputError, ProgramError, nearest
 from pentapod.files import atomic_write
 from pentapod.input_files import read_bytes
 from pentapod.machine.machine import Machine
+from pentapod.program.csv import csv_bytes
+from pentapod.program.judged import Judgement, check_passed
+from pentapod.program.posts.unverified import told_unverified
 from pentapod.program.program import Program
 from pentapod.toolpath.toolpath import Toolpath
 
 GROUP = "pentapod.posts"
 """Entry points of this group name a `Post`, or a function without arguments that returns one."""
 
+_INSIST = "name the verdict.json of the program, or insist with unverified=True"
+
 
 @dataclass(frozen=True, eq=False)
 class PostInput:
-    """What there is to write. machine: as the program was made for it. toolpath: as placed, machine frame."""
+    """What there is to write. machine: as the program was made for it. toolpath: as placed, machine frame.
+
+    sha256: of the file that the program was read from; None where it is what `write_csv` writes.
+    """
 
     program: Program
     machine: Machine | None = None
     toolpath: Toolpath | None = None
+    sha256: str | None = None
 
     def the_machine(self) -> Machine:
         """Return the machine. Raises InputError where there is none, or not that of the program."""
@@ -104,13 +114,32 @@ def find_post(name: str) -> Post:
     return post
 
 
-def write_post(given: PostInput, name: str, folder: str | Path) -> list[Path]:
+def write_post(
+    given: PostInput,
+    name: str,
+    folder: str | Path,
+    *,
+    verdict: Judgement | None = None,
+    unverified: bool = False,
+) -> list[Path]:
     """Write the files of a post into a folder, made where it is missing, and return their paths.
 
-    Nothing is written unless everything could be made. Raises InputError: an unknown post, a machine or
-    toolpath that is missing, a folder that cannot be written.
+    verdict: what says that exactly this program was judged and passed: a verdict.json, or its content. unverified:
+    write without one; then every file says so in its first line (a script in its second).
+    Nothing is written unless everything could be made. Raises InputError: no passed verdict on this program, an unknown
+    post, one that cannot say that it is unverified, a machine or toolpath that is missing, a folder that cannot be
+    written.
     """
-    contents, made = find_post(name).write(given), []
+    post = find_post(name)
+    if not unverified:
+        if verdict is None:
+            raise InputError("nothing says that this program was judged", key="verdict", remedy=_INSIST)
+        check_passed(verdict, given.sha256 or sha256(csv_bytes(given.program)).hexdigest())
+    source = replace(given.program.provenance, unverified=unverified)
+    contents = post.write(replace(given, program=replace(given.program, provenance=source)))
+    if unverified:
+        contents = {relative: told_unverified(relative, content) for relative, content in contents.items()}
+    made: list[Path] = []
     for relative, content in contents.items():
         path = Path(folder) / relative
         try:

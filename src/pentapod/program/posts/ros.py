@@ -16,7 +16,7 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.errors import ProgramError
-from pentapod.program.header import Header, header_text
+from pentapod.program.header import UNVERIFIED, Header, header_text
 from pentapod.program.posts.motion import accelerations, velocities
 from pentapod.program.posts.registry import Post, PostInput, read_file, register
 from pentapod.program.posts.rows import check_legs, check_rows, header_of
@@ -48,7 +48,8 @@ def _message(program: Program) -> str:
         seconds, nanoseconds = divmod(round(k * program.period * _NANO), _NANO)
         fields = "".join(f'"{name}": {rows[k]}, ' for name, rows in texts.items())
         points.append(f'{{{fields}"time_from_start": {{"sec": {seconds}, "nanosec": {nanoseconds}}}}}')
-    head = '"header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}'
+    frame = json.dumps(UNVERIFIED if program.provenance.unverified else "")
+    head = f'"header": {{"stamp": {{"sec": 0, "nanosec": 0}}, "frame_id": {frame}}}'
     return "{" + head + ',\n"joint_names": ' + json.dumps(_LEGS) + ',\n"points": [\n' + ",\n".join(points) + "\n]}\n"
 
 

@@ -1,0 +1,55 @@
+"""Whether a verdict has passed for exactly this program: asked before a program is written for a controller."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from pentapod.errors import ProgramError
+
+Judgement = Mapping[str, Any] | str | Path
+"""The content of a verdict.json (`Verdict.to_dict`), or where that file is."""
+
+_REMEDY = "plan the job or verify the program (pentapod verify --json > verdict.json), or insist with --unverified"
+
+
+def check_passed(verdict: Judgement, sha256: str, program: str | Path | None = None) -> None:
+    """Raise ProgramError unless a verdict has passed for the program file with this SHA-256.
+
+    program: the file's name, for the message.
+    """
+    content = verdict if isinstance(verdict, Mapping) else _content(Path(verdict), program)
+    if content.get("passed") is not True:
+        raise ProgramError(f"the verdict on this program {_failure(content)}", file=program, remedy=_REMEDY)
+    sources = content.get("sha256")
+    judged = cast("Mapping[str, Any]", sources).get("program") if isinstance(sources, Mapping) else None
+    if judged is None:
+        raise ProgramError("the verdict does not say which file it is about", file=program, remedy=_REMEDY)
+    if judged != sha256:
+        raise ProgramError(
+            "the verdict is about another file: the program was changed, or replaced", file=program,
+            value=f"SHA-256 {sha256[:12]}…", expected=f"{str(judged)[:12]}…", remedy=_REMEDY,
+        )  # fmt: skip
+
+
+def _failure(content: Mapping[str, Any]) -> str:
+    """Return in words how far a verdict is from passed."""
+    claims: Any = content.get("certificates")
+    each = [c for c in claims if isinstance(c, dict)] if isinstance(claims, list) else []
+    failed = [str(c.get("claim")) for c in each if c.get("passed") is not True]
+    return f"failed: {', '.join(failed[:3])}{', …' if len(failed) > 3 else ''}" if failed else "has not passed"
+
+
+def _content(file: Path, program: str | Path | None) -> Mapping[str, Any]:
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        what = "nothing says that this program was judged"
+        raise ProgramError(what, file=program, expected=f"its verdict in {file}", remedy=_REMEDY) from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise ProgramError("not a verdict, or a broken one", file=file, remedy=_REMEDY) from error
+    if not isinstance(content, dict):
+        raise ProgramError("not a verdict", file=file, remedy=_REMEDY)
+    return cast("dict[str, Any]", content)
