@@ -1,5 +1,6 @@
 """The documentation: a reference that the code agrees with, commands that run, a site that builds without a warning."""
 
+import json
 import os
 import re
 import shlex
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 from pentapod.cli.main import run
+from pentapod.files import sha256_of
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job
 from pentapod.kinematics import Component
@@ -114,6 +116,8 @@ def test_the_post_of_ones_own_is_one(tmp_path):
     source = Provenance(machine.name, machine.digest, "", "1")
     program = Program(1e-3, legs, "cubic", Component(1, 1), RigidTransform.identity(), source)
     write_csv(program, tmp_path / "program.csv")
+    verdict = {"passed": True, "sha256": {"program": sha256_of(tmp_path / "program.csv")}}
+    (tmp_path / "verdict.json").write_text(json.dumps(verdict), encoding="utf-8")
     path = os.pathsep.join([str(tmp_path / "site"), str(ROOT / "src")])
     pentapod = [sys.executable, "-c", "from pentapod.cli.main import main; main()", "post"]
 

@@ -22,7 +22,7 @@ from short_motion import given, motion, post
 
 from pentapod.errors import InputError, ProgramError
 from pentapod.program import Program
-from pentapod.program.posts import PostInput
+from pentapod.program.posts import PostInput, write_post
 from pentapod.program.posts.linuxcnc.trivkins import read_gcode
 from pentapod.program.posts.motion import lengths_at
 
@@ -44,17 +44,20 @@ MISSING = missing()
 real = pytest.mark.skipif(bool(MISSING), reason=MISSING)
 
 
-def play(folder: Path) -> np.ndarray:
-    """Run a folder's play.sh; return what was recorded, without the number of the sample, which has no gaps."""
+def play(folder: Path, code: int = 0) -> np.ndarray:
+    """Run a folder's play.sh to its exit code; return what was recorded, without the number of the sample.
+
+    There are no gaps in that number.
+    """
     log = folder / "test.log"
     # One at a time on a host: LinuxCNC has one lock file for all.
     with (Path(tempfile.gettempdir()) / "pentapod-test-linuxcnc.lock").open("w") as lock, log.open("w") as out:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        code = subprocess.run(
+        left = subprocess.run(
             ["sh", "play.sh"], cwd=folder, stdin=subprocess.DEVNULL, stdout=out, stderr=out, timeout=120, check=False
         ).returncode
     text = (folder / "played.txt").read_text() if (folder / "played.txt").exists() else ""
-    assert code == 0, log.read_text()[-2000:]
+    assert left == code, log.read_text()[-2000:]
     assert "overrun" not in text
     table = np.array([[float(word) for word in line.split()] for line in text.splitlines()])
     assert (np.diff(table[:, 0]) == 1).all()
@@ -68,10 +71,10 @@ def ini_of(file: Path) -> configparser.ConfigParser:
     return ini
 
 
-def streamed(tmp_path, **changes):
+def streamed(tmp_path, code=0, **changes):
     what = given(**changes)
     post(what, "linuxcnc", tmp_path)
-    table = play(tmp_path / "stream")
+    table = play(tmp_path / "stream", code)
     said = (tmp_path / "stream" / "test.log").read_text()
     changed = float(re.search(r"the limits changed the lengths by at most (\S+) mm", said)[1])
     assert changed == pytest.approx(np.abs(table[:, :5] - table[:, 5:]).max(), rel=1e-5)
@@ -94,7 +97,8 @@ def test_hal_plays_every_setpoint_and_the_limits_change_nothing(tmp_path):
 
 @real
 def test_hal_clips_a_program_beyond_the_limits(tmp_path):
-    plan, before, after = streamed(tmp_path, duration=0.76)
+    plan, before, after = streamed(tmp_path, code=1, duration=0.76)
+    assert "FAILED: limit3 clipped the program" in (tmp_path / "stream" / "test.log").read_text()
     assert np.abs(np.diff(plan, 2, axis=0)).max() / 1e-6 == pytest.approx(1.2 * 5000.0, rel=0.01)
     assert np.abs(before[-1] - plan[-1]).max() < 1e-6
     assert np.abs(before - after).max() > 0.5
@@ -111,10 +115,39 @@ def test_the_legs_as_axes_keep_path_and_time(tmp_path):
     said = (tmp_path / "trivkins" / "test.log").read_text()
     told = float(re.search(r"the legs moved for (\S+) s", said)[1])
     assert told == pytest.approx(len(moving) * what.program.period, abs=1e-9)
+    check_accelerations(joints[moving[0] : moving[-1] + 1, :5], what, tmp_path, said)
     curve = MM * lengths_at(what.program, np.linspace(0.0, what.program.duration, 150_001))
     away, _ = cKDTree(curve).query(joints[moving[0] : moving[-1] + 1, :5])
     assert away.max() < 0.02
     assert np.abs(joints[-1, :5] - curve[-1]).max() < 1e-6
+
+
+def check_accelerations(legs, what, folder, said):
+    """More than the legs have, for a program that needs a tenth; less than is said; and play.sh says how much."""
+    commanded = np.abs(np.diff(legs, 2, axis=0)).max() / what.program.period**2
+    needed = MM * np.abs(np.diff(what.program.legs, 2, axis=0)).max() / what.program.period**2
+    limit = MM * what.machine.legs.max_acceleration.min()
+    text = re.sub(r"\s+", " ", (folder / "README.md").read_text(encoding="utf-8"))
+    told = re.search(
+        r"its accelerations are not.*?(\d+) mm/s² here, where the legs of the machine have (\d+) mm/s²", text
+    )
+    assert float(told[2]) == pytest.approx(limit)
+    ini = ini_of(folder / "trivkins" / "pentapod.ini")
+    allowed = [float(ini[f"JOINT_{k}"]["MAX_ACCELERATION"]) for k in range(5)]
+    assert float(told[1]) == pytest.approx(max(allowed), abs=1.0)
+    assert needed < 0.1 * limit < limit < commanded <= float(told[1])
+    measured = float(re.search(r"largest acceleration that was commanded: (\d+) mm/s²", said)[1])
+    assert measured == pytest.approx(commanded, abs=1.0)
+
+
+@real
+def test_an_unverified_folder_runs_with_its_mark_in_every_file(tmp_path):
+    write_post(given(duration=1.0), "linuxcnc", tmp_path, unverified=True)
+    files = [file for file in tmp_path.rglob("*") if file.is_file()]
+    assert all("UNVERIFIED" in "".join(file.read_text().splitlines()[:2]) for file in files)
+    for part in ("stream", "trivkins", "pentakins"):
+        table = play(tmp_path / part)
+        assert len(table) > 300
 
 
 @real

@@ -1,4 +1,4 @@
-"""Nothing unjudged reaches a controller: posts want a verdict that passed for exactly this file, or say they have none."""
+"""Nothing unjudged reaches a controller: posts want a verdict that passed for exactly this file, or say so."""
 
 from __future__ import annotations
 
@@ -88,6 +88,27 @@ def test_one_byte_of_the_program_undoes_its_verdict(folder, capsys):
     assert not (folder / "again").exists()
 
 
+def test_a_run_is_posted_as_it_was_planned(make_job, tmp_path, capsys):
+    """A program that its own run judged; not when its verdict or itself is of another run."""
+    job, out = make_job(), tmp_path / "out"
+    assert run(["plan", str(job), "-o", str(out), "--quiet"]) == 0
+    assert run(["post", str(out / "program.csv"), "--to", "linuxcnc", "-o", str(tmp_path / "posted")]) == 0
+    assert (tmp_path / "posted" / "pentakins" / "play.sh").is_file()
+    program = read_csv(out / "program.csv")
+    write_csv(jumping(program), out / "program.csv")
+    capsys.readouterr()
+    assert run(["post", str(out / "program.csv"), "--to", "linuxcnc", "-o", str(tmp_path / "jumps")]) == 2
+    assert "about another file" in capsys.readouterr().err
+    assert run(["verify", str(out / "program.csv"), "--job", str(job), "--json"]) == 1
+    said = capsys.readouterr()
+    (out / "verdict.json").write_text(said.out, encoding="utf-8")
+    assert "note: " in said.err
+    assert "program.csv" in said.err
+    assert run(["post", str(out / "program.csv"), "--to", "linuxcnc", "-o", str(tmp_path / "jumps")]) == 2
+    assert "the verdict on this program failed" in capsys.readouterr().err
+    assert not (tmp_path / "jumps").exists()
+
+
 def test_the_verdict_may_lie_elsewhere(folder, capsys):
     write_verdict(folder, passed=True)
     (folder / "verdict.json").rename(folder / "mine.json")
@@ -108,7 +129,7 @@ def test_who_insists_gets_files_that_say_so(name, tmp_path):
         if file.suffix in (".npz", ".h5"):
             continue  # read back below
         first, second = [*file.read_text(encoding="utf-8").splitlines(), ""][:2]
-        assert MARK in (second if first.startswith("#!") else first), file
+        assert MARK in (second if first.startswith(("#!", "%")) else first), file
     back = read_post(tmp_path, name)
     if isinstance(back, Program):
         assert back.provenance.unverified

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from pentapod.progress import Progress
     from pentapod.verify.verdict import Certificate, NotJudged, Verdict
 
@@ -94,6 +96,17 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
         finally:
             log.removeHandler(handler)
             log.setLevel(level)
+
+
+def note_changes(folder: Path) -> None:
+    """Say on stderr where the files of a run's folder are not of one run."""
+    from pentapod.errors import InputError
+    from pentapod.run_folder import check_run
+
+    try:
+        check_run(folder)
+    except InputError as error:
+        click.echo(f"note: {error}", err=True)
 
 
 def verdict_text(verdict: Verdict) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
+from pentapod.cli.output import echo_json, json_option, note_changes, progress_bar, quiet_option
 
 if TYPE_CHECKING:
     from pentapod.machine import Machine
@@ -73,6 +73,7 @@ def post(
     from pentapod.program.posts import PostInput, find_post, placed_toolpath, write_post
 
     takes_toolpath = find_post(name).takes_toolpath  # an unknown one is said at once
+    note_changes(program.parent)
     with progress_bar(quiet=quiet or as_json) as progress:
         progress("reading", 0.0, program.name)
         read, digest = read_csv(program), sha256_of(program)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option, verdict_text
+from pentapod.cli.output import echo_json, json_option, note_changes, progress_bar, quiet_option, verdict_text
 
 
 @click.command()
@@ -26,6 +26,7 @@ def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -
     from pentapod.job import Job
     from pentapod.pipeline import judge
 
+    note_changes(program.parent)
     loaded = Job.load(job)
     with progress_bar(quiet=quiet or as_json) as progress:
         verdict = judge(loaded, program, progress, strict=strict)

@@ -125,7 +125,7 @@ def write_post(
     """Write the files of a post into a folder, made where it is missing, and return their paths.
 
     verdict: what says that exactly this program was judged and passed: a verdict.json, or its content. unverified:
-    write without one; then every file says so in its first line (a script in its second).
+    write without one; then every file says so in its first line (scripts, and G-code after "%", in their second).
     Nothing is written unless everything could be made. Raises InputError: no passed verdict on this program, an unknown
     post, one that cannot say that it is unverified, a machine or toolpath that is missing, a folder that cannot be
     written.

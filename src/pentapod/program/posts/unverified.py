@@ -15,8 +15,9 @@ _ARCHIVES = (".npz", ".h5")
 
 
 def told_unverified(name: str, content: bytes) -> bytes:
-    """Return a file's content with the line in front, unless it begins with it; a script has it as its second line.
+    """Return a file's content with the line in front, unless it begins with it.
 
+    What must begin otherwise has it as its second line: a script, and G-code between two "%".
     Raises InputError where the format has no place for it.
     """
     told, suffix = UNVERIFIED.encode(), PurePosixPath(name).suffix
@@ -25,6 +26,8 @@ def told_unverified(name: str, content: bytes) -> bytes:
         return content
     if first.startswith(b"#!"):
         return first + b"\n# " + told + b"\n" + rest
+    if suffix == ".ngc" and first.strip() == b"%":
+        return first + b"\n(" + told + b")\n" + rest
     if suffix not in _COMMENTS:
         raise InputError(
             "this format has no place to say that the program is unverified", key=name,

@@ -19,7 +19,15 @@ def _write(given: PostInput) -> dict[str, bytes]:
     if given.toolpath is not None:
         folders["pentakins"] = pentakins.pentakins_files(given)
     files = {f"{folder}/{name}": content for folder, files in folders.items() for name, content in files.items()}
-    return {"README.md": packaged("README.md"), **files}
+    machine = given.the_machine()
+    words = {
+        "allowed": trivkins.planner_acceleration(given.program, machine).max(),
+        "limit": 1e3 * machine.legs.max_acceleration.min(),
+    }
+    text = packaged("README.md").decode()
+    for name, value in words.items():
+        text = text.replace(f"{{{name}}}", f"{value:.0f}")
+    return {"README.md": text.encode(), **files}
 
 
 def _read(folder: Path) -> Program | Toolpath:

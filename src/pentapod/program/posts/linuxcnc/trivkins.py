@@ -1,7 +1,8 @@
 """LinuxCNC with the legs as axes X Y Z U V: G-code in inverse time, with its ini and HAL.
 
 LinuxCNC's planner looks one segment ahead and so never goes faster than √(ds·a/2), ds the way of one segment. A
-program is played in its own time only where a ≥ 2·v/dt, and where dt is at least ten servo periods.
+program is played in its own time only where a ≥ 2·v/dt, and where dt is at least ten servo periods. The planner uses
+what it is given: at the points, between which it moves straight, it commands far more than the program's accelerations.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.errors import ProgramError
+from pentapod.machine.machine import Machine
 from pentapod.program.posts.linuxcnc.config import (
     Axis,
     files_of,
@@ -45,7 +47,7 @@ def trivkins_files(given: PostInput) -> dict[str, bytes]:
     limits = machine.legs
     low, high = 1e3 * limits.min_length, 1e3 * limits.max_length
     velocity = 1e3 * limits.max_velocity
-    acceleration = np.maximum(1e3 * limits.max_acceleration, _HEADROOM * 2.0 * velocity.max() / dt)
+    acceleration = planner_acceleration(program, machine)
     # The speed of a block is that of X, Y and Z together: never the path, always the axes limit it.
     fastest = 5.0 * float(velocity.max())
     axes = [Axis(letter, legs[0, k], low[k], high[k], velocity[k], acceleration[k]) for k, letter in enumerate(LETTERS)]
@@ -63,6 +65,12 @@ def trivkins_files(given: PostInput) -> dict[str, bytes]:
         servo_period_ns(program.period),
     )
     return files_of(ini, hal_text(), FILE, gcode(legs, dt))
+
+
+def planner_acceleration(program: Program, machine: Machine) -> Floats:
+    """Return the accelerations (5,) in mm/s² that the planner is given and may command: more than the legs have."""
+    limits, dt = machine.legs, float(knots(program)[1])
+    return np.maximum(1e3 * limits.max_acceleration, _HEADROOM * 2.0 * 1e3 * limits.max_velocity.max() / dt)
 
 
 def knots(program: Program) -> Floats:

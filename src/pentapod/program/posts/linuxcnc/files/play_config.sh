@@ -23,5 +23,19 @@ if ! grep -qx DONE linuxcnc.log; then
   grep '^FAILED' linuxcnc.log >&2 || tail -n 20 linuxcnc.log >&2
   exit 1
 fi
-echo "played: the legs moved for $(awk -v period="$(sed -n 's/^SERVO_PERIOD = //p' pentapod.ini)" \
-  '$7 != 0 { moving++ } END { printf "%.3f", moving * period / 1e9 }' played.txt) s"
+awk -v period="$(sed -n 's/^SERVO_PERIOD = //p' pentapod.ini)" '
+$7 != 0 {
+  moving++
+  for (k = 2; k <= 6; k++) {
+    d = $k - 2 * one[k] + two[k]
+    if (moving > 2 && d < 0) d = -d
+    if (moving > 2 && d > most) most = d
+    two[k] = one[k]
+    one[k] = $k
+  }
+}
+END {
+  seconds = period / 1e9
+  printf "played: the legs moved for %.3f s\n", moving * seconds
+  printf "largest acceleration that was commanded: %.0f mm/s²\n", most / seconds / seconds
+}' played.txt

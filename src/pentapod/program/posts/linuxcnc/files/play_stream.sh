@@ -37,4 +37,7 @@ wait $feeder
 wait $sampler
 halcmd stop
 awk '{ for (k = 2; k <= 6; k++) { d = $k - $(k + 5); if (d < 0) d = -d; if (d > most) most = d } }
-END { printf "played: the limits changed the lengths by at most %g mm\n", most }' played.txt
+END { printf "played: the limits changed the lengths by at most %g mm\n", most; exit most > 0 }' played.txt || {
+  echo "FAILED: limit3 clipped the program: it is not within the limits of the legs" >&2
+  exit 1
+}
