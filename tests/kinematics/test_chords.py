@@ -8,6 +8,7 @@ from scipy.interpolate import BPoly
 
 from pentapod.errors import ArrayError
 from pentapod.kinematics import Component, LinearPentapod, prove_chords, prove_tip_tube
+from pentapod.kinematics.krawczyk_kernels import angle_within
 
 BASE = np.array([[-0.552, -0.229], [-0.312, 0.510], [0.155, 0.577], [0.429, -0.417], [-0.078, -0.563]])
 ROBOT = LinearPentapod.quadratic(BASE, 0.2125)
@@ -190,3 +191,17 @@ def test_no_pose_no_proof():
     assert np.isinf(found.speeds).all()
     assert (found.base_cosines == -1.0).all()
     assert (found.platform_cosines == [-1.0, 1.0]).all()
+
+
+def test_directions_may_turn_by_more_than_a_right_angle_when_little_is_known() -> None:
+    """Between a unit vector and any vector at a distance; from a distance of 1 on, every angle occurs."""
+    rng = np.random.default_rng(9)
+    for distance in (1e-9, 0.1, 0.7, 0.999, 1.0, 1.0001, 1.5):
+        offsets = rng.normal(size=(3000, 3))
+        offsets *= distance / np.linalg.norm(offsets, axis=1)[:, None]
+        offsets[0] = (0.0, 0.0, -distance)
+        other = np.array([0.0, 0.0, 1.0]) + offsets
+        lengths = np.linalg.norm(other, axis=1)
+        angles = np.arccos(np.clip(other[lengths > 0.0, 2] / lengths[lengths > 0.0], -1.0, 1.0))
+        assert angles.max() <= angle_within(distance) + 2e-8
+    assert angle_within(0.5) == pytest.approx(np.arcsin(0.5), rel=1e-12)

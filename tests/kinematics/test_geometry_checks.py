@@ -61,6 +61,18 @@ def test_offsets_within_the_tolerance_are_made_exact() -> None:
         LinearPentapod.from_offsets(BASE, rough, 0.512345678)
 
 
+def test_kinematics_and_proofs_are_about_one_machine() -> None:
+    exact = 0.03 + 0.5 * BASE[:, 0]
+    given = exact + 1e-10 * np.array([1.0, -1.0, 0.0, 1.0, -1.0])  # within the constructor's tolerance
+    pentapod = LinearPentapod(BASE, given, 0.5)
+    np.testing.assert_array_equal(pentapod.offsets, exact)
+    p, i = np.array([0.1, 0.05, 0.6]), np.array([0.36, 0.48, 0.8])
+    q, j = pentapod.pose(pentapod.leg_lengths(p, i), pentapod.component(p, i))
+    assert np.abs(np.r_[q - p, j - i]).max() < 1e-14, (
+        "the closed form, from δ, and the lengths, from the offsets, agree"
+    )
+
+
 def test_delta_is_fitted_where_it_is_not_claimed() -> None:
     pentapod = LinearPentapod.from_offsets(BASE, 0.03 - 0.7 * BASE[:, 0])
     assert pentapod.delta == pytest.approx(-0.7, rel=1e-14)

@@ -1,9 +1,10 @@
 """How far a platform strays while its legs keep within lengths: against the forward kinematics."""
 
+import mpmath as mp
 import numpy as np
 import pytest
 
-from pentapod.kinematics import roaming
+from pentapod.kinematics import LinearPentapod, roaming
 
 
 def well_posed(pentapod, random_poses, leg_determinant):
@@ -49,3 +50,36 @@ def test_no_pose_is_no_proof(pentapod):
     points, turn = roaming(pentapod, nowhere, nowhere, np.ones((1, 2, 5)), np.zeros(2))
     assert np.isinf(points).all()
     assert np.isinf(turn).all()
+
+
+@pytest.mark.parametrize("far", [0.0, 1e3, 1e6])
+def test_rounding_is_counted_however_far_off_the_base_is(far):
+    """Newton's method in 50 digits says where the platform is with these lengths."""
+    near, shift = 0.2 * np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)]), (far, -0.3 * far)
+    robot = LinearPentapod.from_offsets(near + shift, 0.5 * near[:, 0], tolerance=1e-6)
+    rng, arms = np.random.default_rng(4), np.array([-0.3, 0.0, 0.2])
+    p = rng.uniform((-0.3, -0.3, 0.4), (0.3, 0.3, 0.9), (24, 3)) + np.array([*shift, 0.0])
+    i = np.c_[rng.uniform(-0.6, 0.6, (24, 2)), np.ones(24)]
+    i /= np.linalg.norm(i, axis=1)[:, None]
+    legs = np.linalg.norm(robot.leg_vectors(p, i), axis=2)
+    points, turn = roaming(robot, p, i, np.stack([legs, legs * (1.0 + 1e-15)], axis=1), arms)
+    assert np.isfinite(turn).all()
+    assert points.max() < 1e-12 + 5e-14 * far, "and not much more is counted"
+    base = [[*row, 0.0] for row in robot.base.tolist()]
+    with mp.workdps(50):
+        for k in range(24):
+            start = mp.matrix([*p[k].tolist(), *i[k].tolist()])
+            x = start.copy()
+            for _ in range(6):
+                values, rows = [], []
+                for a, z, length in zip(base, robot.offsets.tolist(), legs[k].tolist(), strict=True):
+                    d = [x[c] + mp.mpf(z) * x[3 + c] - mp.mpf(a[c]) for c in range(3)]
+                    values.append((sum(c * c for c in d) - mp.mpf(length) ** 2) / 2)
+                    rows.append(d + [mp.mpf(z) * c for c in d])
+                values.append((sum(x[3 + c] ** 2 for c in range(3)) - 1) / 2)
+                rows.append([0, 0, 0, x[3], x[4], x[5]])
+                x -= mp.lu_solve(mp.matrix(rows), mp.matrix(values))
+            way = x - start
+            for arm, point in zip(arms.tolist(), points[k].tolist(), strict=True):
+                assert mp.sqrt(sum((way[c] + mp.mpf(arm) * way[3 + c]) ** 2 for c in range(3))) <= point
+            assert mp.sqrt(sum(way[3 + c] ** 2 for c in range(3))) <= turn[k]

@@ -165,7 +165,7 @@ def test_the_axis_is_bounded_between_coarse_samples():
     straight = across[0] * (1 - t[:, None]) + across[-1] * t[:, None]
     angles = np.arccos(np.clip((straight * along).sum(axis=1) / np.linalg.norm(straight, axis=1), -1, 1))
     ends = max(angles[0], angles[-1])
-    rise = 0.25 * own**2 + 0.125 * path**2 + path**3 / 60.0
+    rise = 0.25 * own**2 + 0.125 * path**2 + path**3 / 50.0
     assert angles.max() <= _raised(np.array([ends]), np.array([rise]), np.zeros(1))[0]
 
 

@@ -67,13 +67,21 @@ def test_waypoints_that_are_not_reached_are_those_beyond_what_is_allowed(beyond,
     assert not count or f"; {count} waypoints" in found.method
 
 
+@pytest.mark.parametrize("angle", [0.2, 0.9, 1.0, 1.7])
+def test_a_straight_line_between_axes_lags_behind_the_arc_by_less_than_is_counted(angle):
+    share = np.linspace(0.0, 1.0, 2001)
+    lag = np.abs(np.arctan((2.0 * share - 1.0) * np.tan(0.5 * angle)) - (share - 0.5) * angle).max()
+    counted = np.radians(axis_deviation(replay(chord_arcs=np.array([0.0, 0.0, angle]))).value) - 0.03
+    assert counted >= 0.125 * angle**2 + lag
+
+
 def test_what_the_axis_turns_between_samples_counts():
     """Of its own turn two eighths of the square, of the path's one and a little; the stray of the nearer chord."""
     found = axis_deviation(replay(lean=[0.0, 0.0, 0.0, 0.2]))
     assert np.radians(found.value) == pytest.approx(0.04 / 4.0 + 0.03, abs=1e-6)
     assert found.where.time_s == 2
     found = axis_deviation(replay(chord_arcs=np.array([0.0, 0.0, 0.2])))
-    assert np.radians(found.value) == pytest.approx(0.04 / 8.0 + 0.008 / 60.0 + 0.03, abs=1e-6)
+    assert np.radians(found.value) == pytest.approx(0.04 / 8.0 + 0.008 / 50.0 + 0.03, abs=1e-6)
     found = axis_deviation(replay(angles=np.array([0.05, 0.0, 0.0, 0.0])))
     assert np.radians(found.value) == pytest.approx(0.05 + 0.01, abs=1e-9)
     assert found.bound == pytest.approx(np.degrees(0.11))

@@ -1,6 +1,7 @@
 """Polynomials in Bernstein form on [0, 1] whose coefficients are balls: coefficients first, (n + 1, ...).
 
-The laws are those of `geometry.bernstein`; what is read off the results holds in spite of rounding.
+The laws are those of `geometry.bernstein`; what is read off the results holds in spite of rounding (lemmas 5 and 6 of
+docs/proofs.md).
 """
 
 from __future__ import annotations
@@ -10,12 +11,19 @@ from math import comb
 import numpy as np
 
 from pentapod.arrays import Floats
+from pentapod.errors import ArrayError
 from pentapod.geometry.balls import Ball
+
+_LARGEST = 1 << 1020
 
 
 def multiply(a: Ball, b: Ball) -> Ball:
-    """Return the product (n + m + 1, ...) of polynomials (n + 1, ...) and (m + 1, ...); what follows broadcasts."""
+    """Return the product (n + m + 1, ...) of polynomials (n + 1, ...) and (m + 1, ...); what follows broadcasts.
+
+    Raises ArrayError for a degree n + m above 1020.
+    """
     n, m = len(a.mid) - 1, len(b.mid) - 1
+    weights = _binomials(n + m, max(a.mid.ndim - 1, b.mid.ndim))
     first, second = _weighted(a), _weighted(b)
     total: Ball | None = None
     for j in range(n + 1):
@@ -25,7 +33,7 @@ def multiply(a: Ball, b: Ball) -> Ball:
         total = padded if total is None else total + padded
     if total is None:
         raise ValueError("a polynomial has at least one coefficient")
-    return total / _binomials(n + m, total.mid.ndim)
+    return total / weights
 
 
 def elevate(a: Ball, by: int) -> Ball:
@@ -65,5 +73,12 @@ def _weighted(a: Ball) -> Ball:
     return a * _binomials(len(a.mid) - 1, a.mid.ndim)
 
 
-def _binomials(n: int, axes: int) -> Floats:
-    return np.array([float(comb(n, j)) for j in range(n + 1)]).reshape((-1,) + (1,) * (axes - 1))
+def _binomials(n: int, axes: int) -> Ball:
+    """Return C(n, 0), ..., C(n, n) along the first of so many axes: exact up to 2⁵³, from n = 57 on rounded."""
+    exact = [comb(n, j) for j in range(n + 1)]
+    if exact[n // 2] > _LARGEST:
+        raise ArrayError("polynomials of this degree cannot be multiplied", value=n, expected="1020 or less")
+    rounded = [float(c) for c in exact]
+    errors = [float(abs(c - int(r))) for c, r in zip(exact, rounded, strict=True)]  # of few digits, so exact
+    shape = (-1,) + (1,) * (axes - 1)
+    return Ball(np.array(rounded).reshape(shape), np.array(errors).reshape(shape))

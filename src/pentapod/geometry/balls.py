@@ -3,7 +3,8 @@
 A `Ball` encloses an unknown exact number, or every number of a range: whatever the operands' exact values are, the
 exact result lies in the result's ball. So a bound read off a computed ball is a proof. The midpoints are computed as
 usual; each operation adds its own rounding, at most u |result| with u = 2⁻⁵³ (IEEE 754, rounding to nearest), to the
-radius, and radii are enlarged by more than their own roundings. Overflow ends in radii that are infinite or NaN: ask
+radius, and radii are enlarged by more than their own roundings (lemma 5 of docs/proofs.md). Overflow ends in radii
+that are infinite or NaN: ask
 `x < bound`, never `not x >= bound`, and such balls prove nothing.
 
 Source: S. M. Rump, "Fast and parallel interval arithmetic", BIT 39 (1999), on midpoint-radius arithmetic.

@@ -1,4 +1,7 @@
-"""Whether polynomials in Bernstein form are positive on [0, 1]: yes with a bound, no, or undecided and where."""
+"""Whether polynomials in Bernstein form are positive on [0, 1]: yes with a bound, no, or undecided and where.
+
+Lemma 6 of docs/proofs.md.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Poses carried along while the legs change, with a proof: tube after tube, each step as long as its proof allows."""
+"""Poses carried along while the legs change, with a proof: tube after tube, each step as long as its proof allows.
+
+Lemma 10 of docs/proofs.md.
+"""
 
 from __future__ import annotations
 

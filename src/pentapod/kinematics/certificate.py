@@ -4,7 +4,7 @@ Between two setpoints the legs are polynomials of degree k in time. So are the s
 u, v, and both discriminants, w² = 1 − u² − v² (4k) and S² = R²|n|² − c² (8k). Where both are positive on a
 whole interval, the four assembly modes exist throughout and never meet, and none can turn into another.
 Positivity is read off Bernstein coefficients, with subdivision, and holds in spite of rounding:
-see `_roundings`. The coefficients themselves come from `discriminants`.
+see `_roundings`. Lemmas 3, 4 and 6 of docs/proofs.md. The coefficients themselves come from `discriminants`.
 """
 
 from __future__ import annotations

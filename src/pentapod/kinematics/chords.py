@@ -4,8 +4,10 @@ Between two samples the legs are polynomials in time, and x̃(t) is the straight
 As in `tip_tube` Krawczyk's operator proves, component by component, that there is exactly one pose within a box around
 x̃(t) at each time, and how large the box is; here with the line in place of a fitted polynomial and with floating
 point and explicit allowances for rounding in place of ball arithmetic, which takes microseconds for each chord. To
-first order the motion is x̃ − C G(x̃(t), t), and this polynomial is what the bounds are taken of: of second order in the
-chord, like the deviation itself. The speed follows from the derivative in the same way. Where the proof fails, the
+first order the motion is x̃ − C G(x̃(t), t), and this polynomial is what the bounds are taken of: of second order in
+the
+chord, like the deviation itself (lemmas 7, 8 and 12 of docs/proofs.md). The speed follows from the derivative in the
+same way. Where the proof fails, the
 chord is halved.
 """
 

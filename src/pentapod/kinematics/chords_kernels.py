@@ -11,6 +11,7 @@ from pentapod.arrays import Bools, Floats
 from pentapod.compiled import kernel
 from pentapod.kinematics.krawczyk_kernels import (
     ROUND,
+    angle_within,
     defect,
     enclosed,
     inflated,
@@ -83,7 +84,7 @@ def chords(
         for m in range(2 * k + 1):
             sine = max(sine, np.sqrt(e[3, m] ** 2 + e[4, m] ** 2 + e[5, m] ** 2))
         sine += np.sqrt(z[3] ** 2 + z[4] ** 2 + z[5] ** 2)
-        turned[h] = np.arcsin(min(1.0, sine * (1.0 + ROUND)))
+        turned[h] = angle_within(sine)
         swing = np.sqrt(bound[3] ** 2 + bound[4] ** 2 + bound[5] ** 2)
         start_i, end_i = start[h, 3:], end[h, 3:]
         for j in range(5):
@@ -173,7 +174,8 @@ def _derived(
 ) -> bool:
     """Fill e' (6, 2k) and by how much (6,) the solution's derivative may differ from x̃' − e'; False where unbounded.
 
-    J x' = (l l', 0) and C (J(x̃) x̃' − (l l', 0)) = e'. So f = x' − x̃' solves C J f = −e' − q, q = C (J(x) − J(x̃)) x̃',
+    J x' = (l l', 0) and C (J(x̃) x̃' − (l l', 0)) = e'. So f = x' − x̃' solves C J f = −e' − q, q = C (J(x) − J(x̃))
+    x̃',
     and |f + e'| ≤ |q| + |1 − C J| |f|.
     """
     size, degree = geometry[5, 2], de.shape[1]

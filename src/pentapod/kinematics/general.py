@@ -29,7 +29,8 @@ class GeneralPentapod(FiveLegs):
     """Five base attachments a_i = (x_i, y_i, 0) and any offsets z_i along the platform line, b_i = p + z_i i.
 
     base (5, 2) and offsets (5,) in metres, machine frame: the base plane is z = 0. Leg lengths have at most four
-    real poses, two roots with two mirror images each (kinematics notes, section 5), named by a `Mode`. Where
+    isolated real poses, two roots with two mirror images each (lemma 1 of docs/proofs.md), named by a `Mode`; only the
+    quadratic family and other special geometries have self-motions, infinite sets of poses, besides. Where
     the offsets are proportional these are the four of `LinearPentapod`, to the same accuracy, and where they
     nearly are nothing special happens: there is one formula for both.
 

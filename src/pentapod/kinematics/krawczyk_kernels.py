@@ -13,7 +13,8 @@ from pentapod.arrays import Floats
 from pentapod.compiled import kernel
 
 ROUND = 2.0**-46
-"""A result of fewer than 100 operations on products of size A is off by less than this times A."""
+"""Lemma 4 of docs/proofs.md: a result of fewer than 100 operations on products of size A is off by less than this
+times A."""
 
 
 @kernel
@@ -148,6 +149,16 @@ def mapped(
             out[r] += abs(inverse[r, j]) * across
     for r in range(6):
         out[r] *= 1.0 + ROUND
+
+
+@kernel
+def angle_within(distance: float) -> float:
+    """Return the largest angle, radians, between a unit vector and one whose tip is no farther from its tip than this.
+
+    Lemma 8 of docs/proofs.md: the sine is at most the distance, and from a distance of 1 on any angle is possible.
+    """
+    sine = distance * (1.0 + ROUND)
+    return np.arcsin(sine) if sine < 1.0 else np.pi
 
 
 @kernel

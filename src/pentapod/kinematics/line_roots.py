@@ -29,6 +29,8 @@ class Interior(NamedTuple):
 def interior(line: SolutionLine, *, thorough: bool = False) -> Interior:
     """Return a point between the two roots of each line (N,); where there is none, the best there is.
 
+    Lemmas 1 and 2 of docs/proofs.md.
+
     thorough: where there clearly is none, go on to the best point instead of stopping when that is known.
     The margin √(D1 E) − |g| is concave, so its slope tells on which side its maximum lies, and its tangent bounds
     what can still be found. A maximum that is negative by no more than rounding counts as a double root: the leg

@@ -28,7 +28,8 @@ class LinearPentapod(FiveLegs):
 
     base (5, 2) and offsets (5,) in metres; delta: the constant z_i − z_3 = δ (x_i − x_3) of the quadratic
     family. Build one with `LinearPentapod.quadratic` or `LinearPentapod.from_offsets`. Machine frame: the
-    base plane is z = 0; leg 3's attachment may be anywhere in it.
+    base plane is z = 0; leg 3's attachment may be anywhere in it. Offsets that deviate by less than that, but by
+    more than rounding, are replaced by z_3 + δ (x_i − x_3): closed form, leg lengths and proofs are about one machine.
 
     Raises MachineError: not five attachments or offsets, numbers that are not finite, offsets that do not fit
     delta (to 1e-9 of the machine's size), an architecturally singular geometry.
@@ -63,7 +64,9 @@ class LinearPentapod(FiveLegs):
         base, offsets = given(self.base, "base", (5, 2)), given(self.offsets, "offsets", (5,))
         delta = float(given(self.delta, "delta", ()))
         size = max(1.0, abs(delta)) * float(np.abs(base).max()) + float(np.abs(offsets).max())
-        check_offsets(base, offsets, delta, 1e-9 * size)
+        fitting = check_offsets(base, offsets, delta, 1e-9 * size)
+        # One machine for kinematics and proofs alike; but what is rounded in another order is as good.
+        offsets = np.where(np.abs(offsets - fitting) <= 2.0**-50 * size, offsets, fitting)
         set_frozen(self, base=frozen(base, "base"), offsets=frozen(offsets, "offsets"), delta=delta)
         measure = reciprocal_condition(base, delta)
         if measure < _SINGULAR:

@@ -1,4 +1,7 @@
-"""On which side of the singularities poses are: the sign of the Jacobian's determinant, with a proof."""
+"""On which side of the singularities poses are: the sign of the Jacobian's determinant, with a proof.
+
+Lemma 11 of docs/proofs.md.
+"""
 
 from __future__ import annotations
 

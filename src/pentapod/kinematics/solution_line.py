@@ -84,7 +84,8 @@ class SolutionLine:
     def loosened(self) -> SolutionLine:
         """Return the lines with l_3 and the direction a little longer: by what rounding may take.
 
-        If the exact lengths have a pose, then D1 E − g² of these is positive there, whatever rounding did to D1, E
+        Lemma 2 of docs/proofs.md. If the exact lengths have a pose, then D1 E − g² of these is positive there,
+        whatever rounding did to D1, E
         and g: √((D1 + a)(E + b)) ≥ √(D1 E) + √(a b), and a, b are so large that √(a b) exceeds the error of g.
         """
         reach = np.sqrt(self.reach_squared)

@@ -8,7 +8,8 @@ comes close; that it does is proven afterwards. With the leg equations G(x, t) =
     Z ≥ |1 − C J(x)| for all x within ρ of x̃(t) for some t,
 
 are bounded component by component, in ball arithmetic. If y + Z ρ < ρ, then for every t there is exactly one
-solution within ρ of x̃(t) (Krawczyk 1969), it is within y + Z ρ, and it depends continuously on t. If w and S keep the
+solution within ρ of x̃(t) (Krawczyk 1969; lemma 7 of docs/proofs.md), it is within y + Z ρ, and it depends
+continuously on t. If w and S keep the
 component's signs all over the tube, the solution is the pose of the component: lengths have one pose in each.
 Where this fails, the interval is halved.
 """

@@ -1,7 +1,8 @@
 """How near bodies come to each other at any time: proven from some moments, and how far bodies stray from there.
 
 Time is cut into stretches of rows. In the middle of each the gaps are computed; from there on no body moves further
-than `roaming` proves of the platform. Stretches that may hold a gap smaller than what is known are cut into eight.
+than `roaming` proves of the platform (lemmas 9 and 13 of docs/proofs.md). Stretches that may hold a gap smaller than
+what is known are cut into eight.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 A stretch is some chords between samples. On it the tool is swept as if its pivot went straight and its axis turned
 evenly: exactly, between the samples too. Where the motion really is differs from that by what is measured at the
-samples and what is proven of the chords between them. Stretches that may hold something deeper than what is
+samples and what is proven of the chords between them (lemmas 12 and 13 of docs/proofs.md). Stretches that may hold
+something deeper than what is
 known are cut into eight, down to single chords; most programs are decided long before.
 """
 

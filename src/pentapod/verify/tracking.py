@@ -66,8 +66,8 @@ def axis_deviation(replay: Replay) -> Finding:
         own[part] = angle_between(before[part], after[part])
     # Vectors that go straight from end to end are farthest apart at an end, and as far off the arc of unit vectors as
     # it is high: an eighth of the angle squared. At a waypoint's visit the motion's own is off the arc already.
-    # Along the arc they lag behind by less than a sixtieth of the angle cubed.
-    rise = 0.25 * own**2 + 0.125 * replay.chord_arcs**2 + replay.chord_arcs**3 / 60.0
+    # Along the arc they lag behind by less than a fiftieth of the angle cubed (lemma 14 of docs/proofs.md).
+    rise = 0.25 * own**2 + 0.125 * replay.chord_arcs**2 + replay.chord_arcs**3 / 50.0
     stray = replay.survey.turned
     at_sample = _raised(match.angles, at_samples(rise), at_samples(stray))
     chord = np.minimum(match.times.astype(np.intp), len(stray) - 1)
