@@ -20,6 +20,7 @@ from pentapod.pipeline import judge, run
 from pentapod.planning import LegPath, PlacedPath
 from pentapod.program import read_csv
 from pentapod.refusal import Refusal
+from pentapod.run_folder import staged
 from pentapod.strategy_tables import TABLES
 from pentapod.timing import Explanation, Trajectory
 from pentapod.toolpath import SegmentKind, Toolpath
@@ -169,7 +170,14 @@ def test_a_refused_job_leaves_no_program_not_even_an_old_one(make_job, tmp_path)
     assert all(c["passed"] is False for c in verdict["certificates"])
 
 
-@pytest.mark.parametrize("stage", ["plan", "leg_path", "retime", "sample", "verify", "write_arrays", "write_json"])
+def test_a_second_run_on_the_folder_is_told_before_any_work(make_job, tmp_path):
+    stages = []
+    with staged(tmp_path / "out"), pytest.raises(InputError, match="another run is writing into this folder"):
+        run(Job.load(make_job()), tmp_path / "out", lambda stage, *_: stages.append(stage))
+    assert stages == []
+
+
+@pytest.mark.parametrize("stage", ["plan", "leg_path", "retime", "sample", "judged", "write_arrays", "write_json"])
 @pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
 def test_interrupted_runs_change_nothing(stage, error, make_job, tmp_path, monkeypatch):
     job, old, fresh = Job.load(make_job()), tmp_path / "old", tmp_path / "deep" / "fresh"

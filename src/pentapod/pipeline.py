@@ -51,16 +51,17 @@ def run(
     each made from the outcome (the report, which stands above this floor).
     The program is judged from the file, as it was written. What cannot be done ends in an outcome with a
     refusal: verdict.json says so, and there is no program. The folder changes when the run ends: an
-    error or an interruption leaves it as it was. Raises InputError for a bad job, mesh, machine or folder.
+    error or an interruption leaves it as it was. Raises InputError for a bad job, mesh, machine or folder, and where
+    another run is writing into the folder.
     """
     folder = Path(out)
     check_folder(folder)
     clock = Clock(progress)
-    machine = job_machine(job)
-    mesh = clock.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
-
-    task = _Task(job, job_specification(job, machine, mesh, lambda: _toolpath(job, mesh, piece, clock)), clock, piece)
-    with staged(folder) as staging:
+    with staged(folder) as staging:  # from the start: a second run on the folder is told at once
+        machine = job_machine(job)
+        mesh = clock.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
+        asked = job_specification(job, machine, mesh, lambda: _toolpath(job, mesh, piece, clock))
+        task = _Task(job, asked, clock, piece)
         outcome = _reached(task, staging, writers or {})
         refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
         if refusal is not None and refusal.stage == "placement" and splits:
