@@ -7,7 +7,12 @@ READY := $(VENV)/.ready
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test test-all lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view reference pictures site clean
+# What the tests of `test-lowest` need beside the package, and the tests: arithmetic, kernels, solvers, files, a whole plan.
+ORACLES := pytest pytest-xdist hypothesis mpmath trimesh rtree pyyaml psutil python-flint
+LOWEST_TESTS := tests/geometry tests/kinematics tests/timing tests/program tests/toolpath/test_sweep.py \
+	tests/toolpath/test_drawings_in.py tests/simulate/test_servo.py tests/test_kernel_cache.py tests/test_pipeline.py
+
+.PHONY: demo test test-all test-lowest lock lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view reference pictures site clean
 
 demo: $(READY)  ## plan a dome and judge the program
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
@@ -17,6 +22,19 @@ test: $(READY)  ## the fast suite
 
 test-all: $(READY)  ## everything, the long forms too
 	$(BIN)/pytest -n 2
+
+test-lowest:  ## a part of the fast suite with the lowest versions that pyproject.toml allows, in an environment of its own
+	rm -rf out/lowest && $(PYTHON) -m venv out/lowest
+	sed -nE 's/^ *"([A-Za-z0-9_.-]+)[>=]=([0-9.]+)".*/\1==\2/p' pyproject.toml | sort -u > out/lowest/constraints.txt
+	out/lowest/bin/python -m pip install --quiet --constraint out/lowest/constraints.txt --editable ".[plot,hdf5,drawings,sim,view]" $(ORACLES)
+	out/lowest/bin/python -m pytest -q -m "not slow" $(LOWEST_TESTS)
+
+lock:  ## constraints.txt anew: the newest versions that fit together, as a fresh environment gets them
+	rm -rf out/lock && $(PYTHON) -m venv out/lock
+	out/lock/bin/python -m pip install --quiet --editable ".[dev]"
+	sed -n '/^#/p' constraints.txt > out/constraints.txt
+	out/lock/bin/python -m pip freeze --exclude-editable >> out/constraints.txt
+	mv out/constraints.txt constraints.txt
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -59,11 +77,11 @@ pictures: $(READY)  ## the screenshots of the documentation, from the tests that
 site: $(READY)  ## the documentation as a site, in site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
-$(READY): pyproject.toml
+$(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "pentapod needs Python 3.11 or newer")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable ".[dev]"
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]"
 	touch $@
 
 clean:
