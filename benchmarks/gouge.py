@@ -1,9 +1,9 @@
 """Contact points, normals and gouge check of a 6 mm ball, in points a second, against OpenCAMLib's BatchDropCutter.
 
-Run ``make bench-gouge``. The mesh is a wavy sheet of 200,000 facets, the points lie on a raster over it. Ours:
-everything from the mesh to the verdict, the tree of facets included. Its: the drop cutter alone, without the time that
-it needs before the first point, on every n-th of the same points, for it would take long over all of them. Seconds are
-those of the processor, of one thread each, so that other work on the machine does not count.
+Run ``make bench-gouge``. The mesh is an irregular wavy sheet of 200,000 facets, the points lie on a raster over it.
+Ours: everything from the mesh to the verdict, the tree of facets included. Its: the drop cutter alone, without the time
+that it needs before the first point, on every n-th of the same points, for it would take long over all of them.
+Seconds are those of the processor, of one thread each, so that other work on the machine does not count.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import time
 from typing import Any
 
 import numpy as np
+from scipy.spatial import Delaunay
 
 from pentapod.arrays import Floats
 from pentapod.toolpath import HeightField, Mesh
@@ -26,16 +27,22 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def wavy_sheet(width: float) -> Mesh:
-    """Return a sheet of 2 · CELLS² facets, waves 4 mm high and 50 mm long, on a square `width` metres wide."""
-    line = np.linspace(-0.5 * width, 0.5 * width, CELLS + 1)
-    x, y = np.meshgrid(line, line)
+    """Return a sheet of about 2 · CELLS² facets, waves 4 mm high and 50 mm long, on a square `width` metres wide.
+
+    Its vertices lie anywhere and the facets have any shape: on a regular grid the peer's tree is at its worst.
+    """
+    inside = np.random.default_rng(1).uniform(-0.5 * width, 0.5 * width, (CELLS**2, 2))
+    line = np.linspace(-0.5 * width, 0.5 * width, CELLS + 1)[:-1]
+    border = np.full(CELLS, 0.5 * width)
+    sides = [np.stack(pair, 1) for pair in ((line, -border), (border, line), (-line, border), (-border, -line))]
+    places = np.concatenate([inside, *sides])
+    x, y = places.T
     z = 4e-3 * np.sin(x / 8e-3) * np.cos(y / 9e-3)
-    first = np.arange(CELLS * (CELLS + 1)).reshape(CELLS, CELLS + 1)[:, :-1].ravel()
-    n = CELLS + 1
-    faces = np.concatenate(
-        [np.stack([first, first + 1, first + n + 1], 1), np.stack([first, first + n + 1, first + n], 1)]
-    )
-    return Mesh.of(np.stack([x, y, z], -1).reshape(-1, 3), faces)
+    faces = Delaunay(places).simplices.astype(np.intp)
+    (a, b), (c, d) = (places[faces[:, k]].T - places[faces[:, 0]].T for k in (1, 2))
+    turned = a * d - b * c < 0.0
+    faces[turned] = faces[turned][:, ::-1]
+    return Mesh.of(np.stack([x, y, z], -1), faces)
 
 
 def raster_points(width: float, count: int) -> Floats:

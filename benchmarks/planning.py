@@ -1,7 +1,7 @@
 """The planner's own solver against IPOPT on the same problems, in the same run. Run ``make bench-planning``.
 
 Smallest margin and time of both from the same start; the cost and the time of the calmest axes at the same placement;
-the same against plain IPOPT, on all waypoints and all margins at once. Then what a tilt cone gains over strict
+the same on 1,000 and 10,000 waypoints, the axes also against plain IPOPT. Then what a tilt cone gains over strict
 normals, how fast the axes turn beside strict normals, how long refusals take beside plans, and how time and memory grow
 with the number of waypoints.
 """
@@ -44,8 +44,6 @@ from pentapod.toolpath.toolpath import Toolpath
 
 CALM_SHARE = 0.9
 EVEN_PLACES = 4_000
-PATIENCE_S = 600.0
-"""Processor seconds after which plain IPOPT is given up."""
 Value = TypeVar("Value")
 
 
@@ -89,25 +87,28 @@ def calm_against(setting: Setting, at: Candidate, *, whole: bool) -> str:
     return f" {' '.join(costs)} {their_seconds / seconds:6.1f}x"
 
 
-def against_plain_ipopt(tasks: list[Instance], machine: Machine) -> None:
-    """Print both solvers where IPOPT gets all waypoints and margins: 10,000 for the placement, 1,000 for the axes."""
-    print("plain IPOPT: all waypoints and margins at once")
+def against_ipopt_on_many(tasks: list[Instance], machine: Machine) -> None:
+    """Print both solvers on many waypoints: the placement beside our own IPOPT, which generates its constraints.
+
+    For the axes IPOPT gets all waypoints and margins at once, and finishes.
+    """
     for task, count in ((tasks[0], 1_000), (tasks[1], 1_000), (tasks[0], 10_000)):
         setting = Setting.of(visited(task, count, 0.0), machine)
         start = start_of(setting)
         ours, seconds = timed(lambda s=setting, c=start: SequentialSolver(s, True).raise_margin(c))
-        plain = IpoptSolver(setting, True, True, PATIENCE_S)
-        theirs, their_seconds = timed(lambda s=plain, c=start: s.raise_margin(c))
-        given_up = " at least: IPOPT was given up" if their_seconds > PATIENCE_S else ""
+        theirs, their_seconds = timed(lambda s=setting, c=start: IpoptSolver(s, True).raise_margin(c))
         print(
             f"{task.name:58s} placement, {count:6,d} waypoints: {ours.smallest:.4f} {theirs.smallest:.4f} "
-            f"{seconds:.2f} s, {their_seconds / seconds:.0f}x as fast{given_up}",
+            f"{seconds:.2f} s, {their_seconds / seconds:.1f}x as fast as IPOPT with constraint generation",
             flush=True,
         )
     for task in tasks[:4]:
         setting = Setting.of(visited(task, 1_000, max(task.tilt, np.radians(5.0))), machine)
         raised = SequentialSolver(setting, True).raise_margin(start_of(setting))
-        print(f"{task.name:58s} axes, 1,000 waypoints: {calm_against(setting, raised, whole=True)}", flush=True)
+        print(
+            f"{task.name:58s} axes, 1,000 waypoints, plain IPOPT: {calm_against(setting, raised, whole=True)}",
+            flush=True,
+        )
     print()
 
 
@@ -261,7 +262,7 @@ def main() -> None:
     machine, tasks = Machine.load("desk"), instances(count)
     print(f"casadi {version('casadi')}, SciPy {version('scipy')}, Python {platform.python_version()}, one core\n")
     against_ipopt(tasks, machine)
-    against_plain_ipopt(tasks, machine)
+    against_ipopt_on_many(tasks, machine)
     tilt_gain(tasks, machine)
     rates(tasks, machine)
     refusals(tasks[:8], machine)
