@@ -10,6 +10,8 @@ from pentapod.errors import InputError
 MOST_BYTES = 2_000_000_000
 """No file is read into memory beyond this size; programs are read in blocks and have no bound."""
 
+_BLOCK = 1 << 20
+
 
 def read_bytes(
     path: Path, wrong: type[InputError], expected: str, most: int = MOST_BYTES, start: str | None = None
@@ -22,7 +24,10 @@ def read_bytes(
     try:
         with path.open("rb") as source:
             size = path.stat().st_size
-            data = source.read(most + 1) if size <= most else b""
+            data = source.read(size) if size <= most else b""
+            # Devices and pipes have no size.
+            while size <= most and len(data) <= most and (more := source.read(_BLOCK)):
+                data += more
     except FileNotFoundError as error:
         if start:
             raise wrong(f"no such {expected.removeprefix('a ')}", file=path, remedy=start) from error

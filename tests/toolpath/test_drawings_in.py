@@ -82,7 +82,7 @@ BAD = {
     "no_unit.csv": (CSV.replace("x_mm", "x").encode(), "no_unit.csv:1.*unknown column.*did you mean"),
     "no_z.csv": (b"x_mm,y_mm\n0,0\n1,1\n", "no_z.csv:1.*a column is missing.*z_mm"),
     "twice.csv": (b"x_mm,x_cm,y_mm,z_mm\n0,0,0,0\n", "there twice"),
-    "word.csv": (CSV.replace("10,5", "ten,5").encode(), "word.csv:4.*x.*not a number.*ten"),
+    "word.csv": (CSV.replace("10,5", "ten,5").encode(), "word.csv:4.*x.*not a finite number.*ten"),
     "nan.csv": (CSV.replace("10,5", "nan,5").encode(), "nan.csv:4.*finite"),
     "short.csv": (CSV.encode() + b"1,2\n", "short.csv:5.*columns"),
     "one.csv": (b"x_mm,y_mm,z_mm\n0,0,0\n", "no polyline"),

@@ -9,7 +9,7 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.errors import ToolpathError
-from pentapod.toolpath.drawings_in import extra, small_file
+from pentapod.toolpath.drawing_files import extra, small_file
 
 _MOST_PIXELS = 20_000_000
 _DEEPEST = 65_535.0

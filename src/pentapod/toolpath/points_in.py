@@ -12,7 +12,7 @@ import numpy as np
 from pentapod.arrays import Floats
 from pentapod.errors import ToolpathError, nearest
 from pentapod.input_files import number_in
-from pentapod.toolpath.drawings_in import small_file
+from pentapod.toolpath.drawing_files import small_file
 
 _TOLD = re.compile(r"#\s*points\s*=\s*([0-9]{1,12})")
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
-import math
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from pentapod.archives import MOST_UNPACKED
+from pentapod.archives import MOST_UNPACKED, read_arrays
 from pentapod.errors import InputError, ProgramError
 from pentapod.input_files import read_bytes
 from pentapod.program.header import header_text
@@ -19,7 +19,28 @@ from pentapod.program.program import Program
 from pentapod.program.resolution import to_millimetres
 
 _FILE = "program.h5"
-_WIDEST = 8  # bytes of a number
+_MOST_SECONDS, _TOO_LARGE = 8, 4  # of computing; the code with which the process below says so
+_CHILD = """
+import sys
+import h5py
+import numpy as np
+source, target, most, seconds = sys.argv[1:]
+try:
+    import resource
+    resource.setrlimit(resource.RLIMIT_CPU, (int(seconds), int(seconds)))
+except ImportError:
+    pass
+with h5py.File(source, "r") as archive:
+    header, legs = str(archive.attrs["header"]), archive["legs_mm"]
+    if legs.is_virtual or legs.external or legs.dtype.kind not in "fiu" or legs.dtype.itemsize > 8:
+        sys.exit(1)
+    count = 1
+    for length in legs.shape:
+        count *= int(length)
+    if 8 * count > int(most):
+        sys.exit(4)
+    np.savez(target, header=np.array(header), legs_mm=np.asarray(legs, dtype=np.float64))
+"""
 
 
 def _h5py() -> Any:
@@ -41,23 +62,24 @@ def _write(given: PostInput) -> dict[str, bytes]:
 
 
 def _read(folder: Path) -> Program:
-    file, h5py = folder / _FILE, _h5py()
-    data = read_bytes(file, ProgramError, "an HDF5 file")
-    try:
-        with h5py.File(io.BytesIO(data), "r") as archive:
-            header, legs = np.array(archive.attrs["header"]), archive["legs_mm"]
-            if legs.is_virtual or legs.external or legs.dtype.kind not in "fiu" or legs.dtype.itemsize > _WIDEST:
-                raise ProgramError("not numbers that the file holds itself", file=file, key="legs_mm")
-            rows = math.prod(legs.shape) // 5
-            if rows * 5 * legs.dtype.itemsize > MOST_UNPACKED:
-                expected = f"at most {MOST_UNPACKED / 1e6:,.0f} MB unpacked"
-                raise ProgramError("the array is too large", file=file, key="legs_mm", value=rows, expected=expected)
-            legs_mm = np.asarray(legs, dtype=np.float64)
-    except InputError:
-        raise
-    except Exception as error:  # of whatever kind: what is in the file decides how the library stumbles
-        raise ProgramError("not an HDF5 file of a program, or a broken one", file=file) from error
-    return of_archive(np.array(str(header)), legs_mm, file)
+    """Return the program. The library runs in a process of its own: there are files with which it does not end."""
+    file = folder / _FILE
+    _h5py()
+    read_bytes(file, ProgramError, "an HDF5 file")
+    with tempfile.TemporaryDirectory() as place:
+        unpacked = Path(place) / "arrays.npz"
+        command = [sys.executable, "-c", _CHILD, str(file), str(unpacked), str(MOST_UNPACKED), str(_MOST_SECONDS)]
+        try:
+            done = subprocess.run(command, capture_output=True, check=False, timeout=12 * _MOST_SECONDS)
+        except subprocess.TimeoutExpired as error:
+            raise ProgramError("not an HDF5 file of a program, or a broken one", file=file) from error
+        if done.returncode == _TOO_LARGE:
+            expected = f"at most {MOST_UNPACKED / 1e6:,.0f} MB unpacked"
+            raise ProgramError("the array is too large", file=file, key="legs_mm", expected=expected)
+        if done.returncode or not unpacked.exists():
+            raise ProgramError("not an HDF5 file of a program, or a broken one", file=file)
+        arrays = read_arrays(unpacked, ("header", "legs_mm"), ProgramError)
+    return of_archive(arrays["header"], arrays["legs_mm"], file)
 
 
 HDF5 = register(Post("hdf5", "HDF5 archive (extra hdf5)", _write, _read))
