@@ -24,11 +24,12 @@ from itertools import pairwise
 import numpy as np
 
 from pentapod.arrays import Floats
+from pentapod.timing.jerk_part import Part
+from pentapod.timing.jerk_passes import PASSES, answer_of
 from pentapod.timing.jerk_problem import Problem
 from pentapod.timing.jerk_rows import NO_ROWS, JerkRows, RowsAt
 from pentapod.timing.stages import Failure
 
-PASSES = 3
 BLOCK = 65_536
 """Gridpoints of a block."""
 
@@ -70,10 +71,6 @@ class Solved:
     y: Floats
     shift: float
 
-    def alone(self) -> Solved:
-        """Return the answer without the rows that it was found by, which are most of it."""
-        return replace(self, problem=replace(self.problem, rows=NO_ROWS))
-
     def at(self, s: Floats) -> tuple[Floats, Floats]:
         """Return x and x′ (n,) at sorted stations s (n,) of the whole path."""
         knots = self.problem.knots
@@ -81,9 +78,15 @@ class Solved:
         return v[:, 0], v[:, 1]
 
     def run(self, low: float, high: float) -> Run:
-        """Return the law at its gridpoints from `low` to before `high`, stations of the whole path; rests included."""
-        problem, v = self.problem, self.problem.values(self.y)
-        s, x, slope = problem.s, v[:, 0], v[:, 1]
+        """Return the law from `low` to before `high`, stations of the whole path; rests included.
+
+        At its gridpoints, and halfway between: what is made of them follows the spline closely.
+        """
+        problem, v = self.problem, np.empty((2 * len(self.problem.s) - 1, 3))
+        s = np.empty(len(v))
+        s[::2], s[1::2] = problem.s, (problem.s[1:] + problem.s[:-1]) / 2.0
+        v[::2], v[1::2] = problem.values(self.y), problem.at(self.y, s[1::2])
+        x, slope = v[:, 0], v[:, 1]
         if problem.begin.join > 0.0:
             s, x, slope = np.append(0.0, s), np.append(0.0, x), np.append(0.0, slope)
         if problem.end.join > 0.0:
@@ -97,42 +100,25 @@ class Solved:
 class SmoothProfile:
     """x = ṡ² (N,) and its slope x′ = 2 s̈ (N,) at stations (N,); jerk about constant between.
 
-    lead, parts: the blocks' solutions that it was joined from.
+    lead: gridpoints by which the blocks reached beyond their cuts, from whose solutions it was joined.
     """
 
     s: Floats
     x: Floats
     slope: Floats
     lead: int
-    parts: tuple[Solved, ...]
 
 
-def jerk_limited(s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: int = PASSES) -> SmoothProfile | Failure:
+def jerk_limited(
+    s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: int = PASSES, least_step: float = 0.0
+) -> SmoothProfile | Failure:
     """Return the fastest jerk-limited profile below x (N + 1,) at s (N + 1,).
 
     It rests at the ends where x is 0, and has the speed of x without acceleration where it is not. marks: where the
-    path's third derivative has kinks. A Failure where the passes find nothing.
+    path's third derivative has kinks. least_step: seconds below which the law needs no freedom. A Failure where the
+    passes find nothing.
     """
-    return _joined(s, len(s), lambda block: solved(s, x, rows_at, marks, passes, block))
-
-
-def limited_again(
-    before: SmoothProfile, s: Floats, x: Floats, rows_at: RowsAt, passes: int = PASSES
-) -> SmoothProfile | None:
-    """Return the profile for limits that were lowered at places, from the one before: solved anew about these alone.
-
-    x (N + 1,) at s (N + 1,): the law without jerk limits, lowered too. None where the rests are touched, where most of
-    the path is, or where a pass finds nothing: then it has to be solved as a whole.
-    """
-    parts: list[Solved] = []
-    for block, part in zip(blocks(len(s), before.lead), before.parts, strict=True):
-        here = slice(block.low, block.high + 1)
-        again = _again(part, s[here] - part.shift, x[here], partial(_shifted, rows_at, part.shift), passes)
-        if again is None:
-            return None
-        parts.append(again)
-    runs = list(runs_of(s, len(s), before.lead, parts))
-    return None if None in runs else _profile(runs, before.lead, parts)
+    return _joined(s, len(s), lambda block: solved(s, x, rows_at, marks, passes, least_step, block))
 
 
 def blocks(count: int, lead: int) -> list[Block]:
@@ -146,22 +132,18 @@ def leads(count: int) -> list[int]:
     return [LEAD] if len(blocks(count, LEAD)) == 1 else [LEAD << k for k in range((BLOCK // LEAD).bit_length() - 1)]
 
 
-def solved(s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: int, block: Block) -> Solved | Failure:
-    """Return the answer of one block; arguments as for `jerk_limited`."""
+def solved(
+    s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: int, least_step: float, block: Block
+) -> Solved | Failure:
+    """Return the answer of one block, without its rows; arguments as for `jerk_limited`."""
     here, shift = slice(block.low, block.high + 1), float(s[block.low])
     local, rows = np.asarray(s[here]) - shift, partial(_shifted, rows_at, shift)
-    problem = Problem.of(local, np.asarray(x[here]), rows, marks - shift, block.goes_on(len(s)))
-    y = problem.start()
-    around = np.minimum(problem.top, problem.ramps)
-    for number in range(passes):
-        better = problem.improved(y, around, number)
-        if better is None:
-            if number == 0:
-                return Failure(-1, NOT_LIMITED)
-            break
-        y = better
-        around = np.maximum(problem.values(y)[:, 0], 1e-9 * problem.top)
-    return Solved(problem, y, shift)
+    part = Part.of(local, np.asarray(x[here]), rows, marks - shift, block.goes_on(len(s)), least_step)
+    answer = answer_of(part, passes)
+    if answer is None:
+        return Failure(-1, NOT_LIMITED)
+    problem, y = answer
+    return Solved(replace(problem, rows=NO_ROWS), y, shift)
 
 
 def runs_of(s: Floats, count: int, lead: int, parts: Iterable[Solved]) -> Iterator[Run | None]:
@@ -193,14 +175,14 @@ def _joined(s: Floats, count: int, solve: Callable[[Block], Solved | Failure]) -
             continue
         runs = list(runs_of(s, count, lead, found))
         if None not in runs:
-            return _profile(runs, lead, found)
+            return _profile(runs, lead)
         reason = Failure(-1, APART)
     return reason
 
 
-def _profile(runs: Sequence[Run | None], lead: int, parts: Sequence[Solved]) -> SmoothProfile:
+def _profile(runs: Sequence[Run | None], lead: int) -> SmoothProfile:
     columns = (np.concatenate([run[k] for run in runs if run is not None]) for k in range(3))
-    return SmoothProfile(*columns, lead=lead, parts=tuple(parts))
+    return SmoothProfile(*columns, lead=lead)
 
 
 def _differing(left: Solved, right: Solved, low: float, high: float) -> float:
@@ -217,25 +199,6 @@ def _passage(left: Solved, right: Solved, low: float, high: float) -> Run:
     u = (s - low) / (high - low)
     share, rise = u**3 * (10.0 - 15.0 * u + 6.0 * u**2), 30.0 * (u * (1.0 - u)) ** 2 / (high - low)
     return s, x + share * (other - x), slope + share * (other_slope - slope) + rise * (other - x)
-
-
-def _again(before: Solved, s: Floats, x: Floats, rows_at: RowsAt, passes: int) -> Solved | None:
-    """Return a block's answer for limits that were lowered at places, None where it has to be solved as a whole."""
-    problem = before.problem.lowered(s, x, rows_at)
-    stretches = problem.stretches(before.problem)
-    if stretches is None:
-        return None
-    y, given = before.y, problem.held
-    around = np.minimum(problem.values(y)[:, 0], problem.top)
-    for number in range(passes):
-        for low, high in stretches:
-            held = (given[0] if low == 0 else 3, given[1] if high == len(y) else 3)
-            found = problem.solved(y, around, number, low, high, held)
-            if found is None and number == 0:
-                return None
-            y = y if found is None else found
-        around = np.maximum(problem.values(y)[:, 0], 1e-9 * problem.top)
-    return Solved(problem, y, before.shift)
 
 
 def _shifted(rows_at: RowsAt, shift: float, s: Floats) -> JerkRows:

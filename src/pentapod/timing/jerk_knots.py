@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from pentapod.arrays import Bools, Floats
+from pentapod.timing.jerk_part import Part
 from pentapod.timing.jerk_rows import JerkRows
 
-_KNOTS_PER_RAMP = 6
+KNOTS_PER_RAMP = 8.0
 _LEAST_KNOTS = 64
 _GROWTH = 1.5
+
+_BENT = 0.05
+"""Share of a limit that the path's own bend takes by itself, above which its kinks become knots."""
 
 _CALM_MARGIN, _CALM_GROWTH, _CALM_MOST = 3.0, 0.3, 12.0
 """Knots become fewer from so many ramps on inside a stretch of constant speed, how fast with the time, and how few."""
@@ -17,27 +22,57 @@ _CALM_MARGIN, _CALM_GROWTH, _CALM_MOST = 3.0, 0.3, 12.0
 _CALM_SHARE = 0.5
 
 
-def law_knots(s: Floats, x: Floats, rows: JerkRows, marks: Floats, begin: float, end: float) -> Floats:
-    """Return inner knots (K,) from begin to end: even in the time of the law x, at marks, ever closer to the rests.
+def law_knots(part: Part, x: Floats, pushed: float, per_ramp: float) -> Floats:
+    """Return inner knots (K,) even in the time of the law x (N + 1,), at the path's kinks, ever closer to the rests.
 
-    There is a rest where the spline does not reach to the path's end.
-
-    Where that law keeps its speed and no other limit is near there is little to find: knots are few.
+    So many for each ramp: the time in which jerk brings the accelerations to the share `pushed` of their limits; but
+    no closer in time than the part's least step. Where the law keeps its speed and no other limit is near there is
+    little to find: knots are few.
     """
+    s, rows = part.s, part.rows
+    calm = _calm(x, rows)
+    # Where the path's own jerk holds the law far below x, knots are close in the time that it takes there.
+    with np.errstate(divide="ignore"):
+        x = np.minimum(x, np.abs(rows.jerks[:, :, 0]).max(axis=1) ** (-2.0 / 3.0))
     speed = np.sqrt(x)
     steps = 2.0 * np.diff(s) / (speed[:-1] + speed[1:])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ramps = 2.0 * np.abs(rows.jerks[:, :, 2]).max(axis=1) / np.abs(rows.first).max(axis=1)
-    ramp = float(np.median(ramps[np.isfinite(ramps) & (ramps > 0.0)]))
-    calm = _calm(x, rows)
+    ramp = pushed * _ramp(rows)
     room = _seconds_to_others(steps, calm) - _CALM_MARGIN * ramp
-    every = min(ramp / _KNOTS_PER_RAMP, float(steps.sum()) / _LEAST_KNOTS)
+    every = min(max(ramp / per_ramp, part.least_step), float(steps.sum()) / _LEAST_KNOTS)
     wide = every * np.clip(1.0 + _CALM_GROWTH * room / every, 1.0, _CALM_MOST)
     number = np.concatenate([[0.0], np.cumsum(2.0 * steps / (wide[:-1] + wide[1:]))])
     even = np.interp(np.linspace(0.0, number[-1], int(np.ceil(number[-1])) + 1), number, s)
+    marks = _kinks(part, x, np.concatenate([[0.0], np.cumsum(steps)]))
     marks = marks[np.interp(marks, s, wide) < _CALM_MOST * every]
     gap = np.interp(s, (even[1:] + even[:-1]) / 2.0, np.diff(even))
-    knots = np.sort(np.concatenate([even, marks]))
+    if len(marks) > 2:
+        gap = np.minimum(gap, np.interp(s, (marks[1:] + marks[:-1]) / 2.0, np.diff(marks)))
+    return _towards_rests(part, np.sort(np.concatenate([even, marks])), gap)
+
+
+def _ramp(rows: JerkRows) -> float:
+    """Return the seconds in which jerk brings an acceleration to its limit."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ramps = 2.0 * np.abs(rows.jerks[:, :, 2]).max(axis=1) / np.abs(rows.first).max(axis=1)
+    return float(np.median(ramps[np.isfinite(ramps) & (ramps > 0.0)]))
+
+
+def _kinks(part: Part, x: Floats, times: Floats) -> Floats:
+    """Return the marks where the path's bend takes part of a limit by the law x, no closer than the least step."""
+    use = np.maximum(
+        np.abs(part.rows.jerks[:, :, 0]).max(axis=1) * x**1.5, np.abs(part.rows.second).max(axis=1) * x
+    )
+    marks = part.marks[np.interp(part.marks, part.s, maximum_filter1d(use, 5)) > _BENT]
+    if part.least_step <= 0.0 or not len(marks):
+        return marks
+    at = np.interp(marks, part.s, times)
+    # The first of each least step.
+    return marks[np.concatenate([[True], np.diff(np.floor(at / part.least_step)) > 0.0])]
+
+
+def _towards_rests(part: Part, knots: Floats, gap: Floats) -> Floats:
+    """Return the knots between the ends of the spline, ever closer to the rests; gap (N + 1,): how close they are."""
+    s, begin, end = part.s, part.begin.join, part.length - part.end.join
     length = end - begin
     near = begin * _GROWTH ** np.arange(1, 200)
     far = (s[-1] - end) * _GROWTH ** np.arange(1, 200)

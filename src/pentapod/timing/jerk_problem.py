@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
-from pentapod.timing.jerk_ends import End, Open, Ramp, Steady
+from pentapod.timing.jerk_ends import End
 from pentapod.timing.jerk_kernels import convex_pass
-from pentapod.timing.jerk_knots import law_knots
-from pentapod.timing.jerk_rows import ROW_NAMES, JerkRows, RowsAt
+from pentapod.timing.jerk_part import Part
+from pentapod.timing.jerk_rows import ROW_NAMES, JerkRows
 from pentapod.timing.spline_kernels import cubic_basis, spline_values
 
 GRIDPOINTS_PER_KNOT = 4
@@ -22,12 +22,10 @@ WINDOW = 256
 LEAD = 64
 """Coefficients on either side of a seam, beyond which the path has no say in what happens there."""
 
-_COLD, _WARM = (1.0, 0.1), (0.01,)
+_COLD, _WARM = (1.0, 0.1), (0.01, 0.1, 1.0)
 """Levels of slacks and multipliers to start from, one after the other until one leads to an answer: those of rows of
 order 1, and of an answer that is nearly right."""
 _ITERATIONS = 60
-_MOST_AGAIN = 0.6
-"""Share of the coefficients up to which solving only what was lowered is worth it."""
 
 _GAP = 1e-5
 _KEPT = 1e-6
@@ -50,59 +48,32 @@ class Problem:
     length: float
 
     @classmethod
-    def of(
-        cls, s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, goes_on: tuple[bool, bool] = (False, False)
-    ) -> Problem:
-        """Return the problem below x (N + 1,) at s (N + 1,), from s = 0; arguments as for `jerk_limited`.
-
-        goes_on: whether the path goes on beyond either end.
-        """
-        length = float(s[-1])
-        coarse = rows_at(s)
-        turned = JerkRows(*(getattr(coarse, name)[::-1] for name in ROW_NAMES))
-        begin, end = (
-            Open() if on else Ramp.of(rows, there, length / 8.0) if here == 0.0 else Steady(float(here))
-            for on, rows, there, here in ((goes_on[0], coarse, s, x[0]), (goes_on[1], turned, s[::-1], x[-1]))
-        )
-        inner = law_knots(s, x, coarse, marks, begin.join, length - end.join)
+    def on(cls, part: Part, inner: Floats, before: Problem | None = None) -> Problem:
+        """Return the problem with inner knots (K,); rows of gridpoints that `before` has are taken from there."""
         steps = np.diff(inner)[:, None] * (np.arange(GRIDPOINTS_PER_KNOT) / GRIDPOINTS_PER_KNOT)
         grid = np.append((inner[:-1, None] + steps).ravel(), inner[-1])
         knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
         basis, first = np.empty((len(grid), 3, 4)), np.empty(len(grid), dtype=np.int64)
         cubic_basis(knots, grid, basis, first)
-        rows = rows_at(grid)
-        top = np.minimum(np.interp(grid, s, x), rows.ceiling)
+        rows = part.rows_at(grid) if before is None else _some_anew(part, grid, before)
+        top = np.minimum(np.interp(grid, part.s, part.x), rows.ceiling)
         weight = np.gradient(grid)
-        ramps = np.minimum(begin.bound(grid), end.bound(length - grid))
+        ramps = np.minimum(part.begin.bound(grid), part.end.bound(part.length - grid))
         weight *= len(grid) / (weight / np.sqrt(np.minimum(top, ramps))).sum()
-        return cls(grid, knots, basis, first, rows, top, ramps, weight, begin, end, length)
+        return cls(grid, knots, basis, first, rows, top, ramps, weight, part.begin, part.end, part.length)
 
-    def lowered(self, s: Floats, x: Floats, rows_at: RowsAt) -> Problem:
-        """Return the problem with the same knots below other limits: x (N + 1,) at s (N + 1,), rows anew."""
-        rows = rows_at(self.s)
-        return replace(self, rows=rows, top=np.minimum(np.interp(self.s, s, x), rows.ceiling))
+    @property
+    def inner(self) -> Floats:
+        """Knots (K,), each once."""
+        return self.knots[3:-3]
 
-    def stretches(self, other: Problem) -> list[tuple[int, int]] | None:
-        """Return the coefficients, from and to before, about the gridpoints at which limits are not the other's.
-
-        None where these are at a rest, or most of the path.
-        """
-        changed = (
-            (self.rows.jerks != other.rows.jerks).any(axis=(1, 2))
-            | (self.rows.first != other.rows.first).any(axis=1)
-            | (np.abs(self.top - other.top) > 1e-9 * other.top)
-        )
+    def stretches(self, stations: Floats) -> list[tuple[int, int]]:
+        """Return stretches of coefficients, from and to before, about sorted stations (n,) between inner knots."""
         n = len(self.knots) - 4
-        at = np.flatnonzero(changed)
-        if changed[: 4 * GRIDPOINTS_PER_KNOT].any() or changed[-4 * GRIDPOINTS_PER_KNOT :].any():
-            return None
-        if not len(at):
-            return []
-        lows = np.maximum(self.first[at] - LEAD, 0)
-        highs = np.minimum(self.first[at] + 4 + LEAD, n)
+        at = np.clip(np.searchsorted(self.knots, stations, "right") - 1, 3, n - 1)
+        lows, highs = np.maximum(at - 3 - LEAD // 2, 0), np.minimum(at + 1 + LEAD // 2, n)
         apart = np.flatnonzero(lows[1:] > highs[:-1]) + 1
-        found = [(int(lows[run[0]]), int(highs[run[-1]])) for run in np.split(np.arange(len(at)), apart)]
-        return found if sum(high - low for low, high in found) < _MOST_AGAIN * n else None
+        return [(int(lows[run[0]]), int(highs[run[-1]])) for run in np.split(np.arange(len(at)), apart)]
 
     @property
     def held(self) -> tuple[int, int]:
@@ -119,12 +90,13 @@ class Problem:
             y[-1 - k] = value
         return y
 
-    def improved(self, y: Floats, around: Floats, number: int) -> Floats | None:
+    def improved(self, y: Floats, around: Floats, number: int, gains: Floats | None = None) -> Floats | None:
         """Return the coefficients after pass `number` with tangents at `around` (N,), None where it found nothing.
 
         Long stretches go in windows between coefficients that stay. The first pass has found these in windows of
         their own, about each seam with a lead on both sides; the seams of later passes lie halfway between the last
-        ones, and what stays there is the last pass's, so that every window has an answer.
+        ones, and what stays there is the last pass's, so that every window has an answer. gains (N,): what the pass
+        before has won at each gridpoint, less what is worth another one; a window without any is left as it is.
         """
         n = len(y)
         if n < 2 * WINDOW:
@@ -143,6 +115,8 @@ class Problem:
         better = y.copy()
         for left, right in pairwise([0, *seams, n]):
             low, high = max(left - 1, 0), min(right + 2, n)
+            if gains is not None and gains[self._gridpoints(low, high)].sum() <= 0.0:
+                continue
             held = (self.held[0] if left == 0 else 3, self.held[1] if right == n else 3)
             found = self.solved(y, around, number, low, high, held)
             if found is None and number == 0:
@@ -150,6 +124,10 @@ class Problem:
             if found is not None:
                 better[low:high] = found[low:high]
         return better
+
+    def _gridpoints(self, low: int, high: int) -> slice:
+        """Return the gridpoints that coefficients from low to before high alone have a say in."""
+        return slice(int(np.searchsorted(self.first, low)), int(np.searchsorted(self.first, high - 4, "right")))
 
     def solved(
         self, y: Floats, around: Floats, number: int, low: int, high: int, held: tuple[int, int]
@@ -162,7 +140,7 @@ class Problem:
     def _solved(
         self, y: Floats, around: Floats, level: float, low: int, high: int, held: tuple[int, int]
     ) -> Floats | None:
-        here = slice(int(np.searchsorted(self.first, low)), int(np.searchsorted(self.first, high - 4, "right")))
+        here = self._gridpoints(low, high)
         fixed = np.zeros(high - low, dtype=np.int64)
         fixed[: held[0]] = 1
         fixed[len(fixed) - held[1] :] = 1
@@ -201,3 +179,20 @@ class Problem:
         cubic_basis(self.knots, s, basis, first)
         spline_values(basis, first, y, v)
         return v
+
+
+def _some_anew(part: Part, grid: Floats, before: Problem) -> JerkRows:
+    """Return the rows at gridpoints (N,), of which those that another problem has are taken from there."""
+    near = np.minimum(np.searchsorted(before.s, grid), len(before.s) - 1)
+    anew = before.s[near] != grid
+    fresh = part.rows_at(grid[anew])
+    columns: list[Floats] = []
+    for name in ROW_NAMES:
+        old, new = getattr(before.rows, name), getattr(fresh, name)
+        if len(old) == len(before.s):
+            column = old[near]
+            column[anew] = new
+        else:  # one row for all
+            column = old
+        columns.append(column)
+    return JerkRows(*columns)

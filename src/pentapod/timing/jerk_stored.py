@@ -21,7 +21,8 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.errors import InputError
-from pentapod.timing.jerk import APART, PASSES, Block, Run, Solved, blocks, leads, runs_of, solved
+from pentapod.timing.jerk import APART, Block, Run, Solved, blocks, leads, runs_of, solved
+from pentapod.timing.jerk_passes import PASSES
 from pentapod.timing.jerk_rows import RowsAt
 from pentapod.timing.stages import Failure
 
@@ -52,6 +53,7 @@ def limit_stored(
     out: Path,
     *,
     passes: int = PASSES,
+    least_step: float = 0.0,
     processes: int = 1,
 ) -> Failure | None:
     """Write the law that `jerk_limited` finds to the file `out` (.npy): columns station, ṡ² and its slope (n, 3).
@@ -65,7 +67,7 @@ def limit_stored(
     for lead in leads(count):
         with tempfile.TemporaryDirectory(dir=out.parent) as scratch:
             raw = Path(scratch) / "runs"
-            work = partial(_solved, stored, rows_at, marks, passes)
+            work = partial(_solved, stored, rows_at, marks, passes, least_step)
             reason = _write(raw, runs_of(stored.s, count, lead, _each(work, blocks(count, lead), processes)))
             if reason is None:
                 whole = Path(scratch) / "law.npy"
@@ -83,9 +85,10 @@ class _NoLawError(Exception):
         self.failure = failure
 
 
-def _solved(stored: StoredProfile, rows_at: RowsAt, marks: Floats, passes: int, block: Block) -> Solved | Failure:
-    found = solved(stored.s, stored.x, rows_at, marks, passes, block)
-    return found if isinstance(found, Failure) else found.alone()
+def _solved(
+    stored: StoredProfile, rows_at: RowsAt, marks: Floats, passes: int, least_step: float, block: Block
+) -> Solved | Failure:
+    return solved(stored.s, stored.x, rows_at, marks, passes, least_step, block)
 
 
 def _each(work: partial[Solved | Failure], todo: list[Block], processes: int) -> Iterator[Solved]:
