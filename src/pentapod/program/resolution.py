@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from pentapod.arrays import Floats, as_floats
 from pentapod.errors import ProgramError
+from pentapod.machine.rounding import QUANTA_PER_M
 
-QUANTA_PER_M = 1e11
 QUANTA_PER_MM = 1e8
 MM_DECIMALS = 8
 LARGEST_M = 10_000.0

@@ -11,6 +11,7 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.machine.machine import Machine
+from pentapod.machine.rounding import TIP_ROUNDING, jerk_of_rounding
 from pentapod.machine.tool_limits import ToolLimits
 from pentapod.timing.course import Course, legs_along, tip_along, turn_along
 from pentapod.timing.paths import PieceLike
@@ -31,6 +32,9 @@ CONSTRAINTS = (
 
 FEED = CONSTRAINTS.index("feed")
 RAPID = CONSTRAINTS.index("rapid rate")
+_LEAST_LEFT = 0.25
+"""Share of a jerk limit that is planned with at least, however much rounding may add."""
+
 PUSHES = slice(5, 12)
 """Columns of the accelerations; the others are speeds."""
 
@@ -43,7 +47,8 @@ class Limits:
 
     velocity (5,) m/s, acceleration (5,) m/s² and jerk (5,) m/s³ of the legs; tool: of the tip and the axis; rapid: the
     tip's speed on rapids, m/s; feed_fraction of each feed; guard: seconds by which a slower section's feed reaches
-    into its faster neighbours, so that no interval between two setpoints straddles the step too fast.
+    into its faster neighbours, so that no interval between two setpoints straddles the step too fast; period: seconds
+    between setpoints. Jerks leave room for the rounding of setpoints.
     """
 
     velocity: Floats
@@ -53,25 +58,28 @@ class Limits:
     rapid: float
     feed_fraction: float
     guard: float
+    period: float
 
     @classmethod
     def of(cls, machine: Machine, velocity_margin: float, acceleration_margin: float, guard: float) -> Limits:
         """Return the machine's limits less the margins (fractions)."""
         slower, softer = 1.0 - velocity_margin, 1.0 - acceleration_margin
-        tool = machine.tool_limits
+        tool, controller = machine.tool_limits, machine.controller
+        rounding = jerk_of_rounding(controller.period, controller.interpolation)
         return cls(
             velocity=machine.legs.max_velocity * slower,
             acceleration=machine.legs.max_acceleration * softer,
-            jerk=machine.legs.max_jerk * softer,
+            jerk=_less(machine.legs.max_jerk * softer, rounding),
             tool=ToolLimits(
                 tool.max_tip_acceleration * softer,
-                tool.max_tip_jerk * softer,
+                float(_less(tool.max_tip_jerk * softer, TIP_ROUNDING * rounding)),
                 tool.max_axis_velocity * slower,
                 tool.max_axis_acceleration * softer,
             ),
             rapid=machine.rapid_velocity * slower,
             feed_fraction=slower,
             guard=guard,
+            period=controller.period,
         )
 
     @property
@@ -194,3 +202,8 @@ class Limits:
         if self.tool.limits_tip_jerk:
             shares[:, 5] = np.linalg.norm(jerk(*course.tip), axis=1) / self.tool.max_tip_jerk
         return shares
+
+
+def _less(jerk: Floats | float, rounding: float) -> Floats:
+    """Return what rounding leaves of a jerk."""
+    return np.maximum(np.asarray(jerk) - rounding, _LEAST_LEFT * np.asarray(jerk))

@@ -13,6 +13,7 @@ from pentapod.timing.constraints import FEED, PUSHES, RAPID, Limits
 from pentapod.timing.course import Course
 from pentapod.timing.engine import Engine, fastest
 from pentapod.timing.grid import first_grid
+from pentapod.timing.jerk_caps import acceleration_caps
 from pentapod.timing.jerk_rows import JerkRows
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.paths import PieceLike
@@ -28,14 +29,16 @@ _SWITCHING_LOSS = 3e-4
 
 _EASINGS = 3
 
+_LEAST_PERIODS = 0.5
+"""Periods of the controller below which a law limited in jerk needs no freedom."""
+
 
 @dataclass(frozen=True, eq=False)
 class PieceProfile:
     """Squared speeds x (N + 1,) in m²/s² at stations s (N + 1,) in metres of a piece, linear in s between.
 
-    ease_acceleration, ease_speed and ease_jerk (N + 1,): factors ≤ 1 on the limits at each gridpoint, where a plan at
-    full limits was measured to exceed them. before: what was found for the limits before these were eased. x_start,
-    x_end: x that is given at the ends, 0 at rests.
+    ease_acceleration, ease_speed (N + 1,): factors ≤ 1 on the limits at each gridpoint, where a plan at full limits was
+    measured to exceed them. x_start, x_end: x that is given at the ends, 0 at rests.
     """
 
     piece: PieceLike
@@ -44,9 +47,7 @@ class PieceProfile:
     x: Floats
     ease_acceleration: Floats
     ease_speed: Floats
-    ease_jerk: Floats
     engine: Engine = "core"
-    before: SmoothProfile | None = None
     x_start: float = 0.0
     x_end: float = 0.0
 
@@ -77,10 +78,38 @@ class PieceProfile:
     @cached_property
     def smooth(self) -> SmoothProfile | Failure:
         """The fastest profile below this one that keeps the jerk limits too."""
-        from pentapod.timing.jerk import jerk_limited, limited_again  # noqa: PLC0415  (compiled: loaded where it is used)
+        from pentapod.timing.jerk import jerk_limited  # noqa: PLC0415  (compiled: loaded where it is used)
 
-        again = limited_again(self.before, self.s, self.x, self._jerk_rows) if self.before else None
-        return again or jerk_limited(self.s, self.x, self._jerk_rows, self.piece.knots)
+        x: Floats | Failure = self.x
+        if (self._push_caps < 1.0).any():
+            first, second = self.rows()
+            caps = self._with_tool(self._push_caps, first.shape[1])
+            x = fastest(
+                self.s, first / caps, second / caps, self.ceiling(), x_start=self.x_start, x_end=self.x_end,
+                engine=self.engine,
+            )  # fmt: skip
+        return jerk_limited(
+            self.s,
+            self.x if isinstance(x, Failure) else np.minimum(x, self.x),
+            self._jerk_rows,
+            self.piece.knots,
+            least_step=_LEAST_PERIODS * self.limits.period,
+        )
+
+    @cached_property
+    def _push_caps(self) -> Floats:
+        """Shares (N + 1, 5) of the legs' acceleration limits that no law within the jerk limits exceeds."""
+        limits = self.limits
+        one, ceiling = self.course.legs[0], limits.ceiling(self.course)
+        return (
+            acceleration_caps(self.s, one, ceiling, limits.acceleration, limits.jerk, moving=self.moving)
+            / limits.acceleration
+        )
+
+    @staticmethod
+    def _with_tool(caps: Floats, rows: int) -> Floats:
+        """Return the caps (n, R) of all rows; those of the tool have none."""
+        return np.concatenate([caps, np.ones((len(caps), rows - caps.shape[1]))], axis=1)
 
     def smooth_law(self) -> MotionLaw | Failure:
         """Return the law of `smooth`."""
@@ -89,15 +118,15 @@ class PieceProfile:
 
     def _jerk_rows(self, s: Floats) -> JerkRows:
         course = self.limits.course(self.piece, s, 3)
-        acceleration, speed, jerk = (
-            np.interp(s, self.s, ease)[:, None] for ease in (self.ease_acceleration, self.ease_speed, self.ease_jerk)
-        )
+        acceleration, speed = (np.interp(s, self.s, ease)[:, None] for ease in (self.ease_acceleration, self.ease_speed))
         first, second = self.limits.rows(course)
+        caps = np.stack([np.interp(s, self.s, cap) for cap in self._push_caps.T], axis=1)
+        pushes = self._with_tool(caps, first.shape[1]) * acceleration
         return JerkRows(
-            first / acceleration,
-            second / acceleration,
+            first / pushes,
+            second / pushes,
             np.zeros((1, first.shape[1])),
-            self.limits.jerk_rows(course) / jerk[:, :, None],
+            self.limits.jerk_rows(course),
             self.limits.ceiling(course) * speed[:, 0] ** 2,
         )
 
@@ -105,14 +134,10 @@ class PieceProfile:
         """Return the largest x (N + 1,) at each gridpoint that any path acceleration allows, m²/s²."""
         return self.limits.ceiling(self.course) * self.ease_speed**2
 
-    def eased(self, acceleration: Floats, speed: Floats, jerk: Floats | None = None) -> PieceProfile | Failure:
-        """Return the profile solved anew with further factors (N + 1,) on accelerations, speeds and jerks."""
-        smooth = self.__dict__.get("smooth")
+    def eased(self, acceleration: Floats, speed: Floats) -> PieceProfile | Failure:
+        """Return the profile solved anew with further factors (N + 1,) on accelerations and speeds."""
         return self.with_(
-            before=None if isinstance(smooth, Failure) else smooth,
-            ease_acceleration=self.ease_acceleration * acceleration,
-            ease_speed=self.ease_speed * speed,
-            ease_jerk=self.ease_jerk if jerk is None else self.ease_jerk * jerk,
+            ease_acceleration=self.ease_acceleration * acceleration, ease_speed=self.ease_speed * speed
         ).solved()
 
     def with_(self, **changes: Any) -> PieceProfile:
@@ -131,7 +156,7 @@ class PieceProfile:
         added = [self.s[:-1][switching] + (where * np.diff(self.s))[switching]]
         added += [(self.s[:-1] + between * np.diff(self.s))[exceeding] for between in _BETWEEN]
         s = np.unique(np.concatenate([self.s, *added]))
-        x, *eases = (np.interp(s, self.s, y) for y in (self.x, self.ease_acceleration, self.ease_speed, self.ease_jerk))
+        x, *eases = (np.interp(s, self.s, y) for y in (self.x, self.ease_acceleration, self.ease_speed))
         return PieceProfile(
             self.piece, self.limits, s, x, *eases, engine=self.engine, x_start=self.x_start, x_end=self.x_end
         )
@@ -221,7 +246,7 @@ def time_piece(
     """
     s = first_grid(piece, limits)
     x_start, x_end = speeds[0] ** 2, speeds[1] ** 2
-    ones = (np.ones_like(s) for _ in range(3))
+    ones = (np.ones_like(s) for _ in range(2))
     problem = PieceProfile(piece, limits, s, np.zeros_like(s), *ones, engine=engine, x_start=x_start, x_end=x_end)
     profile = problem.solved()
     for attempt in range(_REFINEMENTS + _EASINGS):
