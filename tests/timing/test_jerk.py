@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_retime import PATHS, nod
+from test_retime import PATHS
 from timing_paths import Path, machine, straight
 
 from pentapod.timing import Trajectory, certify, retime
 from pentapod.timing.engine import fastest
-from pentapod.timing.jerk import jerk_limited, limited_again
+from pentapod.timing.jerk import jerk_limited
 from pentapod.timing.jerk_rows import JerkRows
 from pentapod.timing.law import MotionLaw
 
-FINE = 1e-5
+FINE = 2.5e-4
 
 
 def timed(path, m, **options):
@@ -50,11 +50,13 @@ def test_short_straight_takes_the_time_of_four_phases(length, j):
     m.legs.max_jerk.flags.writeable = True
     m.legs.max_jerk[:] = j
     expected = 4 * (length / 2 / j) ** (1 / 3)
-    m.controller = type(m.controller)(expected / 2000, "linear")
+    # Of so many periods that rounding setpoints takes no more than a hundredth of the jerk.
+    count = min(2000, int((0.01 * 32 * length / 4e-11) ** (1 / 3)))
+    m.controller = type(m.controller)(expected / count, "linear")
     trajectory = timed(
         Path((straight([0, 1, 0, 0, 0], length, start=0.0),)), m
     )  # third differences of 0.8 m would be rounding
-    assert expected < trajectory.duration < 1.02 * expected
+    assert expected < trajectory.duration < (1.02 + 1.5 / count) * expected
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
@@ -63,7 +65,7 @@ def test_every_limit_holds_on_the_sampled_program(name, interpolation):
     m = machine(interpolation=interpolation)
     trajectory = timed(Path((PATHS[name](),)), m)
     use = {u.quantity: u.share for u in certify(trajectory, m)}
-    assert use["leg jerk"] < 1.05
+    assert use["leg jerk"] < 1.0
     assert max(use["leg velocity"], use["leg acceleration"], use["feed"]) < 1.0
     assert max(use.values()) > 0.97
     # By finite differences of the setpoints, which know nothing of splines: over three periods jerk is averaged.
@@ -109,34 +111,6 @@ def test_passes_improve_and_two_come_close(name):
     assert durations[1] < 1.02 * durations[-1]
     below = MotionLaw.from_profile(s, x).duration
     assert below < durations[-1]
-
-
-def test_lowered_limits_are_met_by_solving_about_their_places_alone():
-    m, piece = machine(), nod(0.2)
-    s = np.unique(np.concatenate([np.linspace(0, piece.length, 4000), piece.knots]))
-    rows = rows_of(piece, m)
-
-    def lowered(at):
-        r, near = rows(at), 1.0 - 0.2 * (np.abs(at - 0.09) < 0.002)
-        return JerkRows(r.first / near[:, None], r.second, r.offset, r.jerks / near[:, None, None], r.ceiling * near)
-
-    def law_of(p):
-        return MotionLaw.through(p.s, p.x, p.slope)
-
-    before = jerk_limited(s, fastest(s, rows(s).first, rows(s).second, rows(s).ceiling), rows, piece.knots)
-    x = fastest(s, lowered(s).first, lowered(s).second, lowered(s).ceiling)
-    again, whole = limited_again(before, s, x, lowered), jerk_limited(s, x, lowered, piece.knots)
-    far = np.abs(again.s - 0.09) > 0.05
-    assert far.sum() > 0.4 * len(far)
-    assert np.array_equal(again.x[far], before.x[far])  # not solved again
-    assert law_of(before).duration < law_of(again).duration
-    assert law_of(again).duration == pytest.approx(law_of(whole).duration, rel=1e-3)
-    assert (again.x[1:-1] <= lowered(again.s[1:-1]).ceiling * (1 + 1e-6)).all()
-    (part,) = again.parts
-    v = part.problem.values(part.y)
-    jerk = np.sqrt(v[:, :1]) * np.einsum("nkd,nd->nk", lowered(part.problem.s).jerks, v)
-    assert np.abs(jerk).max() < 1.0 + 1e-6
-    assert limited_again(before, s, x, lambda at: lowered(at + 0.09)) is None  # the rests are touched
 
 
 @pytest.mark.parametrize("seed", range(3))

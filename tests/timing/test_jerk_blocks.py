@@ -9,7 +9,7 @@ import pytest
 from pentapod.errors import InputError
 from pentapod.timing import jerk
 from pentapod.timing.engine import fastest
-from pentapod.timing.jerk import jerk_limited, limited_again
+from pentapod.timing.jerk import jerk_limited
 from pentapod.timing.jerk_rows import JerkRows
 from pentapod.timing.jerk_stored import StoredProfile, limit_stored
 from pentapod.timing.law import MotionLaw
@@ -68,8 +68,8 @@ def small(monkeypatch):
 def test_blocks_find_the_law_of_the_whole(whole, small):
     s, x, law = whole
     blocked = jerk_limited(s, x, Waves(), NO_MARKS)
-    assert len(law.parts) == 1
-    assert len(blocked.parts) == 6
+    assert len(jerk.blocks(len(s), blocked.lead)) == 6
+    assert not np.array_equal(blocked.x, law.x)
     assert duration(blocked) == pytest.approx(duration(law), rel=1e-3)
     assert (np.diff(blocked.s) > 0.0).all()
     assert blocked.x[0] == blocked.x[-1] == 0.0
@@ -97,7 +97,7 @@ def test_from_disk_and_by_processes_the_same_bits(whole, small, tmp_path, proces
     np.save(tmp_path / "s.npy", s)
     np.save(tmp_path / "x.npy", x)
     out = tmp_path / "law.npy"
-    assert len(law.parts) == 6
+    assert len(jerk.blocks(len(s), law.lead)) == 6
     assert limit_stored(StoredProfile(tmp_path), Waves(), NO_MARKS, out, processes=processes) is None
     assert np.array_equal(np.load(out), np.column_stack([law.s, law.x, law.slope]))
     assert sorted(file.name for file in tmp_path.iterdir()) == ["law.npy", "s.npy", "x.npy"]
@@ -147,22 +147,6 @@ def test_where_blocks_do_not_agree_leads_get_longer(whole, monkeypatch, answer):
 def test_blocks_that_never_agree_have_no_law(whole, small, monkeypatch):
     monkeypatch.setattr(jerk, "_AGREED", 0.0)
     assert jerk_limited(*whole[:2], Waves(), NO_MARKS) == Failure(-1, jerk.APART)
-
-
-def test_lowered_limits_are_solved_anew_in_their_blocks_alone(whole, small):
-    s, x, _ = whole
-    law = jerk_limited(s, x, Waves(), NO_MARKS)
-
-    def lowered(at):
-        rows = Waves()(at)
-        near = np.where(np.abs(at - 0.9) < 0.01, 0.8, 1.0)
-        return JerkRows(rows.first, rows.second, rows.offset, rows.jerks / near[:, None, None], rows.ceiling)
-
-    again = limited_again(law, s, x, lowered)
-    assert again is not None
-    assert duration(again) > duration(law)
-    far = (again.s < 0.5) & (law.s < 0.5) if len(again.s) == len(law.s) else slice(0, 1000)
-    np.testing.assert_allclose(again.x[far], law.x[far], rtol=1e-12)
 
 
 def test_memory_does_not_grow_with_the_path(small, tmp_path):

@@ -32,6 +32,9 @@ CONSTRAINTS = (
 
 FEED = CONSTRAINTS.index("feed")
 RAPID = CONSTRAINTS.index("rapid rate")
+_RINGING = 0.975
+"""Share of a jerk limit that is planned with: where jerk steps, the spline through setpoints rings above it."""
+
 _LEAST_LEFT = 0.25
 """Share of a jerk limit that is planned with at least, however much rounding may add."""
 
@@ -48,7 +51,7 @@ class Limits:
     velocity (5,) m/s, acceleration (5,) m/s² and jerk (5,) m/s³ of the legs; tool: of the tip and the axis; rapid: the
     tip's speed on rapids, m/s; feed_fraction of each feed; guard: seconds by which a slower section's feed reaches
     into its faster neighbours, so that no interval between two setpoints straddles the step too fast; period: seconds
-    between setpoints. Jerks leave room for the rounding of setpoints.
+    between setpoints. Jerks leave room for what rounding setpoints adds; jerk_fraction of what is left is planned with.
     """
 
     velocity: Floats
@@ -57,6 +60,7 @@ class Limits:
     tool: ToolLimits
     rapid: float
     feed_fraction: float
+    jerk_fraction: float
     guard: float
     period: float
 
@@ -64,20 +68,22 @@ class Limits:
     def of(cls, machine: Machine, velocity_margin: float, acceleration_margin: float, guard: float) -> Limits:
         """Return the machine's limits less the margins (fractions)."""
         slower, softer = 1.0 - velocity_margin, 1.0 - acceleration_margin
+        smoother = softer * _RINGING
         tool, controller = machine.tool_limits, machine.controller
         rounding = jerk_of_rounding(controller.period, controller.interpolation)
         return cls(
             velocity=machine.legs.max_velocity * slower,
             acceleration=machine.legs.max_acceleration * softer,
-            jerk=_less(machine.legs.max_jerk * softer, rounding),
+            jerk=_less(machine.legs.max_jerk, rounding) * smoother,
             tool=ToolLimits(
                 tool.max_tip_acceleration * softer,
-                float(_less(tool.max_tip_jerk * softer, TIP_ROUNDING * rounding)),
+                float(_less(tool.max_tip_jerk, TIP_ROUNDING * rounding)) * smoother,
                 tool.max_axis_velocity * slower,
                 tool.max_axis_acceleration * softer,
             ),
             rapid=machine.rapid_velocity * slower,
             feed_fraction=slower,
+            jerk_fraction=smoother,
             guard=guard,
             period=controller.period,
         )

@@ -8,21 +8,21 @@ import numpy as np
 from scipy.optimize import brentq
 
 from pentapod.timing.law import MotionLaw
+from pentapod.timing.local_stretch import Stretchable
 from pentapod.timing.piece import PieceProfile
 from pentapod.timing.stages import Failure
 
 
-def law_between(profile: PieceProfile, slower: float, period: float, *, smooth: bool) -> MotionLaw | Failure:
+def law_between(
+    profile: PieceProfile, slower: float, period: float, nodes: Stretchable | None = None
+) -> MotionLaw | Failure:
     """Return the law of a profile with given speeds at its ends, `slower` times slower, in whole periods.
 
     What has to be slower is so by a share of x = ṡ² that rises from 0 at the ends that move, with two vanishing
-    derivatives: so these speeds stay, and no limit of speed is exceeded. smooth: the law limited in jerk. A Failure
-    where there is none, or where a tenth of x is still too fast.
+    derivatives: so these speeds stay, and no limit of speed is exceeded. nodes: of the law limited in jerk, instead. A
+    Failure where a tenth of x is still too fast.
     """
-    smoothed = profile.smooth if smooth else None
-    if isinstance(smoothed, Failure):
-        return smoothed
-    s, x = (profile.s, profile.x) if smoothed is None else (smoothed.s, smoothed.x)
+    s, x = (profile.s, profile.x) if nodes is None else (nodes.s, nodes.x)
     far = np.minimum(
         s / s[-1] if profile.x_start > 0.0 else np.ones_like(s),
         1.0 - s / s[-1] if profile.x_end > 0.0 else np.ones_like(s),
@@ -35,9 +35,9 @@ def law_between(profile: PieceProfile, slower: float, period: float, *, smooth: 
 
     def law(less: float) -> MotionLaw:
         kept = 1.0 - less * share
-        if smoothed is None:
+        if nodes is None:
             return MotionLaw.from_profile(s, x * kept)
-        return MotionLaw.through(s, x * kept, smoothed.slope * kept - less * rise * x)
+        return MotionLaw.through(s, x * kept, nodes.slope * kept - less * rise * x)
 
     goal = whole_periods(law(0.0).duration * slower, period)
     most = 0.9

@@ -59,9 +59,7 @@ def _ramp(rows: JerkRows) -> float:
 
 def _kinks(part: Part, x: Floats, times: Floats) -> Floats:
     """Return the marks where the path's bend takes part of a limit by the law x, no closer than the least step."""
-    use = np.maximum(
-        np.abs(part.rows.jerks[:, :, 0]).max(axis=1) * x**1.5, np.abs(part.rows.second).max(axis=1) * x
-    )
+    use = np.maximum(np.abs(part.rows.jerks[:, :, 0]).max(axis=1) * x**1.5, np.abs(part.rows.second).max(axis=1) * x)
     marks = part.marks[np.interp(part.marks, part.s, maximum_filter1d(use, 5)) > _BENT]
     if part.least_step <= 0.0 or not len(marks):
         return marks

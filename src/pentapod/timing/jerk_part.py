@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from pentapod.arrays import Floats
 from pentapod.timing.jerk_ends import End, Open, Ramp, Steady
 from pentapod.timing.jerk_rows import ROW_NAMES, JerkRows, RowsAt

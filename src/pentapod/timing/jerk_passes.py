@@ -40,7 +40,9 @@ def answer_of(part: Part, passes: int = PASSES) -> Answer | None:
         y, around = problem.start(), np.minimum(problem.top, problem.ramps)
     else:
         coarse, rough = found
-        problem = Problem.on(part, law_knots(part, _law_at(part, coarse, rough), _pushed(coarse, rough), KNOTS_PER_RAMP))
+        problem = Problem.on(
+            part, law_knots(part, _law_at(part, coarse, rough), _pushed(coarse, rough), KNOTS_PER_RAMP)
+        )
         y, around = _carried(coarse, rough, problem)
     better = _settled(problem, y, around, passes)
     if better is None:
@@ -153,7 +155,9 @@ def _carried(old: Problem, y: Floats, new: Problem) -> tuple[Floats, Floats]:
     one, two = v[:n], v[n:]
     third = (two[:, 2] - one[:, 2]) / (high - low)
     a, b, c = (t[index + k] - low for k in (1, 2, 3))
-    blossom = one[:, 0] + one[:, 1] * (a + b + c) / 3.0 + one[:, 2] * (a * b + b * c + c * a) / 6.0 + third * a * b * c / 6.0
+    blossom = (
+        one[:, 0] + one[:, 1] * (a + b + c) / 3.0 + one[:, 2] * (a * b + b * c + c * a) / 6.0 + third * a * b * c / 6.0
+    )
     start, (begun, ended) = new.start(), new.held
     blossom = np.maximum(blossom, 1e-12 * new.top.max())
     blossom[:begun] = start[:begun]

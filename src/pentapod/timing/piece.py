@@ -118,7 +118,9 @@ class PieceProfile:
 
     def _jerk_rows(self, s: Floats) -> JerkRows:
         course = self.limits.course(self.piece, s, 3)
-        acceleration, speed = (np.interp(s, self.s, ease)[:, None] for ease in (self.ease_acceleration, self.ease_speed))
+        acceleration, speed = (
+            np.interp(s, self.s, ease)[:, None] for ease in (self.ease_acceleration, self.ease_speed)
+        )
         first, second = self.limits.rows(course)
         caps = np.stack([np.interp(s, self.s, cap) for cap in self._push_caps.T], axis=1)
         pushes = self._with_tool(caps, first.shape[1]) * acceleration
