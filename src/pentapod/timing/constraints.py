@@ -60,9 +60,9 @@ class Limits:
     tool: ToolLimits
     rapid: float
     feed_fraction: float
-    jerk_fraction: float
     guard: float
-    period: float
+    jerk_fraction: float = 1.0
+    period: float = 0.0
 
     @classmethod
     def of(cls, machine: Machine, velocity_margin: float, acceleration_margin: float, guard: float) -> Limits:

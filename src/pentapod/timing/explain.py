@@ -79,7 +79,7 @@ class Explanation:
 
     def __str__(self) -> str:
         lines = [
-            f"cycle time {self.duration:.3f} s, {100.0 * self.gap / self.duration:.1f} % above what feeds and leg "
+            f"cycle time {self.duration:.3f} s, {100.0 * self.gap / self.lower_bound:.1f} % above what feeds and leg "
             f"velocities alone would take ({self.lower_bound:.3f} s)"
         ]
         lines += [f"  {c.name}: holds the motion for {c.time:.3g} s, costs {c.cost:.3g} s" for c in self.causes]

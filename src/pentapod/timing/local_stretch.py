@@ -23,7 +23,7 @@ class Stretchable:
         return MotionLaw.through(self.s, self.x, self.slope)
 
     def slower(self, times: Floats, depths: Floats, widths: Floats) -> Stretchable:
-        """Return it slower about some of its times (n,): by the shares `depths` (n,) there, by less up to `widths` (n,).
+        """Return it slower about some of its times (n,): by the shares `depths` there, by less up to `widths` (n,).
 
         The speed is multiplied by f = 1 − depth (1 − u²)³, u = (t − time) / width, which has no step in the jerk; so x
         by f², and x′ = 2 s̈ follows. Places that overlap multiply.

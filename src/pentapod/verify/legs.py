@@ -5,20 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.arrays import Floats
-from pentapod.program.program import Program
-from pentapod.program.resolution import QUANTA_PER_M
 from pentapod.verify.claim import ALLOWANCE, MM, Claim, Finding, with_allowance
 from pentapod.verify.replay import Replay
 from pentapod.verify.survey import Extreme
 
 _EXACT = "exact extrema of the controller's polynomials, rows and between"
-
-JERK_ALLOWANCE = 0.05
-"""Relative allowance on leg jerks: where the jerk of the motion steps, the spline through its setpoints overshoots."""
-
-# What rounding each row by half a quantum can do to third differences, 8 / 2, and to the spline's third derivative,
-# 24 / 2 (rows rounded up and down in turn), in quanta by the period cubed.
-_ROUNDED = {"linear": 4.0, "cubic": 12.0}
 
 
 def shortest(replay: Replay) -> Finding:
@@ -55,26 +46,13 @@ def acceleration(replay: Replay) -> Finding:
 
 def jerk(replay: Replay) -> Finding:
     """Judge the jerk of every leg, with rest before the first row and after the last."""
-    found, limit, program = replay.survey.jerks, replay.machine.legs.max_jerk, replay.program
-    rounding = jerk_of_rounding(program)
-    leg = int(np.argmax(found.values / limit))
-    value, bound = float(found.values[leg]), float(limit[leg])
-    method = (
+        method = (
         "third difference of the rows by the period cubed, in place of the impulses that lines between rows have; "
-        if program.interpolation == "linear"
+        if replay.program.interpolation == "linear"
         else "third derivative of the spline, constant between the rows: exact; "
     )
-    method += (
-        "a step of acceleration at either end counts over one period; "
-        f"{JERK_ALLOWANCE:.0%} allowed, and {MM * rounding:.3g} mm/s³ for the rounding of the rows"
-    )
-    allowed = bound * (1.0 + JERK_ALLOWANCE) + rounding
-    return _finding(replay, value <= allowed, (value, bound, "mm/s³"), (int(found.at[leg]), leg), method, allowed)
-
-
-def jerk_of_rounding(program: Program) -> float:
-    """Return the jerk, m/s³, that rounding the rows of a program can add to a leg's."""
-    return _ROUNDED[program.interpolation] / QUANTA_PER_M / program.period**3
+    method += "a step of acceleration at either end counts over one period"
+    return _below(replay, replay.survey.jerks, replay.machine.legs.max_jerk, "mm/s³", method)
 
 
 def _below(replay: Replay, found: Extreme, limit: Floats, unit: str, method: str) -> Finding:

@@ -10,12 +10,9 @@ import numpy as np
 from pentapod.arrays import Floats
 from pentapod.geometry.interpolant import Interpolant, largest_length
 from pentapod.verify.claim import ALLOWANCE, MM, Claim, Finding, Idle, with_allowance
-from pentapod.verify.legs import JERK_ALLOWANCE, jerk_of_rounding
 from pentapod.verify.replay import Replay
 
 _DEG = 180.0 / np.pi  # in a radian
-_ROUNDED = 10.0
-"""What rounding the rows may add to the tip's jerk, by what it may add to a leg's."""
 
 
 def acceleration(replay: Replay) -> Finding:
@@ -28,12 +25,9 @@ def acceleration(replay: Replay) -> Finding:
 
 def jerk(replay: Replay) -> Finding:
     """Judge the tip's jerk."""
-    limit, rounding = replay.machine.tool_limits.max_tip_jerk, _ROUNDED * jerk_of_rounding(replay.program)
-    method = (
-        "third derivative of what joins the program's tips, between its rows; "
-        f"{JERK_ALLOWANCE:.0%} allowed, and {MM * rounding:.3g} mm/s³ for the rounding of the rows"
-    )
-    allowed = limit * (1.0 + JERK_ALLOWANCE) + rounding
+    limit = replay.machine.tool_limits.max_tip_jerk
+    method = f"third derivative of what joins the program's tips, between its rows; {ALLOWANCE:.1%} allowed"
+    allowed = with_allowance(limit)
     return _below(replay, _largest(_tip(replay).jerk_lengths), limit, (MM, "mm/s³", allowed), method)
 
 
