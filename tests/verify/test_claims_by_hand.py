@@ -313,7 +313,7 @@ def judged(replay, name, machine=None, **changes):
     [
         ("leg rates", "max_velocity", 1e-3),
         ("leg accelerations", "max_acceleration", 1e-3),
-        ("leg jerks", "max_jerk", 0.05),
+        ("leg jerks", "max_jerk", 1e-3),
         ("starts at rest", "max_acceleration", 1e-3),
         ("ends at rest", "max_acceleration", 1e-3),
         ("legs not too long", "max_length", 0.0),

@@ -8,7 +8,6 @@ import replay_cases as cases
 from scipy.interpolate import CubicSpline
 
 from pentapod.machine.tool_limits import ToolLimits
-from pentapod.program.resolution import QUANTA_PER_M
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import verify
 
@@ -64,12 +63,7 @@ def test_the_true_value_decides(good, claim):
     assert (above.passed, below.passed) == (True, False)
     assert below.value == pytest.approx(factor * value, rel=0.02)
     assert below.bound == pytest.approx(factor * 0.9 * value)
-    allowed = 1.001 * below.bound
-    if claim == "tip jerk":
-        # Ten times what half a quantum in each of the rows makes of a leg's third difference, or thrice that.
-        weights = 8 if good.program.interpolation == "linear" else 24
-        allowed = 1.05 * below.bound + 10.0 * 1e3 * 0.5 * weights / QUANTA_PER_M / cases.PERIOD**3
-    assert below.allowed == pytest.approx(allowed, rel=1e-9)
+    assert below.allowed == pytest.approx(1.001 * below.bound, rel=1e-9)
 
 
 def test_without_limits_there_are_no_claims(good):

@@ -32,6 +32,8 @@ _EASINGS = 3
 _LEAST_PERIODS = 0.5
 """Periods of the controller below which a law limited in jerk needs no freedom."""
 
+_STAGE_PERIODS = 1.0
+
 
 @dataclass(frozen=True, eq=False)
 class PieceProfile:
@@ -80,21 +82,29 @@ class PieceProfile:
         """The fastest profile below this one that keeps the jerk limits too."""
         from pentapod.timing.jerk import jerk_limited  # noqa: PLC0415  (compiled: loaded where it is used)
 
-        x: Floats | Failure = self.x
+        s, x = self.s, self.x
         if (self._push_caps < 1.0).any():
-            first, second = self.rows()
-            caps = self._with_tool(self._push_caps, first.shape[1])
-            x = fastest(
-                self.s, first / caps, second / caps, self.ceiling(), x_start=self.x_start, x_end=self.x_end,
-                engine=self.engine,
-            )  # fmt: skip
-        return jerk_limited(
-            self.s,
-            self.x if isinstance(x, Failure) else np.minimum(x, self.x),
-            self._jerk_rows,
-            self.piece.knots,
-            least_step=_LEAST_PERIODS * self.limits.period,
-        )
+            s = self._fine_grid()
+            x, rows = np.interp(s, self.s, self.x), self._jerk_rows(s)
+            capped = fastest(
+                s, rows.first, rows.second, rows.ceiling, x_start=self.x_start, x_end=self.x_end, engine=self.engine
+            )
+            x = x if isinstance(capped, Failure) else np.minimum(x, capped)
+        return jerk_limited(s, x, self._jerk_rows, self.piece.knots, least_step=_LEAST_PERIODS * self.limits.period)
+
+    def _fine_grid(self) -> Floats:
+        """Return the gridpoints and more between them, so that no stage lasts longer than a period.
+
+        The law below lower accelerations switches where this grid has no points for it.
+        """
+        ds, speed = np.diff(self.s), np.sqrt(self.x)
+        longest = _STAGE_PERIODS * self.limits.period
+        if longest <= 0.0:
+            return self.s
+        counts = np.ceil(2.0 * ds / (speed[:-1] + speed[1:]) / longest).astype(np.intp)
+        stage = np.repeat(np.arange(len(ds)), counts)
+        within = np.arange(len(stage)) - np.repeat(np.cumsum(counts) - counts, counts)
+        return np.append(self.s[stage] + ds[stage] * (within / counts[stage]), self.s[-1])
 
     @cached_property
     def _push_caps(self) -> Floats:

@@ -46,7 +46,7 @@ def acceleration(replay: Replay) -> Finding:
 
 def jerk(replay: Replay) -> Finding:
     """Judge the jerk of every leg, with rest before the first row and after the last."""
-        method = (
+    method = (
         "third difference of the rows by the period cubed, in place of the impulses that lines between rows have; "
         if replay.program.interpolation == "linear"
         else "third derivative of the spline, constant between the rows: exact; "
