@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.given_speeds import whole_periods
-from pentapod.timing.jerk import SmoothProfile
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.local_stretch import Stretchable
 from pentapod.timing.piece import PieceProfile
 from pentapod.timing.setpoints import EDGE, Setpoints, Use
+
+if TYPE_CHECKING:
+    from pentapod.timing.jerk import SmoothProfile
 
 _ROUNDS = 30
 _PHASES = (0.0, 0.25, 0.5, 0.75)

@@ -18,7 +18,6 @@ from pentapod.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.eased import eased
 from pentapod.timing.given_speeds import law_between, whole_periods
-from pentapod.timing.jerk import SmoothProfile
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.local_stretch import Stretchable
 from pentapod.timing.measured import measured, untouched
@@ -68,7 +67,7 @@ class _Plan:
         Where the passes find no law that keeps the jerk limits, the averaged one is run as slowly as they ask.
         """
         found = profile.smooth if smooth else None
-        if isinstance(found, SmoothProfile):
+        if not (found is None or isinstance(found, Failure)):
             first = MotionLaw.through(found.s, found.x, found.slope).duration
             return cls(profile, mended(profile, found, machine), 1.0, first, window)
         if isinstance(found, Failure) and profile.moving:
