@@ -14,7 +14,20 @@ from pentapod.program.csv import read_csv
 from pentapod.program.program import Program
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.verify import bodies, collisions, component, gouge, joints, legs, origin, speed, standing, tool, tracking
+from pentapod.verify import (
+    bodies,
+    collisions,
+    component,
+    gouge,
+    joints,
+    legs,
+    origin,
+    slowness,
+    speed,
+    standing,
+    tool,
+    tracking,
+)
 from pentapod.verify.claim import Claim
 from pentapod.verify.replay import SURVEY_SHARE, Replay
 from pentapod.verify.specification import Asked, Specification
@@ -31,6 +44,7 @@ CLAIMS: tuple[Claim, ...] = (
     *tracking.CLAIMS,
     *speed.CLAIMS,
     *standing.CLAIMS,
+    *slowness.CLAIMS,
     *tool.CLAIMS,
     *collisions.CLAIMS,
 )

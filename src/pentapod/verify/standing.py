@@ -19,7 +19,7 @@ _SECONDS = 1e-9
 
 def exact_stops(replay: Replay) -> Finding | Idle:
     """Judge that the robot comes to rest wherever the toolpath stops."""
-    stops = _stops(replay)
+    stops = asked_stops(replay)
     if not stops:
         return Idle("the toolpath asks for no stop")
     period, limit = replay.program.period, replay.machine.legs.max_acceleration
@@ -40,7 +40,7 @@ def exact_stops(replay: Replay) -> Finding | Idle:
 
 def dwells(replay: Replay) -> Finding | Idle:
     """Judge that the robot stands as long as the toolpath asks."""
-    asked = [stop for stop in _stops(replay) if stop[2] > 0.0]
+    asked = [stop for stop in asked_stops(replay) if stop[2] > 0.0]
     if not asked:
         return Idle("the toolpath asks for no dwell")
     still = np.abs(np.diff(replay.program.legs, axis=0)).max(axis=1) <= STILL_M
@@ -54,7 +54,7 @@ def dwells(replay: Replay) -> Finding | Idle:
     return Finding(value >= bound - _SECONDS, value, bound, "s", replay.place(2 * asked[worst][0]), method)
 
 
-def _stops(replay: Replay) -> list[tuple[int, int, float]]:
+def asked_stops(replay: Replay) -> list[tuple[int, int, float]]:
     """Return for each stop of the toolpath the steps from row to row, from and to before, near it; and its seconds."""
     path, match, count = replay.toolpath, replay.match, len(replay.program.legs) - 1
     # Where the tool turns on the spot its way does not tell one waypoint from the next.
