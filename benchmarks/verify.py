@@ -100,7 +100,13 @@ def main() -> None:
     parser.add_argument("--cells", type=int, default=200, help="of the hill's mesh, each way")
     given = parser.parse_args()
     _, toolpath, program = (machine, *_) = case(given.rows, given.waypoints)
-    tolerances = {"tilt": 0.0, "path_tolerance": 20e-6, "axis_tolerance": np.radians(0.5), "job_digest": "bench"}
+    tolerances = {
+        "tilt": 0.0,
+        "path_tolerance": 20e-6,
+        "axis_tolerance": np.radians(0.5),
+        "lowest_share": 0.6,
+        "job_digest": "bench",
+    }
     surface = MeshDistance.of(hill(given.cells))
     tool = BallCutter(BALL, shank=(Cone(0.03, 2e-3, 2e-3),), holder=(Cone(0.02, 8e-3, 8e-3),))
     around = Surroundings((Obstacle("part", surface, clamped=True, allowance=5e-5),), mounted(tool.solids, machine))

@@ -38,5 +38,6 @@ def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Cal
         cutting=cutting,
         freedom=freedom,
         component=None if component is None else Component.parse(component),
+        lowest_share=job.feed.lowest_share,
         waived=job.verify.waive,
     )

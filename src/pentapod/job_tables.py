@@ -187,6 +187,13 @@ class FeedTable(Table):
     link_mm_min: Positive | None = Field(
         default=None, le=100_000.0, description="feed of approaches and links; the cutting feed when left out"
     )
+    lowest_share: float | None = Field(
+        default=None,
+        ge=0.0,
+        le=1.0,
+        description="of the feed, that cuts and links reach wherever no limit of machine or job is used; below it the "
+        "verdict fails. 0.9 when left out, 0.95 for laser and spray; 0 asks for none",
+    )
     dwell_s: float | None = Field(
         default=None,
         ge=0.0,

@@ -17,7 +17,7 @@ from pentapod.verify.replay import Replay
 from pentapod.verify.standing import STILL_M, asked_stops
 
 LOWEST_SHARE = 0.9
-"""Of the feed: slower is a cut or a link only where a limit of the machine or the job is used."""
+"""Of the feed, where the job says nothing: slower is a cut or a link only where a limit of machine or job is used."""
 
 LOWEST_SHARE_STANDOFF = 0.95
 """The same for what works from a stand-off, a laser or a spray, where what it does depends on the feed."""
@@ -40,18 +40,21 @@ _CREEP = 0.01
 
 def lowest_feed(replay: Replay) -> Finding | Idle:
     """Judge that cuts and links are not slower than the feed where no limit asks for it."""
+    standoff, bound = replay.toolpath.pivot < 0.0, replay.specification.lowest_share
+    if bound is None:
+        bound = LOWEST_SHARE_STANDOFF if standoff else LOWEST_SHARE
+    if bound == 0.0:
+        return Idle("the job asks for no lowest feed")
     feeds = _feeds(replay)
     judged = np.isfinite(feeds)
     if not judged.any():
         return Idle("no moment belongs to a cut or a link alone")
-    standoff = replay.toolpath.pivot < 0.0
     period = replay.program.period
     tip = _speeds(replay, 0.0)
     share = (_speeds(replay, replay.toolpath.pivot) if standoff else tip) / feeds
     used = np.maximum(_used(replay), tip / replay.machine.rapid_velocity if standoff else 0.0)
     around = max(math.ceil(_AROUND_S / period), _AROUND_ROWS)
     judged &= maximum_filter1d(used, 2 * around + 1) < _USED
-    bound = LOWEST_SHARE_STANDOFF if standoff else LOWEST_SHARE
     row = int(np.argmin(np.where(judged, share, np.inf)))
     value = min(float(share[row]), 1.0) if judged[row] else 1.0
     slow = judged & (share < bound)
@@ -73,7 +76,7 @@ def unasked_stop(replay: Replay) -> Finding:
     # The row nearest to a stop is within half a period of it: by then a leg has gained at most this.
     rest = np.minimum(legs.max_jerk * period**2, _CREEP * min(feeds))
     steps = np.abs(np.diff(replay.program.legs, axis=0))
-    runs = marked_runs((steps <= np.maximum(rest * period, STILL_M)).all(axis=1))
+    runs = marked_runs(np.asarray((steps <= np.maximum(rest * period, STILL_M)).all(axis=1)))
     reasons, asked = _reasons(replay, runs)
     seconds = (runs[:, 1] - runs[:, 0]) * period
     beyond = np.where(reasons, np.maximum(seconds - asked - _SPARE_S, 0.0), seconds)

@@ -26,8 +26,10 @@ class Specification:
     tilt: half angle in radians of the cone about the nominal axis in which the tool may stand; axis_tolerance:
     radians beyond that; path_tolerance: metres. job_digest: of the job that the header must name. surroundings: what
     legs, spindle and tool must not touch. cutting: what cuts, and into which part. freedom: where the part may be
-    placed. component: in which the program must be, None where any will do. waived: names of claims without which the
-    verdict may pass where they cannot be judged. Raises ArrayError where a tolerance is not a sensible number.
+    placed. component: in which the program must be, None where any will do. lowest_share: of the feed, that cuts and
+    links must reach where no limit is used; None for the default of the tool, 0 where it does not matter. waived: names
+    of claims without which the verdict may pass where they cannot be judged. Raises ArrayError where a tolerance is not
+    a sensible number.
     """
 
     machine: Machine
@@ -40,6 +42,7 @@ class Specification:
     cutting: Cutting | None = None
     freedom: Freedom | None = None
     component: Component | None = None
+    lowest_share: float | None = None
     waived: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -47,6 +50,8 @@ class Specification:
             value = getattr(self, name)
             if not (np.isfinite(value) and (value >= 0.0 if name != "path_tolerance" else value > 0.0)):
                 raise ArrayError("must be a positive number", key=name, value=value)
+        if self.lowest_share is not None and not 0.0 <= self.lowest_share <= 1.0:
+            raise ArrayError("must be a share", key="lowest_share", value=self.lowest_share, expected="0 to 1")
 
 
 class Asked(TypedDict, total=False):
@@ -60,4 +65,5 @@ class Asked(TypedDict, total=False):
     cutting: Cutting | None
     freedom: Freedom | None
     component: Component | None
+    lowest_share: float | None
     waived: tuple[str, ...]
