@@ -94,7 +94,14 @@ def test_a_run_is_posted_as_it_was_planned(make_job, tmp_path, capsys):
     assert run(["plan", str(job), "-o", str(out), "--quiet"]) == 0
     assert run(["post", str(out / "program.csv"), "--to", "linuxcnc", "-o", str(tmp_path / "posted")]) == 0
     assert (tmp_path / "posted" / "pentakins" / "play.sh").is_file()
+    # Alone, it is judged anew.
     program = read_csv(out / "program.csv")
+    (alone := tmp_path / "alone").mkdir()
+    write_csv(program, alone / "program.csv")
+    capsys.readouterr()
+    assert run(["verify", str(alone / "program.csv"), "--job", str(job), "--json"]) == 0
+    (alone / "verdict.json").write_text(capsys.readouterr().out, encoding="utf-8")
+    assert run(["post", str(alone / "program.csv"), "--to", "pvt", "-o", str(alone)]) == 0
     write_csv(jumping(program), out / "program.csv")
     capsys.readouterr()
     assert run(["post", str(out / "program.csv"), "--to", "linuxcnc", "-o", str(tmp_path / "jumps")]) == 2

@@ -23,6 +23,7 @@ def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -
     Nothing of the planner is used: the rows are replayed through the closed-form forward kinematics and
     compared with the toolpath that the job asks for.
     """
+    from pentapod.files import sha256_of
     from pentapod.job import Job
     from pentapod.pipeline import judge
 
@@ -31,7 +32,7 @@ def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -
     with progress_bar(quiet=quiet or as_json) as progress:
         verdict = judge(loaded, program, progress, strict=strict)
     if as_json:
-        echo_json(verdict.to_dict())
+        echo_json({**verdict.to_dict(), "sha256": {"program": sha256_of(program)}})
     elif not quiet:
         click.echo(verdict_text(verdict))
     return 0 if verdict.passed else 1
