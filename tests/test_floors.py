@@ -49,6 +49,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
             "job_surroundings",
             "job_tool",
             "job_values",
+            "job_verdict",
             "outcome",
             "clock",
             "plan_arrays",

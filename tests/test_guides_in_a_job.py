@@ -13,8 +13,9 @@ from pentapod import pipeline
 from pentapod.errors import InputError, MachineError, ProgramError
 from pentapod.job import Job
 from pentapod.job_values import job_machine
+from pentapod.job_verdict import judge
 from pentapod.machine.machine import Machine
-from pentapod.pipeline import judge, run
+from pentapod.pipeline import run
 from pentapod.planning import PlacedPath
 from pentapod.program import read_csv
 from pentapod.program.posts import PostInput

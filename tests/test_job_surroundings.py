@@ -9,7 +9,8 @@ from pentapod.errors import JobError, MeshError
 from pentapod.job import Job
 from pentapod.job_surroundings import job_surroundings
 from pentapod.job_values import job_machine, job_mesh
-from pentapod.pipeline import judge, run
+from pentapod.job_verdict import judge
+from pentapod.pipeline import run
 from pentapod.toolpath.stl import write_stl
 
 HELD = "diameter_mm = 10\nshank_mm = [[20, 8, 8]]\nholder_mm = [[25, 20, 30]]"

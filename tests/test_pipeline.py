@@ -15,8 +15,9 @@ from pentapod.geometry import RigidTransform
 from pentapod.job import Job
 from pentapod.job_placement import job_freedom
 from pentapod.job_values import job_machine, job_mesh, job_toolpath
+from pentapod.job_verdict import judge
 from pentapod.outcome import SetUps
-from pentapod.pipeline import judge, run
+from pentapod.pipeline import run
 from pentapod.planning import LegPath, PlacedPath
 from pentapod.program import read_csv
 from pentapod.refusal import Refusal

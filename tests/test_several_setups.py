@@ -142,11 +142,16 @@ def test_verdict_and_report_tell_of_all(done):
     assert "part stands" in (out / "setup-2" / "report.html").read_text()
 
 
-def test_each_program_is_judged_alone(done, job, capsys):
-    """Against its own piece it passes; with another's piece in its header it fails."""
+def test_the_programs_together_are_the_job_and_one_alone_is_not(done, job, capsys):
+    """The folder passes; a program alone leaves open who makes the other cuts; with another's piece it fails."""
     out, _ = done
     file = out / "setup-2" / "program.csv"
-    assert command(["verify", str(file), "--job", str(job), "--strict", "-q"]) == 0
+    assert command(["verify", str(out), "--job", str(job), "--strict", "-q"]) == 0
+    capsys.readouterr()
+    assert command(["verify", str(file), "--job", str(job), "--json"]) == 1
+    verdict = json.loads(capsys.readouterr().out)
+    assert all(certificate["passed"] for certificate in verdict["certificates"])
+    assert [entry["claim"] for entry in verdict["not_judged"]] == ["every cut is made in one set-up"]
     other = (out / "setup-1" / "program.csv").read_text()
     lines = [re.search(r"# setup_box_mm = .*", content)[0] for content in (other, file.read_text())]
     wrong = out.parent / "wrong.csv"

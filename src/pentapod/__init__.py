@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pentapod.geometry import RigidTransform as RigidTransform
     from pentapod.job import Job as Job
+    from pentapod.job_verdict import judge as judge
     from pentapod.kinematics import Component as Component
     from pentapod.kinematics import LinearPentapod as LinearPentapod
     from pentapod.machine import Machine as Machine
     from pentapod.machine import Surroundings as Surroundings
     from pentapod.outcome import Outcome as Outcome
-    from pentapod.pipeline import judge as judge
     from pentapod.pipeline import run as run
     from pentapod.planning import Freedom as Freedom
     from pentapod.planning import LegPath as LegPath
@@ -82,7 +82,7 @@ _HOMES = {
     "Refusal": "refusal",
     "Job": "job",
     "run": "pipeline",
-    "judge": "pipeline",
+    "judge": "job_verdict",
     "Outcome": "outcome",
     "write_report": "report",
     "__version__": "version",

@@ -39,5 +39,6 @@ def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Cal
         freedom=freedom,
         component=None if component is None else Component.parse(component),
         lowest_share=job.feed.lowest_share,
+        setups=job.placement.setups,
         waived=job.verify.waive,
     )

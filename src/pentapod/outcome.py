@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -11,6 +12,7 @@ from pentapod.planning.placed_path import PlacedPath
 from pentapod.program.program import Program
 from pentapod.refusal import Refusal
 from pentapod.toolpath.parting import Piece
+from pentapod.verify.pieces import WHOLE
 from pentapod.verify.verdict import Certificate, Place, Verdict
 
 Value = TypeVar("Value")
@@ -125,12 +127,14 @@ class SetUp:
 class SetUps:
     """The set-ups into which a job was split, in their order.
 
-    cuts: how many intervals of the toolpath are cut; missed: how many of them in no set-up, or in more than one.
+    cuts: how many intervals of the toolpath are cut; missed: how many of them in no set-up, or in more than one. most:
+    set-ups that the job allows.
     """
 
     parts: tuple[SetUp, ...]
     cuts: int
     missed: int
+    most: int
 
     def __str__(self) -> str:
         lines = [f"{len(self.parts)} set-ups, for one placement cannot reach all:"]
@@ -140,12 +144,22 @@ class SetUps:
     @property
     def verdict(self) -> Verdict:
         """All claims about all set-ups, and that they are the whole work."""
-        words = f"{self.cuts} intervals between waypoints are cut; the set-ups' pieces were counted against them"
-        whole = Certificate("every cut is made in one set-up", self.missed == 0, self.missed, 0.0, "", Place(), words)
-        parts = [(f"set-up {part.number}: ", part.outcome.verdict) for part in self.parts]
-        certificates = (replace(c, claim=before + c.claim) for before, verdict in parts for c in verdict.certificates)
-        unjudged = (replace(n, claim=before + n.claim) for before, verdict in parts for n in verdict.not_judged)
-        return Verdict((whole, *certificates), tuple(unjudged))
+        return setups_verdict(
+            [(part.number, part.outcome.verdict) for part in self.parts], self.cuts, self.missed, self.most
+        )
+
+
+def setups_verdict(verdicts: Sequence[tuple[int, Verdict]], cuts: int, missed: int, most: int) -> Verdict:
+    """Return all claims about all set-ups, by number, and that they are the whole work; most: that the job allows."""
+    words = (
+        f"{cuts} intervals between waypoints are cut; the set-ups' pieces were counted against them; {len(verdicts)} "
+        f"set-ups, at most {most} are allowed"
+    )
+    whole = Certificate(WHOLE, missed == 0 and len(verdicts) <= most, missed, 0.0, "", Place(), words)
+    parts = [(f"set-up {number}: ", verdict) for number, verdict in verdicts]
+    certificates = (replace(c, claim=before + c.claim) for before, verdict in parts for c in verdict.certificates)
+    unjudged = (replace(n, claim=before + n.claim) for before, verdict in parts for n in verdict.not_judged)
+    return Verdict((whole, *certificates), tuple(unjudged))
 
 
 def refusal_verdict(refusal: Refusal) -> Verdict:

@@ -14,7 +14,7 @@ from pentapod.job import Job
 from pentapod.job_placement import job_weights
 from pentapod.job_specification import job_specification
 from pentapod.job_tool import job_link_style
-from pentapod.job_values import job_machine, job_mesh, job_piece, job_toolpath, program_toolpath
+from pentapod.job_values import job_machine, job_mesh, job_piece, job_toolpath
 from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import NOTHING
 from pentapod.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
@@ -30,8 +30,8 @@ from pentapod.run_folder import staged, unstaged
 from pentapod.timing import Explanation, Trajectory, certify, explain, retime, unheld
 from pentapod.toolpath import Mesh, Toolpath
 from pentapod.toolpath.links import LinkStyle
-from pentapod.toolpath.parting import Piece, cutting_intervals, part_of
-from pentapod.verify import Specification, Verdict, judged
+from pentapod.toolpath.parting import Piece, missed_cuts, part_of
+from pentapod.verify import Specification, judged
 from pentapod.version import __version__, library_versions, processor_kind
 
 Writer = Callable[[Outcome, Path], object]
@@ -61,6 +61,8 @@ def run(
         machine = job_machine(job)
         mesh = clock.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
         asked = job_specification(job, machine, mesh, lambda: _toolpath(job, mesh, piece, clock))
+        if piece is not None:  # whoever asks for a piece has the others made elsewhere
+            asked = dataclasses.replace(asked, setups=max(asked.setups, 2))
         task = _Task(job, asked, clock, piece)
         outcome = _reached(task, staging, writers or {})
         refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
@@ -113,6 +115,7 @@ def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, write
     if isinstance(found, Refusal):
         verdict = refusal_verdict(found)
         return _written(Outcome(job, task.machine, tuple(clock.stages), verdict), staging, writers, clock.progress)
+    cutting, missed = missed_cuts(toolpath, found)
     parts: list[SetUp] = []
     before = [stage for stage in clock.stages if stage.name not in ("toolpath", "set-ups")]
     for number, piece in enumerate(found, start=1):
@@ -122,24 +125,12 @@ def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, write
         folder = staging / SetUp.folder_of(number)
         folder.mkdir()
         own_task = dataclasses.replace(
-            task, asked=dataclasses.replace(task.asked, toolpath=part), clock=own, piece=piece
+            task, asked=dataclasses.replace(task.asked, toolpath=part, missed=missed), clock=own, piece=piece
         )
         parts.append(SetUp(number, piece, _reached(own_task, folder, writers)))
-    times = np.sum([piece.cuts(toolpath) for piece in found], axis=0)
-    cutting = cutting_intervals(toolpath)
-    done = SetUps(tuple(parts), int(cutting.sum()), int((times != cutting).sum()))
+    done = SetUps(tuple(parts), cutting, missed, job.placement.setups)
     clock.stages.append(Stage("set-ups planned", sum(part.seconds for part in parts), done, str(done)))
     return _written(Outcome(job, task.machine, tuple(clock.stages), done.verdict), staging, writers, clock.progress)
-
-
-def judge(job: Job, program: str | Path, progress: Progress = silent, *, strict: bool = False) -> Verdict:
-    """Return the verdict on a program file, by all that the job implies; strict as in `verify`.
-
-    Raises InputError for a bad job, mesh or machine, and where there is no such program.
-    """
-    machine, mesh = job_machine(job), job_mesh(job, progress)
-    asked = job_specification(job, machine, mesh, lambda: program_toolpath(job, mesh, Path(program), progress))
-    return judged(program, asked, strict=strict, progress=progress)
 
 
 @dataclasses.dataclass(frozen=True)

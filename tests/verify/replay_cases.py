@@ -192,7 +192,9 @@ class Case:
 
 
 def good_case(lean=0.0, interpolation="cubic"):
-    machine = replace(load_machine(Path(__file__).with_name("stand.toml")), rapid_velocity=RAPID)
+    stand = load_machine(Path(__file__).with_name("stand.toml"))
+    controller = replace(stand.controller, interpolation=interpolation)
+    machine = replace(stand, rapid_velocity=RAPID, controller=controller)
     parts = strokes()
     tips, axes = timed(parts)
     return Case(

@@ -16,7 +16,11 @@ from pentapod.verify import CLAIMS, verify, write_verdict
 
 GEOMETRY = {"tip deviation", "toolpath covered"}
 CUTTING = cases.cutting_of(*cases.hill())
-AROUND = {"legs, spindle and tool clear of the surroundings"}  # one claim where nobody told what is there
+NOT_ASKED = {
+    "legs, spindle and tool clear of the surroundings",  # one claim where nobody told what is there
+    "component as asked",
+    "every cut is made in one set-up",
+}
 FEEDS = {"feed on cuts", "feed on links", "rapid rate"}
 
 
@@ -66,7 +70,7 @@ def test_good_program_passes_every_claim(good):
     assert failed(verdict) == set()
     of_the_tool = {"tip acceleration", "tip jerk", "axis velocity", "axis acceleration"}  # this machine limits none
     # It has no guides either, and the path nowhere stops.
-    idle = of_the_tool | {"guides within their travel", "exact stops", "dwells", *AROUND}
+    idle = of_the_tool | {"guides within their travel", "exact stops", "dwells", *NOT_ASKED}
     assert {c.claim for c in verdict.certificates} == {claim.name for claim in CLAIMS} - idle
     assert all(c.method for c in verdict.certificates)
 
@@ -147,6 +151,7 @@ def test_program_without_a_job_is_asked_for_none(good):
     ("untold", "claims"),
     [
         ({"cutting": None}, {"gouge on cuts and links", "gouge on rapids"}),
+        ({"freedom": None}, {"placement as the job asks"}),
         ({"surroundings": None}, {"legs, spindle and tool clear of the surroundings"}),
     ],
 )
@@ -178,7 +183,7 @@ def test_guides_for_a_machine_that_has_none(good):
 def test_feed_5_percent_over_everywhere(good):
     # Planned at 98 % of every feed.
     faster = replace(good.program, period=good.program.period * 0.98 / 1.05)
-    assert failed(judge(replace(good, program=faster))) == FEEDS
+    assert failed(judge(replace(good, program=faster))) == {*FEEDS, "controller"}
 
 
 @pytest.mark.parametrize(
@@ -196,7 +201,7 @@ def test_feed_5_percent_over_on_one_kind(good, kind, claim):
 
 def test_feed_allowance_is_small(good):
     faster = replace(good.program, period=good.program.period * 0.98 / 1.004)
-    assert failed(judge(replace(good, program=faster))) == {"feed on cuts"}
+    assert failed(judge(replace(good, program=faster))) == {"feed on cuts", "controller"}
 
 
 def test_tilt_beyond_the_cone(good):
@@ -464,7 +469,7 @@ def test_unknown_keys_of_the_header_are_refused_by_name(linear, tmp_path):
     path.write_bytes(path.read_bytes().replace(b"# rows", b"# spindle_rpm = 3\n# coolant = true\n# rows", 1))
     for refused in (verdict(strict=True), verdict()):
         assert failed(refused) == {"readable"}
-        assert "line 10" in refused.certificates[0].method
+        assert "program.csv:10:" in refused.certificates[0].method
         assert "spindle_rpm: unknown key in the header" in refused.certificates[0].method
 
 

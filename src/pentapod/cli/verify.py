@@ -18,14 +18,15 @@ from pentapod.cli.output import echo_json, json_option, note_changes, progress_b
 @json_option
 @quiet_option
 def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -> int:
-    """Judge PROGRAM.csv against its job, from the file alone.
+    """Judge PROGRAM against its job, from the file alone: a program.csv, or the folder of a run.
 
-    Nothing of the planner is used: the rows are replayed through the closed-form forward kinematics and
-    compared with the toolpath that the job asks for.
+    Nothing of the planner is used: the rows are replayed through the closed-form forward kinematics and compared with
+    what the job asks for. Of a job in several set-ups name the folder: only there it shows that they make every cut.
+    What cannot be judged is listed and fails, unless the job waives it ([verify] waive).
     """
     from pentapod.files import sha256_of
     from pentapod.job import Job
-    from pentapod.pipeline import judge
+    from pentapod.job_verdict import judge
 
     note_changes(program.parent)
     loaded = Job.load(job)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,6 +67,12 @@ def cutting_intervals(toolpath: Toolpath) -> Bools:
     """Return which intervals (N − 1,) between waypoints are cuts."""
     cutting = np.array([segment.kind is SegmentKind.CUT for segment in toolpath.segments])
     return np.asarray(cutting[toolpath.segment_of_interval], dtype=np.bool_)
+
+
+def missed_cuts(toolpath: Toolpath, pieces: Sequence[Piece]) -> tuple[int, int]:
+    """Return how many intervals of a toolpath are cuts, and how many of them are in no piece or in more than one."""
+    times, cutting = np.sum([piece.cuts(toolpath) for piece in pieces], axis=0), cutting_intervals(toolpath)
+    return int(cutting.sum()), int((times != cutting).sum())
 
 
 def pass_ends(toolpath: Toolpath) -> Ints:

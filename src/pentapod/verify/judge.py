@@ -22,6 +22,8 @@ from pentapod.verify import (
     joints,
     legs,
     origin,
+    pieces,
+    placement,
     slowness,
     speed,
     standing,
@@ -36,6 +38,8 @@ from pentapod.verify.verdict import Certificate, NotJudged, Place, Verdict
 READABLE = "readable"
 CLAIMS: tuple[Claim, ...] = (
     *origin.CLAIMS,
+    *placement.CLAIMS,
+    *pieces.CLAIMS,
     *component.CLAIMS,
     *legs.CLAIMS,
     *joints.CLAIMS,

@@ -48,8 +48,29 @@ def guides(replay: Replay) -> Finding | Idle:
     return Finding(bool(rooms.min() >= 0.0), float(rooms.min()), 0.0, "mm", Place(), method)
 
 
+def component(replay: Replay) -> Finding | Idle:
+    """Judge that the program works in the component that is asked for; not asked where any will do."""
+    asked, own = replay.specification.component, replay.program.component
+    if asked is None:
+        return Idle("any component will do")
+    return Finding(own == asked, None, None, "", Place(), f"header: component {own}, asked for: {asked}")
+
+
+def controller(replay: Replay) -> Finding:
+    """Judge that the rows are meant for this machine's controller: its period and its motion between rows."""
+    program, own = replay.program, replay.machine.controller
+    passed = program.period == own.period and program.interpolation == own.interpolation
+    method = (
+        f"header: a row each {program.period:.9g} s, {program.interpolation} between rows; the controller, as machine "
+        f"and job set it, takes one each {own.period:.9g} s, {own.interpolation} between rows"
+    )
+    return Finding(passed, None, None, "", Place(), method)
+
+
 CLAIMS = (
     Claim("machine", machine, needs_pose=False),
     Claim(GUIDES, guides, needs_pose=False),
+    Claim("controller", controller, needs_pose=False),
     Claim("job", job, needs_pose=False),
+    Claim("component as asked", component, needs_pose=False),
 )

@@ -27,9 +27,11 @@ class Specification:
     radians beyond that; path_tolerance: metres. job_digest: of the job that the header must name. surroundings: what
     legs, spindle and tool must not touch. cutting: what cuts, and into which part. freedom: where the part may be
     placed. component: in which the program must be, None where any will do. lowest_share: of the feed, that cuts and
-    links must reach where no limit is used; None for the default of the tool, 0 where it does not matter. waived: names
-    of claims without which the verdict may pass where they cannot be judged. Raises ArrayError where a tolerance is not
-    a sensible number.
+    links must reach where no limit is used; None for the default of the tool, 0 where it does not matter. setups: most
+    programs into which the work may be split; missed: how many intervals of the whole toolpath should be cut and are
+    cut in none of them, or in more than one; None where the other programs are not known. waived: names of claims
+    without which the verdict may pass where they cannot be judged. Raises ArrayError where a tolerance is not a
+    sensible number.
     """
 
     machine: Machine
@@ -43,6 +45,8 @@ class Specification:
     freedom: Freedom | None = None
     component: Component | None = None
     lowest_share: float | None = None
+    setups: int = 1
+    missed: int | None = None
     waived: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -66,4 +70,6 @@ class Asked(TypedDict, total=False):
     freedom: Freedom | None
     component: Component | None
     lowest_share: float | None
+    setups: int
+    missed: int | None
     waived: tuple[str, ...]
