@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pentapod.job import Job
+from pentapod.job_coverage import job_coverage
 from pentapod.job_tool import job_tool
 from pentapod.machine.surroundings import Surroundings
 from pentapod.strategy_tables import sunk_mm
@@ -20,5 +21,6 @@ def job_cutting(job: Job, surroundings: Surroundings) -> Cutting | None:
     depth = job.gouge.tolerance_mm + sunk_mm(job.toolpath)
     for obstacle in surroundings.obstacles:
         if obstacle.name == "part":
-            return Cutting(obstacle.surface, job_tool(job).solids, _MM * depth)
+            mesh = obstacle.surface.mesh
+            return Cutting(obstacle.surface, job_tool(job).solids, _MM * depth, job_coverage(job, mesh))
     return None

@@ -82,6 +82,13 @@ def job_options(job: Job) -> PathOptions:
     )
 
 
+def job_region(job: Job) -> Region:
+    """Return which part of the surface a job machines."""
+    part = job.part
+    box = None if part.region_box_mm is None else np.array(part.region_box_mm) * _MM
+    return Region(direction=part.region_direction, angle=_rad(part.region_angle_deg), box=box)
+
+
 def _covering(job: Job, table: CoverTable, common: dict[str, Any]) -> PathOptions:
     """Return the options of a strategy that covers the surface."""
     common = {
@@ -107,14 +114,10 @@ def _covering(job: Job, table: CoverTable, common: dict[str, Any]) -> PathOption
 
 def _common(job: Job, table: StrategyTable) -> dict[str, Any]:
     """Return what every strategy is told."""
-    part, feed = job.part, job.feed
+    feed = job.feed
     link = feed.cut_mm_min if feed.link_mm_min is None else feed.link_mm_min
     return {
-        "region": Region(
-            direction=part.region_direction,
-            angle=_rad(part.region_angle_deg),
-            box=None if part.region_box_mm is None else np.array(part.region_box_mm) * _MM,
-        ),
+        "region": job_region(job),
         "chordal": job.tolerance.chordal_mm * _MM,
         "spacing": table.spacing_mm * _MM,
         "axis_step": _rad(table.axis_step_deg),

@@ -225,6 +225,17 @@ class ToleranceTable(Table):
     axis_deg: float = Field(
         default=0.5, gt=0.0, le=10.0, description="by which the axis may leave the tilt cone on the way"
     )
+    left_mm: Positive | None = Field(
+        default=None,
+        description="material above the surface that counts as none; for a stand-off tool, distance from its lines;"
+        " when left out, a ridge (half a stepover) and a quarter, and chordal_mm and path_mm",
+    )
+    left_share: float = Field(
+        default=0.001,
+        ge=0.0,
+        le=1.0,
+        description="of the region's area, 0 to 1: on so much of it more may be left, where the cutter could reach",
+    )
 
 
 class OutputTable(Table):

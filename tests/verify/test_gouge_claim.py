@@ -18,7 +18,8 @@ from pentapod.toolpath.tools import BallCutter, FlatEnd, StandOff
 from pentapod.verify import Cutting, verify
 from pentapod.verify.claim import Idle
 from pentapod.verify.gouge import _rapid, gouge
-from pentapod.verify.immersion import Immersion, _runs, _strays, _Stretches, _unresolved
+from pentapod.verify.immersion import Immersion, _unresolved
+from pentapod.verify.stretches import Stretches, strays
 
 CUTS, RAPIDS = "gouge on cuts and links", "gouge on rapids"
 LARGE = 1e3  # trimesh counts in units of about this many to the metre
@@ -285,7 +286,7 @@ def test_strays_are_never_less_than_at_dense_moments(replay, cubic, lever):
     ends = len(replay.pivots) - 1
     starts = np.array([200, 2600, 6900, 7060, 7400, 7700, 8200, ends - 64])
     counts = np.array([64, 8, 64, 300, 1, 64, 64, 64])
-    found = _strays(replay, _Stretches(starts, starts + counts), lever)
+    found = strays(replay, Stretches(starts, starts + counts), lever)
     for k, (first, last) in enumerate(zip(starts, starts + counts, strict=True)):
         own = slice(first * parts // 2, last * parts // 2)
         start, end = (replay.pivots[first], replay.axes[first]), (replay.pivots[last], replay.axes[last])
@@ -312,7 +313,7 @@ def test_an_axis_that_swings_out_and_back_is_bounded_or_said_not_to_be(swing, bo
     axes = np.stack([np.sin(lean), 0.0 * lean, np.cos(lean)], axis=1)
     survey = SimpleNamespace(away=np.zeros(4), turned=np.zeros(4))
     swung = SimpleNamespace(pivots=np.zeros((5, 3)), axes=axes, survey=survey)
-    found = _strays(swung, _Stretches(np.array([0]), np.array([4])), 0.03)[0]
+    found = strays(swung, Stretches(np.array([0]), np.array([4])), 0.03)[0]
     assert np.isfinite(found) == bounded
     assert found >= 0.06 * np.sin(0.5 * swing)
 
@@ -320,7 +321,7 @@ def test_an_axis_that_swings_out_and_back_is_bounded_or_said_not_to_be(swing, bo
 def test_stretches_are_cut_without_gaps():
     marked = np.zeros(300, dtype=bool)
     marked[3:131], marked[200:201], marked[290:] = True, True, True
-    pieces = _runs(marked).cut(64)
+    pieces = Stretches.along(marked).cut(64)
     assert pieces.starts.tolist() == [3, 67, 200, 290]
     assert pieces.ends.tolist() == [67, 131, 201, 300]
     again = pieces.where(np.array([1, 3])).cut(8)

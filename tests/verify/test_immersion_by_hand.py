@@ -13,7 +13,8 @@ from pentapod.toolpath.tools import BallCutter, FlatEnd
 from pentapod.verify.claim import Idle
 from pentapod.verify.cutting import Cutting
 from pentapod.verify.gouge import CLAIMS, _enclosed, gouge
-from pentapod.verify.immersion import _runs, _strays, _Stretches, immersion
+from pentapod.verify.immersion import immersion
+from pentapod.verify.stretches import Stretches, strays
 from pentapod.verify.verdict import Place
 
 RADIUS = 3e-3
@@ -148,17 +149,17 @@ def test_a_stray_is_that_from_the_nearest_place():
         axes=np.broadcast_to([0.0, 0.0, 1.0], (5, 3)),
         survey=SimpleNamespace(away=np.array([1e-5, 2e-5, 4e-5, 3e-5]), turned=np.array([1e-3, 4e-3, 2e-3, 1e-3])),
     )
-    stretches = _Stretches(np.array([0, 2]), np.array([4, 4]))
-    np.testing.assert_allclose(_strays(still, stretches, 0.0), [2e-3 + 4e-5, 4e-5], atol=1e-15)
-    np.testing.assert_allclose(_strays(still, stretches, 0.5), [2e-3 + 4e-5 + 2e-3, 4e-5 + 1e-3], atol=1e-15)
+    stretches = Stretches(np.array([0, 2]), np.array([4, 4]))
+    np.testing.assert_allclose(strays(still, stretches, 0.0), [2e-3 + 4e-5, 4e-5], atol=1e-15)
+    np.testing.assert_allclose(strays(still, stretches, 0.5), [2e-3 + 4e-5 + 2e-3, 4e-5 + 1e-3], atol=1e-15)
     still.pivots = pivots - np.array([0.0, 2e-3, 0.0]) * (np.arange(5) == 1)[:, None]
     still.pivots[1, 0], still.pivots[2, 0] = -0.25, 4.5
-    np.testing.assert_allclose(_strays(still, _Stretches(np.array([0]), np.array([4])), 0.0), [0.5 + 4e-5], atol=1e-15)
+    np.testing.assert_allclose(strays(still, Stretches(np.array([0]), np.array([4])), 0.0), [0.5 + 4e-5], atol=1e-15)
     still.pivots[2, 0] = 2.0
-    np.testing.assert_allclose(_strays(still, _Stretches(np.array([0]), np.array([4])), 0.0), [0.25 + 4e-5], atol=1e-15)
+    np.testing.assert_allclose(strays(still, Stretches(np.array([0]), np.array([4])), 0.0), [0.25 + 4e-5], atol=1e-15)
     leaning = SimpleNamespace(**{**vars(still), "axes": still.axes.copy(), "pivots": np.zeros((5, 3))})
     leaning.axes[1] = [0.0, np.sin(0.1), np.cos(0.1)]
-    found = _strays(leaning, stretches, 0.5)
+    found = strays(leaning, stretches, 0.5)
     # The chord of that lean is as long as the sine of an angle that is a little larger.
     assert 0.5 * (0.1 + 4e-3) + 4e-5 <= found[0] <= 0.5 * (0.1 + 2e-4 + 4e-3) + 4e-5
     assert found[1] == pytest.approx(4e-5 + 1e-3)
@@ -172,7 +173,7 @@ def test_the_nearest_place_weighs_pivot_and_axis():
         axes=np.stack([0.0 * lean, np.sin(lean), np.cos(lean)], axis=1),
         survey=SimpleNamespace(away=np.zeros(2), turned=np.zeros(2)),
     )
-    found = _strays(moment, _Stretches(np.array([0]), np.array([2])), 0.5)
+    found = strays(moment, Stretches(np.array([0]), np.array([2])), 0.5)
     height = 0.02**2 / 8.0
     assert found[0] == pytest.approx(0.04 * 0.02 + 0.5 * (0.16 * 0.02 + height), rel=1e-3)
 
@@ -185,14 +186,14 @@ def test_an_arc_beyond_a_radian_is_too_long(turn, bounded):
         axes=np.stack([np.sin(lean), 0.0 * lean, np.cos(lean)], axis=1),
         survey=SimpleNamespace(away=np.zeros(4), turned=np.zeros(4)),
     )
-    assert np.isfinite(_strays(turning, _Stretches(np.array([0]), np.array([4])), 0.1)[0]) == bounded
-    assert _strays(turning, _Stretches(np.array([0]), np.array([4])), 0.0)[0] == 0.0
+    assert np.isfinite(strays(turning, Stretches(np.array([0]), np.array([4])), 0.1)[0]) == bounded
+    assert strays(turning, Stretches(np.array([0]), np.array([4])), 0.0)[0] == 0.0
 
 
 def test_runs_begin_and_end_where_marks_do():
-    runs = _runs(np.array([True, False, False, True, True]))
+    runs = Stretches.along(np.array([True, False, False, True, True]))
     assert (runs.starts.tolist(), runs.ends.tolist()) == ([0, 3], [1, 5])
-    assert not len(_runs(np.zeros(4, dtype=bool)).starts)
+    assert not len(Stretches.along(np.zeros(4, dtype=bool)).starts)
 
 
 # The claims that are made of it.

@@ -36,17 +36,21 @@ class FacetTree:
         """Return the tree of a mesh's facets."""
         from pentapod.toolpath.box_kernels import fit_boxes  # noqa: PLC0415 - loads numba
 
-        low, high = mesh.bounds
-        extent = float((high - low).max()) or 1.0
-        centres = mesh.vertices[mesh.faces].mean(axis=1)
-        cells = ((centres - low) * ((2**_BITS - 1) / extent)).astype(np.int64)
-        order = np.argsort(_spread(cells[:, 0]) | _spread(cells[:, 1]) << 1 | _spread(cells[:, 2]) << 2, kind="stable")
+        order = along_morton_curve(mesh.vertices[mesh.faces].mean(axis=1), mesh.bounds)
         corners = np.ascontiguousarray(mesh.vertices[mesh.faces[order]])
         leaves = 1 << max(0, (len(order) // _FACETS_PER_LEAF).bit_length() - 1)
         starts = (np.arange(leaves + 1) * len(order)) // leaves
         boxes = np.empty((2 * leaves - 1, 15))
         fit_boxes(corners, starts, boxes)
         return cls(corners, order, boxes, starts)
+
+
+def along_morton_curve(points: Floats, bounds: Floats) -> Ints:
+    """Return the order (N,) of points (N, 3) within bounds (2, 3) along a Morton curve: neighbours are near."""
+    low, high = bounds
+    extent = float((high - low).max()) or 1.0
+    cells = ((points - low) * ((2**_BITS - 1) / extent)).astype(np.int64)
+    return np.argsort(_spread(cells[:, 0]) | _spread(cells[:, 1]) << 1 | _spread(cells[:, 2]) << 2, kind="stable")
 
 
 def _spread(numbers: Ints) -> Ints:

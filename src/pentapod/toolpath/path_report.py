@@ -15,7 +15,8 @@ class PathReport:
     less than travel_bound. dropped: passes shorter than asked for, dropped_length their sum. hidden:
     waypoints left out because the part itself lies above them. tight: waypoints where the surface is hollow
     along the pass with a radius below the ball's or the stand-off: a ball gouges there, a beam's tip turns back.
-    unproven: rapids for which no way clear of the part was found. notes: of the strategy.
+    unproven: rapids for which no way was found that keeps clear with a margin: whether they are clear is for the
+    verdict to judge. notes: of the strategy.
     """
 
     strategy: str
@@ -51,5 +52,7 @@ class PathReport:
         if self.tight:
             text += f"\n  problem: at {self.tight:,} waypoints the surface is hollower than the ball or the stand-off"
         if self.unproven:
-            text += f"\n  problem: {self.unproven:,} rapids are not proven clear of the part"
+            text += (
+                f"\n  note: {self.unproven:,} rapids pass the part closely; the verdict judges whether they are clear"
+            )
         return text

@@ -36,6 +36,19 @@ def stepover_for(scallop: float, radius: float, curvature: ArrayLike = 0.0) -> F
     return 2.0 * chord * np.where(x > 1e-6, np.arcsin(x) / np.where(x > 1e-6, x, 1.0), 1.0)
 
 
+def ridge(stepover: float, tool: Tool) -> float:
+    """Return the height of the ridge, metres, that a cutter leaves between passes on a plane.
+
+    Of a rounded corner that is narrower than the passes are apart, and of a flat end: as of a ball as wide as the tool.
+    A tool wider than which the passes are apart leaves all that its radius holds.
+    """
+    radius = tool.scallop_radius or 0.0
+    if 0.5 * stepover > radius:
+        radius = max((s.low_radius + s.rounding for s in tool.solids if s.kind == "cutter"), default=radius)
+    half = min(0.5 * stepover, radius)
+    return radius - float(np.sqrt(radius**2 - half**2))
+
+
 def cutting_radius(tool: Tool, scallop: float) -> float:
     """Return the radius that leaves the scallop. Raises ToolpathError for a tool without, or a scallop too high."""
     radius = tool.scallop_radius

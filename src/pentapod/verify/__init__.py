@@ -1,6 +1,7 @@
 """Verify: judges the program that was emitted. Reads it, replays it, certifies it; knows no planner."""
 
 from pentapod.verify.claim import Claim
+from pentapod.verify.coverage import Coverage
 from pentapod.verify.cutting import Cutting
 from pentapod.verify.judge import CLAIM_NAMES, CLAIMS, judged, verify, write_verdict
 from pentapod.verify.replay import Replay
@@ -12,6 +13,7 @@ __all__ = [
     "CLAIM_NAMES",
     "Certificate",
     "Claim",
+    "Coverage",
     "Cutting",
     "NotJudged",
     "Place",

@@ -11,6 +11,7 @@ from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.solids import Solid
 from pentapod.toolpath.tools import Tool
+from pentapod.verify.coverage import Coverage
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,21 +19,22 @@ class Cutting:
     """surface: of the finished part, workpiece frame. solids: of the tool; those of kind "cutter" cut.
 
     depth: metres by which cuts and links may go into the part: what counts as no gouge, and what is engraved on
-    purpose. Raises ArrayError where it is negative.
+    purpose. coverage: what is to be machined, None where nobody says. Raises ArrayError where depth is negative.
     """
 
     surface: MeshDistance
     solids: tuple[Solid, ...]
     depth: float
+    coverage: Coverage | None = None
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.depth) and self.depth >= 0.0):
             raise ArrayError("must not be negative", key="depth", value=self.depth)
 
     @classmethod
-    def of(cls, part: Mesh, tool: Tool, depth: float = 50e-6) -> Cutting:
+    def of(cls, part: Mesh, tool: Tool, depth: float = 50e-6, *, coverage: Coverage | None = None) -> Cutting:
         """Return what a tool cuts into a part, whose mesh is in the workpiece frame."""
-        return cls(MeshDistance.of(part), tool.solids, depth)
+        return cls(MeshDistance.of(part), tool.solids, depth, coverage)
 
     @property
     def cutter(self) -> tuple[Solid, ...]:

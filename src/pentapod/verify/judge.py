@@ -27,6 +27,7 @@ from pentapod.verify import (
     slowness,
     speed,
     standing,
+    surface_left,
     tool,
     tracking,
 )
@@ -45,6 +46,7 @@ CLAIMS: tuple[Claim, ...] = (
     *joints.CLAIMS,
     *bodies.CLAIMS,
     *gouge.CLAIMS,
+    *surface_left.CLAIMS,
     *tracking.CLAIMS,
     *speed.CLAIMS,
     *standing.CLAIMS,
