@@ -35,23 +35,16 @@ def block(scale=1.0):
             ):
                 if low < h:
                     quads.append([(*a, low), (*b, low), (*b, h), (*a, h)])
-    quads = np.array(quads, dtype=float)
-    return quads.reshape(-1, 3), (4 * np.arange(len(quads))[:, None, None] + [[0, 1, 2], [0, 2, 3]]).reshape(-1, 3)
+    return write_stl(np.array(quads, dtype=float)[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3), "block")
 
 
 @pytest.fixture
 def block_job(make_job):
     """A job on that block, at its own size or scaled."""
 
-    def make(scale=1.0, **changes):
-        path = make_job((STEPOVER, "stepover_mm = 4"), ("diameter_mm = 10", "diameter_mm = 6"))
-        text = path.read_text()
-        for old, new in changes.items():
-            text = text.replace(old, new)
-        path.write_text(text)
-        vertices, facets = block(scale)
-        write_stl(path.with_name("part.stl"), vertices, facets)
-        return Job.load(path)
+    def make(scale=1.0, stepover=4, diameter=6):
+        changes = (STEPOVER, f"stepover_mm = {stepover}"), ("diameter_mm = 10", f"diameter_mm = {diameter}")
+        return Job.load(make_job(*changes, mesh=block(scale)))
 
     return make
 
@@ -92,7 +85,7 @@ def test_waterlines_leave_what_is_flat_to_others(make_job):
     region = coverage(job).region
     assert region is not None
     slopes = np.degrees(np.arccos(region.facet_normals[:, 2]))
-    assert slopes.min() > 10.0
+    assert slopes.min() > 6.0  # facets of a few degrees; the normals between them are smooth
     assert region.areas.sum() < job_mesh(job).facet_areas.sum()
 
 
@@ -119,7 +112,7 @@ def test_the_block_is_sound_and_its_region_is_what_faces_up(block_job):
 @pytest.mark.slow
 def test_a_block_whose_motions_were_dropped_does_not_pass(block_job, tmp_path):
     """Its motions that gouge are dropped: the floor keeps a strip along the walls that the ball could have cleared."""
-    job = block_job(0.4, **{"stepover_mm = 4": "stepover_mm = 2", "diameter_mm = 6": "diameter_mm = 3"})
+    job = block_job(0.4, stepover=2, diameter=3)
     _, reports = job_toolpath(job, job_mesh(job))
     assert "dropped" in str(reports)
     outcome = run(job, tmp_path / "out")
