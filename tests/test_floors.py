@@ -42,6 +42,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
             "placement_table",
             "job_tables",
             "job",
+            "job_coverage",
             "job_cutting",
             "job_placement",
             "job_specification",

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from pentapod.toolpath import load_mesh as load_mesh
     from pentapod.toolpath import make_toolpath as make_toolpath
     from pentapod.verify import Certificate as Certificate
+    from pentapod.verify import Coverage as Coverage
     from pentapod.verify import Cutting as Cutting
     from pentapod.verify import NotJudged as NotJudged
     from pentapod.verify import Verdict as Verdict
@@ -77,6 +78,7 @@ _HOMES = {
     "read_csv": "program",
     "Certificate": "verify",
     "NotJudged": "verify",
+    "Coverage": "verify",
     "Cutting": "verify",
     "Verdict": "verify",
     "Refusal": "refusal",
@@ -116,6 +118,7 @@ __all__ = [  # noqa: RUF022 - in the order of the flow
     "read_csv",
     "Certificate",
     "NotJudged",
+    "Coverage",
     "Cutting",
     "Verdict",
     "Refusal",

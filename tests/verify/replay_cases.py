@@ -17,7 +17,7 @@ from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.toolpath.tools import BallCutter
-from pentapod.verify import Cutting, Replay, Specification
+from pentapod.verify import Coverage, Cutting, Replay, Specification
 
 BALL = 3e-3
 FEED = 0.03
@@ -62,7 +62,7 @@ def hill(shape=(121, 81)):
 
 def cutting_of(vertices, facets, tool=None, depth=5e-5):
     tool = tool or BallCutter(BALL)
-    return Cutting(MeshDistance.of(Mesh.of(vertices, facets)), tool.solids, depth)
+    return Cutting(MeshDistance.of(Mesh.of(vertices, facets)), tool.solids, depth, Coverage.nothing("two passes"))
 
 
 def slerp(a, b, f):

@@ -15,6 +15,7 @@ PROVEN_MOTION = {
     *("base joint cones", "platform joints not too closed", "platform joints not too open"),
     *("tip deviation", "axis deviation", "toolpath covered", "clearance between legs and shaft"),
     *("feed on cuts", "feed on links", "rapid rate", "gouge on cuts and links", "gouge on rapids"),
+    "surface left on the region",
 }
 WITHOUT_POSES = {
     *("machine", "job", "guides within their travel", "component kept, w", "component kept, S"),

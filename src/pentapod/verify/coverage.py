@@ -69,7 +69,7 @@ class Coverage:
     ) -> Coverage:
         """Return what a strategy with these options is to cover; nothing, where it draws lines, unless `left` is given.
 
-        left: when None, the ridge between passes on a plane, a quarter of that for what is curved, and the tolerances of
+        left: when None, the ridge between passes on a plane and a quarter of it, for what is curved, and tolerances of
         chords and path; of a beam or spray half the distance between the lines instead of the ridge.
         """
         if left is None and not isinstance(options, CoverOptions):
