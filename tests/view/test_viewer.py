@@ -163,7 +163,7 @@ def test_it_plans_anew_where_the_part_is(viewer):
     assert done.outcome.passed
     assert viewer.run is done.run
     assert viewer.placement.translation == pytest.approx(wanted.translation, abs=1e-8)
-    assert "The verdict passed" in viewer.panel.news.content
+    assert "Verdict: passed" in viewer.panel.news.content
     # With the table that is shown the job is the program's job.
     job = viewer.run.job.path
     text = job.read_text(encoding="utf-8")

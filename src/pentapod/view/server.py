@@ -168,6 +168,7 @@ def _came_to(done: Replanned) -> str:
     refusal = done.outcome.refusal
     if refusal is not None:
         return f"**Refused**: {refusal}"
-    answer = "The verdict passed" if done.outcome.passed else "**The verdict failed**"
+    answer = f"Verdict: {done.outcome.verdict.answer}"
+    answer = answer if done.outcome.passed else f"**{answer}**"
     where = "the job file" if done.outcome.find(Piece) is None else "a copy of the job file, for this set-up alone"
     return f"{answer}. Files: `{done.folder}`. For {where}:\n```toml\n{done.table}\n```"
