@@ -30,6 +30,7 @@ def test_the_python_runs(tmp_path, monkeypatch):
     for old, new in (
         ('"toolpaths/dome.stl"', repr(str(ROOT / "toolpaths" / "dome.stl"))),
         ("stepover=3e-3", "stepover=25e-3"),  # the same, sooner
+        ('limits["path_tolerance"])\n', 'limits["path_tolerance"], share=1.0)\n'),  # passes that far apart cover little
     ):
         assert old in code
         code = code.replace(old, new)

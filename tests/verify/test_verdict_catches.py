@@ -69,8 +69,14 @@ def test_good_program_passes_every_claim(good):
     verdict = judge(good)
     assert failed(verdict) == set()
     of_the_tool = {"tip acceleration", "tip jerk", "axis velocity", "axis acceleration"}  # this machine limits none
-    # It has no guides either, and the path nowhere stops.
-    idle = of_the_tool | {"guides within their travel", "exact stops", "dwells", *NOT_ASKED}
+    # It has no guides either, and the path nowhere stops and covers no region.
+    idle = of_the_tool | {
+        "guides within their travel",
+        "surface left on the region",
+        "exact stops",
+        "dwells",
+        *NOT_ASKED,
+    }
     assert {c.claim for c in verdict.certificates} == {claim.name for claim in CLAIMS} - idle
     assert all(c.method for c in verdict.certificates)
 
@@ -150,7 +156,7 @@ def test_program_without_a_job_is_asked_for_none(good):
 @pytest.mark.parametrize(
     ("untold", "claims"),
     [
-        ({"cutting": None}, {"gouge on cuts and links", "gouge on rapids"}),
+        ({"cutting": None}, {"gouge on cuts and links", "gouge on rapids", "surface left on the region"}),
         ({"freedom": None}, {"placement as the job asks"}),
         ({"surroundings": None}, {"legs, spindle and tool clear of the surroundings"}),
     ],
