@@ -69,12 +69,13 @@ def test_good_program_passes_every_claim(good):
     verdict = judge(good)
     assert failed(verdict) == set()
     of_the_tool = {"tip acceleration", "tip jerk", "axis velocity", "axis acceleration"}  # this machine limits none
-    # It has no guides either, and the path nowhere stops and covers no region.
+    # It has no guides either, the path nowhere stops and covers no region, and no lowest feed is asked for.
     idle = of_the_tool | {
         "guides within their travel",
         "surface left on the region",
         "exact stops",
         "dwells",
+        "lowest feed",
         *NOT_ASKED,
     }
     assert {c.claim for c in verdict.certificates} == {claim.name for claim in CLAIMS} - idle
@@ -86,11 +87,11 @@ def test_any_lean_within_the_cone_passes(lean):
     assert judge(cases.good_case(lean=lean)).passed
 
 
-def test_dwell_is_allowed(good):
+def test_dwell_that_nothing_asks_for_is_caught(good):
     stop = rows_of(good, good.toolpath.starts[4])
     legs = good.program.legs
     dwelling = np.concatenate([legs[: stop + 1], np.repeat(legs[stop : stop + 1], 300, axis=0), legs[stop + 1 :]])
-    assert failed(judge(with_legs(good, dwelling))) == set()
+    assert failed(judge(with_legs(good, dwelling))) == {"no unasked stop"}
 
 
 @pytest.mark.parametrize("leg", range(5))
@@ -304,7 +305,9 @@ def test_wrong_placement(good):
     shift = RigidTransform(np.eye(3), np.array([0.0, 100e-6, 0.0]))
     moved = replace(good.program, placement=good.program.placement @ shift)
     names = failed(judge(replace(good, program=moved)))
-    assert names == {"starts at the toolpath's start", "ends at the toolpath's end", *GEOMETRY}
+    assert names >= {"starts at the toolpath's start", "ends at the toolpath's end", *GEOMETRY}
+    # A stop that lies off the path is far from what asks for it.
+    assert names <= {"starts at the toolpath's start", "ends at the toolpath's end", "no unasked stop", *GEOMETRY}
 
 
 def test_placement_far_off(good):
@@ -358,8 +361,8 @@ def test_hum_of_3_micrometres_in_a_dwell(good):
     humming = np.repeat(legs[stop : stop + 1], 300, axis=0)
     humming[:, 2] += 3.4e-6 * np.sin(np.pi * np.arange(300) / 299) ** 4 * np.sin(2 * np.pi * 150.0 * t)
     verdict = judge(with_legs(good, np.concatenate([legs[: stop + 1], humming, legs[stop + 1 :]])))
-    assert failed(verdict) == {"leg jerks"}
-    (found,) = (c for c in verdict.certificates if not c.passed)
+    assert failed(verdict) == {"leg jerks", "no unasked stop"}
+    found = next(c for c in verdict.certificates if c.claim == "leg jerks")
     assert found.value == pytest.approx(1e3 * 3.4e-6 * (2 * np.pi * 150.0) ** 3, rel=0.15)
     assert found.where.row == pytest.approx(stop + 150, abs=10)
     assert found.method.startswith("leg 3")
@@ -390,11 +393,8 @@ def extremes(case):
     ],
 )
 def test_limit_of_the_machine_exceeded(good, claim, name, sign, slack, part):
-    """With the limit just beyond what the program needs it passes; just before, that claim fails alone.
-
-    Of a jerk 5 % are allowed, so that the limit needed is that much smaller.
-    """
-    scale = {"mm": 1e-3, "mm/s": 1e-3, "mm/s²": 1e-3, "mm/s³": 1e-3 / 1.05, "deg": np.pi / 180}
+    """With the limit just beyond what the program needs it passes; just before, that claim fails alone."""
+    scale = {"mm": 1e-3, "mm/s": 1e-3, "mm/s²": 1e-3, "mm/s³": 1e-3, "deg": np.pi / 180}
     found = extremes(good)[claim]
     needed = found.value * scale[found.unit]
     relative = slack if name in {"max_velocity", "max_acceleration", "max_jerk"} else slack / needed
