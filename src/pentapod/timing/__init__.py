@@ -8,6 +8,7 @@ from pentapod.timing.override import override
 from pentapod.timing.paths import LegPathLike, PieceLike
 from pentapod.timing.process import Unheld, unheld
 from pentapod.timing.retime import retime
+from pentapod.timing.slowed import Slowed
 from pentapod.timing.trajectory import Profile, Trajectory
 from pentapod.timing.waypoints import WaypointMotion, through_waypoints
 
@@ -21,6 +22,7 @@ __all__ = [
     "MotionLaw",
     "PieceLike",
     "Profile",
+    "Slowed",
     "Trajectory",
     "Unheld",
     "WaypointMotion",

@@ -11,6 +11,7 @@ from pentapod.arrays import Floats, Ints
 from pentapod.machine.machine import Machine
 from pentapod.timing.certificates import LimitUse
 from pentapod.timing.process import Unheld
+from pentapod.timing.slowed import Slowed
 from pentapod.timing.trajectory import Trajectory
 
 STANDING = "standing still"
@@ -62,7 +63,7 @@ class Explanation:
     duration (s); lower_bound (s): ∫ max(1/feed, max_i |l_i′|/v_i) ds, which no motion along this path can beat; causes:
     most costly first, their times add up to the duration and their costs to the gap; places: the ten
     that cost most; uses: how much of each limit the sampled program uses; slow_cuts: where a process that wants
-    constant speed on the surface does not get it.
+    constant speed on the surface does not get it; slowed: pieces that had to be slower than their first law.
     """
 
     duration: float
@@ -71,6 +72,7 @@ class Explanation:
     places: tuple[CostlyPlace, ...]
     uses: tuple[LimitUse, ...] = ()
     slow_cuts: tuple[Unheld, ...] = ()
+    slowed: tuple[Slowed, ...] = ()
 
     @property
     def gap(self) -> float:
@@ -89,6 +91,9 @@ class Explanation:
             seconds = sum(place.seconds for place in self.slow_cuts)
             lines.append(f"cutting below the feed for {seconds:.3g} s, at {len(self.slow_cuts)} places")
             lines += [f"  {place}" for place in self.slow_cuts[:MOST_PLACES]]
+        lines += [str(piece) for piece in self.slowed[:MOST_PLACES]]
+        if len(self.slowed) > MOST_PLACES:
+            lines.append(f"{len(self.slowed) - MOST_PLACES} more pieces last longer than their first laws")
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -133,6 +138,7 @@ def explain(
         tuple(sorted(places, key=lambda p: -p.cost)[:MOST_PLACES]),
         uses,
         slow_cuts,
+        tuple(sorted(trajectory.slowed, key=lambda piece: piece.first - piece.duration)),
     )
 
 

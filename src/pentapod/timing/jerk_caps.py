@@ -14,6 +14,8 @@ from pentapod.arrays import Floats
 
 _ROUNDS = 2
 _MOST_CELLS = 400_000
+_LEAST = 1e-3
+"""Share of an acceleration limit below which there is no cap: a leg that rests at gridpoints may move between them."""
 
 
 def acceleration_caps(
@@ -30,7 +32,7 @@ def acceleration_caps(
     for _ in range(_ROUNDS):  # lower accelerations take less time to reach, in which less else is reached
         reach = float(np.sqrt(ceiling.max()) * (caps / jerk).max())
         caps = np.minimum(caps, np.sqrt(sides * jerk * _spread(s, velocities, reach)))
-    return caps
+    return np.maximum(caps, _LEAST * acceleration)
 
 
 def _spread(s: Floats, velocities: Floats, reach: float) -> Floats:

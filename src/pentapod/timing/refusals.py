@@ -51,23 +51,24 @@ def refusal(path: LegPathLike, k: int, failure: Failure, short: tuple[str, float
     cause = f"{failure.reason}; {where}"
     if s is None:
         return Refusal("timing", cause)
-    cause += f", {1e3 * (float(path.starts[k]) + s):.6g} mm along the path, segment {_segment(piece, s)}"
+    cause += f", {1e3 * (float(path.starts[k]) + s):.6g} mm along the path, segment {segment_at(piece, s)}"
     if failure.limits:
         cause += f"; in conflict: {' and '.join(failure.limits)}"
     tangent = piece(np.array([s]), 1)[0]
     if np.isfinite(tangent).all():
         cause += f"; legs move by ({', '.join(f'{rate:.3g}' for rate in tangent)}) m for each metre there"
     limits = [short] if short else [(name, 0.0, "") for name in failure.limits or ["time law"]]
-    waypoints = (_waypoints(piece, s),)
+    waypoints = (waypoints_at(piece, s),)
     return Refusal("timing", cause, tuple(Blame(name, waypoints, amount, unit) for name, amount, unit in limits))
 
 
-def _segment(piece: PieceLike, s: float) -> int:
+def segment_at(piece: PieceLike, s: float) -> int:
+    """Return the toolpath's segment at a station of a piece."""
     section = min(int(np.searchsorted(piece.section_ends, s, side="left")), len(piece.section_segments) - 1)
     return int(piece.section_segments[section])
 
 
-def _waypoints(piece: PieceLike, s: float) -> tuple[int, int]:
+def waypoints_at(piece: PieceLike, s: float) -> tuple[int, int]:
     """Return the toolpath's waypoints on both sides of a station; twice the same where it is at one."""
     stations, waypoints = np.asarray(piece.waypoint_stations), np.asarray(piece.waypoints)
     last = len(stations) - 1

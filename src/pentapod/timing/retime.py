@@ -17,6 +17,7 @@ from pentapod.timing.paths import LegPathLike
 from pentapod.timing.piece import PieceProfile, time_piece
 from pentapod.timing.refusals import STILL_M, refusal, unfit
 from pentapod.timing.sampled import WINDOW_PERIODS, Unmended, sampled_laws
+from pentapod.timing.slowed import slowed
 from pentapod.timing.stages import Failure
 from pentapod.timing.trajectory import Profile, Trajectory
 
@@ -41,6 +42,9 @@ def retime(
     path asks (`dwells`), in whole periods. The margins are fractions of the limits that the plan leaves free; the
     rounding of setpoints and what happens between gridpoints uses part of them. Pieces of no length are passed over.
     Method: TOPP-RA (Pham and Pham 2018), by a compiled core; engine "toppra" takes the reference instead.
+
+    Pieces that must be slower than their first law limited in jerk, so that their setpoints keep the limits, are told
+    in `Trajectory.slowed`; one that would last more than 20 times as long is refused.
 
     start_speed, end_speed: ṡ in m/s at the path's start and end, where the motion is part of a longer one; with
     limit_jerk there is no acceleration there. They must be below what the limits less the margins leave; where
@@ -85,11 +89,12 @@ def retime(
         smoothed = sampled_laws(profiles, machine, dwells, smooth=limit_jerk)
         if isinstance(smoothed, Unmended):
             return refusal(path, indices[smoothed.index], smoothed.failure)
-        profiles, laws = smoothed
+        profiles, laws, firsts = smoothed.profiles, smoothed.laws, smoothed.firsts
     else:
-        laws = [_plain_law(p, period) for p in profiles]
+        firsts = laws = [_plain_law(p, period) for p in profiles]
     profile = _profile(path, indices, profiles, laws, dwells, smooth=limit_jerk)
-    return Trajectory(path, tuple(indices), tuple(laws), profile, dwells)
+    told = (slowed(path, *both, period) for both in zip(indices, firsts, laws, strict=True)) if limit_jerk else ()
+    return Trajectory(path, tuple(indices), tuple(laws), profile, dwells, tuple(x for x in told if x is not None))
 
 
 def _check_margins(velocity: float, acceleration: float) -> None:

@@ -24,6 +24,7 @@ from pentapod.timing.measured import measured, untouched
 from pentapod.timing.mended import about, mended, worst_places
 from pentapod.timing.piece import PieceProfile
 from pentapod.timing.setpoints import Setpoints, Use
+from pentapod.timing.slowed import most_lost
 from pentapod.timing.stages import Failure
 
 WINDOW_PERIODS = 4
@@ -48,8 +49,17 @@ class Unmended:
 
 
 @dataclass(frozen=True, eq=False)
+class Sampled:
+    """The profiles of pieces, their laws, and the laws with which these began."""
+
+    profiles: list[PieceProfile]
+    laws: list[MotionLaw]
+    firsts: list[MotionLaw]
+
+
+@dataclass(frozen=True, eq=False)
 class _Plan:
-    """A piece's profile, what its law is made of, by which factor it is run slower; first: seconds of the first law.
+    """A piece's profile, what its law is made of, by which factor it is run slower; first: its first law.
 
     nodes: of a law limited in jerk; None where it is averaged from the profile, over `window` periods.
     """
@@ -57,7 +67,7 @@ class _Plan:
     profile: PieceProfile
     nodes: Stretchable | None
     slower: float
-    first: float
+    first: MotionLaw
     window: int
 
     @classmethod
@@ -68,14 +78,25 @@ class _Plan:
         """
         found = profile.smooth if smooth else None
         if not (found is None or isinstance(found, Failure)):
-            first = MotionLaw.through(found.s, found.x, found.slope).duration
+            first = MotionLaw.through(found.s, found.x, found.slope)
             return cls(profile, mended(profile, found, machine), 1.0, first, window)
         if isinstance(found, Failure) and profile.moving:
             return found
-        return cls(profile, None, 1.0, MotionLaw.from_profile(profile.s, profile.x).duration, window)
+        return cls(profile, None, 1.0, MotionLaw.from_profile(profile.s, profile.x), window)
 
     def law(self, period: float) -> MotionLaw | Failure:
-        """Return the law, in whole periods; a Failure where it cannot have the speeds that are given at its ends."""
+        """Return the law, in whole periods; a Failure where it cannot have the speeds that are given at its ends.
+
+        Or where it lasts many times as long as the first one, which is told before its setpoints are made: their number
+        grows with its duration.
+        """
+        law = self._law(period)
+        if isinstance(law, Failure) or law.duration <= MOST_SLOWER * self.first.duration + (self.window + 1) * period:
+            return law
+        reason = _SLOW.format(law.duration / self.first.duration)
+        return Failure(-1, reason, station=most_lost(self.first, law))
+
+    def _law(self, period: float) -> MotionLaw | Failure:
         if self.profile.moving:
             return law_between(self.profile, self.slower, period, self.nodes)
         law = MotionLaw.from_profile(self.profile.s, self.profile.x) if self.nodes is None else self.nodes.law()
@@ -98,7 +119,7 @@ class _Plan:
 
 def sampled_laws(
     profiles: Sequence[PieceProfile], machine: Machine, dwells: Floats, *, smooth: bool
-) -> tuple[list[PieceProfile], list[MotionLaw]] | Unmended:
+) -> Sampled | Unmended:
     """Return profiles and laws whose setpoints keep the machine's limits and the feeds, as they are joined.
 
     dwells (P + 1,): seconds of standing before each piece, and after the last. smooth: jerks are limited too.
@@ -120,6 +141,7 @@ def sampled_laws(
 
     pieces = [timed(k) for k in range(len(plans))]
     uses: list[Use | None] = [None] * len(plans)
+    found: list[Use] = []
     exceeding: list[int] = []
     for attempt in range(_LOCAL + _SLOWINGS):
         for k, piece in enumerate(pieces):
@@ -128,7 +150,7 @@ def sampled_laws(
         found = measured(pieces, machine, uses)
         exceeding = [k for k, use in enumerate(found) if use.exceeds]
         if not exceeding:
-            return _kept(plans, [piece.law for piece in pieces])
+            return Sampled([p.profile for p in plans], [piece.law for piece in pieces], [p.first for p in plans])
         uses = untouched(pieces, found, exceeding)
         for k in exceeding:
             if attempt < _LOCAL and plans[k].nodes is not None:
@@ -142,19 +164,12 @@ def sampled_laws(
                 slower = plans[k].slower * float(found[k].slowing.max()) * _EXTRA
                 plans[k] = replace(plans[k], slower=slower)
                 if slower > MOST_SLOWER:
-                    return Unmended(k, _too_slow(pieces[k], found[k], slower))
+                    return Unmended(k, Failure(-1, _SLOW.format(slower), station=_worst(pieces[k], found[k])))
             pieces[k] = timed(k)
-    return Unmended(exceeding[0], Failure(-1, _EVERYWHERE))
+    k = exceeding[0]
+    return Unmended(k, Failure(-1, _EVERYWHERE, station=_worst(pieces[k], found[k])))
 
 
-def _kept(plans: Sequence[_Plan], laws: list[MotionLaw]) -> tuple[list[PieceProfile], list[MotionLaw]] | Unmended:
-    """Return profiles and laws, unless one lasts many times as long as the law that it began with."""
-    for k, (plan, law) in enumerate(zip(plans, laws, strict=True)):
-        if plan.nodes is not None and law.duration > MOST_SLOWER * plan.first + plan.profile.limits.period:
-            return Unmended(k, Failure(-1, _SLOW.format(law.duration / plan.first)))
-    return [plan.profile for plan in plans], laws
-
-
-def _too_slow(piece: Setpoints, use: Use, slower: float) -> Failure:
-    worst = (int(use.slowing.argmax()) - piece.before) * piece.period
-    return Failure(-1, _SLOW.format(slower), station=float(piece.law([worst])[0]))
+def _worst(piece: Setpoints, use: Use) -> float:
+    """Return the station of the row that exceeds most, as far as the piece's law is still the one that was measured."""
+    return float(piece.law([(int(use.slowing.argmax()) - piece.before) * piece.period])[0])

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from pentapod.arrays import Bools, Floats, Ints, as_floats, frozen, set_frozen
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.paths import LegPathLike, PieceLike
+from pentapod.timing.slowed import Slowed
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,8 @@ class Trajectory:
 
     path: the leg path; indices: those of its pieces that move; laws: their motion laws, one after the other.
     Each lasts a whole number of the controller's periods, so that exact stops fall on setpoints. dwells (L + 1,):
-    seconds for which the machine stands before each law, and after the last; whole periods, too.
+    seconds for which the machine stands before each law, and after the last; whole periods, too. slowed: pieces that
+    last more than 1.02 times as long as their first law limited in jerk.
     """
 
     path: LegPathLike
@@ -60,6 +62,7 @@ class Trajectory:
     laws: tuple[MotionLaw, ...]
     profile: Profile
     dwells: Floats
+    slowed: tuple[Slowed, ...] = ()
 
     def __post_init__(self) -> None:
         set_frozen(self, indices=tuple(self.indices), laws=tuple(self.laws))
