@@ -30,6 +30,7 @@ from pentapod.report.signals import Signals
 from pentapod.report.words import duration, number, opening, placement_sentences
 from pentapod.timing import Trajectory
 from pentapod.toolpath import Mesh, Toolpath, load_mesh
+from pentapod.verify import NotJudged, Verdict
 
 TOO_FAR = ("position_mm = [", "position_mm = [1000.0, 0, 700] # [")
 
@@ -202,6 +203,26 @@ def test_report_of_a_failed_verdict_puts_the_failures_first(make_job, tmp_path):
     _, page = page_of(failed, tmp_path)
     assert "Do not run it" in page.text
     assert page.text.index("a claim that fails") < page.text.index("leg rates")
+
+
+def test_what_was_not_judged_is_told_with_its_reason(make_job, tmp_path):
+    """A program that fails only by it shows the cause; one that passes by waivers shows them."""
+    outcome = run(Job.load(make_job()), tmp_path / "out")
+    for waived, status, lead, mark in (
+        (False, "failed", "2 claims were not judged. Do not run it.", "not judged"),
+        (True, "passed", "2 more were not judged: the job waives them.", "waived"),
+    ):
+        unknown = tuple(NotJudged(name, f"nobody told {name}", waived) for name in ("speed of sound", "colour"))
+        told = Outcome(
+            outcome.job, outcome.machine, outcome.stages, Verdict(outcome.verdict.certificates, unknown)
+        )  # fmt: skip
+        _, page = page_of(told, tmp_path)
+        text = " ".join(page.text.split())
+        assert f"job {status}" in text
+        assert lead in text
+        assert "claims about the program do not hold" not in text
+        for name in ("speed of sound", "colour"):
+            assert f"{name} {mark} nobody told {name}" in text
 
 
 def test_names_cannot_break_the_page(make_job, tmp_path):

@@ -79,6 +79,8 @@ def _context(outcome: Outcome) -> dict[str, Any]:
         "status": status,
         "certificates": sorted(outcome.verdict.certificates, key=lambda c: c.passed),
         "failed": failed,
+        "unjudged": [entry for entry in outcome.verdict.not_judged if not entry.waived],
+        "waived": [entry for entry in outcome.verdict.not_judged if entry.waived],
         "refusal": outcome.refusal,
         "facts": _facts(outcome, signals),
         "worst": [] if signals is None else worst_places(signals, outcome.machine),
