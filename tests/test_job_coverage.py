@@ -13,6 +13,7 @@ from pentapod.toolpath import write_stl
 
 CLAIM = "surface left on the region"
 STEPOVER = "stepover_mm = 15"
+BY_DEFAULT = ("left_share = 1\n", "")
 
 
 def block(scale=1.0):
@@ -44,7 +45,7 @@ def block_job(make_job):
 
     def make(scale=1.0, stepover=4, diameter=6):
         changes = (STEPOVER, f"stepover_mm = {stepover}"), ("diameter_mm = 10", f"diameter_mm = {diameter}")
-        return Job.load(make_job(*changes, mesh=block(scale)))
+        return Job.load(make_job(BY_DEFAULT, *changes, mesh=block(scale)))
 
     return make
 
@@ -62,10 +63,10 @@ def coverage(job):
     ],
 )
 def test_what_may_be_left_follows_from_the_job(make_job, way, left):
-    found = coverage(Job.load(make_job((STEPOVER, way))))
+    found = coverage(Job.load(make_job(BY_DEFAULT, (STEPOVER, way))))
     assert found.left == pytest.approx(1e-3 * (left + 0.01 + 0.05))
     assert found.share == 1e-3
-    said = make_job((STEPOVER, way), ("path_mm = 0.05", "path_mm = 0.05\nleft_mm = 0.7\nleft_share = 0.02"))
+    said = make_job((STEPOVER, way), ("left_share = 1", "left_mm = 0.7\nleft_share = 0.02"))
     found = coverage(Job.load(said))
     assert (found.left, found.share) == pytest.approx((7e-4, 0.02))
 

@@ -28,6 +28,7 @@ cut_mm_min = 3000
 
 [tolerance]
 path_mm = 0.05
+left_share = 1
 
 [placement]
 mode = "fixed"
@@ -38,6 +39,9 @@ component = "++"
 
 
 def job_text() -> str:
-    """The part in the middle of the work volume, its top towards the base: nothing is left to search for."""
+    """The part in the middle of the work volume, its top towards the base: nothing is left to search for.
+
+    Its few passes are quick to plan; they are wider apart than the cutter, and may leave what they leave.
+    """
     centre = Machine.load("desk").work.centre * 1e3
     return JOB.format(position=np.round(centre, 3).tolist())
