@@ -21,7 +21,11 @@ from timing_peers import copp_robot, highs, our_chain, socp, toppra_chain
 from timing_robots import drake_solver, ruckig_line
 
 from pentapod.timing.engine import fastest
-from pentapod.timing.jerk import PASSES, jerk_limited
+from pentapod.timing.jerk import jerk_limited
+from pentapod.timing.jerk_knots import KNOTS_PER_RAMP, law_knots
+from pentapod.timing.jerk_part import Part
+from pentapod.timing.jerk_passes import PASSES
+from pentapod.timing.jerk_problem import Problem as Pass
 from pentapod.timing.jerk_rows import JerkRows
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.reference import solve as solve_by_toppra
@@ -144,50 +148,57 @@ def core(sizes: list[int]) -> None:
                 print(f"{'':28s} copp-py {1e6 * theirs / n:.2f} µs: {theirs / ours:.1f} times; durations {same:.1e}")
 
 
+def one_pass(p: Problem, x: np.ndarray) -> tuple[Pass, float, float]:
+    """Return a pass as the product makes it, and its seconds: as the first one, and as the next."""
+    part = Part.of(p.s, x, p.jerk_rows, NO_MARKS, (False, False), 0.0)
+    problem = Pass.on(part, law_knots(part, x, 1.0, KNOTS_PER_RAMP))
+    start, around = problem.start(), np.minimum(problem.top, problem.ramps)
+    problem.improved(start, around, 0)
+    first, y = best(lambda: problem.improved(start, around, 0), 3)
+    if not isinstance(y, np.ndarray):
+        raise SystemExit("the first pass finds no law")
+    inside = np.maximum(problem.values(y)[:, 0], 1e-9 * x.max())
+    later, _ = best(lambda: problem.improved(y, inside, 1), 3)
+    return problem, first, later
+
+
 def jerk(n: int) -> None:
-    """Jerk limits: time a pass, and how near two passes come to what they converge to."""
+    """Jerk limits: time a pass and the whole law, and how near few passes come to what they settle at."""
     for kind in ("raster", "sine"):
         p = Problem(kind, n)
         x = p.solved("core")
-        durations, last = [], 0.0
-        jerk_limited(p.s, x, p.jerk_rows, NO_MARKS, 1)
-        for passes in (1, 2, PASSES, 8):
+        problem, first, later = one_pass(p, x)
+        count, durations, used = len(problem.s), [], 0.0
+        for passes in (1, 2, PASSES):
             used, profile = best(lambda k=passes, p=p, x=x: jerk_limited(p.s, x, p.jerk_rows, NO_MARKS, k), 2)
             durations.append(MotionLaw.through(profile.s, profile.x, profile.slope).duration)
-            last = used
-            if passes == 1:
-                one = used
-        each = (last - one) / 7.0
         print(
-            f"{kind:7s} {len(profile.s):8d} gridpoints, jerk: first pass {1e6 * one / len(profile.s):.1f} µs, "
-            f"each further {1e6 * each / len(profile.s):.1f} µs; durations after 1, 2, {PASSES}, 8 passes: "
-            + ", ".join(f"{d:.4f}" for d in durations)
+            f"{kind:7s} {count:8d} gridpoints, jerk: first pass {1e6 * first / count:.1f} µs, the next "
+            f"{1e6 * later / count:.1f} µs; the whole law {1e6 * used / n:.1f} µs for each of {n} gridpoints given; "
+            f"durations with at most 1, 2, {PASSES} passes: " + ", ".join(f"{d:.4f}" for d in durations)
             + f" s (without jerk limits {p.duration(x):.4f} s)",
             flush=True,
-        )
+        )  # fmt: skip
 
 
 def jerk_peers(n: int) -> None:
-    """One pass of ours, by HiGHS and by copp-py's TOPP3-SOCP, for the same path; and what these converge to."""
+    """One pass of ours, by HiGHS and by copp-py's TOPP3-SOCP, for the same path; and what these settle at."""
     for kind in ("raster", "sine"):
         p = Problem(kind, n)
         x = p.solved("core")
-        laws = {}
-        for passes in (1, 2, 8):
-            used, profile = best(lambda k=passes, p=p, x=x: jerk_limited(p.s, x, p.jerk_rows, NO_MARKS, k), 3)
-            laws[passes] = used, MotionLaw.through(profile.s, profile.x, profile.slope).duration
-        count = len(profile.s) - 2
-        each = (laws[8][0] - laws[1][0]) / 7.0 / count
-        line = f"{kind:7s} {count} gridpoints: our pass {1e6 * each:.1f} µs"
-        solve, same = highs(p.s, x, p.jerk_rows, NO_MARKS)
-        used, _ = best(solve, 1)
-        line += f"; HiGHS {1e6 * used / same:.0f} µs: {used / same / each:.0f} times"
+        problem, first, later = one_pass(p, x)
+        count = len(problem.s)
+        line = f"{kind:7s} {count} gridpoints: our first pass {1e6 * first / count:.1f} µs, the next "
+        line += f"{1e6 * later / count:.1f} µs"
+        used, _ = best(highs(problem), 1)
+        line += f"; HiGHS {1e6 * used / count:.0f} µs: {used / first:.0f} times the first"
         if peer := copp_robot(p.s, p.q, (VELOCITY, ACCELERATION, JERK), p.feed):
             solves, durations = socp(peer, x, p.s, 6)
             used, _ = best(solves[0], 1)
-            line += f"; TOPP3-SOCP {1e6 * used / len(p.s):.0f} µs: {used / len(p.s) / each:.0f} times; durations "
-            line += f"{laws[2][1]:.4f} s after 2 passes, {laws[8][1]:.4f} after 8, SOCP's "
-            line += ", ".join(f"{d:.4f}" for d in durations)
+            profile = jerk_limited(p.s, x, p.jerk_rows, NO_MARKS)
+            ours = MotionLaw.through(profile.s, profile.x, profile.slope).duration
+            line += f"; TOPP3-SOCP {1e6 * used / len(p.s):.0f} µs: {used / len(p.s) / (first / count):.0f} times; "
+            line += f"durations {ours:.4f} s, SOCP's " + ", ".join(f"{d:.4f}" for d in durations)
         print(line, flush=True)
 
 
@@ -270,13 +281,13 @@ def million(n: int) -> None:
     x = p.solved("core")
     s, base = p.s, p.s[-1]
     start, wall = time.process_time(), time.perf_counter()
-    profile = jerk_limited(s, x, p.jerk_rows, NO_MARKS, 2)
+    profile = jerk_limited(s, x, p.jerk_rows, NO_MARKS)
     MotionLaw.through(profile.s, profile.x, profile.slope)
     count = len(profile.s)
     used = time.process_time() - start
     print(
-        f"long path: {n} gridpoints ({base:.0f} m), {count} with jerk limits, two jerk passes "
-        f"and the law: {used:.1f} s ({1e6 * used / n:.1f} µs a gridpoint, wall {time.perf_counter() - wall:.1f} s); "
+        f"long path: {n} gridpoints ({base:.0f} m), {count} with jerk limits, all passes and "
+        f"the law: {used:.1f} s ({1e6 * used / n:.1f} µs a gridpoint, wall {time.perf_counter() - wall:.1f} s); "
         f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.2f} GB"
     )
 

@@ -13,7 +13,6 @@ from scipy.sparse import csr_array, vstack
 
 from pentapod.refusal import Refusal
 from pentapod.timing.jerk_problem import Problem
-from pentapod.timing.jerk_rows import RowsAt
 from pentapod.timing.waypoints import through_waypoints
 
 FAR = 1e3
@@ -61,9 +60,8 @@ def socp(peer, x: np.ndarray, s: np.ndarray, rounds: int) -> tuple[list[Callable
     return solves, durations
 
 
-def highs(s: np.ndarray, x: np.ndarray, rows_at: RowsAt, marks: np.ndarray) -> tuple[Callable[[], object], int]:
-    """Return how HiGHS takes a first pass, and at how many gridpoints; the objective is linear about the same x."""
-    problem = Problem.of(s, x, rows_at, marks)
+def highs(problem: Problem) -> Callable[[], object]:
+    """Return how HiGHS takes a first pass of a problem; the objective is linear about the same x."""
     y, rows = problem.start(), problem.rows
     around = np.minimum(problem.top, problem.ramps)
     count, n = len(problem.s), len(y)
@@ -94,7 +92,7 @@ def highs(s: np.ndarray, x: np.ndarray, rows_at: RowsAt, marks: np.ndarray) -> t
             raise SystemExit(f"HiGHS: {result.message}")
         return result
 
-    return solve, count
+    return solve
 
 
 def toppra_chain(s: np.ndarray, legs: np.ndarray, velocity: float, acceleration: float, period: float):

@@ -31,7 +31,7 @@ from pentapod.toolpath.solids import Cone
 from pentapod.toolpath.tools import BallCutter
 from pentapod.verify import Cutting, verify
 
-BALL, FEED, RAMP = 3e-3, 0.025, 2.0
+BALL, FEED, RAMP = 3e-3, 0.025, 0.5
 
 
 def timed(work: Callable[[], object]) -> tuple[float, object]:
@@ -104,8 +104,9 @@ def main() -> None:
         "tilt": 0.0,
         "path_tolerance": 20e-6,
         "axis_tolerance": np.radians(0.5),
-        "lowest_share": 0.6,
+        "lowest_share": 0.0,
         "job_digest": "bench",
+        "waived": ("surface left on the region",),
     }
     surface = MeshDistance.of(hill(given.cells))
     tool = BallCutter(BALL, shank=(Cone(0.03, 2e-3, 2e-3),), holder=(Cone(0.02, 8e-3, 8e-3),))
@@ -134,6 +135,8 @@ def main() -> None:
     for certificate in verdict.certificates:
         if not certificate.passed:
             print(f"  FAIL {certificate.claim}: {certificate.value} ({certificate.bound}) {certificate.method}")
+    for claim in verdict.not_judged:
+        print(f"  not judged: {claim.claim}: {claim.why}")
     memory = f"peak {peak / 1024:.0f} MB (before it {before / 1024:.0f} MB)"
     gouge = next(c for c in verdict.certificates if c.claim == "gouge on cuts and links")
     print(f"gouge: {gouge.value:.4g} mm of {gouge.bound:.4g} mm, {2 * given.cells**2:,} facets")

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import replay_cases as cases
+from scipy.interpolate import make_interp_spline
 
 from pentapod.errors import ArrayError, InputError, ProgramError
 from pentapod.geometry.rigid import RigidTransform
@@ -366,6 +367,27 @@ def test_hum_of_3_micrometres_in_a_dwell(good):
     assert found.value == pytest.approx(1e3 * 3.4e-6 * (2 * np.pi * 150.0) ** 3, rel=0.15)
     assert found.where.row == pytest.approx(stop + 150, abs=10)
     assert found.method.startswith("leg 3")
+
+
+def test_ripple_beyond_the_jerk_limit_at_a_short_period(cubic):
+    """At 0.1 ms rounding alone may make 120 m/s³ of jerk: that is no leave to exceed the limit by as much."""
+    fine, limit = 1e-4, float(cubic.machine.legs.max_jerk[2])
+    t = np.arange(len(cubic.program.legs)) * cubic.program.period
+    stop = 10 * rows_of(cubic, cubic.toolpath.starts[4])
+    legs = make_interp_spline(t, cubic.program.legs)(np.arange(10 * (len(t) - 1) + 1) * fine)
+    ripple = np.repeat(legs[stop : stop + 1], 3000, axis=0)
+    rows, pulse = np.arange(3000), 2 * np.pi * 100.0
+    ripple[:, 2] += (limit + 40.0) / pulse**3 * np.sin(np.pi * rows / 2999) ** 4 * np.sin(pulse * rows * fine)
+    rippled = with_legs(cubic, np.concatenate([legs[: stop + 1], ripple, legs[stop + 1 :]]))
+    machine = replace(cubic.machine, controller=replace(cubic.machine.controller, period=fine))
+    source = replace(rippled.program.provenance, machine_digest=machine.digest)
+    program = replace(rippled.program, period=fine, provenance=source)
+    verdict = judge(replace(rippled, program=program, machine=machine))
+    assert "leg jerks" in failed(verdict)
+    found = next(c for c in verdict.certificates if c.claim == "leg jerks")
+    assert found.method.startswith("leg 3")
+    assert found.where.row == pytest.approx(stop + 1500, abs=100)
+    assert 1.0 < found.value / found.bound < 1.0 + 120.0 / limit
 
 
 def test_bulge_off_the_path(good):
