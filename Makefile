@@ -8,7 +8,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 # What the tests of `test-lowest` need beside the package, and the tests: arithmetic, kernels, solvers, files, a whole plan.
-ORACLES := pytest pytest-xdist hypothesis mpmath trimesh rtree pyyaml psutil python-flint
+ORACLES := pytest pytest-xdist hypothesis mpmath rtree pyyaml psutil python-flint
 LOWEST_TESTS := tests/geometry tests/kinematics tests/timing tests/program tests/toolpath/test_sweep.py \
 	tests/toolpath/test_drawings_in.py tests/simulate/test_servo.py tests/test_kernel_cache.py tests/test_pipeline.py
 

@@ -7,7 +7,7 @@ import pytest
 import toolpath_surfaces as surfaces
 
 from pentapod.errors import InputError, MeshError
-from pentapod.toolpath import UNITS, load_mesh, write_stl
+from pentapod.toolpath import UNITS, Mesh, load_mesh, write_stl
 from pentapod.toolpath.obj import read_obj
 
 
@@ -319,3 +319,17 @@ def test_a_changed_byte_is_read_or_refused_but_never_crashes(tmp_path, suffix):
         else:
             continue
         assert path.name in message
+
+
+def test_meshes_go_to_trimesh_and_back():
+    import trimesh
+
+    shape = trimesh.creation.box((80.0, 60.0, 30.0))
+    mesh = Mesh.from_trimesh(shape, 1e-3)
+    assert mesh.facet_areas.sum() == pytest.approx(1e-6 * shape.area)
+    back = mesh.to_trimesh()
+    assert back.volume == pytest.approx(1e-9 * shape.volume)
+    np.testing.assert_array_equal(back.vertices, mesh.vertices)
+    np.testing.assert_array_equal(back.faces, mesh.faces)
+    with pytest.raises(MeshError, match="metres"):
+        Mesh.from_trimesh(shape, 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,9 @@ from pentapod.progress import Progress, silent
 from pentapod.toolpath import mending, normals
 from pentapod.toolpath.diagnosis import MeshDiagnosis
 from pentapod.toolpath.topology import Topology
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 CREASE_ANGLE = np.radians(40.0)
 """Facets that meet at more than this angle keep their own normals."""
@@ -143,6 +147,22 @@ class Mesh:
             source=f"{self.diagnosis.source}, body {number}",
             crease_angle=self.crease_angle,
         )
+
+    @classmethod
+    def from_trimesh(cls, shape: Trimesh, metres: float, *, repair: bool = False) -> Mesh:
+        """Return the mesh of a `trimesh.Trimesh`: of any format or shape that trimesh knows.
+
+        metres: in one unit of its numbers, 1e-3 for millimetres; trimesh has none. repair and errors: as `of`.
+        """
+        if not (np.isfinite(metres) and metres > 0.0):
+            raise MeshError("the unit must be a positive number of metres", key="metres", value=metres)
+        return cls.of(metres * np.asarray(shape.vertices), shape.faces, repair=repair, source="trimesh")
+
+    def to_trimesh(self) -> Trimesh:
+        """Return the mesh as a `trimesh.Trimesh`, in metres, with the same vertices and facets in the same order."""
+        from trimesh import Trimesh  # noqa: PLC0415  heavy: only for those who ask
+
+        return Trimesh(self.vertices, self.faces, process=False)
 
     def flipped(self) -> Mesh:
         """Return the mesh with its other side out: for an open sheet that faces away from the tool."""
