@@ -9,6 +9,7 @@ import numpy as np
 from pentapod.job import Job
 from pentapod.job_cutting import job_cutting
 from pentapod.job_placement import job_freedom
+from pentapod.job_sources import job_sources
 from pentapod.job_surroundings import job_surroundings
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import Machine
@@ -41,4 +42,5 @@ def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Cal
         lowest_share=job.feed.lowest_share,
         setups=job.placement.setups,
         waived=job.verify.waive,
+        sources=job_sources(job),
     )

@@ -13,6 +13,7 @@ from pentapod.program.program import Program
 from pentapod.refusal import Refusal
 from pentapod.toolpath.parting import Piece
 from pentapod.verify.pieces import WHOLE
+from pentapod.verify.sources import UNTOLD, Sources
 from pentapod.verify.verdict import Certificate, Place, Verdict
 
 Value = TypeVar("Value")
@@ -150,7 +151,10 @@ class SetUps:
 
 
 def setups_verdict(verdicts: Sequence[tuple[int, Verdict]], cuts: int, missed: int, most: int) -> Verdict:
-    """Return all claims about all set-ups, by number, and that they are the whole work; most: that the job allows."""
+    """Return all claims about all set-ups, by number, and that they are the whole work; most: that the job allows.
+
+    Its sources name no program: each set-up's verdict names its own.
+    """
     words = (
         f"{cuts} intervals between waypoints are cut; the set-ups' pieces were counted against them; {len(verdicts)} "
         f"set-ups, at most {most} are allowed"
@@ -159,10 +163,11 @@ def setups_verdict(verdicts: Sequence[tuple[int, Verdict]], cuts: int, missed: i
     parts = [(f"set-up {number}: ", verdict) for number, verdict in verdicts]
     certificates = (replace(c, claim=before + c.claim) for before, verdict in parts for c in verdict.certificates)
     unjudged = (replace(n, claim=before + n.claim) for before, verdict in parts for n in verdict.not_judged)
-    return Verdict((whole, *certificates), tuple(unjudged))
+    sources = replace(verdicts[0][1].sources, program=None) if verdicts else UNTOLD
+    return Verdict((whole, *certificates), tuple(unjudged), sources)
 
 
-def refusal_verdict(refusal: Refusal) -> Verdict:
+def refusal_verdict(refusal: Refusal, sources: Sources) -> Verdict:
     """Return the verdict on a job that was refused: each limit in the way is a claim that fails."""
     blames = [
         Certificate(
@@ -177,7 +182,7 @@ def refusal_verdict(refusal: Refusal) -> Verdict:
         for blame in refusal.blames
     ]
     whole = Certificate("the job can be done", False, None, None, "", Place(), str(refusal))
-    return Verdict((whole, *blames))
+    return Verdict((whole, *blames), sources=sources)
 
 
 def refusal_dict(refusal: Refusal) -> dict[str, Any]:

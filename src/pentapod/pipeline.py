@@ -86,7 +86,7 @@ def _reached(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outco
     """Run the stages after the toolpath and the verdict, write the files, and return what was reached."""
     program, clock = task.program(staging / PROGRAM), task.clock
     if isinstance(program, Refusal):
-        verdict = refusal_verdict(program)
+        verdict = refusal_verdict(program, task.asked.sources)
     else:
         file = staging / PROGRAM
         verdict = clock.time("verify", lambda: judged(file, task.asked, progress=clock.progress))
@@ -113,7 +113,7 @@ def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, write
     search = (task.toolpath, task.fits, style, job.placement.setups, refusal, clock.progress)
     found = clock.time("set-ups", lambda: setups(*search))
     if isinstance(found, Refusal):
-        verdict = refusal_verdict(found)
+        verdict = refusal_verdict(found, task.asked.sources)
         return _written(Outcome(job, task.machine, tuple(clock.stages), verdict), staging, writers, clock.progress)
     cutting, missed = missed_cuts(toolpath, found)
     parts: list[SetUp] = []

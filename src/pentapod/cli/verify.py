@@ -24,7 +24,6 @@ def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -
     what the job asks for. Of a job in several set-ups name the folder: only there it shows that they make every cut.
     What cannot be judged is listed and fails, unless the job waives it ([verify] waive).
     """
-    from pentapod.files import sha256_of
     from pentapod.job import Job
     from pentapod.job_verdict import judge
 
@@ -33,7 +32,7 @@ def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -
     with progress_bar(quiet=quiet or as_json) as progress:
         verdict = judge(loaded, program, progress, strict=strict)
     if as_json:
-        echo_json({**verdict.to_dict(), "sha256": {"program": sha256_of(program)}})
+        echo_json(verdict.to_dict())
     elif not quiet:
         click.echo(verdict_text(verdict))
     return 0 if verdict.passed else 1

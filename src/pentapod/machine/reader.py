@@ -64,7 +64,7 @@ def load_machine(name_or_path: str | Path) -> Machine:
     """
     name = str(name_or_path)
     if name in shipped_machines():
-        return read_machine((_library() / f"{name}.toml").read_text(encoding="utf-8"), f"{name}.toml")
+        return read_machine(machine_bytes(name).decode("utf-8"), f"{name}.toml")
     path = Path(name_or_path)
     if not path.exists():
         known = ", ".join(shipped_machines())
@@ -73,6 +73,17 @@ def load_machine(name_or_path: str | Path) -> Machine:
         raise MachineError("no such machine or machine file", file=name or '""', remedy=remedy)
     text = read_toml(path, "machine", MachineError, start='"pentapod machine list" names those that ship')
     return read_machine(text, path)
+
+
+def machine_bytes(name_or_path: str | Path) -> bytes:
+    """Return the bytes of the file that `load_machine` reads. Raises MachineError where it cannot be read."""
+    name = str(name_or_path)
+    try:
+        if name in shipped_machines():
+            return (_library() / f"{name}.toml").read_bytes()
+        return Path(name_or_path).read_bytes()
+    except OSError as error:
+        raise MachineError("the machine file cannot be read", file=name) from error
 
 
 def read_machine(text: str, file: str | Path) -> Machine:

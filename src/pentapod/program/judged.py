@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, cast
 
 from pentapod.errors import ProgramError
-from pentapod.files import sha256_of
 
 Judgement = Mapping[str, Any] | str | Path
 """The content of a verdict.json (`Verdict.to_dict`), or where that file is."""
@@ -22,8 +21,6 @@ def check_passed(verdict: Judgement, sha256: str, program: str | Path | None = N
     program: the file's name, for the message.
     """
     content = verdict if isinstance(verdict, Mapping) else _content(Path(verdict), program)
-    if not isinstance(verdict, Mapping) and "sha256" not in content:
-        content = {**content, "sha256": {"program": _of_the_run(Path(verdict))}}
     if content.get("passed") is not True:
         raise ProgramError(f"the verdict on this program {_failure(content)}", file=program, remedy=_REMEDY)
     sources = content.get("sha256")
@@ -43,16 +40,6 @@ def _failure(content: Mapping[str, Any]) -> str:
     each = [c for c in claims if isinstance(c, dict)] if isinstance(claims, list) else []
     failed = [str(c.get("claim")) for c in each if c.get("passed") is not True]
     return f"failed: {', '.join(failed[:3])}{', …' if len(failed) > 3 else ''}" if failed else "has not passed"
-
-
-def _of_the_run(verdict: Path) -> str | None:
-    """Return the SHA-256 of the program that was written with a verdict, as the manifest beside it says; else None."""
-    try:
-        files = json.loads(verdict.with_name("manifest.json").read_text(encoding="utf-8"))["files"]
-        same = files[verdict.name]["sha256"] == sha256_of(verdict)
-        return str(files["program.csv"]["sha256"]) if same else None
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return None
 
 
 def _content(file: Path, program: str | Path | None) -> Mapping[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import platform
+from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ from pentapod.timing.trajectory import Trajectory
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.parting import Piece
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
-from pentapod.version import __version__
+from pentapod.version import __version__, library_versions, processor_kind
 
 _POSES = 240
 
@@ -93,7 +93,6 @@ def _context(outcome: Outcome) -> dict[str, Any]:
         "chosen_by": "" if placed is None else placed.placement.chosen_by,
         "component": "" if placed is None else str(placed.component),
         "stages": outcome.stages,
-        "seconds": sum(stage.seconds for stage in outcome.stages),
         "program": program,
         "poses_shown": signals is not None,
         "provenance": _provenance(outcome),
@@ -235,11 +234,14 @@ def _to_prepare(outcome: Outcome, signals: Signals | None) -> list[tuple[str, st
 
 def _provenance(outcome: Outcome) -> list[tuple[str, str]]:
     job, machine = outcome.job, outcome.machine
+    files = asdict(outcome.verdict.sources)
     return [
         ("job", f"{job.path.name}, {job.digest}"),
         ("mesh", job.mesh_path.name),
         ("machine", f"{machine.name}, {machine.digest}"),
         ("controller", f"a row every {1e3 * machine.controller.period:g} ms, {machine.controller.interpolation}"),
         ("pentapod", __version__),
-        ("Python, NumPy", f"{platform.python_version()}, {np.__version__}"),
+        ("libraries", library_versions()),
+        ("processor", processor_kind()),
+        *((f"SHA-256 of the {name}", digest) for name, digest in files.items() if digest is not None),
     ]

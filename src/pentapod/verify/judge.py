@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Unpack
 
 from pentapod.errors import InputError, MachineError, ProgramError, nearest
-from pentapod.files import atomic_write
+from pentapod.files import atomic_write, sha256_of
 from pentapod.machine.machine import Machine
 from pentapod.program.csv import read_csv
 from pentapod.program.program import Program
@@ -92,22 +92,23 @@ def judged(
     for name in specification.waived:
         if name not in CLAIM_NAMES:
             raise InputError("no such claim", key="waived", value=name, remedy=nearest(name, CLAIM_NAMES))
-    read: list[Certificate] = []
+    read, sources = list[Certificate](), specification.sources
     if not isinstance(program, Program):
         path = Path(program)
         if not path.is_file():
             raise ProgramError("there is no such file", file=path, expected="a program file")
         progress("verify", 0.0, "reading")
+        sources = replace(sources, program=sha256_of(path))
         try:
             program = read_csv(path)
         except InputError as error:
-            return Verdict((Certificate(READABLE, False, None, None, "", Place(), str(error)),))
+            return Verdict((Certificate(READABLE, False, None, None, "", Place(), str(error)),), sources=sources)
         method = f"{len(program.legs)} rows, {program.duration:.6g} s, {program.interpolation} between rows"
         read = [Certificate(READABLE, True, None, None, "", Place(), method)]
     try:
         specification = replace(specification, machine=program.machine(specification.machine))
     except MachineError as error:
-        return Verdict((*read, Certificate(origin.GUIDES, False, None, None, "", Place(), str(error))))
+        return Verdict((*read, Certificate(origin.GUIDES, False, None, None, "", Place(), str(error))), sources=sources)
     replay, unjudged = Replay(program, specification, progress), list[NotJudged]()
     _ = replay.survey
     claims = (*CLAIMS, *collisions.claims(specification.surroundings))
@@ -121,7 +122,7 @@ def judged(
         elif strict:
             read.append(claim.inapplicable(answer))
     progress("verify", 1.0)
-    return Verdict(tuple(read), tuple(unjudged))
+    return Verdict(tuple(read), tuple(unjudged), sources)
 
 
 def write_verdict(verdict: Verdict, path: str | Path) -> Path:

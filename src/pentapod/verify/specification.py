@@ -11,6 +11,7 @@ from pentapod.errors import ArrayError
 from pentapod.machine.machine import Machine
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify.cutting import Cutting
+from pentapod.verify.sources import UNTOLD, Sources
 
 if TYPE_CHECKING:
     from pentapod.kinematics.component import Component
@@ -30,8 +31,8 @@ class Specification:
     links must reach where no limit is used; None for the default of the tool, 0 where it does not matter. setups: most
     programs into which the work may be split; missed: how many intervals of the whole toolpath should be cut and are
     cut in none of them, or in more than one; None where the other programs are not known. waived: names of claims
-    without which the verdict may pass where they cannot be judged. Raises ArrayError where a tolerance is not a
-    sensible number.
+    without which the verdict may pass where they cannot be judged. sources: the files that all this is from.
+    Raises ArrayError where a tolerance is not a sensible number.
     """
 
     machine: Machine
@@ -48,6 +49,7 @@ class Specification:
     setups: int = 1
     missed: int | None = None
     waived: tuple[str, ...] = ()
+    sources: Sources = UNTOLD
 
     def __post_init__(self) -> None:
         for name in ("tilt", "path_tolerance", "axis_tolerance"):
@@ -73,3 +75,4 @@ class Asked(TypedDict, total=False):
     setups: int
     missed: int | None
     waived: tuple[str, ...]
+    sources: Sources

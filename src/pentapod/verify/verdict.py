@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from pentapod.verify.sources import UNTOLD, Sources
+from pentapod.version import __version__, library_versions, processor_kind
+
 
 @dataclass(frozen=True)
 class Place:
@@ -52,13 +55,14 @@ class NotJudged:
 
 @dataclass(frozen=True)
 class Verdict:
-    """All certificates of a program, and what was not judged.
+    """All certificates of a program, what was not judged, and the files that it is about.
 
     passed: there is at least one claim, every claim holds, and what was not judged is waived.
     """
 
     certificates: tuple[Certificate, ...]
     not_judged: tuple[NotJudged, ...] = ()
+    sources: Sources = UNTOLD
 
     @property
     def passed(self) -> bool:
@@ -84,4 +88,10 @@ class Verdict:
             "passed": self.passed,
             "certificates": [asdict(c) for c in self.certificates],
             "not_judged": [asdict(entry) for entry in self.not_judged],
+            "sha256": asdict(self.sources),
+            "judged_by": {
+                "pentapod": __version__,
+                "libraries": library_versions(),
+                "processor": processor_kind(),
+            },
         }

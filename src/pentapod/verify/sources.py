@@ -1,0 +1,24 @@
+"""Sources: the files that a verdict is about, by their bytes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Sources:
+    """SHA-256 of each file that a verdict is about, as hex digits; None where there is none, or nobody told.
+
+    machine: of the machine's file, also where it is one that ships. fixture: of its mesh.
+    """
+
+    program: str | None = None
+    job: str | None = None
+    machine: str | None = None
+    mesh: str | None = None
+    fixture: str | None = None
+    stock: str | None = None
+
+
+UNTOLD = Sources()
+"""Of what no file is known."""
