@@ -22,7 +22,9 @@ def test_one_thread_or_two(make_job, tmp_path):
         out = tmp_path / threads
         environment = os.environ | dict.fromkeys(VARIABLES, threads)
         subprocess.run([*COMMAND, str(path), "-o", str(out), "--quiet"], env=environment, check=True)
-        files.append({name: (out / name).read_bytes() for name in ("program.csv", "plan.npz", "verdict.json", "report.html")})
+        files.append(
+            {name: (out / name).read_bytes() for name in ("program.csv", "plan.npz", "verdict.json", "report.html")}
+        )
     for name, content in files[0].items():
         assert content == files[1][name], name
     source = read_csv(tmp_path / "1" / "program.csv").provenance

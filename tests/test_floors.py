@@ -45,6 +45,7 @@ FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
             "job_coverage",
             "job_cutting",
             "job_placement",
+            "job_sources",
             "job_specification",
             "job_strategy",
             "job_surroundings",

@@ -36,8 +36,14 @@ if TYPE_CHECKING:
     from pentapod.timing import Trajectory as Trajectory
     from pentapod.timing import retime as retime
     from pentapod.toolpath import BallCutter as BallCutter
+    from pentapod.toolpath import BullNose as BullNose
+    from pentapod.toolpath import FlatEnd as FlatEnd
+    from pentapod.toolpath import GougeOptions as GougeOptions
+    from pentapod.toolpath import Lollipop as Lollipop
     from pentapod.toolpath import Mesh as Mesh
+    from pentapod.toolpath import Orientation as Orientation
     from pentapod.toolpath import RasterOptions as RasterOptions
+    from pentapod.toolpath import Remedy as Remedy
     from pentapod.toolpath import StandOff as StandOff
     from pentapod.toolpath import Toolpath as Toolpath
     from pentapod.toolpath import load_mesh as load_mesh
@@ -59,8 +65,14 @@ _HOMES = {
     "load_mesh": "toolpath",
     "Mesh": "toolpath",
     "BallCutter": "toolpath",
+    "FlatEnd": "toolpath",
+    "BullNose": "toolpath",
+    "Lollipop": "toolpath",
     "StandOff": "toolpath",
     "RasterOptions": "toolpath",
+    "Orientation": "toolpath",
+    "GougeOptions": "toolpath",
+    "Remedy": "toolpath",
     "make_toolpath": "toolpath",
     "Toolpath": "toolpath",
     "plan": "planning",
@@ -99,8 +111,14 @@ __all__ = [  # noqa: RUF022 - in the order of the flow
     "load_mesh",
     "Mesh",
     "BallCutter",
+    "FlatEnd",
+    "BullNose",
+    "Lollipop",
     "StandOff",
     "RasterOptions",
+    "Orientation",
+    "GougeOptions",
+    "Remedy",
     "make_toolpath",
     "Toolpath",
     "plan",

@@ -1,10 +1,12 @@
 """The workpiece as mathematics: meshes, strategies, tools, links. No robot in it."""
 
+from pentapod.toolpath.axis_modes import AxisMode, Between, Fixed, Normal, Pointed
 from pentapod.toolpath.cross_hatch import CrossHatchOptions
 from pentapod.toolpath.curves import CurveOptions
 from pentapod.toolpath.diagnosis import MeshDiagnosis
 from pentapod.toolpath.drawings_in import read_lines
 from pentapod.toolpath.edges import EdgeOptions
+from pentapod.toolpath.gouge_report import GougeOptions, Remedy
 from pentapod.toolpath.heightfield import HeightField
 from pentapod.toolpath.image import ImageOptions
 from pentapod.toolpath.lettering import lettering
@@ -12,6 +14,7 @@ from pentapod.toolpath.load import UNITS, load_mesh
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.offset import OffsetOptions
 from pentapod.toolpath.options import CoverOptions, Entry, PathOptions
+from pentapod.toolpath.orientation import Orientation
 from pentapod.toolpath.path_report import PathReport
 from pentapod.toolpath.pictures_in import read_darkness
 from pentapod.toolpath.points_in import read_points
@@ -23,29 +26,40 @@ from pentapod.toolpath.spiral import SpiralOptions
 from pentapod.toolpath.stl import write_stl
 from pentapod.toolpath.strategies import STRATEGIES, Strategy, make_toolpath, toolpath_with_report
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.toolpath.tools import BallCutter, StandOff, Tool
+from pentapod.toolpath.tools import BallCutter, BullNose, FlatEnd, Lollipop, StandOff, Tool
 from pentapod.toolpath.waterline import WaterlineOptions
 
 __all__ = [
     "STRATEGIES",
     "UNITS",
+    "AxisMode",
     "BallCutter",
+    "Between",
+    "BullNose",
     "CoverOptions",
     "CrossHatchOptions",
     "CurveOptions",
     "EdgeOptions",
     "Entry",
+    "Fixed",
+    "FlatEnd",
+    "GougeOptions",
     "HeightField",
     "ImageOptions",
+    "Lollipop",
     "Mesh",
     "MeshDiagnosis",
+    "Normal",
     "OffsetOptions",
+    "Orientation",
     "PathOptions",
     "PathReport",
     "Pattern",
+    "Pointed",
     "PolylineOptions",
     "RasterOptions",
     "Region",
+    "Remedy",
     "Segment",
     "SegmentKind",
     "SpiralOptions",

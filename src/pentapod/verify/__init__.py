@@ -5,6 +5,7 @@ from pentapod.verify.coverage import Coverage
 from pentapod.verify.cutting import Cutting
 from pentapod.verify.judge import CLAIM_NAMES, CLAIMS, judged, verify, write_verdict
 from pentapod.verify.replay import Replay
+from pentapod.verify.sources import Sources
 from pentapod.verify.specification import Specification
 from pentapod.verify.verdict import Certificate, NotJudged, Place, Verdict
 
@@ -18,6 +19,7 @@ __all__ = [
     "NotJudged",
     "Place",
     "Replay",
+    "Sources",
     "Specification",
     "Verdict",
     "judged",
