@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from pentapod.arrays import Bools
 from pentapod.geometry.polyline import arc_length
+from pentapod.toolpath.mesh_distance import MeshDistance
+from pentapod.toolpath.solids import Solid
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.claim import MM, Claim, Finding, Idle
-from pentapod.verify.cutting import Cutting
 from pentapod.verify.immersion import Immersion, immersion
 from pentapod.verify.replay import Replay
+
+_THICK = 0.9
+"""Of the cutter's thickness: up to this depth a mesh point inside it is judged where the cutter is."""
 
 
 def gouge(replay: Replay, *, rapid: bool) -> Finding | Idle:
@@ -28,27 +33,32 @@ def gouge(replay: Replay, *, rapid: bool) -> Finding | Idle:
     allowed = 0.0 if rapid else cutting.depth
     bound = allowed + replay.path_tolerance
     thickness = max(solid.thickness for solid in cutting.cutter)
-    if bound >= thickness:
-        return Idle(f"{MM * bound:g} mm are allowed, and nothing is deeper in a cutter this thin", unknown=True)
-    found = immersion(replay, cutting.surface, cutting.cutter, chords, bound=bound)
-    passed, inside = found.most <= bound, _enclosed(replay, cutting)
+    # No mesh point is deeper in a cutter than it is thick. So it is raised along its axis until what is left to be
+    # allowed is less: moved by so much, it can be deeper by no more than that.
+    rise = max(bound - _THICK * thickness, 0.0)
+    cutter = tuple(replace(solid, low=solid.low + rise, high=solid.high + rise) for solid in cutting.cutter)
+    found = immersion(replay, cutting.surface, cutter, chords, bound=bound - rise)
+    most, inside = found.most + rise, _enclosed(replay, cutting.surface, cutter)
+    passed = most <= bound
     if passed and inside:
         return Finding(False, None, MM * bound, "mm", replay.place(0), "the cutter begins inside the part")
-    method = _method(found, bound) + f"; allowed: {MM * replay.path_tolerance:g} mm off the toolpath"
+    method = _method(found, rise) + f"; allowed: {MM * replay.path_tolerance:g} mm off the toolpath"
     if not rapid:
         method += f", and {MM * cutting.depth:g} mm that count as none or are engraved"
-    return Finding(passed, MM * found.most, MM * bound, "mm", replay.place(found.sample), method)
+    return Finding(passed, MM * most, MM * bound, "mm", replay.place(found.sample), method)
 
 
-def _method(found: Immersion, bound: float) -> str:
+def _method(found: Immersion, rise: float) -> str:
+    raised = f" ({MM * rise:g} mm, and what the cutter has when it is raised by them along its axis)" if rise else ""
     if found.met:
-        return "this deep is the cutter in the part at this moment; others may be worse"
+        return f"this deep is the cutter in the part at this moment{raised}; others may be worse"
     if not np.isfinite(found.most):
         return "not proven: the tool turns too far within half a period"
-    what = "deepest mesh point inside the cutter" if found.most > 0.0 else "smallest gap of the cutter (negative)"
+    deep = rise > 0.0 or found.most > 0.0
+    what = "deepest mesh point inside the cutter" if deep else "smallest gap of the cutter (negative)"
     return (
-        f"proven bound for all times of the {what}: swept exactly along straight stretches of the replayed motion, "
-        "with what that strays from them"
+        f"proven bound for all times of the {what}{raised}: swept exactly along straight stretches of the replayed "
+        "motion, with what that strays from them"
     )
 
 
@@ -63,10 +73,10 @@ def _rapid(replay: Replay) -> Bools:
     return np.asarray(before[behind] == before[first])
 
 
-def _enclosed(replay: Replay, cutting: Cutting) -> bool:
+def _enclosed(replay: Replay, surface: MeshDistance, cutter: tuple[Solid, ...]) -> bool:
     """Return whether the cutter begins wholly inside: what never meets the surface stays on its side."""
-    top = max(solid.top for solid in cutting.cutter) - replay.toolpath.pivot
-    return bool(cutting.surface.contains(replay.pivots[:1] + top * replay.axes[:1]).any())
+    top = max(solid.top for solid in cutter) - replay.toolpath.pivot
+    return bool(surface.contains(replay.pivots[:1] + top * replay.axes[:1]).any())
 
 
 CLAIMS = (
