@@ -191,7 +191,8 @@ class Case:
     axes: np.ndarray
 
 
-def good_case(lean=0.0, interpolation="cubic"):
+def good_case(lean=0.0, interpolation="cubic", *, longer=0.0):
+    """A case; with the program made for a tool so much longer than the machine has, metres."""
     stand = load_machine(Path(__file__).with_name("stand.toml"))
     controller = replace(stand.controller, interpolation=interpolation)
     machine = replace(stand, rapid_velocity=RAPID, controller=controller)
@@ -200,7 +201,7 @@ def good_case(lean=0.0, interpolation="cubic"):
     return Case(
         machine,
         toolpath_of(parts),
-        program_of(machine, tips, axes, lean=lean, interpolation=interpolation),
+        program_of(machine.with_tool(machine.tool_length + longer), tips, axes, lean=lean, interpolation=interpolation),
         tips,
         axes,
     )

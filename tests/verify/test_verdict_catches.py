@@ -311,6 +311,41 @@ def test_wrong_placement(good):
     assert names <= {"starts at the toolpath's start", "ends at the toolpath's end", "no unasked stop", *GEOMETRY}
 
 
+def made_for_longer_tool(case, longer):
+    """The rows of a program made for a tool that is longer, beside the machine with the job's."""
+    made = cases.good_case(0.5 * cases.TILT, case.program.interpolation, longer=longer)
+    return replace(case, program=replace(made.program, provenance=case.program.provenance))
+
+
+@pytest.mark.parametrize(("longer", "words"), [(3e-5, "0.030 mm longer"), (-1e-3, "1.000 mm shorter")])
+def test_a_tool_of_another_length_is_told(good, longer, words):
+    verdict = judge(made_for_longer_tool(good, longer))
+    found = {c.claim: c for c in verdict.certificates}["tip deviation"]
+    assert not found.passed
+    assert found.value == pytest.approx(1e3 * abs(longer), abs=0.5e-3)
+    assert found.method.startswith(f"as if the program were made for a tool {words} than the job's")
+
+
+@pytest.mark.parametrize("shift", [[0.0, 1e-4, 0.0], [3e-3, -2e-3, 1e-4]])
+def test_a_part_that_stands_elsewhere_is_told(good, shift):
+    placement = good.program.placement
+    moved = RigidTransform(np.eye(3), -np.array(shift)) @ placement
+    verdict = judge(replace(good, program=replace(good.program, placement=moved)))
+    found = {c.claim: c for c in verdict.certificates}["tip deviation"]
+    x, y, z = 1e3 * np.array(shift)
+    assert not found.passed
+    assert found.value == pytest.approx(1e3 * np.linalg.norm(shift), abs=0.5e-3)
+    assert found.method.startswith(f"as if the part stood [{x:.3f}, {y:.3f}, {z:.3f}] mm elsewhere")
+
+
+def test_no_cause_is_told_where_the_tip_is_off_at_one_place(good):
+    legs = good.program.legs.copy()
+    legs[middle_of_first_cut(good)] += 50e-6
+    found = {c.claim: c for c in judge(with_legs(good, legs)).certificates}["tip deviation"]
+    assert not found.passed
+    assert "as if" not in found.method
+
+
 def test_placement_far_off(good):
     shift = RigidTransform(np.eye(3), np.array([0.0, 0.3, 0.0]))
     moved = replace(good.program, placement=good.program.placement @ shift)

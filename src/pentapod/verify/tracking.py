@@ -15,6 +15,7 @@ from pentapod.arrays import Floats
 from pentapod.geometry.directions import angle_between
 from pentapod.kinematics.blocks import blocks
 from pentapod.verify.claim import ALLOWANCE, MM, Claim, Finding, with_allowance
+from pentapod.verify.offset import constant_offset
 from pentapod.verify.replay import Replay
 
 _BLOCK = 1 << 15  # samples
@@ -27,7 +28,11 @@ def tip_deviation(replay: Replay) -> Finding:
     its deviation is that of the tip once the tool is turned back to the nominal axis.
     """
     stray = at_samples(replay.survey.away)
-    deviation = replay.match.distances + stray
+    deviation, offset = replay.match.distances + stray, None
+    if deviation.max() > with_allowance(replay.path_tolerance):
+        offset = constant_offset(replay)
+        if offset is not None and (offset.distances + stray).max() < deviation.max():
+            deviation = offset.distances + stray
     worst = int(np.argmax(deviation))
     method = (
         "proven bound for all times, of the point "
@@ -37,6 +42,8 @@ def tip_deviation(replay: Replay) -> Finding:
         f"chord in between is proven by Krawczyk's operator (here {1e6 * stray[worst]:.2g} µm); at the toolpath's "
         'corners the claim "toolpath covered" says the rest'
     )
+    if offset is not None:
+        method = f"{offset.cause}: without that it is within the tolerance; {method}"
     return _within(replay, float(deviation[worst]), worst, method)
 
 
