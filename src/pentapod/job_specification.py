@@ -40,6 +40,7 @@ def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Cal
         freedom=freedom,
         component=None if component is None else Component.parse(component),
         lowest_share=job.feed.lowest_share,
+        stop_angle=float(np.radians(job.feed.stop_angle_deg)),
         setups=job.placement.setups,
         waived=job.verify.waive,
         sources=job_sources(job),

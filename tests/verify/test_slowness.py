@@ -80,7 +80,7 @@ def test_standing_amid_a_cut_fails(linear, seconds):
     assert judged(linear)[STOP].passed
 
 
-def test_coming_to_rest_amid_a_cut_fails(linear):
+def resting_amid(case):
     """Not for long: the motion slows down to rest and goes on."""
     parts = cases.strokes()
     forth = parts[1]
@@ -89,7 +89,19 @@ def test_coming_to_rest_amid_a_cut_fails(linear):
         replace(forth, pose=lambda f: forth.pose(0.5 + 0.5 * f), count=31),
     ]
     tips, axes = cases.timed([parts[0], *halves, *parts[2:]])
-    assert not judged(linear, cases.program_of(linear.machine, tips, axes, interpolation="linear"))[STOP].passed
+    return cases.program_of(case.machine, tips, axes, interpolation="linear")
+
+
+@pytest.mark.parametrize(("stop_angle", "passed"), [(None, False), (1e-3, True), (0.1, False), (2.0, False)])
+def test_coming_to_rest_amid_a_cut_fails_where_the_toolpath_does_not_turn_enough(linear, stop_angle, passed):
+    """At the hill's crest: the toolpath turns there by some milliradians from waypoint to waypoint."""
+    assert judged(linear, resting_amid(linear), stop_angle=stop_angle)[STOP].passed is passed
+
+
+@pytest.mark.parametrize("angle", [0.0, -0.1, 4.0, float("nan")])
+def test_a_stop_angle_is_an_angle(linear, angle):
+    with pytest.raises(ArrayError, match="stop_angle"):
+        judged(linear, stop_angle=angle)
 
 
 @pytest.mark.parametrize(("dwell", "passed"), [(None, False), (0.3, False), (0.5, True), (10.0, True)])

@@ -29,7 +29,7 @@ _AROUND_S, _AROUND_ROWS = 0.02, 5
 """So near in time it must be used, or in so many rows where these are longer."""
 
 _CORNER = math.radians(20.0)
-"""Where the toolpath turns by more within the path tolerance, a motion may come to rest."""
+"""Where the toolpath turns by more within the path tolerance, a motion may come to rest. A job's angle may be less."""
 
 _SPARE_S = 0.05
 """By so much a robot may stand longer than asked."""
@@ -77,7 +77,8 @@ def unasked_stop(replay: Replay) -> Finding:
     rest = np.minimum(legs.max_jerk * period**2, _CREEP * min(feeds))
     steps = np.abs(np.diff(replay.program.legs, axis=0))
     runs = marked_runs(np.asarray((steps <= np.maximum(rest * period, STILL_M)).all(axis=1)))
-    reasons, asked = _reasons(replay, runs)
+    corner = min(_CORNER, replay.specification.stop_angle or _CORNER)
+    reasons, asked = _reasons(replay, runs, corner)
     seconds = (runs[:, 1] - runs[:, 0]) * period
     beyond = np.where(reasons, np.maximum(seconds - asked - _SPARE_S, 0.0), seconds)
     worst = int(np.argmax(beyond)) if len(beyond) else 0
@@ -85,7 +86,7 @@ def unasked_stop(replay: Replay) -> Finding:
     row = int(runs[worst, 0]) if value > 0.0 else 0
     method = (
         f"longest time at rest without a reason; reasons are dwells, for as long as they ask and {_SPARE_S:g} s, ends "
-        f"of segments, and corners of more than {math.degrees(_CORNER):g} deg within the path tolerance; at rest is "
+        f"of segments, and corners of more than {math.degrees(corner):g} deg within the path tolerance; at rest is "
         f"what moves no leg faster than its jerk allows within a period, or than {_CREEP:.0%} of the slowest feed"
     )
     if value > 0.0:
@@ -144,8 +145,11 @@ def _raise(used: Floats, shares: Floats) -> None:
     np.maximum(part, shares.max(axis=1), out=part)
 
 
-def _reasons(replay: Replay, runs: Ints) -> tuple[Bools, Floats]:
-    """Return for each run of steps whether the robot may rest there at all, and for how many seconds it is asked to."""
+def _reasons(replay: Replay, runs: Ints, least: float) -> tuple[Bools, Floats]:
+    """Return for each run of steps whether the robot may rest there at all, and for how many seconds it is asked to.
+
+    least: corners of more radians are a reason.
+    """
     path, match = replay.toolpath, replay.match
     way = arc_length(path.pivots)
     arcs, within = match.arcs[::2], replay.path_tolerance
@@ -160,7 +164,7 @@ def _reasons(replay: Replay, runs: Ints) -> tuple[Bools, Floats]:
     corner[at[1:]] = angle_between(step[at[:-1]], step[at[1:]])
     turned = np.append(0.0, np.cumsum(corner + np.append(0.0, angle_between(path.axes[:-1], path.axes[1:]))))
     first, behind = np.searchsorted(way, low, "left"), np.searchsorted(way, high, "right")
-    reasons |= turned[behind] - turned[np.minimum(first, behind)] > _CORNER
+    reasons |= turned[behind] - turned[np.minimum(first, behind)] > least
     asked = np.zeros(len(runs))
     for begin, end, seconds in asked_stops(replay):
         asked += np.where((runs[:, 0] < end) & (runs[:, 1] > begin), seconds, 0.0)

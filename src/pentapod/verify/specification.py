@@ -28,8 +28,10 @@ class Specification:
     radians beyond that; path_tolerance: metres. job_digest: of the job that the header must name. surroundings: what
     legs, spindle and tool must not touch. cutting: what cuts, and into which part. freedom: where the part may be
     placed. component: in which the program must be, None where any will do. lowest_share: of the feed, that cuts and
-    links must reach where no limit is used; None for the default of the tool, 0 where it does not matter. setups: most
-    programs into which the work may be split; missed: how many intervals of the whole toolpath should be cut and are
+    links must reach where no limit is used; None for the default of the tool, 0 where it does not matter.
+    stop_angle: radians; where the toolpath turns by more the program may stop (anyway from 20 degrees on); None where
+    nobody says. setups: most programs into which the work may be split; missed: how many intervals of the whole
+    toolpath should be cut and are
     cut in none of them, or in more than one; None where the other programs are not known. waived: names of claims
     without which the verdict may pass where they cannot be judged. sources: the files that all this is from.
     Raises ArrayError where a tolerance is not a sensible number.
@@ -46,6 +48,7 @@ class Specification:
     freedom: Freedom | None = None
     component: Component | None = None
     lowest_share: float | None = None
+    stop_angle: float | None = None
     setups: int = 1
     missed: int | None = None
     waived: tuple[str, ...] = ()
@@ -58,6 +61,8 @@ class Specification:
                 raise ArrayError("must be a positive number", key=name, value=value)
         if self.lowest_share is not None and not 0.0 <= self.lowest_share <= 1.0:
             raise ArrayError("must be a share", key="lowest_share", value=self.lowest_share, expected="0 to 1")
+        if self.stop_angle is not None and not 0.0 < self.stop_angle <= np.pi:
+            raise ArrayError("must be an angle", key="stop_angle", value=self.stop_angle, expected="0 to π, not 0")
 
 
 class Asked(TypedDict, total=False):
@@ -72,6 +77,7 @@ class Asked(TypedDict, total=False):
     freedom: Freedom | None
     component: Component | None
     lowest_share: float | None
+    stop_angle: float | None
     setups: int
     missed: int | None
     waived: tuple[str, ...]
