@@ -254,8 +254,9 @@ def test_new_gives_a_job_that_plans(tmp_path, capsys):
         model = RasterTable if table == "toolpath" else field.annotation
         for key in model.model_fields:
             assert f"{key} = " in text
-    # Quick form: the same job, fewer passes.
-    (folder / "job.toml").write_text(text.replace("stepover_mm = 6.0", "stepover_mm = 20.0"))
+    # Quick form: the same job, fewer passes, which leave material between them.
+    quick = text.replace("stepover_mm = 6.0", "stepover_mm = 20.0").replace("# left_share = 0.001", "left_share = 1")
+    (folder / "job.toml").write_text(quick)
     assert run(["plan", str(folder / "job.toml"), "-o", str(folder / "out")]) == 0
     assert run(["new", str(folder)]) == 2
 

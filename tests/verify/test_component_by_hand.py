@@ -146,7 +146,7 @@ def test_the_dwell_that_falls_short_most_is_named(monkeypatch):
     moving = np.ones(200, dtype=bool)
     moving[10:100] = moving[150:165] = False
     legs = np.cumsum(np.append(False, moving))[:, None] * np.ones(5) * 1e-6
-    monkeypatch.setattr("pentapod.verify.standing._stops", lambda _: [(5, 120, 1.0), (140, 190, 0.2), (0, 5, 0.0)])
+    monkeypatch.setattr("pentapod.verify.standing.asked_stops", lambda _: [(5, 120, 1.0), (140, 190, 0.2), (0, 5, 0.0)])
     replay = SimpleNamespace(program=SimpleNamespace(legs=legs, period=0.01), place=lambda sample: sample)
     finding = dwells(replay)
     assert not finding.passed
