@@ -39,7 +39,7 @@ def rise(found, axis):
 
 WAVES = (5, 6, 8, 9, 11, 13, 14, 15, 17, 18, 20)
 NOT_REACHED = {"corner 20 µm", "turns 1 mm", "turns 0.2 mm", *(f"waves {k}" for k in WAVES)}
-"""Their first laws rise by 2e-4 at most; what setpoints each millisecond cost then differs by up to 7.6e-3."""
+"""Their first laws rise by less than 1e-3; what setpoints each millisecond cost then differs by up to 7.6e-3."""
 
 KNOWN = pytest.mark.xfail(reason="running slower about single places costs up to 7.6e-3 more at looser limits")
 
