@@ -261,4 +261,4 @@ def test_a_cutter_whose_top_is_inside_begins_inside(top, passed):
     faces += [[3, 0, 4], [3, 4, 7]]
     mesh = Mesh.of(first + [0.0, 0.0, top] + 4e-4 * block, np.array(faces))
     replay.cutting = Cutting(MeshDistance.of(mesh), BallCutter(RADIUS, flute=6.1e-3).solids, 5e-5)
-    assert _enclosed(replay, replay.cutting) is not passed
+    assert _enclosed(replay, replay.cutting.surface, replay.cutting.cutter) is not passed
