@@ -80,38 +80,6 @@ def test_shipped_jobs(name, tmp_path):
         assert len(outcome.verdict.certificates) > 15
 
 
-PARTS = {  # mesh, [part], stepover
-    "wavy_mesh_with_hole.ply": ('unit = "mm"\nscale = 10', 8),
-    "facade_infill_open_mid_res.stl": (
-        'unit = "mm"\nregion_direction = [1, 0, 0]\nregion_box_mm = [[-100, -60, 40], [100, 60, 160]]',
-        10,
-    ),
-    "octagonal_pocket.stl": ('unit = "m"\nscale = 0.6\nregion_angle_deg = 30', 10),
-    "torus.STL": ('unit = "mm"\nscale = 40\nregion_angle_deg = 40', 10),
-    "wavy_vase_open_low_res.stl": ('unit = "mm"', 25),
-}
-
-
-@pytest.mark.parts
-@pytest.mark.parametrize("mesh", PARTS)
-def test_parts_by_others(mesh, tmp_path, parts):
-    assert (parts / mesh).is_file()
-    part, stepover = PARTS[mesh]
-    job = tmp_path / "job.toml"
-    job.write_text(
-        f'[part]\nmesh = "${{PENTAPOD_PARTS}}/{mesh}"\n{part}\n[tool]\ntype = "ball"\ndiameter_mm = 6\n'
-        f"[toolpath]\nstepover_mm = {stepover}\n[feed]\ncut_mm_min = 3000\n"
-        "[tolerance]\nleft_share = 1  # few passes, far apart\n"
-    )
-    outcome = run(Job.load(job), tmp_path / "out")
-    if "vase" in mesh:
-        assert outcome.refusal is not None
-        assert outcome.refusal.blames
-        assert not (tmp_path / "out" / "program.csv").exists()
-    else:
-        assert outcome.passed, outcome.refusal or [c for c in outcome.verdict.certificates if not c.passed]
-
-
 def test_artefacts_agree_with_each_other(make_job, tmp_path):
     out = tmp_path / "deep" / "out"
     outcome = run(Job.load(make_job()), out)
