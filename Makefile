@@ -29,11 +29,13 @@ test-lowest:  ## a part of the fast suite with the lowest versions that pyprojec
 	out/lowest/bin/python -m pip install --quiet --constraint out/lowest/constraints.txt --editable ".[plot,hdf5,drawings,sim,view]" $(ORACLES)
 	out/lowest/bin/python -m pytest -q -m "not slow" $(LOWEST_TESTS)
 
-lock:  ## constraints.txt anew: the newest versions that fit together, as a fresh environment gets them
+lock:  ## constraints.txt anew: the newest releases that fit together, with the hashes of their files, from the index that pip uses
 	rm -rf out/lock && $(PYTHON) -m venv out/lock
-	out/lock/bin/python -m pip install --quiet --editable ".[dev]"
+	out/lock/bin/python -m pip install --quiet uv
 	sed -n '/^#/p' constraints.txt > out/constraints.txt
-	out/lock/bin/python -m pip freeze --exclude-editable >> out/constraints.txt
+	UV_DEFAULT_INDEX="$${PIP_INDEX_URL:-$$(out/lock/bin/python -m pip config get global.index-url 2>/dev/null)}" \
+		out/lock/bin/uv pip compile --quiet --universal --python-version 3.11 --extra dev --generate-hashes \
+		--no-annotate --no-header pyproject.toml >> out/constraints.txt
 	mv out/constraints.txt constraints.txt
 
 lint: $(READY)
@@ -80,8 +82,8 @@ site: $(READY)  ## the documentation as a site, in site/
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "pentapod needs Python 3.11 or newer")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]"
+	$(BIN)/python -m pip install --quiet --require-hashes --requirement constraints.txt
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	touch $@
 
 clean:
