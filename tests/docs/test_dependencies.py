@@ -26,14 +26,44 @@ def test_each_has_a_line_and_a_licence():
     assert sorted(rows) == sorted(declared())
 
 
+def locked() -> list[tuple[str, str, str, list[str]]]:
+    """Name, version, condition and hashes of each release in the lock file."""
+    text = CONSTRAINTS.replace("\\\n", " ")
+    rows = [line.split("--hash=sha256:") for line in text.splitlines() if not line.startswith("#")]
+    found = []
+    for head, *hashes in rows:
+        release, _, condition = head.partition(";")
+        name, _, version = release.strip().partition("==")
+        found.append((name, version, condition.strip(), [value.strip() for value in hashes]))
+    return found
+
+
 def test_make_installs_one_version_of_each_within_its_bounds():
-    pinned = dict(re.findall(r"^([A-Za-z0-9_.-]+)==([0-9.]+)$", CONSTRAINTS, re.M))
-    pinned = {name.lower().replace("_", "-"): version for name, version in pinned.items()}
+    pinned: dict[str, list[str]] = {}
+    for name, version, _, _ in locked():
+        pinned.setdefault(name, []).append(version)
     for name, lowest in declared().items():
-        assert numbers(pinned[name]) >= lowest, name
+        assert all(numbers(version) >= lowest for version in pinned[name]), name
     assert "numba" in pinned
     assert "llvmlite" in pinned, "what dependencies need is pinned too"
+    for name, versions in pinned.items():
+        conditions = [condition for other, _, condition, _ in locked() if other == name]
+        assert len(versions) == 1 or all(re.match("python_full_version [<>]", condition) for condition in conditions), (
+            name
+        )
     assert not re.search("@|/", CONSTRAINTS), "no addresses: whoever installs has an index of their own"
+
+
+def test_make_installs_no_file_without_its_hash():
+    for name, _, _, hashes in locked():
+        assert hashes, name
+        assert all(re.fullmatch("[0-9a-f]{64}", value) for value in hashes), name
+    ready = (ROOT / "Makefile").read_text("utf-8").partition("\n$(READY):")[2].partition("\n\n")[0]
+    installs = [line for line in ready.splitlines() if " pip install" in line]
+    assert len(installs) == 2
+    assert "--require-hashes --requirement constraints.txt" in installs[0]
+    assert "--no-deps --no-build-isolation --editable ." in installs[1]
+    assert "hatchling" in {name for name, *_ in locked()}
 
 
 def test_the_licence_is_there_and_is_the_one_declared():
