@@ -7,6 +7,9 @@ READY := $(VENV)/.ready
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
+# Two processes, each with whole files as far as that goes, so that what a file's tests share is made once.
+SPREAD := -n 2 --dist worksteal
+
 # What the tests of `test-lowest` need beside the package, and the tests: arithmetic, kernels, solvers, files, a whole plan.
 ORACLES := pytest pytest-xdist hypothesis mpmath rtree pyyaml psutil python-flint
 LOWEST_TESTS := tests/geometry tests/kinematics tests/timing tests/program tests/toolpath/test_sweep.py \
@@ -18,10 +21,10 @@ demo: $(READY)  ## plan a dome and judge the program
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
 
 test: $(READY)  ## the fast suite
-	$(BIN)/pytest -n 2 -m "not slow" --durations=25
+	$(BIN)/pytest $(SPREAD) -m "not slow" --durations=25
 
 test-all: $(READY)  ## everything, the long forms too
-	$(BIN)/pytest -n 2
+	$(BIN)/pytest $(SPREAD)
 
 test-lowest:  ## a part of the fast suite with the lowest versions that pyproject.toml allows, in an environment of its own
 	rm -rf out/lowest && $(PYTHON) -m venv out/lowest

@@ -15,7 +15,7 @@ COMMAND = [sys.executable, "-c", "from pentapod.cli.main import main; main()", "
 
 
 def test_one_thread_or_two(make_job, tmp_path):
-    path = make_job(("tilt_deg = 0", "tilt_deg = 10"), ("stepover_mm = 15", "stepover_mm = 5"))
+    path = make_job(("tilt_deg = 0", "tilt_deg = 10"), ("stepover_mm = 15", "stepover_mm = 9"))
     path.write_text(path.read_text().split("[placement]")[0] + '[placement]\nthen = "force"\n')
     files: list[dict[str, bytes]] = []
     for threads in ("1", "2"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from pentapod import pipeline
 from pentapod.artefacts import check_folder
+from pentapod.cli.new import dome_stl
 from pentapod.errors import InputError, JobError, MeshError, ToolpathError
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job
@@ -25,6 +27,7 @@ from pentapod.run_folder import staged
 from pentapod.strategy_tables import TABLES
 from pentapod.timing import Explanation, Trajectory
 from pentapod.toolpath import SegmentKind, Toolpath
+from usual_job import job_text
 
 TOOLPATHS = Path(__file__).parents[1] / "toolpaths"
 SHIPPED = sorted(path.stem for path in TOOLPATHS.glob("*.toml"))
@@ -40,7 +43,14 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-QUICK = {"dome", "flower", "oversize"}
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory):
+    """The usual job and the folder of its run, to be read or copied."""
+    folder = tmp_path_factory.mktemp("usual")
+    (folder / "part.stl").write_bytes(dome_stl(cells=12))
+    (folder / "job.toml").write_text(job_text(), encoding="utf-8")
+    job = Job.load(folder / "job.toml")
+    return job, folder / "out", run(job, folder / "out")
 
 
 def test_the_shipped_jobs_show_every_strategy():
@@ -49,7 +59,7 @@ def test_the_shipped_jobs_show_every_strategy():
     assert shown | {"file"} == set(TABLES)
 
 
-@pytest.mark.parametrize("name", sorted(set(SHIPPED) - QUICK))
+@pytest.mark.parametrize("name", SHIPPED)
 def test_toolpaths_of_shipped_jobs(name):
     job = Job.load(TOOLPATHS / f"{name}.toml")
     toolpath, report = job_toolpath(job, job_mesh(job))
@@ -57,9 +67,9 @@ def test_toolpaths_of_shipped_jobs(name):
     assert "problem" not in str(report)
 
 
-@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in SHIPPED])
-def test_shipped_jobs(name, tmp_path):
-    outcome = run(Job.load(TOOLPATHS / f"{name}.toml"), tmp_path)
+def check_shipped(job, folder):
+    outcome = run(job, folder)
+    name = job.path.stem
     assert outcome.passed is (name != "oversize"), outcome.refusal or [
         c for c in outcome.verdict.certificates if not c.passed
     ]
@@ -69,20 +79,36 @@ def test_shipped_jobs(name, tmp_path):
         assert refusal.stage == "placement"
         assert any("too long" in blame.constraint for blame in refusal.blames)
         assert all(blame.shortfall > 0 and blame.waypoints for blame in refusal.blames)
-        assert names(tmp_path) == WHOLE - {"program.csv"}
+        assert names(folder) == WHOLE - {"program.csv"}
     elif name == "rail":
         setups = outcome.find(SetUps)
         assert setups is not None
         assert len(setups.parts) == 2
-        assert all(names(tmp_path / part.folder) == WHOLE for part in setups.parts)
+        assert all(names(folder / part.folder) == WHOLE for part in setups.parts)
     else:
-        assert names(tmp_path) == WHOLE
+        assert names(folder) == WHOLE
         assert len(outcome.verdict.certificates) > 15
 
 
-def test_artefacts_agree_with_each_other(make_job, tmp_path):
-    out = tmp_path / "deep" / "out"
-    outcome = run(Job.load(make_job()), out)
+@pytest.mark.slow  # in the fast lane: make demo plans the dome
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_jobs(name, tmp_path):
+    check_shipped(Job.load(TOOLPATHS / f"{name}.toml"), tmp_path)
+
+
+def test_the_oversize_job_with_fewer_waypoints(tmp_path):
+    shutil.copytree(TOOLPATHS, tmp_path / "toolpaths")
+    path = tmp_path / "toolpaths" / "oversize.toml"
+    text = path.read_text(encoding="utf-8")
+    for old, new in (("stepover_mm = 10", "stepover_mm = 80"), ("spacing_mm = 5", "spacing_mm = 30")):
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+    check_shipped(Job.load(path), tmp_path / "out")
+
+
+def test_artefacts_agree_with_each_other(usual):
+    _, out, outcome = usual
     assert outcome.passed
     assert names(out) == WHOLE
     program = read_csv(out / "program.csv")
@@ -116,6 +142,7 @@ def test_two_runs_give_the_same_bytes(make_job, tmp_path):
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
+@pytest.mark.slow  # in the fast lane: test_determinism.py
 def test_free_placement_gives_the_same_bytes_twice(make_job, tmp_path):
     text = make_job().read_text().split("[placement]")[0].replace("tilt_deg = 0", "tilt_deg = 12")
     path = tmp_path / "free.toml"
@@ -125,9 +152,8 @@ def test_free_placement_gives_the_same_bytes_twice(make_job, tmp_path):
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
-def test_a_refused_job_leaves_no_program_not_even_an_old_one(make_job, tmp_path):
-    out = tmp_path / "out"
-    run(Job.load(make_job()), out)
+def test_a_refused_job_leaves_no_program_not_even_an_old_one(usual, make_job, tmp_path):
+    out = shutil.copytree(usual[1], tmp_path / "out")
     (out / "notes.txt").write_text("mine")
     outcome = run(Job.load(make_job(TOO_FAR)), out)
     assert isinstance(outcome.refusal, Refusal)
@@ -147,11 +173,15 @@ def test_a_second_run_on_the_folder_is_told_before_any_work(make_job, tmp_path):
     assert stages == []
 
 
-@pytest.mark.parametrize("stage", ["plan", "leg_path", "retime", "sample", "judged", "write_arrays", "write_json"])
-@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
-def test_interrupted_runs_change_nothing(stage, error, make_job, tmp_path, monkeypatch):
-    job, old, fresh = Job.load(make_job()), tmp_path / "old", tmp_path / "deep" / "fresh"
-    run(job, old)
+STAGES = ["plan", "leg_path", "retime", "sample", "judged", "write_arrays", "write_json"]
+
+
+@pytest.mark.parametrize(
+    ("stage", "error"), [*((stage, KeyboardInterrupt) for stage in STAGES), ("leg_path", RuntimeError)]
+)
+def test_interrupted_runs_change_nothing(stage, error, usual, tmp_path, monkeypatch):
+    job, old, fresh = usual[0], tmp_path / "old", tmp_path / "deep" / "fresh"
+    shutil.copytree(usual[1], old)
     before = contents(old)
 
     def stop(*_: object, **__: object) -> None:
@@ -165,9 +195,8 @@ def test_interrupted_runs_change_nothing(stage, error, make_job, tmp_path, monke
     assert not fresh.exists()
 
 
-def test_bad_mesh_changes_nothing(make_job, tmp_path):
-    out = tmp_path / "out"
-    run(Job.load(make_job()), out)
+def test_bad_mesh_changes_nothing(usual, make_job, tmp_path):
+    out = shutil.copytree(usual[1], tmp_path / "out")
     before = contents(out)
     with pytest.raises(MeshError):
         run(Job.load(make_job(mesh=b"solid text, not a mesh\n")), out)
@@ -250,39 +279,24 @@ def test_a_job_may_limit_the_tool(make_job, tmp_path):
     assert "tip acceleration" in str(outcome.find(Explanation))
 
 
-def test_a_dwell_after_each_cut_by_job_key(make_job, tmp_path):
+def test_a_dwell_after_each_cut_by_job_key(usual, make_job, tmp_path):
     """The verdict judges it from the file; a program for the same job without the key fails that claim."""
-    outcomes = {
-        name: run(
-            Job.load(make_job(("cut_mm_min = 3000", "cut_mm_min = 3000" + more), name=f"{name}.toml")), tmp_path / name
-        )
-        for name, more in (("plain", ""), ("dwell", "\ndwell_s = 0.25"))
-    }
-    assert all(outcome.passed for outcome in outcomes.values())
-    toolpath = outcomes["dwell"].find(Toolpath)
+    job = Job.load(make_job(("cut_mm_min = 3000", "cut_mm_min = 3000\ndwell_s = 0.25")))
+    outcome = run(job, tmp_path / "dwell")
+    assert outcome.passed
+    toolpath = outcome.find(Toolpath)
     count = sum(seconds == 0.25 for seconds in toolpath.dwells)
     assert count >= 1
-    claims = {c.claim: c for c in outcomes["dwell"].verdict.certificates}
+    claims = {c.claim: c for c in outcome.verdict.certificates}
     assert claims["dwells"].passed
     assert claims["dwells"].value == pytest.approx(0.25, abs=0.02)
     assert claims["exact stops"].passed
-    taken = [outcome.find(Trajectory).duration for outcome in outcomes.values()]
-    assert taken[1] - taken[0] > 0.25 * count
-    job = Job.load(make_job(("cut_mm_min = 3000", "cut_mm_min = 3000\ndwell_s = 0.25")))
-    judged = judge(job, tmp_path / "plain" / "program.csv")
+    assert outcome.find(Trajectory).duration - usual[2].find(Trajectory).duration > 0.25 * count
+    judged = judge(job, usual[1] / "program.csv")
     assert not {c.claim: c for c in judged.certificates}["dwells"].passed
 
 
-def test_exact_stops_at_corners_by_job_key(make_job, tmp_path):
-    pieces = [
-        len(
-            run(
-                Job.load(make_job(("cut_mm_min = 3000", f"cut_mm_min = 3000\nstop_angle_deg = {angle}"))),
-                tmp_path / str(angle),
-            )
-            .find(LegPath)
-            .pieces
-        )
-        for angle in (135, 60)
-    ]
-    assert pieces[1] > pieces[0]
+def test_exact_stops_at_corners_by_job_key(usual, make_job, tmp_path):
+    """The default is 135 degrees."""
+    job = Job.load(make_job(("cut_mm_min = 3000", "cut_mm_min = 3000\nstop_angle_deg = 60")))
+    assert len(run(job, tmp_path).find(LegPath).pieces) > len(usual[2].find(LegPath).pieces)

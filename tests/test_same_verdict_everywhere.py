@@ -87,13 +87,29 @@ def test_a_program_sunk_into_the_part_passes_nowhere(planned, tmp_path):
         assert not gouge.passed
 
 
+def test_a_drawing_is_named_by_its_bytes(make_job, tmp_path):
+    """In the verdict on a job that cannot be done too."""
+    drawing = (
+        b'<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm" viewBox="0 0 9 9"><path d="M1 1L8 8"/></svg>'
+    )
+    (tmp_path / "a.svg").write_bytes(drawing)
+    job = make_job(
+        ("stepover_mm = 15\nspacing_mm = 4", 'strategy = "drawing"\nfile = "a.svg"'),
+        ("position_mm = [", "position_mm = [1000.0, 0, 700] # ["),
+    )
+    assert run(Job.load(job), tmp_path / "out").refusal is not None
+    found = json.loads((tmp_path / "out" / "verdict.json").read_text(encoding="utf-8"))["sha256"]
+    assert found["toolpath_file"] == sha256(drawing).hexdigest()
+    assert found["toolpath_curve"] is None
+
+
 def test_the_files_are_named_by_their_bytes(planned, capsys):
     job, outcome, folder = planned
     library = resources.files("pentapod.machine") / "library" / "desk.toml"
     files = {"program": folder / "program.csv", "job": job.path, "machine": library, "mesh": job.mesh_path}
     wanted = {name: sha256(file.read_bytes()).hexdigest() for name, file in files.items()}
     found = json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
-    assert found["sha256"] == {**wanted, "fixture": None, "stock": None}
+    assert found["sha256"] == dict.fromkeys(found["sha256"]) | wanted
     made_by = {"pentapod": __version__, "libraries": library_versions(), "processor": processor_kind()}
     assert found["judged_by"] == made_by
     page = (folder / REPORT).read_text(encoding="utf-8")

@@ -30,14 +30,16 @@ from usual_job import job_text
 EACH = {"program.csv", "plan.npz", "verdict.json", "manifest.json"}
 
 
-def text(setups: int = 3, scale: float = 3.0) -> str:
+def text(setups: int = 3, scale: float = 3.0, stepover: float = 60, spacing: float = 15) -> str:
     """A dome of 180 mm that two poses of a fixture, 120 mm apart, reach together."""
     centre = Machine.load("desk").work.centre * 1e3 + (0.0, 0.0, 20.0)
     shift = np.array([60.0, 0.0, 0.0])
     places = np.round([centre - shift, centre + shift], 3).tolist()
     poses = [[*place, 180, 0, 0] for place in places]
     head = job_text().split("[placement]")[0].replace('unit = "mm"', f'unit = "mm"\nscale = {scale}')
-    head = head.replace("stepover_mm = 15", "stepover_mm = 45").replace("spacing_mm = 4", "spacing_mm = 9")
+    head = head.replace("stepover_mm = 15", f"stepover_mm = {stepover}").replace(
+        "spacing_mm = 4", f"spacing_mm = {spacing}"
+    )
     return f'{head}[placement]\nmode = "fixture"\nposes_mm_deg = {poses}\nsetups = {setups}\ncomponent = "++"\n'
 
 
@@ -53,6 +55,13 @@ def job(tmp_path_factory):
 def done(job):
     out = job.parent / "out"
     return out, run(Job.load(job), out, writers={"report.html": write_report})
+
+
+@pytest.fixture
+def pieces(done, monkeypatch):
+    """The search for pieces is over at once: those found before."""
+    found = tuple(part.piece for part in done[1].find(SetUps).parts)
+    monkeypatch.setattr(pipeline, "setups", lambda *_: found)
 
 
 def test_each_set_up_has_its_files(done):
@@ -169,7 +178,7 @@ def test_the_programs_together_are_the_job_and_one_alone_is_not(done, job, capsy
 def test_too_few_set_ups_are_a_refusal_that_names_what_is_left(job, tmp_path):
     """So large that two poses never reach all of it; files of the run before are gone."""
     large = job.with_name("large.toml")
-    large.write_text(text(setups=2, scale=4.5))
+    large.write_text(text(setups=2, scale=4.5, stepover=45, spacing=9))
     old = tmp_path / "setup-1"
     old.mkdir()
     (old / "program.csv").write_text("")
@@ -183,7 +192,7 @@ def test_too_few_set_ups_are_a_refusal_that_names_what_is_left(job, tmp_path):
 
 
 @pytest.mark.parametrize("stage", ["setups", "leg_path", "write_json"])
-def test_an_interruption_changes_nothing(stage, job, tmp_path, monkeypatch):
+def test_an_interruption_changes_nothing(stage, job, pieces, tmp_path, monkeypatch):
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 

@@ -18,6 +18,7 @@ def job_sources(job: Job) -> Sources:
         machine=sha256(machine_bytes(job.machine_file or str(job.machine.name))).hexdigest(),
         mesh=sha256_of(job.mesh_path),
         fixture=None if job.fixture_mesh is None else sha256_of(job.fixture_mesh),
+        **{f"toolpath_{key}": sha256_of(file) for key, file in job.files.items()},
     )
 
 

@@ -84,7 +84,7 @@ def guides_in(arrays: Mapping[str, NDArray[Any]]) -> list[float] | None:
 
 
 def _metres(values_mm: Floats) -> list[float]:
-    """Return metres to the nanometre: those of whole micrometres, as the planner sets them, come back bit for bit."""
+    """Return metres to the nanometre: those of whole micrometres, as the planner sets them, come back exactly."""
     return [round(value / _MM, 9) for value in values_mm.tolist()]
 
 

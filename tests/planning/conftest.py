@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pentapod.machine.machine import Machine
+from pentapod.planning import PlacedPath, plan
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 
@@ -39,3 +40,11 @@ def cap() -> Toolpath:
 def wide() -> Toolpath:
     """Too wide for the desk machine."""
     return dome(0.5, 30.0)
+
+
+@pytest.fixture(scope="session")
+def cap_placed(desk: Machine, cap: Toolpath) -> PlacedPath:
+    """The cap where it is best, with axes that may lean by 15 degrees."""
+    answer = plan(cap, desk, tilt=np.radians(15.0))
+    assert isinstance(answer, PlacedPath), str(answer)
+    return answer

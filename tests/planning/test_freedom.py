@@ -110,10 +110,8 @@ def test_impossible_freedoms_are_errors():
 
 
 @pytest.fixture(scope="module")
-def best(desk, cap):
-    answer = plan(cap, desk, tilt=TILT)
-    assert isinstance(answer, PlacedPath)
-    return answer
+def best(cap_placed):
+    return cap_placed
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

@@ -21,10 +21,8 @@ TILT = np.radians(15.0)
 
 
 @pytest.fixture(scope="module")
-def placed(desk, cap):
-    answer = plan(cap, desk, tilt=TILT)
-    assert isinstance(answer, PlacedPath), str(answer)
-    return answer
+def placed(cap_placed):
+    return cap_placed
 
 
 def test_every_waypoint_keeps_every_limit(desk, placed):
@@ -79,6 +77,7 @@ def test_tilt_gains_over_strict_normals(desk, cap, placed):
         assert strict.stage == "placement"
 
 
+@pytest.mark.slow  # in the fast lane: test_determinism.py
 def test_same_task_same_plan(desk, cap, placed):
     again = plan(cap, desk, tilt=TILT)
     assert isinstance(again, PlacedPath)

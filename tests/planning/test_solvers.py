@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from planning_instances import instances
 
+from conftest import dome
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.planning.calming import SLACK
@@ -22,8 +23,8 @@ TILT = np.radians(15.0)
 
 
 @pytest.fixture(scope="module")
-def setting(desk, cap):
-    return Setting.of(Task.of(cap, TILT), desk)
+def setting(desk):
+    return Setting.of(Task.of(dome(0.12, 35.0, waypoints=160), TILT), desk)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="50mm" viewB
 CSV = "x_mm,y_mm,z_mm\n0,0,0\n10,0,0\n10,5,1\n"
 
 
-def dxf(unit=4):
+def dxf(unit=4, more=lambda document: None):
     import ezdxf
 
     document = ezdxf.new("R2010")
@@ -23,6 +23,7 @@ def dxf(unit=4):
     model.add_circle((10, 5), 4)
     model.add_lwpolyline([(0, 0), (20, 0, 0, 0, 1), (20, 10)], format="xyseb")
     model.add_line((0, 0), (3, 4))
+    more(document)
     text = io.StringIO()
     document.write(text)
     return text.getvalue().encode()
@@ -102,6 +103,42 @@ def test_bad_files_get_one_clear_line(tmp_path, name):
         read(path)
     assert "\n" not in str(caught.value)
     assert name in str(caught.value)
+
+
+def block(document):
+    document.blocks.new("hole").add_circle((0, 0), 2)
+    document.modelspace().add_blockref("hole", (5, 5))
+
+
+LEFT_OUT = {
+    "block.dxf": (dxf(more=block), "handle.*INSERT is not read.*explode blocks"),
+    "text.dxf": (dxf(more=lambda d: d.modelspace().add_text("N 1")), "TEXT is not read.*turn text into lines"),
+    "mtext.dxf": (dxf(more=lambda d: d.modelspace().add_mtext("N 1")), "MTEXT is not read.*turn text into lines"),
+    "text.svg": (SVG.format('<circle r="3"/><text id="n" x="3" y="9">N 1</text>').encode(), "id n: <text> is not read"),
+    "in_a_group.svg": (
+        SVG.format('<g><text>N<tspan>1</tspan></text></g><circle r="3"/>').encode(),
+        "turn text into paths",
+    ),
+    "picture.svg": (SVG.format('<circle r="3"/><image href="a.png" width="9" height="9"/>').encode(), "<image> is not"),
+}
+
+
+@pytest.mark.parametrize("name", LEFT_OUT)
+def test_what_would_be_left_out_is_told(tmp_path, name):
+    content, message = LEFT_OUT[name]
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ToolpathError, match=message) as caught:
+        read_lines(tmp_path / name, 1e-5)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_shows_no_line_is_passed_over(tmp_path):
+    path = tmp_path / "a.svg"
+    path.write_text(SVG.format('<title>N 1</title><defs><text id="t">N</text></defs><text/><circle r="3"/>'))
+    assert len(read_lines(path, 1e-5)) == 1
+    path = tmp_path / "a.dxf"
+    path.write_bytes(dxf(more=lambda document: document.modelspace().add_point((1, 1))))
+    assert len(read_lines(path, 1e-5)) == 3
 
 
 def picture():

@@ -36,6 +36,10 @@ def sheet(height, low=(0.0, 0.0), high=(0.02, 0.012), cells=40):
     return Mesh.of(points, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]))
 
 
+NARROW = plate(high=(0.006, 0.012))
+"""Lines along x leave the same on it."""
+
+
 def pocket(depth=0.01, size=0.02):
     """A floor at z = 0 with four walls that are square to it, open above."""
     corners = np.array([[x, y, z] for z in (0.0, depth) for x, y in ((0, 0), (size, 0), (size, size), (0, size))])
@@ -97,13 +101,13 @@ def test_a_ball_raster_on_a_plane_leaves_its_scallop(make, step):
     """r − √(r² − s²/4): all is covered a hair above it; below it the share is that of strips in closed form."""
     tool, scallop = make(R), R - np.sqrt(R**2 - step**2 / 4)
     replay = along(*raster(step), tool=tool)
-    found = judged(replay, plate(), tool, 1.02 * scallop)
+    found = judged(replay, NARROW, tool, 1.02 * scallop)
     assert found.passed
     assert found.value == 0.0
     assert 0.95 * scallop < deepest(found) < 1.01 * scallop
     low = 0.5 * scallop
     held = 2.0 * np.sqrt(R**2 - (R - low) ** 2)
-    found = judged(replay, plate(), tool, low, share=0.01)
+    found = judged(replay, NARROW, tool, low, share=0.01)
     assert not found.passed
     assert found.value == pytest.approx(100.0 * (1.0 - held / step), rel=0.06)
     assert 0.9 * scallop < deepest(found) < 1.01 * scallop
@@ -111,8 +115,8 @@ def test_a_ball_raster_on_a_plane_leaves_its_scallop(make, step):
 
 def test_a_flat_end_leaves_nothing_between_passes_that_overlap_and_strips_between_those_that_do_not():
     tool = FlatEnd(2e-3, flute=0.01)
-    assert judged(along(*raster(3.9e-3), tool=tool), plate(), tool, 2e-5).value == 0.0
-    found = judged(along(*raster(6e-3), tool=tool), plate(), tool, 2e-5)
+    assert judged(along(*raster(3.9e-3), tool=tool), NARROW, tool, 2e-5).value == 0.0
+    found = judged(along(*raster(6e-3), tool=tool), NARROW, tool, 2e-5)
     assert found.value == pytest.approx(100.0 * 4.0 / 12.0, rel=0.03)
     assert deepest(found) == pytest.approx(8e-3)  # nothing was met as far as one looks
 

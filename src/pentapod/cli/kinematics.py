@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pentapod.cli.numbers import Real
 from pentapod.cli.output import echo_json, json_option, quiet_option
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ _machine_option = click.option(
 
 
 @click.command(context_settings=_NEGATIVES)
-@click.argument("pose", nargs=-1, type=float, metavar="[X Y Z I J K]")
+@click.argument("pose", nargs=-1, type=Real(), metavar="[X Y Z I J K]")
 @_machine_option
 @json_option
 @quiet_option
@@ -63,7 +64,7 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -
 
 
 @click.command(context_settings=_NEGATIVES)
-@click.argument("legs", nargs=-1, type=float, metavar="[L1 L2 L3 L4 L5]")
+@click.argument("legs", nargs=-1, type=Real(), metavar="[L1 L2 L3 L4 L5]")
 @click.option("-c", "--component", help='Signs of w and S: "++", "+-", "-+", "--"; all four when left out.')
 @_machine_option
 @json_option

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pentapod.cli.numbers import Real, Whole
 from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from pentapod.toolpath import Toolpath
 
 _OF_SERVO, _OF_MUJOCO = ("correct", "seed"), ("export", "cutting_force_n", "base_error", "offset_error")
-_LEG = click.IntRange(1, 5)
+_LEG, _MM = Whole(1, 5), Real()
 
 
 @click.command()
@@ -28,15 +29,15 @@ _LEG = click.IntRange(1, 5)
 @click.option("--engine", type=click.Choice(["servo", "mujoco"]), default="servo", show_default=True,
               help="servo: drives with encoders, dead time and force ripple. mujoco: rigid bodies.")  # fmt: skip
 @click.option("--correct", is_flag=True, help="Servo: correct the legs by the pose, rebuilt in the loop.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Servo: of the ripple's phases.")
+@click.option("--seed", type=Whole(0), default=0, show_default=True, help="Servo: of the ripple's phases.")
 @click.option("--export", type=click.Path(path_type=Path), metavar="FILE", help="MuJoCo: write the model as MJCF.")
-@click.option("--cutting-force", "cutting_force_n", type=click.FloatRange(0.0, min_open=True), metavar="N",
+@click.option("--cutting-force", "cutting_force_n", type=Real(0.0, min_open=True), metavar="N",
               help="MuJoCo: play again with this force on the tip, against its motion, on cuts.")  # fmt: skip
-@click.option("--base-error", type=(_LEG, float, float, float), multiple=True, metavar="LEG X Y Z",
+@click.option("--base-error", type=(_LEG, _MM, _MM, _MM), multiple=True, metavar="LEG X Y Z",
               help="MuJoCo: a base joint is off by so many mm; may be repeated.")  # fmt: skip
-@click.option("--offset-error", type=(_LEG, float), multiple=True, metavar="LEG MM",
+@click.option("--offset-error", type=(_LEG, _MM), multiple=True, metavar="LEG MM",
               help="MuJoCo: a platform joint is off along the tool by so many mm; may be repeated.")  # fmt: skip
-@click.option("--within", "within_mm", type=click.FloatRange(0.0, min_open=True), metavar="MM",
+@click.option("--within", "within_mm", type=Real(0.0, min_open=True), metavar="MM",
               help="Fail where the tip leaves the programmed path by more.")  # fmt: skip
 @click.option("--plots", "plots", type=click.Path(path_type=Path), metavar="FILE",
               help="Write every measure against time as a page for the browser.")  # fmt: skip

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import click
 
+from pentapod.cli.numbers import Whole
 from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
 
 
@@ -17,7 +18,7 @@ from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_opti
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
 @click.option("--job", type=click.Path(path_type=Path), help="The job it was made from, where that was moved.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0 for all.")
-@click.option("--port", type=click.IntRange(1, 65535), default=8080, show_default=True,
+@click.option("--port", type=Whole(1, 65535), default=8080, show_default=True,
               help="Port to listen on; the next one where it is taken.")  # fmt: skip
 @click.option("--open/--no-open", "opens", default=True, help="Open a browser there.")
 @json_option

@@ -37,7 +37,7 @@ def csv_bytes(program: Program) -> bytes:
 
 
 def read_csv(path: str | Path) -> Program:
-    """Return the program in a file, bit for bit as it was sampled. Raises ProgramError with file and line.
+    """Return the program in a file, exactly as it was sampled. Raises ProgramError with file and line.
 
     Read in blocks, so that a long program is never in memory as text. Refused are: what is no program, an unknown
     format version, a header with a key missing or wrong, a truncated file, a wrong number of columns or rows, NaN, and

@@ -243,5 +243,5 @@ def _provenance(outcome: Outcome) -> list[tuple[str, str]]:
         ("pentapod", __version__),
         ("libraries", library_versions()),
         ("processor", processor_kind()),
-        *((f"SHA-256 of the {name}", digest) for name, digest in files.items() if digest is not None),
+        *((f"SHA-256 of the {name.replace('_', ' ')}", digest) for name, digest in files.items() if digest is not None),
     ]

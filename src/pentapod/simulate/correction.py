@@ -67,6 +67,7 @@ def correction_for(drives: Drives, period: float, parts: int, delay: int) -> Cor
     """
     gains = np.stack([drives.position_gain, drives.velocity_gain, drives.velocity_integral], axis=1)
     kinds, which = np.unique(gains, axis=0, return_inverse=True)
+    which = which.reshape(-1)  # NumPy 2.0.0 keeps the axis
     designs = [_design(*_sampled(kind, period, parts, delay)) for kind in kinds]
     found = [design for design in designs if design is not None]
     if len(found) < len(designs):

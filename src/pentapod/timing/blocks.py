@@ -1,10 +1,11 @@
 """Long paths: the two passes block by block, from and to disk, in constant memory; several processes on request.
 
 The backward pass needs of what lies behind a block two numbers, the controllable speeds at its end; so blocks taken one
-after the other, from the last to the first, are the pass over the whole, bit for bit, and likewise forwards. Several
-processes begin their blocks a lead too late and from rest. What they found is taken where it meets what lies behind in
-the very same bits, and done again where it does not; so the bits are the same however many there are. Exact stops
-need nothing more: a path's pieces between them are problems of their own.
+after the other, from the last to the first, are the pass over the whole, and likewise forwards: bit for bit, on one
+kind of processor and with one set of libraries. Several processes begin their blocks a lead too late and from rest.
+What they found is taken where it meets what lies behind in the very same bits, and done again where it does not; so the
+bits are the same however many there are. Exact stops need nothing more: a path's pieces between them are problems of
+their own.
 """
 
 from __future__ import annotations
@@ -68,10 +69,11 @@ def fastest_stored(
     block: int = BLOCK,
     processes: int = 1,
 ) -> Failure | None:
-    """Write the largest x of stored stages to the file `out` (.npy), as `fastest` would find it, bit for bit.
+    """Write the largest x of stored stages to the file `out` (.npy), as `fastest` would find it.
 
-    Returns why there is none, or None. Memory does not grow with the path. Raises InputError: a block of less than 2
-    gridpoints, no process, what the stages raise.
+    The same bits, on one kind of processor and with one set of libraries. Returns why there is none, or None. Memory
+    does not grow with the path. Raises InputError: a block of less than 2 gridpoints, no process, what the stages
+    raise.
     """
     if block < 2 or processes < 1:
         raise InputError("nothing can be done so", key="block, processes", value=(block, processes))

@@ -14,13 +14,22 @@ from pentapod.toolpath.drawing_files import check_points, distinct, extra
 
 _DXF_UNITS = {1: 25.4e-3, 2: 304.8e-3, 4: 1e-3, 5: 1e-2, 6: 1.0, 14: 0.1}
 _LINE = re.compile(r"line (\d+)")
+_WITH_LINES = {
+    "INSERT": "explode blocks into lines",
+    "TEXT": "turn text into lines, or delete it",
+    "MTEXT": "turn text into lines, or delete it",
+}
+"""What shows lines in a drawing that are not read, and what to do with it: leaving it out would be a silent loss."""
 _MOST_BYTES = 16_000_000
 _LARGEST_M = 1e4
 """No drawing reaches farther from its origin: a circle of 1e300 would have no end of chords."""
 
 
 def dxf_lines(path: Path, data: bytes, tolerance: float) -> list[Floats]:
-    """Return the lines of a DXF's model space, whose header must say its unit."""
+    """Return the lines of a DXF's model space, whose header must say its unit.
+
+    Raises ToolpathError for blocks and text, which would be left out; dimensions and points are passed over.
+    """
     if len(data) > _MOST_BYTES:
         raise ToolpathError("the file is too large", file=path, value=len(data), expected=f"at most {_MOST_BYTES:,}")
     if not data.rstrip(b" \t\r\n\0").endswith(b"EOF"):
@@ -44,10 +53,16 @@ def dxf_lines(path: Path, data: bytes, tolerance: float) -> list[Floats]:
         lines: list[Floats] = []
         count = 0
         for entity in document.modelspace():
+            if entity.dxftype() in _WITH_LINES:
+                raise ToolpathError(
+                    f"{entity.dxftype()} is not read", file=path, key=f"handle {entity.dxf.handle}",
+                    expected="lines, polylines, arcs, circles, ellipses and splines",
+                    remedy=f"{_WITH_LINES[entity.dxftype()]} in the drawing program",
+                )  # fmt: skip
             try:
                 outline = paths.make_path(entity)
             except TypeError:
-                continue  # dimensions, hatches and the like are not lines
+                continue  # dimensions, points and the like are no lines to follow
             parts = outline.sub_paths() if outline.has_sub_paths else [outline]
             for part in parts:
                 corners = np.array([[p.x, p.y] for p in part.control_vertices()]).reshape(-1, 2)

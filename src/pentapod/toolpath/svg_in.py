@@ -31,7 +31,8 @@ _SHAPING = re.compile(r"(?:^|;)\s*(?:display|transform|d|r|rx|ry|cx|cy|x|y|width
 def svg_lines(path: Path, data: bytes, tolerance: float) -> list[Floats]:
     """Return the lines of an SVG; 96 user units are an inch where the file says nothing else; y turned up.
 
-    Raises ToolpathError, before anything is unfolded, for what would take hours or all memory.
+    Raises ToolpathError, before anything is unfolded, for what would take hours or all memory; and for text and
+    pictures, which would be left out.
     """
     svg = extra("svgelements", "svgelements", path)
     try:
@@ -40,7 +41,10 @@ def svg_lines(path: Path, data: bytes, tolerance: float) -> list[Floats]:
         _check(path, root)
         text = ElementTree.tostring(root, encoding="unicode")
         drawing = svg.SVG.parse(io.StringIO(text), reify=True, on_error="raise")
-        shapes = [e for e in drawing.elements() if isinstance(e, svg.Shape)]
+        parts = list(drawing.elements())
+        for element in parts:
+            _check_kind(path, svg, element)
+        shapes = [e for e in parts if isinstance(e, svg.Shape)]
         found = [svg.Path(shape).segments() for shape in shapes]
         lines: list[Floats] = []
         points = count()
@@ -87,6 +91,20 @@ def _check(path: Path, root: ElementTree.Element) -> None:
         _too_much(path, f"it unfolds to {elements:,} elements", _MOST_ELEMENTS)
     if numbers > _MOST_NUMBERS:
         _too_much(path, f"its paths unfold to {numbers:,} numbers and commands", _MOST_NUMBERS)
+
+
+def _check_kind(path: Path, svg: Any, element: Any) -> None:
+    """Raise ToolpathError for text and pictures: they show lines, or something like them, that are not read."""
+    if isinstance(element, svg.Image):
+        remedy = "trace or delete the picture"
+    elif isinstance(element, svg.Text) and (element.text or "").strip():
+        remedy = "turn text into paths"
+    else:
+        return
+    what = f"<{type(element).__name__.lower()}> is not read"
+    key = None if element.id is None else f"id {element.id[:40]}"
+    remedy = f"{remedy} in the drawing program"
+    raise ToolpathError(what, file=path, key=key, expected="paths and shapes", remedy=remedy)
 
 
 def _shaping(text: str) -> str:

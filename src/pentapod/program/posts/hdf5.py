@@ -20,15 +20,17 @@ from pentapod.program.resolution import to_millimetres
 
 _FILE = "program.h5"
 _MOST_SECONDS, _TOO_LARGE = 8, 4  # of computing; the code with which the process below says so
+_MOST_MEMORY = 2 * MOST_UNPACKED + 2_000_000_000  # the array, its copy as it is written, and the libraries
 _CHILD = """
 import sys
 import h5py
 import numpy as np
-source, target, most, seconds = sys.argv[1:]
+source, target, most, seconds, memory = sys.argv[1:]
 try:
     import resource
     resource.setrlimit(resource.RLIMIT_CPU, (int(seconds), int(seconds)))
-except ImportError:
+    resource.setrlimit(resource.RLIMIT_AS, (int(memory), int(memory)))
+except (ImportError, OSError, ValueError):  # Windows has no limits, macOS not all, and lower ones may be set
     pass
 with h5py.File(source, "r") as archive:
     header, legs = str(archive.attrs["header"]), archive["legs_mm"]
@@ -68,7 +70,8 @@ def _read(folder: Path) -> Program:
     read_bytes(file, ProgramError, "an HDF5 file")
     with tempfile.TemporaryDirectory() as place:
         unpacked = Path(place) / "arrays.npz"
-        command = [sys.executable, "-c", _CHILD, str(file), str(unpacked), str(MOST_UNPACKED), str(_MOST_SECONDS)]
+        limits = [str(MOST_UNPACKED), str(_MOST_SECONDS), str(_MOST_MEMORY)]
+        command = [sys.executable, "-c", _CHILD, str(file), str(unpacked), *limits]
         try:
             done = subprocess.run(command, capture_output=True, check=False, timeout=12 * _MOST_SECONDS)
         except subprocess.TimeoutExpired as error:
