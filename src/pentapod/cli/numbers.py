@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import Any
 
 import click
@@ -17,7 +18,7 @@ class Real(click.FloatRange):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return the number; click tells what is wrong with any other text."""
-        if isinstance(value, str) and number_in(value) is None:
+        if _is_other_text(value, lambda text: number_in(text) is not None):
             self.fail(f"{value!r} is not a finite decimal number.", param, ctx)
         return super().convert(value, param, ctx)
 
@@ -27,6 +28,11 @@ class Whole(click.IntRange):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
         """Return the number; click tells what is wrong with any other text."""
-        if isinstance(value, str) and not _WHOLE.fullmatch(value):
+        if _is_other_text(value, lambda text: _WHOLE.fullmatch(text) is not None):
             self.fail(f"{value!r} is not a whole decimal number.", param, ctx)
         return super().convert(value, param, ctx)
+
+
+def _is_other_text(value: Any, is_number: Callable[[str], bool]) -> bool:
+    """Return whether a value is text, not a default, and no number."""
+    return isinstance(value, str) and not is_number(value)
