@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from pentapod.timing import retime as retime
     from pentapod.toolpath import BallCutter as BallCutter
     from pentapod.toolpath import BullNose as BullNose
+    from pentapod.toolpath import Cone as Cone
     from pentapod.toolpath import FlatEnd as FlatEnd
     from pentapod.toolpath import GougeOptions as GougeOptions
     from pentapod.toolpath import Lollipop as Lollipop
@@ -48,6 +49,8 @@ if TYPE_CHECKING:
     from pentapod.toolpath import Toolpath as Toolpath
     from pentapod.toolpath import load_mesh as load_mesh
     from pentapod.toolpath import make_toolpath as make_toolpath
+    from pentapod.toolpath import oriented as oriented
+    from pentapod.toolpath import without_gouges as without_gouges
     from pentapod.verify import Certificate as Certificate
     from pentapod.verify import Coverage as Coverage
     from pentapod.verify import Cutting as Cutting
@@ -69,11 +72,14 @@ _HOMES = {
     "BullNose": "toolpath",
     "Lollipop": "toolpath",
     "StandOff": "toolpath",
+    "Cone": "toolpath",
     "RasterOptions": "toolpath",
     "Orientation": "toolpath",
     "GougeOptions": "toolpath",
     "Remedy": "toolpath",
     "make_toolpath": "toolpath",
+    "oriented": "toolpath",
+    "without_gouges": "toolpath",
     "Toolpath": "toolpath",
     "plan": "planning",
     "Freedom": "planning",
@@ -115,11 +121,14 @@ __all__ = [  # noqa: RUF022 - in the order of the flow
     "BullNose",
     "Lollipop",
     "StandOff",
+    "Cone",
     "RasterOptions",
     "Orientation",
     "GougeOptions",
     "Remedy",
     "make_toolpath",
+    "oriented",
+    "without_gouges",
     "Toolpath",
     "plan",
     "Freedom",

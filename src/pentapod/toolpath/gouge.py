@@ -13,6 +13,7 @@ from pentapod.progress import Progress, silent
 from pentapod.toolpath.facet_tree import FacetTree
 from pentapod.toolpath.gouge_report import GougeOptions, GougeReport, Remedy
 from pentapod.toolpath.links import RAPID_SPACING_M, spaced
+from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.rejoining import rejoined
 from pentapod.toolpath.sweep import RESOLUTION_M, Sweep, sweep, touch
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
@@ -23,6 +24,13 @@ _LIFTS = 40
 _ROUNDS = 3
 _RISES = (0.05, 0.1, 0.25, 0.5, 1.0)
 """Of the most that lifting may lift: how high a link is tried that stands for a dropped cut."""
+
+
+def without_gouges(
+    toolpath: Toolpath, tool: Tool, part: Mesh, options: GougeOptions, progress: Progress = silent
+) -> tuple[Toolpath, GougeReport]:
+    """Return `checked` against a part as it is loaded: the toolpath with its gouges remedied, and what was found."""
+    return checked(toolpath, tool, FacetTree.of(part), options, progress)
 
 
 def checked(
