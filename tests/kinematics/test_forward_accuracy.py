@@ -176,3 +176,22 @@ def test_random_poses_of_random_designs_to_nine_digits_but_for_the_nearly_singul
         right, total = right + int((error <= 1e-9).sum()), total + 1000
         assert (robot.component(position, direction) == robot.component(p, i)).all()
     assert right >= share * total
+
+
+def test_legs_of_the_answer_are_those_asked_for_as_far_as_the_design_is_well_conditioned(random_poses) -> None:
+    """In units of 2⁻⁵³ of the longest length, by the condition of the equations that the legs are put into."""
+    rng = np.random.default_rng(1)
+    for k in range(200):
+        base, delta = rng.uniform(-1.0, 1.0, (5, 2)), rng.uniform(-1.5, 1.5)
+        base[4] = base[4] if k % 2 else base[3] + 10.0 ** rng.uniform(-5.0, -0.5) * rng.normal(size=2)
+        robot = LinearPentapod(base, delta * base[:, 0] + 0.1, delta)
+        x, y = (np.delete(base, 2, axis=0) - base[2]).T / np.abs(base - base[2]).max()
+        condition = np.linalg.cond(np.stack([x, y, x * x, x * y], axis=1))
+        p, i = random_poses(robot, 200, seed=k)
+        p, i = p[np.abs(i[:, 1]) > 0.05], i[np.abs(i[:, 1]) > 0.05]
+        legs = robot.leg_lengths(p, i)
+        position, direction = robot.pose(legs, robot.component(p, i))
+        found = np.isfinite(position).all(axis=1)
+        longest = np.maximum(legs.max(axis=1), max(np.abs(base).max(), np.abs(robot.offsets).max()))
+        off = np.abs(robot.leg_lengths(position, direction) - legs).max(axis=1) / longest * 2.0**53
+        assert off[found].max() <= 10.0 * condition
