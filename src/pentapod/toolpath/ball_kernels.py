@@ -13,6 +13,7 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.compiled import kernel
+from pentapod.toolpath.box_kernels import open_node
 
 _STACK = 128
 _ROUNDS = 40
@@ -151,19 +152,9 @@ def nearest_to_point(
             continue
         leaf = node - (leaves - 1)
         if leaf < 0:
-            left, right = 2 * node + 1, 2 * node + 2
-            near, far = (
-                lower_bound(boxes[left], start, way, best[0], g),
-                lower_bound(boxes[right], start, way, best[0], g),
-            )
-            if far < near:
-                left, right, near, far = right, left, far, near
-            if far < best[0]:
-                nodes[count], bounds[count] = right, far
-                count += 1
-            if near < best[0]:
-                nodes[count], bounds[count] = left, near
-                count += 1
+            near = lower_bound(boxes[2 * node + 1], start, way, best[0], g)
+            far = lower_bound(boxes[2 * node + 2], start, way, best[0], g)
+            count = open_node(node, near, far, best[0], count, nodes, bounds)
         else:
             for k in range(starts[leaf], starts[leaf + 1]):
                 distance, t = _nearest_time(corners[k], start, way, g)

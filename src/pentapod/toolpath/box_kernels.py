@@ -1,4 +1,4 @@
-"""Kernel of `FacetTree`: boxes along the mean normals of runs of facets."""
+"""Kernels of trees of boxes: those of `FacetTree`, along the mean normals of runs of facets; how a tree is searched."""
 
 from __future__ import annotations
 
@@ -66,3 +66,21 @@ def _fit(corners: Floats, box: Floats) -> None:
         box[3 + k] = 0.5 * (high - low) + slack
         for j in range(3):
             box[j] += 0.5 * (low + high) * box[6 + 3 * k + j]
+
+
+@kernel
+def open_node(node: int, near: float, far: float, best: float, count: int, nodes: Ints, bounds: Floats) -> int:
+    """Put the children of a node on the stack that may hold what is nearer than `best`; return how many are on it.
+
+    near, far: lower bounds of the first and the second child. The nearer child is on top, and so looked at first.
+    """
+    first, second = 2 * node + 1, 2 * node + 2
+    if far < near:
+        first, second, near, far = second, first, far, near
+    if far < best:
+        nodes[count], bounds[count] = second, far
+        count += 1
+    if near < best:
+        nodes[count], bounds[count] = first, near
+        count += 1
+    return count

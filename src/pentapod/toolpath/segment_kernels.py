@@ -14,6 +14,7 @@ import numpy as np
 from pentapod.arrays import Floats, Ints
 from pentapod.compiled import kernel
 from pentapod.toolpath.ball_kernels import lower_bound, to_facet
+from pentapod.toolpath.box_kernels import open_node
 
 _STACK = 128
 _ROUNDS = 40
@@ -112,17 +113,9 @@ def nearest_to_segments(
                 continue
             leaf = node - (leaves - 1)
             if leaf < 0:
-                left, right = 2 * node + 1, 2 * node + 2
-                near = _bound(boxes[left], start, way, square, best, g)
-                far = _bound(boxes[right], start, way, square, best, g)
-                if far < near:
-                    left, right, near, far = right, left, far, near
-                if far < best:
-                    nodes[count], bounds[count] = right, far
-                    count += 1
-                if near < best:
-                    nodes[count], bounds[count] = left, near
-                    count += 1
+                near = _bound(boxes[2 * node + 1], start, way, square, best, g)
+                far = _bound(boxes[2 * node + 2], start, way, square, best, g)
+                count = open_node(node, near, far, best, count, nodes, bounds)
             else:
                 for k in range(leaf_starts[leaf], leaf_starts[leaf + 1]):
                     distance, t = _to_facet(corners[k], start, way, square, best, g)

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from pentapod.arrays import Floats, Ints
+from pentapod.arrays import Floats
 from pentapod.compiled import kernel
-from pentapod.verify.swept_cutter_kernels import STACK, at_share, entry, nearest_stretch, to_stretch
+from pentapod.verify.swept_cutter_kernels import STACK, Room, Swept, at_share, entry, nearest_stretch, to_stretch
 
 
 @kernel
@@ -68,23 +68,17 @@ def _deepen(
     n: Floats,
     most: float,
     warm: int,
-    stretches: Floats,
-    boxes: Floats,
-    starts: Ints,
-    solid: Floats,
-    wide: float,
-    is_ball: bool,
-    nodes: Ints,
-    bounds: Floats,
+    swept: Swept,
+    room: Room,
     deepest: Floats,
 ) -> None:
     """Raise deepest (4,) to what is left above q, at most `most`, where that is more; and where."""
     x = np.empty(3)
     for i in range(3):
         x[i] = q[i] + deepest[0] * n[i]
-    if nearest_stretch(x, warm, 0.0, stretches, boxes, starts, solid, wide, is_ball, nodes, bounds)[0] <= 0.0:
+    if nearest_stretch(x, warm, 0.0, swept, room)[0] <= 0.0:
         return
-    left = entry(q, n, most, warm, stretches, boxes, starts, solid, wide, is_ball, nodes, bounds)[0]
+    left = entry(q, n, most, warm, swept, room)[0]
     if left > deepest[0]:
         deepest[0] = left
         for i in range(3):
@@ -98,12 +92,7 @@ def uncovered(
     height: float,
     coarse: float,
     fine: float,
-    stretches: Floats,
-    boxes: Floats,
-    starts: Ints,
-    solid: Floats,
-    wide: float,
-    is_ball: bool,
+    swept: Swept,
     deepest: Floats,
     found: Floats,
 ) -> int:
@@ -115,7 +104,8 @@ def uncovered(
     more than K: then not all were written. deepest (4,): raised to what is left at most at the middle of
     a covered cell, and where that is.
     """
-    nodes, bounds, warm = np.empty(STACK, dtype=np.intp), np.empty(STACK), -1
+    stretches, _, _, solid, _, is_ball = swept
+    room, warm = (np.empty(STACK, dtype=np.intp), np.empty(STACK)), -1
     cells, middle, x, rise = np.empty((STACK, 3, 3)), np.empty(3), np.empty(3), np.empty(3)
     total = 0
     for f in range(len(corners)):
@@ -132,15 +122,10 @@ def uncovered(
                 _halve(cells, count)
                 count += 1
                 continue
-            gap, warm, share = nearest_stretch(
-                x, warm, -reach, stretches, boxes, starts, solid, wide, is_ball, nodes, bounds
-            )
+            gap, warm, share = nearest_stretch(x, warm, -reach, swept, room)
             if gap <= -reach or (gap <= 0.0 and _covers(cell, rise, stretches[warm], solid, is_ball, share)):
                 count -= 1
-                _deepen(
-                    middle, normals[f], height, warm,
-                    stretches, boxes, starts, solid, wide, is_ball, nodes, bounds, deepest,
-                )  # fmt: skip
+                _deepen(middle, normals[f], height, warm, swept, room, deepest)
                 continue
             if gap <= reach and reach > fine and count < STACK:
                 _halve(cells, count)

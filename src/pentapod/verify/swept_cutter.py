@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from pentapod.toolpath.facet_tree import along_morton_curve
 from pentapod.toolpath.solids import Solid
 from pentapod.verify.replay import Replay
 from pentapod.verify.stretches import CUT, LONGEST, Stretches, strays
+
+if TYPE_CHECKING:
+    from pentapod.verify.swept_cutter_kernels import Swept
 
 _PER_LEAF = 4
 
@@ -60,18 +64,21 @@ class SweptSolid:
         numbers = np.array((0.0, 0.0, 0.0, 0.0, wide) if solid.is_ball else solid.numbers)
         return cls(np.ascontiguousarray(rows), boxes, starts, numbers, wide, solid.is_ball)
 
+    @property
+    def _swept(self) -> Swept:
+        return self.stretches, self.boxes, self.starts, self.numbers, self.wide, self.is_ball
+
     def entries(self, points: Floats, normals: Floats, heights: Floats) -> None:
         """Lower heights (N,), metres, to where rays from points along unit normals (N, 3) first meet the solid."""
         from pentapod.verify.swept_cutter_kernels import entries  # noqa: PLC0415  loads numba
 
-        shape = (self.stretches, self.boxes, self.starts, self.numbers, self.wide, self.is_ball)
-        entries(points, normals, *shape, heights)
+        entries(points, normals, self._swept, heights)
 
     def distances(self, points: Floats, gaps: Floats) -> None:
         """Lower gaps (N,), metres, to how far points (N, 3) are from where the solid has been."""
         from pentapod.verify.swept_cutter_kernels import distances  # noqa: PLC0415  loads numba
 
-        distances(points, self.stretches, self.boxes, self.starts, self.numbers, self.wide, self.is_ball, gaps)
+        distances(points, self._swept, gaps)
 
     def uncovered(
         self, corners: Floats, normals: Floats, height: float, coarse: float, fine: float
@@ -83,11 +90,10 @@ class SweptSolid:
         """
         from pentapod.verify.surface_left_kernels import uncovered  # noqa: PLC0415  loads numba
 
-        shape = (self.stretches, self.boxes, self.starts, self.numbers, self.wide, self.is_ball)
         room = max(2 * len(corners), 1 << 14)
         while True:
             found, deepest = np.empty((room, 12)), np.array([0.0, np.nan, np.nan, np.nan])
-            count = uncovered(corners, normals, height, coarse, fine, *shape, deepest, found)
+            count = uncovered(corners, normals, height, coarse, fine, self._swept, deepest, found)
             if count <= room:
                 return found[:count], deepest
             room = count

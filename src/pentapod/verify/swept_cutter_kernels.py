@@ -13,9 +13,17 @@ import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.compiled import kernel
+from pentapod.toolpath.box_kernels import open_node
 
 STACK = 128
 """Nodes of a tree, or cells, that may wait to be looked at."""
+Swept = tuple[Floats, Floats, Ints, Floats, float, bool]
+"""One solid and where it has been: stretches (S, 13), boxes (2 L − 1, 6), starts (L + 1,), the solid (5,), wide, and
+whether it is a ball. Boxes are around the axis of the solid; nothing of it is farther from there than `wide`."""
+
+Room = tuple[Ints, Floats]
+"""Of a search: nodes and their lower bounds, both (STACK,)."""
+
 _GOLDEN = 0.6180339887498949
 _ROUNDS = 12
 _MET = 1e-7  # metres: a ray that comes so near has entered
@@ -112,20 +120,15 @@ def nearest_stretch(
     x: Floats,
     warm: int,
     enough: float,
-    stretches: Floats,
-    boxes: Floats,
-    starts: Ints,
-    solid: Floats,
-    wide: float,
-    is_ball: bool,
-    nodes: Ints,
-    bounds: Floats,
+    swept: Swept,
+    room: Room,
 ) -> tuple[float, int, float]:
     """Return the signed distance of a point from the sweep of a solid, the stretch, and the share of it.
 
-    Ends at the first place that is not farther than `enough`. warm: a stretch to look at first, −1 for none. boxes
-    (2 L − 1, 6): around the axis of the solid; nothing of it is farther from there than `wide`.
+    Ends at the first place that is not farther than `enough`. warm: a stretch to look at first, −1 for none.
     """
+    stretches, boxes, starts, solid, wide, is_ball = swept
+    nodes, bounds = room
     best, facet, where = math.inf, -1, 0.0
     if warm >= 0:
         best, where = to_stretch(x, stretches[warm], solid, is_ball)
@@ -142,16 +145,8 @@ def nearest_stretch(
             continue
         leaf = node - (leaves - 1)
         if leaf < 0:
-            left, right = 2 * node + 1, 2 * node + 2
-            near, far = _to_box(x, boxes[left]) - wide, _to_box(x, boxes[right]) - wide
-            if far < near:
-                left, right, near, far = right, left, far, near
-            if far < best:
-                nodes[count], bounds[count] = right, far
-                count += 1
-            if near < best:
-                nodes[count], bounds[count] = left, near
-                count += 1
+            near, far = _to_box(x, boxes[2 * node + 1]) - wide, _to_box(x, boxes[2 * node + 2]) - wide
+            count = open_node(node, near, far, best, count, nodes, bounds)
         else:
             for k in range(starts[leaf], starts[leaf + 1]):
                 distance, share = to_stretch(x, stretches[k], solid, is_ball)
@@ -168,21 +163,15 @@ def entry(
     n: Floats,
     most: float,
     warm: int,
-    stretches: Floats,
-    boxes: Floats,
-    starts: Ints,
-    solid: Floats,
-    wide: float,
-    is_ball: bool,
-    nodes: Ints,
-    bounds: Floats,
+    swept: Swept,
+    room: Room,
 ) -> tuple[float, int]:
     """Return at which height along a normal a ray from q first enters the sweep, at most `most`; and the stretch."""
     t, x = 0.0, np.empty(3)
     for _ in range(_STEPS):
         for i in range(3):
             x[i] = q[i] + t * n[i]
-        gap, warm, _ = nearest_stretch(x, warm, _MET, stretches, boxes, starts, solid, wide, is_ball, nodes, bounds)
+        gap, warm, _ = nearest_stretch(x, warm, _MET, swept, room)
         if gap <= _MET:
             return t, warm
         t += gap
@@ -195,38 +184,24 @@ def entry(
 def entries(
     points: Floats,
     normals: Floats,
-    stretches: Floats,
-    boxes: Floats,
-    starts: Ints,
-    solid: Floats,
-    wide: float,
-    is_ball: bool,
+    swept: Swept,
     heights: Floats,
 ) -> None:
     """Lower heights (N,) to where rays from points along normals (N, 3) first enter the sweep of a solid."""
-    nodes, bounds, warm = np.empty(STACK, dtype=np.intp), np.empty(STACK), -1
+    room, warm = (np.empty(STACK, dtype=np.intp), np.empty(STACK)), -1
     for k in range(len(points)):
-        height, warm = entry(
-            points[k], normals[k], heights[k], warm, stretches, boxes, starts, solid, wide, is_ball, nodes, bounds
-        )
+        height, warm = entry(points[k], normals[k], heights[k], warm, swept, room)
         heights[k] = min(heights[k], height)
 
 
 @kernel
 def distances(
     points: Floats,
-    stretches: Floats,
-    boxes: Floats,
-    starts: Ints,
-    solid: Floats,
-    wide: float,
-    is_ball: bool,
+    swept: Swept,
     gaps: Floats,
 ) -> None:
     """Lower gaps (N,) to how far points (N, 3) are from the sweep of a solid; negative inside."""
-    nodes, bounds, warm = np.empty(STACK, dtype=np.intp), np.empty(STACK), -1
+    room, warm = (np.empty(STACK, dtype=np.intp), np.empty(STACK)), -1
     for k in range(len(points)):
-        gap, warm, _ = nearest_stretch(
-            points[k], warm, -math.inf, stretches, boxes, starts, solid, wide, is_ball, nodes, bounds
-        )
+        gap, warm, _ = nearest_stretch(points[k], warm, -math.inf, swept, room)
         gaps[k] = min(gaps[k], gap)
