@@ -29,7 +29,8 @@ _AROUND_S, _AROUND_ROWS = 0.02, 5
 """So near in time it must be used, or in so many rows where these are longer."""
 
 _CORNER = math.radians(20.0)
-"""Where the toolpath turns by more within the path tolerance, a motion may come to rest. A job's angle may be less."""
+"""Where the toolpath turns by more within the path tolerance, the motion is next to rest for a moment however the
+corner is rounded; standing there longer than `_SPARE_S` has no reason. A job's angle for exact stops may be less."""
 
 _SPARE_S = 0.05
 """By so much a robot may stand longer than asked."""
@@ -85,9 +86,10 @@ def unasked_stop(replay: Replay) -> Finding:
     value = float(beyond[worst]) if len(beyond) else 0.0
     row = int(runs[worst, 0]) if value > 0.0 else 0
     method = (
-        f"longest time at rest without a reason; reasons are dwells, for as long as they ask and {_SPARE_S:g} s, ends "
-        f"of segments, and corners of more than {math.degrees(corner):g} deg within the path tolerance; at rest is "
-        f"what moves no leg faster than its jerk allows within a period, or than {_CREEP:.0%} of the slowest feed"
+        f"longest time at rest without a reason: any at all, but at dwells, ends of segments and corners of more than "
+        f"{math.degrees(corner):g} deg within the path tolerance only what exceeds the dwell asked for and "
+        f"{_SPARE_S:g} s; at rest is what moves no leg faster than its jerk allows within a period, or than "
+        f"{_CREEP:.0%} of the slowest feed"
     )
     if value > 0.0:
         method += f"; {np.count_nonzero(beyond)} such stops"
