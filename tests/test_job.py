@@ -67,6 +67,10 @@ MISTAKES = {  # what is replaced, and the pieces that the message must hold
     "no such mesh": (('"part.stl"', '"prat.stl"'), ("job.toml:2", "part.mesh", "prat.stl", "no such file")),
     "mesh is a folder": (('"part.stl"', '"."'), ("part.mesh", "is not a file")),
     "no such variable": (('"part.stl"', '"${NOT_SET_AT_ALL}/part.stl"'), ("part.mesh", "NOT_SET_AT_ALL", "not set")),
+    "a name too long": (
+        ('"part.stl"', f'"{"x" * 300}.stl"'),
+        ("job.toml:2", "part.mesh", "cannot be read: file name too long"),
+    ),
     "no such machine file": (('name = "desk"', 'file = "m.toml"'), ("machine.file", "no such file")),
 }
 

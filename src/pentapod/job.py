@@ -187,7 +187,7 @@ def _tuples(value: Any) -> Any:
 
 
 def _resolve(job: Path, text: str, where: tuple[str, str], name: str) -> Path:
-    """Return the file that a key names. Raises JobError where a variable is not set or nothing is there."""
+    """Return the file that a key names. Raises JobError where a variable is not set or no file can be read there."""
     table, key = where
 
     def wrong(what: str, **details: Any) -> JobError:
@@ -198,9 +198,12 @@ def _resolve(job: Path, text: str, where: tuple[str, str], name: str) -> Path:
         if variable not in os.environ:
             raise wrong(f"the environment variable {variable} is not set", remedy=f"set {variable} to a folder")
     path = job.parent / _VARIABLE.sub(lambda match: os.environ[match[1]], name)
-    if not path.is_file():
-        what = "is not a file" if path.exists() else "no such file"
-        raise wrong(what, expected="a path relative to the job file's folder")
+    try:
+        if not path.is_file():
+            what = "is not a file" if path.exists() else "no such file"
+            raise wrong(what, expected="a path relative to the job file's folder")
+    except OSError as error:  # a name too long, or a folder that may not be searched
+        raise wrong(f"cannot be read: {(error.strerror or str(error)).lower()}") from error
     return path
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pentapod.errors import MachineError
-from pentapod.kinematics import Component, LinearPentapod, architectural_measure
+from pentapod.kinematics import Component, GeneralPentapod, LinearPentapod, architectural_measure
 from pentapod.kinematics.quadratic import LinearPart
 
 BASE = np.array([(-0.4, 0.2), (-0.2, -0.4), (0.0, 0.0), (0.2, -0.4), (0.4, 0.4)])
@@ -36,6 +36,31 @@ def test_numbers_that_are_not_finite(bad: float) -> None:
         LinearPentapod.quadratic(base, 0.5)
     with pytest.raises(MachineError, match="delta"):
         LinearPentapod.quadratic(BASE, bad)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("large", [1e308, -1e200, 2e9])
+def test_numbers_too_large_for_a_machine(large: float) -> None:
+    base, offsets = BASE.copy(), 0.5 * BASE[:, 1]
+    base[0, 0] = offsets[4] = large
+    for build in (
+        lambda: LinearPentapod.quadratic(base, 0.5),
+        lambda: LinearPentapod.quadratic(BASE, large),
+        lambda: GeneralPentapod(base, 0.5 * BASE[:, 1]),
+        lambda: GeneralPentapod(BASE, offsets),
+    ):
+        with pytest.raises(MachineError, match="too large for a machine"):
+            build()
+
+
+@pytest.mark.parametrize("scale", [1e-40, 1e-160, 1e-300])
+def test_attachments_that_as_good_as_coincide(scale: float) -> None:
+    for build in (
+        lambda: LinearPentapod.quadratic(scale * BASE, 0.5),
+        lambda: GeneralPentapod(scale * BASE, 0.5 * BASE[:, 1]),
+    ):
+        with pytest.raises(MachineError, match="architecturally singular"):
+            build()
 
 
 @pytest.mark.parametrize("leg", range(5))

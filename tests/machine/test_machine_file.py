@@ -123,6 +123,11 @@ def test_missing_file_lists_what_is_shipped(tmp_path):
         Machine.load(tmp_path)
 
 
+def test_a_file_name_too_long():
+    with pytest.raises(MachineError, match="file name too long"):
+        Machine.load("x" * 300 + ".toml")
+
+
 @pytest.mark.parametrize(("content", "words"), [(b"", "empty"), (b"  \n", "empty"), (b"\xff\xfe\x00binary", "UTF-8")])
 def test_files_that_are_no_text(tmp_path, content, words):
     path = tmp_path / "m.toml"

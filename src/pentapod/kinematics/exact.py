@@ -7,6 +7,9 @@ from math import prod
 
 import numpy as np
 
+LEAST_EXTENT_M = 1e-30
+"""Attachments as near as this count as one: quotients of their distances could leave the range of float64."""
+
 
 def eliminate(rows: list[list[Fraction]]) -> list[list[Fraction]]:
     """Return the right-hand sides (n, m) after Gauss-Jordan elimination of (n, n + m). Raises LinAlgError."""

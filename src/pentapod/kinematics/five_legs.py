@@ -16,6 +16,9 @@ from pentapod.kinematics.blocks import blocks
 SAVED_BY_KERNELS = 30e-9
 """Seconds a pose that compiled kernels save, forwards and backwards."""
 
+_LARGEST = 1e9
+"""Metres, or the slope δ: what is computed from larger numbers could overflow."""
+
 
 class FiveLegs:
     """Base attachments a_i = (x_i, y_i, 0), base (5, 2), and platform joints b_i = p + z_i i, offsets (5,), metres."""
@@ -71,11 +74,17 @@ def outputs(out: tuple[Floats, ...] | None, batch: tuple[int, ...], *tails: tupl
 
 
 def given(value: ArrayLike, key: str, shape: tuple[int, ...]) -> Floats:
-    """Return the design's numbers as finite float64 of exactly this shape. Raises MachineError under the key."""
+    """Return the design's numbers as float64 of exactly this shape.
+
+    Raises MachineError under the key, also for numbers that are not finite or beyond 1e9.
+    """
     try:
         array = as_floats(value, key, shape)
     except ArrayError as error:
         raise MachineError(error.what, key=key, value=error.value, expected=error.expected) from error
     if array.shape != shape:
         raise MachineError(f"{key} has shape {array.shape}", key=key, expected=f"shape {shape}")
+    largest = float(np.abs(array).max())
+    if largest > _LARGEST:
+        raise MachineError("too large for a machine", key=key, value=largest, expected=f"at most {_LARGEST:g}")
     return array

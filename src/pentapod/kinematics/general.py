@@ -34,8 +34,8 @@ class GeneralPentapod(FiveLegs):
     the offsets are proportional these are the four of `LinearPentapod`, to the same accuracy, and where they
     nearly are nothing special happens: there is one formula for both.
 
-    Raises MachineError: not five attachments or offsets, numbers that are not finite, an architecturally singular
-    geometry.
+    Raises MachineError: not five attachments or offsets, numbers that are not finite or beyond 1e9, an
+    architecturally singular geometry.
     """
 
     base: Floats
@@ -46,7 +46,7 @@ class GeneralPentapod(FiveLegs):
         base, offsets = given(self.base, "base", (5, 2)), given(self.offsets, "offsets", (5,))
         set_frozen(self, base=frozen(base, "base"), offsets=frozen(offsets, "offsets"))
         measure = line_condition(base, offsets)
-        if measure < _SINGULAR:
+        if not measure >= _SINGULAR:
             raise MachineError(
                 "the geometry is architecturally singular: no pose is held by its legs",
                 key="base",

@@ -13,7 +13,7 @@ from fractions import Fraction
 import numpy as np
 
 from pentapod.arrays import Floats
-from pentapod.kinematics.exact import eliminate
+from pentapod.kinematics.exact import LEAST_EXTENT_M, eliminate
 from pentapod.kinematics.singularity_polynomial import exact_cofactors, reduced
 
 _OTHERS = (0, 1, 3, 4)  # the legs whose equations are taken relative to leg 3
@@ -76,7 +76,7 @@ def line_condition(base: Floats, offsets: Floats) -> float:
     others = np.array(_OTHERS)
     relative, axial = base[others] - base[2], offsets[others] - offsets[2]
     size, length = float(np.linalg.norm(relative, axis=1).max()), float(np.abs(axial).max())
-    if not (size > 0.0 and length > 0.0):
+    if not min(size, length) > LEAST_EXTENT_M:
         return 0.0
     (x, y), z = (relative / size).T, axial / length
     values = np.linalg.svd(np.stack([z, x, y, x * z, y * z], axis=1), compute_uv=False)

@@ -31,8 +31,8 @@ class LinearPentapod(FiveLegs):
     base plane is z = 0; leg 3's attachment may be anywhere in it. Offsets that deviate by less than that, but by
     more than rounding, are replaced by z_3 + δ (x_i − x_3): closed form, leg lengths and proofs are about one machine.
 
-    Raises MachineError: not five attachments or offsets, numbers that are not finite, offsets that do not fit
-    delta (to 1e-9 of the machine's size), an architecturally singular geometry.
+    Raises MachineError: not five attachments or offsets, numbers that are not finite or beyond 1e9, offsets that do not
+    fit delta (to 1e-9 of the machine's size), an architecturally singular geometry.
     """
 
     base: Floats
@@ -69,7 +69,7 @@ class LinearPentapod(FiveLegs):
         offsets = np.where(np.abs(offsets - fitting) <= 2.0**-50 * size, offsets, fitting)
         set_frozen(self, base=frozen(base, "base"), offsets=frozen(offsets, "offsets"), delta=delta)
         measure = reciprocal_condition(base, delta)
-        if measure < _SINGULAR:
+        if not measure >= _SINGULAR:
             raise MachineError(
                 "the geometry is architecturally singular: no pose is held by its legs",
                 key="base" if delta else "delta",

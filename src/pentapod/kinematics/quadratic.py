@@ -15,7 +15,7 @@ import numpy as np
 
 from pentapod.arrays import Bools, Floats
 from pentapod.geometry.double_double import DoubleDouble
-from pentapod.kinematics.exact import eliminate
+from pentapod.kinematics.exact import LEAST_EXTENT_M, eliminate
 
 _OTHERS = (0, 1, 3, 4)  # the legs whose equations are taken relative to leg 3
 
@@ -97,11 +97,11 @@ def reciprocal_condition(base: Floats, delta: float) -> float:
     """Return the reciprocal 2-norm condition number of the matrix [x, y, δx², δxy] (4, 4) of `LinearPart`.
 
     Base attachments (5, 2), taken relative to leg 3's and divided by the largest distance from it: the figure
-    does not change with the unit of length. 0 where the matrix is zero or the attachments coincide.
+    does not change with the unit of length. 0 where the matrix is zero or the attachments coincide, or as good as.
     """
     relative = base[_OTHERS, :] - base[2]
     size = float(np.linalg.norm(relative, axis=1).max())
-    if not size > 0.0:
+    if not size > LEAST_EXTENT_M:
         return 0.0
     x, y = (relative / size).T
     values = np.linalg.svd(np.stack([x, y, delta * x * x, delta * x * y], axis=1), compute_uv=False)

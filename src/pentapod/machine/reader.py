@@ -66,7 +66,11 @@ def load_machine(name_or_path: str | Path) -> Machine:
     if name in shipped_machines():
         return read_machine(machine_bytes(name).decode("utf-8"), f"{name}.toml")
     path = Path(name_or_path)
-    if not path.exists():
+    try:
+        missing = not path.exists()
+    except OSError:  # a name too long, or a folder that may not be searched: what reads the file says so
+        missing = False
+    if missing:
         known = ", ".join(shipped_machines())
         hint = nearest(name, shipped_machines()) if name else ""
         remedy = f"shipped machines: {known}" + (f"; {hint}" if hint.startswith("did") else "")
