@@ -8,8 +8,9 @@ from scipy.ndimage import maximum_filter1d
 from pentapod.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.piece import PieceProfile
-from pentapod.timing.setpoints import EDGE, GOAL, Setpoints, Use
+from pentapod.timing.setpoints import EDGE, Setpoints
 from pentapod.timing.stages import Failure
+from pentapod.timing.use import GOAL, Use
 
 _EXTRA, _EXTRA_PER_ROUND = 0.99, 0.01
 """Each easing moves the setpoints against the corners of the path: a place that comes back gets more room."""

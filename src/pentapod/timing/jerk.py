@@ -24,9 +24,10 @@ from itertools import pairwise
 import numpy as np
 
 from pentapod.arrays import Floats
+from pentapod.timing.jerk_eased import Eased, Measure, Over, eased
 from pentapod.timing.jerk_part import Part
 from pentapod.timing.jerk_passes import PASSES, answer_of
-from pentapod.timing.jerk_problem import Problem
+from pentapod.timing.jerk_problem import Problem, Run
 from pentapod.timing.jerk_rows import NO_ROWS, JerkRows, RowsAt
 from pentapod.timing.stages import Failure
 
@@ -45,9 +46,6 @@ _PASSAGE = 128
 NOT_LIMITED = "no law below the fastest one keeps the jerk limits"
 APART = "the blocks of a long path do not agree on a law that keeps the jerk limits"
 
-Run = tuple[Floats, Floats, Floats]
-"""Stations, x and x′ (n,) of a part of a law."""
-
 
 @dataclass(frozen=True)
 class Block:
@@ -65,11 +63,16 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """A problem of stations from 0 on, which is `shift` metres along the path, and the coefficients that answer it."""
+    """A problem of stations from 0 on, which is `shift` metres along the path, and the coefficients that answer it.
+
+    longer: seconds that lower limits cost where setpoints exceeded; exceeds: whether some still do.
+    """
 
     problem: Problem
     y: Floats
     shift: float
+    longer: float
+    exceeds: bool
 
     def at(self, s: Floats) -> tuple[Floats, Floats]:
         """Return x and x′ (n,) at sorted stations s (n,) of the whole path."""
@@ -78,19 +81,8 @@ class Solved:
         return v[:, 0], v[:, 1]
 
     def run(self, low: float, high: float) -> Run:
-        """Return the law from `low` to before `high`, stations of the whole path; rests included.
-
-        At its gridpoints, and halfway between: what is made of them follows the spline closely.
-        """
-        problem, v = self.problem, np.empty((2 * len(self.problem.s) - 1, 3))
-        s = np.empty(len(v))
-        s[::2], s[1::2] = problem.s, (problem.s[1:] + problem.s[:-1]) / 2.0
-        v[::2], v[1::2] = problem.values(self.y), problem.at(self.y, s[1::2])
-        x, slope = v[:, 0], v[:, 1]
-        if problem.begin.join > 0.0:
-            s, x, slope = np.append(0.0, s), np.append(0.0, x), np.append(0.0, slope)
-        if problem.end.join > 0.0:
-            s, x, slope = np.append(s, problem.length), np.append(x, 0.0), np.append(slope, 0.0)
+        """Return the law from `low` to before `high`, stations of the whole path; rests included."""
+        s, x, slope = self.problem.run(self.y)
         s = s + self.shift
         own = (s >= low) & (s < high)
         return s[own], x[own], slope[own]
@@ -100,25 +92,35 @@ class Solved:
 class SmoothProfile:
     """x = ṡ² (N,) and its slope x′ = 2 s̈ (N,) at stations (N,); jerk about constant between.
 
-    lead: gridpoints by which the blocks reached beyond their cuts, from whose solutions it was joined.
+    longer: seconds that lower limits cost where setpoints exceeded; exceeds: whether some still do; lead: gridpoints by
+    which the blocks reached beyond their cuts, from whose solutions it was joined.
     """
 
     s: Floats
     x: Floats
     slope: Floats
+    longer: float
+    exceeds: bool
     lead: int
 
 
 def jerk_limited(
-    s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: int = PASSES, least_step: float = 0.0
+    s: Floats,
+    x: Floats,
+    rows_at: RowsAt,
+    marks: Floats,
+    passes: int = PASSES,
+    *,
+    least_step: float = 0.0,
+    measure: Measure | None = None,
 ) -> SmoothProfile | Failure:
     """Return the fastest jerk-limited profile below x (N + 1,) at s (N + 1,).
 
     It rests at the ends where x is 0, and has the speed of x without acceleration where it is not. marks: where the
     path's third derivative has kinks. least_step: seconds below which the law needs no freedom. A Failure where the
-    passes find nothing.
+    passes find nothing. measure: says where setpoints of a law exceed; there it is solved anew with lower limits.
     """
-    return _joined(s, len(s), lambda block: solved(s, x, rows_at, marks, passes, least_step, block))
+    return _joined(s, len(s), lambda block: solved(s, x, rows_at, marks, passes, least_step, block, measure))
 
 
 def blocks(count: int, lead: int) -> list[Block]:
@@ -133,7 +135,14 @@ def leads(count: int) -> list[int]:
 
 
 def solved(
-    s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, passes: int, least_step: float, block: Block
+    s: Floats,
+    x: Floats,
+    rows_at: RowsAt,
+    marks: Floats,
+    passes: int,
+    least_step: float,
+    block: Block,
+    measure: Measure | None = None,
 ) -> Solved | Failure:
     """Return the answer of one block, without its rows; arguments as for `jerk_limited`."""
     here, shift = slice(block.low, block.high + 1), float(s[block.low])
@@ -142,8 +151,11 @@ def solved(
     answer = answer_of(part, passes)
     if answer is None:
         return Failure(-1, NOT_LIMITED)
-    problem, y = answer
-    return Solved(replace(problem, rows=NO_ROWS), y, shift)
+    softer = Eased(answer, 0.0, exceeds=True)
+    if measure is not None:
+        softer = eased(*answer, partial(_measured, measure, shift), passes)
+    problem, y = softer.answer
+    return Solved(replace(problem, rows=NO_ROWS), y, shift, softer.longer, softer.exceeds)
 
 
 def runs_of(s: Floats, count: int, lead: int, parts: Iterable[Solved]) -> Iterator[Run | None]:
@@ -175,14 +187,15 @@ def _joined(s: Floats, count: int, solve: Callable[[Block], Solved | Failure]) -
             continue
         runs = list(runs_of(s, count, lead, found))
         if None not in runs:
-            return _profile(runs, lead)
+            return _profile(runs, found, lead)
         reason = Failure(-1, APART)
     return reason
 
 
-def _profile(runs: Sequence[Run | None], lead: int) -> SmoothProfile:
+def _profile(runs: Sequence[Run | None], parts: Sequence[Solved], lead: int) -> SmoothProfile:
     columns = (np.concatenate([run[k] for run in runs if run is not None]) for k in range(3))
-    return SmoothProfile(*columns, lead=lead)
+    longer, exceeds = sum(part.longer for part in parts), any(part.exceeds for part in parts)
+    return SmoothProfile(*columns, longer=longer, exceeds=exceeds, lead=lead)
 
 
 def _differing(left: Solved, right: Solved, low: float, high: float) -> float:
@@ -204,3 +217,10 @@ def _passage(left: Solved, right: Solved, low: float, high: float) -> Run:
 def _shifted(rows_at: RowsAt, shift: float, s: Floats) -> JerkRows:
     """Return the rows at stations s (n,) from `shift` metres on."""
     return rows_at(s + shift)
+
+
+def _measured(measure: Measure, shift: float, run: Run, between: Floats) -> Over:
+    """Return where the law of a run exceeds whose stations begin `shift` metres on."""
+    s, x, slope = run
+    over = measure((s + shift, x, slope), between + shift)
+    return replace(over, s=over.s - shift)

@@ -10,7 +10,7 @@ from pentapod.timing.jerk_part import Part
 from pentapod.timing.jerk_rows import JerkRows
 
 KNOTS_PER_RAMP = 8.0
-_LEAST_KNOTS = 64
+_LEAST_KNOTS = 96
 _GROWTH = 1.5
 
 _BENT = 0.05

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.arrays import Bools, Floats
+from pentapod.timing.jerk_about import SETTLED, about, tangents
 from pentapod.timing.jerk_knots import KNOTS_PER_RAMP, law_knots
 from pentapod.timing.jerk_part import Part
-from pentapod.timing.jerk_problem import GRIDPOINTS_PER_KNOT, Problem
+from pentapod.timing.jerk_problem import GRIDPOINTS_PER_KNOT, Answer, Problem
 
 PASSES = 8
 """Passes at most once the knots are where they stay."""
@@ -16,9 +17,6 @@ _FIRST = 2
 _FIRST_KNOTS = 0.5
 """Passes that find out how hard the law pushes, and how many knots they have beside the last ones."""
 
-_SETTLED = 2e-4
-"""Share of the time that a pass must have gained for another one."""
-
 _ROUNDS = 3
 _JERK, _PUSH, _FAST, _SLOW = 1.03, 1.005, 1.005, 0.2
 """Shares of the limits above which knots are halved, and of ṡ² beside it below which."""
@@ -26,9 +24,6 @@ _JERK, _PUSH, _FAST, _SLOW = 1.03, 1.005, 1.005, 0.2
 _SPARE = 1.1
 _LEAST = 1e-9
 _REACHED = 0.995
-
-Answer = tuple[Problem, Floats]
-"""A problem and the coefficients that answer it."""
 
 
 def answer_of(part: Part, passes: int = PASSES) -> Answer | None:
@@ -70,11 +65,11 @@ def _settled(problem: Problem, y: Floats, around: Floats, passes: int) -> Floats
         better = problem.improved(y, around, number, gains)
         if better is None:
             return None if number == 0 else y
-        y, around = better, _tangents(problem, better)
+        y, around = better, tangents(problem, better)
         taken = problem.weight / np.sqrt(around)
         if number > 0:
-            gains = last - (1.0 + _SETTLED) * taken
-            if (last - taken).sum() <= _SETTLED * taken.sum():
+            gains = last - (1.0 + SETTLED) * taken
+            if (last - taken).sum() <= SETTLED * taken.sum():
                 break
         last = taken
     return y
@@ -85,21 +80,7 @@ def _halved(part: Part, problem: Problem, y: Floats, bad: Bools, passes: int) ->
     near = bad | np.append(bad[1:], False) | np.append(False, bad[:-1])
     middles = ((problem.inner[1:] + problem.inner[:-1]) / 2.0)[near]
     finer = Problem.on(part, np.sort(np.concatenate([problem.inner, middles])), problem)
-    y, around = _carried(problem, y, finer)
-    held, stretches, last = finer.held, finer.stretches(middles), np.inf
-    for _ in range(passes):
-        moved = False
-        for low, high in stretches:
-            ends = (held[0] if low == 0 else 3, held[1] if high == len(y) else 3)
-            better = finer.solved(y, around, 1, low, high, ends)
-            if better is not None:
-                y, moved = better, True
-        around = _tangents(finer, y)
-        taken = float((finer.weight / np.sqrt(around)).sum())
-        if not moved or last - taken < _SETTLED * taken:
-            break
-        last = taken
-    return finer, y
+    return finer, about(finer, *_carried(problem, y, finer), middles, passes)[0]
 
 
 def _exceeding(part: Part, problem: Problem, y: Floats) -> Bools:
@@ -113,10 +94,6 @@ def _exceeding(part: Part, problem: Problem, y: Floats) -> Bools:
     bad = (jerks > _JERK) | (pushes > _PUSH) | (x > _FAST * rows.ceiling)
     bad |= x < _SLOW * np.minimum(ends[:-1], ends[1:])
     return bad.reshape(-1, GRIDPOINTS_PER_KNOT).any(axis=1)
-
-
-def _tangents(problem: Problem, y: Floats) -> Floats:
-    return np.maximum(problem.values(y)[:, 0], _LEAST * problem.top)
 
 
 def _pushed(problem: Problem, y: Floats) -> float:

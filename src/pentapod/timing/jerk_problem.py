@@ -31,6 +31,10 @@ _GAP = 1e-5
 _KEPT = 1e-6
 
 
+Run = tuple[Floats, Floats, Floats]
+"""Stations, x and x′ (n,) of a part of a law."""
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Knots, gridpoints and rows of one stretch, and how the spline begins and ends."""
@@ -67,11 +71,14 @@ class Problem:
         """Knots (K,), each once."""
         return self.knots[3:-3]
 
-    def stretches(self, stations: Floats) -> list[tuple[int, int]]:
-        """Return stretches of coefficients, from and to before, about sorted stations (n,) between inner knots."""
+    def stretches(self, stations: Floats, lead: int) -> list[tuple[int, int]]:
+        """Return stretches of coefficients, from and to before, about sorted stations (n,) between inner knots.
+
+        With `lead` coefficients on either side.
+        """
         n = len(self.knots) - 4
         at = np.clip(np.searchsorted(self.knots, stations, "right") - 1, 3, n - 1)
-        lows, highs = np.maximum(at - 3 - LEAD // 2, 0), np.minimum(at + 1 + LEAD // 2, n)
+        lows, highs = np.maximum(at - 3 - lead, 0), np.minimum(at + 1 + lead, n)
         apart = np.flatnonzero(lows[1:] > highs[:-1]) + 1
         return [(int(lows[run[0]]), int(highs[run[-1]])) for run in np.split(np.arange(len(at)), apart)]
 
@@ -115,7 +122,7 @@ class Problem:
         better = y.copy()
         for left, right in pairwise([0, *seams, n]):
             low, high = max(left - 1, 0), min(right + 2, n)
-            if gains is not None and gains[self._gridpoints(low, high)].sum() <= 0.0:
+            if gains is not None and gains[self.gridpoints(low, high)].sum() <= 0.0:
                 continue
             held = (self.held[0] if left == 0 else 3, self.held[1] if right == n else 3)
             found = self.solved(y, around, number, low, high, held)
@@ -125,7 +132,7 @@ class Problem:
                 better[low:high] = found[low:high]
         return better
 
-    def _gridpoints(self, low: int, high: int) -> slice:
+    def gridpoints(self, low: int, high: int) -> slice:
         """Return the gridpoints that coefficients from low to before high alone have a say in."""
         return slice(int(np.searchsorted(self.first, low)), int(np.searchsorted(self.first, high - 4, "right")))
 
@@ -140,7 +147,7 @@ class Problem:
     def _solved(
         self, y: Floats, around: Floats, level: float, low: int, high: int, held: tuple[int, int]
     ) -> Floats | None:
-        here = self._gridpoints(low, high)
+        here = self.gridpoints(low, high)
         fixed = np.zeros(high - low, dtype=np.int64)
         fixed[: held[0]] = 1
         fixed[len(fixed) - held[1] :] = 1
@@ -169,6 +176,27 @@ class Problem:
         y[low:high] = part
         return y
 
+    def run(self, y: Floats) -> Run:
+        """Return the law at the gridpoints, and halfway between: what is made of them follows the spline closely.
+
+        Rests included.
+        """
+        v, s = np.empty((2 * len(self.s) - 1, 3)), np.empty(2 * len(self.s) - 1)
+        s[::2], s[1::2] = self.s, (self.s[1:] + self.s[:-1]) / 2.0
+        v[::2], v[1::2] = self.values(y), self.at(y, s[1::2])
+        x, slope = v[:, 0], v[:, 1]
+        if self.begin.join > 0.0:
+            s, x, slope = np.append(0.0, s), np.append(0.0, x), np.append(0.0, slope)
+        if self.end.join > 0.0:
+            s, x, slope = np.append(s, self.length), np.append(x, 0.0), np.append(slope, 0.0)
+        return s, x, slope
+
+    def seconds(self, y: Floats) -> float:
+        """Return about how long the law lasts."""
+        s, x, _ = self.run(y)
+        v = np.sqrt(x)
+        return float((2.0 * np.diff(s) / (v[:-1] + v[1:])).sum())
+
     def values(self, y: Floats) -> Floats:
         """Return x, x′, x″ (N, 3) at the gridpoints."""
         return np.einsum("ndk,nk->nd", self.basis, y[self.first[:, None] + np.arange(4)])
@@ -179,6 +207,10 @@ class Problem:
         cubic_basis(self.knots, s, basis, first)
         spline_values(basis, first, y, v)
         return v
+
+
+Answer = tuple[Problem, Floats]
+"""A problem and the coefficients that answer it."""
 
 
 def _some_anew(part: Part, grid: Floats, before: Problem) -> JerkRows:

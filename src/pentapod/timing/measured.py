@@ -8,7 +8,8 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.machine.machine import Machine
-from pentapod.timing.setpoints import EDGE, Setpoints, Use
+from pentapod.timing.setpoints import EDGE, Setpoints
+from pentapod.timing.use import Use
 
 _AT_ONCE = 1 << 16
 """Rows measured at once: memory does not grow with the piece by more than four numbers a row."""
@@ -46,12 +47,9 @@ def _measured(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, k
             behind[:, 5] += lengths[-2]
             rows = np.concatenate([rows, behind])
         rows[:, 5] -= lengths[k]
-        parts.append(pieces[k].use(rows, machine, first_row, count))
-    columns = (
-        np.concatenate([getattr(part, name)[: None if part is parts[-1] else -1] for part in parts])
-        for name in ("speed", "acceleration", "jerk", "reach")
-    )
-    return Use(*columns)
+        use = pieces[k].use(rows, machine, first_row, count)
+        parts.append(use if low + count == begins[k + 1] else use.at(np.arange(count)))
+    return Use.joined(parts)
 
 
 def _rows(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, first: int, last: int) -> Floats:

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.machine.machine import Machine
-from pentapod.timing.given_speeds import whole_periods
+from pentapod.timing.exceeding import exceeding, law_times
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.local_stretch import Stretchable
 from pentapod.timing.piece import PieceProfile
-from pentapod.timing.setpoints import EDGE, Setpoints, Use
 
 if TYPE_CHECKING:
     from pentapod.timing.jerk import SmoothProfile
 
 _ROUNDS = 30
-_PHASES = (0.0, 0.25, 0.5, 0.75)
-"""Of the setpoints, in periods: what is slower at one place shifts all later ones against the path."""
-
 _EXTRA = 0.002
 """Share by which a place is slower than it would have to be: the spline through setpoints rings where it is not."""
 
@@ -32,12 +27,6 @@ what they are: over fewer, slowing down would itself take jerks beyond the limit
 _LEAST_WIDTH = 12
 """Periods on either side over which a law is slower about a place, at least."""
 
-_NEAR = 8
-"""Rows near a rest that are measured where they are alone, not at other phases."""
-
-_AT_ONCE = 1 << 16
-"""Rows measured at once."""
-
 
 def mended(profile: PieceProfile, smooth: SmoothProfile, machine: Machine) -> Stretchable:
     """Return the law of a piece with setpoints that keep the limits at any phase; ends that move are left as they are.
@@ -46,19 +35,20 @@ def mended(profile: PieceProfile, smooth: SmoothProfile, machine: Machine) -> St
     is taken where it costs less.
     """
     nodes, period = Stretchable(smooth.s, smooth.x, smooth.slope), machine.controller.period
-    law = nodes.law()
-    spans, uniform, first = _spans(np.array([[0.0, law.duration]]), period), 1.0, law
+    if not smooth.exceeds:
+        return nodes
+    law = first = nodes.law()
+    between: Floats | None = None
+    uniform = 1.0
     for _ in range(_ROUNDS):
-        found = [_exceeding(profile, law, machine, *span) for span in spans]
-        at, slowing, reach = (np.concatenate([part[k] for part in found]) for k in range(3))
+        at, use = exceeding(profile, law, machine, between)
         if not len(at):
             break
-        uniform = uniform if uniform > 1.0 else float(slowing.max())
-        places = worst_places(at, slowing, reach, period)
+        uniform = uniform if uniform > 1.0 else float(use.slowing.max())
+        places = worst_places(at, use.slowing, use.reach, period)
         nodes, changed = about(nodes, law, profile, *places, period)
         law = nodes.law()
-        ends = np.interp(changed, law.stations, law.times) + np.array([[-EDGE], [EDGE]]) * period
-        spans = _spans(np.clip(ends.T, 0.0, law.duration), period)
+        between = law_times(law, changed)
     if not profile.moving and law.duration > first.duration * uniform * (1.0 + _EXTRA):
         slower = 1.0 / (uniform * (1.0 + _EXTRA)) ** 2
         return Stretchable(smooth.s, smooth.x * slower, smooth.slope * slower)
@@ -99,41 +89,3 @@ def about(
         if moves:
             widths = np.minimum(widths, np.maximum(room, period))
     return nodes.slower(at, depths, widths), law(np.stack([at - widths, at + widths]))
-
-
-def _exceeding(
-    profile: PieceProfile, law: MotionLaw, machine: Machine, begin: float, end: float
-) -> tuple[Floats, Floats, Floats]:
-    """Return times (n,) between two of a law at which rows exceed, and the slowing and reach that `Use` says."""
-    period = machine.controller.period
-    # The motion begins and ends on a row: at other phases there is nothing to say about rows near rests.
-    whole = law if profile.moving else law.stretched(whole_periods(law.duration, period))
-    setpoints, ratio = Setpoints(profile, whole, True, period, 0, 0), law.duration / whole.duration
-    last = int(np.ceil(whole.duration / period - 1e-9))
-    low, high = max(int(begin / period) - EDGE, 0), min(int(np.ceil(end / period)) + EDGE, last)
-    found: list[Floats] = []
-    for phase in _PHASES:
-        rows = setpoints.rows(low, high, phase)
-        use: Use = setpoints.use(rows, machine, 0, len(rows) - 1)
-        at_ends = _NEAR if phase > 0.0 else 0
-        use = use.without_edges(
-            EDGE if low > 0 or profile.x_start > 0.0 else at_ends,
-            EDGE if high < last or profile.x_end > 0.0 else at_ends,
-        )
-        bad = np.flatnonzero(use.slowing > 1.0)
-        times = np.clip((low + bad + phase) * period * ratio, 0.0, law.duration)
-        found.append(np.asarray(np.stack([times, use.slowing[bad], use.reach[bad]]), dtype=np.float64))
-    at, slowing, reach = np.concatenate(found, axis=1)
-    return at, slowing, reach
-
-
-def _spans(spans: Floats, period: float) -> list[tuple[float, float]]:
-    """Return times from and to (n, 2), sorted by where they begin, as stretches that do not overlap, none too long."""
-    until = np.maximum.accumulate(spans[:, 1])
-    apart = np.flatnonzero(spans[1:, 0] > until[:-1]) + 1
-    begins, ends = spans[np.append(0, apart), 0], until[np.append(apart - 1, len(spans) - 1)]
-    cuts = (
-        np.linspace(begin, end, int(np.ceil((end - begin) / (_AT_ONCE * period))) + 1).tolist()
-        for begin, end in zip(begins.tolist(), ends.tolist(), strict=True)
-    )
-    return [span for cut in cuts for span in pairwise(cut)]

@@ -21,6 +21,7 @@ from pentapod.timing.stages import Failure
 
 if TYPE_CHECKING:
     from pentapod.timing.jerk import SmoothProfile
+    from pentapod.timing.jerk_eased import Measure
 
 _BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 _REFINEMENTS = 4
@@ -29,7 +30,7 @@ _SWITCHING_LOSS = 3e-4
 
 _EASINGS = 3
 
-_LEAST_PERIODS = 0.5
+_LEAST_PERIODS = 1.0
 """Periods of the controller below which a law limited in jerk needs no freedom."""
 
 _STAGE_PERIODS = 1.0
@@ -77,9 +78,8 @@ class PieceProfile:
         limits = tuple(dict.fromkeys(names[row] for row in x.conflict))
         return replace(x, limits=limits, station=float(self.s[x.gridpoint]) if x.gridpoint >= 0 else None)
 
-    @cached_property
-    def smooth(self) -> SmoothProfile | Failure:
-        """The fastest profile below this one that keeps the jerk limits too."""
+    def smooth(self, measure: Measure) -> SmoothProfile | Failure:
+        """Return the fastest profile below this one that keeps the jerk limits too; measure: of its setpoints."""
         from pentapod.timing.jerk import jerk_limited  # noqa: PLC0415  (compiled: loaded where it is used)
 
         s, x = self.s, self.x
@@ -90,7 +90,8 @@ class PieceProfile:
                 s, rows.first, rows.second, rows.ceiling, x_start=self.x_start, x_end=self.x_end, engine=self.engine
             )
             x = x if isinstance(capped, Failure) else np.minimum(x, capped)
-        return jerk_limited(s, x, self._jerk_rows, self.piece.knots, least_step=_LEAST_PERIODS * self.limits.period)
+        least = _LEAST_PERIODS * self.limits.period
+        return jerk_limited(s, x, self._jerk_rows, self.piece.knots, least_step=least, measure=measure)
 
     def _fine_grid(self) -> Floats:
         """Return the gridpoints and more between them, so that no stage lasts longer than a period.
@@ -120,11 +121,6 @@ class PieceProfile:
     def _with_tool(caps: Floats, rows: int) -> Floats:
         """Return the caps (n, R) of all rows; those of the tool have none."""
         return np.concatenate([caps, np.ones((len(caps), rows - caps.shape[1]))], axis=1)
-
-    def smooth_law(self) -> MotionLaw | Failure:
-        """Return the law of `smooth`."""
-        smooth = self.smooth
-        return smooth if isinstance(smooth, Failure) else MotionLaw.through(smooth.s, smooth.x, smooth.slope)
 
     def _jerk_rows(self, s: Floats) -> JerkRows:
         course = self.limits.course(self.piece, s, 3)

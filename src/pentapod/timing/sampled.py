@@ -11,21 +11,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.eased import eased
+from pentapod.timing.exceeding import over_limits
 from pentapod.timing.given_speeds import law_between, whole_periods
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.local_stretch import Stretchable
 from pentapod.timing.measured import measured, untouched
 from pentapod.timing.mended import about, mended, worst_places
 from pentapod.timing.piece import PieceProfile
-from pentapod.timing.setpoints import Setpoints, Use
+from pentapod.timing.setpoints import Setpoints
 from pentapod.timing.slowed import most_lost
 from pentapod.timing.stages import Failure
+from pentapod.timing.use import Use
 
 WINDOW_PERIODS = 4
 """Periods over which a law with steps of acceleration is averaged: fewer overshoot, more cost time at each stop."""
@@ -76,9 +79,11 @@ class _Plan:
 
         Where the passes find no law that keeps the jerk limits, the averaged one is run as slowly as they ask.
         """
-        found = profile.smooth if smooth else None
+        found = profile.smooth(partial(over_limits, profile, machine)) if smooth else None
         if not (found is None or isinstance(found, Failure)):
             first = MotionLaw.through(found.s, found.x, found.slope)
+            # The first law is the one before limits were lowered where setpoints exceeded.
+            first = first.stretched(max(first.duration - found.longer, 0.5 * first.duration))
             return cls(profile, mended(profile, found, machine), 1.0, first, window)
         if isinstance(found, Failure) and profile.moving:
             return found

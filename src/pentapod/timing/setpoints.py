@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -15,42 +14,10 @@ from pentapod.timing.law import MotionLaw
 from pentapod.timing.piece import PieceProfile
 from pentapod.timing.run_in import run_in
 from pentapod.timing.stages import Failure
-
-GOAL = 0.999
-"""Share of each limit that a sampled program may use."""
+from pentapod.timing.use import Use
 
 EDGE = 32
 """Rows beyond which the spline through all rows has forgotten a row: 0.27 of its say is left from each to the next."""
-
-
-@dataclass(frozen=True, eq=False)
-class Use:
-    """Shares (rows,) of the limits around the setpoints of a piece: of rates or feed, of accelerations, of jerks.
-
-    reach (rows,): seconds over which a jerk at its limit changes the legs' velocities by what they are.
-    """
-
-    speed: Floats
-    acceleration: Floats
-    jerk: Floats
-    reach: Floats
-
-    @property
-    def exceeds(self) -> bool:
-        """Whether a share is above what is aimed at."""
-        return bool((self.slowing > 1.0).any())
-
-    @cached_property
-    def slowing(self) -> Floats:
-        """By which factor (rows,) the motion must be slower at each row to keep the goal."""
-        return np.maximum(np.maximum(self.speed / GOAL, np.sqrt(self.acceleration / GOAL)), np.cbrt(self.jerk / GOAL))
-
-    def without_edges(self, start: int, end: int) -> Use:
-        """Return it with no shares in so many rows at the start and at the end."""
-        rows = np.arange(len(self.speed))
-        known = (rows >= start) & (rows < len(rows) - end)
-        speed, acceleration, jerk = (np.where(known, y, 0.0) for y in (self.speed, self.acceleration, self.jerk))
-        return Use(speed, acceleration, jerk, self.reach)
 
 
 @dataclass(frozen=True, eq=False)
