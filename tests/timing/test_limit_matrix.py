@@ -37,14 +37,7 @@ def rise(found, axis):
     return float(((np.diff(found, axis=axis) - 1e-3) / before).max())
 
 
-WAVES = (5, 6, 8, 9, 11, 13, 14, 15, 17, 18, 20)
-NOT_REACHED = {"corner 20 µm", "turns 1 mm", "turns 0.2 mm", *(f"waves {k}" for k in WAVES)}
-"""Their first laws rise by less than 1e-3; what setpoints each millisecond cost then differs by up to 7.6e-3."""
-
-KNOWN = pytest.mark.xfail(reason="running slower about single places costs up to 7.6e-3 more at looser limits")
-
-
-@pytest.mark.parametrize("name", [pytest.param(n, marks=KNOWN if n in NOT_REACHED else ()) for n in MATRIX])
+@pytest.mark.parametrize("name", MATRIX)
 def test_durations_fall_along_both_limits(name):
     def machine_with(acceleration, jerk):
         m = machine(a=acceleration, rapid=1e3, interpolation="cubic")

@@ -120,7 +120,7 @@ def jerk_limited(
     path's third derivative has kinks. least_step: seconds below which the law needs no freedom. A Failure where the
     passes find nothing. measure: says where setpoints of a law exceed; there it is solved anew with lower limits.
     """
-    return _joined(s, len(s), lambda block: solved(s, x, rows_at, marks, passes, least_step, block, measure))
+    return _joined(s, len(s), lambda block: solved(s, x, rows_at, marks, passes, least_step, measure, block))
 
 
 def blocks(count: int, lead: int) -> list[Block]:
@@ -141,8 +141,8 @@ def solved(
     marks: Floats,
     passes: int,
     least_step: float,
+    measure: Measure | None,
     block: Block,
-    measure: Measure | None = None,
 ) -> Solved | Failure:
     """Return the answer of one block, without its rows; arguments as for `jerk_limited`."""
     here, shift = slice(block.low, block.high + 1), float(s[block.low])

@@ -15,12 +15,18 @@ _JOIN = 0.01
 
 _END_JERK = 0.98
 
+_GENTLER = 0.25
+
 
 class End(Protocol):
     """One end of a spline x(s). join: the distance in metres from the path's end at which the spline begins."""
 
     @property
     def join(self) -> float: ...  # noqa: D102 (described above)
+    def gentler(self) -> End:
+        """Return the end out of which a ramp leads with less jerk."""
+        ...
+
     def bound(self, distance: Floats) -> Floats:
         """Return what x (n,) may be at most at distances (n,) from the path's end, by what leads to the spline."""
         ...
@@ -49,6 +55,10 @@ class Ramp:
         length = min(length, (0.5 * float(rows.ceiling[:within].min()) / c) ** 0.75)
         return cls(c, _JOIN * length)
 
+    def gentler(self) -> Ramp:
+        """Return a slower ramp: on a path that bends hard right after the rest the spline must be able to go on."""
+        return Ramp(self.c * _GENTLER, self.join)
+
     def bound(self, distance: Floats) -> Floats:
         """Return the ramp's own x (n,), as it would go on."""
         return self.c * np.maximum(distance, self.join) ** (4.0 / 3.0)
@@ -66,6 +76,10 @@ class Steady:
     x: float
     join: float = 0.0
 
+    def gentler(self) -> Steady:
+        """Return itself: there is no ramp."""
+        return self
+
     def bound(self, distance: Floats) -> Floats:
         """Return no bound (n,)."""
         return np.full(len(distance), np.inf)
@@ -81,6 +95,10 @@ class Open:
     """Where the path goes on beyond the stretch that is looked at."""
 
     join: float = 0.0
+
+    def gentler(self) -> Open:
+        """Return itself: there is no ramp."""
+        return self
 
     def bound(self, distance: Floats) -> Floats:
         """Return no bound (n,)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pentapod.arrays import Floats
 from pentapod.timing.jerk_ends import End, Open, Ramp, Steady
@@ -44,3 +44,7 @@ class Part:
     def length(self) -> float:
         """Metres."""
         return float(self.s[-1])
+
+    def gentler(self) -> Part:
+        """Return it with slower ramps out of its rests."""
+        return replace(self, begin=self.begin.gentler(), end=self.end.gentler())

@@ -89,7 +89,7 @@ class _NoLawError(Exception):
 def _solved(
     stored: StoredProfile, rows_at: RowsAt, marks: Floats, passes: int, least_step: float, block: Block
 ) -> Solved | Failure:
-    return solved(stored.s, stored.x, rows_at, marks, passes, least_step, block)
+    return solved(stored.s, stored.x, rows_at, marks, passes, least_step, None, block)
 
 
 def _each(work: partial[Solved | Failure], todo: list[Block], processes: int) -> Iterator[Solved]:
