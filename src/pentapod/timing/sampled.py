@@ -2,9 +2,10 @@
 
 A law that keeps the limits at every instant does not yet keep them so: the cubic spline through its setpoints
 overshoots where accelerations jump (by 27 % at a reversal from full acceleration to full braking) or jerks do. What
-the controller will make is measured exactly. A law limited in jerk is run slower about the places where it exceeds
-(`mended`); others, for a cubic controller, are averaged over a few periods, and the plan is eased around such places
-and solved again. After a bounded number of rounds the pieces that still exceed are run slower as a whole.
+the controller will make is measured exactly. Of a law limited in jerk the limits are lowered where it exceeds, and it
+is solved anew there (`jerk_eased`); what is left is run slower (`mended`). Other laws, for a cubic controller, are
+averaged over a few periods, and the plan is eased around such places and solved again. After a bounded number of
+rounds the pieces that still exceed are run slower as a whole.
 """
 
 from __future__ import annotations
