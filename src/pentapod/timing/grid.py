@@ -23,6 +23,9 @@ _DRIFT = 0.1
 """Share of an acceleration limit by which the speed gained in a stage may change what the curve itself takes."""
 _ROUNDS = 7
 
+_AT_ONCE = 1 << 16
+"""Stages looked at at once."""
+
 
 def first_grid(piece: PieceLike, limits: Limits) -> Floats:
     """Return gridpoints (N + 1,) from 0 to the piece's length.
@@ -78,8 +81,20 @@ def _ramps(piece: PieceLike, limits: Limits) -> Floats:
     return np.where(after > before, up, down)
 
 
+def parts(stages: int) -> list[slice]:
+    """Return the gridpoints of parts of so many stages, each with those at both of its ends.
+
+    What is asked of every stage is asked of one part after the other, so that memory does not grow with it.
+    """
+    return [slice(low, min(low + _AT_ONCE, stages) + 1) for low in range(0, stages, _AT_ONCE)]
+
+
 def _rough(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
     """Return which stages (N,) are too long, by what the constraints' coefficients do at their middle."""
+    return np.concatenate([_rough_part(piece, limits, s[part]) for part in parts(len(s) - 1)])
+
+
+def _rough_part(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
     points = np.empty(2 * len(s) - 1)
     points[0::2], points[1::2] = s, (s[:-1] + s[1:]) / 2.0
     course = limits.course(piece, points)

@@ -12,7 +12,7 @@ from pentapod.arrays import Bools, Floats, Ints
 from pentapod.timing.constraints import FEED, PUSHES, RAPID, Limits
 from pentapod.timing.course import Course
 from pentapod.timing.engine import Engine, fastest
-from pentapod.timing.grid import first_grid
+from pentapod.timing.grid import first_grid, parts
 from pentapod.timing.jerk_caps import acceleration_caps
 from pentapod.timing.jerk_rows import JerkRows
 from pentapod.timing.law import MotionLaw
@@ -85,10 +85,13 @@ class PieceProfile:
         s, x = self.s, self.x
         if (self._push_caps < 1.0).any():
             s = self._fine_grid()
-            x, rows = np.interp(s, self.s, self.x), self._jerk_rows(s)
-            capped = fastest(
-                s, rows.first, rows.second, rows.ceiling, x_start=self.x_start, x_end=self.x_end, engine=self.engine
+            x = np.interp(s, self.s, self.x)
+            found = [self._capped_rows(s[part], self.limits.course(self.piece, s[part])) for part in parts(len(s) - 1)]
+            # Each part ends where the next begins.
+            rows = (
+                np.concatenate([*(row[:-1] for row in column), column[-1][-1:]]) for column in zip(*found, strict=True)
             )
+            capped = fastest(s, *rows, x_start=self.x_start, x_end=self.x_end, engine=self.engine)
             x = x if isinstance(capped, Failure) else np.minimum(x, capped)
         least = _LEAST_PERIODS * self.limits.period
         return jerk_limited(s, x, self._jerk_rows, self.piece.knots, least_step=least, measure=measure)
@@ -124,19 +127,18 @@ class PieceProfile:
 
     def _jerk_rows(self, s: Floats) -> JerkRows:
         course = self.limits.course(self.piece, s, 3)
+        first, second, ceiling = self._capped_rows(s, course)
+        return JerkRows(first, second, np.zeros((1, first.shape[1])), self.limits.jerk_rows(course), ceiling)
+
+    def _capped_rows(self, s: Floats, course: Course) -> tuple[Floats, Floats, Floats]:
+        """Return the accelerations' rows (n, R), no looser than laws within the jerk limits can use, and ceilings."""
         acceleration, speed = (
             np.interp(s, self.s, ease)[:, None] for ease in (self.ease_acceleration, self.ease_speed)
         )
         first, second = self.limits.rows(course)
         caps = np.stack([np.interp(s, self.s, cap) for cap in self._push_caps.T], axis=1)
         pushes = self._with_tool(caps, first.shape[1]) * acceleration
-        return JerkRows(
-            first / pushes,
-            second / pushes,
-            np.zeros((1, first.shape[1])),
-            self.limits.jerk_rows(course),
-            self.limits.ceiling(course) * speed[:, 0] ** 2,
-        )
+        return first / pushes, second / pushes, self.limits.ceiling(course) * speed[:, 0] ** 2
 
     def ceiling(self) -> Floats:
         """Return the largest x (N + 1,) at each gridpoint that any path acceleration allows, m²/s²."""
@@ -175,10 +177,14 @@ class PieceProfile:
 
     def shares_between(self) -> tuple[Floats, Floats]:
         """Return the largest shares (N,) of velocities and feed, and of accelerations inside each stage."""
-        ds, dx, u = np.diff(self.s), np.diff(self.x), self.path_accelerations()
-        s = (self.s[:-1, None] + _BETWEEN * ds[:, None]).ravel()
-        x = (self.x[:-1, None] + _BETWEEN * dx[:, None]).ravel()
-        shares = self.limits.shares(self.limits.course(self.piece, s), x, np.repeat(u, len(_BETWEEN)))
+        found = [self._shares_between(part) for part in parts(len(self.s) - 1)]
+        return np.concatenate([rates for rates, _ in found]), np.concatenate([pushes for _, pushes in found])
+
+    def _shares_between(self, part: slice) -> tuple[Floats, Floats]:
+        ds, dx = np.diff(self.s[part]), np.diff(self.x[part])
+        s = (self.s[part][:-1, None] + _BETWEEN * ds[:, None]).ravel()
+        x = (self.x[part][:-1, None] + _BETWEEN * dx[:, None]).ravel()
+        shares = self.limits.shares(self.limits.course(self.piece, s), x, np.repeat(dx / (2.0 * ds), len(_BETWEEN)))
         worst = shares.reshape(len(ds), len(_BETWEEN), -1).max(axis=1)
         return np.delete(worst, PUSHES, axis=1).max(axis=1), worst[:, PUSHES].max(axis=1)
 
