@@ -9,7 +9,7 @@ import numpy as np
 from pentapod.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.given_speeds import whole_periods
-from pentapod.timing.jerk_eased import Over, Run
+from pentapod.timing.jerk_over import Over, Run
 from pentapod.timing.law import MotionLaw
 from pentapod.timing.piece import PieceProfile
 from pentapod.timing.setpoints import EDGE, Setpoints

@@ -24,10 +24,11 @@ from itertools import pairwise
 import numpy as np
 
 from pentapod.arrays import Floats
-from pentapod.timing.jerk_eased import Eased, Measure, Over, eased
+from pentapod.timing.jerk_eased import Eased, eased
+from pentapod.timing.jerk_over import Measure, Over, Run
 from pentapod.timing.jerk_part import Part
 from pentapod.timing.jerk_passes import PASSES, answer_of
-from pentapod.timing.jerk_problem import Problem, Run
+from pentapod.timing.jerk_problem import Problem
 from pentapod.timing.jerk_rows import NO_ROWS, JerkRows, RowsAt
 from pentapod.timing.stages import Failure
 

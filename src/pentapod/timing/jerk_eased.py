@@ -6,14 +6,14 @@ the rows of the nearest gridpoints get less of that limit; the law changes there
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.timing.jerk_about import about, tangents
-from pentapod.timing.jerk_problem import Answer, Problem, Run
+from pentapod.timing.jerk_over import Measure
+from pentapod.timing.jerk_problem import Answer, Problem
 
 _ROUNDS = 10
 _EXTRA = 0.003
@@ -25,24 +25,6 @@ _LEAST = 0.75
 
 _JERK, _PUSH = 0.7, 0.9
 """Shares of the limits that a law uses at gridpoints near which setpoints may exceed."""
-
-
-@dataclass(frozen=True, eq=False)
-class Over:
-    """Sorted stations (n,) where setpoints of a law exceed, and by which factors (n,), of speed, acceleration and jerk.
-
-    reach (n,): metres on either side of which the rows say what the controller makes of it.
-    """
-
-    s: Floats
-    reach: Floats
-    speed: Floats
-    acceleration: Floats
-    jerk: Floats
-
-
-Measure = Callable[[Run, Floats], Over]
-"""Says where a law exceeds, looked for between stations (2, m)."""
 
 
 @dataclass(frozen=True, eq=False)

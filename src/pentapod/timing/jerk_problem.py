@@ -10,6 +10,7 @@ import numpy as np
 from pentapod.arrays import Floats, Ints
 from pentapod.timing.jerk_ends import End
 from pentapod.timing.jerk_kernels import convex_pass
+from pentapod.timing.jerk_over import Run
 from pentapod.timing.jerk_part import Part
 from pentapod.timing.jerk_rows import ROW_NAMES, JerkRows
 from pentapod.timing.spline_kernels import cubic_basis, spline_values
@@ -29,10 +30,6 @@ _ITERATIONS = 60
 
 _GAP = 1e-5
 _KEPT = 1e-6
-
-
-Run = tuple[Floats, Floats, Floats]
-"""Stations, x and x′ (n,) of a part of a law."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,8 @@ import numpy as np
 from pentapod.arrays import Floats
 from pentapod.errors import InputError
 from pentapod.timing.jerk import APART, Block, Solved, blocks, leads, runs_of, solved
+from pentapod.timing.jerk_over import Run
 from pentapod.timing.jerk_passes import PASSES
-from pentapod.timing.jerk_problem import Run
 from pentapod.timing.jerk_rows import RowsAt
 from pentapod.timing.stages import Failure
 

@@ -21,7 +21,7 @@ from pentapod.timing.stages import Failure
 
 if TYPE_CHECKING:
     from pentapod.timing.jerk import SmoothProfile
-    from pentapod.timing.jerk_eased import Measure
+    from pentapod.timing.jerk_over import Measure
 
 _BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 _REFINEMENTS = 4
