@@ -10,10 +10,13 @@ import pytest
 from limit_matrix import ACCELERATIONS, JERKS, MATRIX
 from timing_paths import Path, machine
 
+from pentapod.job import Job
+from pentapod.pipeline import run
 from pentapod.timing import Trajectory, certify, retime
 
 pytestmark = pytest.mark.slow
 
+TOOLPATHS = File(__file__).parents[2] / "toolpaths"
 RISE = 1e-3
 
 
@@ -74,3 +77,18 @@ def test_memory_is_linear_in_the_duration():
 
     (short, little), (long, much) = peak(0.25), peak(1.0)
     assert much <= 1.5 * little * long / short
+
+
+@pytest.mark.parametrize("name", ["deburr", "flower"])
+def test_durations_of_shipped_jobs_fall_along_both_limits(name, tmp_path):
+    """One path with short fillets between cuts, one that bends hard right before it comes to rest."""
+    outcome = run(Job.load(TOOLPATHS / f"{name}.toml"), tmp_path / "out")
+    path, shipped = outcome.find(Trajectory).path, outcome.machine
+
+    def machine_with(acceleration, jerk):
+        legs = replace(shipped.legs, max_acceleration=np.full(5, acceleration), max_jerk=np.full(5, jerk))
+        return replace(shipped, legs=legs)
+
+    found = durations(path, machine_with)
+    rounded = 1e-3 * (len(path.pieces) - 1)  # each piece lasts whole periods
+    assert max(rise(found, 0), rise(found, 1)) <= RISE + rounded / found.min(), found
