@@ -49,19 +49,19 @@ SHAPES = {
 }
 
 
-def ridges(kind, mesh, toolpath):
-    """Height (n,) of what is left over random points of the surface, metres, well inside the region."""
+def ridges(kind, mesh, toolpath, count):
+    """Height (n,) of what is left over `count` random points of the surface, metres, well inside the region."""
     centres = []
     for segment in toolpath.segments:
         if segment.kind is SegmentKind.CUT:
             line = segment.tips + RADIUS * segment.axes
-            count = np.maximum(np.ceil(np.linalg.norm(np.diff(line, axis=0), axis=1) / 5e-5).astype(int), 1)
+            steps = np.maximum(np.ceil(np.linalg.norm(np.diff(line, axis=0), axis=1) / 5e-5).astype(int), 1)
             centres += [
                 a + (b - a) * np.linspace(0, 1, n, endpoint=False)[:, None]
-                for a, b, n in zip(line, line[1:], count, strict=False)
+                for a, b, n in zip(line, line[1:], steps, strict=False)
             ]
     tree = KDTree(np.concatenate(centres))
-    points, _ = surfaces.random_points(mesh, 6_000, Region(angle=np.radians(42.0)))
+    points, _ = surfaces.random_points(mesh, count, Region(angle=np.radians(42.0)))
     if kind == "cylinder":
         points = points[np.abs(points[:, 0]) < 0.036]
     normals = exact_normals(kind, points)
@@ -74,6 +74,7 @@ def ridges(kind, mesh, toolpath):
     return low
 
 
+FEW, MANY = 6_000, 20_000  # of few points chance can put more than 0.1 % where an offset's fronts turn a corner
 QUICK = {("torus", RasterOptions), ("cylinder", RasterOptions), ("sphere", OffsetOptions)}
 
 
@@ -90,7 +91,8 @@ def test_scallops_are_as_high_as_asked_for(kind, options):
     mesh = Mesh.of(*SHAPES[kind]())
     told = options(scallop=SCALLOP, region=UPPER, spacing=1e-3, chordal=2e-6)
     toolpath, _ = toolpath_with_report(mesh, BallCutter(RADIUS), told)
-    high = np.quantile(ridges(kind, mesh, toolpath), 0.999)
+    points = FEW if (kind, options) in QUICK else MANY
+    high = np.quantile(ridges(kind, mesh, toolpath, points), 0.999)
     assert 0.9 * SCALLOP <= high <= 1.05 * SCALLOP
 
 
