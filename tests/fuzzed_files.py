@@ -136,7 +136,7 @@ def _post(name):
 def readers():
     """Return by name: how a folder of files is read, and the files, the first of which gets the faults."""
     from pentapod.job import Job
-    from pentapod.machine.reader import load_machine
+    from pentapod.machine.machine import load_machine
     from pentapod.program import read_csv
     from pentapod.program.posts import read_post
     from pentapod.toolpath import load_mesh, read_darkness, read_lines, read_points

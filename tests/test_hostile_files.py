@@ -15,7 +15,7 @@ import pytest
 import fuzzed_files
 from pentapod.errors import InputError, JobError, MachineError, MeshError, ProgramError, ToolpathError
 from pentapod.job import Job
-from pentapod.machine.reader import load_machine
+from pentapod.machine.machine import load_machine
 from pentapod.program import read_csv
 from pentapod.program.posts import read_post
 from pentapod.toolpath import load_mesh, read_darkness, read_lines, read_points, write_stl

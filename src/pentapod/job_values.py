@@ -11,7 +11,8 @@ from pentapod.errors import InputError, MachineError, MeshError
 from pentapod.job import Job
 from pentapod.job_strategy import job_options
 from pentapod.job_tool import FileReport, Reports, finished_as_asked, job_link_style, job_tool
-from pentapod.machine.machine import ControllerSettings, Machine
+from pentapod.machine.machine import Machine
+from pentapod.machine.parts import ControllerSettings
 from pentapod.machine.tool_limits import ToolLimits
 from pentapod.program import read_header
 from pentapod.progress import Progress, silent

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS
-from pentapod.machine.machine import ControllerSettings
+from pentapod.machine.parts import ControllerSettings
 from pentapod.program import Provenance, quantised, read_csv, sample, write_csv
 
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from pentapod.machine.machine import ControllerSettings, LegLimits
+from pentapod.machine.parts import ControllerSettings, LegLimits
 from pentapod.machine.tool_limits import ToolLimits
 from pentapod.toolpath.toolpath import SegmentKind
 

@@ -4,16 +4,9 @@ from pentapod.machine.check import AMPLIFICATION_LIMIT, Finding, MachineReport, 
 from pentapod.machine.clearance import clearances, pair_names
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.explain import explain
-from pentapod.machine.machine import (
-    ARCHITECTURAL_LIMIT,
-    Bodies,
-    ControllerSettings,
-    JointLimits,
-    LegLimits,
-    Machine,
-    WorkVolume,
-)
-from pentapod.machine.reader import load_machine, read_machine, shipped_machines
+from pentapod.machine.machine import ARCHITECTURAL_LIMIT, Machine, load_machine, read_machine
+from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, WorkVolume
+from pentapod.machine.reader import shipped_machines
 from pentapod.machine.segments import segment_distance
 from pentapod.machine.surroundings import NOTHING, Obstacle, Surroundings
 from pentapod.machine.tool_limits import ToolLimits

@@ -1,11 +1,14 @@
-"""Machine files: TOML to `Machine`, with one clear error for whatever is wrong."""
+"""Machine files: TOML to the parts of a machine, with one clear error for whatever is wrong.
+
+What is made of the parts is given (`Machine`): the errors that it raises are told by key and line, too.
+"""
 
 from __future__ import annotations
 
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -16,7 +19,7 @@ from pentapod.errors import InputError, MachineError, nearest
 from pentapod.kinematics.guides import ReconfigurablePentapod
 from pentapod.kinematics.pentapod import LinearPentapod
 from pentapod.machine.drives import Drives, Masses
-from pentapod.machine.machine import Bodies, ControllerSettings, JointLimits, LegLimits, Machine, WorkVolume
+from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, WorkVolume
 from pentapod.machine.tables import DrivesTable, GeometryTable, GuidesTable, MachineTables, MassesTable
 from pentapod.machine.tool_limits import ToolLimits
 from pentapod.toml_files import first_of, line_of, parsed, read_toml, wrong_value
@@ -49,6 +52,33 @@ _FILE_KEYS = {
 }
 
 
+_Made_co = TypeVar("_Made_co", covariant=True)
+
+
+class Maker(Protocol[_Made_co]):
+    """What a machine is made by: the class `Machine`. Raises MachineError where the parts make no machine."""
+
+    def __call__(
+        self,
+        *,
+        name: str,
+        pentapod: LinearPentapod,
+        legs: LegLimits,
+        joints: JointLimits,
+        bodies: Bodies,
+        tool_length: float,
+        rapid_velocity: float,
+        controller: ControllerSettings,
+        work: WorkVolume,
+        drives: Drives,
+        masses: Masses,
+        tool_limits: ToolLimits,
+        guides: ReconfigurablePentapod | None,
+    ) -> _Made_co:
+        """Return what the parts make, all in SI units."""
+        ...
+
+
 def shipped_machines() -> tuple[str, ...]:
     """Return the names of the machines that come with pentapod, sorted."""
     return tuple(
@@ -56,15 +86,15 @@ def shipped_machines() -> tuple[str, ...]:
     )
 
 
-def load_machine(name_or_path: str | Path) -> Machine:
-    """Return a shipped machine by its name, or the machine of a TOML file.
+def load(name_or_path: str | Path, make: Maker[_Made_co]) -> _Made_co:
+    """Return what is made of a shipped machine's file, by the machine's name, or of another TOML file.
 
     A text without folder and suffix is taken for a name first. Raises MachineError: one line with file, line,
     key, value and remedy.
     """
     name = str(name_or_path)
     if name in shipped_machines():
-        return read_machine(machine_bytes(name).decode("utf-8"), f"{name}.toml")
+        return read(machine_bytes(name).decode("utf-8"), f"{name}.toml", make)
     path = Path(name_or_path)
     try:
         missing = not path.exists()
@@ -76,11 +106,11 @@ def load_machine(name_or_path: str | Path) -> Machine:
         remedy = f"shipped machines: {known}" + (f"; {hint}" if hint.startswith("did") else "")
         raise MachineError("no such machine or machine file", file=name or '""', remedy=remedy)
     text = read_toml(path, "machine", MachineError, start='"pentapod machine list" names those that ship')
-    return read_machine(text, path)
+    return read(text, path, make)
 
 
 def machine_bytes(name_or_path: str | Path) -> bytes:
-    """Return the bytes of the file that `load_machine` reads. Raises MachineError where it cannot be read."""
+    """Return the bytes of the file that `load` reads. Raises MachineError where it cannot be read."""
     name = str(name_or_path)
     try:
         if name in shipped_machines():
@@ -90,11 +120,11 @@ def machine_bytes(name_or_path: str | Path) -> bytes:
         raise MachineError("the machine file cannot be read", file=name) from error
 
 
-def read_machine(text: str, file: str | Path) -> Machine:
-    """Return the machine that TOML text describes; `file` is named in errors. Raises MachineError."""
+def read(text: str, file: str | Path, make: Maker[_Made_co]) -> _Made_co:
+    """Return what is made of the machine that TOML text describes; `file` is named in errors. Raises MachineError."""
     content = parsed(text, file, MachineError)
     try:
-        return _build(MachineTables.model_validate(content))
+        return _made(MachineTables.model_validate(content), make)
     except ValidationError as error:
         raise _from_pydantic(error, text, file) from error
     except InputError as error:
@@ -119,10 +149,10 @@ def _si(values: object) -> Floats:
     return np.asarray(values, dtype=np.float64) / 1000.0
 
 
-def _build(tables: MachineTables) -> Machine:
+def _made(tables: MachineTables, make: Maker[_Made_co]) -> _Made_co:
     legs, joints, bodies, work = tables.legs, tables.joints, tables.bodies, tables.work
     pentapod = _geometry(tables.geometry)
-    return Machine(
+    return make(
         name=tables.name,
         pentapod=pentapod,
         legs=LegLimits(

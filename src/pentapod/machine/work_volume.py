@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.arrays import Floats
-from pentapod.machine.machine import WorkVolume
+from pentapod.machine.parts import WorkVolume
 
 
 def sample_work_volume(volume: WorkVolume, *, rings: int, around: int, levels: int) -> tuple[Floats, Floats]:
