@@ -27,13 +27,14 @@ from planning_instances import Instance, instances
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine.machine import Machine
 from pentapod.planning.axis_cost import AxisCost
+from pentapod.planning.axis_course import AxisCourse
 from pentapod.planning.ipopt import IpoptSolver
 from pentapod.planning.leg_path import leg_path
 from pentapod.planning.margins import Margins
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.planning.placement import Placement
 from pentapod.planning.plan import plan
-from pentapod.planning.sampling import first_guesses
+from pentapod.planning.sampling import first_candidate, first_guesses
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Candidate, Setting
 from pentapod.planning.task import Task
@@ -56,7 +57,7 @@ def timed(action: Callable[[], Value]) -> tuple[Value, float]:
 def start_of(setting: Setting) -> Candidate:
     """Return the first candidate of the best first guess."""
     guess = first_guesses(setting.task, setting.machine, COMPONENTS, 0)[0]
-    return setting.first_candidate(Margins.of(setting.machine, guess.component), guess.transform)
+    return first_candidate(setting, Margins.of(setting.machine, guess.component), guess.transform)
 
 
 def against_ipopt(tasks: list[Instance], machine: Machine) -> None:
@@ -82,7 +83,7 @@ def calm_against(setting: Setting, at: Candidate, *, whole: bool) -> str:
     keep = CALM_SHARE * at.smallest
     ours, seconds = timed(lambda: SequentialSolver(setting, False).calm(at, keep))
     theirs, their_seconds = timed(lambda: IpoptSolver(setting, False, whole).calm(at, keep))
-    cost = AxisCost(setting, at)
+    cost = AxisCost(setting, AxisCourse.of(setting.task, setting.cone), at)
     costs = [f"{'none':>9s}" if c is None else f"{cost.of(c):9.6f}" for c in (ours, theirs)]
     return f" {' '.join(costs)} {their_seconds / seconds:6.1f}x"
 
@@ -155,7 +156,7 @@ def rates(tasks: list[Instance], machine: Machine) -> None:
 
 def calm_axes(setting: Setting, calm: np.ndarray) -> np.ndarray:
     """Return the axes (N, 3) of a course, workpiece frame."""
-    return lean(setting.task.nominal, setting.course.leans(calm))
+    return lean(setting.task.nominal, AxisCourse.of(setting.task, setting.cone).leans(calm))
 
 
 def strict_fits(setting: Setting, at: Candidate) -> tuple[np.ndarray, np.ndarray]:

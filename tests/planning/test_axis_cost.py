@@ -8,12 +8,12 @@ from planning_instances import instances
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.planning import axis_cost
 from pentapod.planning.axis_cost import EXCESS_WEIGHT, AxisCost
-from pentapod.planning.axis_course import BANDS, FORESIGHT_M
+from pentapod.planning.axis_course import BANDS, FORESIGHT_M, AxisCourse
 from pentapod.planning.leg_path import leg_path
 from pentapod.planning.margins import Margins
 from pentapod.planning.placed_path import PlacedPath
 from pentapod.planning.placement import Placement
-from pentapod.planning.sampling import first_guesses
+from pentapod.planning.sampling import first_candidate, first_guesses
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Setting
 from pentapod.planning.task import Task
@@ -25,40 +25,44 @@ KEPT = 0.9
 def candidate_of(instance, desk):
     setting = Setting.of(Task.of(instance.toolpath, max(instance.tilt, 0.1)), desk)
     guess = first_guesses(setting.task, desk, COMPONENTS, 0, samples=2000)[0]
-    return setting, setting.first_candidate(Margins.of(desk, guess.component), guess.transform)
+    return setting, first_candidate(setting, Margins.of(desk, guess.component), guess.transform)
 
 
 @pytest.fixture(scope="module", params=[0, 6, 11])
 def made(request, desk):
     """A setting, a candidate and its cost, for a raster, a spiral and a curve."""
     setting, at = candidate_of(instances(12)[request.param], desk)
-    return setting, at, AxisCost(setting, at)
+    return setting, at, AxisCost(setting, course_of(setting), at)
+
+
+def course_of(setting):
+    return AxisCourse.of(setting.task, setting.cone)
 
 
 def random_coefficients(setting, size=0.3):
-    c = np.random.default_rng(0).normal(size=(setting.course.hessian.shape[1] // 2, 2))
+    c = np.random.default_rng(0).normal(size=(course_of(setting).hessian.shape[1] // 2, 2))
     return size * c / np.maximum(1.0, np.linalg.norm(c, axis=1, keepdims=True))
 
 
 def legs_of(setting, at, desk, c):
     """Leg lengths at the nodes, by the robot's own inverse kinematics."""
-    rows = setting.course.nodes
-    axes = lean(setting.task.nominal, setting.course.leans(c))[rows]
+    rows = course_of(setting).nodes
+    axes = lean(setting.task.nominal, course_of(setting).leans(c))[rows]
     tips, turned = setting.task.machine_poses(at.transform, axes, rows)
     return desk.pentapod.leg_lengths(tips + desk.tool_length * turned, -turned)
 
 
 def test_strict_normals_are_not_charged(made):
     setting, _, cost = made
-    strict = np.zeros((setting.course.hessian.shape[1] // 2, 2))
-    assert cost.of(strict) == pytest.approx(setting.course.cost_of(strict), rel=1e-12)
-    assert cost.of(random_coefficients(setting)) > 2.0 * setting.course.cost_of(random_coefficients(setting))
+    strict = np.zeros((course_of(setting).hessian.shape[1] // 2, 2))
+    assert cost.of(strict) == pytest.approx(course_of(setting).cost_of(strict), rel=1e-12)
+    assert cost.of(random_coefficients(setting)) > 2.0 * course_of(setting).cost_of(random_coefficients(setting))
 
 
 def test_charges_are_sums_over_the_nodes(made, desk):
     """Node by node, from lengths of the robot's own kinematics and axes themselves, in plain loops."""
     setting, at, cost = made
-    c, way = random_coefficients(setting), setting.course.way
+    c, way = random_coefficients(setting), course_of(setting).way
 
     def bent(legs):
         before, after = np.diff(way)[:-1, None], np.diff(way)[1:, None]
@@ -66,7 +70,7 @@ def test_charges_are_sums_over_the_nodes(made, desk):
 
     ours, strict = (np.abs(bent(legs_of(setting, at, desk, x))) for x in (c, np.zeros_like(c)))
     worst = strict.max(axis=1)
-    nominal = setting.task.nominal[setting.course.nodes]
+    nominal = setting.task.nominal[course_of(setting).nodes]
     rates = np.linalg.norm(np.diff(nominal, axis=0), axis=1) / np.diff(way)
     price = EXCESS_WEIGHT * FORESIGHT_M**2 * ((np.diff(way) * rates**2).sum() / (way[-1] - way[0]) + 0.1**2)
     charge = 0.0
@@ -80,8 +84,8 @@ def test_rates_are_those_of_the_axes(made):
     """Told in pairs that are carried along they have the length of the axes' own, but for what lies along the axis."""
     setting, _, cost = made
     c = random_coefficients(setting, 0.05)
-    rows, way = setting.course.nodes, setting.course.way
-    axes = lean(setting.task.nominal, setting.course.leans(c))[rows]
+    rows, way = course_of(setting).nodes, course_of(setting).way
+    axes = lean(setting.task.nominal, course_of(setting).leans(c))[rows]
     true = np.linalg.norm(np.diff(axes, axis=0), axis=1) / np.diff(way)
     np.testing.assert_allclose(np.linalg.norm(cost.rates(c), axis=1), true, rtol=0.02, atol=0.02 * true.max())
 
@@ -98,7 +102,7 @@ def test_soft_rows_are_the_derivatives_of_what_is_charged(made):
         return float(rows.weight @ np.square(np.maximum(values - rows.upper, 0.0)))
 
     def charged(x):
-        return cost.of(x) - setting.course.cost_of(x)
+        return cost.of(x) - course_of(setting).cost_of(x)
 
     assert by_rows(c) == pytest.approx(charged(c), rel=1e-9)
     assert by_rows(c + d) - by_rows(c) == pytest.approx(charged(c + d) - charged(c), rel=1e-3)
@@ -140,7 +144,7 @@ def above_strict(desk, number):
     calm = SequentialSolver(setting, free=False).calm(at, KEPT * at.smallest)
     strict, ours = (
         accelerations(instance, setting, at, desk, axes)
-        for axes in (setting.task.nominal, lean(setting.task.nominal, setting.course.leans(calm)))
+        for axes in (setting.task.nominal, lean(setting.task.nominal, course_of(setting).leans(calm)))
     )
     return (ours > 1.1 * strict + 0.01 * strict.max()).mean()
 

@@ -13,7 +13,7 @@ from pentapod.planning.axis_course import BANDS, FORESIGHT_M, UPRIGHT_WEIGHT, Ax
 from pentapod.planning.calming import calmed
 from pentapod.planning.interior_point import AxisProgram, SoftRows
 from pentapod.planning.margins import Margins
-from pentapod.planning.sampling import first_guesses
+from pentapod.planning.sampling import first_candidate, first_guesses
 from pentapod.planning.setting import Setting
 from pentapod.planning.task import Task
 
@@ -161,7 +161,7 @@ def test_short_paths_and_single_places_have_a_course(moved, desk):
     task = Task(pivots, np.tile([0.0, 0.0, 1.0], (len(pivots), 1)), 0.003, 0.2)
     setting = Setting.of(task, desk)
     guess = first_guesses(task, desk, COMPONENTS, 0, samples=500)[0]
-    start = setting.first_candidate(Margins.of(desk, guess.component), guess.transform)
+    start = first_candidate(setting, Margins.of(desk, guess.component), guess.transform)
     strict = setting.values_of(start.margins, start.transform, np.zeros_like(pivots)).min()
     calm = calmed(setting, start, strict - 0.01)
-    assert np.linalg.norm(setting.course.leans(calm), axis=1).max() < 1e-3
+    assert np.linalg.norm(AxisCourse.of(setting.task, setting.cone).leans(calm), axis=1).max() < 1e-3

@@ -9,12 +9,13 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.machine.clearance import clearances
 from pentapod.machine.surroundings import Obstacle, Surroundings
+from pentapod.planning.axis_course import AxisCourse
 from pentapod.planning.blame import blame
 from pentapod.planning.contacts import comforts, names
 from pentapod.planning.formulation import step_slopes, stepped
 from pentapod.planning.ipopt import IpoptSolver
 from pentapod.planning.margins import TOOL_COMFORTABLE_M, Margins
-from pentapod.planning.sampling import first_guesses
+from pentapod.planning.sampling import first_candidate, first_guesses
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Setting
 from pentapod.planning.task import Task
@@ -147,7 +148,7 @@ def setting(desk, cap):
 def free(desk, setting):
     """A first guess where nothing is in the way."""
     guess = first_guesses(setting.task, desk, (PLUS,), 0, samples=2000)[0]
-    return setting.first_candidate(Margins.of(desk, PLUS), guess.transform)
+    return first_candidate(setting, Margins.of(desk, PLUS), guess.transform)
 
 
 def beside(desk, setting, free, leg, away):
@@ -212,7 +213,10 @@ def test_calming_keeps_clear_of_a_fixture(desk, setting, free):
     keep = start.smallest - 0.05
     calm = SequentialSolver(setting, False).calm(start, keep)
     if calm is not None:
-        assert setting.values_of(margins, free.transform, setting.course.leans(calm)).min() >= keep - 1e-4
+        assert (
+            setting.values_of(margins, free.transform, AxisCourse.of(setting.task, setting.cone).leans(calm)).min()
+            >= keep - 1e-4
+        )
 
 
 def test_a_refusal_names_the_fixture(desk, setting, free):

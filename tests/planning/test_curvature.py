@@ -10,7 +10,7 @@ from pentapod.planning.curvature import Curvature
 from pentapod.planning.dense_program import dense_program
 from pentapod.planning.formulation import stepped
 from pentapod.planning.margins import Margins
-from pentapod.planning.sampling import first_guesses
+from pentapod.planning.sampling import first_candidate, first_guesses
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Setting
 from pentapod.planning.task import Task
@@ -55,7 +55,7 @@ def test_curvature_against_differences(desk, cap):
     """The Lagrangian of the margins, weighed by multipliers, along a line: second differences of the margins."""
     setting = Setting.of(Task.of(cap, np.radians(15.0)), desk)
     guess = first_guesses(setting.task, desk, (Component(1, 1),), 0, samples=2000)[0]
-    at = setting.first_candidate(Margins.of(desk, guess.component), guess.transform)
+    at = first_candidate(setting, Margins.of(desk, guess.component), guess.transform)
     rows = np.arange(len(setting.task.pivots))
     model = SequentialSolver(setting, free=True).model(at, rows, at.smallest)
     rng = np.random.default_rng(5)

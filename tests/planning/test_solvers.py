@@ -7,12 +7,13 @@ from planning_instances import instances
 from conftest import dome
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS
+from pentapod.planning.axis_course import AxisCourse
 from pentapod.planning.calming import SLACK
 from pentapod.planning.formulation import stepped
 from pentapod.planning.ipopt import IpoptSolver
 from pentapod.planning.linear_model import REACH
 from pentapod.planning.margins import Margins
-from pentapod.planning.sampling import first_guesses
+from pentapod.planning.sampling import first_candidate, first_guesses
 from pentapod.planning.search import search
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Setting
@@ -30,7 +31,7 @@ def setting(desk):
 @pytest.fixture(scope="module")
 def start(setting, desk):
     guess = first_guesses(setting.task, desk, COMPONENTS, 0, samples=2000)[0]
-    return setting.first_candidate(Margins.of(desk, guess.component), guess.transform)
+    return first_candidate(setting, Margins.of(desk, guess.component), guess.transform)
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +68,7 @@ def test_the_result_recomputed_is_what_was_claimed(setting, raised):
 
 def test_calm_axes_match_the_reference(setting, raised):
     """The same problem at a given placement: the same optimum to 0.1 %."""
-    keep, course = 0.9 * raised.smallest, setting.course
+    keep, course = 0.9 * raised.smallest, AxisCourse.of(setting.task, setting.cone)
     ours = SequentialSolver(setting, free=False).calm(raised, keep)
     reference = IpoptSolver(setting, free=False).calm(raised, keep)
     assert setting.values_of(raised.margins, raised.transform, course.leans(ours)).min() >= keep - SLACK
@@ -78,7 +79,7 @@ def test_calm_axes_match_the_reference(setting, raised):
 
 def test_calm_axes_turn_slower_than_strict_normals(setting, raised):
     ours = SequentialSolver(setting, free=False).calm(raised, 0.9 * raised.smallest)
-    axes = lean(setting.task.nominal, setting.course.leans(ours))
+    axes = lean(setting.task.nominal, AxisCourse.of(setting.task, setting.cone).leans(ours))
     strict, turned = (np.linalg.norm(np.diff(x, axis=0), axis=1) for x in (setting.task.nominal, axes))
     assert np.median(turned) < np.median(strict)
     assert turned.max() <= 1.1 * strict.max()

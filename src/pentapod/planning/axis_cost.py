@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
-from pentapod.planning.axis_course import BANDS, FORESIGHT_M
+from pentapod.planning.axis_course import BANDS, FORESIGHT_M, AxisCourse
 from pentapod.planning.divided import as_matrix, differences, divided_differences
 from pentapod.planning.formulation import leg_function
 from pentapod.planning.interior_point import SoftRows
@@ -75,14 +75,14 @@ class _Charge:
 
 
 class AxisCost:
-    """The cost of coefficients (K, 2) of a setting's course, at the placement of a candidate.
+    """The cost of coefficients (K, 2) of a course of the axes, at the placement of a candidate.
 
     The course's own, and EXCESS_WEIGHT times the excesses. Rates are of nominal plus lean, not normalised, by the way
     of the course; bends are the second derivatives of the leg lengths by it.
     """
 
-    def __init__(self, setting: Setting, at: Candidate) -> None:
-        self.course, task = setting.course, setting.task
+    def __init__(self, setting: Setting, course: AxisCourse, at: Candidate) -> None:
+        self.course, task = course, setting.task
         nodes, way = self.course.nodes, self.course.way
         self.basis = self.course.basis[nodes]
         self.weights, self.first = self.basis.data.reshape(-1, 4), self.basis.indices[::4].astype(np.intp)

@@ -60,7 +60,7 @@ class _Model:
 
 
 def calmed(setting: Setting, start: Candidate, keep: float) -> Floats | None:
-    """Return coefficients (K, 2) of the setting's course: the calmest one that keeps the margin `keep`.
+    """Return coefficients (K, 2) of the course along the setting's task: the calmest one that keeps the margin `keep`.
 
     It starts at the leans of `start`, at whose placement it stays. None where no course of the axes was found to keep
     it.
@@ -82,8 +82,9 @@ class _Calming:
     """
 
     def __init__(self, setting: Setting, start: Candidate, keep: float) -> None:
-        self.setting, self.course, self.start, self.keep = setting, setting.course, start, keep
-        self.cost = AxisCost(setting, start)
+        self.setting, self.start, self.keep = setting, start, keep
+        self.course = AxisCourse.of(setting.task, setting.cone)
+        self.cost = AxisCost(setting, self.course, start)
         self.slopes: dict[tuple[int, ...], Slopes] = {}
         self.kinds: Bools = np.zeros(len(start.margins.limits), dtype=bool)
         self.reach, self.accuracy = _WHOLE, _ROUGH

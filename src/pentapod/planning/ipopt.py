@@ -14,7 +14,7 @@ import numpy as np
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.axis_cost import AxisCost
-from pentapod.planning.axis_course import within_discs
+from pentapod.planning.axis_course import AxisCourse, within_discs
 from pentapod.planning.formulation import point_function, room_function, stepped
 from pentapod.planning.linear_model import valleys
 from pentapod.planning.setting import Candidate, Setting
@@ -85,7 +85,8 @@ class IpoptSolver:
         """
         import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
-        setting, task, course = self.setting, self.setting.task, self.setting.course
+        setting, task = self.setting, self.setting.task
+        course = AxisCourse.of(task, setting.cone)
         count, first = len(task.pivots), course.fitted(setting.leans(start.coefficients))
         margins = setting.values_of(start.margins, start.transform, course.leans(first))
         kinds = [int(k) for k in np.flatnonzero((margins.min(axis=0) < keep + _NEAR) | self.whole)]
@@ -96,7 +97,7 @@ class IpoptSolver:
             np.tile(start.transform.translation[:, None], (1, count)),
             setting.contacts(start.margins, start.transform, course.leans(first), np.arange(count)).T,
         )  # fmt: skip
-        cost = AxisCost(setting, start)
+        cost = AxisCost(setting, course, start)
         spent, excess, room = cost.symbolic(c)
         problem = {
             "x": ca.vertcat(ca.vec(c), excess),

@@ -9,6 +9,7 @@ from pentapod.arrays import Floats
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import NOTHING, Surroundings
+from pentapod.planning.axis_course import AxisCourse
 from pentapod.planning.blame import refusal
 from pentapod.planning.freedom import FREE, Freedom
 from pentapod.planning.guiding import guided
@@ -82,7 +83,7 @@ def plan(
     if tilt > 0.0:
         progress("tool axis", 0.0, f"smallest margin {best.smallest:.3f}")
         calm = SOLVERS[solver](setting, False).calm(best, min(keep, best.smallest))
-        leans = leans if calm is None else setting.course.leans(calm)
+        leans = leans if calm is None else AxisCourse.of(setting.task, setting.cone).leans(calm)
     return _path(toolpath, setting, best, leans, found.choice)
 
 

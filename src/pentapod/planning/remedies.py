@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pentapod.planning.freedom import FREE
+from pentapod.planning.sampling import first_candidate
 from pentapod.planning.setting import Candidate, Setting
 from pentapod.planning.task import Task
 
@@ -46,7 +47,7 @@ def _cone(setting: Setting, best: Candidate, improve: Raise, needed: float) -> s
         there = Setting.of(
             Task(task.pivots, task.nominal, task.pivot, tilt), setting.machine, setting.freedom, setting.weights
         )
-        return improve(there, there.first_candidate(best.margins, best.transform)).smallest >= needed
+        return improve(there, first_candidate(there, best.margins, best.transform)).smallest >= needed
 
     enough = 0.0
     for tilt in reversed(wider):
@@ -69,7 +70,7 @@ def _region(setting: Setting, best: Candidate, improve: Raise, needed: float) ->
         found = None
         if len(inside) > 0:
             part = Setting.of(setting.task.at(inside), setting.machine, setting.freedom, setting.weights)
-            found = improve(part, part.first_candidate(start.margins, start.transform))
+            found = improve(part, first_candidate(part, start.margins, start.transform))
         if found is not None and found.smallest >= needed:
             fits, start = share, found
         else:

@@ -14,6 +14,7 @@ from pentapod.machine.machine import Machine
 from pentapod.machine.surroundings import NOTHING, Surroundings
 from pentapod.planning.freedom import FREE, Freedom
 from pentapod.planning.margins import Margins
+from pentapod.planning.setting import Candidate, Setting
 from pentapod.planning.task import Task
 from pentapod.planning.tilt import lean
 
@@ -22,6 +23,7 @@ KEPT = 6
 """Guesses returned for each component; they differ from each other."""
 
 _RANKED = 48
+_FITTED = 192
 _APART_M, _APART_RAD = 0.02, np.radians(15.0)
 LARGEST_SLOPE = np.radians(40.0)
 """How far the part's mean axis may lean from the base normal in a first guess."""
@@ -82,6 +84,20 @@ def first_guesses(
         ]
         guesses += _different(sorted(found, key=lambda g: -g.margin), centre)
     return sorted(guesses, key=lambda g: -g.margin)
+
+
+def first_candidate(setting: Setting, margins: Margins, transform: RigidTransform) -> Candidate:
+    """Return the candidate whose smooth field comes near the tilts that are best for each waypoint by itself."""
+    coefficients, task, domain = setting.upright, setting.task, setting.domain
+    if task.tilt > 0.0:
+        rows = task.representatives(_FITTED)
+        _, leans = best_tilted_margins(task.at(rows), margins, transform)
+        # Smoothness, lightly weighed, decides where the representatives do not.
+        smooth = np.vstack([0.3 * domain.roughness(), 1e-3 * np.eye(domain.size)])
+        wanted = np.vstack([leans @ domain.lean_plane.T, np.zeros((len(smooth), 2))])
+        fitted = np.linalg.lstsq(np.vstack([setting.basis[rows], smooth]), wanted, rcond=None)[0]
+        coefficients = setting.within_cone(np.asarray(fitted, dtype=np.float64))
+    return setting.candidate(margins, transform, coefficients)
 
 
 def tilts(angle: float) -> Floats:

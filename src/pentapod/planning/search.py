@@ -15,7 +15,7 @@ from pentapod.machine.surroundings import NOTHING, Surroundings
 from pentapod.planning.freedom import Freedom
 from pentapod.planning.ipopt import IpoptSolver
 from pentapod.planning.margins import Margins
-from pentapod.planning.sampling import first_guesses
+from pentapod.planning.sampling import first_candidate, first_guesses
 from pentapod.planning.sequential import SequentialSolver
 from pentapod.planning.setting import Candidate, Setting
 from pentapod.planning.weights import NEEDED_MARGIN
@@ -46,7 +46,7 @@ class Solver(Protocol):
         ...
 
     def calm(self, start: Candidate, keep: float) -> Floats | None:
-        """Return coefficients of the setting's course: the calmest one that keeps the margin `keep`.
+        """Return coefficients of the course along the setting's task: the calmest one that keeps the margin `keep`.
 
         At the placement of `start`, and from its leans on. None where no such course was found.
         """
@@ -109,7 +109,7 @@ def search(
         for margins, transform in starts[:count]:
             if freedom.moves and tried >= REFINED and best is not None and _is_decided(best):
                 break
-            found = improver.raise_margin(setting.first_candidate(margins, transform))
+            found = improver.raise_margin(first_candidate(setting, margins, transform))
             best = found if best is None or found.smallest > best.smallest else best
             tried += 1
             note = f"component {best.margins.component}, best margin so far {best.smallest:.3f}"

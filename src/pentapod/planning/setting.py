@@ -1,19 +1,16 @@
-"""Setting: the task, the machine and the tilt field that both solvers work on; Candidate: what they improve."""
+"""Setting: the task, the machine and the tilt field that all solvers work on; Candidate: what they improve."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from pentapod.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.machine import Machine
-from pentapod.planning.axis_course import AxisCourse
 from pentapod.planning.freedom import FREE, Freedom
 from pentapod.planning.margins import Margins
-from pentapod.planning.sampling import best_tilted_margins
 from pentapod.planning.task import Task
 from pentapod.planning.tilt import FieldDomain, lean
 from pentapod.planning.weights import EVEN, Weights, weighed
@@ -22,7 +19,6 @@ CONE_SHARE = 0.98
 """Share of the tilt cone used by the optimisers; the rest absorbs what happens between waypoints."""
 
 _CELLS = 2
-_FITTED = 192
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,21 +107,3 @@ class Setting:
         """Return the candidate with its smallest margin over all waypoints."""
         smallest = float(self.values(margins, transform, coefficients).min())
         return Candidate(margins, transform, coefficients, smallest)
-
-    def first_candidate(self, margins: Margins, transform: RigidTransform) -> Candidate:
-        """Return the candidate whose smooth field comes near the tilts that are best for each waypoint by itself."""
-        coefficients = self.upright
-        if self.task.tilt > 0.0:
-            rows = self.task.representatives(_FITTED)
-            _, leans = best_tilted_margins(self.task.at(rows), margins, transform)
-            # Smoothness, lightly weighed, decides where the representatives do not.
-            smooth = np.vstack([0.3 * self.domain.roughness(), 1e-3 * np.eye(self.domain.size)])
-            wanted = np.vstack([leans @ self.domain.lean_plane.T, np.zeros((len(smooth), 2))])
-            fitted = np.linalg.lstsq(np.vstack([self.basis[rows], smooth]), wanted, rcond=None)[0]
-            coefficients = self.within_cone(np.asarray(fitted, dtype=np.float64))
-        return self.candidate(margins, transform, coefficients)
-
-    @cached_property
-    def course(self) -> AxisCourse:
-        """The leans along the path as a spline: what calming works on."""
-        return AxisCourse.of(self.task, self.cone)
