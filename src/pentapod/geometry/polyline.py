@@ -12,3 +12,13 @@ def arc_length(points: ArrayLike) -> Floats:
     """Return the cumulated length (N,) along a polyline of points (N, d); starts at 0."""
     p = as_floats(points, "points", (None, None))
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1))])
+
+
+def spaced(corners: Floats, spacing: float) -> Floats:
+    """Return the polyline (M, 3) with points added so that none are further apart than `spacing` metres."""
+    steps = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    counts = np.maximum(np.ceil(steps / spacing - 1e-9), 1.0).astype(np.intp)
+    leg = np.repeat(np.arange(len(steps)), counts)
+    number = np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts, counts)
+    t = (number / counts[leg])[:, None]
+    return np.vstack([corners[leg] + t * (corners[leg + 1] - corners[leg]), corners[-1:]])

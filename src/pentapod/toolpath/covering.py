@@ -41,18 +41,6 @@ def rest_covered(patch: Patch, steps: Floats, seeds: Floats, parts: list[Passes]
     return Passes.joined([part for part in (*parts, gaps) if len(part)])
 
 
-def aligned(passes: Passes, towards: Floats) -> Passes:
-    """Return the passes with closed ones begun where they reach furthest `towards` (3,): neighbours' ends are near."""
-    index = np.arange(len(passes.points))
-    reach = passes.points @ towards
-    for k in np.flatnonzero(passes.closed):
-        rows = passes.rows(int(k))
-        begin = rows.start + int(reach[rows].argmax())
-        around = np.concatenate([np.arange(begin, rows.stop - 1), np.arange(rows.start, begin)])
-        index[rows] = np.concatenate([around, around[:1]])
-    return Passes(passes.points[index], passes.normals[index], passes.starts, passes.levels)
-
-
 def gap_lines(
     patch: Patch,
     seeds: Floats,

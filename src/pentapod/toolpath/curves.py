@@ -14,9 +14,9 @@ from pentapod.geometry.directions import tangent_frame
 from pentapod.toolpath.closest import closest, normals_at
 from pentapod.toolpath.draping import Landing, draped, sunk
 from pentapod.toolpath.drawing import Drawing, Order
-from pentapod.toolpath.finishing import nothing_left
 from pentapod.toolpath.heightfield import HeightField
 from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import PathOptions, chosen, finite, not_negative, positive
 from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.shooting import Shots, neighbours, shoot

@@ -8,8 +8,8 @@ import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import normalised
+from pentapod.geometry.polyline import spaced
 from pentapod.geometry.runs import marked_runs
-from pentapod.toolpath.links import spaced
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.passes import Passes
 

@@ -11,9 +11,9 @@ from pentapod.arrays import Bools, Floats, Ints, set_frozen
 from pentapod.errors import ToolpathError
 from pentapod.geometry.directions import angle_between
 from pentapod.toolpath.drawing import Drawing, Order
-from pentapod.toolpath.finishing import nothing_left
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.normals import unit_or_zero
+from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import PathOptions, chosen
 from pentapod.toolpath.passes import Passes
 from pentapod.toolpath.patch import Patch

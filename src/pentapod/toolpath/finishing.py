@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.arrays import Floats
-from pentapod.errors import ToolpathError
 from pentapod.geometry.directions import normalised, tangent_frame
 from pentapod.toolpath import ordering
-from pentapod.toolpath.covering import aligned
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.heightfield import HeightField
 from pentapod.toolpath.joining import Run, joined
 from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.passes import Passes
 from pentapod.toolpath.path_report import PathReport
@@ -92,7 +91,7 @@ def _laid(drawing: Drawing, field: HeightField, options: PathOptions) -> _Laid:
     """Return the waypoints along a drawing, without what the part itself hides."""
     passes, hidden = drawing.passes, 0
     if drawing.order is Order.ZIGZAG:
-        passes = aligned(passes, tangent_frame(options.up)[0])
+        passes = ordering.aligned(passes, tangent_frame(options.up)[0])
     number = np.arange(len(passes))
     # Passes keep their numbers through the resampling as levels.
     levels = passes.levels
@@ -136,21 +135,3 @@ def _tight(passes: Passes, tool: Tool) -> int:
     """Return how many steps of the passes run through a hollow narrower than the ball or the stand-off."""
     closing = -(np.diff(passes.points, axis=0) * np.diff(passes.normals, axis=0)).sum(axis=1)
     return int((passes.within & (closing * abs(tool.pivot) > passes.steps**2)).sum())
-
-
-def nothing_left(mesh: Mesh, options: PathOptions, dropped: int) -> ToolpathError:
-    """Return the error that says why no pass is left, as far as it can be told."""
-    away = float(mesh.facet_areas[mesh.facet_normals @ options.region.direction < 0.0].sum() / mesh.facet_areas.sum())
-    if dropped:
-        short = 1e3 * options.shortest
-        remedy = f"all {dropped} passes are shorter than {short:.3g} mm; check the unit of the mesh"
-    elif options.region.box is not None:
-        low, high = 1e3 * mesh.bounds
-        extent = " x ".join(f"{a:.4g}..{b:.4g}" for a, b in zip(low, high, strict=True))
-        remedy = f"check the box against the part, which spans {extent} mm"
-    else:
-        remedy = (
-            f"{100.0 * away:.0f} % of the surface faces away from the direction; "
-            "turn the direction, or repair the winding"
-        )
-    return ToolpathError("the region holds nothing to machine", key="region", remedy=remedy)

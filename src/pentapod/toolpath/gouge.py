@@ -8,11 +8,12 @@ import numpy as np
 
 from pentapod.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import tangent_frame
+from pentapod.geometry.polyline import spaced
 from pentapod.geometry.runs import equal_runs, marked_runs
 from pentapod.progress import Progress, silent
 from pentapod.toolpath.facet_tree import FacetTree
 from pentapod.toolpath.gouge_report import GougeOptions, GougeReport, Remedy
-from pentapod.toolpath.links import RAPID_SPACING_M, spaced
+from pentapod.toolpath.links import RAPID_SPACING_M
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.rejoining import rejoined
 from pentapod.toolpath.sweep import RESOLUTION_M, Sweep, sweep, touch

@@ -14,7 +14,7 @@ import numpy as np
 
 from pentapod.arrays import Floats
 from pentapod.geometry.directions import angle_between
-from pentapod.geometry.polyline import arc_length
+from pentapod.geometry.polyline import arc_length, spaced
 from pentapod.toolpath.options import Entry
 from pentapod.toolpath.toolpath import Segment, SegmentKind
 
@@ -139,13 +139,3 @@ def rounded(corners: Floats) -> Floats:
         parts.append((1.0 - t) ** 2 * enter + 2.0 * t * (1.0 - t) * corner + t * t * leave_at)
     parts.append(corners[-1:])
     return np.vstack(parts)
-
-
-def spaced(corners: Floats, spacing: float) -> Floats:
-    """Return the polyline (M, 3) with points added so that none are further apart than `spacing` metres."""
-    steps = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-    counts = np.maximum(np.ceil(steps / spacing - 1e-9), 1.0).astype(np.intp)
-    leg = np.repeat(np.arange(len(steps)), counts)
-    number = np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts, counts)
-    t = (number / counts[leg])[:, None]
-    return np.vstack([corners[leg] + t * (corners[leg + 1] - corners[leg]), corners[-1:]])

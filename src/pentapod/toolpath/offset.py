@@ -8,14 +8,14 @@ import numpy as np
 
 from pentapod.arrays import Floats, frozen, set_frozen
 from pentapod.errors import ToolpathError
+from pentapod.geometry.polyline import spaced
 from pentapod.toolpath.closest import closest
 from pentapod.toolpath.covering import FACETS_PER_FRONT, edge_for, rest_covered
 from pentapod.toolpath.drawing import Drawing, Order
-from pentapod.toolpath.finishing import nothing_left
 from pentapod.toolpath.geodesic import border_vertices, distances, seeds_along, seeds_at
 from pentapod.toolpath.levels import gradients
-from pentapod.toolpath.links import spaced
 from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.scallop import surface_steps

@@ -96,3 +96,15 @@ def rotated_to_meet(points: Floats, here: Floats | None, closed: Bools | bool) -
     if here is None or not closed:
         return 0
     return int(np.linalg.norm(points[:-1] - here, axis=1).argmin())
+
+
+def aligned(passes: Passes, towards: Floats) -> Passes:
+    """Return the passes with closed ones begun where they reach furthest `towards` (3,): neighbours' ends are near."""
+    index = np.arange(len(passes.points))
+    reach = passes.points @ towards
+    for k in np.flatnonzero(passes.closed):
+        rows = passes.rows(int(k))
+        begin = rows.start + int(reach[rows].argmax())
+        around = np.concatenate([np.arange(begin, rows.stop - 1), np.arange(rows.start, begin)])
+        index[rows] = np.concatenate([around, around[:1]])
+    return Passes(passes.points[index], passes.normals[index], passes.starts, passes.levels)

@@ -13,9 +13,9 @@ from pentapod.errors import ToolpathError
 from pentapod.toolpath.closest import closest, normals_at
 from pentapod.toolpath.draping import draped, sunk
 from pentapod.toolpath.drawing import Drawing, Order
-from pentapod.toolpath.finishing import nothing_left
 from pentapod.toolpath.heightfield import HeightField
 from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import PathOptions, chosen, not_negative
 from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.tools import Tool

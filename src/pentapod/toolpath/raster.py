@@ -13,10 +13,10 @@ from pentapod.errors import ToolpathError
 from pentapod.geometry.directions import tangent_frame
 from pentapod.toolpath.covering import edge_for, gap_lines
 from pentapod.toolpath.drawing import Drawing, Order
-from pentapod.toolpath.finishing import nothing_left
 from pentapod.toolpath.geodesic import seeds_along
 from pentapod.toolpath.levels import spread
 from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import CoverOptions, chosen, finite
 from pentapod.toolpath.passes import Passes
 from pentapod.toolpath.patch import Patch

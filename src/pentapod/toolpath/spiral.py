@@ -12,10 +12,10 @@ from pentapod.errors import ToolpathError
 from pentapod.geometry.directions import tangent_frame
 from pentapod.toolpath.covering import FACETS_PER_FRONT, edge_for, rest_covered
 from pentapod.toolpath.drawing import Drawing, Order
-from pentapod.toolpath.finishing import nothing_left
 from pentapod.toolpath.geodesic import seeds_along
 from pentapod.toolpath.levels import gradients, spread
 from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.offset import contours_of
 from pentapod.toolpath.options import CoverOptions, chosen
 from pentapod.toolpath.patch import Patch

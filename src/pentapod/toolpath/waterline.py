@@ -10,8 +10,8 @@ from pentapod.arrays import Floats, frozen, set_frozen
 from pentapod.errors import ToolpathError
 from pentapod.geometry.directions import normalised
 from pentapod.toolpath.drawing import Drawing, Order
-from pentapod.toolpath.finishing import nothing_left
 from pentapod.toolpath.mesh import Mesh
+from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.raster import plane_lines
