@@ -18,9 +18,9 @@ from scipy.spatial import Delaunay
 
 from pentapod.arrays import Floats
 from pentapod.toolpath import HeightField, Mesh
+from pentapod.toolpath.ball_cutter import BallCutter
 from pentapod.toolpath.facet_tree import FacetTree
 from pentapod.toolpath.sweep import sweep, touch
-from pentapod.toolpath.tools import BallCutter
 
 RADIUS, CELLS = 3e-3, 316
 UP = np.array([0.0, 0.0, 1.0])

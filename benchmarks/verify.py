@@ -25,10 +25,10 @@ from pentapod.machine.surroundings import Obstacle, Surroundings, mounted
 from pentapod.planning.freedom import FREE
 from pentapod.program import quantised, read_csv, write_csv
 from pentapod.toolpath import Segment, SegmentKind
+from pentapod.toolpath.ball_cutter import BallCutter
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.solids import Cone
-from pentapod.toolpath.tools import BallCutter
 from pentapod.verify import Cutting, verify
 
 BALL, FEED, RAMP = 3e-3, 0.025, 0.5

@@ -14,16 +14,21 @@ from pentapod.strategy_tables import FileTable, sunk_mm
 from pentapod.table import Vector
 from pentapod.toolpath.axis_modes import AxisMode, Between, Fixed, Normal, Pointed
 from pentapod.toolpath.axis_steps import fastest_turn, stepped
+from pentapod.toolpath.ball_cutter import BallCutter
+from pentapod.toolpath.bull_nose import BullNose
 from pentapod.toolpath.facet_tree import FacetTree
+from pentapod.toolpath.flat_end import FlatEnd
 from pentapod.toolpath.gouge import checked
 from pentapod.toolpath.gouge_report import GougeOptions, Remedy
 from pentapod.toolpath.links import LinkStyle
+from pentapod.toolpath.lollipop import Lollipop
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.orientation import Orientation
 from pentapod.toolpath.orienting import oriented
 from pentapod.toolpath.solids import Cone
+from pentapod.toolpath.stand_off import StandOff
+from pentapod.toolpath.tool import Tool
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.toolpath.tools import BallCutter, BullNose, FlatEnd, Lollipop, StandOff, Tool
 
 _MM = 1e-3
 _SLACK = 1.05

@@ -12,13 +12,14 @@ import toolpath_surfaces as surfaces
 from pentapod.errors import ToolpathError
 from pentapod.geometry import angle_between
 from pentapod.toolpath import Mesh, Segment, SegmentKind, Toolpath
+from pentapod.toolpath.ball_cutter import BallCutter
 from pentapod.toolpath.facet_tree import FacetTree
+from pentapod.toolpath.flat_end import FlatEnd
 from pentapod.toolpath.gouge import checked
 from pentapod.toolpath.gouge_report import GougeOptions, Remedy
 from pentapod.toolpath.links import LinkStyle
 from pentapod.toolpath.solids import Cone
 from pentapod.toolpath.sweep import sweep
-from pentapod.toolpath.tools import BallCutter, FlatEnd
 
 WALL_X = 0.01
 

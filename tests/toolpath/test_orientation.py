@@ -174,8 +174,9 @@ def test_a_finished_toolpath_is_turned_and_stays_whole():
     from toolpath_surfaces import grid
 
     from pentapod.toolpath import Mesh, RasterOptions, make_toolpath
+    from pentapod.toolpath.ball_cutter import BallCutter
     from pentapod.toolpath.orienting import oriented
-    from pentapod.toolpath.tools import BallCutter, StandOff
+    from pentapod.toolpath.stand_off import StandOff
 
     mesh = Mesh.of(*grid(lambda x, y: -(x**2 + y**2) / 0.2, width=0.05, cells=20))
     for tool in (BallCutter(3e-3), StandOff(5e-3)):

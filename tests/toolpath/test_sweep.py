@@ -12,10 +12,14 @@ from hypothesis import strategies as st
 
 from pentapod.errors import ToolpathError
 from pentapod.toolpath import Mesh, load_mesh
+from pentapod.toolpath.ball_cutter import BallCutter
+from pentapod.toolpath.bull_nose import BullNose
 from pentapod.toolpath.facet_tree import FacetTree
+from pentapod.toolpath.flat_end import FlatEnd
+from pentapod.toolpath.lollipop import Lollipop
 from pentapod.toolpath.solids import Cone
+from pentapod.toolpath.stand_off import StandOff
 from pentapod.toolpath.sweep import RESOLUTION_M, sweep, touch
-from pentapod.toolpath.tools import BallCutter, BullNose, FlatEnd, Lollipop, StandOff
 
 UP = np.array([0.0, 0.0, 1.0])
 TOOLS = [

@@ -8,8 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pentapod.errors import ToolpathError
+from pentapod.toolpath.ball_cutter import BallCutter
+from pentapod.toolpath.bull_nose import BullNose
+from pentapod.toolpath.flat_end import FlatEnd
+from pentapod.toolpath.lollipop import Lollipop
 from pentapod.toolpath.solids import Cone, Solid
-from pentapod.toolpath.tools import BallCutter, BullNose, FlatEnd, Lollipop, StandOff
+from pentapod.toolpath.stand_off import StandOff
 
 SHANK, HOLDER = (Cone(0.03, 0.003, 0.003),), (Cone(0.01, 0.006, 0.012), Cone(0.03, 0.012, 0.012))
 CUTTERS = [

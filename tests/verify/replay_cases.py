@@ -13,10 +13,10 @@ from pentapod.machine import load_machine
 from pentapod.machine.surroundings import NOTHING
 from pentapod.planning.freedom import FREE
 from pentapod.program import Program, Provenance, quantised
+from pentapod.toolpath.ball_cutter import BallCutter
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.toolpath.tools import BallCutter
 from pentapod.verify import Coverage, Cutting, Replay, Specification
 
 BALL = 3e-3

@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 
 from pentapod.errors import ArrayError
 from pentapod.geometry.interpolant import Interpolant
+from pentapod.toolpath.ball_cutter import BallCutter
+from pentapod.toolpath.flat_end import FlatEnd
+from pentapod.toolpath.stand_off import StandOff
 from pentapod.toolpath.sweep import RESOLUTION_M
 from pentapod.toolpath.toolpath import SegmentKind
-from pentapod.toolpath.tools import BallCutter, FlatEnd, StandOff
 from pentapod.verify import Cutting, verify
 from pentapod.verify.claim import Idle
 from pentapod.verify.gouge import _rapid, gouge

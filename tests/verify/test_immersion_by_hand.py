@@ -5,11 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pentapod.toolpath.ball_cutter import BallCutter
+from pentapod.toolpath.flat_end import FlatEnd
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.solids import Solid
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.toolpath.tools import BallCutter, FlatEnd
 from pentapod.verify.claim import Idle
 from pentapod.verify.cutting import Cutting
 from pentapod.verify.gouge import CLAIMS, _enclosed, gouge

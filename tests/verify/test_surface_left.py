@@ -7,13 +7,17 @@ import pytest
 
 from pentapod.errors import ArrayError
 from pentapod.geometry.polyline import arc_length
+from pentapod.toolpath.ball_cutter import BallCutter
+from pentapod.toolpath.bull_nose import BullNose
+from pentapod.toolpath.flat_end import FlatEnd
+from pentapod.toolpath.lollipop import Lollipop
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.parting import Piece
 from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.region import Region
+from pentapod.toolpath.stand_off import StandOff
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.toolpath.tools import BallCutter, BullNose, FlatEnd, Lollipop, StandOff
 from pentapod.verify import Coverage, Cutting
 from pentapod.verify.claim import Idle
 from pentapod.verify.surface_left import surface_left

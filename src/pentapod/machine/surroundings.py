@@ -14,7 +14,7 @@ from pentapod.machine.machine import Machine
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import Gap, MeshDistance
 from pentapod.toolpath.solids import Solid
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.tool import Tool
 
 TOOL_BODY = "tool body"
 """How shank and holder are called in claims and margins."""

@@ -2,17 +2,21 @@
 
 from pentapod.toolpath.axis_modes import AxisMode, Between, Fixed, Normal, Pointed
 from pentapod.toolpath.axis_steps import stepped
+from pentapod.toolpath.ball_cutter import BallCutter
+from pentapod.toolpath.bull_nose import BullNose
 from pentapod.toolpath.cross_hatch import CrossHatchOptions
 from pentapod.toolpath.curves import CurveOptions
 from pentapod.toolpath.diagnosis import MeshDiagnosis
 from pentapod.toolpath.drawings_in import read_lines
 from pentapod.toolpath.edges import EdgeOptions
+from pentapod.toolpath.flat_end import FlatEnd
 from pentapod.toolpath.gouge import without_gouges
 from pentapod.toolpath.gouge_report import GougeOptions, GougeReport, Remedy
 from pentapod.toolpath.heightfield import HeightField
 from pentapod.toolpath.image import ImageOptions
 from pentapod.toolpath.lettering import lettering
 from pentapod.toolpath.load import UNITS, load_mesh
+from pentapod.toolpath.lollipop import Lollipop
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.offset import OffsetOptions
 from pentapod.toolpath.options import CoverOptions, Entry, PathOptions
@@ -27,10 +31,11 @@ from pentapod.toolpath.region import Region
 from pentapod.toolpath.scallop import stepover_for
 from pentapod.toolpath.solids import Cone
 from pentapod.toolpath.spiral import SpiralOptions
+from pentapod.toolpath.stand_off import StandOff
 from pentapod.toolpath.stl import write_stl
 from pentapod.toolpath.strategies import STRATEGIES, Strategy, make_toolpath, toolpath_with_report
+from pentapod.toolpath.tool import Tool
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.toolpath.tools import BallCutter, BullNose, FlatEnd, Lollipop, StandOff, Tool
 from pentapod.toolpath.waterline import WaterlineOptions
 
 __all__ = [

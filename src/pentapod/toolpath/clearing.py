@@ -8,7 +8,7 @@ from pentapod.arrays import Floats
 from pentapod.toolpath.facet_tree import FacetTree
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.sweep import sweep
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.tool import Tool
 
 
 class Clearing:

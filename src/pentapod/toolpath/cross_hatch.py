@@ -11,7 +11,7 @@ from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.options import finite
 from pentapod.toolpath.passes import Passes
 from pentapod.toolpath.raster import Pattern, RasterOptions, draw_raster
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.tool import Tool
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,7 +20,7 @@ from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import PathOptions, chosen, finite, not_negative, positive
 from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.shooting import Shots, neighbours, shoot
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.tool import Tool
 
 
 class Laying(StrEnum):

@@ -17,7 +17,7 @@ from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import PathOptions, chosen
 from pentapod.toolpath.passes import Passes
 from pentapod.toolpath.patch import Patch
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.tool import Tool
 
 _CORNER = np.radians(40.0)
 _INSIDE = 1e-7

@@ -18,8 +18,8 @@ from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.passes import Passes
 from pentapod.toolpath.path_report import PathReport
 from pentapod.toolpath.resampling import resample
+from pentapod.toolpath.tool import Tool
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.toolpath.tools import Tool
 from pentapod.toolpath.tour import travel, travel_bound
 
 REACH_STEPOVERS = 3.0

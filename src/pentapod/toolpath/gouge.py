@@ -17,8 +17,8 @@ from pentapod.toolpath.links import RAPID_SPACING_M
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.rejoining import rejoined
 from pentapod.toolpath.sweep import RESOLUTION_M, Sweep, sweep, touch
+from pentapod.toolpath.tool import Tool
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.toolpath.tools import Tool
 
 _RINGS, _SPOKES = 4, 16
 _LIFTS = 40

@@ -17,7 +17,7 @@ from pentapod.toolpath.draping import draped, sunk
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.options import PathOptions, chosen, finite, not_negative, positive
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.tool import Tool
 
 _LANE = np.array([[0.0, 0.0], [1.0, 0.0]])
 

@@ -16,8 +16,8 @@ from pentapod.toolpath.options import Entry, PathOptions
 from pentapod.toolpath.passes import Passes
 from pentapod.toolpath.resampling import resample
 from pentapod.toolpath.staydown import surface_links
+from pentapod.toolpath.tool import Tool
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.toolpath.tools import Tool
 
 _TOUCH_M = 1e-9
 _TINY_M = 1e-7

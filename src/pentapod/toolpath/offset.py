@@ -20,7 +20,7 @@ from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.scallop import surface_steps
 from pentapod.toolpath.slicing import LevelSet
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.tool import Tool
 
 _CURVE_POINTS_PER_EDGE = 8.0
 

@@ -11,8 +11,8 @@ from pentapod.arrays import Floats
 from pentapod.geometry.directions import partway
 from pentapod.geometry.polyline import arc_length
 from pentapod.toolpath.orientation import Orientation
+from pentapod.toolpath.tool import Tool
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
-from pentapod.toolpath.tools import Tool
 
 
 def oriented(toolpath: Toolpath, tool: Tool, orientation: Orientation) -> Toolpath:

@@ -18,7 +18,7 @@ from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import PathOptions, chosen, not_negative
 from pentapod.toolpath.patch import Patch
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.tool import Tool
 
 
 class Towards(StrEnum):

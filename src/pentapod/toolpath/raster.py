@@ -23,7 +23,7 @@ from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.scallop import surface_steps
 from pentapod.toolpath.slicing import LevelSet
 from pentapod.toolpath.slopes import monotone
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.tool import Tool
 
 MOST_CROSSINGS = 30_000_000
 STEEPEST = 0.05

@@ -18,7 +18,7 @@ from pentapod.arrays import Floats, as_floats
 from pentapod.errors import ToolpathError
 from pentapod.toolpath.levels import gradients
 from pentapod.toolpath.patch import Patch
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.tool import Tool
 
 _TIGHTEST = -0.9
 

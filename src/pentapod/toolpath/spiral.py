@@ -21,7 +21,7 @@ from pentapod.toolpath.options import CoverOptions, chosen
 from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.scallop import surface_steps
 from pentapod.toolpath.slicing import LevelSet
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.tool import Tool
 
 _STEEPEST = 0.05
 

@@ -20,8 +20,8 @@ from pentapod.toolpath.path_report import PathReport
 from pentapod.toolpath.polyline import PolylineOptions, draw_polyline
 from pentapod.toolpath.raster import RasterOptions, draw_raster
 from pentapod.toolpath.spiral import SpiralOptions, draw_spiral
+from pentapod.toolpath.tool import Tool
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.toolpath.tools import Tool
 from pentapod.toolpath.waterline import WaterlineOptions, draw_waterline
 
 

@@ -15,7 +15,7 @@ from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.raster import plane_lines
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.tool import Tool
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

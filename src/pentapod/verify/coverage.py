@@ -16,8 +16,9 @@ from pentapod.toolpath.options import CoverOptions, PathOptions
 from pentapod.toolpath.parting import Piece, cutting_intervals
 from pentapod.toolpath.patch import Patch
 from pentapod.toolpath.scallop import ridge
+from pentapod.toolpath.stand_off import StandOff
+from pentapod.toolpath.tool import Tool
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.toolpath.tools import StandOff, Tool
 from pentapod.toolpath.waterline import WaterlineOptions
 
 _MOST_FACETS = 1_000_000

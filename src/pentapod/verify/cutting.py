@@ -10,7 +10,7 @@ from pentapod.errors import ArrayError
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.solids import Solid
-from pentapod.toolpath.tools import Tool
+from pentapod.toolpath.tool import Tool
 from pentapod.verify.coverage import Coverage
 
 

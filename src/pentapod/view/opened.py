@@ -31,8 +31,8 @@ from pentapod.run_folder import check_run
 from pentapod.toolpath.formats import read_toolpath
 from pentapod.toolpath.mesh import Mesh
 from pentapod.toolpath.parting import Piece
+from pentapod.toolpath.tool import Tool
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.toolpath.tools import Tool
 
 _FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
     JOB_FILE: ("U", ()),
