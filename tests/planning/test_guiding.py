@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from domes import dome
 from scipy.optimize import differential_evolution
 
-from conftest import dome
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.kinematics.guides import ReconfigurablePentapod

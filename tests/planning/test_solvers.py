@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from domes import dome
 from planning_instances import instances
 
-from conftest import dome
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.planning.axis_course import AxisCourse
