@@ -12,8 +12,8 @@ SPREAD := -n 2 --dist worksteal
 
 # What the tests of `test-lowest` need beside the package, and the tests: arithmetic, kernels, solvers, files, a whole plan.
 ORACLES := pytest pytest-xdist hypothesis mpmath rtree pyyaml psutil python-flint
-LOWEST_TESTS := tests/geometry tests/kinematics tests/timing tests/program tests/toolpath/test_sweep.py \
-	tests/toolpath/test_drawings_in.py tests/simulate/test_servo.py tests/test_kernel_cache.py tests/test_pipeline.py
+LOWEST_TESTS := tests/numerics tests/geometry tests/kinematics tests/timing tests/program tests/mesh/query/test_swept_depth.py \
+	tests/toolpath/inputs/test_drawings.py tests/simulate/test_servo.py tests/job/test_pipeline.py
 
 .PHONY: demo test test-all test-lowest lock lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view reference pictures site clean
 

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial import Delaunay
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
+from pentapod.cutters.ball import BallCutter
+from pentapod.mesh.query.swept_depth import sweep, touch
+from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath import HeightField, Mesh
-from pentapod.toolpath.ball_cutter import BallCutter
-from pentapod.toolpath.facet_tree import FacetTree
-from pentapod.toolpath.sweep import sweep, touch
 
 RADIUS, CELLS = 3e-3, 316
 UP = np.array([0.0, 0.0, 1.0])

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.compiled import kernels_used
+from pentapod.base.arrays import Floats
 from pentapod.geometry import elevate
 from pentapod.kinematics import (
     AsBuiltPentapod,
@@ -27,6 +26,7 @@ from pentapod.kinematics import (
     certify_motion,
     prove_tip_tube,
 )
+from pentapod.numerics.kernels import kernels_used
 
 BASE = 0.2 * np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)])
 

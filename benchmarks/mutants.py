@@ -115,7 +115,8 @@ def function(module: ModuleType, name: str) -> FunctionType | None:
 
 def put(it: Mutant) -> bool:
     """Change the functions that are loaded to those of a mutant. False where that is not enough to make it."""
-    module = sys.modules[f"pentapod.verify.{it.file.stem}"]
+    name = ".".join(it.file.with_suffix("").parts).rpartition(".src.")[2]
+    module = sys.modules[name]
     sources = it.file.read_text(encoding="utf-8"), it.source
     changed = changed_functions(*(compile(source, str(it.file), "exec", dont_inherit=True) for source in sources))
     found = [(function(module, code.co_qualname), code) for code in changed or ()]

@@ -1,6 +1,6 @@
 """Would the tests notice? Mutants of verify/ by cosmic-ray's operators, each run against the tests of the verdict.
 
-Run ``make mutation``; ``--every 10`` takes each tenth of the mutants, ``--files legs.py speed.py`` those of some files.
+Run ``make mutation``; ``--every 10`` takes each tenth of the mutants, ``--files claims/legs.py`` those of some files.
 The tests are collected once, and each runs once alone to see which lines it executes. Then every mutant lives in a
 forked child, meets the tests that execute its statement, first those that kill most per second, and dies with the
 first that fails. What survives is listed with its line: a test that is missing, or a change that means nothing.
@@ -262,7 +262,7 @@ class Run:
 def main() -> int:
     """Print what survives, and the share that is killed."""
     parser = argparse.ArgumentParser(description=__doc__)
-    files = sorted(file.name for file in VERIFY.glob("*.py") if file.name != "__init__.py")
+    files = sorted(str(file.relative_to(VERIFY)) for file in VERIFY.rglob("*.py") if file.name != "__init__.py")
     parser.add_argument("--files", nargs="*", default=files)
     parser.add_argument("--tests", nargs="*", default=[""], help="only those of these files of tests/verify")
     parser.add_argument("--every", type=int, default=1, help="only each n-th mutant")

@@ -24,23 +24,23 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "planning"))
 from planning_instances import Instance, instances
 
+from pentapod.base.refusal import Refusal
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine.machine import Machine
-from pentapod.planning.axis_cost import AxisCost
-from pentapod.planning.axis_course import AxisCourse
-from pentapod.planning.ipopt import IpoptSolver
-from pentapod.planning.leg_path import leg_path
-from pentapod.planning.margins import Margins
-from pentapod.planning.placed_path import PlacedPath
-from pentapod.planning.placement import Placement
+from pentapod.planning.leg_path.leg_path import leg_path
+from pentapod.planning.limits.margins import Margins
+from pentapod.planning.placement.ipopt import IpoptSolver
+from pentapod.planning.placement.placed_path import PlacedPath
+from pentapod.planning.placement.placement import Placement
+from pentapod.planning.placement.sampling import first_candidate, first_guesses
+from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.plan import plan
-from pentapod.planning.sampling import first_candidate, first_guesses
-from pentapod.planning.sequential import SequentialSolver
-from pentapod.planning.setting import Candidate, Setting
-from pentapod.planning.task import Task
-from pentapod.planning.tilt import lean
-from pentapod.planning.weights import NEEDED_MARGIN
-from pentapod.refusal import Refusal
+from pentapod.planning.problem.problem import Candidate, Setting
+from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.tilt_field import lean
+from pentapod.planning.problem.weights import NEEDED_MARGIN
+from pentapod.planning.tool_axis.cost import AxisCost
+from pentapod.planning.tool_axis.spline import AxisCourse
 from pentapod.toolpath.toolpath import Toolpath
 
 CALM_SHARE = 0.9

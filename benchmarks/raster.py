@@ -15,10 +15,10 @@ from typing import TypeVar
 
 import numpy as np
 
+from pentapod.mesh.query.swept_depth import touch
+from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath import BallCutter, Mesh, RasterOptions, toolpath_with_report
-from pentapod.toolpath.facet_tree import FacetTree
-from pentapod.toolpath.raster import draw_raster
-from pentapod.toolpath.sweep import touch
+from pentapod.toolpath.strategies.raster import draw_raster
 
 WIDTH, STEPOVER = 0.3, 1.5e-3
 TOOL = BallCutter(3e-3)

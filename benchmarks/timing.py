@@ -20,16 +20,16 @@ from scipy.interpolate import make_interp_spline
 from timing_peers import copp_robot, highs, our_chain, socp, toppra_chain
 from timing_robots import drake_solver, ruckig_line
 
-from pentapod.timing.engine import fastest
-from pentapod.timing.jerk import jerk_limited
-from pentapod.timing.jerk_knots import KNOTS_PER_RAMP, law_knots
-from pentapod.timing.jerk_part import Part
-from pentapod.timing.jerk_passes import PASSES
-from pentapod.timing.jerk_problem import Problem as Pass
-from pentapod.timing.jerk_rows import JerkRows
-from pentapod.timing.law import MotionLaw
-from pentapod.timing.reference import solve as solve_by_toppra
-from pentapod.timing.stages import Failure, Stages
+from pentapod.timing.jerk.knots import KNOTS_PER_RAMP, law_knots
+from pentapod.timing.jerk.limited import jerk_limited
+from pentapod.timing.jerk.part import Part
+from pentapod.timing.jerk.passes import PASSES
+from pentapod.timing.jerk.problem import Problem as Pass
+from pentapod.timing.jerk.rows import JerkRows
+from pentapod.timing.law.time_law import MotionLaw
+from pentapod.timing.topp.engine import fastest
+from pentapod.timing.topp.reference import solve as solve_by_toppra
+from pentapod.timing.topp.stages import Failure, Stages
 
 NO_MARKS = np.empty(0)
 VELOCITY, ACCELERATION, JERK, FEED = 0.5, 5.0, 200.0, 0.1

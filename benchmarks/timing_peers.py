@@ -11,8 +11,8 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, vstack
 
-from pentapod.refusal import Refusal
-from pentapod.timing.jerk_problem import Problem
+from pentapod.base.refusal import Refusal
+from pentapod.timing.jerk.problem import Problem
 from pentapod.timing.waypoints import through_waypoints
 
 FAR = 1e3

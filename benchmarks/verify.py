@@ -18,17 +18,17 @@ from pathlib import Path
 import numpy as np
 
 from pentapod import Machine, Program, Provenance, Toolpath
+from pentapod.cutters.ball import BallCutter
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.geometry.solids import Cone
 from pentapod.kinematics import Component, prove_tip_tube
-from pentapod.machine.surroundings import Obstacle, Surroundings, mounted
-from pentapod.planning.freedom import FREE
+from pentapod.machine.clearance.collision_world import Obstacle, Surroundings, mounted
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.query.distance import MeshDistance
+from pentapod.planning.problem.constraints import FREE
 from pentapod.program import quantised, read_csv, write_csv
 from pentapod.toolpath import Segment, SegmentKind
-from pentapod.toolpath.ball_cutter import BallCutter
-from pentapod.toolpath.mesh import Mesh
-from pentapod.toolpath.mesh_distance import MeshDistance
-from pentapod.toolpath.solids import Cone
 from pentapod.verify import Cutting, verify
 
 BALL, FEED, RAMP = 3e-3, 0.025, 0.5

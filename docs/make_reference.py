@@ -17,13 +17,17 @@ import click
 from pydantic import BaseModel
 
 from pentapod.cli.verbs import VERBS, cli
-from pentapod.job_tables import JobTables
+from pentapod.job.schema.tables import JobTables
 from pentapod.machine.tables import MachineTables
 
 HERE = Path(__file__).parent / "reference"
 PACKAGES = (
     "pentapod",
+    "pentapod.base",
+    "pentapod.mesh",
+    "pentapod.cutters",
     "pentapod.kinematics",
+    "pentapod.theory",
     "pentapod.toolpath",
     "pentapod.toolpath.formats",
     "pentapod.machine",
@@ -33,6 +37,7 @@ PACKAGES = (
     "pentapod.program.posts",
     "pentapod.verify",
     "pentapod.simulate",
+    "pentapod.job",
 )
 _MADE = "<!-- Made from the code by docs/make_reference.py; change the code, then run `make reference`. -->\n\n"
 _WIDE = 88
@@ -179,10 +184,20 @@ def _packages() -> Iterator[str]:
         yield f"## {package}\n\n{_first_line(module)}\n"
         for name in module.__all__:
             thing = getattr(module, name)
-            if inspect.ismodule(thing):
+            if inspect.ismodule(thing) or _is_handed_on(thing, package):
                 continue
             yield f"- `{name}{_signature(thing)}`: {_first_line(thing)}"
         yield ""
+
+
+def _is_handed_on(thing: Any, package: str) -> bool:
+    """Return whether a package shows what another one on this page holds. The top level shows all."""
+    home = getattr(thing, "__module__", None) or package
+    return (
+        package != "pentapod"
+        and not home.startswith(f"{package}.")
+        and any(home.startswith(f"{other}.") for other in PACKAGES[1:])
+    )
 
 
 def _signature(thing: Any) -> str:

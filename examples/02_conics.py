@@ -17,7 +17,8 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pentapod.kinematics import architectural_distance, attachment_conic, conic_determinant, forbidden_conic
+from pentapod.kinematics import attachment_conic, conic_determinant, forbidden_conic
+from pentapod.theory import architectural_distance
 
 BASE = np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)])
 REACH = 4.0

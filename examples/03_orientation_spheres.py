@@ -18,7 +18,8 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
-from pentapod.kinematics import COMPONENTS, LinearPentapod, cell_decomposition
+from pentapod.kinematics import COMPONENTS, LinearPentapod
+from pentapod.theory import cell_decomposition
 
 BASE = np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)])
 COLOURS = ("#4477aa", "#66ccee", "#cc6677", "#ddcc77")

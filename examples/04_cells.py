@@ -18,7 +18,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import ConnectionPatch
 
-from pentapod.kinematics import COMPONENTS, Component, LinearPentapod, cell_decomposition, poses_in_cell
+from pentapod.kinematics import COMPONENTS, Component, LinearPentapod
+from pentapod.theory import cell_decomposition, poses_in_cell
 
 BASE = np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)])
 

@@ -16,7 +16,8 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pentapod.kinematics import Component, LinearPentapod, ReachField, Workspace
+from pentapod.kinematics import Component, LinearPentapod
+from pentapod.theory import ReachField, Workspace
 
 BASE = np.array([(0.586, -0.120), (0.224, 0.554), (-0.326, 0.498), (-0.597, -0.039), (-0.055, -0.595)])
 ROBOT = LinearPentapod.quadratic(BASE, 0.185)

@@ -21,7 +21,8 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pentapod.kinematics import AsBuiltPentapod, Calibration, Component, LinearPentapod, as_built_pose, calibrate
+from pentapod.kinematics import AsBuiltPentapod, Component, LinearPentapod, as_built_pose
+from pentapod.machine import Calibration, calibrate
 
 BASE = np.array([(0.586, -0.120), (0.224, 0.554), (-0.326, 0.498), (-0.597, -0.039), (-0.055, -0.595)])
 NOMINAL = LinearPentapod.quadratic(BASE, 0.185)

@@ -21,7 +21,7 @@ from pentapod.geometry.interpolant import Interpolant
 from pentapod.kinematics import Component
 from pentapod.machine import Machine
 from pentapod.planning import LegPath, PlacedPath, Placement, leg_path
-from pentapod.planning.margins import Limit
+from pentapod.planning.limits.margins import Limit
 from pentapod.timing import Trajectory, certify, explain, override, retime
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 

@@ -17,10 +17,10 @@ import numpy as np
 
 from pentapod import Component, Machine, PlacedPath, Toolpath, plan
 from pentapod.planning import Freedom
-from pentapod.planning.margins import Margins
-from pentapod.planning.search import search
-from pentapod.planning.setting import Setting
-from pentapod.planning.task import Task
+from pentapod.planning.limits.margins import Margins
+from pentapod.planning.placement.search import search
+from pentapod.planning.problem.problem import Setting
+from pentapod.planning.problem.samples import Task
 from pentapod.toolpath import Segment, SegmentKind
 
 WIDTH, SLOPE, TILT, BALL = 0.17, np.radians(50.0), np.radians(20.0), 0.003

@@ -20,9 +20,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import Rectangle
 
+from pentapod.geometry.solids import Solid
 from pentapod.machine import Machine, clearances
-from pentapod.machine.tool_clearance import NUMPY, leg_spindle_gap, leg_tool_gap
-from pentapod.toolpath.solids import Solid
+from pentapod.machine.clearance.tool_clearance import NUMPY, leg_spindle_gap, leg_tool_gap
 
 HEIGHT = 0.467
 SLIM = Solid("holder", 0.02, 0.06, 0.012, 0.016)

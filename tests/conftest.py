@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from pentapod.cli.new import dome_stl
+from pentapod.cli.commands.new import dome_stl
 from usual_job import job_text
 
 # A busy machine is no failure. Every run looks at the same examples, so that a run can be repeated;

@@ -22,7 +22,7 @@ MOST_SECONDS, MOST_BYTES = 10, 8_000_000_000
 
 
 def _stl():
-    from pentapod.cli.new import dome_stl
+    from pentapod.cli.commands.new import dome_stl
 
     return dome_stl(cells=4)
 
@@ -228,7 +228,7 @@ def _up(*_: object) -> None:
 
 def main(seed: int, count: int, names: list[str]) -> None:
     """Read `count` spoiled files of each kind; print the kind, the number and the fault of each bad answer."""
-    from pentapod.errors import InputError
+    from pentapod.base.errors import InputError
 
     every = readers()
     for name in names or every:

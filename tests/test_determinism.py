@@ -7,8 +7,8 @@ import subprocess
 import sys
 from importlib.metadata import version
 
+from pentapod.base.version import processor_kind
 from pentapod.program import read_csv
-from pentapod.version import processor_kind
 
 VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 COMMAND = [sys.executable, "-c", "from pentapod.cli.main import main; main()", "plan"]

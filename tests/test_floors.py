@@ -1,7 +1,7 @@
-"""The floors of docs/architecture.md: a package imports from lower floors only, siblings never each other."""
+"""The floors of docs/architecture.md: a room imports from lower floors only; no cycle of folders, none of files."""
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -10,68 +10,26 @@ import pentapod
 
 SOURCE = Path(pentapod.__file__).parent
 
-FLOORS: tuple[tuple[tuple[str, ...], ...], ...] = (
-    # Each floor is a tuple of rooms; the modules within a room may import each other.
-    (
-        (
-            "errors",
-            "arrays",
-            "refusal",
-            "progress",
-            "files",
-            "input_files",
-            "archives",
-            "toml_files",
-            "version",
-            "compiled",
-            "kernel_cache",
-        ),
-    ),
-    (("geometry",),),
-    (("kinematics",), ("toolpath",)),
-    (("machine",),),
-    (("planning",),),
-    (("timing",),),
-    (("program",),),
-    (("verify",),),
-    (("simulate",),),
-    (
-        (
-            "table",
-            "strategy_tables",
-            "placement_table",
-            "job_tables",
-            "job",
-            "job_coverage",
-            "job_cutting",
-            "job_placement",
-            "job_sources",
-            "job_specification",
-            "job_strategy",
-            "job_surroundings",
-            "job_tool",
-            "job_values",
-            "job_verdict",
-            "outcome",
-            "clock",
-            "plan_arrays",
-            "artefacts",
-            "manifest",
-            "run_folder",
-            "pipeline",
-        ),
-    ),
-    (("report",),),
-    (("view",),),
-    (("cli",),),
+FLOORS: tuple[tuple[str, ...], ...] = (
+    # Each floor is a tuple of rooms, which do not import each other.
+    ("base",),
+    ("numerics",),
+    ("geometry",),
+    ("mesh", "cutters", "kinematics"),
+    ("toolpath", "machine", "theory"),
+    ("planning",),
+    ("timing",),
+    ("program",),
+    ("verify",),
+    ("simulate",),
+    ("job",),
+    ("report",),
+    ("view",),
+    ("cli",),
 )
-PLACES = {
-    module: (floor, room) for floor, rooms in enumerate(FLOORS) for room, names in enumerate(rooms) for module in names
-}
-
-
-def top(path: Path) -> str:
-    return path.relative_to(SOURCE).parts[0].removesuffix(".py")
+PLACES = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
+FOR_NOBODY = ("theory",)
+"""Rooms for those who write scripts: nothing else imports them."""
 
 
 def modules() -> list[Path]:
@@ -83,7 +41,7 @@ def module_name(path: Path) -> str:
     return ".".join(("pentapod", *(parts[:-1] if parts[-1] == "__init__" else parts)))
 
 
-MODULES = {module_name(path) for path in modules()}
+FILES = {module_name(path): path for path in modules()}
 
 
 def imported(tree: ast.AST) -> Iterator[str]:
@@ -95,55 +53,67 @@ def imported(tree: ast.AST) -> Iterator[str]:
             assert node.module is not None
             for alias in node.names:
                 inner = f"{node.module}.{alias.name}"
-                yield inner if inner in MODULES else node.module
+                yield inner if inner in FILES else node.module
 
 
-@pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(SOURCE)))
-def test_imports_point_down(path: Path) -> None:
-    here = top(path)
-    assert here in PLACES, f"{here} stands on no floor"
-    for name in imported(ast.parse(path.read_text(encoding="utf-8"))):
-        parts = name.split(".")
-        if parts[0] != "pentapod":
-            continue
-        assert len(parts) > 1, "import from where a name lives, not from the package that re-exports it"
-        there = parts[1]
-        if there == here:
-            continue
-        assert there in PLACES, f"{name} stands on no floor"
-        same_room = PLACES[there] == PLACES[here]
-        assert same_room or PLACES[there][0] < PLACES[here][0], f"{module_name(path)} must not import {name}"
+def imports_of(path: Path) -> set[str]:
+    """Return what of the package a file imports; imports within functions count as well."""
+    found = imported(ast.parse(path.read_text(encoding="utf-8")))
+    return {name for name in found if name.split(".")[0] == "pentapod"}
 
 
-def test_no_cycles_between_modules() -> None:
-    """Imports within functions count as well: a cycle hidden by a late import is a cycle."""
-    names = {module_name(path): path for path in modules()}
-    graph: dict[str, set[str]] = {}
-    for name, path in names.items():
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        targets = {target for target in imported(tree) if target in names}
-        # A package's __init__ imports its modules; a module that names its own package would close the circle.
-        graph[name] = targets - {name}
+def cycle_in(graph: Mapping[str, set[str]]) -> tuple[str, ...]:
+    """Return names that lead back to the first, or nothing."""
     done: set[str] = set()
 
-    def visit(name: str, above: tuple[str, ...]) -> None:
-        assert name not in above, " → ".join((*above[above.index(name) :], name))
-        if name in done:
-            return
-        for target in sorted(graph[name]):
-            visit(target, (*above, name))
+    def visit(name: str, above: tuple[str, ...]) -> tuple[str, ...]:
+        if name in above:
+            return (*above[above.index(name) :], name)
+        for target in () if name in done else sorted(graph.get(name, ())):
+            if found := visit(target, (*above, name)):
+                return found
         done.add(name)
+        return ()
 
-    for name in graph:
-        visit(name, ())
-
-
-def test_every_floor_exists() -> None:
-    assert {top(path) for path in modules()} == set(PLACES)
+    return next((found for name in sorted(graph) if (found := visit(name, ()))), ())
 
 
-def test_the_check_can_fail() -> None:
-    found = set(
-        imported(ast.parse("import pentapod.cli\nfrom pentapod import planning\nfrom pentapod.verify import x"))
-    )
-    assert found == {"pentapod.cli", "pentapod.planning", "pentapod.verify"}
+def test_the_root_holds_rooms_only() -> None:
+    assert {path.relative_to(SOURCE).parts[0] for path in modules()} == set(PLACES)
+
+
+@pytest.mark.parametrize("room", sorted(PLACES))
+def test_imports_point_down(room: str) -> None:
+    for path in sorted((SOURCE / room).rglob("*.py")):
+        for name in imports_of(path):
+            parts = name.split(".")
+            assert len(parts) > 1, "import from where a name lives, not from the package that re-exports it"
+            if parts[1] != room:
+                assert parts[1] in PLACES, f"{name} stands on no floor"
+                assert PLACES[parts[1]] < PLACES[room], f"{module_name(path)} must not import {name}"
+                assert parts[1] not in FOR_NOBODY, f"{module_name(path)} must not import {name}"
+
+
+def test_no_cycles_of_files() -> None:
+    graph = {name: (imports_of(path) & set(FILES)) - {name} for name, path in FILES.items()}
+    assert cycle_in(graph) == ()
+
+
+def test_no_cycles_of_folders() -> None:
+    """Sub-folders too. What an `__init__` hands on does not count: it only names what its folder holds."""
+    graph: dict[str, set[str]] = {}
+    for path in FILES.values():
+        if path.name == "__init__.py":
+            continue
+        targets = graph.setdefault(str(path.parent.relative_to(SOURCE)), set())
+        for name in imports_of(path) & set(FILES):
+            if FILES[name].name != "__init__.py" and FILES[name].parent != path.parent:
+                targets.add(str(FILES[name].parent.relative_to(SOURCE)))
+    assert cycle_in(graph) == ()
+
+
+def test_the_checks_can_fail() -> None:
+    code = "import pentapod.cli\nfrom pentapod import planning\nfrom pentapod.verify import x"
+    assert set(imported(ast.parse(code))) == {"pentapod.cli", "pentapod.planning", "pentapod.verify"}
+    assert cycle_in({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ("b", "c", "b")
+    assert cycle_in({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == ()

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import fuzzed_files
-from pentapod.errors import InputError, JobError, MachineError, MeshError, ProgramError, ToolpathError
+from pentapod.base.errors import InputError, JobError, MachineError, MeshError, ProgramError, ToolpathError
 from pentapod.job import Job
 from pentapod.machine.machine import load_machine
 from pentapod.program import read_csv

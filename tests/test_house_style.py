@@ -12,6 +12,7 @@ SOURCE = Path(pentapod.__file__).parent
 ROOT = SOURCE.parents[1]
 FILES = sorted(SOURCE.rglob("*.py"))
 LONGEST = 320
+MOST_FILES = 15
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(SOURCE)))
@@ -20,6 +21,11 @@ def test_one_concept_to_a_file(path: Path) -> None:
     assert len(text.splitlines()) <= LONGEST, "two rooms with the wall missing"
     assert not re.search(r"\b(TODO|FIXME|XXX)\b", text)
     assert not re.search(r"^\s*assert ", text, re.M), "inputs are checked by errors, not by assert"
+
+
+def test_a_folder_holds_at_most_fifteen_files() -> None:
+    for folder in {path.parent for path in FILES}:
+        assert len(list(folder.glob("*.py"))) <= MOST_FILES, folder
 
 
 def test_every_dependency_is_justified() -> None:

@@ -32,7 +32,7 @@ from pentapod import (
     without_gouges,
     write_csv,
 )
-from pentapod.cli.new import dome_stl
+from pentapod.cli.commands.new import dome_stl
 from pentapod.toolpath import Fixed, stepped
 from pentapod.verify import verify
 

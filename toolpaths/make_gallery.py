@@ -14,9 +14,9 @@ import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.collections import LineCollection, PolyCollection
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
 from pentapod.job import Job
-from pentapod.job_values import job_mesh, job_toolpath
+from pentapod.job.build.values import job_mesh, job_toolpath
 from pentapod.toolpath import Mesh, PathReport, SegmentKind, Toolpath
 
 FOLDER = Path(__file__).parent

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.arrays import Floats, Ints
+from pentapod.base.arrays import Floats, Ints
 from pentapod.toolpath import write_stl
 
 Height = Callable[[Floats, Floats], Floats]

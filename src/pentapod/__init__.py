@@ -11,15 +11,24 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pentapod.base import Refusal as Refusal
+    from pentapod.base.version import __version__ as __version__
+    from pentapod.cutters import BallCutter as BallCutter
+    from pentapod.cutters import BullNose as BullNose
+    from pentapod.cutters import FlatEnd as FlatEnd
+    from pentapod.cutters import Lollipop as Lollipop
+    from pentapod.cutters import StandOff as StandOff
     from pentapod.geometry import RigidTransform as RigidTransform
     from pentapod.job import Job as Job
-    from pentapod.job_verdict import judge as judge
+    from pentapod.job import Outcome as Outcome
+    from pentapod.job import judge as judge
+    from pentapod.job import run as run
     from pentapod.kinematics import Component as Component
     from pentapod.kinematics import LinearPentapod as LinearPentapod
     from pentapod.machine import Machine as Machine
     from pentapod.machine import Surroundings as Surroundings
-    from pentapod.outcome import Outcome as Outcome
-    from pentapod.pipeline import run as run
+    from pentapod.mesh import Mesh as Mesh
+    from pentapod.mesh import load_mesh as load_mesh
     from pentapod.planning import Freedom as Freedom
     from pentapod.planning import LegPath as LegPath
     from pentapod.planning import PlacedPath as PlacedPath
@@ -31,23 +40,15 @@ if TYPE_CHECKING:
     from pentapod.program import read_csv as read_csv
     from pentapod.program import sample as sample
     from pentapod.program import write_csv as write_csv
-    from pentapod.refusal import Refusal as Refusal
     from pentapod.report import write_report as write_report
     from pentapod.timing import Trajectory as Trajectory
     from pentapod.timing import retime as retime
-    from pentapod.toolpath import BallCutter as BallCutter
-    from pentapod.toolpath import BullNose as BullNose
     from pentapod.toolpath import Cone as Cone
-    from pentapod.toolpath import FlatEnd as FlatEnd
     from pentapod.toolpath import GougeOptions as GougeOptions
-    from pentapod.toolpath import Lollipop as Lollipop
-    from pentapod.toolpath import Mesh as Mesh
     from pentapod.toolpath import Orientation as Orientation
     from pentapod.toolpath import RasterOptions as RasterOptions
     from pentapod.toolpath import Remedy as Remedy
-    from pentapod.toolpath import StandOff as StandOff
     from pentapod.toolpath import Toolpath as Toolpath
-    from pentapod.toolpath import load_mesh as load_mesh
     from pentapod.toolpath import make_toolpath as make_toolpath
     from pentapod.toolpath import oriented as oriented
     from pentapod.toolpath import without_gouges as without_gouges
@@ -56,7 +57,6 @@ if TYPE_CHECKING:
     from pentapod.verify import Cutting as Cutting
     from pentapod.verify import NotJudged as NotJudged
     from pentapod.verify import Verdict as Verdict
-    from pentapod.version import __version__ as __version__
 
 # `verify` is the one verb that is missing: it has the name of its package. `from pentapod.verify import verify`.
 _HOMES = {
@@ -65,13 +65,13 @@ _HOMES = {
     "LinearPentapod": "kinematics",
     "Component": "kinematics",
     "RigidTransform": "geometry",
-    "load_mesh": "toolpath",
-    "Mesh": "toolpath",
-    "BallCutter": "toolpath",
-    "FlatEnd": "toolpath",
-    "BullNose": "toolpath",
-    "Lollipop": "toolpath",
-    "StandOff": "toolpath",
+    "load_mesh": "mesh",
+    "Mesh": "mesh",
+    "BallCutter": "cutters",
+    "FlatEnd": "cutters",
+    "BullNose": "cutters",
+    "Lollipop": "cutters",
+    "StandOff": "cutters",
     "Cone": "toolpath",
     "RasterOptions": "toolpath",
     "Orientation": "toolpath",
@@ -99,13 +99,13 @@ _HOMES = {
     "Coverage": "verify",
     "Cutting": "verify",
     "Verdict": "verify",
-    "Refusal": "refusal",
+    "Refusal": "base",
     "Job": "job",
-    "run": "pipeline",
-    "judge": "job_verdict",
-    "Outcome": "outcome",
+    "run": "job",
+    "judge": "job",
+    "Outcome": "job",
     "write_report": "report",
-    "__version__": "version",
+    "__version__": "base.version",
 }
 
 __all__ = [  # noqa: RUF022 - in the order of the flow

@@ -70,8 +70,8 @@ def test_progress_tells_stage_and_rate(monkeypatch):
     """On a terminal; elsewhere nothing is said."""
     from rich.progress import Progress
 
+    from pentapod.base.progress import silent
     from pentapod.cli.output import progress_bar
-    from pentapod.progress import silent
 
     with progress_bar(quiet=False) as progress:
         assert progress is silent, "stderr is no terminal here"

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from pentapod.cli import verbs as entry
-from pentapod.cli.kinematics import LEGS
+from pentapod.cli.commands.kinematics import LEGS
 from pentapod.cli.main import run
 from pentapod.cli.verbs import VERBS
 from pentapod.machine import Machine
@@ -98,7 +98,7 @@ BAD_MESHES = {
 
 
 def mesh(kind: str) -> bytes:
-    from pentapod.cli.new import dome_stl
+    from pentapod.cli.commands.new import dome_stl
 
     whole = dome_stl(cells=12)
     if kind == "truncated":
@@ -234,7 +234,7 @@ def test_bugs_are_told_from_bad_input(monkeypatch, capsys):
 
 
 def test_debug_shows_the_traceback_of_bad_input_too():
-    from pentapod.errors import JobError
+    from pentapod.base.errors import JobError
 
     with pytest.raises(JobError):
         run(["plan", "nowhere.toml", "--debug"])
@@ -252,8 +252,8 @@ def test_new_gives_a_job_with_every_key(tmp_path, capsys):
     assert run(["new", str(folder)]) == 0
     assert "pentapod plan" in capsys.readouterr().out
     text = (folder / "job.toml").read_text()
-    from pentapod.job_tables import JobTables
-    from pentapod.strategy_tables import RasterTable
+    from pentapod.job.schema.strategies import RasterTable
+    from pentapod.job.schema.tables import JobTables
 
     for table, field in JobTables.model_fields.items():
         assert f"[{table}]" in text
@@ -346,7 +346,7 @@ def test_ctrl_c_in_the_search_for_a_placement_goes_on_with_the_best_so_far(make_
 
         yield progress
 
-    monkeypatch.setattr("pentapod.cli.plan.progress_bar", interrupting)
+    monkeypatch.setattr("pentapod.cli.commands.plan.progress_bar", interrupting)
     assert run(["plan", str(path), "-o", str(tmp_path / "out"), "--explain"]) == 0
     said = capsys.readouterr().out
     assert "placement: largest smallest margin, the search interrupted after 1 of up to 10 starts" in said

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pentapod.base.files import sha256_of
 from pentapod.cli.main import run
-from pentapod.files import sha256_of
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job
 from pentapod.kinematics import Component

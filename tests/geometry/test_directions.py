@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from pentapod.errors import ArrayError
+from pentapod.base.errors import ArrayError
 from pentapod.geometry import angle_between, arc_weights, normalised, partway, tangent_frame
 
 numbers = st.floats(-1.0, 1.0, allow_subnormal=False)

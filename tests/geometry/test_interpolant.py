@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from pentapod.geometry.bernstein import evaluate
 from pentapod.geometry.interpolant import Interpolant, largest_length
+from pentapod.numerics.bernstein import evaluate
 
 PERIOD = 0.25
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pentapod.errors import ArrayError
+from pentapod.base.errors import ArrayError
 from pentapod.geometry import arc_length
 
 

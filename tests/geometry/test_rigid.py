@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from pentapod.errors import ArrayError
+from pentapod.base.errors import ArrayError
 from pentapod.geometry import RigidTransform
 
 numbers = st.floats(-10.0, 10.0, allow_subnormal=False)

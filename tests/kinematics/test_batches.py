@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pentapod.errors import ArrayError
+from pentapod.base.errors import ArrayError
 from pentapod.kinematics import (
     AsBuiltPentapod,
     GeneralPentapod,
@@ -11,21 +11,18 @@ from pentapod.kinematics import (
     ReconfigurablePentapod,
     SixLegPlatform,
     as_built_pose,
-    cell_of,
-    choose_slides,
-    conditioning_criterion,
     forbidden_conic,
     leg_force_map,
     leg_jacobian,
     orientation_distance,
     pose_jacobian,
     position_distance,
-    singularity_free_sphere,
     singularity_polynomial,
     singularity_values,
     tip_compliance,
     tip_stiffness,
 )
+from pentapod.theory import cell_of, choose_slides, conditioning_criterion, singularity_free_sphere
 
 BASE = 0.2 * np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)])
 ROBOT = LinearPentapod.quadratic(BASE, 0.5)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pentapod.errors import MachineError
+from pentapod.base.errors import MachineError
 from pentapod.kinematics import Component, GeneralPentapod, LinearPentapod, architectural_measure
-from pentapod.kinematics.quadratic import LinearPart
+from pentapod.kinematics.forward.quadratic import LinearPart
 
 BASE = np.array([(-0.4, 0.2), (-0.2, -0.4), (0.0, 0.0), (0.2, -0.4), (0.4, 0.4)])
 
@@ -185,7 +185,7 @@ def test_the_linear_map_is_correctly_rounded() -> None:
 
 def test_components_have_names() -> None:
     assert [str(Component.parse(name)) for name in ("++", "+-", "-+", "--")] == ["++", "+-", "-+", "--"]
-    from pentapod.errors import ArrayError
+    from pentapod.base.errors import ArrayError
 
     with pytest.raises(ArrayError, match="unknown component"):
         Component.parse("+")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from pentapod.errors import ArrayError
+from pentapod.base.errors import ArrayError
 from pentapod.geometry import normalised
 from pentapod.kinematics import (
     LinearPentapod,

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pentapod.errors import MachineError
+from pentapod.base.errors import MachineError
 from pentapod.machine import Machine, load_machine, read_machine, shipped_machines
 
 DESK = (resources.files("pentapod.machine") / "library" / "desk.toml").read_text(encoding="utf-8")

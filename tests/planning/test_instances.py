@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from planning_instances import Instance, instances, machine
 
+from pentapod.base.refusal import Refusal
 from pentapod.kinematics.component import COMPONENTS
+from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
-from pentapod.machine.surroundings import NOTHING
 from pentapod.planning import LegPath, PlacedPath, leg_path, plan
-from pentapod.planning.freedom import FREE
-from pentapod.planning.margins import Margins
+from pentapod.planning.limits.margins import Margins
+from pentapod.planning.placement.sampling import best_tilted_margins, first_guesses
 from pentapod.planning.plan import NEEDED_MARGIN
-from pentapod.planning.sampling import best_tilted_margins, first_guesses
-from pentapod.planning.task import Task
+from pentapod.planning.problem.constraints import FREE
+from pentapod.planning.problem.samples import Task
 from pentapod.program import Provenance, sample, write_csv
-from pentapod.refusal import Refusal
 from pentapod.timing import Trajectory, retime
 from pentapod.verify import verify
 

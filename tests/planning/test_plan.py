@@ -5,16 +5,16 @@ import re
 import numpy as np
 import pytest
 
+from pentapod.base.refusal import Refusal
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.planning import Freedom, PlacedPath, plan
-from pentapod.planning.formulation import cayley
-from pentapod.planning.margins import Margins
+from pentapod.planning.limits.margins import Margins
+from pentapod.planning.placement.sampling import best_tilted_margins
 from pentapod.planning.plan import NEEDED_MARGIN
-from pentapod.planning.sampling import best_tilted_margins
-from pentapod.planning.task import Task
-from pentapod.refusal import Refusal
+from pentapod.planning.problem.formulation import cayley
+from pentapod.planning.problem.samples import Task
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 TILT = np.radians(15.0)

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from pentapod.base.refusal import Blame, Refusal
 from pentapod.planning.setups import setups
-from pentapod.refusal import Blame, Refusal
-from pentapod.toolpath.links import LinkStyle
-from pentapod.toolpath.parting import Piece, cutting_intervals, part_of, pass_ends
+from pentapod.toolpath.linking.links import LinkStyle
+from pentapod.toolpath.linking.partition import Piece, cutting_intervals, part_of, pass_ends
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pentapod.errors import InputError, ProgramError
+from pentapod.base.errors import InputError, ProgramError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.program import Program, Provenance, quantised, read_csv, write_csv
-from pentapod.toolpath.parting import Piece
+from pentapod.toolpath.linking.partition import Piece
 
 INF = float("inf")
 SOURCE = Provenance("desk", "m123", "j456", "0.1.0")

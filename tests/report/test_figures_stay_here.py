@@ -11,9 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from pentapod.cli.new import dome_stl
-from pentapod.job import Job
-from pentapod.pipeline import run
+from pentapod.cli.commands.new import dome_stl
+from pentapod.job import Job, run
 from pentapod.report import write_report, write_simulation
 from pentapod.simulate import Reference, Tracking, simulate_servo
 from usual_job import job_text

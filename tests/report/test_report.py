@@ -14,14 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from pentapod.cli.new import dome_stl
+from pentapod.cli.commands.new import dome_stl
 from pentapod.geometry import RigidTransform
-from pentapod.job import Job
-from pentapod.job_placement import job_freedom, rotation_angles_deg
-from pentapod.job_surroundings import job_surroundings
-from pentapod.job_values import job_machine, job_mesh
-from pentapod.outcome import Outcome
-from pentapod.pipeline import run
+from pentapod.job import Job, Outcome, run
+from pentapod.job.build.collision_world import job_surroundings
+from pentapod.job.build.placement import job_freedom, rotation_angles_deg
+from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.planning import PlacedPath
 from pentapod.program import Program
 from pentapod.report import write_report

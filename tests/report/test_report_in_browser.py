@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pentapod.job import Job
-from pentapod.pipeline import run
+from pentapod.job import Job, run
 from pentapod.report import write_report
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
@@ -80,7 +79,7 @@ def chromium():
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     """The report of the small job of all tests."""
-    from pentapod.cli.new import dome_stl
+    from pentapod.cli.commands.new import dome_stl
     from usual_job import job_text
 
     folder = tmp_path_factory.mktemp("report")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from pentapod.cli.new import dome_stl
+from pentapod.cli.commands.new import dome_stl
 from pentapod.program import write_csv
 from pentapod.toolpath.formats import write_toolpath
 

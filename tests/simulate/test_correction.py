@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pentapod.errors import MachineError
-from pentapod.job import Job
+from pentapod.base.errors import MachineError
+from pentapod.base.refusal import Refusal
+from pentapod.job import Job, run
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine import Machine
 from pentapod.machine.drives import Drives
-from pentapod.pipeline import run
 from pentapod.program import Program, quantised, read_csv
-from pentapod.refusal import Refusal
 from pentapod.simulate import Reference, servo, simulate_servo
 from pentapod.simulate.correction import correction_for
 

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pentapod.errors import ArrayError, InputError, MachineError
+from pentapod.base.errors import ArrayError, InputError, MachineError
+from pentapod.base.refusal import Refusal
 from pentapod.geometry.directions import angle_between
-from pentapod.kinematics.as_built import AsBuiltPentapod
-from pentapod.kinematics.as_built_forward import as_built_pose
 from pentapod.kinematics.component import COMPONENTS
+from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.kinematics.families.as_built_forward import as_built_pose
 from pentapod.kinematics.forces import leg_force_map
 from pentapod.program import Program
-from pentapod.refusal import Refusal
 from pentapod.simulate import Reference, cutting_forces, mujoco_engine, plant, simulate_mujoco
 from pentapod.simulate.load import leg_loads
 

@@ -12,11 +12,11 @@ import pytest
 from scipy.optimize import brentq
 from scipy.signal import cont2discrete, dlsim, lsim
 
-from pentapod.errors import InputError, ProgramError
+from pentapod.base.errors import InputError, ProgramError
+from pentapod.base.refusal import Refusal
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine import Machine
 from pentapod.program import Program
-from pentapod.refusal import Refusal
 from pentapod.simulate import Reference, contour_errors, simulate_servo
 
 sys.path.append(str(Path(__file__).parents[1] / "program"))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.geometry.rounding import rounded
+from pentapod.geometry.fillet import rounded
 
 MATRIX = tomllib.loads((Path(__file__).parent / "matrix.toml").read_text(encoding="utf-8"))
 

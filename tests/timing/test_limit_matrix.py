@@ -10,8 +10,7 @@ import pytest
 from limit_matrix import ACCELERATIONS, JERKS, MATRIX
 from timing_paths import Path, machine
 
-from pentapod.job import Job
-from pentapod.pipeline import run
+from pentapod.job import Job, run
 from pentapod.timing import Trajectory, certify, retime
 
 pytestmark = pytest.mark.slow

@@ -19,11 +19,11 @@ from timing_paths import (
     used_by_rows,
 )
 
-from pentapod.errors import InputError
-from pentapod.refusal import Refusal
+from pentapod.base.errors import InputError
+from pentapod.base.refusal import Refusal
 from pentapod.timing import CONSTRAINTS, Trajectory, retime
-from pentapod.timing.constraints import Limits
-from pentapod.timing.grid import first_grid
+from pentapod.timing.limits.constraints import Limits
+from pentapod.timing.pieces.grid import first_grid
 from pentapod.toolpath.toolpath import SegmentKind
 
 TIGHT = {"velocity_margin": 1e-4, "acceleration_margin": 1e-4}
@@ -366,8 +366,8 @@ def test_turning_about_a_still_tip_and_no_motion_at_all_are_refused():
 
 
 def test_a_failing_solver_is_a_refusal_that_names_the_gridpoint(monkeypatch):
-    from pentapod.timing import piece as module
-    from pentapod.timing.stages import Failure
+    from pentapod.timing.pieces import piece as module
+    from pentapod.timing.topp.stages import Failure
 
     monkeypatch.setattr(module, "fastest", lambda *_, **__: Failure(7, "not controllable", (1, 3)))
     result = retime(Path((nod(),)), machine())

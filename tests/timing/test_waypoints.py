@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from pentapod.errors import InputError
-from pentapod.refusal import Refusal
+from pentapod.base.errors import InputError
+from pentapod.base.refusal import Refusal
 from pentapod.timing import WaypointMotion, through_waypoints
 
 

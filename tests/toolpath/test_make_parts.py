@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pentapod.mesh.io.stl import read_stl
 from pentapod.toolpath import load_mesh
-from pentapod.toolpath.stl import read_stl
 
 FOLDER = Path(__file__).parents[2] / "toolpaths"
 SLOPES_DEG = {"dome": 40.0, "saddle": 35.0, "wavy": 19.5, "relief": 16.5, "rail": 20.4, "oversize": 17.5}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import toolpath_surfaces as surfaces
 
-from pentapod.errors import InputError
+import toolpath_surfaces as surfaces
+from pentapod.base.errors import InputError
 from pentapod.toolpath import (
     BallCutter,
     HeightField,

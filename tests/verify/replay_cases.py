@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+from pentapod.cutters.ball import BallCutter
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics import Component
 from pentapod.machine import load_machine
-from pentapod.machine.surroundings import NOTHING
-from pentapod.planning.freedom import FREE
+from pentapod.machine.clearance.collision_world import NOTHING
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.query.distance import MeshDistance
+from pentapod.planning.problem.constraints import FREE
 from pentapod.program import Program, Provenance, quantised
-from pentapod.toolpath.ball_cutter import BallCutter
-from pentapod.toolpath.mesh import Mesh
-from pentapod.toolpath.mesh_distance import MeshDistance
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import Coverage, Cutting, Replay, Specification
 

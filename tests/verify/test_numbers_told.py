@@ -8,7 +8,7 @@ import replay_cases as cases
 
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import CLAIMS, verify
-from pentapod.verify.speed import _limits
+from pentapod.verify.claims.speed import _limits
 
 
 @pytest.fixture(scope="module", params=["cubic", "linear"])

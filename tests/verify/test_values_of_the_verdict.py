@@ -9,7 +9,7 @@ import pytest
 
 import pentapod.verify
 from pentapod.verify.judge import CLAIMS, write_verdict
-from pentapod.verify.verdict import Certificate, Place, Verdict
+from pentapod.verify.verdict.verdict import Certificate, Place, Verdict
 
 PROVEN_MOTION = {
     *("base joint cones", "platform joints not too closed", "platform joints not too open"),
@@ -27,8 +27,8 @@ BEING_FILLED = {"Survey", "ComponentFindings"}  # while the walk along the progr
 
 
 def values():
-    for info in pkgutil.iter_modules(pentapod.verify.__path__):
-        module = importlib.import_module(f"pentapod.verify.{info.name}")
+    for info in pkgutil.walk_packages(pentapod.verify.__path__, "pentapod.verify."):
+        module = importlib.import_module(info.name)
         for value in vars(module).values():
             if inspect.isclass(value) and value.__module__ == module.__name__ and dataclasses.is_dataclass(value):
                 yield value

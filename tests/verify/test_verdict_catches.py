@@ -8,7 +8,7 @@ import pytest
 import replay_cases as cases
 from scipy.interpolate import make_interp_spline
 
-from pentapod.errors import ArrayError, InputError, ProgramError
+from pentapod.base.errors import ArrayError, InputError, ProgramError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics import Component
 from pentapod.program import quantised, write_csv

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from pentapod.cli.new import dome_stl
-from pentapod.job import Job
-from pentapod.pipeline import run
+from pentapod.cli.commands.new import dome_stl
+from pentapod.job import Job, run
 from pentapod.view import open_run
 from usual_job import job_text
 

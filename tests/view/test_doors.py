@@ -10,7 +10,7 @@ import urllib.request
 
 import pytest
 
-from pentapod.errors import InputError
+from pentapod.base.errors import InputError
 from pentapod.view import Viewer, open_run
 from pentapod.view.doors import Doors, load_viser, open_server
 

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from pentapod.cutters.ball import BallCutter
+from pentapod.cutters.bull_nose import BullNose
 from pentapod.geometry import RigidTransform
-from pentapod.toolpath.ball_cutter import BallCutter
-from pentapod.toolpath.bull_nose import BullNose
-from pentapod.toolpath.solids import Solid
+from pentapod.geometry.solids import Solid
 from pentapod.view import Motion
 from pentapod.view.shapes import along, quaternion, revolved, rotation_of, solid_profile, tool_mesh
 

@@ -7,9 +7,8 @@ import shutil
 import numpy as np
 import pytest
 
-from pentapod.errors import InputError
-from pentapod.job import Job
-from pentapod.pipeline import run
+from pentapod.base.errors import InputError
+from pentapod.job import Job, run
 from pentapod.planning import PlacedPath
 from pentapod.program import Program
 from pentapod.view import Study, open_run

@@ -46,7 +46,7 @@ def _answer(error: BaseException) -> tuple[int, str]:
     """Return the exit code of an error, and its one line."""
     import click
 
-    from pentapod.errors import InputError
+    from pentapod.base.errors import InputError
 
     if isinstance(error, (KeyboardInterrupt, Terminated, click.exceptions.Abort)):
         ended = isinstance(error, Terminated)

@@ -17,8 +17,8 @@ import click
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from pentapod.progress import Progress
-    from pentapod.verify.verdict import Certificate, NotJudged, Verdict
+    from pentapod.base.progress import Progress
+    from pentapod.verify.verdict.verdict import Certificate, NotJudged, Verdict
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -54,7 +54,7 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
 
     What the log `pentapod` has to say (that kernels are compiled) stands above the bars.
     """
-    from pentapod.progress import silent
+    from pentapod.base.progress import silent
 
     if quiet or not sys.stderr.isatty():
         yield silent
@@ -100,8 +100,8 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
 
 def note_changes(folder: Path) -> None:
     """Say on stderr where the files of a run's folder are not of one run."""
-    from pentapod.errors import InputError
-    from pentapod.run_folder import check_run
+    from pentapod.base.errors import InputError
+    from pentapod.job.run_folder import check_run
 
     try:
         check_run(folder)

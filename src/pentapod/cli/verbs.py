@@ -8,19 +8,19 @@ from importlib import import_module
 
 import click
 
-from pentapod.errors import nearest
+from pentapod.base.errors import nearest
 
 VERBS = {
-    "plan": "pentapod.cli.plan:plan",
-    "verify": "pentapod.cli.verify:verify",
-    "simulate": "pentapod.cli.simulate:simulate",
-    "view": "pentapod.cli.view:view",
-    "post": "pentapod.cli.post:post",
-    "toolpath": "pentapod.cli.toolpath:toolpath",
-    "machine": "pentapod.cli.machine:machine",
-    "ik": "pentapod.cli.kinematics:ik",
-    "fk": "pentapod.cli.kinematics:fk",
-    "new": "pentapod.cli.new:new",
+    "plan": "pentapod.cli.commands.plan:plan",
+    "verify": "pentapod.cli.commands.verify:verify",
+    "simulate": "pentapod.cli.commands.simulate:simulate",
+    "view": "pentapod.cli.commands.view:view",
+    "post": "pentapod.cli.commands.post:post",
+    "toolpath": "pentapod.cli.commands.toolpath:toolpath",
+    "machine": "pentapod.cli.commands.machine:machine",
+    "ik": "pentapod.cli.commands.kinematics:ik",
+    "fk": "pentapod.cli.commands.kinematics:fk",
+    "new": "pentapod.cli.commands.new:new",
 }
 """In the order of `pentapod --help`: name → module:command."""
 
@@ -53,7 +53,7 @@ class LazyGroup(click.Group):
 
 def _print_version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     if value:
-        from pentapod.version import __version__
+        from pentapod.base.version import __version__
 
         click.echo(f"pentapod {__version__}")
         ctx.exit()

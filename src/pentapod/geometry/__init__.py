@@ -1,6 +1,11 @@
 """Geometry without a robot in it: rigid transforms, directions, polylines, Bernstein polynomials."""
 
-from pentapod.geometry.bernstein import (
+from pentapod.geometry.directions import angle_between, arc_weights, normalised, partway, tangent_frame
+from pentapod.geometry.level_set import enclosed_volume, zero_surface
+from pentapod.geometry.polyline import arc_length
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.geometry.runs import equal_runs, marked_runs, run_starts
+from pentapod.numerics.bernstein import (
     convolve,
     derivative,
     elevate,
@@ -13,12 +18,7 @@ from pentapod.geometry.bernstein import (
     to_power,
     unscaled,
 )
-from pentapod.geometry.directions import angle_between, arc_weights, normalised, partway, tangent_frame
-from pentapod.geometry.level_set import enclosed_volume, zero_surface
-from pentapod.geometry.polyline import arc_length
-from pentapod.geometry.positivity import Positivity, positivity
-from pentapod.geometry.rigid import RigidTransform
-from pentapod.geometry.runs import equal_runs, marked_runs, run_starts
+from pentapod.numerics.positivity import Positivity, positivity
 
 __all__ = [
     "Positivity",

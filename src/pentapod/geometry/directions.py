@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_floats
-from pentapod.errors import ArrayError
+from pentapod.base.arrays import Floats, as_floats
+from pentapod.base.errors import ArrayError
 
 
 def normalised(vectors: ArrayLike, name: str = "direction") -> Floats:

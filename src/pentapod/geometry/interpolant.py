@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.geometry.bernstein import multiply, split
+from pentapod.base.arrays import Floats
+from pentapod.numerics.bernstein import multiply, split
 
 _ROUNDS = 60
 _CLOSE = 1e-13

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Bools, Floats, Ints, as_floats
+from pentapod.base.arrays import Bools, Floats, Ints, as_floats
 
 # Kuhn's six tetrahedra: from corner 0 to corner 7 (bits x, y, z), one axis at a time, in every order of the axes. They
 # fit across the faces of neighbouring cells, so the surface is closed.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_floats
+from pentapod.base.arrays import Floats, as_floats
 
 
 def arc_length(points: ArrayLike) -> Floats:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_floats, frozen, set_frozen
-from pentapod.errors import ArrayError
+from pentapod.base.arrays import Floats, as_floats, frozen, set_frozen
+from pentapod.base.errors import ArrayError
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Bools, Ints
+from pentapod.base.arrays import Bools, Ints
 
 
 def equal_runs(values: ArrayLike) -> Ints:

@@ -1,18 +1,31 @@
 """The robot as mathematics: leg lengths, assembly modes, singularities, Jacobian, forces, certificates."""
 
-from pentapod.kinematics.architecture import ArchitecturalDistance, architectural_distance
-from pentapod.kinematics.as_built import AsBuiltPentapod
-from pentapod.kinematics.as_built_forward import ProvenPoses, as_built_pose
-from pentapod.kinematics.assembly import AssemblyObstacles, Obstacle, assembly_obstacles, platform_obstacles
-from pentapod.kinematics.calibration import Calibration, calibrate
-from pentapod.kinematics.cell_poses import cell_of, poses_in_cell
-from pentapod.kinematics.cells import Cell, CellDecomposition, cell_decomposition
-from pentapod.kinematics.certificate import ComponentProof, certify_component
-from pentapod.kinematics.chords import Chords, prove_chords
+from importlib import import_module
+from typing import Any
+
 from pentapod.kinematics.component import COMPONENTS, Component
-from pentapod.kinematics.conics import Conic, attachment_conic, conic_determinant, forbidden_conic
+from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.kinematics.families.as_built_forward import ProvenPoses, as_built_pose
+from pentapod.kinematics.families.assembly_obstacles import (
+    AssemblyObstacles,
+    Obstacle,
+    assembly_obstacles,
+    platform_obstacles,
+)
+from pentapod.kinematics.families.conics import Conic, attachment_conic, conic_determinant, forbidden_conic
+from pentapod.kinematics.families.general import GeneralPentapod
+from pentapod.kinematics.families.path_tracking import FollowedPath, follow
+from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
+from pentapod.kinematics.families.singularities import (
+    architectural_measure,
+    orientation_distance,
+    position_distance,
+    singular_plane,
+    singularity_values,
+)
+from pentapod.kinematics.families.six_leg import SixLegPlatform
 from pentapod.kinematics.five_legs import FiveLegs
-from pentapod.kinematics.following import FollowedPath, follow
 from pentapod.kinematics.forces import (
     leg_force_map,
     leg_load_map,
@@ -20,38 +33,21 @@ from pentapod.kinematics.forces import (
     tip_force_amplification,
     tip_moment_amplification,
 )
-from pentapod.kinematics.general import GeneralPentapod
-from pentapod.kinematics.guide_choice import GuideChoice, choose_slides, conditioning_criterion, stiffness_criterion
-from pentapod.kinematics.guides import ReconfigurablePentapod
+from pentapod.kinematics.forward.singularity_polynomial import singularity_cofactors, singularity_polynomial
 from pentapod.kinematics.jacobian import leg_jacobian, pose_jacobian, square_jacobian
 from pentapod.kinematics.mode import MODES, Mode
-from pentapod.kinematics.motion import MotionProof, certify_motion
-from pentapod.kinematics.pentapod import LinearPentapod
-from pentapod.kinematics.reach import ReachField
-from pentapod.kinematics.roaming import roaming
-from pentapod.kinematics.singularities import (
-    architectural_measure,
-    orientation_distance,
-    position_distance,
-    singular_plane,
-    singularity_values,
-)
-from pentapod.kinematics.singularity_polynomial import singularity_cofactors, singularity_polynomial
-from pentapod.kinematics.six_legs import SixLegPlatform
-from pentapod.kinematics.sphere import SingularityFreeSphere, singularity_free_sphere
+from pentapod.kinematics.proofs.certificate import ComponentProof, certify_component
+from pentapod.kinematics.proofs.chords import Chords, prove_chords
+from pentapod.kinematics.proofs.motion import MotionProof, certify_motion
+from pentapod.kinematics.proofs.pose_enclosure import roaming
+from pentapod.kinematics.proofs.tip_tube import TipTube, prove_tip_tube
 from pentapod.kinematics.stiffness import tip_compliance, tip_stiffness
-from pentapod.kinematics.tip_tube import TipTube, prove_tip_tube
-from pentapod.kinematics.workspace import Workspace
 
 __all__ = [
     "COMPONENTS",
     "MODES",
-    "ArchitecturalDistance",
     "AsBuiltPentapod",
     "AssemblyObstacles",
-    "Calibration",
-    "Cell",
-    "CellDecomposition",
     "Chords",
     "Component",
     "ComponentProof",
@@ -59,30 +55,20 @@ __all__ = [
     "FiveLegs",
     "FollowedPath",
     "GeneralPentapod",
-    "GuideChoice",
     "LinearPentapod",
     "Mode",
     "MotionProof",
     "Obstacle",
     "ProvenPoses",
-    "ReachField",
     "ReconfigurablePentapod",
-    "SingularityFreeSphere",
     "SixLegPlatform",
     "TipTube",
-    "Workspace",
-    "architectural_distance",
     "architectural_measure",
     "as_built_pose",
     "assembly_obstacles",
     "attachment_conic",
-    "calibrate",
-    "cell_decomposition",
-    "cell_of",
     "certify_component",
     "certify_motion",
-    "choose_slides",
-    "conditioning_criterion",
     "conic_determinant",
     "follow",
     "forbidden_conic",
@@ -93,20 +79,45 @@ __all__ = [
     "orientation_distance",
     "platform_obstacles",
     "pose_jacobian",
-    "poses_in_cell",
     "position_distance",
     "prove_chords",
     "prove_tip_tube",
     "roaming",
     "singular_plane",
     "singularity_cofactors",
-    "singularity_free_sphere",
     "singularity_polynomial",
     "singularity_values",
     "square_jacobian",
-    "stiffness_criterion",
     "tip_compliance",
     "tip_force_amplification",
     "tip_moment_amplification",
     "tip_stiffness",
 ]
+
+_ELSEWHERE = {
+    "ArchitecturalDistance": "theory",
+    "Calibration": "machine",
+    "Cell": "theory",
+    "CellDecomposition": "theory",
+    "GuideChoice": "theory",
+    "ReachField": "theory",
+    "SingularityFreeSphere": "theory",
+    "Workspace": "theory",
+    "architectural_distance": "theory",
+    "calibrate": "machine",
+    "cell_decomposition": "theory",
+    "cell_of": "theory",
+    "choose_slides": "theory",
+    "conditioning_criterion": "theory",
+    "poses_in_cell": "theory",
+    "singularity_free_sphere": "theory",
+    "stiffness_criterion": "theory",
+}
+"""Names that were here, and the packages in which they are now."""
+
+
+def __getattr__(name: str) -> Any:
+    """Load a name that is now in another package from there. Raises AttributeError for others."""
+    if name not in _ELSEWHERE:
+        raise AttributeError(f"module 'pentapod.kinematics' has no attribute {name!r}")
+    return getattr(import_module(f"pentapod.{_ELSEWHERE[name]}"), name)

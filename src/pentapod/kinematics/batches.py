@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_batch
-from pentapod.errors import ArrayError
+from pentapod.base.arrays import Floats, as_batch
+from pentapod.base.errors import ArrayError
 
 
 def as_poses(position: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:

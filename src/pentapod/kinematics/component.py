@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import as_batch
-from pentapod.errors import ArrayError
+from pentapod.base.arrays import as_batch
+from pentapod.base.errors import ArrayError
 
 
 class Component(NamedTuple):

@@ -7,11 +7,11 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_floats
-from pentapod.compiled import kernels_pay
-from pentapod.errors import ArrayError, MachineError
+from pentapod.base.arrays import Floats, as_floats
+from pentapod.base.errors import ArrayError, MachineError
 from pentapod.kinematics.batches import as_poses, joined_poses
-from pentapod.kinematics.blocks import blocks
+from pentapod.numerics.blocks import blocks
+from pentapod.numerics.kernels import kernels_pay
 
 SAVED_BY_KERNELS = 30e-9
 """Seconds a pose that compiled kernels save, forwards and backwards."""

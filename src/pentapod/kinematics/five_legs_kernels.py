@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.compiled import kernel
+from pentapod.base.arrays import Floats
+from pentapod.numerics.kernels import kernel
 
 _LANES = 64  # poses at a time: their columns become vector instructions
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_batch
+from pentapod.base.arrays import Floats, as_batch
 from pentapod.kinematics.batches import joined_poses
-from pentapod.kinematics.blocks import in_blocks
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.jacobian import invert, line_tangents
+from pentapod.numerics.blocks import in_blocks
 
 
 def leg_force_map(pentapod: FiveLegs, position: ArrayLike, direction: ArrayLike, tool_length: float) -> Floats:

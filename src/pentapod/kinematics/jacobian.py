@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_batch
+from pentapod.base.arrays import Floats, as_batch
 from pentapod.geometry.directions import tangent_frame
 from pentapod.kinematics.five_legs import FiveLegs
 

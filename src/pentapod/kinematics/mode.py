@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_batch
-from pentapod.errors import ArrayError
+from pentapod.base.arrays import Floats, as_batch
+from pentapod.base.errors import ArrayError
 
 
 class Mode(NamedTuple):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_batch, as_floats
-from pentapod.errors import ArrayError
+from pentapod.base.arrays import Floats, as_batch, as_floats
+from pentapod.base.errors import ArrayError
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.forces import leg_load_map
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pentapod.arrays import Floats, frozen, set_frozen
-from pentapod.errors import MachineError
+from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.errors import MachineError
 from pentapod.machine.fields import not_negative, per_leg, positive
 
 

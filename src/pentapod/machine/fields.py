@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.arrays import frozen, set_frozen
-from pentapod.errors import MachineError
+from pentapod.base.arrays import frozen, set_frozen
+from pentapod.base.errors import MachineError
 
 
 def per_leg(owner: object, *names: str) -> None:

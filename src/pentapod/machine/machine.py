@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, frozen, set_frozen
-from pentapod.errors import MachineError
-from pentapod.kinematics.guides import ReconfigurablePentapod
-from pentapod.kinematics.pentapod import LinearPentapod
-from pentapod.kinematics.singularities import architectural_measure
+from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.errors import MachineError
+from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
+from pentapod.kinematics.families.singularities import architectural_measure
 from pentapod.machine import reader
 from pentapod.machine.digest import digest_of
 from pentapod.machine.drives import Drives, Masses

@@ -7,8 +7,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from pentapod.arrays import Floats, frozen, set_frozen
-from pentapod.errors import MachineError
+from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.errors import MachineError
 from pentapod.machine.fields import per_leg, positive
 
 Interpolation = Literal["linear", "cubic"]

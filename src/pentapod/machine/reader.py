@@ -14,15 +14,15 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from pentapod.arrays import Floats
-from pentapod.errors import InputError, MachineError, nearest
-from pentapod.kinematics.guides import ReconfigurablePentapod
-from pentapod.kinematics.pentapod import LinearPentapod
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import InputError, MachineError, nearest
+from pentapod.base.toml import first_of, line_of, parsed, read_toml, wrong_value
+from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, WorkVolume
 from pentapod.machine.tables import DrivesTable, GeometryTable, GuidesTable, MachineTables, MassesTable
 from pentapod.machine.tool_limits import ToolLimits
-from pentapod.toml_files import first_of, line_of, parsed, read_toml, wrong_value
 
 OFFSET_TOLERANCE_M = 1e-6  # offsets in a file are rounded; beyond a micrometre they mean another machine
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
 from pentapod.machine.drives import Drives, Masses
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import radians
 from typing import Protocol
 
-from pentapod.errors import MachineError
+from pentapod.base.errors import MachineError
 
 
 class ToolLimitKeys(Protocol):

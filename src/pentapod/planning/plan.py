@@ -5,28 +5,28 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypedDict
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
+from pentapod.base.progress import Progress, silent
+from pentapod.base.refusal import Refusal
 from pentapod.kinematics.component import Component
+from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
 from pentapod.machine.machine import Machine
-from pentapod.machine.surroundings import NOTHING, Surroundings
-from pentapod.planning.axis_course import AxisCourse
-from pentapod.planning.blame import refusal
-from pentapod.planning.freedom import FREE, Freedom
-from pentapod.planning.guiding import guided
-from pentapod.planning.placed_path import PlacedPath, UnplacedPath
-from pentapod.planning.placement import Placement
-from pentapod.planning.remedies import remedies
-from pentapod.planning.sampling import best_tilted_margins
-from pentapod.planning.search import SOLVERS, Search, Solver, SolverName, search
-from pentapod.planning.second_aim import SecondAim, aim_of, improved
-from pentapod.planning.sequential import SequentialSolver
-from pentapod.planning.setting import Candidate, Setting
-from pentapod.planning.task import Task
-from pentapod.planning.threads import on_one_thread
-from pentapod.planning.tilt import lean
-from pentapod.planning.weights import EVEN, NEEDED_MARGIN, Weights
-from pentapod.progress import Progress, silent
-from pentapod.refusal import Refusal
+from pentapod.numerics.one_thread import on_one_thread
+from pentapod.planning.diagnosis import refusal
+from pentapod.planning.placement.base_reconfiguration import guided
+from pentapod.planning.placement.placed_path import PlacedPath, UnplacedPath
+from pentapod.planning.placement.placement import Placement
+from pentapod.planning.placement.sampling import best_tilted_margins
+from pentapod.planning.placement.search import SOLVERS, Search, Solver, SolverName, search
+from pentapod.planning.placement.secondary_objective import SecondAim, aim_of, improved
+from pentapod.planning.placement.sequential import SequentialSolver
+from pentapod.planning.problem.constraints import FREE, Freedom
+from pentapod.planning.problem.problem import Candidate, Setting
+from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.tilt_field import lean
+from pentapod.planning.problem.weights import EVEN, NEEDED_MARGIN, Weights
+from pentapod.planning.suggestions import remedies
+from pentapod.planning.tool_axis.spline import AxisCourse
 from pentapod.toolpath.toolpath import Toolpath
 
 CALM_SHARE = 0.9

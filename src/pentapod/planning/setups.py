@@ -8,12 +8,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from pentapod.arrays import Bools, Floats
+from pentapod.base.arrays import Bools, Floats
+from pentapod.base.progress import Progress, silent
+from pentapod.base.refusal import Blame, Refusal
 from pentapod.geometry.runs import marked_runs
-from pentapod.progress import Progress, silent
-from pentapod.refusal import Blame, Refusal
-from pentapod.toolpath.links import LinkStyle
-from pentapod.toolpath.parting import Piece, cutting_intervals, part_of, pass_ends
+from pentapod.toolpath.linking.links import LinkStyle
+from pentapod.toolpath.linking.partition import Piece, cutting_intervals, part_of, pass_ends
 from pentapod.toolpath.toolpath import Toolpath
 
 Fits = Callable[[Toolpath], bool]

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.errors import ProgramError
-from pentapod.files import atomic_write
+from pentapod.base.errors import ProgramError
+from pentapod.base.files import atomic_write
 from pentapod.program.csv_rows import COLUMNS, TimeCheck, read_rows
 from pentapod.program.header import MAGIC, Header, header_text, parse_header
 from pentapod.program.program import FORMAT_VERSION, Program

@@ -13,12 +13,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.errors import ArrayError, InputError, ProgramError, ToolpathError
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import ArrayError, InputError, ProgramError, ToolpathError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.program.program import FORMAT_VERSION, Program, Provenance
-from pentapod.toolpath.parting import Piece
+from pentapod.toolpath.linking.partition import Piece
 
 MAGIC = "pentapod_program"
 KEYS = (

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from pentapod.errors import ProgramError
+from pentapod.base.errors import ProgramError
 
 Judgement = Mapping[str, Any] | str | Path
 """The content of a verdict.json (`Verdict.to_dict`), or where that file is."""

@@ -8,12 +8,12 @@ from typing import Literal
 
 import numpy as np
 
-from pentapod.arrays import Floats, frozen, set_frozen
-from pentapod.errors import ProgramError
+from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.errors import ProgramError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import Machine
-from pentapod.toolpath.parting import Piece
+from pentapod.toolpath.linking.partition import Piece
 
 FORMAT_VERSION = 1
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_floats
-from pentapod.errors import ProgramError
+from pentapod.base.arrays import Floats, as_floats
+from pentapod.base.errors import ProgramError
 from pentapod.machine.rounding import QUANTA_PER_M
 
 QUANTA_PER_MM = 1e8

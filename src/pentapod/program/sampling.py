@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
+from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import Machine
 from pentapod.program.program import Program, Provenance
 from pentapod.program.resolution import quantised
-from pentapod.timing.trajectory import Trajectory
-from pentapod.version import __version__, library_versions, processor_kind
+from pentapod.timing.law.trajectory import Trajectory
 
 _CHUNK = 100_000
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pentapod.arrays import Floats, Ints
-from pentapod.job_surroundings import job_fixture
-from pentapod.outcome import Outcome
-from pentapod.planning.placed_path import PlacedPath
+from pentapod.base.arrays import Floats, Ints
+from pentapod.job.build.collision_world import job_fixture
+from pentapod.job.outcome import Outcome
+from pentapod.planning.placement.placed_path import PlacedPath
 
 
 @dataclass(frozen=True, eq=False)

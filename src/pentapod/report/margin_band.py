@@ -9,7 +9,7 @@ import numpy as np
 
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import equal_runs
-from pentapod.planning.placed_path import PlacedPath
+from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.report.figure import LIMIT_COLOUR, QUIET_COLOUR
 
 _COLUMNS = 480

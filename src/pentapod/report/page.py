@@ -9,15 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.files import atomic_write
+from pentapod.base.files import atomic_write
+from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job import Job
-from pentapod.job_placement import job_at, placement_toml
-from pentapod.job_surroundings import job_surroundings
-from pentapod.machine.surroundings import NOTHING, Surroundings
-from pentapod.outcome import Outcome, SetUps
-from pentapod.plan_arrays import matrix_mm
-from pentapod.planning.placed_path import PlacedPath, UnplacedPath
+from pentapod.job.build.collision_world import job_surroundings
+from pentapod.job.build.placement import job_at, placement_toml
+from pentapod.job.outcome import Outcome, SetUps
+from pentapod.job.plan_arrays import matrix_mm
+from pentapod.job.schema.job import Job
+from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
+from pentapod.mesh.mesh import Mesh
+from pentapod.planning.placement.placed_path import PlacedPath, UnplacedPath
 from pentapod.program.program import Program
 from pentapod.report import plots, scene, words
 from pentapod.report.figure import PLOT_CONFIG, Figure, as_script
@@ -26,11 +28,9 @@ from pentapod.report.setup_sheet import setup_sheet
 from pentapod.report.signals import Signals
 from pentapod.report.worst import worst_places
 from pentapod.timing.explain import Explanation
-from pentapod.timing.trajectory import Trajectory
-from pentapod.toolpath.mesh import Mesh
-from pentapod.toolpath.parting import Piece
+from pentapod.timing.law.trajectory import Trajectory
+from pentapod.toolpath.linking.partition import Piece
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
-from pentapod.version import __version__, library_versions, processor_kind
 
 _POSES = 240
 

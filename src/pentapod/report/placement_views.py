@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
-from pentapod.planning.placed_path import PlacedPath
+from pentapod.mesh.mesh import Mesh
+from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.report.decimate import thinned_mesh
 from pentapod.report.figure import HELD_COLOUR, LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR
 from pentapod.report.held import Held
-from pentapod.toolpath.mesh import Mesh
 
 _FACETS, _POINTS = 1200, 1500
 _LETTER = 15.0  # of a drawing 500 wide

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.report.decimate import keep_extremes
 from pentapod.report.figure import LEG_COLOURS, LEG_DASHES, LIMIT_COLOUR, QUIET_COLOUR, Figure, packed

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.arrays import Bools, Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.refusal import Refusal
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.machine import Machine
-from pentapod.refusal import Refusal
+from pentapod.mesh.faults import faults
+from pentapod.mesh.mesh import Mesh
 from pentapod.report.decimate import keep_extremes, thinned_mesh
 from pentapod.report.figure import HELD_COLOUR, LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR, Figure, packed
 from pentapod.report.held import Held
 from pentapod.report.signals import Signals
-from pentapod.toolpath.faults import faults
-from pentapod.toolpath.mesh import Mesh
-from pentapod.toolpath.parting import Piece
+from pentapod.toolpath.linking.partition import Piece
 from pentapod.toolpath.toolpath import Toolpath
 
 MACHINE_TRACES = 8

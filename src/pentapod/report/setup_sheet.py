@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from html import escape
 
-from pentapod.outcome import Outcome
-from pentapod.planning.binding import Binding, bindings
-from pentapod.planning.placed_path import PlacedPath
+from pentapod.job.outcome import Outcome
+from pentapod.mesh.mesh import Mesh
+from pentapod.planning.active_limits import Binding, bindings
+from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.report.held import held_mesh
 from pentapod.report.margin_band import margin_band
 from pentapod.report.placement_views import placement_views
 from pentapod.report.words import number
-from pentapod.toolpath.mesh import Mesh
 
 _ROWS = 10
 

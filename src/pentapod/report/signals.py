@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pentapod.arrays import Floats, Ints, set_frozen
+from pentapod.base.arrays import Floats, Ints, set_frozen
 from pentapod.geometry.interpolant import Interpolant
+from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
 from pentapod.machine.machine import Machine
-from pentapod.machine.surroundings import NOTHING, Surroundings
-from pentapod.planning.margins import Margins
+from pentapod.planning.limits.margins import Margins
 from pentapod.program.program import Program
-from pentapod.timing.trajectory import Trajectory
+from pentapod.timing.law.trajectory import Trajectory
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 MOST_MARGIN_ROWS = 40_000

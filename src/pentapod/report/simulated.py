@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.files import atomic_write
+from pentapod.base.arrays import Floats
+from pentapod.base.files import atomic_write
 from pentapod.report.decimate import keep_extremes
 from pentapod.report.figure import LEG_COLOURS, LEG_DASHES, PLOT_CONFIG, Figure, as_script, packed
 from pentapod.simulate import Tracking

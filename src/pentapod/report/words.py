@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job_tables import ToolTable
+from pentapod.job.schema.tables import ToolTable
 
 
 def number(value: float | None, unit: str = "") -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.arrays import Bools, Floats
+from pentapod.base.arrays import Bools, Floats
 from pentapod.geometry.runs import marked_runs
 from pentapod.machine.machine import Machine
 from pentapod.report.signals import Signals

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.arrays import Floats, Ints
+from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.directions import angle_between
 
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
 from pentapod.machine.drives import Drives
 
 if TYPE_CHECKING:

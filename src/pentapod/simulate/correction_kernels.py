@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.compiled import kernel
-from pentapod.kinematics.quadratic_kernels import poses
+from pentapod.base.arrays import Floats
+from pentapod.kinematics.forward.quadratic_kernels import poses
+from pentapod.numerics.kernels import kernel
 
 Known = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats]
 """How pose and path are found: linear_map (4, 5) and constant (4,) of `LinearPart`; geometry (7,): delta, x_3, y_3,

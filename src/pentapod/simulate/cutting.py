@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.arrays import Bools, Floats
-from pentapod.errors import InputError
+from pentapod.base.arrays import Bools, Floats
+from pentapod.base.errors import InputError
 from pentapod.simulate.reference import Reference
 
 _SLOW = 1e-3  # m/s: below it the force fades, so that it turns round without a step

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.arrays import Floats, Ints
-from pentapod.kinematics.blocks import blocks
+from pentapod.base.arrays import Floats, Ints
 from pentapod.kinematics.jacobian import pose_jacobian
+from pentapod.numerics.blocks import blocks
 from pentapod.simulate.bodies import Capsule, leg_cylinder, leg_rod, spindle
 from pentapod.simulate.reference import Reference
 

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.arrays import Bools, Floats, frozen, set_frozen
+from pentapod.base.arrays import Bools, Floats, frozen, set_frozen
 from pentapod.geometry.directions import angle_between
 from pentapod.simulate.contour import contour_errors
 from pentapod.simulate.played import Played
 from pentapod.simulate.reference import Reference
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
-from pentapod.verify.free_space import PosedPolyline
-from pentapod.verify.path_matching import PathMatch, match
+from pentapod.verify.replay.free_space import PosedPolyline
+from pentapod.verify.replay.path_matching import PathMatch, match
 
 _MM = 1e3
 _TIME_CONSTANTS = 3.0  # of the position loop: so much later than due the tool is looked for

@@ -15,8 +15,8 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.kinematics.as_built import AsBuiltPentapod
+from pentapod.base.arrays import Floats
+from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.machine.machine import Machine
 from pentapod.simulate.bodies import Capsule, leg_cylinder, leg_rod, spindle
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, frozen, set_frozen
-from pentapod.errors import ArrayError, InputError
-from pentapod.kinematics.as_built import AsBuiltPentapod
-from pentapod.kinematics.as_built_forward import as_built_pose
-from pentapod.progress import Progress, silent
-from pentapod.refusal import Refusal
+from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.errors import ArrayError, InputError
+from pentapod.base.progress import Progress, silent
+from pentapod.base.refusal import Refusal
+from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.kinematics.families.as_built_forward import as_built_pose
 from pentapod.simulate.load import leg_loads
 from pentapod.simulate.measures import Measure
 from pentapod.simulate.mjcf import mjcf

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pentapod.arrays import Floats, frozen, set_frozen
+from pentapod.base.arrays import Floats, frozen, set_frozen
 
 
 @dataclass(frozen=True, eq=False)

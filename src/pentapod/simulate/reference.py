@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.errors import ProgramError
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import ProgramError
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine.machine import Machine
 from pentapod.program.program import Program

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.errors import InputError
-from pentapod.kinematics.quadratic import NEAR_W_SQUARED
-from pentapod.refusal import Refusal
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import InputError
+from pentapod.base.refusal import Refusal
+from pentapod.kinematics.forward.quadratic import NEAR_W_SQUARED
 from pentapod.simulate.correction import NO_CORRECTION, correction_for
 from pentapod.simulate.played import Played
 from pentapod.simulate.reference import Reference

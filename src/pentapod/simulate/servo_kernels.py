@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.compiled import kernel
+from pentapod.base.arrays import Floats
+from pentapod.numerics.kernels import kernel
 from pentapod.simulate.correction_kernels import Feedback, Known, contour, correct
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
 from pentapod.geometry.interpolant import Interpolant, largest_length
 from pentapod.machine.machine import Machine
-from pentapod.timing.run_in import run_in
-from pentapod.timing.trajectory import Trajectory
+from pentapod.timing.law.trajectory import Trajectory
+from pentapod.timing.pieces.spline_padding import run_in
 
 
 @dataclass(frozen=True)

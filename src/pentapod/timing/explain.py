@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.arrays import Floats, Ints
+from pentapod.base.arrays import Floats, Ints
 from pentapod.machine.machine import Machine
 from pentapod.timing.certificates import LimitUse
+from pentapod.timing.law.slowed import Slowed
+from pentapod.timing.law.trajectory import Trajectory
 from pentapod.timing.process import Unheld
-from pentapod.timing.slowed import Slowed
-from pentapod.timing.trajectory import Trajectory
 
 STANDING = "standing still"
 MOST_PLACES = 10

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
 from pentapod.geometry.runs import equal_runs, marked_runs
-from pentapod.timing.trajectory import Trajectory
+from pentapod.timing.law.trajectory import Trajectory
 from pentapod.toolpath.toolpath import SegmentKind
 
 HELD = 0.98

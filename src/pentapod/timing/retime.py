@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.errors import InputError
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import InputError
+from pentapod.base.progress import Progress, silent
+from pentapod.base.refusal import Refusal
 from pentapod.machine.machine import Machine
-from pentapod.progress import Progress, silent
-from pentapod.refusal import Refusal
-from pentapod.timing.constraints import CONSTRAINTS, Limits
-from pentapod.timing.engine import Engine
-from pentapod.timing.given_speeds import whole_periods
-from pentapod.timing.law import MotionLaw
-from pentapod.timing.paths import LegPathLike
-from pentapod.timing.piece import PieceProfile, time_piece
-from pentapod.timing.refusals import STILL_M, refusal, unfit
-from pentapod.timing.sampled import WINDOW_PERIODS, Unmended, sampled_laws
-from pentapod.timing.slowed import slowed
-from pentapod.timing.stages import Failure
-from pentapod.timing.trajectory import Profile, Trajectory
+from pentapod.timing.law.paths import LegPathLike
+from pentapod.timing.law.refusals import STILL_M, refusal, unfit
+from pentapod.timing.law.slowed import slowed
+from pentapod.timing.law.time_law import MotionLaw
+from pentapod.timing.law.trajectory import Profile, Trajectory
+from pentapod.timing.limits.constraints import CONSTRAINTS, Limits
+from pentapod.timing.pieces.boundary_speeds import whole_periods
+from pentapod.timing.pieces.piece import PieceProfile, time_piece
+from pentapod.timing.pieces.sampled import WINDOW_PERIODS, Unmended, sampled_laws
+from pentapod.timing.topp.engine import Engine
+from pentapod.timing.topp.stages import Failure
 
 
 def retime(

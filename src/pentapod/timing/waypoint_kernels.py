@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.compiled import kernel
+from pentapod.base.arrays import Floats
+from pentapod.numerics.kernels import kernel
 
 
 @kernel

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats, as_floats, frozen, set_frozen
-from pentapod.errors import InputError
-from pentapod.refusal import Blame, Refusal
-from pentapod.timing.engine import Engine, fastest
-from pentapod.timing.law import MotionLaw
-from pentapod.timing.stages import Failure
+from pentapod.base.arrays import Floats, as_floats, frozen, set_frozen
+from pentapod.base.errors import InputError
+from pentapod.base.refusal import Blame, Refusal
+from pentapod.timing.law.time_law import MotionLaw
+from pentapod.timing.topp.engine import Engine, fastest
+from pentapod.timing.topp.stages import Failure
 
 
 @dataclass(frozen=True, eq=False)

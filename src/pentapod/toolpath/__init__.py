@@ -1,42 +1,42 @@
 """The workpiece as mathematics: meshes, strategies, tools, links. No robot in it."""
 
-from pentapod.toolpath.axis_modes import AxisMode, Between, Fixed, Normal, Pointed
-from pentapod.toolpath.axis_steps import stepped
-from pentapod.toolpath.ball_cutter import BallCutter
-from pentapod.toolpath.bull_nose import BullNose
-from pentapod.toolpath.cross_hatch import CrossHatchOptions
-from pentapod.toolpath.curves import CurveOptions
-from pentapod.toolpath.diagnosis import MeshDiagnosis
-from pentapod.toolpath.drawings_in import read_lines
-from pentapod.toolpath.edges import EdgeOptions
-from pentapod.toolpath.flat_end import FlatEnd
-from pentapod.toolpath.gouge import without_gouges
-from pentapod.toolpath.gouge_report import GougeOptions, GougeReport, Remedy
-from pentapod.toolpath.heightfield import HeightField
-from pentapod.toolpath.image import ImageOptions
-from pentapod.toolpath.lettering import lettering
-from pentapod.toolpath.load import UNITS, load_mesh
-from pentapod.toolpath.lollipop import Lollipop
-from pentapod.toolpath.mesh import Mesh
-from pentapod.toolpath.offset import OffsetOptions
+from pentapod.cutters.ball import BallCutter
+from pentapod.cutters.bull_nose import BullNose
+from pentapod.cutters.flat_end import FlatEnd
+from pentapod.cutters.lollipop import Lollipop
+from pentapod.cutters.stand_off import StandOff
+from pentapod.cutters.tool import Tool
+from pentapod.geometry.solids import Cone
+from pentapod.mesh.diagnosis import MeshDiagnosis
+from pentapod.mesh.io.load import UNITS, load_mesh
+from pentapod.mesh.io.stl import write_stl
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.query.heightfield import HeightField
+from pentapod.mesh.region import Region
+from pentapod.toolpath.axis.modes import AxisMode, Between, Fixed, Normal, Pointed
+from pentapod.toolpath.axis.orientation import Orientation
+from pentapod.toolpath.axis.orienting import oriented
+from pentapod.toolpath.axis.steps import stepped
+from pentapod.toolpath.gouge.gouge import without_gouges
+from pentapod.toolpath.gouge.report import GougeOptions, GougeReport, Remedy
+from pentapod.toolpath.inputs.drawings import read_lines
+from pentapod.toolpath.inputs.lettering import lettering
+from pentapod.toolpath.inputs.pictures import read_darkness
+from pentapod.toolpath.inputs.points import read_points
+from pentapod.toolpath.lines.scallop import stepover_for
 from pentapod.toolpath.options import CoverOptions, Entry, PathOptions
-from pentapod.toolpath.orientation import Orientation
-from pentapod.toolpath.orienting import oriented
 from pentapod.toolpath.path_report import PathReport
-from pentapod.toolpath.pictures_in import read_darkness
-from pentapod.toolpath.points_in import read_points
-from pentapod.toolpath.polyline import PolylineOptions
-from pentapod.toolpath.raster import Pattern, RasterOptions
-from pentapod.toolpath.region import Region
-from pentapod.toolpath.scallop import stepover_for
-from pentapod.toolpath.solids import Cone
-from pentapod.toolpath.spiral import SpiralOptions
-from pentapod.toolpath.stand_off import StandOff
-from pentapod.toolpath.stl import write_stl
-from pentapod.toolpath.strategies import STRATEGIES, Strategy, make_toolpath, toolpath_with_report
-from pentapod.toolpath.tool import Tool
+from pentapod.toolpath.strategies.cross_hatch import CrossHatchOptions
+from pentapod.toolpath.strategies.curves import CurveOptions
+from pentapod.toolpath.strategies.edges import EdgeOptions
+from pentapod.toolpath.strategies.image import ImageOptions
+from pentapod.toolpath.strategies.offset import OffsetOptions
+from pentapod.toolpath.strategies.polyline import PolylineOptions
+from pentapod.toolpath.strategies.raster import Pattern, RasterOptions
+from pentapod.toolpath.strategies.registry import STRATEGIES, Strategy, make_toolpath, toolpath_with_report
+from pentapod.toolpath.strategies.spiral import SpiralOptions
+from pentapod.toolpath.strategies.waterline import WaterlineOptions
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.toolpath.waterline import WaterlineOptions
 
 __all__ = [
     "STRATEGIES",

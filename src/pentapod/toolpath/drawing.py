@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from pentapod.arrays import Floats, set_frozen
-from pentapod.errors import ToolpathError
-from pentapod.toolpath.passes import Passes
+from pentapod.base.arrays import Floats, set_frozen
+from pentapod.base.errors import ToolpathError
+from pentapod.mesh.passes import Passes
 
 
 class Order(StrEnum):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from pentapod.errors import ToolpathError
-from pentapod.toolpath.mesh import Mesh
+from pentapod.base.errors import ToolpathError
+from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.options import PathOptions
 
 

@@ -8,10 +8,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from pentapod.arrays import Floats, frozen, set_frozen
-from pentapod.errors import ToolpathError, nearest
+from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.errors import ToolpathError, nearest
 from pentapod.geometry.directions import normalised
-from pentapod.toolpath.region import Region
+from pentapod.mesh.region import Region
 
 _Choice = TypeVar("_Choice", bound=StrEnum)
 

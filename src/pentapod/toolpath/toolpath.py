@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from pentapod.arrays import Floats, Ints, frozen, set_frozen
-from pentapod.errors import ToolpathError
+from pentapod.base.arrays import Floats, Ints, frozen, set_frozen
+from pentapod.base.errors import ToolpathError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.runs import run_starts
 

@@ -7,38 +7,38 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Unpack
 
-from pentapod.errors import InputError, MachineError, ProgramError, nearest
-from pentapod.files import atomic_write, sha256_of
+from pentapod.base.errors import InputError, MachineError, ProgramError, nearest
+from pentapod.base.files import atomic_write, sha256_of
+from pentapod.base.progress import Progress, silent
 from pentapod.machine.machine import Machine
 from pentapod.program.csv import read_csv
 from pentapod.program.program import Program
-from pentapod.progress import Progress, silent
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.verify import (
+from pentapod.verify.claims import (
     bodies,
     collisions,
     component,
     gouge,
     joints,
     legs,
-    origin,
     pieces,
     placement,
+    provenance,
     slowness,
     speed,
-    standing,
-    surface_left,
-    tool,
+    stops_and_dwells,
+    tool_motion,
     tracking,
 )
-from pentapod.verify.claim import Claim
-from pentapod.verify.replay import SURVEY_SHARE, Replay
-from pentapod.verify.specification import Asked, Specification
-from pentapod.verify.verdict import Certificate, NotJudged, Place, Verdict
+from pentapod.verify.replay.claim import Claim
+from pentapod.verify.replay.replay import SURVEY_SHARE, Replay
+from pentapod.verify.surface import surface_left
+from pentapod.verify.verdict.specification import Asked, Specification
+from pentapod.verify.verdict.verdict import Certificate, NotJudged, Place, Verdict
 
 READABLE = "readable"
 CLAIMS: tuple[Claim, ...] = (
-    *origin.CLAIMS,
+    *provenance.CLAIMS,
     *placement.CLAIMS,
     *pieces.CLAIMS,
     *component.CLAIMS,
@@ -49,9 +49,9 @@ CLAIMS: tuple[Claim, ...] = (
     *surface_left.CLAIMS,
     *tracking.CLAIMS,
     *speed.CLAIMS,
-    *standing.CLAIMS,
+    *stops_and_dwells.CLAIMS,
     *slowness.CLAIMS,
-    *tool.CLAIMS,
+    *tool_motion.CLAIMS,
     *collisions.CLAIMS,
 )
 """Every claim that a verdict makes, in its order; "readable" comes before them where a file is judged.
@@ -108,7 +108,9 @@ def judged(
     try:
         specification = replace(specification, machine=program.machine(specification.machine))
     except MachineError as error:
-        return Verdict((*read, Certificate(origin.GUIDES, False, None, None, "", Place(), str(error))), sources=sources)
+        return Verdict(
+            (*read, Certificate(provenance.GUIDES, False, None, None, "", Place(), str(error))), sources=sources
+        )
     replay, unjudged = Replay(program, specification, progress), list[NotJudged]()
     _ = replay.survey
     claims = (*CLAIMS, *collisions.claims(specification.surroundings))

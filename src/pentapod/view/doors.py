@@ -18,7 +18,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
-from pentapod.errors import InputError
+from pentapod.base.errors import InputError
 
 if TYPE_CHECKING:
     import viser

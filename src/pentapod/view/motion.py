@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.machine import Machine

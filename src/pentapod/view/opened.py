@@ -9,29 +9,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pentapod.archives import check_array, read_arrays
-from pentapod.arrays import Floats
-from pentapod.artefacts import ARRAYS, PROGRAM
-from pentapod.errors import InputError
+from pentapod.base.archives import check_array, read_arrays
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import InputError
+from pentapod.base.progress import Progress, silent
+from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job import Job
-from pentapod.job_surroundings import job_surroundings
-from pentapod.job_tool import job_tool
-from pentapod.job_values import job_machine, job_mesh
+from pentapod.job.artefacts import ARRAYS, PROGRAM
+from pentapod.job.build.collision_world import job_surroundings
+from pentapod.job.build.tool import job_tool
+from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.job.outcome import Outcome, SetUp
+from pentapod.job.plan_arrays import BOX, GUIDES, JOB_FILE, WAYPOINTS, guides_in, piece_in
+from pentapod.job.run_folder import check_run
+from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import COMPONENTS, Component
+from pentapod.machine.clearance.collision_world import Surroundings
 from pentapod.machine.machine import Machine
-from pentapod.machine.surroundings import Surroundings
-from pentapod.outcome import Outcome, SetUp
-from pentapod.plan_arrays import BOX, GUIDES, JOB_FILE, WAYPOINTS, guides_in, piece_in
+from pentapod.mesh.mesh import Mesh
 from pentapod.planning import PlacedPath
 from pentapod.program import Program, read_csv
-from pentapod.progress import Progress, silent
-from pentapod.run_folder import check_run
 from pentapod.toolpath.formats import read_toolpath
-from pentapod.toolpath.mesh import Mesh
-from pentapod.toolpath.parting import Piece
-from pentapod.toolpath.tool import Tool
+from pentapod.toolpath.linking.partition import Piece
 from pentapod.toolpath.toolpath import Toolpath
 
 _FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {

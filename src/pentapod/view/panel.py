@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job_placement import rotation_angles_deg
+from pentapod.job.build.placement import rotation_angles_deg
 from pentapod.report.words import duration, number
 from pentapod.view.motion import Motion, Stance
 from pentapod.view.opened import Opened

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from pentapod.artefacts import REPORT
+from pentapod.base.progress import Progress, silent
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job_placement import job_at, placement_toml
-from pentapod.outcome import Outcome
-from pentapod.pipeline import run as run_job
-from pentapod.progress import Progress, silent
+from pentapod.job.artefacts import REPORT
+from pentapod.job.build.placement import job_at, placement_toml
+from pentapod.job.outcome import Outcome
+from pentapod.job.pipeline import run as run_job
 from pentapod.report import write_report
 from pentapod.view.opened import Opened, run_of
 

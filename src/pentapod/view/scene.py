@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.machine.surroundings import mounted
+from pentapod.machine.clearance.collision_world import mounted
 from pentapod.report.decimate import thinned_mesh
 from pentapod.report.figure import LEG_COLOURS, LIMIT_COLOUR
 from pentapod.view.motion import Stance

@@ -9,9 +9,9 @@ from contextlib import redirect_stdout
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from pentapod.errors import PentapodError
+from pentapod.base.errors import PentapodError
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.toolpath.parting import Piece
+from pentapod.toolpath.linking.partition import Piece
 from pentapod.view.doors import Doors, open_server
 from pentapod.view.motion import Motion
 from pentapod.view.opened import Opened

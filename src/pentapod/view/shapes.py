@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from pentapod.arrays import Floats, Ints
+from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.directions import tangent_frame
-from pentapod.toolpath.solids import Solid
+from pentapod.geometry.solids import Solid
 
 _AROUND, _ARC = 32, 7
 

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pentapod.arrays import Floats, Ints
+from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.planning.margins import Margins
-from pentapod.planning.sampling import best_tilted_margins
-from pentapod.planning.task import Task
+from pentapod.planning.limits.margins import Margins
+from pentapod.planning.placement.sampling import best_tilted_margins
+from pentapod.planning.problem.samples import Task
 from pentapod.view.opened import Opened
 
 COMFORTABLE = 0.4

@@ -9,9 +9,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from pentapod.archives import MOST_UNPACKED, read_arrays
-from pentapod.errors import InputError, ProgramError
-from pentapod.input_files import read_bytes
+from pentapod.base.archives import MOST_UNPACKED, read_arrays
+from pentapod.base.errors import InputError, ProgramError
+from pentapod.base.input_files import read_bytes
 from pentapod.program.header import header_text
 from pentapod.program.posts.registry import Post, PostInput, register
 from pentapod.program.posts.rows import of_archive

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.program.program import Program
 

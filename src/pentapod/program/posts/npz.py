@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.archives import read_arrays
-from pentapod.errors import ProgramError
-from pentapod.files import packed_arrays
+from pentapod.base.archives import read_arrays
+from pentapod.base.errors import ProgramError
+from pentapod.base.files import packed_arrays
 from pentapod.program.header import header_text
 from pentapod.program.posts.registry import Post, PostInput, register
 from pentapod.program.posts.rows import of_archive

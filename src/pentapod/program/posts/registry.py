@@ -9,9 +9,9 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import cast
 
-from pentapod.errors import InputError, ProgramError, nearest
-from pentapod.files import atomic_write
-from pentapod.input_files import read_bytes
+from pentapod.base.errors import InputError, ProgramError, nearest
+from pentapod.base.files import atomic_write
+from pentapod.base.input_files import read_bytes
 from pentapod.machine.machine import Machine
 from pentapod.program.csv import csv_bytes
 from pentapod.program.judged import Judgement, check_passed

@@ -14,8 +14,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.errors import ProgramError
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import ProgramError
 from pentapod.program.header import UNVERIFIED, Header, header_text
 from pentapod.program.posts.motion import accelerations, velocities
 from pentapod.program.posts.registry import Post, PostInput, read_file, register

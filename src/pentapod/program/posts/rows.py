@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pentapod.archives import check_array
-from pentapod.arrays import Floats
-from pentapod.errors import ProgramError
+from pentapod.base.archives import check_array
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import ProgramError
 from pentapod.program.header import Header, parse_header
 from pentapod.program.program import Program
 from pentapod.program.resolution import LARGEST_M, quantised

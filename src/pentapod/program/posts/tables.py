@@ -20,9 +20,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.errors import InputError, ProgramError
-from pentapod.input_files import number_in
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import InputError, ProgramError
+from pentapod.base.input_files import number_in
 from pentapod.program.header import Header, header_text
 from pentapod.program.posts.motion import velocities
 from pentapod.program.posts.registry import Post, PostInput, read_file

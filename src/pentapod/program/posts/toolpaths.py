@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.archives import check_array, read_arrays
-from pentapod.errors import InputError, ProgramError
+from pentapod.base.archives import check_array, read_arrays
+from pentapod.base.errors import InputError, ProgramError
 from pentapod.program.posts.registry import Post, PostInput, read_file, register
 from pentapod.program.program import Program
 from pentapod.toolpath.formats import FORMATS, read_toolpath

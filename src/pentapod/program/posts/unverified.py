@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import PurePosixPath
 
-from pentapod.errors import InputError
+from pentapod.base.errors import InputError
 from pentapod.program.header import UNVERIFIED
 
 _COMMENTS = {

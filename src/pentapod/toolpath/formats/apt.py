@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.errors import ToolpathError, nearest
+from pentapod.base.errors import ToolpathError, nearest
 from pentapod.toolpath.formats.moves import Moves, plain, poses, stands
 from pentapod.toolpath.formats.reading import number, read_lines, seconds
 from pentapod.toolpath.formats.registry import Defaults, Format, register

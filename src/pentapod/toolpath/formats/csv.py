@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from pentapod.errors import ToolpathError
+from pentapod.base.errors import ToolpathError
 from pentapod.toolpath.formats.moves import Moves, plain, poses, stands
 from pentapod.toolpath.formats.reading import number, read_lines, seconds
 from pentapod.toolpath.formats.registry import Defaults, Format, register

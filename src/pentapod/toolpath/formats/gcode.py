@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.errors import ToolpathError
+from pentapod.base.errors import ToolpathError
 from pentapod.toolpath.formats.moves import Moves, plain, poses, stands
 from pentapod.toolpath.formats.reading import read_lines
 from pentapod.toolpath.formats.registry import Defaults, Format, register

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.arrays import Floats, Ints
-from pentapod.errors import ToolpathError
+from pentapod.base.arrays import Floats, Ints
+from pentapod.base.errors import ToolpathError
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 AXIS_TOLERANCE = 1e-4

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pentapod.archives import check_array, read_arrays
-from pentapod.errors import InputError, ToolpathError
-from pentapod.files import packed_arrays
+from pentapod.base.archives import check_array, read_arrays
+from pentapod.base.errors import InputError, ToolpathError
+from pentapod.base.files import packed_arrays
 from pentapod.toolpath.formats.reading import check_head
 from pentapod.toolpath.formats.registry import Defaults, Format, register
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath

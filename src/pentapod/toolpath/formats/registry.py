@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pentapod.errors import ToolpathError, nearest
-from pentapod.files import atomic_write
+from pentapod.base.errors import ToolpathError, nearest
+from pentapod.base.files import atomic_write
 from pentapod.toolpath.toolpath import Toolpath
 
 

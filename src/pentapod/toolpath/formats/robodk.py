@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pentapod.errors import ToolpathError
+from pentapod.base.errors import ToolpathError
 from pentapod.toolpath.formats.moves import Moves, plain, poses
 from pentapod.toolpath.formats.reading import number, read_lines
 from pentapod.toolpath.formats.registry import Defaults, Format, register

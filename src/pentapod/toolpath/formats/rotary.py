@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.arrays import Floats
+from pentapod.base.arrays import Floats
 
 _POLE = 1e-9
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.errors import InputError
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import InputError
 
 Words = Mapping[str, object]
 

@@ -11,7 +11,7 @@ import dataclasses
 
 import numpy as np
 
-from pentapod.errors import InputError
+from pentapod.base.errors import InputError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import Machine

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.arrays import Floats
-from pentapod.errors import ProgramError
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import ProgramError
 from pentapod.machine.machine import Machine
 from pentapod.program.posts.linuxcnc.config import (
     Axis,

@@ -1,0 +1,119 @@
+"""NumPy archives that somebody gives: arrays by name, with every size checked before anything is unpacked."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+import zlib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pentapod.base.errors import InputError
+from pentapod.base.input_files import read_bytes
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+MOST_UNPACKED = 1_000_000_000
+"""Bytes that the arrays of one archive may have unpacked: twenty million rows of five legs, with room."""
+
+_MOST_ENTRIES = 1_000
+_MOST_TEXT = 50_000_000
+_VERSIONS = ((1, 0), (2, 0))
+_ENTRY = b"PK\x01\x02"
+_PLAIN = frozenset("biufU")
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+
+
+def read_arrays(
+    path: Path, names: Iterable[str], wrong: type[InputError], optional: Iterable[str] = ()
+) -> dict[str, NDArray[Any]]:
+    """Return arrays of an .npz by name, numbers, truth values or text; `optional` ones as far as they are there.
+
+    Raises `wrong`: not there, no NumPy archive, broken, an array missing or of another kind, or larger unpacked
+    than `MOST_UNPACKED`. Nothing is allocated that the archive does not hold.
+    """
+    data = read_bytes(path, wrong, "an .npz file")
+    if not data.startswith(b"PK"):
+        raise wrong("not a NumPy archive", file=path, expected="an .npz file")
+    # Each entry of the list at the end costs an object; a list may be long where the arrays are not.
+    if data.count(_ENTRY) > _MOST_ENTRIES:
+        raise wrong("an archive of too many files", file=path, expected=f"at most {_MOST_ENTRIES:,}")
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            return _arrays(archive, path, tuple(names), tuple(optional), wrong)
+    except InputError:
+        raise
+    except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, NotImplementedError, MemoryError) as error:
+        raise _broken(path, wrong) from error
+    except (ValueError, KeyError, TypeError, SyntaxError, IndexError, OverflowError) as error:
+        raise _broken(path, wrong) from error
+
+
+def check_array(
+    values: NDArray[Any], name: str, path: Path, wrong: type[InputError], kinds: str, shape: tuple[int | None, ...]
+) -> None:
+    """Raise `wrong` for an array of another kind. kinds: of numbers as NumPy names them; shape: None for any length."""
+    fits = values.ndim == len(shape) and all(b in (None, a) for a, b in zip(values.shape, shape, strict=True))
+    if values.dtype.kind not in kinds or not fits:
+        told = ", ".join("n" if length is None else str(length) for length in shape)
+        raise wrong(
+            "an array of another kind", file=path, key=name, value=f"{values.dtype} {values.shape}",
+            expected=f"{'text' if kinds == 'U' else 'numbers'} of shape ({told})",
+        )  # fmt: skip
+
+
+def _arrays(
+    archive: zipfile.ZipFile, path: Path, names: tuple[str, ...], optional: tuple[str, ...], wrong: type[InputError]
+) -> dict[str, NDArray[Any]]:
+    held = {entry.filename.removesuffix(".npy"): entry for entry in archive.infolist()}
+    if len(held) < len(archive.infolist()):
+        raise wrong("an array stands in the archive twice", file=path, remedy="write it anew")
+    for name in names:
+        if name not in held:
+            raise wrong("an array is missing", file=path, key=name)
+    wanted = [name for name in dict.fromkeys((*names, *optional)) if name in held]
+    unpacked = sum(held[name].file_size for name in wanted)
+    if unpacked > MOST_UNPACKED:
+        raise wrong(
+            "the arrays are too large", file=path, value=f"{unpacked / 1e6:,.0f} MB unpacked",
+            expected=f"at most {MOST_UNPACKED / 1e6:,.0f} MB",
+        )  # fmt: skip
+    return {name: _array(archive, held[name], name, path, wrong) for name in wanted}
+
+
+def _array(
+    archive: zipfile.ZipFile, entry: zipfile.ZipInfo, name: str, path: Path, wrong: type[InputError]
+) -> NDArray[Any]:
+    """Return one array. Its own header must tell the size that the archive has for it."""
+    import numpy as np  # noqa: PLC0415 - the command line reads files without it
+
+    if entry.compress_type not in _METHODS or entry.flag_bits & 1:
+        raise wrong("an array is packed in a way that NumPy does not use", file=path, key=name, remedy="write it anew")
+    # Asked for a number of bytes, the unpacker stops there, whatever the archive holds.
+    with archive.open(entry) as source:
+        content = source.read(entry.file_size)
+    head = io.BytesIO(content)
+    version = np.lib.format.read_magic(head)
+    if version not in _VERSIONS:
+        raise _broken(path, wrong, name)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, fortran, dtype = read(head)
+    if dtype.kind not in _PLAIN or dtype.hasobject:
+        raise wrong("not an array of numbers or text", file=path, key=name, value=str(dtype))
+    count = 1
+    for length in shape:
+        count *= length
+    if min(shape, default=0) < 0 or head.tell() + count * dtype.itemsize != len(content):
+        raise _broken(path, wrong, name)
+    if dtype.kind == "U" and len(content) > _MOST_TEXT:
+        raise wrong("a text of too many letters", file=path, key=name, expected=f"at most {_MOST_TEXT:,} bytes")
+    values = np.frombuffer(content, dtype, count, head.tell()) if count * dtype.itemsize else np.empty(count, dtype)
+    if dtype.kind == "U":
+        "".join(values.tolist()).encode()  # raises ValueError where a letter is none
+    return values.reshape(shape, order="F" if fortran else "C")
+
+
+def _broken(path: Path, wrong: type[InputError], name: str | None = None) -> InputError:
+    return wrong("a broken NumPy archive: it may have been cut off", file=path, key=name, remedy="write it anew")

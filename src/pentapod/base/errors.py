@@ -1,0 +1,112 @@
+"""The exceptions of pentapod.
+
+    PentapodError
+    └── InputError (also ValueError)     what was given is wrong: the command line exits with 2
+        ├── ArrayError                   an array argument: shape, finiteness, range
+        ├── MeshError                    a mesh file or its content
+        ├── ToolpathError                a toolpath, or the parameters of a strategy
+        ├── MachineError                 a machine file or an impossible machine
+        ├── JobError                     a job file
+        └── ProgramError                 a program file, or one that does not belong to its job
+
+That something *cannot be done* (a part out of reach, no time law) is not an exception: it is a
+`pentapod.base.refusal.Refusal`, a value that names the cause.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from pathlib import Path
+
+LONGEST_SHOWN = 200
+"""Characters of a value that a message shows."""
+
+
+class PentapodError(Exception):
+    """Base of every exception that pentapod raises on purpose."""
+
+
+class InputError(PentapodError, ValueError):
+    """What was given is wrong; the message is one line that names the place, the value and the remedy.
+
+    `what` says what is wrong. The keyword arguments are kept as attributes and appear in the message:
+    file, key, line and column say where; value what was found; expected and remedy what to do.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        file: str | Path | None = None,
+        key: str | None = None,
+        line: int | None = None,
+        column: int | None = None,
+        value: object = None,
+        expected: str | None = None,
+        remedy: str | None = None,
+    ) -> None:
+        self.what, self.file, self.key = what, file, key
+        self.line, self.column, self.value = line, column, value
+        self.expected, self.remedy = expected, remedy
+        super().__init__(self._message())
+
+    def _message(self) -> str:
+        place = "" if self.file is None else str(self.file)
+        if self.line is not None:
+            place += f":{self.line}" if place else f"line {self.line}"
+            place += "" if self.column is None else f":{self.column}"
+        head = ": ".join(part for part in (place, _printable(self.key or ""), self.what) if part)
+        if self.value is not None:
+            head += f" (got {_shown(self.value)})"
+        if self.expected:
+            head += f"; expected {self.expected}"
+        if self.remedy:
+            head += f"; {self.remedy}"
+        return head if head.isprintable() else " ".join(_printable(word) for word in head.split())
+
+
+class ArrayError(InputError):
+    """An array argument has the wrong shape, holds NaN or infinity, or is out of range."""
+
+
+class MeshError(InputError):
+    """A mesh file cannot be read, or what it holds is not a surface."""
+
+
+class ToolpathError(InputError):
+    """A toolpath is malformed, or a strategy's parameters make no sense."""
+
+
+class MachineError(InputError):
+    """A machine file is malformed, or describes a machine that cannot exist."""
+
+
+class JobError(InputError):
+    """A job file is malformed, or contradicts itself."""
+
+
+class ProgramError(InputError):
+    """A program file is malformed, or does not belong to the job or machine it is judged against."""
+
+
+def _shown(value: object) -> str:
+    """Return a value for a message, shortened; what is in a file may be of any size."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # a whole number beyond 4,300 digits, or lists in lists in lists
+        return f"{type(value).__name__} too large to show"
+    return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 1] + "…"
+
+
+def _printable(text: str) -> str:
+    """Return a text of a file, shortened and without control characters, which a terminal would obey."""
+    text = text if text.isprintable() else ascii(text)[1:-1]
+    return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 1] + "…"
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return ``did you mean "…"?`` with the known name closest to `name`, or the list of known names."""
+    names = sorted(known)
+    close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    return f'did you mean "{close[0]}"?' if close else "known: " + ", ".join(names)

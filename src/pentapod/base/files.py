@@ -1,0 +1,86 @@
+"""Writing files so that an interruption leaves the old file or none, never half of one."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import io
+import os
+import secrets
+import zipfile
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pentapod.base.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+
+
+@contextmanager
+def atomic_write(path: str | Path) -> Generator[Path]:
+    """Yield the path of an empty temporary file beside `path`; rename it to `path` when the block succeeds.
+
+    The temporary name keeps the suffix, since some writers look at it. When the block raises (also on
+    KeyboardInterrupt) the temporary file is removed and what stood at `path` before is untouched.
+    Raises InputError where the folder does not exist or cannot be written, `path` is a folder, or no space is left.
+
+        with atomic_write("verdict.json") as temporary:
+            temporary.write_text(text)
+    """
+    target = Path(path)
+    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(6)}{target.suffix}")
+    try:
+        if target.is_dir():
+            raise IsADirectoryError(21, "Is a directory")
+        # "x": never someone else's file; created with the user's usual permissions.
+        with temporary.open("xb"):
+            pass
+    except OSError as error:
+        raise unwritable(target, error) from error
+    try:
+        yield temporary
+        # Without it a power cut after the rename may leave an empty file of the right name.
+        with temporary.open("rb+") as written:
+            os.fsync(written.fileno())
+        temporary.replace(target)
+    except OSError as error:
+        # A full disk is told by a number alone, or by a name that is gone by now.
+        if (error.errno in _FULL and error.filename is None) or error.filename in (str(temporary), temporary):
+            raise unwritable(target, error) from error
+        raise
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def unwritable(path: Path, error: OSError) -> InputError:
+    """Return the error that says why a file cannot be written."""
+    reason = (error.strerror or str(error)).lower()
+    expected = "room for it on the disk" if error.errno in _FULL else "a folder that exists and can be written"
+    return InputError(f"cannot be written: {reason}", file=path, expected=expected)
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file's bytes, as hex digits. Raises OSError."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def packed_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """Return the bytes of an .npz; the same arrays give the same bytes."""
+    import numpy as np  # noqa: PLC0415 - the command line writes files without it
+
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_STORED) as archive:
+        for name, array in arrays.items():
+            buffer = io.BytesIO()
+            np.lib.format.write_array(buffer, np.asarray(array, order="C"), allow_pickle=False)
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy", _EPOCH), buffer.getvalue())
+    return packed.getvalue()

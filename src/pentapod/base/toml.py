@@ -1,0 +1,127 @@
+"""TOML files that people write: read and parsed, and what is wrong with them told by line, key and remedy."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from pentapod.base.errors import InputError
+from pentapod.base.input_files import read_bytes
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+    from pydantic_core import ErrorDetails
+
+MOST_BYTES = 1_000_000
+"""Files that people write are smaller."""
+
+DEEPEST = 16
+"""How many arrays and tables may stand in each other."""
+
+_PLACE = re.compile(r"\(at line (\d+), column (\d+)\)")
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w\"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{4 * DEEPEST}}}")
+_MANY_DIGITS = re.compile(r"\w{19,}")
+_TOO_LARGE = 2**63
+_SHALLOW = f"at most {DEEPEST} levels"
+_FEW_DIGITS = "a number that fits 64 bits"
+
+
+def read_toml(path: Path, kind: str, wrong: type[InputError], *, start: str | None = None) -> str:
+    """Return the text of a file. kind: "job" or "machine"; start: how one gets a file to start from, for messages.
+
+    Raises `wrong` where it is missing, a folder, not readable, not text, or empty.
+    """
+    try:
+        # Some editors begin a file with a byte order mark.
+        text = read_bytes(path, wrong, f"a {kind} file", MOST_BYTES, start).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise wrong("not a text file in UTF-8", file=path, expected=f"a {kind} file in TOML") from error
+    if not text.strip():
+        raise wrong(f"the {kind} file is empty", file=path, remedy=start)
+    return text
+
+
+def parsed(text: str, file: str | Path, wrong: type[InputError]) -> dict[str, Any]:
+    """Return the tables of a text. Raises `wrong` with line and column where it is not TOML, or none that is read.
+
+    Not read are numbers beyond 4,300 digits, and tables or arrays nested deeper than `DEEPEST`: none of our files has
+    such, and Python's parser fails on them, or needs hours.
+    """
+    if deep := _LONG_KEY.search(text):
+        line = text.count("\n", 0, deep.start()) + 1
+        raise wrong("a key of too many parts", file=file, line=line, value=deep[0][:40], expected=_SHALLOW)
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        place = _PLACE.search(str(error))
+        # Only the end of the file comes without a place.
+        line, column = (int(place[1]), int(place[2])) if place else (len(text.splitlines()), None)
+        raise wrong(f"not TOML: {str(error).split(' (at ')[0]}", file=file, line=line, column=column) from error
+    except RecursionError as error:
+        raise wrong("nested too deep", file=file, line=_deepest_line(text), expected=_SHALLOW) from error
+    except (ValueError, ArithmeticError) as error:
+        raise wrong("a number of too many digits", file=file, line=_digits_line(text), expected=_FEW_DIGITS) from error
+    _check_values(content, text, file, wrong)
+    return content
+
+
+def _check_values(content: dict[str, Any], text: str, file: str | Path, wrong: type[InputError]) -> None:
+    """Raise `wrong` where values are nested too deep, or a whole number is too large for a computer's own numbers."""
+    level: list[Any] = [content]
+    for _ in range(DEEPEST):
+        inner: list[Any] = []
+        for value in level:
+            if isinstance(value, dict):
+                inner += cast("dict[str, Any]", value).values()
+            elif isinstance(value, list):
+                inner += cast("list[Any]", value)
+            elif isinstance(value, int) and abs(value) >= _TOO_LARGE:
+                raise wrong("a number of too many digits", file=file, line=_digits_line(text), expected=_FEW_DIGITS)
+        level = inner
+    if level:
+        raise wrong("nested too deep", file=file, line=_deepest_line(text), expected=_SHALLOW)
+
+
+def _digits_line(text: str) -> int | None:
+    """Return the line of the first number that is too long."""
+    found = _MANY_DIGITS.search(text)
+    return text.count("\n", 0, found.start()) + 1 if found else None
+
+
+def _deepest_line(text: str) -> int:
+    """Return the line where the most brackets open: for messages, so a plain count is enough."""
+    lines = text.splitlines()
+    depth = [line.count("[") + line.count("{") - line.count("]") - line.count("}") for line in lines]
+    opened = [line.count("[") + line.count("{") for line in lines]
+    return 1 + max(range(len(lines)), key=lambda k: (depth[k], opened[k]))
+
+
+def line_of(text: str, where: Sequence[str]) -> int | None:
+    """Return the line of a key, or of its table's header: for messages, so a plain search is enough."""
+    table, header = "", None
+    for number, line in enumerate(text.splitlines(), start=1):
+        if match := re.match(r"\s*\[\s*(\w+)\s*\]", line):
+            table = match[1]
+            if table == where[0]:
+                header = number
+            continue
+        wanted = where[1:2] if table == where[0] else [] if table else where[:1]
+        if wanted and re.match(rf"\s*{re.escape(wanted[0])}\s*=", line):
+            return number
+    return header
+
+
+def first_of(error: ValidationError) -> ErrorDetails:
+    """Return the one error to show: an unknown key first, since a misspelling is also a missing key."""
+    return min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
+
+
+def wrong_value(error: ErrorDetails, meaning: str) -> dict[str, Any]:
+    """Return what, value and expected of a value that its schema refuses. meaning: what the schema says of the key."""
+    message = error["msg"].removeprefix("Input should be ").removeprefix("a ").removeprefix("valid ")
+    what = "out of range" if set(error.get("ctx", {})) & {"gt", "ge", "lt", "le"} else "wrong value"
+    return {"what": what, "value": error["input"], "expected": f"{message} ({meaning})"}

@@ -1,0 +1,44 @@
+"""The blame table: which limits bind, where on the path, and by how much."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pentapod.base.refusal import Refusal
+    from pentapod.planning.active_limits import Binding
+
+_RANGES = 6
+
+
+def bindings_text(found: Sequence[Binding]) -> str:
+    """Return the table of a plan that fits: every limit with its smallest margin, the nearest first."""
+    lines = [
+        f"{'limit':<46} {'margin':>8} {'room':>12} {'waypoint':>9} {'nearest at':>10}  waypoints where it is nearest"
+    ]
+    for binding in found:
+        room = f"{binding.room:.3g} {binding.unit}" if binding.unit else ""
+        share = f"{100.0 * binding.share:.1f} %" if binding.share else "–"
+        where = _ranges(binding.waypoints)
+        lines.append(
+            f"{binding.limit:<46} {binding.margin:>8.4f} {room:>12} {binding.worst:>9} {share:>10}  {where}".rstrip()
+        )
+    return "\n".join(lines)
+
+
+def blames_text(refusal: Refusal) -> str:
+    """Return the table of a refusal: every limit in the way, the worst first."""
+    lines = [f"{'limit in the way':<46} {'beyond it by':>14}  waypoints"]
+    for blame in refusal.blames:
+        amount = f"{blame.shortfall:.3g} {blame.unit}" if blame.shortfall else "–"
+        lines.append(f"{blame.constraint:<46} {amount:>14}  {_ranges(blame.waypoints)}".rstrip())
+    return "\n".join([*lines, refusal.remedy])
+
+
+def _ranges(waypoints: Sequence[tuple[int, int]]) -> str:
+    """Return the longest ranges, in the order of the path."""
+    longest = sorted(sorted(waypoints, key=lambda pair: pair[0] - pair[1])[:_RANGES])
+    text = ", ".join(f"{a}-{b}" if b > a else f"{a}" for a, b in longest)
+    more = len(waypoints) - len(longest)
+    return text + (f" and {more} shorter" if more > 0 else "")

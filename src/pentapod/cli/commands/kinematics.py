@@ -1,0 +1,171 @@
+"""pentapod ik and fk: between tool poses and leg lengths, for a number or a stream of them."""
+
+# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pentapod.cli.numbers import Real
+from pentapod.cli.output import echo_json, json_option, quiet_option
+
+if TYPE_CHECKING:
+    from pentapod.base.arrays import Floats
+    from pentapod.machine import Machine
+
+POSE = ("x_mm", "y_mm", "z_mm", "i", "j", "k")
+LEGS = ("leg1_mm", "leg2_mm", "leg3_mm", "leg4_mm", "leg5_mm")
+
+_NEGATIVES = {"ignore_unknown_options": True}  # or -120.5 would be taken for an option
+_machine_option = click.option(
+    "-m",
+    "--machine",
+    "machine_name",
+    default="desk",
+    show_default=True,
+    help="Shipped machine, or a machine file.",
+)
+
+
+@click.command(context_settings=_NEGATIVES)
+@click.argument("pose", nargs=-1, type=Real(), metavar="[X Y Z I J K]")
+@_machine_option
+@json_option
+@quiet_option
+def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -> int:
+    """Leg lengths in mm of a tool pose: tip X Y Z in mm, and tool axis I J K, machine frame.
+
+    The axis points from the tip to the spindle, as in APT; it need not have unit length. Without numbers, CSV
+    is read from stdin: a header "x_mm,y_mm,z_mm,i,j,k", then a pose in each line.
+    """
+    import numpy as np
+
+    from pentapod.base.errors import InputError
+
+    machine = _machine(machine_name)
+    rows = _rows(pose, POSE)
+    length = np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
+    if (length == 0.0).any():
+        raise InputError("the tool axis is zero", key="i, j, k", expected="a direction from the tip to the spindle")
+    direction = -rows[:, 3:] / length
+    position = rows[:, :3] * 1e-3 - machine.tool_length * direction
+    legs = machine.pentapod.leg_lengths(position, direction)
+    limits = machine.legs
+    within = ((legs >= limits.min_length) & (legs <= limits.max_length)).all(axis=1)
+    components = [_component(signs) for signs in machine.pentapod.component(position, direction)]
+    columns: dict[str, Any] = {name: legs[:, k] * 1e3 for k, name in enumerate(LEGS)}
+    columns |= {"component": components, "within_strokes": within.tolist()}
+    _print(columns, as_json=as_json, one=bool(pose), quiet=quiet)
+    return 0
+
+
+@click.command(context_settings=_NEGATIVES)
+@click.argument("legs", nargs=-1, type=Real(), metavar="[L1 L2 L3 L4 L5]")
+@click.option("-c", "--component", help='Signs of w and S: "++", "+-", "-+", "--"; all four when left out.')
+@_machine_option
+@json_option
+@quiet_option
+def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_json: bool, quiet: bool) -> int:
+    """Tool poses of five leg lengths in mm: tip in mm, tool axis, distances to singularities.
+
+    Five legs have four poses, one in each component, or none. Without numbers, CSV is read from stdin: a
+    header "leg1_mm,...,leg5_mm", then one set of legs in each line. nan: no such pose. Exit code 1 where a
+    set of legs has no pose.
+    """
+    import numpy as np
+
+    from pentapod.kinematics import COMPONENTS, Component, orientation_distance, position_distance
+
+    machine = _machine(machine_name)
+    rows = _rows(legs, LEGS) * 1e-3
+    chosen = list(COMPONENTS) if component is None else [Component.parse(component)]
+    position, direction = machine.pentapod.pose(rows[:, None, :], np.array(chosen))
+    position, direction = position.reshape(-1, 3), direction.reshape(-1, 3)
+    tips = (position + machine.tool_length * direction) * 1e3
+    columns: dict[str, Any] = {"row": np.repeat(np.arange(len(rows)), len(chosen)).tolist()}
+    columns["component"] = [str(c) for c in chosen] * len(rows)
+    columns |= {name: tips[:, k] for k, name in enumerate(POSE[:3])}
+    columns |= {name: -direction[:, k] for k, name in enumerate(POSE[3:])}
+    columns["singularity_mm"] = position_distance(machine.pentapod, position, direction) * 1e3
+    columns["singularity_deg"] = np.degrees(orientation_distance(machine.pentapod, position, direction))
+    _print(columns, as_json=as_json, one=bool(legs) and component is not None, quiet=quiet)
+    return 0 if np.isfinite(tips).all() else 1
+
+
+def _machine(name: str) -> Machine:
+    from pentapod.machine import Machine
+
+    return Machine.load(name)
+
+
+def _component(signs: Sequence[int]) -> str:
+    return "".join("+" if sign > 0 else "-" if sign < 0 else "0" for sign in signs)
+
+
+def _rows(numbers: tuple[float, ...], names: tuple[str, ...]) -> Floats:
+    """Return the numbers of the command line (1, n), or those of the CSV on stdin (N, n)."""
+    import numpy as np
+
+    from pentapod.base.errors import InputError
+
+    if numbers:
+        if len(numbers) != len(names):
+            raise InputError("wrong count of numbers", value=len(numbers), expected=" ".join(names))
+        rows = np.array([numbers])
+        if not np.isfinite(rows).all():
+            raise InputError("numbers must be finite", value=list(numbers), expected=" ".join(names))
+        return rows
+    if sys.stdin.isatty():
+        raise InputError("no numbers given", expected=" ".join(names), remedy="or CSV on stdin")
+    # Numbered before blank ones are passed over.
+    try:
+        lines = [(number, line.strip()) for number, line in enumerate(sys.stdin, start=1) if line.strip()]
+    except UnicodeDecodeError as error:
+        raise InputError("not UTF-8 text", file="stdin", expected=",".join(names)) from error
+    if not lines or tuple(field.strip() for field in lines[0][1].split(",")) != names:
+        got = lines[0][1][:80] if lines else "nothing"
+        raise InputError("wrong header", file="stdin", line=1, value=got, expected=",".join(names))
+    return np.array([_row(line, number, names) for number, line in lines[1:]]).reshape(-1, len(names))
+
+
+def _row(line: str, number: int, names: tuple[str, ...]) -> list[float]:
+    """Return the numbers of a line of the CSV on stdin. Raises InputError with its number."""
+    from pentapod.base.errors import InputError
+    from pentapod.base.input_files import number_in
+
+    fields, what = line.split(","), "not a row of finite numbers"
+    if len(fields) != len(names):
+        what = "wrong count of numbers"
+    else:
+        row = [value for field in fields if (value := number_in(field)) is not None]
+        if len(row) == len(names):
+            return row
+    raise InputError(what, file="stdin", line=number, value=line[:80], expected=",".join(names))
+
+
+def _print(columns: dict[str, Any], *, as_json: bool, one: bool, quiet: bool) -> None:
+    """Print columns of equal length: as JSON (an object for one row, else a list), or, unless quiet, as CSV."""
+    values = [list(column) for column in columns.values()]
+    records = [dict(zip(columns, (_plain(v) for v in row), strict=True)) for row in zip(*values, strict=True)]
+    if as_json:
+        echo_json(records[0] if one else records)
+        return
+    if quiet:
+        return
+    lines = [",".join(columns)]
+    lines += [",".join(_text(value) for value in record.values()) for record in records]
+    click.echo("\n".join(lines))
+
+
+def _plain(value: Any) -> Any:
+    return value if isinstance(value, (str, bool, int)) else float(value)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.9f}" if isinstance(value, float) else str(value)

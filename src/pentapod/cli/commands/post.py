@@ -1,0 +1,112 @@
+"""pentapod post: a program as a controller takes it."""
+
+# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from pentapod.cli.output import echo_json, json_option, note_changes, progress_bar, quiet_option
+
+if TYPE_CHECKING:
+    from pentapod.machine import Machine
+    from pentapod.program import Program
+
+
+def _print_formats(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    if value:
+        from pentapod.program.posts import find_post, post_names
+
+        width = max(len(name) for name in post_names())
+        for name in post_names():
+            click.echo(f"{name:<{width}}  {find_post(name).about}")
+        ctx.exit()
+
+
+def _complete_format(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
+    from pentapod.program.posts import post_names
+
+    del ctx, param
+    return [name for name in post_names() if name.startswith(incomplete)]
+
+
+@click.command()
+@click.argument("program", type=click.Path(path_type=Path))
+@click.option("--to", "name", required=True, shell_complete=_complete_format, help="Format; --formats lists them.")
+@click.option("-o", "--out", required=True, type=click.Path(path_type=Path), help="Folder for the files.")
+@click.option("--job", type=click.Path(path_type=Path), help="The job it was made from: tells the machine.")
+@click.option("--machine", help="The machine's name or file, where there is no job.")
+@click.option("--plan", type=click.Path(path_type=Path),
+              help="The run's plan.npz, for formats that hold the toolpath  [default: beside PROGRAM]")  # fmt: skip
+@click.option("--verdict", type=click.Path(path_type=Path),
+              help="What judged exactly this file, and passed  [default: verdict.json beside PROGRAM]")  # fmt: skip
+@click.option("--unverified", is_flag=True, help="Write it without a passed verdict; every file then says so.")
+@click.option("--formats", is_flag=True, expose_value=False, is_eager=True, callback=_print_formats,
+              help="List the formats and exit.")  # fmt: skip
+@json_option
+@quiet_option
+def post(
+    program: Path,
+    name: str,
+    out: Path,
+    job: Path | None,
+    machine: str | None,
+    plan: Path | None,
+    verdict: Path | None,
+    unverified: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Write PROGRAM.csv in another format, if a verdict has passed for exactly this file.
+
+    A machine that pentapod ships is found by the name in the program; another one, or a shipped one with another
+    tool or period, by --job or --machine. Formats of your own are found by entry points of the group
+    pentapod.posts.
+    """
+    from pentapod.base.files import sha256_of
+    from pentapod.job.artefacts import ARRAYS, VERDICT
+    from pentapod.program import read_csv
+    from pentapod.program.judged import check_passed
+    from pentapod.program.posts import PostInput, find_post, placed_toolpath, write_post
+
+    takes_toolpath = find_post(name).takes_toolpath  # an unknown one is said at once
+    note_changes(program.parent)
+    with progress_bar(quiet=quiet or as_json) as progress:
+        progress("reading", 0.0, program.name)
+        read, digest = read_csv(program), sha256_of(program)
+        if not unverified:
+            verdict = program.with_name(VERDICT) if verdict is None else verdict
+            check_passed(verdict, digest, program)
+        beside = program.with_name(ARRAYS)
+        plan = beside if plan is None and takes_toolpath and beside.exists() else plan
+        toolpath = None if plan is None else placed_toolpath(plan, read)
+        progress("reading", 1.0, program.name)
+        progress("writing", 0.0, name)
+        given = PostInput(read, _machine(read, job, machine), toolpath, digest)
+        files = write_post(given, name, out, verdict=verdict, unverified=unverified)
+    if as_json:
+        echo_json({"format": name, "verified": not unverified, "files": [str(file) for file in files]})
+    elif not quiet:
+        for file in files:
+            click.echo(str(file))
+    return 0
+
+
+def _machine(program: Program, job: Path | None, machine: str | None) -> Machine | None:
+    """Return the machine that was named, or the shipped one of the program's name; None where there is none."""
+    from pentapod.base.errors import MachineError
+    from pentapod.job.build.values import job_machine
+    from pentapod.job.schema.job import Job
+    from pentapod.machine import Machine
+
+    if job is not None:
+        return job_machine(Job.load(job))
+    if machine is not None:
+        return Machine.load(machine)
+    try:
+        return Machine.load(program.provenance.machine)
+    except MachineError:
+        return None

@@ -1,0 +1,178 @@
+"""pentapod simulate: what a real machine would make of a program."""
+
+# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pentapod.cli.numbers import Real, Whole
+from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
+
+if TYPE_CHECKING:
+    from pentapod.base.progress import Progress
+    from pentapod.base.refusal import Refusal
+    from pentapod.simulate import Physics, Reference, Tracking
+    from pentapod.toolpath import Toolpath
+
+_OF_SERVO, _OF_MUJOCO = ("correct", "seed"), ("export", "cutting_force_n", "base_error", "offset_error")
+_LEG, _MM = Whole(1, 5), Real()
+
+
+@click.command()
+@click.argument("program", type=click.Path(path_type=Path))
+@click.option("--job", required=True, type=click.Path(path_type=Path), help="The job it was made from.")
+@click.option("--engine", type=click.Choice(["servo", "mujoco"]), default="servo", show_default=True,
+              help="servo: drives with encoders, dead time and force ripple. mujoco: rigid bodies.")  # fmt: skip
+@click.option("--correct", is_flag=True, help="Servo: correct the legs by the pose, rebuilt in the loop.")
+@click.option("--seed", type=Whole(0), default=0, show_default=True, help="Servo: of the ripple's phases.")
+@click.option("--export", type=click.Path(path_type=Path), metavar="FILE", help="MuJoCo: write the model as MJCF.")
+@click.option("--cutting-force", "cutting_force_n", type=Real(0.0, min_open=True), metavar="N",
+              help="MuJoCo: play again with this force on the tip, against its motion, on cuts.")  # fmt: skip
+@click.option("--base-error", type=(_LEG, _MM, _MM, _MM), multiple=True, metavar="LEG X Y Z",
+              help="MuJoCo: a base joint is off by so many mm; may be repeated.")  # fmt: skip
+@click.option("--offset-error", type=(_LEG, _MM), multiple=True, metavar="LEG MM",
+              help="MuJoCo: a platform joint is off along the tool by so many mm; may be repeated.")  # fmt: skip
+@click.option("--within", "within_mm", type=Real(0.0, min_open=True), metavar="MM",
+              help="Fail where the tip leaves the programmed path by more.")  # fmt: skip
+@click.option("--plots", "plots", type=click.Path(path_type=Path), metavar="FILE",
+              help="Write every measure against time as a page for the browser.")  # fmt: skip
+@json_option
+@quiet_option
+@click.pass_context
+def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet: bool, **given: Any) -> int:
+    """Play PROGRAM.csv on a simulated machine and measure how far the tool is off.
+
+    Drives and masses are those of the machine file's tables [drives] and [masses]; docs/simulation.md says what is
+    modelled.
+    """
+    from pentapod.base.refusal import Refusal
+    from pentapod.job.build.values import job_machine, job_mesh, program_toolpath
+    from pentapod.job.schema.job import Job
+    from pentapod.program import read_csv
+    from pentapod.program.posts import PostInput
+    from pentapod.simulate import Reference, load_mujoco
+
+    engine, within_mm, plots = given["engine"], given["within_mm"], given.pop("plots")
+    _check_options(ctx, engine)
+    if engine == "mujoco":
+        load_mujoco()  # a missing one is said at once
+    read, loaded = read_csv(program), Job.load(job)
+    reference = Reference(read, PostInput(read, job_machine(loaded)).the_machine())
+    same_job = read.provenance.job_digest == loaded.digest
+    with progress_bar(quiet=quiet or as_json) as progress:
+        progress("toolpath", 0.0)
+        toolpath = program_toolpath(loaded, job_mesh(loaded, progress), program, progress)
+        task = _Task(reference, toolpath, loaded.tolerance.path_mm * 1e-3, progress)
+        found = task.servo(**given) if engine == "servo" else task.mujoco(**given)
+    if isinstance(found, Refusal):
+        if as_json:
+            echo_json({"engine": engine, "done": False, "cause": str(found)})
+        click.echo(f"refused: {found}", err=True)
+        return 1
+    lines, content, tracking = found
+    if plots is not None:
+        from pentapod.report import write_simulation
+
+        names = ("as programmed", f"with {given['cutting_force_n']} N on cuts")
+        write_simulation(plots, program.name, engine, lines, list(zip(names, tracking, strict=False)))
+        lines, content = [*lines, f"  plots: {plots}"], {**content, "plots": str(plots)}
+    largest = max(part.measures[0].largest for part in tracking)
+    passed = within_mm is None or largest <= within_mm
+    if as_json:
+        echo_json(
+            {"engine": engine, "rows": len(read.legs), "same_job": same_job, "done": True, "passed": passed, **content}
+        )
+    elif not quiet:
+        click.echo("\n".join([f"{engine}: {len(read.legs)} setpoints, {read.duration:.6g} s", *lines]))
+    if not same_job and not quiet:
+        click.echo("note: the program was made from another job, so its toolpath may be another", err=True)
+    if not passed:
+        click.echo(f"the contour error, {largest:.3g} mm, exceeds {within_mm:g} mm", err=True)
+    return 0 if passed else 1
+
+
+def _check_options(ctx: click.Context, engine: str) -> None:
+    """Raise UsageError for an option of the other engine."""
+    for name in _OF_MUJOCO if engine == "servo" else _OF_SERVO:
+        if ctx.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE:
+            other = "mujoco" if engine == "servo" else "servo"
+            option = name.removesuffix("_n").replace("_", "-")
+            raise click.UsageError(f"--{option} needs --engine {other}", ctx)
+
+
+_Found = tuple[list[str], dict[str, Any], tuple["Tracking", ...]]
+
+
+@dataclass(frozen=True)
+class _Task:
+    """A program on its machine, and what it is measured against; each engine returns text, JSON and measures."""
+
+    reference: Reference
+    toolpath: Toolpath
+    tolerance: float
+    progress: Progress
+
+    def servo(self, *, seed: int, correct: bool, **_: Any) -> _Found | Refusal:
+        from pentapod.base.refusal import Refusal
+        from pentapod.simulate import Tracking, simulate_servo
+
+        self.progress("simulate", 0.0)
+        played = simulate_servo(self.reference, seed=seed, correct=correct)
+        if isinstance(played, Refusal):
+            return played
+        tracking = Tracking(played, self.reference, self.toolpath, self.tolerance)
+        lines = [f"  seed {seed}, " + ("corrected by the pose" if correct else "not corrected"), *tracking.lines()]
+        return lines, {"seed": seed, "correct": correct, **tracking.to_dict()}, (tracking,)
+
+    def mujoco(self, *, export: Path | None, cutting_force_n: float | None, **given: Any) -> _Found | Refusal:
+        from pentapod.base.files import atomic_write
+        from pentapod.base.refusal import Refusal
+        from pentapod.simulate import cutting_forces, plant, simulate_mujoco
+
+        stands = plant(self.reference, **_errors(given["base_error"], given["offset_error"]))
+        if isinstance(stands, Refusal):
+            return stands
+        if export is not None:
+            with atomic_write(export) as temporary:
+                temporary.write_text(stands.xml, encoding="utf-8")
+        free = simulate_mujoco(self.reference, stands, progress=self.progress)
+        if isinstance(free, Refusal):
+            return free
+        tracking, lines, content = self._told(free)
+        if export is not None:
+            lines, content = [*lines, f"  model: {export}"], {**content, "model": str(export)}
+        if cutting_force_n is None:
+            return lines, content, (tracking,)
+        forces = cutting_forces(self.reference, tracking.cutting, cutting_force_n)
+        loaded = simulate_mujoco(self.reference, stands, tip_forces=forces, progress=self.progress)
+        if isinstance(loaded, Refusal):
+            return loaded
+        second, more, inner = self._told(loaded)
+        lines = [*lines, f"with {cutting_force_n:g} N against the motion on cuts", *more]
+        return lines, {**content, "cutting": {"force_n": cutting_force_n, **inner}}, (tracking, second)
+
+    def _told(self, physics: Physics) -> tuple[Tracking, list[str], dict[str, Any]]:
+        from pentapod.simulate import Tracking
+
+        tracking = Tracking(physics.played, self.reference, self.toolpath, self.tolerance, physics.measures)
+        low, high = physics.leg_forces.min(axis=0), physics.leg_forces.max(axis=0)
+        spans = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in zip(low, high, strict=True))
+        lines = [*tracking.lines(), f"  leg forces 1 to 5, pushing: {spans} N"]
+        return tracking, lines, {**tracking.to_dict(), "leg_forces_n": {"least": low.tolist(), "most": high.tolist()}}
+
+
+def _errors(base: list[tuple[int, float, float, float]], offset: list[tuple[int, float]]) -> dict[str, Any]:
+    """Return the errors of the options, millimetres, as arrays in metres."""
+    import numpy as np
+
+    base_errors, offset_errors = np.zeros((5, 3)), np.zeros(5)
+    for leg, *error in base:
+        base_errors[leg - 1] += np.array(error) * 1e-3
+    for leg, along in offset:
+        offset_errors[leg - 1] += along * 1e-3
+    return {"base_errors": base_errors, "offset_errors": offset_errors}

@@ -1,0 +1,55 @@
+"""pentapod toolpath: a job's toolpath alone, in the workpiece frame."""
+
+# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
+
+
+@click.command()
+@click.argument("job", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--out", required=True, type=click.Path(path_type=Path), help="File to write; its suffix tells the format."
+)
+@click.option("--format", "format_name", help="Format, where the suffix does not tell: see above.")
+@json_option
+@quiet_option
+def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet: bool) -> int:
+    """Write the toolpath of JOB.toml: no machine, no placement, no time.
+
+    Formats: apt (.apt .cls .cl .cldata), xyzab G-code of LinuxCNC's pentakins (.ngc), xyzbc G-code with G43.4 (.nc
+    .tap), both also as xyzab-g93 and xyzbc-g93 with inverse time feed, robodk (.robodk.csv), csv, npz. Axes point
+    from the tip to the spindle; the frame is that of the workpiece.
+    """
+    from pentapod.geometry import arc_length
+    from pentapod.job.build.values import job_mesh, job_toolpath
+    from pentapod.job.schema.job import Job
+    from pentapod.toolpath.formats import format_of, write_toolpath
+
+    format_of(out, format_name)  # an unknown one is said at once
+    loaded = Job.load(job)
+    with progress_bar(quiet=quiet or as_json) as progress:
+        progress("mesh", 0.0)
+        mesh = job_mesh(loaded, progress)
+        progress("mesh", 1.0)
+        progress("toolpath", 0.0)
+        path, came_to = job_toolpath(loaded, mesh, progress)
+        progress("toolpath", 1.0)
+        progress("writing", 0.0, out.name)
+        write_toolpath(path, out, format_name)
+    kinds = [str(segment.kind) for segment in path.segments]
+    lengths = [1e3 * float(arc_length(segment.tips)[-1]) for segment in path.segments]
+    by_kind = {kind: sum(v for k, v in zip(kinds, lengths, strict=True) if k == kind) for kind in set(kinds)}
+    if as_json:
+        summary = {"waypoints": len(path), "segments": len(kinds), "length_mm": dict(sorted(by_kind.items()))}
+        echo_json({**summary, "file": str(out)})
+    elif not quiet:
+        click.echo(str(mesh.diagnosis))
+        click.echo(str(came_to))
+        click.echo(f"toolpath: {out}")
+    return 0

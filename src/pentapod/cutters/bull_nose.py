@@ -1,0 +1,63 @@
+"""BullNose: a flat-ended cutter with a rounded corner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.cutters.mounted import Mounted, check_flute, check_positive, rounded_end, wrong
+from pentapod.geometry.solids import Solid
+
+_UPRIGHT = 1e-6
+"""Sine of the angle between axis and normal below which a flat end counts as lying flat on the surface."""
+
+
+@dataclass(frozen=True)
+class BullNose(Mounted):
+    """A flat end with a rounded corner. radius: of the cutter; corner: of its rounding; flute: cutting length.
+
+    Metres. It meets the surface on the rounding: where the axis is the normal, it lies flat and the contact is
+    under the tip. Raises ToolpathError unless 0 ≤ corner < radius and the flute is longer than the corner.
+    """
+
+    radius: float
+    corner: float
+    flute: float | None = None
+
+    def __post_init__(self) -> None:
+        check_positive("radius", self.radius)
+        if not 0.0 <= self.corner < self.radius:
+            raise wrong("corner", self.corner, f"from 0 to below the cutter's radius, {self.radius} m")
+        check_flute(self.flute, self.corner)
+
+    @property
+    def pivot(self) -> float:
+        """The tip."""
+        return 0.0
+
+    @property
+    def leans(self) -> bool:
+        """False: tilting about any one point lifts it off or digs it in."""
+        return False
+
+    @property
+    def scallop_radius(self) -> float | None:
+        """The corner's, which is the least that a bull-nose cutter cuts with; None for a sharp corner."""
+        return self.corner or None
+
+    def tips(self, contacts: Floats, normals: Floats, axes: Floats) -> Floats:
+        """Return the tips: the contact is the point of the rounding that lies furthest against the normal."""
+        flat = normals - np.einsum("...i,...i->...", normals, axes)[..., None] * axes
+        sine = np.linalg.norm(flat, axis=-1, keepdims=True)
+        outward = np.where(sine > _UPRIGHT, flat / np.where(sine > _UPRIGHT, sine, 1.0), 0.0)
+        return contacts + self.corner * (normals - axes) + (self.radius - self.corner) * outward
+
+    def _cutter(self) -> tuple[Solid, ...]:
+        if self.corner == 0.0:
+            return (Solid("cutter", 0.0, self.flute or self.radius, self.radius, self.radius),)
+        return rounded_end(self.radius, self.corner, self.flute)
+
+    def _base(self) -> float:
+        return super()._base() if self.flute is None else self.flute

@@ -1,0 +1,49 @@
+"""StandOff: a tool that keeps its distance from the surface, such as a laser."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import ToolpathError
+from pentapod.cutters.mounted import Mounted
+from pentapod.geometry.solids import Solid
+
+
+@dataclass(frozen=True)
+class StandOff(Mounted):
+    """A laser, spray or water jet that keeps its distance. distance: tip to surface along the axis, metres, ≥ 0.
+
+    The nozzle is the shank, from the tip on. Raises ToolpathError for a negative distance.
+    """
+
+    distance: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.distance) and self.distance >= 0.0):
+            raise ToolpathError("the stand-off must not be negative", key="distance", value=self.distance)
+
+    @property
+    def pivot(self) -> float:
+        """The spot on the surface, the stand-off below the tip."""
+        return -self.distance
+
+    @property
+    def leans(self) -> bool:
+        """True: about the spot on the surface."""
+        return True
+
+    @property
+    def scallop_radius(self) -> None:
+        """None: what does not cut leaves no ridge."""
+        return
+
+    def tips(self, contacts: Floats, normals: Floats, axes: Floats) -> Floats:
+        """Return the tips: the stand-off away from the contact along the axis, whatever the normal."""
+        del normals
+        return contacts + self.distance * axes
+
+    def _cutter(self) -> tuple[Solid, ...]:
+        return ()

@@ -1,0 +1,101 @@
+"""A C3 curve through a polyline, its corners rounded within a tolerance, and that proven.
+
+The curve is Schoenberg's variation-diminishing spline of degree 4 of the polyline: its control points are the
+polyline's own points at the knots' averages. It reproduces straight stretches exactly, never overshoots,
+and approaches the polyline as the knots get denser; so knots are halved wherever it is too far away. Every corner of
+the polyline is a knot, hence between two knots curve minus polyline is one polynomial, and its Bernstein
+coefficients enclose it: no place between samples is left to chance.
+
+Sources: I. J. Schoenberg, "On spline functions", 1967; R. T. Farouki, CAGD 29 (2012), section 5 (convex hull).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import factorial
+from typing import TypeAlias
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.ndimage import binary_dilation
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.errors import ArrayError
+from pentapod.numerics.bernstein import from_power, split
+
+DEGREE = 4
+HALVINGS = 40
+
+TooFar: TypeAlias = Callable[[Floats, Floats], Bools]
+"""too_far(differences (K, D, 5), chords (K, D, 2)): on which of K stretches the curve may leave its tolerance.
+
+differences: Bernstein coefficients of curve minus polyline; chords: the polyline's points at both ends.
+"""
+
+_PARTS = 8
+"""A stretch whose coefficients are too far out is cut into so many before it is called too far."""
+
+
+def rounded(parameter: Floats, points: Floats, too_far: TooFar) -> BSpline:
+    """Return a clamped C3 spline of degree 4 near the polyline of points (N, D) at parameters (N,), ends exact.
+
+    The polyline is linear between parameters, which must increase strictly. Raises ArrayError where they do
+    not, or where no number of halvings brings the curve near enough.
+    """
+    if len(parameter) < 2 or not (np.diff(parameter) > 0.0).all():
+        raise ArrayError("parameters must increase strictly", key="parameter", expected="two or more")
+    knots, changed = parameter, np.ones(len(parameter) - 1, dtype=np.bool_)
+    for _ in range(HALVINGS):
+        curve = schoenberg(knots, parameter, points)
+        rows = np.flatnonzero(changed)
+        far = np.zeros(len(changed), dtype=np.bool_)
+        far[rows] = _far(*_stretches(curve, knots, rows, parameter, points), too_far)
+        if not far.any():
+            return curve
+        # A new knot moves the curve on the DEGREE spans to either side, and nowhere else.
+        changed = np.repeat(binary_dilation(far, iterations=DEGREE), 1 + far)
+        knots = np.sort(np.concatenate([knots, 0.5 * (knots[:-1] + knots[1:])[far]]))
+    raise ArrayError("the tolerance is too small for the spacing of numbers", value=float(np.diff(knots).min()))
+
+
+def schoenberg(knots: Floats, parameter: Floats, points: Floats) -> BSpline:
+    """Return Schoenberg's spline of the polyline (parameter, points) on clamped simple knots (K,)."""
+    t = np.concatenate([np.full(DEGREE, knots[0]), knots, np.full(DEGREE, knots[-1])])
+    averages = sum(t[1 + k : len(t) - DEGREE + k] for k in range(DEGREE)) / DEGREE
+    # Rounding must not carry the outermost averages beyond the polyline.
+    return BSpline(t, interpolated(np.clip(averages, knots[0], knots[-1]), parameter, points), DEGREE)
+
+
+def interpolated(u: Floats, parameter: Floats, points: Floats) -> Floats:
+    """Return the polyline (K, D) at parameters u (K,)."""
+    k = np.clip(np.searchsorted(parameter, u, side="right") - 1, 0, len(parameter) - 2)
+    share = ((u - parameter[k]) / (parameter[k + 1] - parameter[k]))[:, None]
+    return points[k] + share * (points[k + 1] - points[k])
+
+
+def _stretches(curve: BSpline, knots: Floats, rows: Ints, parameter: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Return differences (K, D, 5) and chords (K, D, 2), as `TooFar` takes them, of the spans `rows` (K,)."""
+    width = np.diff(knots)[rows][:, None]
+    powers = [curve(knots[rows], k) * width**k / factorial(k) for k in range(DEGREE + 1)]
+    chords = np.stack([interpolated(knots[k], parameter, points) for k in (rows, rows + 1)], axis=-1)
+    return from_power(np.stack(powers, axis=-1)) - _along(chords, DEGREE), chords
+
+
+def _far(differences: Floats, chords: Floats, too_far: TooFar) -> Bools:
+    """Return on which stretches (K,) the curve is too far, or so near to it that its parts do not tell."""
+    far = too_far(differences, chords)
+    doubtful = np.flatnonzero(far)
+    if not len(doubtful):
+        return far
+    parts = [differences[doubtful]]
+    while len(parts) < _PARTS:
+        parts = [half for part in parts for half in split(part)]
+    ends = _along(chords[doubtful], _PARTS)
+    far[doubtful] = np.any([too_far(part, ends[..., k : k + 2]) for k, part in enumerate(parts)], axis=0)
+    return far
+
+
+def _along(chords: Floats, count: int) -> Floats:
+    """Return points (K, D, count + 1) evenly along chords (K, D, 2)."""
+    share = np.arange(count + 1) / count
+    return chords[..., :1] * (1.0 - share) + chords[..., 1:] * share

@@ -1,0 +1,86 @@
+"""Solids of revolution that tools are made of: convex, exact distance, one formula for all.
+
+A `Solid` is a frustum thickened by a ball: cylinders and cones have no thickening, a ball is a thickened point,
+the end of a bull-nose cutter a thickened disc, a ball's path a thickened line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.errors import ToolpathError
+
+KINDS = ("cutter", "shank", "holder")
+"""What a solid is part of, in the order of reports."""
+
+
+@dataclass(frozen=True)
+class Solid:
+    """All points within `rounding` of a frustum about the tool's axis. Metres; heights from the tip.
+
+    kind: one of `KINDS`. low, high: heights of the frustum's ends. low_radius, high_radius: its radii there.
+    Raises ToolpathError where the numbers make no body.
+    """
+
+    kind: str
+    low: float
+    high: float
+    low_radius: float
+    high_radius: float
+    rounding: float = 0.0
+
+    def __post_init__(self) -> None:
+        numbers = (self.low, self.high, self.low_radius, self.high_radius, self.rounding)
+        if self.kind not in KINDS:
+            raise ToolpathError("unknown kind of solid", key="kind", value=self.kind, expected=", ".join(KINDS))
+        if not np.isfinite(numbers).all() or self.high < self.low or min(numbers[2:]) < 0.0:
+            raise ToolpathError("impossible solid", value=numbers, expected="low ≤ high, and no negative radius")
+
+    @property
+    def top(self) -> float:
+        """Height of its highest point."""
+        return self.high + self.rounding
+
+    @property
+    def thickness(self) -> float:
+        """A depth, metres, that no point within reaches: at least the radius of the largest ball that fits in."""
+        return min(max(self.low_radius, self.high_radius), 0.5 * (self.high - self.low)) + self.rounding
+
+    @property
+    def is_ball(self) -> bool:
+        """Whether it is a point, thickened."""
+        return self.low == self.high and self.low_radius == self.high_radius == 0.0
+
+    @property
+    def numbers(self) -> tuple[float, float, float, float, float]:
+        """What the kernels take: low, high, low_radius, high_radius, rounding."""
+        return (self.low, self.high, self.low_radius, self.high_radius, self.rounding)
+
+
+@dataclass(frozen=True)
+class Cone:
+    """One piece of a shank or holder: a cylinder, or a frustum where the radii differ. Metres.
+
+    Raises ToolpathError unless the height and a radius are positive.
+    """
+
+    height: float
+    lower_radius: float
+    upper_radius: float
+
+    def __post_init__(self) -> None:
+        radii = (self.lower_radius, self.upper_radius)
+        if not (np.isfinite((self.height, *radii)).all() and self.height > 0.0 and min(radii) >= 0.0 < max(radii)):
+            raise ToolpathError("impossible cone", value=(self.height, *radii), expected="height > 0, radii ≥ 0")
+
+
+def stacked(kind: str, cones: Iterable[Cone], base: float) -> tuple[Solid, ...]:
+    """Return the solids of cones stacked from height `base` upwards."""
+    solids: list[Solid] = []
+    for cone in cones:
+        solids.append(Solid(kind, base, base + cone.height, cone.lower_radius, cone.upper_radius))
+        base += cone.height
+    return tuple(solids)

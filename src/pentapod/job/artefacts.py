@@ -1,0 +1,50 @@
+"""The files of a run: their names, and how they are written."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from pentapod.base.errors import InputError
+from pentapod.base.files import atomic_write, packed_arrays
+
+PROGRAM, VERDICT, REPORT, ARRAYS = "program.csv", "verdict.json", "report.html", "plan.npz"
+MANIFEST = "manifest.json"
+NAMES = (PROGRAM, ARRAYS, REPORT, VERDICT, MANIFEST)
+"""In the order in which they move into the folder: the manifest comes last and stands for all."""
+
+SETUPS = "setup-[1-9]*"
+"""Folders of the same files, one for each set-up of a job that needs several."""
+
+
+def check_folder(folder: Path) -> None:
+    """Raise InputError where the folder cannot be made or written; makes nothing that stays."""
+    existing = folder
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    try:
+        with tempfile.TemporaryFile(dir=existing):
+            pass
+    except OSError as error:
+        reason = "not a folder" if existing.is_file() else (error.strerror or str(error)).lower()
+        raise InputError(
+            f"the output folder cannot be written: {reason}", file=folder, remedy="choose another with -o"
+        ) from error
+
+
+def write_json(content: Mapping[str, Any], path: Path) -> None:
+    """Write JSON that a person can read, atomically. NaN is an error, for JSON has none."""
+    text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
+    with atomic_write(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def write_arrays(arrays: Mapping[str, NDArray[Any]], path: Path) -> None:
+    """Write an .npz, atomically; the same arrays give the same bytes."""
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(packed_arrays(arrays))

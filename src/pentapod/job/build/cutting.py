@@ -1,0 +1,26 @@
+"""From a job to what cuts into its part, and how deep it may."""
+
+from __future__ import annotations
+
+from pentapod.job.build.coverage import job_coverage
+from pentapod.job.build.tool import job_tool
+from pentapod.job.schema.job import Job
+from pentapod.job.schema.strategies import sunk_mm
+from pentapod.machine.clearance.collision_world import Surroundings
+from pentapod.verify import Cutting
+
+_MM = 1e-3
+
+
+def job_cutting(job: Job, surroundings: Surroundings) -> Cutting | None:
+    """Return what a job cuts; surroundings: with its part. None where there is none.
+
+    What counts as no gouge, and what the job engraves, is no gouge here either. Raises JobError where the tool's
+    lengths make no tool.
+    """
+    depth = job.gouge.tolerance_mm + sunk_mm(job.toolpath)
+    for obstacle in surroundings.obstacles:
+        if obstacle.name == "part":
+            mesh = obstacle.surface.mesh
+            return Cutting(obstacle.surface, job_tool(job).solids, _MM * depth, job_coverage(job, mesh))
+    return None

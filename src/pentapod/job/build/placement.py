@@ -1,0 +1,118 @@
+"""From a job's table [placement] to the placements that the planner may choose from, and back."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import ArrayError
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.job.schema.job import Job
+from pentapod.job.schema.placement import PLACEMENT_KEYS, PlacementTable
+from pentapod.job.schema.table import Vector
+from pentapod.machine.machine import Machine
+from pentapod.mesh.mesh import Mesh
+from pentapod.planning.problem.constraints import FREE, Freedom
+from pentapod.planning.problem.weights import Weights
+
+_MM = 1e-3
+_EVERYWHERE = (-np.inf, np.inf)
+_PLACE_KEYS = frozenset(("mode", "setups", *(key for keys in PLACEMENT_KEYS.values() for key in keys)))
+"""What says where the part may go; the other keys say what is wanted of the plan."""
+
+
+def job_freedom(job: Job, machine: Machine, mesh: Mesh) -> Freedom:
+    """Return the placements that the job allows. Raises JobError where its matrix is not rigid."""
+    table = job.placement
+    if table.mode == "fixed":
+        return Freedom.fixture([_fixed(job)])
+    if table.mode == "fixture":
+        poses = np.array(table.poses_mm_deg, dtype=np.float64)
+        return Freedom.fixture([_pose(pose[:3], pose[3:]) for pose in poses])
+    if table.mode == "table":
+        return _on_table(job, machine, mesh)
+    if table.box_mm is None and table.largest_turn_deg is None:
+        return FREE
+    corners = np.array([[-np.inf] * 3, [np.inf] * 3]) if table.box_mm is None else np.array(table.box_mm) * _MM
+    turn = 180.0 if table.largest_turn_deg is None else table.largest_turn_deg
+    reference = _pose(np.zeros(3), table.rotation_deg or (0.0, 0.0, 0.0))
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return Freedom.free(low=low, high=high, reference=reference, largest_turn=float(np.radians(turn)))
+
+
+def job_weights(job: Job) -> Weights:
+    """Return the weights of the margins that the job asks for."""
+    table = job.placement
+    return Weights(table.weight_strokes, table.weight_singularities, table.weight_joints, table.weight_bodies)
+
+
+def job_at(job: Job, placement: RigidTransform) -> Job:
+    """Return the job with its part fixed at a placement, told as `placement_toml` tells it; all else stays."""
+    table = job.placement
+    kept = {name: getattr(table, name) for name in table.model_fields_set - _PLACE_KEYS}
+    position = _rounded(placement.translation / _MM, 6)
+    angles = _rounded(np.array(rotation_angles_deg(placement.rotation)), 8)
+    fixed = PlacementTable(mode="fixed", position_mm=position, rotation_deg=angles, **kept)
+    return dataclasses.replace(job, tables=job.tables.model_copy(update={"placement": fixed}))
+
+
+def _rounded(values: Floats, digits: int) -> Vector:
+    x, y, z = (round(float(value), digits) + 0.0 for value in values)  # no −0
+    return x, y, z
+
+
+def placement_toml(table: PlacementTable) -> str:
+    """Return a table [placement] as a job file has it: what is not as by default."""
+    content = table.model_dump(mode="json", exclude_defaults=True)
+    lines = [f"{key} = {json.dumps(value)}" for key, value in content.items()]
+    return "\n".join(["[placement]", *lines])
+
+
+def rotation_angles_deg(rotation: Floats) -> tuple[float, float, float]:
+    """Return the turns about the fixed x, then y, then z axis (degrees) that make up a rotation (3, 3)."""
+    x = np.arctan2(rotation[2, 1], rotation[2, 2])
+    y = np.arctan2(-rotation[2, 0], np.hypot(rotation[2, 1], rotation[2, 2]))
+    z = np.arctan2(rotation[1, 0], rotation[0, 0])
+    if np.hypot(rotation[2, 1], rotation[2, 2]) < 1e-9:  # only the sum or difference of x and z is known
+        x, z = np.arctan2(-rotation[1, 2], rotation[1, 1]), 0.0
+    return float(np.degrees(x)), float(np.degrees(y)), float(np.degrees(z))
+
+
+def _on_table(job: Job, machine: Machine, mesh: Mesh) -> Freedom:
+    """Return the freedom of the job's part standing on the table with its lowest point."""
+    table = job.placement
+    up = np.array(table.up) / np.linalg.norm(table.up)
+    # Up is towards the base: away from where the machine works.
+    side = -1.0 if machine.work.centre[2] > 0.0 else 1.0
+    lowest = float((mesh.vertices @ up).min())
+    height = float(table.table_z_mm or 0.0) * _MM - side * lowest
+    x, y = (
+        _EVERYWHERE if values is None else (values[0] * _MM, values[1] * _MM)
+        for values in (table.table_x_mm, table.table_y_mm)
+    )
+    return Freedom.table(height, x=x, y=y, up=up, normal=(0.0, 0.0, side))
+
+
+def _fixed(job: Job) -> RigidTransform:
+    table = job.placement
+    if table.matrix is None:
+        return _pose(np.array(table.position_mm), table.rotation_deg or (0.0, 0.0, 0.0))
+    matrix = np.array(table.matrix)
+    matrix[:3, 3] *= _MM
+    try:
+        return RigidTransform.from_matrix(matrix)
+    except ArrayError as error:
+        raise job.error("placement", "matrix", error.what, expected=error.expected) from error
+
+
+def _pose(position_mm: Floats, rotation_deg: Vector | Floats) -> RigidTransform:
+    """Return the placement at a position (mm) after turns about the fixed x, then y, then z axis (degrees)."""
+    cx, cy, cz = np.cos(np.radians(rotation_deg))
+    sx, sy, sz = np.sin(np.radians(rotation_deg))
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return RigidTransform(about_z @ about_y @ about_x, position_mm * _MM)

@@ -1,0 +1,47 @@
+"""From a job to what its program is judged against."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pentapod.job.build.collision_world import job_surroundings
+from pentapod.job.build.cutting import job_cutting
+from pentapod.job.build.placement import job_freedom
+from pentapod.job.build.sources import job_sources
+from pentapod.job.schema.job import Job
+from pentapod.kinematics.component import Component
+from pentapod.machine.machine import Machine
+from pentapod.mesh.mesh import Mesh
+from pentapod.toolpath.toolpath import Toolpath
+from pentapod.verify import Specification
+
+_MM = 1e-3
+
+
+def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Callable[[], Toolpath]) -> Specification:
+    """Return all that the job asks of its program; machine and mesh are the job's own.
+
+    make_toolpath: called last, so that errors of the job's tables are told before the long work.
+    Raises JobError where tables of the job do not go with the machine or the mesh.
+    """
+    surroundings, freedom = job_surroundings(job, machine, mesh), job_freedom(job, machine, mesh)
+    cutting, component = job_cutting(job, surroundings), job.placement.component
+    return Specification(
+        machine,
+        make_toolpath(),
+        tilt=float(np.radians(job.axis.tilt_deg)),
+        path_tolerance=job.tolerance.path_mm * _MM,
+        axis_tolerance=float(np.radians(job.tolerance.axis_deg)),
+        job_digest=job.digest,
+        surroundings=surroundings,
+        cutting=cutting,
+        freedom=freedom,
+        component=None if component is None else Component.parse(component),
+        lowest_share=job.feed.lowest_share,
+        stop_angle=float(np.radians(job.feed.stop_angle_deg)),
+        setups=job.placement.setups,
+        waived=job.verify.waive,
+        sources=job_sources(job),
+    )

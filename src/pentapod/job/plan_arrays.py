@@ -1,0 +1,130 @@
+"""The arrays of all stages, named and in the units of files: the content of plan.npz."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pentapod.base.arrays import Floats
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.job.outcome import Outcome
+from pentapod.planning.leg_path.leg_path import LegPath
+from pentapod.planning.placement.placed_path import PlacedPath
+from pentapod.program.program import Program
+from pentapod.timing.law.trajectory import Trajectory
+from pentapod.toolpath.formats.npz import toolpath_arrays
+from pentapod.toolpath.linking.partition import Piece
+from pentapod.toolpath.toolpath import Toolpath
+
+Arrays = dict[str, NDArray[Any]]
+_MM = 1e3
+
+JOB_FILE = "job.file"
+"""The job file that the run was made from: relative to the run's folder where there is such a way."""
+
+GUIDES = "placed.guides_mm"
+"""Where the guides of a reconfigurable machine are to stand, slides (5,) along them."""
+
+WAYPOINTS, BOX = "setup.waypoints", "setup.box_mm"
+"""Of one of several set-ups: its piece of the job's toolpath, first and last waypoint (2,) and corners (2, 3)."""
+
+
+def arrays_of(outcome: Outcome, folder: Path) -> Arrays:
+    """Return every array of the stages that were reached, by name: `stage.quantity_unit`; and `JOB_FILE`.
+
+    folder: of the run.
+    """
+    arrays: Arrays = {JOB_FILE: np.array(_way(outcome.job.path, folder))}
+    if (toolpath := outcome.find(Toolpath)) is not None:
+        arrays |= toolpath_arrays(toolpath)
+    if (piece := outcome.find(Piece)) is not None:
+        arrays |= _set_up(piece)
+    if (placed := outcome.find(PlacedPath)) is not None:
+        arrays |= _placed(placed)
+    if (path := outcome.find(LegPath)) is not None:
+        arrays |= _leg_path(path)
+    if (trajectory := outcome.find(Trajectory)) is not None:
+        arrays |= _trajectory(trajectory)
+    if (program := outcome.find(Program)) is not None:
+        arrays |= {"program.time_s": program.times, "program.legs_mm": program.legs * _MM}
+    return arrays
+
+
+def _way(job: Path, folder: Path) -> str:
+    try:
+        return Path(os.path.relpath(job.resolve(), folder.resolve())).as_posix()
+    except ValueError:  # on another drive
+        return job.resolve().as_posix()
+
+
+def matrix_mm(transform: RigidTransform) -> Floats:
+    """Return the homogeneous matrix (4, 4) with its translation in millimetres."""
+    matrix = transform.matrix
+    matrix[:3, 3] *= _MM
+    return matrix
+
+
+def piece_in(arrays: Mapping[str, NDArray[Any]]) -> Piece | None:
+    """Return the piece of the job's toolpath that a run is about; None where it is about all of it."""
+    if WAYPOINTS not in arrays:
+        return None
+    first, last = arrays[WAYPOINTS].tolist()
+    (x, y, z), (far_x, far_y, far_z) = (_metres(corner) for corner in arrays[BOX])
+    return Piece(first, last, (x, y, z), (far_x, far_y, far_z))
+
+
+def guides_in(arrays: Mapping[str, NDArray[Any]]) -> list[float] | None:
+    """Return where the placement wants the guides, slides (5,) in metres; None where there are none."""
+    return _metres(arrays[GUIDES]) if GUIDES in arrays else None
+
+
+def _metres(values_mm: Floats) -> list[float]:
+    """Return metres to the nanometre: those of whole micrometres, as the planner sets them, come back exactly."""
+    return [round(value / _MM, 9) for value in values_mm.tolist()]
+
+
+def _set_up(piece: Piece) -> Arrays:
+    return {WAYPOINTS: np.array([piece.first, piece.last]), BOX: np.array([piece.low, piece.high]) * _MM}
+
+
+def _placed(placed: PlacedPath) -> Arrays:
+    slides = placed.placement.slides
+    return ({} if slides is None else {GUIDES: np.array(slides) * _MM}) | {
+        "placed.placement_mm": matrix_mm(placed.placement.transform),
+        "placed.component": np.array(placed.component, dtype=np.int8),
+        "placed.tips_mm": placed.tips * _MM,
+        "placed.axes": placed.axes,
+        "placed.margins": placed.margins,
+        "placed.margin_names": np.array(placed.margin_names),
+    }
+
+
+def _leg_path(path: LegPath) -> Arrays:
+    knots = [start + np.asarray(p.knots) for start, p in zip(path.starts, path.pieces, strict=False)]
+    values = [[p(np.asarray(p.knots), order) for p in path.pieces] for order in range(3)]
+    return {
+        "leg_path.piece_starts_mm": np.asarray(path.starts) * _MM,
+        "leg_path.dwells_s": path.dwells,
+        "leg_path.knots_mm": np.concatenate(knots) * _MM,
+        "leg_path.legs_mm": np.concatenate(values[0]) * _MM,
+        "leg_path.legs_first": np.concatenate(values[1]),
+        "leg_path.legs_second_per_mm": np.concatenate(values[2]) / _MM,
+    }
+
+
+def _trajectory(trajectory: Trajectory) -> Arrays:
+    profile = trajectory.profile
+    return {
+        "trajectory.piece_starts_s": trajectory.starts,
+        "trajectory.time_s": profile.times,
+        "trajectory.station_mm": profile.stations * _MM,
+        "trajectory.speed_mm_s": profile.speeds * _MM,
+        "trajectory.active": profile.active,
+        "trajectory.shares": profile.shares,
+        "trajectory.constraint_names": np.array(profile.constraint_names),
+    }

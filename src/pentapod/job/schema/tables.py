@@ -1,0 +1,286 @@
+"""The tables of a job file: every key with its unit, meaning, default and range.
+
+Documentation and `pentapod new` are generated from the descriptions here, so that there is one source of
+defaults. Units are in the names; values are as in the file (mm, degrees, mm/min), not yet SI.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, cast
+
+from pydantic import Field, model_validator
+
+from pentapod.job.schema.placement import FixtureTable, PlacementTable
+from pentapod.job.schema.strategies import ToolpathTable
+from pentapod.job.schema.table import Positive, Table, Vector, wrong
+
+
+class PartTable(Table):
+    """The workpiece: its mesh, and which side of it is machined."""
+
+    mesh: str = Field(
+        min_length=1,
+        description="mesh file (.stl, .ply, .obj); relative to this job file, ${VARIABLE} is expanded",
+    )
+    unit: Literal["mm", "cm", "m", "inch"] | None = Field(
+        default=None, description="unit of the numbers in the mesh file: compulsory, for no format says it"
+    )
+    scale: Positive = Field(default=1.0, description="factor applied to the mesh after its unit")
+    repair: bool = Field(
+        default=False,
+        description="turn facets so that all are wound alike (doubled or empty ones are left out anyway, and told)",
+    )
+    region_box_mm: tuple[Vector, Vector] | None = Field(
+        default=None,
+        description="machine only inside this box: two opposite corners, mesh frame, scaled",
+    )
+    region_direction: Vector = Field(
+        default=(0.0, 0.0, 1.0), description="direction that the machined side faces, mesh frame"
+    )
+    region_angle_deg: float = Field(
+        default=80.0, gt=0.0, lt=90.0, description="machine only where the normal is within this angle of it"
+    )
+
+    @model_validator(mode="after")
+    def _box(self) -> PartTable:
+        if self.region_box_mm is not None:
+            low, high = self.region_box_mm
+            if any(a == b for a, b in zip(low, high, strict=True)):
+                wrong("region_box_mm", "the box is flat", "corners that differ in x, y and z")
+        if not any(self.region_direction):
+            wrong("region_direction", "the direction is zero", "a direction such as [0, 0, 1]")
+        return self
+
+
+class MachineTable(Table):
+    """The machine: one that ships, by name, or a machine file."""
+
+    name: str | None = Field(default=None, min_length=1, description='a shipped machine, such as "desk"')
+    file: str | None = Field(default=None, min_length=1, description="a machine file, relative to this one")
+
+    @model_validator(mode="after")
+    def _one(self) -> MachineTable:
+        if (self.name is None) == (self.file is None):
+            wrong("name", "name the machine once", 'either name = "desk" or file = "machine.toml"')
+        return self
+
+
+class ToolTable(Table):
+    """The tool: a cutter that touches the surface, or a beam or spray that keeps its distance."""
+
+    type: Literal["ball", "bull", "flat", "lollipop", "standoff"] = Field(
+        description='"ball", "bull" (nose), "flat" or "lollipop" cutter, or "standoff" (laser, spray, water jet)'
+    )
+    diameter_mm: Positive | None = Field(default=None, le=100.0, description="diameter of the cutter, or of its ball")
+    corner_mm: Positive | None = Field(default=None, le=50.0, description="bull: radius of the rounded corner")
+    neck_mm: Positive | None = Field(default=None, le=100.0, description="lollipop: diameter of the neck")
+    reach_mm: Positive | None = Field(default=None, le=500.0, description="lollipop: from the tip to the neck's end")
+    flute_mm: Positive | None = Field(
+        default=None, le=500.0, description="cutting length from the tip; above it the shank begins"
+    )
+    standoff_mm: Positive | None = Field(default=None, le=200.0, description="from the tip to the surface")
+    shank_mm: tuple[Vector, ...] | None = Field(
+        default=None, description="shank or nozzle: [height, lower diameter, upper diameter] of each piece, upwards"
+    )
+    holder_mm: tuple[Vector, ...] | None = Field(default=None, description="holder: pieces as of the shank, above it")
+    length_mm: Positive | None = Field(
+        default=None,
+        le=1000.0,
+        description="from the platform's origin to the tip; the machine's if left out",
+    )
+
+    @model_validator(mode="after")
+    def _own_size(self) -> ToolTable:
+        needed, possible = _TOOL_KEYS[self.type]
+        for key in ("diameter_mm", "corner_mm", "neck_mm", "reach_mm", "flute_mm", "standoff_mm"):
+            given = getattr(self, key) is not None
+            if key in needed and not given:
+                wrong(key, f'missing for a tool of type "{self.type}"', "a length in mm")
+            if given and key not in needed + possible:
+                wrong(key, f'means nothing for a tool of type "{self.type}"', f"{', '.join(needed)} alone")
+        for key in ("shank_mm", "holder_mm"):
+            for piece in getattr(self, key) or ():
+                if piece[0] <= 0.0 or min(piece) < 0.0 or max(piece[1:]) <= 0.0:
+                    wrong(key, "an impossible piece", "[height, lower diameter, upper diameter], all positive")
+        return self
+
+
+_TOOL_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "ball": (("diameter_mm",), ("flute_mm",)),
+    "bull": (("diameter_mm", "corner_mm"), ("flute_mm",)),
+    "flat": (("diameter_mm",), ("flute_mm",)),
+    "lollipop": (("diameter_mm", "neck_mm", "reach_mm"), ()),
+    "standoff": (("standoff_mm",), ()),
+}
+"""Of each type: the keys that it needs, and those that it may have."""
+
+
+class AxisTable(Table):
+    """How freely the tool axis may lean."""
+
+    tilt_deg: float = Field(
+        default=15.0,
+        ge=0.0,
+        le=60.0,
+        description="largest angle of the tool axis to the nominal one (the normal, unless it is set below)",
+    )
+    mode: Literal["normal", "fixed", "toward", "from", "between"] = Field(
+        default="normal",
+        description='nominal axis: "normal", "fixed", "toward" or "from" a point or line, "between" given directions',
+    )
+    direction: Vector | None = Field(default=None, description="fixed: from the tip to the spindle, mesh frame")
+    point_mm: Vector | None = Field(default=None, description="toward, from: a point, mesh frame")
+    line: Vector | None = Field(default=None, description="toward, from: direction of a line through the point")
+    places_mm: tuple[Vector, ...] | None = Field(default=None, description="between: where the directions hold")
+    directions: tuple[Vector, ...] | None = Field(default=None, description="between: one direction for each place")
+    lead_deg: float = Field(default=0.0, ge=-80.0, le=80.0, description="leaning forwards, along the feed")
+    side_deg: float = Field(default=0.0, ge=-80.0, le=80.0, description="leaning to the left of the feed")
+    smoothing_deg: float = Field(default=0.0, ge=0.0, le=45.0, description="by which smoothing may turn an axis")
+    smoothing_reach_mm: Positive = Field(default=5.0, description="over which it works, along and across the passes")
+    rate_deg_mm: Positive | None = Field(default=None, description="most turning of the axis per mm of a cut")
+
+    @model_validator(mode="after")
+    def _mode_keys(self) -> AxisTable:
+        needed = _MODE_KEYS[self.mode]
+        for key in ("direction", "point_mm", "places_mm", "directions"):
+            given = getattr(self, key) is not None
+            if given != (key in needed):
+                what = "missing for" if not given else "means nothing for"
+                wrong(key, f'{what} axis mode "{self.mode}"', ", ".join(needed) or "none of these keys")
+        if self.line is not None and self.mode not in ("toward", "from"):
+            wrong("line", f'means nothing for axis mode "{self.mode}"', 'mode = "toward" or "from"')
+        for key in ("direction", "line"):
+            if getattr(self, key) is not None and not any(getattr(self, key)):
+                wrong(key, "the direction is zero", "a direction such as [0, 0, 1]")
+        if self.places_mm is not None and len(self.places_mm) != len(self.directions or ()):
+            wrong("directions", "as many directions as places are needed", f"{len(self.places_mm)} directions")
+        return self
+
+
+_MODE_KEYS: dict[str, tuple[str, ...]] = {
+    "normal": (),
+    "fixed": ("direction",),
+    "toward": ("point_mm",),
+    "from": ("point_mm",),
+    "between": ("places_mm", "directions"),
+}
+
+
+class GougeTable(Table):
+    """What is done where cutter, shank or holder would cut into the part."""
+
+    remedy: tuple[Literal["tilt", "lift", "drop", "report"], ...] | None = Field(
+        default=None,
+        min_length=1,
+        description='tried in this order: "tilt", "lift", "drop"; or "report" alone, and the verdict fails where it'
+        ' gouges; when left out "drop", for a toolpath from a file "report"',
+    )
+    tolerance_mm: Positive = Field(default=0.05, description="depth that counts as none")
+    cone_deg: float = Field(default=30.0, gt=0.0, lt=90.0, description="tilt: most that an axis may turn")
+    highest_mm: Positive = Field(default=20.0, description="lift: most that a waypoint may rise")
+
+
+class FeedTable(Table):
+    """Speeds of the tool tip, and what this job asks of tip and axis beyond the machine's own limits."""
+
+    cut_mm_min: Positive = Field(le=100_000.0, description="feed while cutting")
+    link_mm_min: Positive | None = Field(
+        default=None, le=100_000.0, description="feed of approaches and links; the cutting feed when left out"
+    )
+    lowest_share: float | None = Field(
+        default=None,
+        ge=0.0,
+        le=1.0,
+        description="of the feed, that cuts and links reach wherever no limit of machine or job is used; below it the "
+        "verdict fails. 0.9 when left out, 0.95 for laser and spray; 0 asks for none",
+    )
+    dwell_s: float | None = Field(
+        default=None,
+        ge=0.0,
+        le=3600.0,
+        description="at the end of each cut: an exact stop, and standing for so long; no stop when left out",
+    )
+    stop_angle_deg: float = Field(
+        default=135.0,
+        gt=0.0,
+        le=180.0,
+        description="an exact stop at every corner where the toolpath turns by more; others are rounded in passing",
+    )
+    max_tip_acceleration_mm_s2: Positive | None = Field(default=None, description="of the tip; the machine's if less")
+    max_tip_jerk_mm_s3: Positive | None = Field(default=None, description="of the tip; the machine's if less")
+    max_axis_velocity_deg_s: Positive | None = Field(
+        default=None, description="of the tool axis; the machine's if less"
+    )
+    max_axis_acceleration_deg_s2: Positive | None = Field(default=None, description="of the tool axis, likewise")
+
+
+class ToleranceTable(Table):
+    """How far the motion may stray from the surface and from the chosen axis."""
+
+    chordal_mm: Positive = Field(default=0.01, description="between the waypoints' chords and the mesh")
+    path_mm: Positive = Field(
+        default=0.02,
+        description="between the motion of the tool's pivot (a ball's centre, a beam's spot) and the toolpath",
+    )
+    axis_deg: float = Field(
+        default=0.5, gt=0.0, le=10.0, description="by which the axis may leave the tilt cone on the way"
+    )
+    left_mm: Positive | None = Field(
+        default=None,
+        description="material above the surface that counts as none; for a stand-off tool, distance from its lines;"
+        " when left out, a ridge (half a stepover) and a quarter, and chordal_mm and path_mm",
+    )
+    left_share: float = Field(
+        default=0.001,
+        ge=0.0,
+        le=1.0,
+        description="of the region's area, 0 to 1: on so much of it more may be left, where the cutter could reach",
+    )
+
+
+class OutputTable(Table):
+    """The program's rows; the machine's own controller settings when left out."""
+
+    period_ms: Positive | None = Field(default=None, ge=0.1, le=100.0, description="time between rows")
+    interpolation: Literal["linear", "cubic"] | None = Field(
+        default=None, description="how the controller moves between rows"
+    )
+
+
+class VerifyTable(Table):
+    """What the verdict may leave out."""
+
+    waive: tuple[str, ...] = Field(
+        default=(), description="names of claims without which the verdict passes where they cannot be judged"
+    )
+
+
+class JobTables(Table):
+    """All tables of a job file, in the order of the flow."""
+
+    part: PartTable
+    machine: MachineTable = Field(default=MachineTable(name="desk"))
+    tool: ToolTable
+    toolpath: ToolpathTable
+    axis: AxisTable = Field(default=AxisTable())
+    gouge: GougeTable = Field(default=GougeTable())
+    feed: FeedTable
+    tolerance: ToleranceTable = Field(default=ToleranceTable())
+    placement: PlacementTable = Field(default=PlacementTable())
+    fixture: FixtureTable = Field(default=FixtureTable())
+    output: OutputTable = Field(default=OutputTable())
+    verify: VerifyTable = Field(default=VerifyTable())
+
+    @model_validator(mode="before")
+    @classmethod
+    def _raster_unless_said(cls, content: Any) -> Any:
+        """Take a toolpath without a strategy for a raster."""
+        if isinstance(content, dict) and isinstance(table := cast(dict[str, Any], content).get("toolpath"), dict):
+            return {**content, "toolpath": {"strategy": "raster", **cast(dict[str, Any], table)}}
+        return content
+
+    @model_validator(mode="after")
+    def _leaning(self) -> JobTables:
+        if self.tool.type in ("bull", "flat") and self.axis.tilt_deg > 0.0:
+            wrong("axis.tilt_deg", f'a tool of type "{self.tool.type}" cannot lean without digging in', "tilt_deg = 0")
+        return self

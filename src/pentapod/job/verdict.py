@@ -1,0 +1,68 @@
+"""judge: the verdict on a program file, or on the folder of a run, by all that its job implies."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from pentapod.base.errors import InputError, ProgramError
+from pentapod.base.progress import Progress, silent
+from pentapod.job.artefacts import PROGRAM, SETUPS
+from pentapod.job.build.specification import job_specification
+from pentapod.job.build.tool import job_link_style
+from pentapod.job.build.values import job_machine, job_mesh, job_toolpath, program_toolpath
+from pentapod.job.outcome import setups_verdict
+from pentapod.job.schema.job import Job
+from pentapod.program import read_header
+from pentapod.toolpath import Toolpath
+from pentapod.toolpath.linking.partition import Piece, missed_cuts, part_of
+from pentapod.verify import Verdict, judged
+
+
+def judge(job: Job, program: str | Path, progress: Progress = silent, *, strict: bool = False) -> Verdict:
+    """Return the verdict on a program file, or on the folder of a run, by all that the job implies.
+
+    A folder holds one program, or one for each set-up in setup-1, setup-2, and so on: then all of them are judged, and
+    that together they make every cut once. The program of one set-up alone leaves that "not judged". strict as in
+    `verify`. Raises InputError for a bad job, mesh or machine, and where there is no such program.
+    """
+    path = Path(program)
+    files = _programs(path) if path.is_dir() else [path]
+    machine, mesh = job_machine(job), job_mesh(job, progress)
+    if not path.is_dir() or (path / PROGRAM).is_file():
+        asked = job_specification(job, machine, mesh, lambda: program_toolpath(job, mesh, files[0], progress))
+        return judged(files[0], asked, strict=strict, progress=progress)
+    asked = job_specification(job, machine, mesh, lambda: job_toolpath(job, mesh, progress)[0])
+    whole, style = asked.toolpath, job_link_style(job, mesh, asked.toolpath)
+    pieces = [_piece(file, whole) for file in files]
+    cuts, missed = missed_cuts(whole, pieces)
+    verdicts: list[tuple[int, Verdict]] = []
+    for number, (file, piece) in enumerate(zip(files, pieces, strict=True), start=1):
+        own = replace(asked, toolpath=part_of(whole, piece, style), missed=missed)
+        verdicts.append((number, judged(file, own, strict=strict, progress=progress)))
+    return setups_verdict(verdicts, cuts, missed, job.placement.setups)
+
+
+def _programs(folder: Path) -> list[Path]:
+    """Return the program files of a run's folder. Raises ProgramError where it has none, or both kinds."""
+    one, several = folder / PROGRAM, sorted(folder.glob(f"{SETUPS}/{PROGRAM}"), key=_number)
+    if one.is_file() and several:
+        what = "this folder has a program and others for set-ups"
+        raise ProgramError(what, file=folder, expected=f"either {PROGRAM} or setup-1, setup-2, ...")
+    if not one.is_file() and not several:
+        raise ProgramError("there is no program in this folder", file=folder, expected=PROGRAM)
+    return several or [one]
+
+
+def _number(file: Path) -> int:
+    digits = file.parent.name.removeprefix("setup-")
+    return int(digits) if digits.isascii() and digits.isdecimal() else 0
+
+
+def _piece(file: Path, whole: Toolpath) -> Piece:
+    """Return the piece that a program is about; the whole where its header does not say, or cannot be read."""
+    try:
+        piece = read_header(file).provenance.piece
+    except InputError:  # the verdict says what is wrong with the file
+        piece = None
+    return piece or Piece(0, len(whole) - 1)

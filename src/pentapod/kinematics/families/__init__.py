@@ -1,0 +1,1 @@
+"""Robots: a file for each family, and what holds for that family alone."""

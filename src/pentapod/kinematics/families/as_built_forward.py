@@ -1,0 +1,135 @@
+"""Forward kinematics of machines as built: the nominal closed form, carried over to the real geometry, with a proof.
+
+Let the geometry change linearly from the nominal one (s = 0) to the real one (s = 1) while the leg readings stay. The
+*intended* pose of the real machine is where the nominal pose of the chosen component goes along the way: the end of
+the continuous curve of solutions that starts there and meets no singularity. It is unique where it exists, and
+has nothing to do with any solver. `as_built_pose` finds it by Newton's method and proves it with tubes
+(`continuation`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.base.arrays import Bools, Floats, Ints, as_batch
+from pentapod.base.errors import ArrayError
+from pentapod.kinematics.batches import broadcast
+from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.kinematics.tubes.continuation import Pose, carry
+from pentapod.kinematics.tubes.leg_equations import Legs
+from pentapod.kinematics.tubes.tube import LegFamily, Tube
+from pentapod.numerics.balls import Ball
+from pentapod.numerics.blocks import blocks
+
+_SHORTEST = 2.0**-16  # of the way from the nominal geometry: where shorter steps are needed, there is no proof
+
+
+@dataclass(frozen=True, eq=False)
+class ProvenPoses:
+    """Poses of a machine as built, and what is known of them.
+
+    position, direction (..., 3): metres, machine frame; NaN where there is no nominal pose, a reading is no longer than
+    its zero, or Newton's method did not settle. proven (...): the exact intended pose exists and is within the two
+    bounds of the one given, in every coordinate. position_error, direction_error (...): these bounds, metres and none;
+    NaN where not proven.
+    """
+
+    position: Floats
+    direction: Floats
+    proven: Bools
+    position_error: Floats
+    direction_error: Floats
+
+    def __post_init__(self) -> None:
+        for array in (getattr(self, field.name) for field in fields(self)):
+            array.flags.writeable = False
+
+
+def as_built_pose(
+    machine: AsBuiltPentapod, nominal: LinearPentapod, legs: ArrayLike, component: ArrayLike
+) -> ProvenPoses:
+    """Return the poses of leg readings (..., 5), metres, that belong to a component of the nominal machine.
+
+    component: as for `LinearPentapod.pose`, a `Component` or signs (..., 2). A pose that comes without proof may be
+    right (near a singularity nothing can tell) or belong to another assembly mode: do not move on it. The proof holds
+    for the machines whose numbers are exactly the given ones, the nominal offsets being z_3 + δ (x_i − x_3).
+    Raises ArrayError for a wrong shape, legs that are infinite or not positive, wrong signs.
+    """
+    readings, signs = as_batch(legs, "legs", (5,)), as_batch(component, "component", (2,))
+    if not (np.isnan(readings) | ((readings > 0.0) & np.isfinite(readings))).all():
+        raise ArrayError("legs must be finite and positive", expected="metres, NaN where there is no reading")
+    readings, signs = broadcast(readings, signs, ("legs", "component"))
+    batch, readings, signs = readings.shape[:-1], readings.reshape(-1, 5), signs.reshape(-1, 2)
+    readings = np.where((readings > machine.zeros).all(axis=-1, keepdims=True), readings, np.nan)
+    position, direction = nominal.pose(readings, signs)
+    out = np.full((len(readings), 8), np.nan)  # position, direction, two errors
+    proven = np.zeros(len(readings), dtype=bool)
+    with np.errstate(all="ignore"):
+        for block in blocks(len(readings), 2048):
+            way = _Way(machine, nominal, readings[block].T)
+            start = (position[block].T, direction[block].T)
+            found = carry(way, start, way.scale, admit=way.in_component, shortest=_SHORTEST)
+            errors = [found.error * way.scale, found.error]
+            out[block], proven[block] = np.concatenate([found.position, found.direction, errors]).T, found.proven
+    values = out.reshape(*batch, 8)
+    return ProvenPoses(
+        values[..., 0:3].copy(),
+        values[..., 3:6].copy(),
+        proven.reshape(batch),
+        values[..., 6].copy(),
+        values[..., 7].copy(),
+    )
+
+
+class _Way:
+    """The straight way from a nominal geometry to one as built, for leg readings (5, N)."""
+
+    def __init__(self, machine: AsBuiltPentapod, nominal: LinearPentapod, readings: Floats) -> None:
+        self.nominal, self.readings = nominal, readings
+        self.scale = machine.scale
+        self.rings = (machine.radii != 0.0)[:, None]
+        x = nominal.base[:, 0]
+        flat = np.concatenate([nominal.base.T, np.zeros((1, 5))])[..., None]
+        family_offsets = (Ball.exact(x) - x[2]) * nominal.delta + nominal.offsets[2]
+        self.start = (Ball.exact(flat), family_offsets[:, None], Ball.exact(np.zeros((5, 1))))
+        end = (machine.base.T[..., None], machine.offsets[:, None], machine.radii[:, None])
+        self.end = tuple(Ball.exact(array) for array in end)
+        self.shift = tuple(b - a for a, b in zip(self.start, self.end, strict=True))
+        self.zeros = machine.zeros[:, None]
+
+    def at(self, which: Ints, s: Floats) -> Legs[Ball]:
+        """Return the geometry at s; where all s are 1, it is the given one."""
+        if (s == 1.0).all():
+            base, offsets, radii = self.end
+        else:
+            base, offsets, radii = (a + d * s for a, d in zip(self.start, self.shift, strict=True))
+        return Legs(base, offsets, radii, Ball.exact(self.readings[:, which]) - self.zeros * s, self.rings)
+
+    def over(self, which: Ints, s: Floats, h: Floats) -> LegFamily:
+        """Return the legs from s to s + h."""
+        first, middle, last = (self.at(which, s + share * h) for share in (0.0, 0.5, 1.0))
+        hull = Legs(
+            Ball.between(first.base, last.base),
+            Ball.between(first.offsets, last.offsets),
+            Ball.between(first.radii, last.radii),
+            Ball.between(first.lengths, last.lengths),
+            self.rings,
+        )
+        base, offsets, radii = (d * h for d in self.shift)
+        slope = Legs(base, offsets, radii, Ball.exact(-self.zeros) * h, self.rings)
+        return LegFamily(middle, hull, slope, np.zeros((5, 1)))
+
+    def in_component(self, nominal_pose: Pose, tube: Tube) -> Bools:
+        """Return where w and S keep their signs (N,) within the tube's ball around the nominal pose."""
+        (x, _, z), (u, _, w) = (
+            Ball(centre, np.broadcast_to(tube.radius * size * (1.0 + 2.0**-48), centre.shape))
+            for centre, size in zip(nominal_pose, (self.scale, 1.0), strict=True)
+        )
+        delta, x3 = self.nominal.delta, float(self.nominal.base[2, 0])
+        lever = Ball.exact(self.nominal.offsets[2]) - Ball.exact(delta) * x3
+        s = w * x * delta + (1.0 - delta * u) * z + lever * w
+        return (np.abs(w.mid) > w.rad) & (np.abs(s.mid) > s.rad)

@@ -1,0 +1,1 @@
+"""Forward kinematics: closed forms of the families, and their line equations."""

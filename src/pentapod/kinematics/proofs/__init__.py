@@ -1,0 +1,1 @@
+"""Proofs in continuous time: components, chords, motions, tip and platform."""

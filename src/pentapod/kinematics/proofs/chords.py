@@ -1,0 +1,179 @@
+"""How far a motion of the legs strays from straight lines between its poses: proven for all times, for long programs.
+
+Between two samples the legs are polynomials in time, and x̃(t) is the straight line from the one pose to the other.
+As in `tip_tube` Krawczyk's operator proves, component by component, that there is exactly one pose within a box around
+x̃(t) at each time, and how large the box is; here with the line in place of a fitted polynomial and with floating
+point and explicit allowances for rounding in place of ball arithmetic, which takes microseconds for each chord. To
+first order the motion is x̃ − C G(x̃(t), t), and this polynomial is what the bounds are taken of: of second order in
+the
+chord, like the deviation itself (lemmas 7, 8 and 12 of docs/proofs.md). The speed follows from the derivative in the
+same way. Where the proof fails, the
+chord is halved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.base.arrays import Bools, Floats, as_batch, as_floats
+from pentapod.base.errors import ArrayError
+from pentapod.kinematics.batches import as_motion
+from pentapod.kinematics.component import as_component
+from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.numerics.bernstein import elevate, multiply, split
+
+Pose = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Chords:
+    """What is proven of H chords, for all times t in [0, 1] of each, and for A points p + arm · i of the line.
+
+    proven (H,): on the whole chord the legs give one continuous motion in the component.
+    away (H, A): the point is nowhere farther than this from its own straight line at the same time, metres.
+    turned (H,): the angle in radians between the line's direction and x̃'s is nowhere larger.
+    speeds (H, A): the point is nowhere faster, metres per duration of the chord.
+    base_cosines (H, 5): the cosine of the angle between each leg (base → platform) and a given direction is nowhere
+    less. platform_cosines (H, 5, 2): that of each leg and the line's direction i is nowhere less, nor more.
+    Infinite, or −1 and 1, where nothing is proven.
+    """
+
+    proven: Bools
+    away: Floats
+    turned: Floats
+    speeds: Floats
+    base_cosines: Floats
+    platform_cosines: Floats
+
+
+def prove_chords(
+    pentapod: LinearPentapod,
+    leg_coefficients: ArrayLike,
+    start: Pose,
+    end: Pose,
+    component: ArrayLike,
+    *,
+    arms: ArrayLike,
+    towards: ArrayLike,
+    depth: int = 8,
+) -> Chords:
+    """Return what can be proven of the motion beside each chord.
+
+    leg_coefficients (H, 5, k + 1): Bernstein coefficients in metres of the legs on the chord, k ≥ 1. start, end:
+    positions and directions (H, 3) each, the poses of the component at both ends, to rounding; whatever they are, the
+    bounds hold. arms (A,): metres along the line from p. towards (5, 3): unit vectors, machine frame, from which the
+    angles of the legs are asked. depth: how often a chord may be halved.
+    Raises ArrayError for a wrong shape, numbers that are not finite, signs other than ±1, a negative depth.
+    """
+    legs = as_motion(as_floats(leg_coefficients, "leg_coefficients"), least=1)
+    signs = np.array(as_component(component), dtype=np.float64)
+    points = as_floats(arms, "arms", (None,))
+    if points.ndim != 1:
+        raise ArrayError(f"arms has shape {points.shape}", expected="shape (A,)")
+    if depth < 0:
+        raise ArrayError("depth must not be negative", value=depth)
+    ends = [np.concatenate([as_batch(x, name, (3,)) for x in pose], axis=-1) for name, pose in _named(start, end)]
+    for name, x in (("start", ends[0]), ("end", ends[1])):
+        if x.shape != (len(legs), 6):
+            raise ArrayError(f"{name} has shape {x.shape}", expected=f"positions and directions ({len(legs)}, 3)")
+    prover = _Prover(pentapod, signs, points, as_floats(towards, "towards", (5, 3)), legs.shape[-1] - 1)
+    return prover.prove(legs, ends[0], ends[1], depth)
+
+
+def _named(start: Pose, end: Pose) -> tuple[tuple[str, Pose], tuple[str, Pose]]:
+    return ("start", start), ("end", end)
+
+
+class _Prover:
+    """The machine and the questions, as the kernel takes them."""
+
+    def __init__(self, pentapod: LinearPentapod, signs: Floats, arms: Floats, towards: Floats, degree: int) -> None:
+        self.pentapod, self.signs, self.arms, self.towards = pentapod, signs, arms, np.ascontiguousarray(towards)
+        one = np.eye(degree + 1)
+        self.products = np.array([[multiply(a, b)[m + n] for n, b in enumerate(one)] for m, a in enumerate(one)])
+        top = max(degree, 2)
+        self.elevations = (
+            _elevation(2, 2 * degree),
+            _elevation(1, degree),
+            np.ascontiguousarray(np.concatenate([_elevation(2, top), _elevation(degree, top)])),
+        )
+
+    def prove(self, legs: Floats, start: Floats, end: Floats, depth: int) -> Chords:
+        """As `prove_chords`; start, end (H, 6)."""
+        from pentapod.kinematics.proofs.chords_kernels import chords  # noqa: PLC0415 - loads numba
+
+        count, points = len(legs), len(self.arms)
+        found = Chords(
+            np.empty(count, dtype=np.bool_),
+            np.empty((count, points)),
+            np.empty(count),
+            np.empty((count, points)),
+            np.empty((count, 5)),
+            np.empty((count, 5, 2)),
+        )
+        chords(
+            np.ascontiguousarray(legs),
+            start,
+            end,
+            self._geometry(legs),
+            self.signs,
+            self.arms,
+            self.towards,
+            self.products,
+            self.elevations,
+            found.proven,
+            found.away,
+            found.turned,
+            found.speeds,
+            found.base_cosines,
+            found.platform_cosines,
+        )
+        if depth > 0:
+            self._halve(found, legs, start, end, depth)
+        return found
+
+    def _geometry(self, legs: Floats) -> Floats:
+        """Return attachments and offsets, then δ, the lever and a length that no sum of lengths here exceeds."""
+        robot = self.pentapod
+        reach = float(np.abs(legs).max(initial=0.0)) + 2.0 * float(np.abs(robot.base).sum(axis=1).max())
+        size = 2.0 * (reach + 2.0 * float(np.abs(robot.offsets).max()))
+        rows = np.column_stack([robot.base, robot.offsets])
+        return np.vstack([rows, [robot.delta, robot.lever, size]])
+
+    def _halve(self, found: Chords, legs: Floats, start: Floats, end: Floats, depth: int) -> None:
+        """Fill in what two halves prove where the whole chord was not, or its speed was not."""
+        failed = ~found.proven | ~np.isfinite(found.speeds).all(axis=1)
+        failed &= np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
+        which = np.flatnonzero(failed)
+        if not len(which):
+            return
+        halves = split(legs[which])
+        middle = np.concatenate(self.pentapod.pose(halves[0][..., -1], self.signs), axis=-1)
+        first, last, half = start[which], end[which], len(which)
+        parts = self.prove(
+            np.concatenate(halves), np.concatenate([first, middle]), np.concatenate([middle, last]), depth - 1
+        )
+        off = middle - 0.5 * (first + last)
+        aside = np.linalg.norm(off[:, None, :3] + self.arms[:, None] * off[:, None, 3:], axis=2)
+
+        def largest(values: Floats) -> Floats:
+            return np.maximum(values[:half], values[half:])
+
+        found.proven[which] = parts.proven[:half] & parts.proven[half:]
+        found.away[which] = largest(parts.away) + aside
+        # Where the middle of the line between unit vectors is longer than 5/6, an offset turns it by no more than this.
+        short = np.linalg.norm(0.5 * (first + last)[:, 3:], axis=1) > 5.0 / 6.0
+        aside_turned = np.where(short, 1.2 * np.linalg.norm(off[:, 3:], axis=1), np.inf)
+        found.turned[which] = largest(parts.turned) + 1.001 * aside_turned
+        found.speeds[which] = 2.0 * largest(parts.speeds)
+        found.base_cosines[which] = -largest(-parts.base_cosines)
+        found.platform_cosines[which, :, 0] = -largest(-parts.platform_cosines[..., 0])
+        found.platform_cosines[which, :, 1] = largest(parts.platform_cosines[..., 1])
+
+
+def _elevation(low: int, high: int) -> Floats:
+    """Return the matrix (low + 1, high + 1) whose rows are the basis of degree `low` written with degree `high`."""
+    return np.ascontiguousarray(elevate(np.eye(low + 1), high - low))

@@ -1,0 +1,258 @@
+"""The proof of `pentapod.kinematics.proofs.chords`, one chord after the other, compiled.
+
+Its bounds are computed in ordinary floating point, and to each is added more than rounding can have taken (`ROUND`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats
+from pentapod.kinematics.proofs.krawczyk_kernels import (
+    ROUND,
+    angle_within,
+    defect,
+    enclosed,
+    inflated,
+    invert,
+    line,
+    mapped,
+    sided,
+    spreads,
+)
+from pentapod.numerics.kernels import kernel
+
+
+@kernel
+def chords(
+    legs: Floats,
+    start: Floats,
+    end: Floats,
+    geometry: Floats,
+    signs: Floats,
+    arms: Floats,
+    towards: Floats,
+    products: Floats,
+    elevations: tuple[Floats, Floats, Floats],
+    proven: Bools,
+    away: Floats,
+    turned: Floats,
+    speeds: Floats,
+    base_cosines: Floats,
+    platform_cosines: Floats,
+) -> None:
+    """Fill what `Chords` holds for legs (H, 5, k + 1) and poses `start`, `end` (H, 6).
+
+    geometry (6, 3): attachments x_j, y_j and offsets z_j; then δ, the lever and the machine's size. products (k + 1,
+    k + 1): what l_a l_b counts in coefficient a + b of l². elevations: matrices from degree 2 to 2k, from 1 to
+    max(k, 1) and from 2 to max(k, 2), and in its last rows from k to max(k, 2).
+    """
+    squares_up, lines_up, cosines_up = elevations
+    k = legs.shape[2] - 1
+    size = geometry[5, 2]
+    first, second, change, step = np.empty((5, 3)), np.empty((5, 3)), np.empty((5, 3)), np.empty(6)
+    jacobian, inverse, work, rest = np.zeros((6, 6)), np.empty((6, 6)), np.empty((6, 12)), np.empty((6, 6))
+    residual, e, de = np.empty((6, 2 * k + 1)), np.empty((6, 2 * k + 1)), np.empty((6, 2 * k))
+    slack, y, z, bound = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
+    spread, spread_i, off = np.empty((5, 3)), np.empty(3), np.empty(6)
+    for h in range(len(legs)):
+        proven[h], turned[h], away[h], speeds[h] = False, np.inf, np.inf, np.inf
+        base_cosines[h], platform_cosines[h, :, 0], platform_cosines[h, :, 1] = -1.0, -1.0, 1.0
+        if not _sane(legs[h], start[h], end[h]):
+            continue
+        line(start[h], end[h], geometry, first, second, change, step, jacobian)
+        if not invert(jacobian, work, inverse):
+            continue
+        defect(inverse, jacobian, rest)
+        _residuals(legs[h], start[h], end[h], first, second, squares_up, products, residual)
+        _corrections(inverse, residual, ROUND * size * size, e, slack, y)
+        if not enclosed(y, rest, inverse, geometry, change, step, spread, spread_i, z, bound):
+            continue
+        if not sided(start[h], end[h], bound, geometry[5, 0], geometry[5, 1], signs, size):
+            continue
+        proven[h] = True
+        # Now that the solution is known to be this near, once more: closer.
+        spreads(geometry, change, step, bound, ROUND * size, spread, spread_i)
+        mapped(rest, inverse, geometry, spread, spread_i, bound, z)
+        bounded = _derived(e, slack, bound, rest, inverse, geometry, change, step, spread, spread_i, de, off)
+        z += slack
+        for a in range(len(arms)):
+            away[h, a] = _farthest(e, step, 0.0, arms[a]) + _joined(z, abs(arms[a]))
+            if bounded:
+                speeds[h, a] = _farthest(de, step, 1.0, arms[a]) + _joined(off, abs(arms[a]))
+        sine = 0.0
+        for m in range(2 * k + 1):
+            sine = max(sine, np.sqrt(e[3, m] ** 2 + e[4, m] ** 2 + e[5, m] ** 2))
+        sine += np.sqrt(z[3] ** 2 + z[4] ** 2 + z[5] ** 2)
+        turned[h] = angle_within(sine)
+        swing = np.sqrt(bound[3] ** 2 + bound[4] ** 2 + bound[5] ** 2)
+        start_i, end_i = start[h, 3:], end[h, 3:]
+        for j in range(5):
+            own, one, two = legs[h, j], first[j], second[j]
+            shortest = own.min()
+            shift, rounding = _joined(bound, abs(geometry[j, 2])), 4.0 * ROUND * size / shortest
+            base = _base_cosine(one, two, towards[j], own, lines_up)
+            base_cosines[h, j] = base - shift / shortest - rounding
+            least, most = _platform_cosine(one, two, start_i, end_i, own, cosines_up)
+            # On the line the vector is no longer than the leg and its shift.
+            loose = ((own.max() + shift) * swing + shift) / shortest + rounding
+            platform_cosines[h, j, 0], platform_cosines[h, j, 1] = least - loose, most + loose
+
+
+@kernel
+def _sane(legs: Floats, start: Floats, end: Floats) -> bool:
+    """Return whether there are poses, and lengths that are positive."""
+    total = 0.0
+    for r in range(6):
+        total += start[r] + end[r]
+    for j in range(5):
+        for m in range(legs.shape[1]):
+            if not legs[j, m] > 0.0:
+                return False
+    return bool(np.isfinite(total))
+
+
+@kernel
+def _residuals(
+    legs: Floats,
+    start: Floats,
+    end: Floats,
+    first: Floats,
+    second: Floats,
+    squares_up: Floats,
+    products: Floats,
+    residual: Floats,
+) -> None:
+    """Fill G along the line (6, 2k + 1): ½ (|D|² − l²) of each leg and ½ (|i|² − 1), as Bernstein coefficients."""
+    for j in range(5):
+        _square(first[j], second[j], squares_up, residual[j])
+        for a in range(len(products)):
+            for b in range(len(products)):
+                residual[j, a + b] -= 0.5 * products[a, b] * legs[j, a] * legs[j, b]
+    _square(start[3:], end[3:], squares_up, residual[5])
+    residual[5] -= 0.5
+
+
+@kernel
+def _square(first: Floats, second: Floats, squares_up: Floats, out: Floats) -> None:
+    """Fill the coefficients (2k + 1,) of ½ |v|², v on the straight line from first to second (3,)."""
+    b0, b1, b2 = _dot(first, first), _dot(first, second), _dot(second, second)
+    for m in range(len(out)):
+        out[m] = 0.5 * (squares_up[0, m] * b0 + squares_up[1, m] * b1 + squares_up[2, m] * b2)
+
+
+@kernel
+def _corrections(inverse: Floats, residual: Floats, rounding: float, e: Floats, slack: Floats, y: Floats) -> None:
+    """Fill C G (6, 2k + 1), what rounding takes from it (6,), and bounds (6,) of both together at all times."""
+    for r in range(6):
+        slack[r] = 4.0 * ROUND * abs(inverse[r, 5])
+        for n in range(5):
+            slack[r] += rounding * abs(inverse[r, n])
+        y[r] = 0.0
+        for m in range(e.shape[1]):
+            e[r, m] = 0.0
+            for n in range(6):
+                e[r, m] += inverse[r, n] * residual[n, m]
+            y[r] = max(y[r], abs(e[r, m]))
+        y[r] += slack[r]
+
+
+@kernel
+def _derived(
+    e: Floats,
+    slack: Floats,
+    bound: Floats,
+    rest: Floats,
+    inverse: Floats,
+    geometry: Floats,
+    change: Floats,
+    step: Floats,
+    spread: Floats,
+    spread_i: Floats,
+    de: Floats,
+    off: Floats,
+) -> bool:
+    """Fill e' (6, 2k) and by how much (6,) the solution's derivative may differ from x̃' − e'; False where unbounded.
+
+    J x' = (l l', 0) and C (J(x̃) x̃' − (l l', 0)) = e'. So f = x' − x̃' solves C J f = −e' − q, q = C (J(x) − J(x̃))
+    x̃',
+    and |f + e'| ≤ |q| + |1 − C J| |f|.
+    """
+    size, degree = geometry[5, 2], de.shape[1]
+    least, q, moved = np.empty(6), np.empty(6), np.zeros(6)
+    for n in range(3):
+        moved[5] += bound[3 + n] * (abs(step[3 + n]) + ROUND)
+        for j in range(5):
+            reach = bound[n] + abs(geometry[j, 2]) * bound[3 + n]
+            moved[j] += reach * (abs(change[j, n]) + ROUND * size)
+    for r in range(6):
+        q[r] = 4.0 * degree * slack[r]
+        for j in range(6):
+            q[r] += abs(inverse[r, j]) * moved[j]
+        largest = 0.0
+        for m in range(degree):
+            de[r, m] = degree * (e[r, m + 1] - e[r, m])
+            largest = max(largest, abs(de[r, m]))
+        least[r] = largest + q[r]
+    growth = inflated(least, size)
+    mapped(rest, inverse, geometry, spread, spread_i, growth, off)
+    bounded = True
+    for r in range(6):
+        bounded = bounded and least[r] + off[r] < growth[r]
+        off[r] += q[r]
+    return bounded
+
+
+@kernel
+def _base_cosine(first: Floats, second: Floats, towards: Floats, legs: Floats, lines_up: Floats) -> float:
+    """Return the least v · towards / l, v on the line from first to second (3,), l of coefficients legs (k + 1,).
+
+    A quotient of polynomials lies between the quotients of their coefficients.
+    """
+    b0, b1 = _dot(first, towards), _dot(second, towards)
+    least = np.inf
+    for m in range(len(legs)):
+        least = min(least, (lines_up[0, m] * b0 + lines_up[1, m] * b1) / legs[m])
+    return least
+
+
+@kernel
+def _platform_cosine(
+    first: Floats, second: Floats, start_i: Floats, end_i: Floats, legs: Floats, cosines_up: Floats
+) -> tuple[float, float]:
+    """Return the least and the largest v · i / l, v and i on their lines; as `_base_cosine`."""
+    b0, b2 = _dot(first, start_i), _dot(second, end_i)
+    b1 = 0.5 * (_dot(first, end_i) + _dot(second, start_i))
+    least, most = np.inf, -np.inf
+    for m in range(cosines_up.shape[1]):
+        length = 0.0
+        for n in range(len(legs)):
+            length += cosines_up[3 + n, m] * legs[n]
+        value = (cosines_up[0, m] * b0 + cosines_up[1, m] * b1 + cosines_up[2, m] * b2) / length
+        least, most = min(least, value), max(most, value)
+    return least, most
+
+
+@kernel
+def _dot(a: Floats, b: Floats) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def _joined(bound: Floats, arm: float) -> float:
+    """Return the largest |p + arm · i| of p and i that `bound` (6,) bounds."""
+    x, y, z = bound[0] + arm * bound[3], bound[1] + arm * bound[4], bound[2] + arm * bound[5]
+    return np.sqrt(x * x + y * y + z * z) * (1.0 + ROUND)
+
+
+@kernel
+def _farthest(e: Floats, step: Floats, moving: float, arm: float) -> float:
+    """Return the largest |moving · step − e| of the point at `arm` over the coefficients e (6, n)."""
+    worst = 0.0
+    for m in range(e.shape[1]):
+        total = 0.0
+        for n in range(3):
+            part = moving * (step[n] + arm * step[3 + n]) - e[n, m] - arm * e[3 + n, m]
+            total += part * part
+        worst = max(worst, total)
+    return np.sqrt(worst) * (1.0 + ROUND)

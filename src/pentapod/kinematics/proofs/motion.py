@@ -1,0 +1,175 @@
+"""A proof in continuous time, for any geometry near a linear pentapod, that a motion of the legs meets no singularity.
+
+Between two setpoints the legs are polynomials in time. `certify_motion` carries the pose along (`continuation`): where
+it succeeds, the motion that the legs prescribe exists, is unique and continuous, and keeps clear of every singularity,
+so it stays in its component. Where the poses at the two ends are proven to be on different sides of the singularities
+(`jacobian_sign`), no motion leads from one to the other without meeting one. This needs no closed form: general
+pentapods, base joints off the plane and rings are all the same to it. For the quadratic family
+`certify_component` is faster, and bounds |w| and |S|; here there are no such functions, and what is bounded is how far
+leg errors move the pose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.base.arrays import Bools, Floats, Ints, as_batch, as_floats
+from pentapod.base.errors import ArrayError
+from pentapod.kinematics.batches import as_motion
+from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.kinematics.proofs.answers import Answers
+from pentapod.kinematics.tubes.continuation import carry
+from pentapod.kinematics.tubes.jacobian_sign import proven_sides
+from pentapod.kinematics.tubes.leg_equations import Legs, mids
+from pentapod.kinematics.tubes.newton import newton
+from pentapod.kinematics.tubes.tube import LegFamily
+from pentapod.numerics.ball_bernstein import blossom, hull, restricted, stack
+from pentapod.numerics.balls import Ball
+from pentapod.numerics.blocks import blocks
+
+
+@dataclass(frozen=True, eq=False)
+class MotionProof(Answers):
+    """What is proven of N intervals of a motion of the legs.
+
+    proven (N,): from the exact pose next to the interval's first one in `position` and `direction` the motion is
+    defined and continuous throughout, ends at the exact pose next to the second one, and its Jacobian is never
+    singular. Where all are proven, this holds for the whole of them: the motion stays in the component it begins in.
+    refuted (N,): proven not to be so: the Jacobian's determinant has opposite signs at these two poses, so that every
+    continuous motion from one to the other, whatever its legs do on the way, meets a singularity (or a pose in which
+    the base joint of a ring lies on the line). What is neither is `undecided`.
+    position, direction (N + 1, 3): the poses at the intervals' ends, from those given by Newton's method; NaN where it
+    did not settle.
+    reached (N,): the share of each interval up to which the proof goes: 1 where proven. What comes after is not proven:
+    the motion comes near a singularity there, or the pose is lost.
+    stop (N,): where the proof was tried in vain, [reached, stop] of the interval; 1 where proven.
+    position_sensitivity, direction_sensitivity (N,): proven for as far as the proof goes: legs that differ by up to a
+    metre each move no coordinate of p by more metres, and none of i by more, than this. Infinite where nothing is
+    proven.
+    """
+
+    proven: Bools
+    refuted: Bools
+    position: Floats
+    direction: Floats
+    reached: Floats
+    stop: Floats
+    position_sensitivity: Floats
+    direction_sensitivity: Floats
+
+    def __post_init__(self) -> None:
+        for array in (getattr(self, field.name) for field in fields(self)):
+            array.flags.writeable = False
+
+
+def certify_motion(
+    machine: AsBuiltPentapod,
+    leg_coefficients: ArrayLike,
+    position: ArrayLike,
+    direction: ArrayLike,
+    *,
+    leg_error: float = 0.0,
+    depth: int = 16,
+) -> MotionProof:
+    """Prove, interval by interval, that a motion of the legs meets no singularity; or that it does.
+
+    leg_coefficients (N, 5, k + 1): Bernstein coefficients in metres of each leg's reading on each interval (for legs
+    linear between setpoints: both setpoints). position, direction (N + 1, 3): the poses at the ends of the intervals,
+    roughly; they only say which of several poses with the same legs are meant. leg_error: metres by which each actual
+    leg may differ from its polynomial at any time: the claim then holds for every such continuous motion. depth: how
+    often an interval may be halved before it is given up.
+
+    Raises ArrayError: wrong shapes, coefficients that are not finite, lengths that are not positive, a negative
+    leg_error or depth, legs that jump between intervals by more than 2 leg_error.
+    """
+    coefficients = as_motion(as_floats(leg_coefficients, "leg_coefficients"))
+    p, i = as_batch(position, "position", (None, 3)), as_batch(direction, "direction", (None, 3))
+    _check(machine, coefficients, p, i, leg_error, depth)
+    n = len(coefficients)
+    if n == 0:
+        nothing = np.zeros(0, dtype=bool)
+        return MotionProof(nothing, nothing, p.copy(), i.copy(), *(np.ones(0) for _ in range(4)))
+    scale, out = machine.scale, np.full((4, n), np.nan)
+    ends = np.concatenate([coefficients[:, :, 0], coefficients[-1:, :, -1]]).T - machine.zeros[:, None]
+    with np.errstate(all="ignore"):
+        route = _Motion(machine, np.moveaxis(coefficients, 0, -1), leg_error)
+        nodes_p, nodes_i, settled = newton(p.T, i.T, mids(route.legs(Ball.exact(ends))), scale)
+        nodes_p[:, ~settled] = nodes_i[:, ~settled] = np.nan
+        for block in blocks(n, 2048):
+            after = slice(block.start + 1, block.stop + 1)
+            part = _Motion(machine, np.moveaxis(coefficients[block], 0, -1), leg_error)
+            found = carry(
+                part,
+                (nodes_p[:, block], nodes_i[:, block]),
+                scale,
+                end=(nodes_p[:, after], nodes_i[:, after]),
+                shortest=2.0**-depth,
+            )
+            out[:2, block] = found.reached, np.minimum(found.reached + found.step, 1.0)
+            out[2:, block] = np.where(found.reached > 0.0, found.sensitivity, np.inf)
+        refuted = np.zeros(n, dtype=bool)
+        doubt = np.flatnonzero(out[0] < 1.0)
+        for block in blocks(len(doubt), 2048):
+            some = doubt[block]
+            before, after = (
+                proven_sides((nodes_p[:, k], nodes_i[:, k]), route.legs(legs[:, some]), route.slack, scale)
+                for k, legs in ((some, route.coefficients[0]), (some + 1, route.coefficients[-1]))
+            )
+            refuted[some] = before * after < 0
+    return MotionProof(out[0] == 1.0, refuted, nodes_p.T.copy(), nodes_i.T.copy(), *out)
+
+
+class _Motion:
+    """The legs of a machine on intervals, from Bernstein coefficients (5, k + 1, N) of their readings."""
+
+    def __init__(self, machine: AsBuiltPentapod, coefficients: Floats, leg_error: float) -> None:
+        self.base = Ball.exact(machine.base.T[..., None])
+        self.offsets, self.radii = Ball.exact(machine.offsets[:, None]), Ball.exact(machine.radii[:, None])
+        self.rings = (machine.radii != 0.0)[:, None]
+        readings = np.moveaxis(coefficients, 1, 0)  # (k + 1, 5, N)
+        self.coefficients = Ball.exact(readings) - machine.zeros[:, None]
+        self.degree = len(readings) - 1
+        self.slack = np.full((5, 1), leg_error)
+
+    def legs(self, lengths: Ball) -> Legs[Ball]:
+        """Return the machine with these lengths (5, N)."""
+        return Legs(self.base, self.offsets, self.radii, lengths, self.rings)
+
+    def at(self, which: Ints, s: Floats) -> Legs[Ball]:
+        """Return the legs at s."""
+        return self.legs(blossom(self.coefficients[:, :, which], [s] * self.degree))
+
+    def over(self, which: Ints, s: Floats, h: Floats) -> LegFamily:
+        """Return the legs from s to s + h: the polynomials' coefficients there are their blossom's values."""
+        c, k = self.coefficients[:, :, which], self.degree
+        if not (s == 0.0).all() or not (h == 1.0).all():
+            c = restricted(c, s, h)
+        slopes = [(c[j + 1] - c[j]) * float(k) for j in range(k)] or [c[0] * 0.0]
+        zero = Ball.exact(np.zeros((1, 1)))
+        slope = Legs(zero[None] * np.zeros((3, 1, 1)), zero, zero, hull(stack(slopes)), self.rings)
+        middle = self.legs(blossom(c, [np.full(len(s), 0.5)] * k))
+        return LegFamily(middle, self.legs(hull(c)), slope, self.slack)
+
+
+def _check(machine: AsBuiltPentapod, c: Floats, p: Floats, i: Floats, leg_error: float, depth: int) -> None:
+    for name, array in (("position", p), ("direction", i)):
+        if array.shape != (len(c) + 1, 3):
+            expected = f"shape ({len(c) + 1}, 3): the poses at the ends of {len(c)} intervals"
+            raise ArrayError(f"{name} has shape {array.shape}", expected=expected)
+    if not (np.isfinite(leg_error) and leg_error >= 0.0 and 0 <= depth <= 40):
+        raise ArrayError("leg_error must not be negative, nor depth beyond 0 to 40", value=(leg_error, depth))
+    if not (c - machine.zeros[:, None] > 0.0).all():
+        raise ArrayError("leg_coefficients must be positive lengths", value=float(c.min()), expected="metres")
+    if len(c) > 1:
+        jumps = np.abs(c[1:, :, 0] - c[:-1, :, -1]).max(axis=1)
+        worst = int(np.argmax(jumps))
+        if jumps[worst] > 2.0 * leg_error:
+            raise ArrayError(
+                f"the legs jump between interval {worst} and the next",
+                value=float(jumps[worst]),
+                expected="intervals that join, to within 2 leg_error",
+                remedy="a leg_error of half the jump covers every continuous motion in between",
+            )

@@ -1,0 +1,1 @@
+"""Verified continuation: tubes about poses, each with exactly one solution in it."""

@@ -1,0 +1,123 @@
+"""Poses carried along while the legs change, with a proof: tube after tube, each step as long as its proof allows.
+
+Lemma 10 of docs/proofs.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.kinematics.tubes.leg_equations import Legs, mids
+from pentapod.kinematics.tubes.newton import newton
+from pentapod.kinematics.tubes.tube import LegFamily, Tube, error_bound, prove_tube, sensitivity
+from pentapod.numerics.balls import Ball
+
+Pose: TypeAlias = tuple[Floats, Floats]
+"""Positions and directions, (3, N) each."""
+
+ATTEMPTS = 150
+_EASY = 0.4  # a contraction below which the next step may be twice as long
+
+
+class Route(Protocol):
+    """How the legs of each element of a batch change with s in [0, 1]; all s and h are short binary fractions."""
+
+    def at(self, which: Ints, s: Floats) -> Legs[Ball]:
+        """Return the legs of elements `which` (n,) at s (n,), their exact values enclosed."""
+        ...
+
+    def over(self, which: Ints, s: Floats, h: Floats) -> LegFamily:
+        """Return the legs of elements `which` from s to s + h, (n,) each."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """How far N poses were carried.
+
+    position, direction (3, N): at s = 1 where proven, else what Newton's method alone found there; NaN for nothing.
+    error (N,): how far at most the exact pose at s = 1 is, in the norm of `tube`; NaN where not proven.
+    reached (N,): the s up to which the proof goes. step (N,): the length of the step that failed there, 0 for none.
+    sensitivity (2, N): the largest of the tubes' `sensitivity` for positions and directions; 0 where there is none.
+    """
+
+    position: Floats
+    direction: Floats
+    error: Floats
+    reached: Floats
+    step: Floats
+    sensitivity: Floats
+
+    @property
+    def proven(self) -> Bools:
+        """Where the pose was carried all the way (N,)."""
+        return np.asarray(self.reached == 1.0)
+
+
+def carry(
+    route: Route,
+    start: Pose,
+    scale: float,
+    *,
+    end: Pose | None = None,
+    admit: Callable[[Pose, Tube], Bools] | None = None,
+    shortest: float,
+) -> Carried:
+    """Carry poses from s = 0 to s = 1 of their routes.
+
+    start: approximate solutions; the exact ones that are carried are those in the first tube around them. end: the
+    approximate solutions at s = 1 that the last tubes shall lead to, by default what Newton's method leads to. admit:
+    asks of the poses at the start and their tubes more than that they are tubes. A step that is not proven is halved,
+    after an easy one the next is doubled; what is `shortest` or needs too many attempts is given up.
+    """
+    n = start[0].shape[-1]
+    out, sure = np.full((7, n), np.nan), np.zeros((4, n))
+    left = np.flatnonzero(np.isfinite(start[0].sum(axis=0)))
+    here, s, h = (start[0][:, left], start[1][:, left]), np.zeros(len(left)), np.ones(len(left))
+    speed = (np.zeros_like(here[0]), np.zeros_like(here[1]))
+    sure[1] = 1.0
+    for attempt in range(ATTEMPTS):
+        if not left.size:
+            break
+        to, legs = s + h, route.at(left, s + h)
+        there, settled = _next(here, speed, h, legs, scale)
+        if end is not None:
+            last = to == 1.0
+            there = np.where(last, end[0][:, left], there[0]), np.where(last, end[1][:, left], there[1])
+            settled |= last
+        family = route.over(left, s, h)
+        tube = prove_tube(here, there, family, scale)
+        good = settled & tube.proven
+        if admit is not None:
+            first = s == 0.0
+            good[first] &= admit(here, tube)[first]
+        if attempt == 0:
+            out[:6, left[settled]] = np.concatenate(there)[:, settled]
+        done = good & (to == 1.0)
+        if done.any():
+            out[:6, left[done]] = np.concatenate(there)[:, done]
+            out[6, left[done]] = error_bound(tube, there, legs)[done]
+        speed = (
+            np.where(good, (there[0] - here[0]) / h, speed[0]),
+            np.where(good, (there[1] - here[1]) / h, speed[1]),
+        )
+        here = np.where(good, there[0], here[0]), np.where(good, there[1], here[1])
+        s = np.where(good, to, s)
+        sure[:2, left] = s, np.where(done, 0.0, h)
+        worst = sure[2:, left]
+        sure[2:, left] = np.where(good, np.maximum(worst, sensitivity(tube, family, scale)), worst)
+        h = np.minimum(h * np.where(~good, 0.5, np.where(tube.contraction < _EASY, 2.0, 1.0)), 1.0 - s)
+        keep = ~done & (h >= shortest)
+        left, s, h = left[keep], s[keep], h[keep]
+        here, speed = (here[0][:, keep], here[1][:, keep]), (speed[0][:, keep], speed[1][:, keep])
+    return Carried(out[:3], out[3:6], out[6], sure[0], sure[1], sure[2:])
+
+
+def _next(here: Pose, speed: Pose, h: Floats, legs: Legs[Ball], scale: float) -> tuple[Pose, Bools]:
+    p, i, settled = newton(here[0] + h * speed[0], here[1] + h * speed[1], mids(legs), scale)
+    return (p, i), settled

@@ -1,0 +1,124 @@
+"""The five leg equations and the unit length of the direction, for any geometry near a linear pentapod.
+
+Leg k runs from a_k, anywhere in space, to the nearest point of a circle of radius r_k around the platform line at
+p + z_k i (r_k = 0: to that point itself). With d = p − a, e = d + z i and ρ = |d × i|, the distance of a from
+the line, its length is l² = (d·i + z)² + (ρ − r)², so that for a unit direction
+
+    G_k = ½ (|e|² + r² − l²) − r ρ = 0,  k = 1 ... 5,      G_6 = ½ (|i|² − 1) = 0.
+
+In this form G is a quadratic polynomial of (p, i) where r = 0, and nothing is a root or a quotient but ρ. Everything
+here takes plain arrays and balls alike: one formula for the solver and for the proof. Vectors have their three
+components on the first axis, legs are on the second, the batch is last: (3, 5, N).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar, cast
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats
+from pentapod.numerics.balls import Ball
+
+Q = TypeVar("Q", Floats, Ball)
+
+_NEXT, _AFTER = [1, 2, 0], [2, 0, 1]
+
+
+@dataclass(frozen=True, eq=False)
+class Legs(Generic[Q]):
+    """The geometry at one moment: base (3, 5, N), offsets, radii and lengths (5, N), or N = 1. rings (5, 1): r ≠ 0."""
+
+    base: Q
+    offsets: Q
+    radii: Q
+    lengths: Q
+    rings: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class Rows(Generic[Q]):
+    """∂G_k/∂p and ∂G_k/∂i (3, 5, N) in metres and metres squared; e (3, 5, N) and ρ (5, N), metres.
+
+    ρ is 0 for legs without a ring.
+    """
+
+    by_position: Q
+    by_direction: Q
+    e: Q
+    rho: Q
+
+
+def dot(a: Q, b: Q) -> Q:
+    """Return the scalar products of vectors (3, ...)."""
+    product = a * b
+    return cast("Q", product[0] + product[1] + product[2])
+
+
+def cross(a: Q, b: Q) -> Q:
+    """Return the vector products of vectors (3, ...)."""
+    return a[_NEXT] * b[_AFTER] - a[_AFTER] * b[_NEXT]
+
+
+def rows(position: Q, direction: Q, legs: Legs[Q]) -> Rows[Q]:
+    """Return the derivatives of the leg equations at positions and directions (3, N)."""
+    p, i = position[:, None], direction[:, None]
+    d, z = p - legs.base, legs.offsets
+    e = d + z * i
+    if not legs.rings.any():
+        return Rows(e, z * e, e, masked(dot(e, e), legs.rings))
+    normal = cross(d, i)
+    rho = root(dot(normal, normal))
+    n = normal / rho
+    pull_p = masked(legs.radii * cross(i, n), legs.rings)
+    pull_i = masked(legs.radii * cross(n, d), legs.rings)
+    return Rows(e - pull_p, z * e - pull_i, e, masked(rho, legs.rings))
+
+
+def residuals(position: Q, direction: Q, legs: Legs[Q]) -> Q:
+    """Return G_1 ... G_5 (5, N), metres squared."""
+    p, i = position[:, None], direction[:, None]
+    d = p - legs.base
+    e = d + legs.offsets * i
+    r, length = legs.radii, legs.lengths
+    g = 0.5 * (dot(e, e) - length * length)
+    if not legs.rings.any():
+        return g
+    normal = cross(d, i)
+    return g + masked(r * (0.5 * r - root(dot(normal, normal))), legs.rings)
+
+
+def root(a: Q) -> Q:
+    """Return the square roots."""
+    return a.sqrt() if isinstance(a, Ball) else np.sqrt(a)
+
+
+def masked(a: Q, mask: Bools) -> Q:
+    """Return `a` where the mask holds, exactly 0 elsewhere: also where `a` is NaN."""
+    return a.where(mask) if isinstance(a, Ball) else np.where(mask, a, 0.0)
+
+
+def mids(legs: Legs[Ball]) -> Legs[Floats]:
+    """Return the midpoints alone."""
+    return Legs(legs.base.mid, legs.offsets.mid, legs.radii.mid, legs.lengths.mid, legs.rings)
+
+
+def float_jacobian(found: Rows[Floats], direction: Floats, scale: float) -> Floats:
+    """Return ∂G/∂(p / scale, i) (N, 6, 6) of directions (3, N)."""
+    matrix = np.zeros((direction.shape[-1], 6, 6))
+    matrix[:, :5, :3] = np.moveaxis(scale * found.by_position, -1, 0).swapaxes(1, 2)
+    matrix[:, :5, 3:] = np.moveaxis(found.by_direction, -1, 0).swapaxes(1, 2)
+    matrix[:, 5, 3:] = direction.T
+    return matrix
+
+
+def ball_jacobian(found: Rows[Ball], direction: Ball, scale: float) -> Ball:
+    """Return ∂G/∂(p / scale, i) (N, 6, 6) of directions (3, N); scale is a power of two."""
+    mid = float_jacobian(
+        Rows(found.by_position.mid, found.by_direction.mid, found.e.mid, found.rho.mid), direction.mid, scale
+    )
+    rad = float_jacobian(
+        Rows(found.by_position.rad, found.by_direction.rad, found.e.rad, found.rho.rad), direction.rad, scale
+    )
+    return Ball(mid, rad)

@@ -1,0 +1,1 @@
+"""Calibration: the geometry of a machine from measured poses."""

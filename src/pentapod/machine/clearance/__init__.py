@@ -1,0 +1,1 @@
+"""What must not touch: legs, spindle, tool, and what stands around them."""

@@ -1,0 +1,155 @@
+"""Surroundings: what legs, spindle and tool must not touch: the part, its fixture, the machine's table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import MachineError
+from pentapod.cutters.tool import Tool
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.geometry.solids import Solid
+from pentapod.machine.machine import Machine
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.query.distance import Gap, MeshDistance
+
+TOOL_BODY = "tool body"
+"""How shank and holder are called in claims and margins."""
+
+LEGS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacle:
+    """One thing in the way. name: "part", "fixture", "table". surface: its mesh.
+
+    clamped: whether it moves with the workpiece, and its mesh is in the workpiece frame; else in the machine frame.
+    allowance: metres by which the tool body may be in it and still count as clear.
+    """
+
+    name: str
+    surface: MeshDistance
+    clamped: bool
+    allowance: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """obstacles, and the tool's solids above its cutting part (shank and holder; none where the spindle is all)."""
+
+    obstacles: tuple[Obstacle, ...] = ()
+    tool: tuple[Solid, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        machine: Machine,
+        tool: Tool,
+        part: Mesh,
+        *,
+        fixture: Mesh | None = None,
+        table: Mesh | None = None,
+        allowance: float = 50e-6,
+    ) -> Surroundings:
+        """Return what is in the way on a machine: the part, what holds it, what stands in the machine.
+
+        part, fixture: workpiece frame; table: machine frame. allowance: metres by which the tool's shank and holder may
+        be in the part and still count as clear. Raises MachineError where the tool is too long for the machine.
+        """
+        body = mounted(tool.solids, machine)
+        room = machine.tool_length - float(machine.pentapod.offsets.max())
+        if body and max(solid.high for solid in body) > room:
+            raise MachineError(
+                "the tool stands above the lowest platform joint",
+                key="tool",
+                expected=f"at most {1e3 * room:.4g} mm from the tip to the holder's end",
+                remedy="a longer tool length, or a shorter holder",
+            )
+        found = [Obstacle("part", MeshDistance.of(part), clamped=True, allowance=allowance)]
+        for name, mesh in (("fixture", fixture), ("table", table)):
+            if mesh is not None:
+                found.append(Obstacle(name, MeshDistance.of(mesh), clamped=name == "fixture"))
+        return cls(tuple(found), body)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What moves (K,): five legs, the spindle, and the tool body where there is one."""
+        legs = tuple(f"leg {k + 1}" for k in range(LEGS))
+        return (*legs, "spindle", *((TOOL_BODY,) if self.tool else ()))
+
+
+NOTHING = Surroundings()
+"""Nothing in the way, and a tool without shank and holder."""
+
+
+@dataclass(frozen=True, eq=False)
+class MovingBodies:
+    """Where the moving bodies are in N poses, in an obstacle's frame, metres.
+
+    starts, ends (N, 6, 3): axes of the five legs, base joint to platform joint, and of the spindle. tips, axes (N, 3):
+    of the tool, the axis unit, tip → spindle. radii (6,): of legs and spindle.
+    """
+
+    starts: Floats
+    ends: Floats
+    tips: Floats
+    axes: Floats
+    radii: Floats
+
+    @classmethod
+    def at(
+        cls, machine: Machine, position: Floats, direction: Floats, frame: RigidTransform | None = None
+    ) -> MovingBodies:
+        """Return the bodies at poses (N, 3) of the machine; frame: that of the obstacle → machine, if another."""
+        robot, top, nose = machine.pentapod, *spindle_ends(machine)
+        count = len(position)
+        bases = np.broadcast_to(np.column_stack([robot.base, np.zeros(LEGS)]), (count, LEGS, 3))
+        joints = position[:, None] + robot.offsets[:, None] * direction[:, None]
+        starts = np.concatenate([bases, (position + top * direction)[:, None]], axis=1)
+        ends = np.concatenate([joints, (position + nose * direction)[:, None]], axis=1)
+        tips, axes = position + machine.tool_length * direction, -direction
+        if frame is not None:
+            back = frame.inverse()
+            starts, ends, tips, axes = back.apply(starts), back.apply(ends), back.apply(tips), back.rotate(axes)
+        radii = np.append(np.full(LEGS, machine.bodies.leg_radius), machine.bodies.shaft_radius)
+        return cls(starts, ends, tips, axes, radii)
+
+    def segments(self, surface: MeshDistance, within: float) -> Gap:
+        """Return the gaps of legs and spindle, (N · 6,) in rows of six, surface to surface, none above `within`."""
+        axes = surface.segments(self.starts.reshape(-1, 3), self.ends.reshape(-1, 3), within + float(self.radii.max()))
+        distance = axes.distance - np.tile(self.radii, len(self.tips))
+        return Gap(np.minimum(distance, within), axes.place, axes.normal)
+
+    def gaps(self, obstacle: Obstacle, tool: Sequence[Solid], within: float) -> Floats:
+        """Return the gaps (N, K) of all that moves, in the order of `Surroundings.names`; none above `within`.
+
+        What runs through an open sheet is at most as deep in it as it is thick. The tool's allowance is added.
+        """
+        found = self.segments(obstacle.surface, within).distance.reshape(-1, LEGS + 1)
+        if not tool:
+            return found
+        body, _ = obstacle.surface.bodies(tool, self.tips, self.axes, within)
+        return np.column_stack([found, np.minimum(body + obstacle.allowance, within)])
+
+
+def spindle_ends(machine: Machine) -> tuple[float, float]:
+    """Return the offsets along the platform line of the spindle's top and of its nose, metres."""
+    return float(machine.pentapod.offsets.min()), machine.tool_length - machine.bodies.shaft_end
+
+
+def mounted(solids: Sequence[Solid], machine: Machine) -> tuple[Solid, ...]:
+    """Return the shank and holder of a tool's solids, without what the spindle holds inside itself."""
+    end, radius = machine.bodies.shaft_end, machine.bodies.shaft_radius
+    kept: list[Solid] = []
+    for solid in solids:
+        inside = max(solid.low_radius, solid.high_radius) + solid.rounding <= radius
+        if solid.kind == "cutter" or (inside and solid.low >= end):
+            continue
+        high = min(solid.high, end) if inside else solid.high
+        share = (high - solid.low) / (solid.high - solid.low) if solid.high > solid.low else 1.0
+        top = solid.low_radius + share * (solid.high_radius - solid.low_radius)
+        kept.append(Solid(solid.kind, solid.low, high, solid.low_radius, top, solid.rounding))
+    return tuple(kept)

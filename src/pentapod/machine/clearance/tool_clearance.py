@@ -1,0 +1,106 @@
+"""Clearances between each leg and what hangs on its own platform line: the spindle, the shank and the holder.
+
+A leg begins on the line, at its platform joint: leg and line lie in a plane, and bodies of revolution about the line
+are nearest to it in that plane. So the question is two-dimensional, and has a closed form. It also shows where a leg
+can cross the line at all: nowhere but where it lies along it, that is where the line runs through its base joint.
+
+With θ the angle between leg (seen from its platform joint) and tool axis, the leg runs from (0, h) along
+(sin θ, cos θ) in coordinates (distance from the line, height over the tip). The formulas use element-wise
+arithmetic only: they serve NumPy arrays and casadi symbols alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.geometry.solids import Solid
+from pentapod.machine.machine import Machine
+
+_TINY = 1e-18
+
+
+@dataclass(frozen=True)
+class Arithmetic:
+    """The functions that differ between NumPy and casadi: square root, smaller and larger of two, choice."""
+
+    sqrt: Any
+    least: Any
+    most: Any
+    where: Any
+
+
+NUMPY = Arithmetic(np.sqrt, np.minimum, np.maximum, np.where)
+
+
+def leg_spindle_gap(machine: Machine, leg: int, cosine: Any, do: Arithmetic) -> Any:
+    """Return the gap in metres of a leg from the spindle; cosine: of the angle θ.
+
+    The leg counts from `joint_radius` on. Its distance from the line grows along it, so its nearest point is there.
+    """
+    bodies, robot = machine.bodies, machine.pentapod
+    sine = _sine(cosine, do)
+    height = machine.tool_length - float(robot.offsets[leg]) + bodies.joint_radius * cosine
+    top = machine.tool_length - float(robot.offsets.min())
+    beyond = do.most(do.most(height - top, bodies.shaft_end - height), 0.0)
+    aside = bodies.joint_radius * sine
+    return do.sqrt(aside * aside + beyond * beyond + _TINY) - bodies.shaft_radius - bodies.leg_radius
+
+
+def leg_tool_gap(machine: Machine, solids: Sequence[Solid], leg: int, cosine: Any, length: Any, do: Arithmetic) -> Any:
+    """Return the gap in metres of a leg from the nearest of a tool's solids, negative where it runs through one.
+
+    cosine: of θ; length: of the leg, metres. Negative: by how much the leg runs below a rim of the solid, or the
+    solid stands above the platform joint.
+    """
+    joint = machine.tool_length - float(machine.pentapod.offsets[leg])
+    sine = _sine(cosine, do)
+    end_r, end_h = length * sine, joint + length * cosine
+    gaps: list[Any] = []
+    for solid in solids:
+        low, high = solid.low, solid.high
+        found: Any = joint - high
+        for radius, height in ((solid.low_radius, low), (solid.high_radius, high)):
+            found = do.least(found, _to_rim(radius, joint - height, sine, cosine, length, do))
+            aside, off = do.most(end_r - radius, 0.0), end_h - height
+            found = do.least(found, do.sqrt(aside * aside + off * off + _TINY))
+        step_r, step_h = solid.high_radius - solid.low_radius, high - low
+        share = ((end_r - solid.low_radius) * step_r + (end_h - low) * step_h) / (step_r * step_r + step_h * step_h)
+        share = do.least(do.most(share, 0.0), 1.0)
+        aside, off = end_r - solid.low_radius - share * step_r, end_h - low - share * step_h
+        found = do.least(found, do.sqrt(aside * aside + off * off + _TINY)) - solid.rounding
+        gaps.append(found)
+    return reduce(do.least, gaps) - machine.bodies.leg_radius
+
+
+def leg_tool_gaps(machine: Machine, solids: Sequence[Solid], position: Floats, direction: Floats) -> Floats:
+    """Return the gaps (N, 5) in metres of the legs from a tool's solids in poses (N, 3)."""
+    cosines, lengths = _cosines(machine, position, direction)
+    gaps = [leg_tool_gap(machine, solids, k, cosines[:, k], lengths[:, k], NUMPY) for k in range(len(lengths.T))]
+    return np.stack(gaps, axis=1)
+
+
+def _cosines(machine: Machine, position: Floats, direction: Floats) -> tuple[Floats, Floats]:
+    """Return the cosines of θ and the lengths of the legs, (N, 5)."""
+    vectors = machine.pentapod.leg_vectors(position, direction)
+    lengths = np.linalg.norm(vectors, axis=-1)
+    return np.einsum("nji,ni->nj", vectors, direction) / lengths, lengths
+
+
+def _to_rim(radius: float, depth: float, sine: Any, cosine: Any, length: Any, do: Arithmetic) -> Any:
+    """Return the distance of a leg from a rim that lies `depth` below its joint: negative where it runs below it."""
+    along = radius * sine - depth * cosine
+    across = radius * cosine + depth * sine
+    over = do.most(along - length, 0.0)
+    distance = do.sqrt(across * across + over * over + _TINY)
+    before = float(np.hypot(radius, depth))
+    return do.where(along < 0.0, before, do.where(across < 0.0, -distance, distance))
+
+
+def _sine(cosine: Any, do: Arithmetic) -> Any:
+    return do.sqrt(do.most(1.0 - cosine * cosine, 0.0) + _TINY)

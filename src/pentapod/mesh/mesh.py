@@ -1,0 +1,236 @@
+"""Mesh: a triangulated surface in metres, welded, with smooth normals and its diagnosis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.base.arrays import Bools, Floats, Ints, as_batch, frozen, set_frozen
+from pentapod.base.errors import MeshError
+from pentapod.base.progress import Progress, silent
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.mesh import normals
+from pentapod.mesh import repair as mending
+from pentapod.mesh.diagnosis import MeshDiagnosis
+from pentapod.mesh.topology import Topology
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+CREASE_ANGLE = np.radians(40.0)
+"""Facets that meet at more than this angle keep their own normals."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A surface of triangles. Make one with `Mesh.of` or `load_mesh`; the constructor takes what is sound.
+
+    vertices (V, 3): metres, workpiece frame. faces (F, 3): vertex indices, counterclockwise seen from
+    outside. diagnosis: what was found and mended. crease_angle: radians, see `normals`.
+    """
+
+    vertices: Floats
+    faces: Ints
+    diagnosis: MeshDiagnosis
+    crease_angle: float = CREASE_ANGLE
+
+    def __post_init__(self) -> None:
+        faces = np.array(self.faces, dtype=np.intp)
+        faces.flags.writeable = False
+        set_frozen(self, vertices=frozen(self.vertices, "vertices", (None, 3)), faces=faces)
+
+    @classmethod
+    def of(
+        cls,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        *,
+        repair: bool = False,
+        source: str = "mesh",
+        crease_angle: float = CREASE_ANGLE,
+        notes: tuple[str, ...] = (),
+        progress: Progress = silent,
+    ) -> Mesh:
+        """Return the mesh of vertices (V, 3) in metres and facets (F, 3).
+
+        Equal vertices are welded. Doubled and degenerate facets are dropped and listed among the repairs:
+        nothing can be machined on them. With `repair`, facets are also wound alike, and a closed surface
+        outwards; without it, that is only diagnosed. Raises MeshError where there are no facets, no area,
+        indices beyond the vertices, or coordinates that are not finite.
+        """
+        points, facets = _checked(vertices, faces, source)
+        progress("mesh", 0.3, "welding")
+        points, facets = mending.weld(points, facets)
+        repairs: list[str] = []
+        degenerate = mending.degenerate_facets(points, facets)
+        if degenerate.all():
+            raise MeshError("the mesh has zero area: no facet spans a surface", file=source)
+        if degenerate.any():
+            repairs.append(f"{int(degenerate.sum()):,} degenerate facets dropped")
+            facets = facets[~degenerate]
+        duplicated = mending.duplicated_facets(facets, len(points))
+        if duplicated.any():
+            repairs.append(f"{int(duplicated.sum()):,} duplicated facets dropped")
+            facets = facets[~duplicated]
+        if repair:
+            facets, said = mending.wind(points, facets)
+            repairs.extend(said)
+        if repairs:
+            points, facets = mending.weld(points, facets)
+        progress("mesh", 0.6, "edges")
+        topology = Topology(facets, len(points))
+        mended = (int(duplicated.sum()), int(degenerate.sum()))
+        diagnosis = _diagnose(points, topology, source=source, mended=mended, repairs=repairs, notes=notes)
+        mesh = cls(points, facets, diagnosis, crease_angle)
+        mesh.__dict__["topology"] = topology  # fills the cached property: sorting a million edges takes a second
+        return mesh
+
+    @cached_property
+    def topology(self) -> Topology:
+        """Which facets share which edges."""
+        return Topology(self.faces, len(self.vertices))
+
+    @cached_property
+    def facet_normals(self) -> Floats:
+        """Unit normals (F, 3) of the facets."""
+        return frozen(normals.unit_or_zero(normals.facet_cross(self.vertices, self.faces)), "facet_normals")
+
+    @cached_property
+    def facet_areas(self) -> Floats:
+        """Areas (F,) of the facets, square metres."""
+        return frozen(0.5 * np.linalg.norm(normals.facet_cross(self.vertices, self.faces), axis=1), "facet_areas")
+
+    @cached_property
+    def vertex_normals(self) -> Floats:
+        """Unit normals (V, 3), smooth over all facets at a vertex: for display, not for toolpaths."""
+        return frozen(normals.vertex_normals(self.vertices, self.faces, self.facet_normals), "vertex_normals")
+
+    @cached_property
+    def smooth_pairs(self) -> Bools:
+        """Which of `topology.side_pairs` (M,) join smoothly: alike wound and no crease between them."""
+        return normals.smooth_pairs(self.topology, self.facet_normals, self.crease_angle)
+
+    @cached_property
+    def corner_normals(self) -> Floats:
+        """Unit normals (F, 3, 3) at the facets' corners, equal across edges except at creases and borders."""
+        return frozen(
+            normals.corner_normals(self.vertices, self.topology, self.facet_normals, self.smooth_pairs),
+            "corner_normals",
+        )
+
+    @property
+    def bounds(self) -> Floats:
+        """Lowest and highest coordinates (2, 3), metres."""
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    def transformed(self, transform: RigidTransform) -> Mesh:
+        """Return the mesh moved rigidly; its diagnosis follows."""
+        return Mesh.of(
+            transform.apply(self.vertices),
+            self.faces,
+            source=self.diagnosis.source,
+            crease_angle=self.crease_angle,
+            notes=self.diagnosis.notes,
+        )
+
+    def body(self, number: int) -> Mesh:
+        """Return one of the bodies that `diagnosis.bodies` counts. Raises MeshError for a number beyond them."""
+        count, body_of_facet = self.topology.bodies
+        if not 0 <= number < count:
+            raise MeshError("no such body", value=number, expected=f"0 to {count - 1}")
+        return Mesh.of(
+            self.vertices,
+            self.faces[body_of_facet == number],
+            source=f"{self.diagnosis.source}, body {number}",
+            crease_angle=self.crease_angle,
+        )
+
+    @classmethod
+    def from_trimesh(cls, shape: Trimesh, metres: float, *, repair: bool = False) -> Mesh:
+        """Return the mesh of a `trimesh.Trimesh`: of any format or shape that trimesh knows.
+
+        metres: in one unit of its numbers, 1e-3 for millimetres; trimesh has none. repair and errors: as `of`.
+        """
+        if not (np.isfinite(metres) and metres > 0.0):
+            raise MeshError("the unit must be a positive number of metres", key="metres", value=metres)
+        return cls.of(metres * np.asarray(shape.vertices), shape.faces, repair=repair, source="trimesh")
+
+    def to_trimesh(self) -> Trimesh:
+        """Return the mesh as a `trimesh.Trimesh`, in metres, with the same vertices and facets in the same order."""
+        from trimesh import Trimesh  # noqa: PLC0415  heavy: only for those who ask
+
+        return Trimesh(self.vertices, self.faces, process=False)
+
+    def flipped(self) -> Mesh:
+        """Return the mesh with its other side out: for an open sheet that faces away from the tool."""
+        return Mesh.of(
+            self.vertices,
+            self.faces[:, ::-1],
+            source=self.diagnosis.source,
+            crease_angle=self.crease_angle,
+            notes=self.diagnosis.notes,
+        )
+
+
+def _checked(vertices: ArrayLike, faces: ArrayLike, source: str) -> tuple[Floats, Ints]:
+    points, facets = as_batch(vertices, "vertices", (None, 3)), np.asarray(faces)
+    if facets.size == 0 or not len(points):
+        raise MeshError("the mesh has no facets", file=source, expected="a surface made of triangles")
+    if facets.ndim != 2 or facets.shape[1] != 3 or not np.issubdtype(facets.dtype, np.integer):
+        raise MeshError(
+            "facets are not triangles of vertex indices", file=source, value=facets.shape, expected="(F, 3)"
+        )
+    facets = facets.astype(np.intp)
+    if facets.min() < 0 or facets.max() >= len(points):
+        raise MeshError(
+            f"a facet names a vertex that is not there; the mesh has {len(points):,} vertices",
+            file=source,
+            value=int(facets.max() if facets.max() >= len(points) else facets.min()),
+            remedy="the file may be truncated",
+        )
+    finite = np.isfinite(points).all(axis=1)
+    wrong = np.flatnonzero(~np.take(finite, facets).all(axis=1))
+    if len(wrong):
+        raise MeshError(
+            f"{len(wrong):,} facets have coordinates that are not finite, the first is facet {int(wrong[0])}",
+            file=source,
+            remedy="export the mesh again",
+        )
+    return points, facets
+
+
+def _diagnose(
+    points: Floats,
+    topology: Topology,
+    *,
+    source: str,
+    mended: tuple[int, int],
+    repairs: list[str],
+    notes: tuple[str, ...],
+) -> MeshDiagnosis:
+    facets = topology.faces
+    closed = topology.watertight and topology.consistent
+    extents = points.max(axis=0) - points.min(axis=0)
+    return MeshDiagnosis(
+        source=source,
+        facets=len(facets),
+        vertices=len(points),
+        bodies=topology.bodies[0],
+        watertight=topology.watertight,
+        consistent=topology.consistent,
+        inverted=closed and mending.signed_volume(points, facets) < 0.0,
+        border_loops=topology.border_loops,
+        non_manifold_edges=int((topology.facets_at_edge > 2).sum()),
+        inconsistent_edges=int((~topology.pair_agrees).sum()),
+        slivers=int(mending.slivers(points, facets).sum()),
+        duplicated=mended[0],
+        degenerate=mended[1],
+        area=float(0.5 * np.linalg.norm(normals.facet_cross(points, facets), axis=1).sum()),
+        extents=(float(extents[0]), float(extents[1]), float(extents[2])),
+        repairs=tuple(repairs),
+        notes=notes,
+    )

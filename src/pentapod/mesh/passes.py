@@ -1,0 +1,114 @@
+"""Passes: many polylines on a surface, in flat arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats, Ints, set_frozen
+from pentapod.geometry.runs import run_starts
+
+
+@dataclass(frozen=True, eq=False)
+class Passes:
+    """P polylines: pass k holds the points starts[k] to starts[k + 1] − 1, at least two.
+
+    points (N, 3): metres, on the surface. normals (N, 3): such that linear interpolation between points
+    gives the surface's normal up to its length (not unit). starts (P + 1,). levels (P,): which line of the
+    strategy each belongs to, such as the slicing plane.
+    """
+
+    points: Floats
+    normals: Floats
+    starts: Ints
+    levels: Ints
+
+    def __post_init__(self) -> None:
+        for name in ("points", "normals", "starts", "levels"):
+            array = np.asarray(getattr(self, name)).copy()
+            array.flags.writeable = False
+            set_frozen(self, **{name: array})
+
+    def __len__(self) -> int:
+        return len(self.levels)
+
+    @cached_property
+    def pass_of_point(self) -> Ints:
+        """The pass (N,) of each point."""
+        return np.repeat(np.arange(len(self)), np.diff(self.starts))
+
+    @cached_property
+    def within(self) -> Bools:
+        """Whether (N − 1,) the step from point j to j + 1 stays in one pass."""
+        return self.pass_of_point[1:] == self.pass_of_point[:-1]
+
+    @cached_property
+    def steps(self) -> Floats:
+        """Distance (N − 1,) in metres from point j to j + 1, zero between passes."""
+        return np.where(self.within, np.linalg.norm(np.diff(self.points, axis=0), axis=1), 0.0)
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """Length (P,) of each pass, metres."""
+        sums = np.concatenate([[0.0], np.cumsum(self.steps)])
+        return sums[self.starts[1:] - 1] - sums[self.starts[:-1]] if len(self) else np.zeros(0)
+
+    @cached_property
+    def closed(self) -> Bools:
+        """Whether (P,) each pass ends where it begins."""
+        ends = self.points[self.starts[1:] - 1] - self.points[self.starts[:-1]]
+        return (ends == 0.0).all(axis=1) & (np.diff(self.starts) > 3)
+
+    def where(self, keep: Bools) -> Passes:
+        """Return the passes (P,) marked in `keep`."""
+        points = keep[self.pass_of_point]
+        counts = np.diff(self.starts)[keep]
+        starts = run_starts(counts)
+        return Passes(self.points[points], self.normals[points], starts, self.levels[keep])
+
+    def split(self, keep: Bools) -> Passes:
+        """Return the runs of two or more consecutive points (N,) marked in `keep`, as passes of their own."""
+        begins = keep & ~np.concatenate([[False], keep[:-1] & self.within])
+        run = np.cumsum(begins) - 1
+        counts = np.bincount(run[keep], minlength=int(begins.sum()))
+        long = counts >= 2
+        points = keep.copy()
+        points[keep] = long[run[keep]]
+        starts = run_starts(counts[long])
+        levels = self.levels[self.pass_of_point[begins]][long]
+        return Passes(self.points[points], self.normals[points], starts, levels)
+
+    def rows(self, k: int) -> slice:
+        """Return where the points of pass k are."""
+        return slice(int(self.starts[k]), int(self.starts[k + 1]))
+
+    @classmethod
+    def of(cls, lines: list[tuple[Floats, Floats]], levels: Ints | None = None) -> Passes:
+        """Return the passes of lines, each points and normals (n, 3), n ≥ 2; by default each its own level."""
+        starts = run_starts([len(points) for points, _ in lines])
+        points, normals = (np.concatenate([line[k] for line in lines] or [np.zeros((0, 3))]) for k in range(2))
+        return cls(points, normals, starts, np.arange(len(lines)) if levels is None else levels)
+
+    @classmethod
+    def joined(cls, parts: list[Passes]) -> Passes:
+        """Return the passes of all parts, the levels of each numbered after those before."""
+        if not parts:
+            return cls.of([])
+        points, normals = (np.concatenate([getattr(p, name) for p in parts]) for name in ("points", "normals"))
+        counts = np.concatenate([np.diff(p.starts) for p in parts])
+        first, levels = 0, []
+        for part in parts:
+            levels.append(part.levels + first)
+            first += int(part.levels.max(initial=-1)) + 1
+        starts = run_starts(counts)
+        return cls(points, normals, starts, np.concatenate(levels))
+
+    def slices(self, begins: Ints, ends: Ints) -> Passes:
+        """Return runs of points begins[k] to ends[k], both included, as passes; runs may share their ends."""
+        counts = ends - begins + 1
+        starts = run_starts(counts)
+        index = np.repeat(begins - starts[:-1], counts) + np.arange(int(counts.sum()))
+        levels = self.levels[self.pass_of_point[begins]]
+        return Passes(self.points[index], self.normals[index], starts, levels)

@@ -1,0 +1,226 @@
+"""Patch: the part of a surface that a strategy works on, with its normals; whole, trimmed to a region, or refined."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.errors import ToolpathError
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.normals import facet_cross
+from pentapod.mesh.region import Region
+from pentapod.mesh.topology import Topology
+from pentapod.mesh.trimming import Root, bisected, halves
+
+MOST_FACETS = 8_000_000
+_SAME_NORMAL = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Facets of a mesh, or pieces of them: the same surface with the same normals.
+
+    vertices (V, 3): metres. faces (F, 3): vertex indices. normals (F, 3, 3): at the facets' corners, such that
+    linear interpolation over a facet gives the surface's normal up to its length.
+    """
+
+    vertices: Floats
+    faces: Ints
+    normals: Floats
+
+    @classmethod
+    def whole(cls, mesh: Mesh) -> Patch:
+        """Return all of a mesh."""
+        patch = cls(mesh.vertices, mesh.faces, mesh.corner_normals)
+        patch.__dict__["topology"] = mesh.topology  # known already: sorting a million edges takes a second
+        return patch
+
+    @classmethod
+    def of(cls, mesh: Mesh, region: Region) -> Patch:
+        """Return the part of a mesh within a region, cut exactly at its edges; empty where there is none."""
+        patch = cls.whole(mesh)
+        if region.box is not None:
+            for axis in range(3):
+                for bound, side in zip(region.bounds[:, axis], (1.0, -1.0), strict=True):
+                    patch = patch._box_side(axis, float(bound), side)
+        return patch._facing(region)
+
+    @cached_property
+    def topology(self) -> Topology:
+        """Which facets share which edges."""
+        return Topology(self.faces, len(self.vertices))
+
+    @cached_property
+    def joins(self) -> Bools:
+        """Whether (E,) exactly two facets meet at an edge, wound alike, and without a crease."""
+        topology = self.topology
+        joins = np.zeros(len(topology.edges), dtype=np.bool_)
+        a, b = topology.side_pairs
+        flat = self.normals.reshape(-1, 3)
+        after_a, after_b = (side - side % 3 + (side + 1) % 3 for side in (a, b))
+        same = np.abs(flat[a] - flat[after_b]).max(axis=1, initial=0.0) < _SAME_NORMAL
+        same &= np.abs(flat[after_a] - flat[b]).max(axis=1, initial=0.0) < _SAME_NORMAL
+        joins[topology.pair_edges] = topology.pair_agrees & same
+        return joins
+
+    @cached_property
+    def facet_normals(self) -> Floats:
+        """Unit normals (F, 3) of the facets; zero for facets without area."""
+        cross = facet_cross(self.vertices, self.faces)
+        length = np.linalg.norm(cross, axis=1, keepdims=True)
+        return cross / np.where(length > 0.0, length, 1.0)
+
+    @cached_property
+    def areas(self) -> Floats:
+        """Areas (F,) of the facets, square metres."""
+        return 0.5 * np.linalg.norm(facet_cross(self.vertices, self.faces), axis=1)
+
+    @cached_property
+    def vertex_normals(self) -> Floats:
+        """Unit normals (V, 3), the mean over all corners at a vertex."""
+        total = np.zeros((len(self.vertices), 3))
+        for k in range(3):
+            total[:, k] = np.bincount(
+                self.faces.ravel(), weights=self.normals[..., k].ravel(), minlength=len(self.vertices)
+            )
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        return np.where(length > 0.0, total / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])
+
+    def refined(self, longest: float) -> Patch:
+        """Return the same surface in facets whose edges are no longer than `longest` metres.
+
+        Edges are halved until they are short enough. Raises ToolpathError where that would take millions.
+        """
+        patch = self
+        while len(patch.faces):
+            sides = np.roll(patch.faces, -1, axis=1)
+            long = np.linalg.norm(patch.vertices[sides] - patch.vertices[patch.faces], axis=2) > longest
+            if not long.any():
+                break
+            if len(patch.faces) + long.sum() > MOST_FACETS:
+                raise ToolpathError(
+                    "the stepover is too fine for this part",
+                    key="stepover",
+                    expected=f"at most {MOST_FACETS:,} facets with edges of {1e3 * longest:.3g} mm",
+                    remedy="check the unit of the mesh and the stepover",
+                )
+            patch = patch._halved(long)
+        return patch
+
+    def rim(self, width: float, longest: float) -> tuple[Patch, Bools]:
+        """Return the facets around borders and creases, with edges up to `longest`, and which vertices (V,) are near.
+
+        Near is within `width` metres; beyond that as much again is there too.
+        """
+        border = self.topology.edges[~self.joins]
+        if not len(border):
+            return Patch(self.vertices[:0], self.faces[:0], self.normals[:0]), np.zeros(0, dtype=np.bool_)
+        start, way = self.vertices[border[:, 0]], self.vertices[border[:, 1]] - self.vertices[border[:, 0]]
+        counts = np.ceil(np.linalg.norm(way, axis=1) / longest).astype(np.intp) + 1
+        edge = np.repeat(np.arange(len(border)), counts)
+        number = np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
+        tree = KDTree(start[edge] + (number / np.maximum(counts - 1, 1)[edge])[:, None] * way[edge])
+        # Drop what is far and halve what is long, in turns: what is far need not become small.
+        sides = self.vertices[np.roll(self.faces, -1, axis=1)] - self.vertices[self.faces]
+        patch, size = self, max(float(np.linalg.norm(sides, axis=2).max()), longest)
+        while True:
+            patch = patch.refined(size)
+            centres = patch.vertices[patch.faces].mean(axis=1)
+            bound = 2.0 * width + size
+            close = np.isfinite(np.asarray(tree.query(centres, distance_upper_bound=bound)[0]))
+            used = np.zeros(len(patch.vertices), dtype=np.bool_)
+            used[patch.faces[close]] = True
+            faces = (np.cumsum(used) - 1)[patch.faces[close]]
+            patch = Patch(patch.vertices[used], faces, patch.normals[close])
+            if size <= longest:
+                break
+            size = max(0.5 * size, longest)
+        return patch, np.asarray(tree.query(patch.vertices)[0]) < width
+
+    def _halved(self, long: Bools) -> Patch:
+        """Return the patch with the sides (F, 3) in `long` cut in the middle; neighbours agree on which."""
+        topology, old = self.topology, len(self.vertices)
+        edge = topology.edge_of_side
+        split = np.zeros(len(topology.edges), dtype=np.bool_)
+        split[edge[long]] = True
+        number = old + np.cumsum(split) - 1
+        a, b = topology.edges[split].T
+        vertices = np.concatenate([self.vertices, 0.5 * (self.vertices[a] + self.vertices[b])])
+        # Each facet's corners and middles, 0..5: corner k, middle of side k.
+        index = np.concatenate([self.faces, number[edge]], axis=1)
+        normals = np.concatenate([self.normals, 0.5 * (self.normals + np.roll(self.normals, -1, axis=1))], axis=1)
+        marks = split[edge]
+        faces, corner_normals = [], []
+        for turn in range(3):
+            for wanted, triangles in _CUTS.items():
+                rows = np.flatnonzero((marks == np.roll(wanted, turn)).all(axis=1))
+                if turn and wanted in ((False,) * 3, (True,) * 3):
+                    continue
+                turned = [tuple((k + turn) % 3 + (3 if k > 2 else 0) for k in t) for t in triangles]
+                for triangle in turned:
+                    faces.append(index[rows][:, triangle])
+                    corner_normals.append(normals[rows][:, triangle])
+        return Patch(vertices, np.concatenate(faces), np.concatenate(corner_normals))
+
+    def steeper(self, upright: Floats, angle: float) -> Patch:
+        """Return the part whose normals are more than `angle` radians from `upright` (3,) and from its opposite."""
+        length = np.linalg.norm(self.normals, axis=2)
+        values = np.cos(angle) * length - np.abs(self.normals @ upright)
+
+        def root(facet: Ints, a: Ints, b: Ints) -> Floats:
+            ends = self.normals[facet, a], self.normals[facet, b]
+            return bisected(lambda n: np.cos(angle) * np.linalg.norm(n, axis=1) - np.abs(n @ upright), *ends)
+
+        return self if (values >= 0.0).all() else self._kept(values, root)
+
+    def above(self, values: Floats, bound: float) -> tuple[Patch, Floats]:
+        """Return the part where a quantity (V,) is at least `bound`, and the quantity at its vertices."""
+        at = values[self.faces] - bound
+
+        def root(facet: Ints, a: Ints, b: Ints) -> Floats:
+            return at[facet, a] / (at[facet, a] - at[facet, b])
+
+        # The quantity comes along as a fourth coordinate.
+        points = np.concatenate([self.vertices, values[:, None]], axis=1)
+        vertices, faces, normals = halves(points, self.faces, self.normals, at, root)
+        return Patch(vertices[:, :3].copy(), faces, normals), vertices[:, 3].copy()
+
+    def _box_side(self, axis: int, bound: float, side: float) -> Patch:
+        """Return the part with side · (x_axis − bound) ≥ 0."""
+        values = side * (self.vertices[:, axis] - bound)
+        if (values >= 0.0).all():
+            return self
+
+        def root(facet: Ints, a: Ints, b: Ints) -> Floats:
+            start, end = values[self.faces[facet, a]], values[self.faces[facet, b]]
+            return start / (start - end)
+
+        return self._kept(values[self.faces], root)
+
+    def _facing(self, region: Region) -> Patch:
+        """Return the part whose normals are within the region's angle of its direction."""
+        values = region.faces(self.normals)
+        if (values >= 0.0).all():
+            return self
+
+        def root(facet: Ints, a: Ints, b: Ints) -> Floats:
+            return bisected(region.faces, self.normals[facet, a], self.normals[facet, b])
+
+        return self._kept(values, root)
+
+    def _kept(self, values: Floats, root: Root) -> Patch:
+        vertices, faces, normals = halves(self.vertices, self.faces, self.normals, values, root)
+        return Patch(vertices, faces, normals)
+
+
+_CUTS: dict[tuple[bool, bool, bool], tuple[tuple[int, int, int], ...]] = {
+    (False, False, False): ((0, 1, 2),),
+    (True, False, False): ((0, 3, 2), (3, 1, 2)),
+    (True, True, False): ((3, 1, 4), (0, 3, 4), (0, 4, 2)),
+    (True, True, True): ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+}
+"""By which of its sides are halved: the triangles that a facet becomes, of corners 0 to 2 and middles 3 to 5."""

@@ -1,0 +1,86 @@
+"""Kernels of trees of boxes: those of `FacetTree`, along the mean normals of runs of facets; how a tree is searched."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.numerics.kernels import kernel
+
+
+@kernel
+def fit_boxes(corners: Floats, starts: Ints, boxes: Floats) -> None:
+    """Fill boxes (2 L − 1, 15) of the complete tree over facets (F, 3, 3) with leaves starts (L + 1,)."""
+    leaves = len(starts) - 1
+    for node in range(2 * leaves - 1):
+        width, first = 1, node + 1
+        while first < leaves:
+            first, width = 2 * first, 2 * width
+        begin, end = starts[first - leaves], starts[first - leaves + width]
+        _stand(corners[begin:end], boxes[node])
+        _fit(corners[begin:end], boxes[node])
+
+
+@kernel
+def _stand(corners: Floats, box: Floats) -> None:
+    """Write the axes of a box (15,): the last along the mean normal of the facets (F, 3, 3)."""
+    normal = np.zeros(3)
+    for f in range(len(corners)):
+        p = corners[f]
+        ux, uy, uz = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
+        vx, vy, vz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
+        normal[0] += uy * vz - uz * vy
+        normal[1] += uz * vx - ux * vz
+        normal[2] += ux * vy - uy * vx
+    length = math.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
+    if length < 1e-300:
+        normal[0], normal[1], normal[2], length = 0.0, 0.0, 1.0, 1.0
+    normal /= length
+    # Across: from the coordinate axis that is least along the normal.
+    least = np.argmin(np.abs(normal))
+    across = -normal[least] * normal
+    across[least] += 1.0
+    across /= math.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
+    box[6:9] = across
+    box[9] = normal[1] * across[2] - normal[2] * across[1]
+    box[10] = normal[2] * across[0] - normal[0] * across[2]
+    box[11] = normal[0] * across[1] - normal[1] * across[0]
+    box[12:15] = normal
+
+
+@kernel
+def _fit(corners: Floats, box: Floats) -> None:
+    """Write centre and half sizes of a box (15,) with known axes, so that it holds the facets (F, 3, 3)."""
+    box[0:3] = 0.0
+    for k in range(3):
+        low, high = math.inf, -math.inf
+        for f in range(len(corners)):
+            for j in range(3):
+                p = corners[f, j]
+                along = p[0] * box[6 + 3 * k] + p[1] * box[7 + 3 * k] + p[2] * box[8 + 3 * k]
+                low, high = min(low, along), max(high, along)
+        # A hair's breadth more, for what rounding takes.
+        slack = 1e-12 * (high - low) + 1e-15 * max(abs(low), abs(high))
+        box[3 + k] = 0.5 * (high - low) + slack
+        for j in range(3):
+            box[j] += 0.5 * (low + high) * box[6 + 3 * k + j]
+
+
+@kernel
+def open_node(node: int, near: float, far: float, best: float, count: int, nodes: Ints, bounds: Floats) -> int:
+    """Put the children of a node on the stack that may hold what is nearer than `best`; return how many are on it.
+
+    near, far: lower bounds of the first and the second child. The nearer child is on top, and so looked at first.
+    """
+    first, second = 2 * node + 1, 2 * node + 2
+    if far < near:
+        first, second, near, far = second, first, far, near
+    if far < best:
+        nodes[count], bounds[count] = second, far
+        count += 1
+    if near < best:
+        nodes[count], bounds[count] = first, near
+        count += 1
+    return count

@@ -1,0 +1,123 @@
+"""Shooting: straight on over a surface, facet after facet, as if it were unfolded; many shots at once.
+
+A straightest line enters each next facet at the angle at which it left the last (Polthier and Schmies 1998): the
+direction's part across the common edge is carried from one facet's plane into the other's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.mesh.patch import Patch
+
+_INSIDE = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Shots:
+    """N places on a patch, each with a direction in its facet. weights (N, 3): barycentric in facets (N,).
+
+    directions (N, 3): unit. landed (N,): false where the border came first.
+    """
+
+    facets: Ints
+    weights: Floats
+    directions: Floats
+    landed: Bools
+
+    def points(self, patch: Patch) -> Floats:
+        """Return the places (N, 3), metres."""
+        return (self.weights[:, :, None] * patch.vertices[patch.faces[self.facets]]).sum(axis=1)
+
+
+def neighbours(patch: Patch) -> Ints:
+    """Return the facet (F, 3) on the other side of each facet's side, or −1 at borders."""
+    other = np.full(3 * len(patch.faces), -1, dtype=np.intp)
+    a, b = patch.topology.side_pairs
+    agree = patch.topology.pair_agrees
+    a, b = a[agree], b[agree]
+    other[a], other[b] = b // 3, a // 3
+    return other.reshape(-1, 3)
+
+
+def shoot(patch: Patch, beside: Ints, start: Shots, lengths: Floats) -> Shots:
+    """Return where shots end that go `lengths` (N,) metres straight on over a patch. beside: its `neighbours`.
+
+    The loop is over the facets that the longest shot crosses, all shots at once.
+    """
+    facets, weights = start.facets.copy(), start.weights.copy()
+    directions, landed = start.directions.copy(), start.landed.copy()
+    left = np.where(landed, lengths, 0.0).astype(np.float64)
+    from_side = np.full(len(facets), -1, dtype=np.intp)
+    going = np.flatnonzero(left > 0.0)
+    for _ in range(20 * len(patch.faces)):
+        if not len(going):
+            break
+        f = facets[going]
+        corners = patch.vertices[patch.faces[f]]
+        rate = _rates(corners, directions[going])
+        w = weights[going]
+        # Side s lies opposite corner s + 2: there that weight runs out.
+        opposite = np.roll(w, 1, axis=1), np.roll(rate, 1, axis=1)
+        falls = opposite[1] < -_INSIDE
+        time = np.where(falls, -opposite[0] / np.where(falls, opposite[1], -1.0), np.inf)
+        time[np.arange(len(going)), from_side[going]] = np.where(
+            from_side[going] >= 0, np.inf, time[np.arange(len(going)), from_side[going]]
+        )
+        side = time.argmin(axis=1)
+        until = np.maximum(time[np.arange(len(going)), side], 0.0)
+        ends = left[going] <= until
+        advance = np.minimum(left[going], until)
+        w = np.maximum(w + advance[:, None] * rate, 0.0)
+        weights[going] = w / w.sum(axis=1, keepdims=True)
+        left[going] -= advance
+        going, side, f = going[~ends], side[~ends], f[~ends]
+        following = beside[f, side]
+        lost = following < 0
+        landed[going[lost]] = False
+        going, side, f, following = going[~lost], side[~lost], f[~lost], following[~lost]
+        _cross(patch, (facets, weights, directions, from_side), going, f, side, following)
+    return Shots(facets, weights, directions, landed)
+
+
+def _rates(corners: Floats, directions: Floats) -> Floats:
+    """Return by how much barycentric weights (N, 3) change per metre along directions (N, 3) in facets' planes."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    normal = np.cross(b - a, c - a)
+    square = np.maximum((normal * normal).sum(axis=1, keepdims=True), 1e-300)
+    # Each weight grows away from the opposite side.
+    slopes = [np.cross(normal, side) / square for side in (c - b, a - c, b - a)]
+    return np.stack([(slope * directions).sum(axis=1) for slope in slopes], axis=1)
+
+
+def _cross(
+    patch: Patch,
+    state: tuple[Ints, Floats, Floats, Ints],
+    going: Ints,
+    f: Ints,
+    side: Ints,
+    following: Ints,
+) -> None:
+    """Carry shots `going` from facets f over their sides into the following facets, in place."""
+    facets, weights, directions, from_side = state
+    rows = np.arange(len(going))
+    first = patch.faces[f, side]
+    second = patch.faces[f, (side + 1) % 3]
+    along = patch.vertices[second] - patch.vertices[first]
+    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+    # Across the edge, outwards of the one facet and inwards of the other.
+    out = np.cross(along, patch.facet_normals[f])
+    inwards = np.cross(along, patch.facet_normals[following])
+    d = directions[going]
+    d = (d * along).sum(axis=1, keepdims=True) * along + (d * out).sum(axis=1, keepdims=True) * inwards
+    directions[going] = d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-300)
+    share_first, share_second = weights[going, side], weights[going, (side + 1) % 3]
+    # The neighbour runs along the edge the other way: its side from `second` to `first`.
+    corners = patch.faces[following]
+    entered = np.argmax((corners == second[:, None]) & (np.roll(corners, -1, axis=1) == first[:, None]), axis=1)
+    new = np.zeros((len(going), 3))
+    new[rows, entered], new[rows, (entered + 1) % 3] = share_second, share_first
+    facets[going], weights[going], from_side[going] = following, new / new.sum(axis=1, keepdims=True), entered

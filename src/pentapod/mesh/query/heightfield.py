@@ -1,0 +1,110 @@
+"""HeightField: what lies on top, seen along a view direction; exact on the facets, found through a grid."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.geometry.directions import normalised, tangent_frame
+from pentapod.mesh.mesh import Mesh
+
+_FACETS_PER_CELL = 2.0
+_MOST_ENTRIES = 20_000_000
+_ASIDE_M = 1e-7
+
+
+class HeightField:
+    """The topmost facet over any point of the plane across `view` (3,), a direction towards the tool."""
+
+    def __init__(self, mesh: Mesh, view: Floats) -> None:
+        self.mesh, self.view = mesh, normalised(view, "view")
+        self._frame = np.stack([*tangent_frame(self.view), self.view])
+        self._local = mesh.vertices @ self._frame.T
+        corners = self._local[mesh.faces]
+        self._doubled = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        # Facets seen edge on cover nothing.
+        self._seen = np.flatnonzero(np.abs(self._doubled) > 1e-9 * 2.0 * mesh.facet_areas)
+        self._low = self._local[:, :2].min(axis=0)
+        self._extent = np.maximum(np.ptp(self._local[:, :2], axis=0), 1e-9)
+
+    @cached_property
+    def _grid(self) -> tuple[Floats, Ints, Ints, Ints]:
+        """Cell size (2,), cells (2,), where each cell's facets begin, and the facets of all cells."""
+        flat = self._local[self.mesh.faces[self._seen]][:, :, :2] - self._low
+        cells = max(1.0, len(self._seen) / _FACETS_PER_CELL)
+        while True:
+            size = np.sqrt(self._extent.prod() / cells)
+            shape = np.clip(np.ceil(self._extent / size), 1, 4096).astype(np.intp)
+            cell = self._extent / shape
+            low = np.clip((flat.min(axis=1) / cell).astype(np.intp), 0, shape - 1)
+            high = np.clip((flat.max(axis=1) / cell).astype(np.intp), 0, shape - 1)
+            span = high - low + 1
+            count = span.prod(axis=1)
+            if count.sum() <= _MOST_ENTRIES or cells <= 1.0:
+                break
+            cells /= 4.0
+        owner = np.repeat(np.arange(len(count)), count)
+        number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+        x = low[owner, 0] + number // span[owner, 1]
+        y = low[owner, 1] + number % span[owner, 1]
+        key = x * shape[1] + y
+        order = np.argsort(key, kind="stable")
+        begins = np.searchsorted(key[order], np.arange(int(shape.prod()) + 1))
+        return cell, shape, begins.astype(np.intp), self._seen[owner[order]]
+
+    def topmost(self, points: Floats, margin: float = 1e-9) -> tuple[Floats, Floats, Floats]:
+        """Return the surface points (N, 3) on top over points (N, 3), normals (N, 3) there, and heights (N,).
+
+        Heights are metres along the view from the origin; −inf, with NaN points and normals, where nothing
+        lies below or above. margin: how far outside a facet (in barycentric coordinates) still counts as on
+        it; negative: only its interior.
+        """
+        local = points @ self._frame.T
+        query, facet, weights = self._candidates(local[:, :2], margin)
+        height = (weights * self._local[:, 2][self.mesh.faces[facet]]).sum(axis=1)
+        order = np.lexsort((facet, -height, query))
+        best = order[np.flatnonzero(np.diff(query[order], prepend=-1))]
+        surface, normals = np.full((2, len(points), 3), np.nan)
+        heights = np.full(len(points), -np.inf)
+        who, what, share = query[best], facet[best], weights[best][:, :, None]
+        heights[who] = height[best]
+        surface[who] = (share * self.mesh.vertices[self.mesh.faces[what]]).sum(axis=1)
+        normals[who] = (share * self.mesh.corner_normals[what]).sum(axis=1)
+        return surface, normals, heights
+
+    def hides(self, points: Floats, slack: float) -> Bools:
+        """Return whether the mesh lies above points (N, 3), along the view, by more than `slack` metres.
+
+        Looked up a hair's breadth to either side, and hidden only if so on both: what stands at the foot of a
+        wall is not hidden by it, what lies under a seam between two facets is.
+        """
+        aside = _ASIDE_M * (0.83 * self._frame[0] + 0.56 * self._frame[1])
+        height = points @ self.view + slack
+        return (self.topmost(points + aside)[2] > height) & (self.topmost(points - aside)[2] > height)
+
+    def _candidates(self, points: Floats, margin: float) -> tuple[Ints, Ints, Floats]:
+        """Return pairs (M,), (M,) of points and facets over each other, and barycentric weights (M, 3)."""
+        cell, shape, begins, facets = self._grid
+        place = np.floor((points - self._low) / cell)
+        # The upper rim belongs to the last cell.
+        rim = (points - self._low <= self._extent * (1.0 + 1e-9)) & (place >= shape)
+        index = np.where(rim, shape - 1, place)
+        index = np.where((index < 0) & (points - self._low >= -1e-9 * self._extent), 0, index)
+        inside = ((index >= 0) & (index < shape)).all(axis=1)
+        key = np.where(inside, index[:, 0] * shape[1] + index[:, 1], 0).astype(np.intp)
+        count = np.where(inside, begins[key + 1] - begins[key], 0)
+        query = np.repeat(np.arange(len(points)), count)
+        entry = np.arange(len(query)) - np.repeat(np.cumsum(count) - count, count) + begins[key][query]
+        facet = facets[entry]
+        a, b, c = (self._local[self.mesh.faces[facet, k]][:, :2] for k in range(3))
+        p, doubled = points[query], self._doubled[facet]
+        weights = np.stack([_cross(c - b, p - b), _cross(a - c, p - c), _cross(b - a, p - a)], axis=1)
+        weights = weights / doubled[:, None]
+        hit = (weights >= -margin).all(axis=1)
+        return query[hit], facet[hit], weights[hit]
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]

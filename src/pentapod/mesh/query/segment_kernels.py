@@ -1,0 +1,126 @@
+"""Kernel for the distance of straight segments, which may be long and far away, from a mesh.
+
+The question is that of `ball_kernels`, a point on a straight way; but there the ways are short and the mesh is touched,
+so that the tangents at a way's ends bound the distance well. Here the distance of the segment from the ball around
+each box does, until the boxes are as small as they are far.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.mesh.query.ball_kernels import lower_bound, to_facet
+from pentapod.mesh.query.box_kernels import open_node
+from pentapod.numerics.kernels import kernel
+
+_STACK = 128
+_ROUNDS = 40
+_EXACT = 1e-9  # metres
+
+
+@kernel
+def _bound(box: Floats, start: Floats, way: Floats, square: float, enough: float, g: Floats) -> float:
+    """Return a lower bound on the distance of a segment, of squared length `square`, from a box (15,)."""
+    x, y, z = box[0] - start[0], box[1] - start[1], box[2] - start[2]
+    t = 0.0
+    if square > 0.0:
+        t = min(max((x * way[0] + y * way[1] + z * way[2]) / square, 0.0), 1.0)
+    x, y, z = x - t * way[0], y - t * way[1], z - t * way[2]
+    reach = math.sqrt(box[3] * box[3] + box[4] * box[4] + box[5] * box[5])
+    ball = math.sqrt(x * x + y * y + z * z) - reach
+    if ball >= enough:
+        return ball
+    return max(ball, lower_bound(box, start, way, enough, g))
+
+
+@kernel
+def _to_facet(p: Floats, start: Floats, way: Floats, square: float, enough: float, g: Floats) -> tuple[float, float]:
+    """Return the distance of a segment from a facet (3, 3), and where on the way; some larger one if over `enough`.
+
+    The distance of a point that moves along the segment is a convex function of its place: tangents enclose the least.
+    """
+    t0, t1 = 0.0, 1.0
+    # First the place nearest to the facet's middle: most facets are too far away to matter.
+    mx = (p[0, 0] + p[1, 0] + p[2, 0]) / 3.0 - start[0]
+    my = (p[0, 1] + p[1, 1] + p[2, 1]) / 3.0 - start[1]
+    mz = (p[0, 2] + p[1, 2] + p[2, 2]) / 3.0 - start[2]
+    t = 0.0
+    if square > 0.0:
+        t = min(max((mx * way[0] + my * way[1] + mz * way[2]) / square, 0.0), 1.0)
+    low0 = low1 = -math.inf
+    s0, s1 = -1.0, 1.0
+    best, when = math.inf, t
+    for round_ in range(_ROUNDS):
+        d = to_facet(p, start[0] + t * way[0], start[1] + t * way[1], start[2] + t * way[2], g)
+        if d < best:
+            best, when = d, t
+        s = 0.0
+        if d > 0.0:
+            s = (g[0] * way[0] + g[1] * way[1] + g[2] * way[2]) / d
+        if s < 0.0 and t < 1.0:
+            t0, low0, s0 = t, d, s
+        elif s > 0.0 and t > 0.0:
+            t1, low1, s1 = t, d, s
+        else:
+            break
+        if low0 == -math.inf or low1 == -math.inf:
+            end = 1.0 if s < 0.0 else 0.0
+            if d + s * (end - t) >= min(enough, best - _EXACT):
+                break
+            t = end
+            continue
+        meet = (low1 - s1 * t1 - low0 + s0 * t0) / (s0 - s1)
+        if low0 + s0 * (meet - t0) >= min(enough, best - _EXACT):
+            break
+        # Tangents creep towards a kink; every third time the middle is taken.
+        t = 0.5 * (t0 + t1) if round_ % 3 == 2 or not t0 < meet < t1 else meet
+    if best < enough:
+        to_facet(p, start[0] + when * way[0], start[1] + when * way[1], start[2] + when * way[2], g)
+    return best, when
+
+
+@kernel
+def nearest_to_segments(
+    starts: Floats,
+    ways: Floats,
+    corners: Floats,
+    boxes: Floats,
+    leaf_starts: Ints,
+    within: float,
+    distances: Floats,
+    where: Floats,
+    facets: Ints,
+) -> None:
+    """Fill distances (M,), where (M, 4): place on the way and mesh point, and facets (M,), −1 where none is nearer.
+
+    starts, ways (M, 3): the segments. within: only what is nearer is looked for.
+    """
+    nodes, bounds, g = np.empty(_STACK, dtype=np.intp), np.empty(_STACK), np.empty(3)
+    leaves = len(leaf_starts) - 1
+    for m in range(len(starts)):
+        start, way, best = starts[m], ways[m], within
+        square = way[0] * way[0] + way[1] * way[1] + way[2] * way[2]
+        facets[m] = -1
+        nodes[0], bounds[0] = 0, _bound(boxes[0], start, way, square, best, g)
+        count = 1
+        while count > 0:
+            count -= 1
+            node = nodes[count]
+            if bounds[count] >= best:
+                continue
+            leaf = node - (leaves - 1)
+            if leaf < 0:
+                near = _bound(boxes[2 * node + 1], start, way, square, best, g)
+                far = _bound(boxes[2 * node + 2], start, way, square, best, g)
+                count = open_node(node, near, far, best, count, nodes, bounds)
+            else:
+                for k in range(leaf_starts[leaf], leaf_starts[leaf + 1]):
+                    distance, t = _to_facet(corners[k], start, way, square, best, g)
+                    if distance < best:
+                        best, facets[m] = distance, k
+                        distances[m], where[m, 0] = distance, t
+                        for j in range(3):
+                            where[m, 1 + j] = start[j] + t * way[j] - g[j]

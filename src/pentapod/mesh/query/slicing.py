@@ -1,0 +1,187 @@
+"""Slicing: the lines on a surface where a quantity takes given values, all of them at once.
+
+The quantity (height along a direction, geodesic distance, a winding phase) is known at the vertices and linear on
+facets. Each vertex gets the number of levels at or below it, an integer; from these follow without any tolerance
+which levels cross which edge, and each crossing's own number. A facet crossed by a level gives one directed
+piece, from the side where its boundary comes down through the level to the side where it goes up, so that
+neighbours' pieces join head to tail. Pieces are then chained by pointer doubling. The time is proportional
+to the number of crossings (times the logarithm of the longest chain), whatever the number of levels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.geometry.runs import run_starts
+from pentapod.mesh.passes import Passes
+from pentapod.mesh.patch import Patch
+from pentapod.mesh.topology import components
+
+
+@dataclass(frozen=True, eq=False)
+class LevelSet:
+    """A quantity on a patch and the values at which lines are wanted.
+
+    values (V,): at the vertices. levels (L,): ascending. turns (F, 3) or None: integers that each facet adds to
+    its corners' values, alike along an edge but for a constant, for a quantity that grows by one with
+    each turn about a point; the levels are then the integers, all of them, and `levels` is not looked at.
+    """
+
+    patch: Patch
+    values: Floats
+    levels: Floats
+    turns: Ints | None = None
+
+    @cached_property
+    def corner_bins(self) -> Ints:
+        """The highest level (F, 3) at or below each corner; −1 below all."""
+        if self.turns is None:
+            return self._vertex_bins[self.patch.faces]
+        return self._vertex_bins[self.patch.faces] + self.turns
+
+    @cached_property
+    def _vertex_bins(self) -> Ints:
+        if self.turns is None:
+            return np.searchsorted(self.levels, self.values, side="right") - 1
+        return np.floor(self.values).astype(np.intp)
+
+    @property
+    def crossings(self) -> int:
+        """How many times facets are crossed by levels: what slicing will cost."""
+        return int((self.corner_bins.max(axis=1, initial=-1) - self.corner_bins.min(axis=1, initial=1 << 40)).sum())
+
+    def level_values(self, level: Ints) -> Floats:
+        """Return the quantity on levels (R,)."""
+        return self.levels[level] if self.turns is None else level.astype(np.float64)
+
+    @cached_property
+    def edge_bins(self) -> tuple[Ints, Ints]:
+        """Each edge's lower level (E,), as its first vertex counts; its first crossing's number (E + 1,)."""
+        edges = self.patch.topology.edges
+        first, second = self._vertex_bins[edges[:, 0]], self._vertex_bins[edges[:, 1]]
+        if self.turns is not None:
+            # What the second end counts more than the first, as any of the edge's facets sees it.
+            side = np.empty(len(edges), dtype=np.intp)
+            side[self.patch.topology.edge_of_side.ravel()] = np.arange(3 * len(self.patch.faces))
+            here, after = side, side - side % 3 + (side + 1) % 3
+            swap = self.patch.faces.ravel()[here] != edges[:, 0]
+            here, after = np.where(swap, after, here), np.where(swap, here, after)
+            second = second + self.turns.ravel()[after] - self.turns.ravel()[here]
+        between = np.abs(second - first)
+        return np.minimum(first, second), run_starts(between)
+
+    def lines(self) -> Passes:
+        """Return the lines, ordered by level.
+
+        A line ends at the patch's border, at a crease, and where neighbouring facets disagree (winding, more than
+        two at an edge). Closed lines begin and end in the same point. Seen with the surface's outside up
+        and the quantity growing to the left, they run forward.
+        """
+        patch, topology = self.patch, self.patch.topology
+        bins = self.corner_bins
+        low = bins.min(axis=1, initial=1 << 40)
+        count = np.maximum(bins.max(axis=1, initial=-1) - low, 0)
+        facet = np.repeat(np.arange(len(patch.faces)), count)
+        level = np.arange(len(facet)) - np.repeat(np.cumsum(count) - count, count) + low[facet] + 1
+
+        above = bins[facet] >= level[:, None]
+        after = np.roll(above, -1, axis=1)
+        sides = [np.argmax(above & ~after, axis=1), np.argmax(~above & after, axis=1)]  # coming down, going up
+        ends = [self._crossing(facet, level, side) for side in sides]
+        nodes, edges = [e[2] for e in ends], [topology.edge_of_side[facet, side] for side in sides]
+        joins = [patch.joins[edge] for edge in edges]
+        total = int(self.edge_bins[1][-1])
+        order, chain = chained(_following(total, nodes, joins[0], joins[1]))
+        tails, heads = ([values[order] for values in end[:2]] for end in ends)
+        return _assembled(tails, heads, chain, level[order])
+
+    def _crossing(self, facet: Ints, level: Ints, side: Ints) -> tuple[Floats, Floats, Ints]:
+        """Return where (R, 3) levels cross sides of facets, the normals (R, 3) there, and the crossing's number.
+
+        The side is taken from its lower vertex to its higher, so that both its facets get the same bits.
+        """
+        faces, edge = self.patch.faces, self.patch.topology.edge_of_side[facet, side]
+        a, b = side, (side + 1) % 3
+        swap = faces[facet, a] > faces[facet, b]
+        a, b = np.where(swap, b, a), np.where(swap, a, b)
+        first, second = faces[facet, a], faces[facet, b]
+        base, more = np.intp(0), np.intp(0)
+        if self.turns is not None:
+            base = self.turns[facet, a]
+            more = self.turns[facet, b] - base
+        start, end = self.values[first], self.values[second] + more
+        lowest, first_number = self.edge_bins
+        number = first_number[edge] + (level - base - lowest[edge] - 1)
+        rise = end - start
+        t = (self.level_values(level - base) - start) / np.where(rise == 0.0, 1.0, rise)
+        t = np.clip(t, 0.0, 1.0)[:, None]
+        points = self.patch.vertices[first] + t * (self.patch.vertices[second] - self.patch.vertices[first])
+        normals = self.patch.normals
+        return points, (1.0 - t) * normals[facet, a] + t * normals[facet, b], number
+
+
+def _following(node_count: int, nodes: list[Ints], open_start: Bools, open_end: Bools) -> Ints:
+    """Return for each piece (R,) the piece that goes on where it ends, or −1."""
+    begins_at = np.full(node_count, -1, dtype=np.intp)
+    starting = np.flatnonzero(open_start)
+    begins_at[nodes[0][starting]] = starting
+    return np.where(open_end, begins_at[nodes[1]], -1) if len(nodes[1]) else np.zeros(0, dtype=np.intp)
+
+
+def chained(after: Ints) -> tuple[Ints, Ints]:
+    """Return an order (K,) of items in which each stands right behind its predecessor, and its chain (K,).
+
+    after (K,): the item that follows each, or −1; no item follows two. Closed chains are cut before their
+    lowest item. Chains are ordered by their first items.
+    """
+    count = len(after)
+    before = np.full(count, -1, dtype=np.intp)
+    linked = np.flatnonzero(after >= 0)
+    before[after[linked]] = linked
+    number, label = components(count, linked, after[linked])
+    headed = np.zeros(number, dtype=np.bool_)
+    headed[label[before < 0]] = True
+    lowest = np.full(number, count, dtype=np.intp)
+    np.minimum.at(lowest, label, np.arange(count))
+    before[lowest[~headed]] = -1  # closed chains
+
+    # Pointer doubling: `jump` leads 2^k items back, `distance` is how far that was.
+    jump = np.where(before < 0, np.arange(count), before)
+    distance = (before >= 0).astype(np.intp)
+    while True:
+        further = distance[jump]
+        if not further.any():
+            break
+        distance, jump = distance + further, jump[jump]
+    order = np.lexsort((distance, jump))
+    return order, np.cumsum(distance[order] == 0) - 1
+
+
+def _assembled(tails: list[Floats], heads: list[Floats], chain: Ints, level: Ints) -> Passes:
+    """Return passes from pieces (K,) in order: each chain's first tail, then all its heads."""
+    count = len(chain)
+    chains = int(chain[-1]) + 1 if count else 0
+    at = np.arange(count) + chain + 1
+    first = np.flatnonzero(np.diff(chain, prepend=-1))
+    arrays: list[Floats] = []
+    for tail, head in zip(tails, heads, strict=True):
+        array = np.empty((count + chains, 3))
+        array[at] = head
+        array[at[first] - 1] = tail[first]
+        arrays.append(array)
+    starts = np.concatenate([at[first] - 1, [count + chains]]).astype(np.intp)
+    # By level first; within a level in the order of the facets, which is the mesh's.
+    passes = Passes(arrays[0], arrays[1], starts, level[first])
+    return _by_level(passes)
+
+
+def _by_level(passes: Passes) -> Passes:
+    order = np.argsort(passes.levels, kind="stable")
+    counts = np.diff(passes.starts)[order]
+    starts = run_starts(counts)
+    index = np.repeat(passes.starts[order] - starts[:-1], counts) + np.arange(len(passes.points))
+    return Passes(passes.points[index], passes.normals[index], starts, passes.levels[order])

@@ -1,0 +1,182 @@
+"""Sweep: how deep the mesh reaches into a tool on its way, and how near the tool comes to the mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats, Ints, as_floats, set_frozen
+from pentapod.base.errors import ToolpathError
+from pentapod.base.progress import Progress, silent
+from pentapod.geometry.directions import angle_between, tangent_frame
+from pentapod.geometry.solids import KINDS, Solid
+from pentapod.mesh.query.tree import FacetTree
+
+RESOLUTION_M = 5e-7
+"""Depths are exact to this and one per cent."""
+
+_CHUNK = 5_000
+
+
+class Body(Protocol):
+    """What is swept: a tool, or part of one. pivot: metres from the tip to the point that moves straight."""
+
+    @property
+    def pivot(self) -> float:
+        """Distance in metres from the tip along the axis to the point about which the body turns."""
+        ...
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        """The convex bodies that make it up."""
+        ...
+
+
+@dataclass(frozen=True)
+class TouchingBody:
+    """Solids alone, standing: their pivot does not matter."""
+
+    solids: tuple[Solid, ...]
+    pivot: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """What a tool met on M motions. Columns are `KINDS`: cutter, shank, holder.
+
+    depths (M, 3): metres by which the deepest mesh point lies inside that part of the tool: negative is the
+    gap that is left, −inf where it is not within the threshold that was asked for. times (M, 3): when, as a
+    fraction of the motion. points (M, 3, 3): the mesh point, metres. facets (M, 3): of the mesh, −1 for none.
+    """
+
+    depths: Floats
+    times: Floats
+    points: Floats
+    facets: Ints
+
+    def __post_init__(self) -> None:
+        for name in ("depths", "times", "points", "facets"):
+            array = np.asarray(getattr(self, name))
+            array.flags.writeable = False
+            set_frozen(self, **{name: array})
+
+    @property
+    def deepest(self) -> Floats:
+        """Depth (M,) of the part of the tool that is worst on each motion."""
+        return self.depths.max(axis=1)
+
+    def beyond(self, threshold: float) -> Bools:
+        """Return whether (M,) any part of the tool is deeper than `threshold`, metres."""
+        return self.deepest > threshold
+
+
+def sweep(
+    tree: FacetTree,
+    tool: Body,
+    tips: Floats,
+    axes: Floats,
+    *,
+    threshold: float = 0.0,
+    every: int = 1,
+    progress: Progress = silent,
+) -> Sweep:
+    """Return what a tool meets on the N − 1 motions between N poses: tips and unit axes (N, 3).
+
+    every: 2 takes the poses as pairs, a motion each, and leaves the ways between pairs out.
+
+    On a motion the pivot goes straight and the axis turns evenly about it. Looked for is what lies deeper than
+    `threshold`, metres; a negative one asks for a gap. Every point of every facet and every time between is
+    covered; depths are exact to `RESOLUTION_M` and 1 %. Raises ToolpathError for fewer than two poses.
+    """
+    tips, axes = as_floats(tips, "tips", (None, 3)), as_floats(axes, "axes", (None, 3))
+    if len(tips) < 2:
+        raise ToolpathError("a motion needs two poses", value=len(tips))
+    return _swept(tree, tool, tips[:-1:every], axes[:-1:every], tips[1::every], axes[1::every], threshold, progress)
+
+
+def touch(
+    tree: FacetTree,
+    tool: Body,
+    tips: Floats,
+    axes: Floats,
+    *,
+    threshold: float = 0.0,
+    resolution: float = RESOLUTION_M,
+    progress: Progress = silent,
+) -> Sweep:
+    """Return what a tool meets that stands at N poses: tips and unit axes (N, 3). As `sweep`, without motion.
+
+    resolution: to which depths are exact, metres, for those who have no time.
+    """
+    tips, axes = as_floats(tips, "tips", (None, 3)), as_floats(axes, "axes", (None, 3))
+    return _swept(tree, tool, tips, axes, tips, axes, threshold, progress, resolution)
+
+
+def _swept(
+    tree: FacetTree,
+    tool: Body,
+    tips0: Floats,
+    axes0: Floats,
+    tips1: Floats,
+    axes1: Floats,
+    threshold: float,
+    progress: Progress,
+    resolution: float = RESOLUTION_M,
+) -> Sweep:
+    from pentapod.mesh.query.ball_kernels import nearest_all  # noqa: PLC0415 - loads numba
+    from pentapod.mesh.query.sweep_kernels import sweep_all  # noqa: PLC0415
+
+    solids = tool.solids
+    count, parts = len(tips0), len(solids)
+    depths, where = np.full((parts, count), -np.inf), np.full((parts, count, 4), np.nan)
+    facets = np.full((parts, count), -1, dtype=np.intp)
+    motions = _motions(tips0, axes0, tips1, axes1, tool.pivot)
+    for k, solid in enumerate(solids):
+        ball = solid.is_ball and solid.low == tool.pivot
+        numbers = np.array(solid.numbers)
+        for first in range(0, count, _CHUNK):
+            rows = slice(first, first + _CHUNK)
+            progress("gouge", (k + first / count) / parts)
+            found = (depths[k, rows], where[k, rows], facets[k, rows])
+            place = (tree.corners, tree.boxes, tree.starts)
+            if ball:
+                way = np.ascontiguousarray(motions[rows, 6:9])
+                nearest_all(np.ascontiguousarray(motions[rows, :3]), way, *place, solid.rounding - threshold, *found)
+                depths[k, rows] = np.where(facets[k, rows] < 0, -np.inf, solid.rounding - depths[k, rows])
+            else:
+                sweep_all(numbers, motions[rows], *place, threshold, resolution, *found)
+    kinds = np.array([KINDS.index(solid.kind) for solid in solids], dtype=np.intp)
+    return _by_kind(depths, where, np.where(facets < 0, -1, tree.facets[facets]), kinds)
+
+
+def _motions(tips0: Floats, axes0: Floats, tips1: Floats, axes1: Floats, pivot: float) -> Floats:
+    """Return the motions (M, 18) as the kernels take them."""
+    start, end = tips0 + pivot * axes0, tips1 + pivot * axes1
+    way = end - start
+    angle = angle_between(axes0, axes1)
+    # The direction a quarter turn on; where the axes are opposite every way round is as good.
+    ahead = axes1 - (axes0 * axes1).sum(axis=1, keepdims=True) * axes0
+    length = np.linalg.norm(ahead, axis=1, keepdims=True)
+    ahead = np.where(length > 1e-12, ahead / np.where(length > 1e-12, length, 1.0), tangent_frame(axes0)[0])
+    angle = np.where((length[:, 0] > 1e-12) | (angle > 1.0), angle, 0.0)
+    spin = angle[:, None] * np.cross(axes0, ahead)
+    size = np.linalg.norm(way, axis=1)
+    tall = np.full((len(start), 1), pivot)
+    return np.ascontiguousarray(np.hstack([start, axes0, way, ahead, spin, size[:, None], angle[:, None], tall]))
+
+
+def _by_kind(depths: Floats, where: Floats, facets: Ints, kinds: Ints) -> Sweep:
+    """Return for each motion and kind of part the solid that is worst."""
+    count = depths.shape[1]
+    rows = np.arange(count)
+    out = (np.full((count, 3), -np.inf), np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan))
+    found = np.full((count, 3), -1, dtype=np.intp)
+    for kind in range(len(KINDS)):
+        own = np.flatnonzero(kinds == kind)
+        if len(own) and count:
+            worst = own[depths[own].argmax(axis=0)]
+            out[0][:, kind], out[1][:, kind] = depths[worst, rows], where[worst, rows, 0]
+            out[2][:, kind], found[:, kind] = where[worst, rows, 1:], facets[worst, rows]
+    return Sweep(*out, found)

@@ -1,0 +1,67 @@
+"""FacetTree: the facets of a mesh in a binary tree of boxes, for questions about what is near.
+
+Facets are sorted along a Morton curve through their centres; the tree above them is complete, so that node k has
+the children 2k + 1 and 2k + 2 and needs no pointers. Each box stands along the mean normal of its facets: over a
+smooth surface it is as thin as the surface is flat, which is what a tool that touches it needs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.mesh.mesh import Mesh
+
+_FACETS_PER_LEAF = 4
+_BITS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class FacetTree:
+    """Boxes and facets. corners (F, 3, 3): of the facets in tree order, metres. facets (F,): their own numbers.
+
+    boxes (2 L − 1, 15): centre, half sizes and the three axes of each node, the L leaves last. starts (L + 1,):
+    where each leaf's facets begin.
+    """
+
+    corners: Floats
+    facets: Ints
+    boxes: Floats
+    starts: Ints
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> FacetTree:
+        """Return the tree of a mesh's facets."""
+        from pentapod.mesh.query.box_kernels import fit_boxes  # noqa: PLC0415 - loads numba
+
+        order = along_morton_curve(mesh.vertices[mesh.faces].mean(axis=1), mesh.bounds)
+        corners = np.ascontiguousarray(mesh.vertices[mesh.faces[order]])
+        leaves = 1 << max(0, (len(order) // _FACETS_PER_LEAF).bit_length() - 1)
+        starts = (np.arange(leaves + 1) * len(order)) // leaves
+        boxes = np.empty((2 * leaves - 1, 15))
+        fit_boxes(corners, starts, boxes)
+        return cls(corners, order, boxes, starts)
+
+
+def along_morton_curve(points: Floats, bounds: Floats) -> Ints:
+    """Return the order (N,) of points (N, 3) within bounds (2, 3) along a Morton curve: neighbours are near."""
+    low, high = bounds
+    extent = float((high - low).max()) or 1.0
+    cells = ((points - low) * ((2**_BITS - 1) / extent)).astype(np.int64)
+    return np.argsort(_spread(cells[:, 0]) | _spread(cells[:, 1]) << 1 | _spread(cells[:, 2]) << 2, kind="stable")
+
+
+def _spread(numbers: Ints) -> Ints:
+    """Return the low 21 bits of each number with two empty bits after each."""
+    x = numbers & 0x1FFFFF
+    for shift, mask in (
+        (32, 0x1F00000000FFFF),
+        (16, 0x1F0000FF0000FF),
+        (8, 0x100F00F00F00F00F),
+        (4, 0x10C30C30C30C30C3),
+        (2, 0x1249249249249249),
+    ):
+        x = (x | x << shift) & mask
+    return x

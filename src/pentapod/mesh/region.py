@@ -1,0 +1,49 @@
+"""Region: which part of a surface is machined, by a box and by the way the surface faces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.errors import ToolpathError
+from pentapod.geometry.directions import normalised
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """Surface points within a box whose normal is within an angle of a direction.
+
+    direction (3,): any length; angle: radians in (0, π/2], so that of a closed solid one side is
+    machined. box (2, 3): two opposite corners, metres, or None. All in the mesh's frame.
+    Raises ToolpathError for a direction of no length, an angle out of range, or a flat box.
+    """
+
+    direction: Floats | tuple[float, float, float] = (0.0, 0.0, 1.0)
+    angle: float = float(np.radians(80.0))
+    box: Floats | tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
+
+    def __post_init__(self) -> None:
+        direction = frozen(self.direction, "region.direction", (3,))
+        if not np.linalg.norm(direction) > 0.0:
+            raise ToolpathError("the direction has no length", key="region.direction")
+        set_frozen(self, direction=frozen(normalised(direction), "region.direction"))
+        if not 0.0 < self.angle <= np.pi / 2:
+            raise ToolpathError("the angle is out of range", key="region.angle", value=self.angle, expected="(0, pi/2]")
+        if self.box is not None:
+            box = frozen(self.box, "region.box", (2, 3))
+            if (box[0] == box[1]).any():
+                raise ToolpathError("the box is flat", key="region.box", value=box.tolist())
+            set_frozen(self, box=frozen(np.sort(box, axis=0), "region.box"))
+
+    @property
+    def bounds(self) -> Floats:
+        """Lowest and highest coordinates (2, 3), infinite without a box."""
+        if self.box is None:
+            return np.array([[-np.inf] * 3, [np.inf] * 3])
+        return np.asarray(self.box)
+
+    def faces(self, normals: Floats) -> Floats:
+        """Return n·d − cos(angle)·‖n‖ (...) of normals (..., 3), of any length: not negative inside."""
+        return normals @ self.direction - np.cos(self.angle) * np.linalg.norm(normals, axis=-1)

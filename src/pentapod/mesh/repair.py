@@ -1,0 +1,101 @@
+"""Mending: from triangles as a file gives them to welded, indexed facets; every change is counted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.mesh.normals import CHUNK, facet_cross
+from pentapod.mesh.topology import Topology
+
+WELD = 1e-8
+"""Vertices closer than about this fraction of the largest extent are one."""
+
+SLIVER = 1e-9
+"""A facet is degenerate when its height is below this fraction of its longest side."""
+
+
+NARROW = 1e-3
+"""A facet is a sliver when its height is below this fraction of its longest side."""
+
+
+def weld(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
+    """Return vertices at the same place merged, unused ones dropped, and the facets on them.
+
+    Same means equal after rounding to `WELD` of the largest extent, finer than the 24 bits of an STL, so that
+    noise about zero is merged and nothing that a file tells apart is. The order follows the coordinates.
+    """
+    used = np.zeros(len(vertices), dtype=np.bool_)
+    used[faces] = True
+    points = vertices[used]
+    lowest = points.min(axis=0)
+    extent = float((points.max(axis=0) - lowest).max())
+    x, y, z = np.rint((points - lowest) / (WELD * extent if extent > 0.0 else 1.0)).astype(np.int64).T
+    bits = int(1.0 / WELD).bit_length() + 1
+    first, number = _distinct((x << bits) + y)
+    first, number = _distinct((number << bits) + z)
+    return points[first], number[np.cumsum(used)[faces] - 1]
+
+
+def _distinct(keys: Ints) -> tuple[Ints, Ints]:
+    """Return where each distinct key first occurs, in the order of the keys, and each key's number."""
+    order = np.argsort(keys, kind="stable")
+    ordered = keys[order]
+    new = np.concatenate([[True], ordered[1:] != ordered[:-1]])
+    number = np.empty(len(keys), dtype=np.intp)
+    number[order] = np.cumsum(new) - 1
+    return order[new], number
+
+
+def degenerate_facets(vertices: Floats, faces: Ints) -> Bools:
+    """Return which facets (F,) have no area to speak of: corners that coincide or lie on a line."""
+    return _lower_than(SLIVER, vertices, faces)
+
+
+def slivers(vertices: Floats, faces: Ints) -> Bools:
+    """Return which facets (F,) are lower than a thousandth of their longest side."""
+    return _lower_than(NARROW, vertices, faces)
+
+
+def _lower_than(share: float, vertices: Floats, faces: Ints) -> Bools:
+    """Return which facets (F,) have a height of at most `share` of their longest side."""
+    low = np.empty(len(faces), dtype=np.bool_)
+    for first in range(0, len(faces), CHUNK):
+        part = faces[first : first + CHUNK]
+        corners = vertices[part]
+        longest = np.square(corners - np.roll(corners, 1, axis=1)).sum(axis=2).max(axis=1)
+        low[first : first + CHUNK] = np.linalg.norm(facet_cross(vertices, part), axis=1) <= share * longest
+    return low
+
+
+def duplicated_facets(faces: Ints, vertex_count: int) -> Bools:
+    """Return which facets (F,) repeat an earlier one on the same three vertices, however wound."""
+    low, middle, high = np.sort(faces, axis=1).T
+    _, pair = _distinct(low * np.intp(vertex_count) + middle)
+    first, _ = _distinct(pair * np.intp(vertex_count) + high)
+    repeated = np.ones(len(faces), dtype=np.bool_)
+    repeated[first] = False
+    return repeated
+
+
+def signed_volume(vertices: Floats, faces: Ints) -> float:
+    """Return the volume in cubic metres that a closed surface encloses, negative when it is inside out."""
+    centred = vertices - vertices.mean(axis=0)
+    return float((centred[faces[:, 0]] * facet_cross(centred, faces)).sum() / 6.0)
+
+
+def wind(vertices: Floats, faces: Ints) -> tuple[Ints, tuple[str, ...]]:
+    """Return the facets wound alike within each body, closed bodies outwards, and what was done for it."""
+    said: list[str] = []
+    areas = np.linalg.norm(facet_cross(vertices, faces), axis=1)
+    flip, possible = Topology(faces, len(vertices)).consistent_winding(areas)
+    if flip.any():
+        said.append(f"{int(flip.sum()):,} facets turned so that neighbours are wound alike")
+    if not possible:
+        said.append("a one-sided surface cannot be wound consistently and was left as it is")
+    wound = np.where(flip[:, None], faces[:, ::-1], faces)
+    topology = Topology(wound, len(vertices))
+    if topology.watertight and topology.consistent and signed_volume(vertices, wound) < 0.0:
+        wound = wound[:, ::-1]
+        said.append("the closed surface was inside out and has been turned")
+    return np.ascontiguousarray(wound), tuple(said)

@@ -1,0 +1,1 @@
+"""Convex programs by interior-point methods."""

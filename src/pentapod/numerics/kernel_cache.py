@@ -1,0 +1,134 @@
+"""Where the machine code of kernels is kept between runs: one folder for each state of their sources.
+
+A kernel holds the machine code of those it calls, but numba looks for changes in the kernel's own file only. So the
+folder's name is a digest of all files with kernels: what was compiled for an older version is never looked at.
+The folders are in the user's cache folder, or in the one that NUMBA_CACHE_DIR names; never beside the sources, which
+may be read-only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import shutil
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import IO
+
+_log = logging.getLogger("pentapod")
+
+_NAME = "pentapod-kernels-"
+_LOCK = "lock"
+_UNUSED = 30 * 86400.0  # seconds after which the folder of another version goes
+_PATIENCE, _LOOK = 600.0, 0.05  # seconds: waited for another process that compiles, and between two looks
+
+
+@cache
+def kernel_cache(given: str) -> Path | None:
+    """Return the folder for these sources, which can be written to; None where there is none.
+
+    given: a folder that the user chose, or "". The folders of versions that nobody used for a month are removed.
+    """
+    sources = sorted(Path(__file__).parents[1].rglob("*_kernels.py"))
+    digest = hashlib.sha256(b"\0".join(file.read_bytes() for file in sources)).hexdigest()
+    try:
+        parent = Path(given) if given else _user_cache()
+        folder = parent / f"{_NAME}{digest[:16]}"
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        (folder / _LOCK).touch()  # its time is that of the last use
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+        _sweep(folder)
+    except (OSError, RuntimeError) as error:  # RuntimeError: nobody's home is known
+        _log.warning(
+            "the cache of compiled kernels cannot be written (%s): each run compiles them anew; "
+            "NUMBA_CACHE_DIR names another folder",
+            error,
+        )
+        return None
+    return folder
+
+
+def _user_cache() -> Path:
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData/Local") / "pentapod"
+    if sys.platform == "darwin":
+        return Path.home() / "Library/Caches/pentapod"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "pentapod"
+
+
+def _sweep(folder: Path) -> None:
+    """Remove the folders beside this one that have not been used for long."""
+    for other in folder.parent.glob(f"{_NAME}*"):
+        with suppress(OSError):  # gone already, or not ours
+            unused = time.time() - (other / _LOCK).stat().st_mtime
+            if other != folder and unused > _UNUSED and not other.is_symlink():
+                shutil.rmtree(other)
+
+
+class Turns:
+    """Lets one process at a time load and compile kernels: `begin` waits for the others, `end` lets the next one in.
+
+    Two that write numba's index of one kernel at once could else file one's machine code under the other's types. A
+    process may begin several times, also in several threads; it is done when all have ended. Where the file
+    system knows no locks, and after ten minutes, it goes on without.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / _LOCK
+        self._count = 0
+        self._guard = threading.Lock()
+        self._held: IO[bytes] | None = None
+
+    def begin(self) -> None:
+        """Wait until no other process is at it."""
+        with self._guard:
+            self._count += 1
+            if self._count == 1:
+                self._held = _locked(self._path)
+
+    def end(self) -> None:
+        """Let others begin, where this is the last end."""
+        with self._guard:
+            self._count -= 1
+            if self._count == 0 and self._held is not None:
+                self._held.close()  # which unlocks it
+                self._held = None
+
+
+def _locked(path: Path) -> IO[bytes] | None:
+    """Return the file, open and locked; None where that cannot be had."""
+    try:
+        file = path.open("ab")
+    except OSError:
+        return None
+    until = time.monotonic() + _PATIENCE
+    while time.monotonic() < until:
+        try:
+            _lock()(file.fileno())
+        except (BlockingIOError, PermissionError):  # another has it
+            time.sleep(_LOOK)
+        except OSError:
+            break
+        else:
+            return file
+    file.close()
+    return None
+
+
+def _lock() -> Callable[[int], None]:
+    """Return what locks an open file at once or raises OSError."""
+    if sys.platform == "win32":
+        import msvcrt  # noqa: PLC0415
+
+        return lambda number: msvcrt.locking(number, msvcrt.LK_NBLCK, 1)
+    import fcntl  # noqa: PLC0415
+
+    return lambda number: fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,0 +1,109 @@
+"""Kernels compiled by numba: where plain loops over a million poses or gridpoints are the clearest and fastest form.
+
+Files named `*_kernels.py` hold them, each function marked with `kernel`; they are imported where they are first used,
+so that `import pentapod` stays light. The machine code is cached on disk (`kernel_cache`): only the first run of a
+version on a machine compiles, and says so to the log `pentapod`.
+
+Loading numba takes about as long as NumPy needs for ten million poses. So work that NumPy can do as well, to the
+last bit, asks `kernels_pay` before it loads kernels: like a skier who rents until the rents add up to a pair of skis,
+it stays with NumPy until the time lost so far would have paid for loading. Which of the two did the work cannot be
+told from the result.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+import threading
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, TypeVar, cast
+
+from pentapod.numerics.kernel_cache import Turns, kernel_cache
+
+_log = logging.getLogger("pentapod")
+
+_Function = TypeVar("_Function", bound=Callable[..., object])
+_Policy = Literal["when they pay", "always", "never"]
+
+_choosing = threading.Lock()
+_policy: ContextVar[_Policy] = ContextVar("kernels", default="when they pay")
+_lost = [0.0]  # seconds that kernels would have saved so far
+_NUMBA, _CACHED = 0.5, 0.05  # seconds: loading numba, and kernels from the cache once it is there
+
+
+def kernels_pay(saved: float) -> bool:
+    """Return whether to use kernels for work on which they save this many seconds. See the module's docstring."""
+    policy = _policy.get()
+    if policy == "never":
+        return False
+    _lost[0] += saved
+    return policy == "always" or _lost[0] > (_CACHED if "numba" in sys.modules else _NUMBA)
+
+
+@contextmanager
+def kernels_used(policy: _Policy) -> Generator[None]:
+    """Use kernels always, never or when they pay, within a `with` block."""
+    token = _policy.set(policy)
+    try:
+        yield
+    finally:
+        _policy.reset(token)
+
+
+def kernel(function: _Function) -> _Function:
+    """Compile a function on its first call; division by zero gives infinity, as in NumPy, and sums keep their order."""
+    from numba import config, njit  # noqa: PLC0415  heavy: only where kernels are used
+
+    settings: Any = config  # made from the environment as it is loaded
+    options: dict[str, Any] = {"error_model": "numpy", "fastmath": False}
+    with _choosing:
+        given: str = settings.CACHE_DIR
+        folder = kernel_cache(given)
+        _listen(folder)
+        if folder is None:
+            return cast("_Function", njit(**options)(function))
+        # numba asks for the folder here only; what else the process compiles goes where it went.
+        settings.CACHE_DIR = str(folder)
+        try:
+            return cast("_Function", njit(cache=True, **options)(function))
+        finally:
+            settings.CACHE_DIR = given
+
+
+@cache
+def _listen(folder: Path | None) -> None:
+    """Let processes compile by turns, and see to it that the log says once when this one begins: it takes long."""
+    from numba.core import event  # noqa: PLC0415
+
+    class Told(event.Listener):
+        """Says it at the first compilation; what comes from the cache is none."""
+
+        said = False
+
+        def on_start(self, event: object) -> None:
+            if not self.said:
+                self.said = True
+                _log.info("compiling the fast kernels: once on this machine, for half a minute or so")
+
+        def on_end(self, event: object) -> None:
+            """Nothing to say."""
+
+    class InTurn(event.Listener):
+        """Holds the folder while numba holds its own lock: from the look into the cache to the entry in it."""
+
+        def __init__(self, turns: Turns) -> None:
+            self._turns = turns
+
+        def on_start(self, event: object) -> None:
+            self._turns.begin()
+
+        def on_end(self, event: object) -> None:
+            self._turns.end()
+
+    event.register("numba:compile", Told())
+    if folder is not None:
+        event.register("numba:compiler_lock", InTurn(Turns(folder)))

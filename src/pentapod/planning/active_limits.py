@@ -1,0 +1,38 @@
+"""Which limits bind a plan, where, and how much room they leave: the blame table of a plan that fits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.planning.diagnosis import ranges
+from pentapod.planning.placement.placed_path import PlacedPath
+
+
+@dataclass(frozen=True)
+class Binding:
+    """One limit. margin: the smallest one, at waypoint `worst`; room: the same in `unit` (mm, deg).
+
+    waypoints: inclusive ranges in which no other limit is nearer; share: of all waypoints.
+    """
+
+    limit: str
+    margin: float
+    worst: int
+    room: float
+    unit: str
+    share: float
+    waypoints: tuple[tuple[int, int], ...]
+
+
+def bindings(placed: PlacedPath) -> tuple[Binding, ...]:
+    """Return every limit of a plan, the nearest first."""
+    nearest = placed.margins.argmin(axis=1)
+    found: list[Binding] = []
+    for k in np.argsort(placed.margins.min(axis=0), kind="stable"):
+        limit, column, here = placed.limits[k], placed.margins[:, k], nearest == k
+        margin, worst = float(column.min()), int(column.argmin())
+        room, share = abs(limit.shortfall(margin)), float(here.mean())
+        found.append(Binding(limit.name, margin, worst, room, limit.unit, share, ranges(here)))
+    return tuple(found)

@@ -1,0 +1,262 @@
+"""LegPath: the leg lengths along the placed path, untimed; C3 pieces between exact stops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.base.arrays import Bools, Floats, Ints, frozen, set_frozen
+from pentapod.base.errors import ToolpathError
+from pentapod.base.refusal import Blame, Refusal
+from pentapod.geometry.fillet import TooFar, rounded
+from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.machine.machine import Machine
+from pentapod.planning.leg_path.tool_curve import ToolCurve
+from pentapod.planning.placement.placed_path import PlacedPath
+from pentapod.toolpath.toolpath import Segment, SegmentKind
+
+STOP_ANGLE = float(np.radians(135.0))
+"""A path that turns back more sharply than this stops at the corner: rounding it would need a crawl."""
+
+TOLERANCE_SHARE = 0.8
+"""Share of the tolerances given to corner rounding; the rest is for setpoints and interpolation."""
+
+_AXIS_LEVER_M = 0.01  # metres of spline parameter per radian: keeps the parameter regular when only the axis turns
+
+
+@dataclass(frozen=True, eq=False)
+class LegPiece:
+    """A C3 stretch of the leg path between two exact stops, parametrised by s in metres, as `ToolCurve` says.
+
+    section_ends (M,): s at which the toolpath's segments end, the last is `length`;
+    section_feeds (M,): m/s, infinite on rapids; section_kinds, section_segments (M,): kind and index of the segment.
+    waypoint_stations (W,): s nearest to each waypoint; waypoints (W,): its index in the toolpath.
+    """
+
+    curve: ToolCurve
+    robot: LinearPentapod
+    tool_length: float
+    section_ends: Floats
+    section_feeds: Floats
+    section_kinds: tuple[SegmentKind, ...]
+    section_segments: Ints
+    waypoint_stations: Floats
+    waypoints: Ints
+
+    @property
+    def length(self) -> float:
+        """Length in s, metres."""
+        return self.curve.length
+
+    @property
+    def knots(self) -> Floats:
+        """Stations (K,) where the fourth derivative may jump, both ends included."""
+        return self.curve.knots
+
+    def pose(self, s: ArrayLike, order: int = 0) -> tuple[Floats, Floats]:
+        """Return tips and tool axes (n, 3), machine frame, or their derivatives of order 1 to 3 in s."""
+        return self.curve(np.asarray(s, dtype=np.float64), order)
+
+    def tip_length(self, s: ArrayLike) -> Floats:
+        """Return how far (n,) in metres the tip itself has moved at stations s (n,)."""
+        return self.curve.tip_length(np.asarray(s, dtype=np.float64))
+
+    def surface_rate(self, s: ArrayLike) -> Floats:
+        """Return how far (n,) the pivot (a beam's spot) moves for each metre of s, at stations s (n,)."""
+        tip, axis = self.pose(s, 1)
+        return np.linalg.norm(tip + self.curve.pivot * axis, axis=1)
+
+    def feed_rate(self, s: ArrayLike) -> Floats:
+        """Return how far (n,) the point whose speed the feed is moves for each metre of s, at stations s (n,).
+
+        With a stand-off (a beam, a spray) it is the spot on the surface. Otherwise, and on rapids, it is the tip, taken
+        as s itself: it is never faster.
+        """
+        spot = self.curve.pivot < 0.0 and bool(np.isfinite(self.section_feeds).all())
+        return self.surface_rate(s) if spot else np.ones(np.shape(s))
+
+    def __call__(self, s: ArrayLike, order: int = 0) -> Floats:
+        """Return leg lengths (n, 5) in metres at stations s (n,), or their derivatives of order 1 to 3 in s."""
+        return self.derivatives(s, order)[-1]
+
+    def derivatives(self, s: ArrayLike, order: int) -> list[Floats]:
+        """Return leg lengths and their derivatives (n, 5) up to `order` ≤ 3: cheaper than one by one."""
+        poses = self.curve.derivatives(np.asarray(s, dtype=np.float64), order)
+        lever = (self.tool_length - self.robot.offsets)[:, None]
+        # From the base joints to the platform joints b_i = tip + (tool length − z_i) axis.
+        d = [tip[:, None, :] + lever * axis[:, None, :] for tip, axis in poses]
+        d[0][..., :2] -= self.robot.base
+        legs = [np.sqrt(_dot(d[0], d[0]))]
+        if order >= 1:
+            legs.append(_dot(d[0], d[1]) / legs[0])
+        if order >= 2:
+            legs.append((_dot(d[1], d[1]) + _dot(d[0], d[2]) - legs[1] * legs[1]) / legs[0])
+        if order >= 3:
+            legs.append((3.0 * _dot(d[1], d[2]) + _dot(d[0], d[3]) - 3.0 * legs[1] * legs[2]) / legs[0])
+        return legs
+
+
+@dataclass(frozen=True, eq=False)
+class LegPath:
+    """Pieces in order; the machine rests between them.
+
+    starts (P + 1,): station where each begins, and the end. dwells (P + 1,): seconds for which it stands there.
+    """
+
+    pieces: tuple[LegPiece, ...]
+    starts: Floats
+    dwells: Floats
+
+    def __post_init__(self) -> None:
+        set_frozen(self, pieces=tuple(self.pieces))
+        set_frozen(self, **{name: frozen(getattr(self, name), name, (None,)) for name in ("starts", "dwells")})
+
+    @property
+    def length(self) -> float:
+        """Total length in s, metres."""
+        return float(self.starts[-1])
+
+    def __call__(self, s: ArrayLike, order: int = 0) -> Floats:
+        """Return leg lengths (n, 5), or derivatives of order 1 to 3, at stations s (n,) of the whole path."""
+        return self._each(s, lambda piece, local: piece(local, order), 5)
+
+    def pose(self, s: ArrayLike) -> tuple[Floats, Floats]:
+        """Return tips and tool axes (n, 3), machine frame, at stations s (n,) of the whole path."""
+        both = self._each(s, lambda piece, local: np.hstack(piece.pose(local)), 6)
+        return both[:, :3], both[:, 3:]
+
+    def surface_rate(self, s: ArrayLike) -> Floats:
+        """Return how far (n,) the pivot (a beam's spot) moves for each metre of s, at stations s (n,)."""
+        return self._each(s, lambda piece, local: piece.surface_rate(local)[:, None], 1)[:, 0]
+
+    def piece_at(self, s: ArrayLike) -> Ints:
+        """Return the index (n,) of the piece that holds each station s (n,)."""
+        k = np.searchsorted(self.starts, np.asarray(s, dtype=np.float64), side="right") - 1
+        return np.clip(k, 0, len(self.pieces) - 1)
+
+    def _each(self, s: ArrayLike, evaluate: Callable[[LegPiece, Floats], Floats], columns: int) -> Floats:
+        s = np.atleast_1d(np.asarray(s, dtype=np.float64))
+        which = self.piece_at(s)
+        out = np.empty((len(s), columns))
+        for k in np.unique(which):
+            rows = which == k
+            out[rows] = evaluate(self.pieces[k], s[rows] - self.starts[k])
+        return out
+
+
+def leg_path(
+    placed: PlacedPath,
+    machine: Machine,
+    *,
+    path_tolerance: float,
+    axis_tolerance: float,
+    stop_angle: float = STOP_ANGLE,
+) -> LegPath | Refusal:
+    """Return the smooth leg path through the placed tool poses.
+
+    path_tolerance: how far in metres the pivot (the cutter's ball centre, the beam's spot) may leave the toolpath;
+    axis_tolerance: how far in radians the axis may leave the planned one. Corners are rounded within both. The machine
+    stops where a rapid meets another kind of motion, where the toolpath asks for it, and at corners that turn by more
+    than `stop_angle` radians. Raises ToolpathError for numbers that are not positive. Returns a Refusal where the tool
+    would have to stand still.
+    """
+    given = {"path_tolerance": path_tolerance, "axis_tolerance": axis_tolerance, "stop_angle": stop_angle}
+    for name, value in given.items():
+        if not value > 0.0:
+            raise ToolpathError("must be positive", key=name, value=value)
+    toolpath = placed.toolpath
+    points = np.hstack([placed.pivots, placed.axes])
+    steps = np.sqrt(
+        np.square(np.diff(points[:, :3], axis=0)).sum(axis=1)
+        + np.square(_AXIS_LEVER_M * np.diff(points[:, 3:], axis=0)).sum(axis=1)
+    )
+    moving = steps > 1e-12
+    keep = np.concatenate([[True], moving])
+    if keep.sum() < 2:
+        return Refusal(
+            "leg path", "the toolpath does not move", (Blame("motion", ((0, len(toolpath) - 1),), 0.0, "mm"),)
+        )
+    points, u = points[keep], np.concatenate([[0.0], np.cumsum(steps[moving])])
+    segment = toolpath.segment_of_interval[moving]
+    stops = np.zeros(len(points), dtype=np.bool_)
+    stops[1:-1] = _stops(points, toolpath.pivot, segment, toolpath.segments, stop_angle)
+    dwells = np.zeros(len(points))
+    for waypoint, seconds in zip(toolpath.starts, toolpath.dwells, strict=True):
+        if seconds is not None:
+            stood = int(keep[: waypoint + 1].sum()) - 1
+            stops[stood], dwells[stood] = True, dwells[stood] + seconds
+    stops[[0, -1]] = True
+    bounds = np.flatnonzero(stops)
+    pieces = []
+    for a, b in pairwise(bounds.tolist()):
+        spline = rounded(
+            u[a : b + 1] - u[a],
+            points[a : b + 1],
+            _tolerance(TOLERANCE_SHARE * path_tolerance, TOLERANCE_SHARE * axis_tolerance),
+        )
+        curve = ToolCurve.of(spline, toolpath.pivot)
+        ends = np.flatnonzero(np.diff(segment[a:b], append=-1)) + 1
+        which = segment[a:b][ends - 1]
+        pieces.append(
+            LegPiece(
+                curve,
+                machine.pentapod,
+                machine.tool_length,
+                section_ends=curve.arc_length(u[a + ends] - u[a]),
+                section_feeds=np.array([toolpath.segments[k].feed for k in which]),
+                section_kinds=tuple(toolpath.segments[k].kind for k in which),
+                section_segments=which,
+                waypoint_stations=curve.arc_length(u[a : b + 1] - u[a]),
+                waypoints=np.flatnonzero(keep)[a : b + 1],
+            )
+        )
+    return LegPath(tuple(pieces), np.concatenate([[0.0], np.cumsum([p.length for p in pieces])]), dwells[bounds])
+
+
+def _tolerance(path: float, axis: float) -> TooFar:
+    """Return the test of a rounded path: pivots within `path` metres, axes within `axis` radians, proven.
+
+    Both are read off the Bernstein coefficients of curve minus polyline, which enclose it. An axis that ends within
+    ε of a vector of length n is at most asin(ε / n) from it.
+    """
+
+    def too_far(differences: Floats, chords: Floats) -> Bools:
+        off, turned = (np.linalg.norm(differences[:, part], axis=1).max(axis=1) for part in (slice(3), slice(3, 6)))
+        nearest = _distance_to_origin(chords[:, 3:, 0], chords[:, 3:, 1])
+        return np.asarray((off > path) | (turned > np.sin(axis) * nearest))
+
+    return too_far
+
+
+def _distance_to_origin(a: Floats, b: Floats) -> Floats:
+    """Return the least distance (K,) from the origin to the segments from a to b (K, 3)."""
+    step = b - a
+    foot = -np.einsum("kj,kj->k", a, step) / np.maximum(np.einsum("kj,kj->k", step, step), 1e-300)
+    return np.linalg.norm(a + np.clip(foot, 0.0, 1.0)[:, None] * step, axis=1)
+
+
+def _stops(points: Floats, pivot: float, segment: Ints, segments: tuple[Segment, ...], angle: float) -> Bools:
+    """Return for each inner waypoint (N − 2,) whether the motion itself asks for a stop there.
+
+    points (N, 6): pivots and axes. angle: radians, of the corners at which it does.
+    """
+    rapid = np.array([s.kind is SegmentKind.RAPID for s in segments])[segment]
+    pivots, tips = points[:, :3], points[:, :3] - pivot * points[:, 3:]
+    return (rapid[1:] != rapid[:-1]) | _turns(pivots, angle) | _turns(tips, angle)
+
+
+def _turns(points: Floats, angle: float) -> Bools:
+    """Return for each inner point (N − 2,) of a polyline whether it turns by more than an angle there."""
+    step = np.diff(points, axis=0)
+    length = np.linalg.norm(step, axis=1)
+    moves = length > 1e-9
+    sharp = (step[1:] * step[:-1]).sum(axis=1) < np.cos(angle) * length[1:] * length[:-1]
+    return sharp & moves[1:] & moves[:-1]
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.einsum("nij,nij->ni", a, b)

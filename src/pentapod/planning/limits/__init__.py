@@ -1,0 +1,1 @@
+"""Margins: one dimensionless number for every limit."""

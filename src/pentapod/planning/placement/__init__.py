@@ -1,0 +1,1 @@
+"""Where the part is clamped: sampling, search, and the solvers that improve a placement."""

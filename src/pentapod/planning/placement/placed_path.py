@@ -1,0 +1,60 @@
+"""PlacedPath: the toolpath in the machine, with the tool axes that were chosen and the margins that they leave."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.refusal import Refusal
+from pentapod.kinematics.component import Component
+from pentapod.planning.limits.margins import Limit
+from pentapod.planning.placement.placement import Placement
+from pentapod.toolpath.toolpath import Toolpath
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedPath:
+    """Tool poses in the machine frame, one for each waypoint of the toolpath.
+
+    tips (N, 3) metres; axes (N, 3) unit, tip → spindle; margins (N, M), normalised, 0 at a limit; limits (M,): what
+    each stands for.
+    """
+
+    toolpath: Toolpath
+    placement: Placement
+    component: Component
+    tips: Floats
+    axes: Floats
+    margins: Floats
+    limits: tuple[Limit, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("tips", "axes", "margins"):
+            set_frozen(self, **{name: frozen(getattr(self, name), name, (len(self.toolpath), None))})
+
+    @property
+    def margin_names(self) -> tuple[str, ...]:
+        """The names (M,) of the limits."""
+        return tuple(limit.name for limit in self.limits)
+
+    @property
+    def smallest_margin(self) -> float:
+        """The smallest margin over all waypoints and limits."""
+        return float(self.margins.min())
+
+    @property
+    def binding(self) -> str:
+        """The limit with the smallest margin."""
+        return self.margin_names[int(self.margins.min(axis=0).argmin())]
+
+    @property
+    def pivots(self) -> Floats:
+        """The points (N, 3) about which the tool is tilted, machine frame, metres."""
+        return self.tips + self.toolpath.pivot * self.axes
+
+
+@dataclass(frozen=True)
+class UnplacedPath(Refusal):
+    """The refusal of a placement, with the attempt that came nearest: what is out of its limits there, and where."""
+
+    attempt: PlacedPath = field(kw_only=True)

@@ -1,0 +1,195 @@
+"""First guesses for the placement: many at random, ranked by their smallest margin over a few waypoints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.geometry.directions import tangent_frame
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import Component
+from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
+from pentapod.machine.machine import Machine
+from pentapod.planning.limits.margins import Margins
+from pentapod.planning.problem.constraints import FREE, Freedom
+from pentapod.planning.problem.problem import Candidate, Setting
+from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.tilt_field import lean
+
+SAMPLES = 12_000
+KEPT = 6
+"""Guesses returned for each component; they differ from each other."""
+
+_RANKED = 48
+_FITTED = 192
+_APART_M, _APART_RAD = 0.02, np.radians(15.0)
+LARGEST_SLOPE = np.radians(40.0)
+"""How far the part's mean axis may lean from the base normal in a first guess."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A placement, the component, and the smallest margin over the representatives."""
+
+    transform: RigidTransform
+    component: Component
+    margin: float
+
+
+def first_guesses(
+    task: Task,
+    machine: Machine,
+    components: tuple[Component, ...],
+    seed: int,
+    samples: int = SAMPLES,
+    freedom: Freedom = FREE,
+    surroundings: Surroundings = NOTHING,
+) -> list[Guess]:
+    """Return the best few of the allowed placements for each component, best first.
+
+    The same for a seed, on one kind of processor and with one set of libraries.
+    Each placement is judged on a dozen representatives with their nominal axes, the best again with a cone of tilts and
+    with the surroundings.
+    """
+    rng = np.random.default_rng(seed)
+    rows = task.representatives(12)
+    centre, mean_axis = task.pivots.mean(axis=0), task.nominal.mean(axis=0)
+    mean_axis = mean_axis / max(float(np.linalg.norm(mean_axis)), 1e-9)
+    guesses: list[Guess] = []
+    for component in components:
+        margins = Margins.of(machine, component, surroundings)
+        simple = task.tilt == 0.0 and not surroundings.obstacles
+        rotations, places = _rotations(mean_axis, -float(component.w), samples, rng), _places(machine, samples, rng)
+        if freedom.is_bounded:
+            rotations, origins = freedom.within(rotations, places - rotations @ centre, rng)
+            places = origins + rotations @ centre
+        for spread in (0.08, 0.03):  # twice closer around the best
+            best = _best(_score(task, margins, rotations, places - rotations @ centre, rows))
+            repeat = samples // 3 // len(best)
+            turned, near = rotations[best].repeat(repeat, axis=0), places[best].repeat(repeat, axis=0)
+            rotations = np.concatenate([rotations[best], _turned(turned, spread, rng)])
+            places = np.concatenate([places[best], near + rng.normal(scale=spread, size=near.shape)])
+            if freedom.is_bounded:
+                rotations, origins = freedom.nearest(rotations, places - rotations @ centre)
+                places = origins + rotations @ centre
+        translations = places - rotations @ centre
+        score = _score(task, margins, rotations, translations, rows)
+        best = _best(score)
+        found = [
+            Guess(t, component, float(score[k] if simple else _smallest(task, margins, t, rows)))
+            for k in best
+            for t in (freedom.nearest_to(RigidTransform(_orthonormal(rotations[k]), translations[k])),)
+        ]
+        guesses += _different(sorted(found, key=lambda g: -g.margin), centre)
+    return sorted(guesses, key=lambda g: -g.margin)
+
+
+def first_candidate(setting: Setting, margins: Margins, transform: RigidTransform) -> Candidate:
+    """Return the candidate whose smooth field comes near the tilts that are best for each waypoint by itself."""
+    coefficients, task, domain = setting.upright, setting.task, setting.domain
+    if task.tilt > 0.0:
+        rows = task.representatives(_FITTED)
+        _, leans = best_tilted_margins(task.at(rows), margins, transform)
+        # Smoothness, lightly weighed, decides where the representatives do not.
+        smooth = np.vstack([0.3 * domain.roughness(), 1e-3 * np.eye(domain.size)])
+        wanted = np.vstack([leans @ domain.lean_plane.T, np.zeros((len(smooth), 2))])
+        fitted = np.linalg.lstsq(np.vstack([setting.basis[rows], smooth]), wanted, rcond=None)[0]
+        coefficients = setting.within_cone(np.asarray(fitted, dtype=np.float64))
+    return setting.candidate(margins, transform, coefficients)
+
+
+def tilts(angle: float) -> Floats:
+    """Return lean vectors (K, 2) in a tangent frame that fill a cone of half angle `angle`: centre and two rings."""
+    rings = [np.zeros((1, 2))]
+    for share, count in ((0.5, 6), (0.95, 12)):
+        turn = 2.0 * np.pi * np.arange(count) / count
+        rings.append(share * np.tan(angle) * np.stack([np.cos(turn), np.sin(turn)], axis=1))
+    return np.concatenate(rings)
+
+
+def best_tilted_margins(
+    task: Task, margins: Margins, placement: RigidTransform, block: int = 4096
+) -> tuple[Floats, Floats]:
+    """Return margins (N, M) at the best tilt of a grid over the cone, each waypoint by itself, and the lean (N, 3)."""
+    grid = tilts(task.tilt) if task.tilt > 0.0 else np.zeros((1, 2))
+    out, leans = np.empty((len(task.pivots), len(margins.limits))), np.empty((len(task.pivots), 3))
+    for start in range(0, len(out), block):
+        rows = np.arange(start, min(start + block, len(out)))
+        t1, t2 = tangent_frame(task.nominal[rows])
+        b = grid[:, None, :1] * t1 + grid[:, None, 1:] * t2
+        tips, axes = task.machine_poses(placement, lean(task.nominal[rows], b), rows)
+        all_margins = margins(tips, axes, placement)
+        choice = all_margins.min(axis=-1).argmax(axis=0)
+        out[rows] = all_margins[choice, np.arange(len(rows))]
+        leans[rows] = b[choice, np.arange(len(rows))]
+    return out, leans
+
+
+def _best(score: Floats) -> Ints:
+    return np.argsort(-score, kind="stable")[:_RANKED]
+
+
+def _different(guesses: list[Guess], centre: Floats) -> list[Guess]:
+    """Return the first KEPT guesses that are not all but the same as one before."""
+    kept: list[Guess] = []
+    for guess in guesses:
+        for other in kept:
+            apart = float(np.linalg.norm(guess.transform.apply(centre) - other.transform.apply(centre)))
+            turn = 0.5 * (float(np.trace(guess.transform.rotation.T @ other.transform.rotation)) - 1.0)
+            if apart < _APART_M and turn > np.cos(_APART_RAD):
+                break
+        else:
+            kept.append(guess)
+        if len(kept) == KEPT:
+            break
+    return kept
+
+
+def _score(task: Task, margins: Margins, r: Floats, t: Floats, rows: Ints) -> Floats:
+    turned = np.einsum("sij,nj->sni", r, task.nominal[rows])
+    tips = np.einsum("sij,nj->sni", r, task.pivots[rows]) + t[:, None, :] - task.pivot * turned
+    return margins.own(tips, turned).min(axis=(-1, -2))
+
+
+def _smallest(task: Task, margins: Margins, placement: RigidTransform, rows: Ints) -> float:
+    return float(best_tilted_margins(task.at(rows), margins, placement)[0].min())
+
+
+def _rotations(mean_axis: Floats, side: float, count: int, rng: np.random.Generator) -> Floats:
+    """Return rotations (count, 3, 3) that turn the mean tool axis to within LARGEST_SLOPE of side · z."""
+    cosine = rng.uniform(np.cos(LARGEST_SLOPE), 1.0, count)
+    azimuth, spin = rng.uniform(0.0, 2.0 * np.pi, (2, count))
+    sine = np.sqrt(1.0 - cosine * cosine)
+    target = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), side * cosine], axis=1)
+    t1, t2 = tangent_frame(target)
+    c, s = np.cos(spin)[:, None], np.sin(spin)[:, None]
+    to = np.stack([c * t1 + s * t2, -s * t1 + c * t2, target], axis=2)
+    m1, m2 = tangent_frame(mean_axis)
+    return to @ np.stack([m1, m2, mean_axis])
+
+
+def _places(machine: Machine, count: int, rng: np.random.Generator) -> Floats:
+    """Return places (count, 3) for the path's centre: a third near the advertised work, the rest anywhere in reach."""
+    base, reach = machine.pentapod.base, float(machine.legs.max_length.max()) + abs(machine.tool_length)
+    low, high = base.min(axis=0), base.max(axis=0)
+    side = np.sign(machine.joints.base_axes[:, 2].sum()) or 1.0
+    wide = np.column_stack([rng.uniform(low, high, (count, 2)), side * rng.uniform(0.1, 1.0, count) * reach])
+    near = machine.work.centre + rng.normal(scale=0.25 * machine.work.diameter, size=(count, 3))
+    return np.where((np.arange(count) % 3 == 0)[:, None], near, wide)
+
+
+def _turned(rotations: Floats, spread: float, rng: np.random.Generator) -> Floats:
+    """Return rotations turned by small random angles (to first order; made exact when one is chosen)."""
+    a = rng.normal(scale=2.0 * spread, size=(len(rotations), 3))
+    small = np.zeros((len(a), 3, 3))
+    small[:, 0, 1], small[:, 0, 2], small[:, 1, 2] = -a[:, 2], a[:, 1], -a[:, 0]
+    small -= small.transpose(0, 2, 1)
+    u, _, v = np.linalg.svd(rotations @ (np.eye(3) + small))
+    return u @ v
+
+
+def _orthonormal(rotation: Floats) -> Floats:
+    u, _, v = np.linalg.svd(rotation)
+    return u @ v

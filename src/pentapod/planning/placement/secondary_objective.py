@@ -1,0 +1,229 @@
+"""The second aim: beside enough margin, small leg forces or a short machining time.
+
+What the first aim leaves undecided, and a tenth of what it reached, is spent on the second: sequential linear
+programming on the linear model of the margins, the aim's own derivatives by central differences of its few ingredients
+at each waypoint (by the placement's motion and the waypoint's lean; the field follows from the leans by its basis).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.forces import tip_force_amplification
+from pentapod.machine.machine import Machine
+from pentapod.planning.placement.sequential import SequentialSolver
+from pentapod.planning.problem.formulation import stepped
+from pentapod.planning.problem.linear_model import LinearModel, by_field, valleys
+from pentapod.planning.problem.problem import Candidate, Setting
+from pentapod.planning.problem.tilt_field import lean
+from pentapod.toolpath.toolpath import Toolpath
+
+SecondAim = Literal["force", "time"]
+
+_STEPS = 40
+_WORST, _SPREAD = 48, 96
+_STEP = 1e-5
+_SMALLEST_REACH, _ENOUGH, _SLACK = 1e-3, 1e-3, 1e-5
+_NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
+
+Poses = tuple[Floats, Floats]
+"""Tips and tool axes (n, 3), machine frame."""
+
+
+class Aim(Protocol):
+    """What is to become small: the largest of some pieces, each of which depends on ingredients at waypoints."""
+
+    def value(self, at: Candidate) -> float:
+        """Return the aim over the whole path."""
+        ...
+
+    def pieces(self, at: Candidate, model: LinearModel) -> tuple[Floats, Floats]:
+        """Return pieces (K,), of which the largest is the aim, and derivatives (K, n) by the model's unknowns."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class LeastForce:
+    """The largest force in the legs that one newton at the tip calls up anywhere on the path, N/N."""
+
+    setting: Setting
+
+    def value(self, at: Candidate) -> float:
+        """Return the worst amplification over all waypoints."""
+        return float(self._at_all(at).max())
+
+    def pieces(self, at: Candidate, model: LinearModel) -> tuple[Floats, Floats]:
+        """Return the amplification at the worst waypoints, and at some everywhere."""
+        values = self._at_all(at)
+        worst = np.argsort(-values, kind="stable")[:_WORST]
+        rows = np.union1d(worst, self.setting.task.representatives(_SPREAD))
+        machine = self.setting.machine
+
+        def amplification(poses: Poses) -> Floats:
+            return _amplification(machine, poses)[:, None]
+
+        by_motion, by_lean = _partials(self.setting, at, rows, model.moves, amplification)
+        return values[rows], _by_unknowns(self.setting, rows, by_motion[:, 0], by_lean[:, 0])
+
+    def _at_all(self, at: Candidate) -> Floats:
+        poses = self.setting.task.machine_poses(at.transform, self.setting.axes(at.coefficients))
+        return _amplification(self.setting.machine, poses)
+
+
+@dataclass(frozen=True, eq=False)
+class LeastTime:
+    """A lower bound of the machining time, seconds: ∫ max(1/feed, |l_i'|/v_i over the legs) ds.
+
+    feeds (N − 1,): m/s, at most the machine's rapid rate.
+    """
+
+    setting: Setting
+    feeds: Floats
+
+    def value(self, at: Candidate) -> float:
+        """Return the bound."""
+        return float(self._times(at)[0].sum())
+
+    def pieces(self, at: Candidate, model: LinearModel) -> tuple[Floats, Floats]:
+        """Return the bound as one piece: a sum of so many maxima that its kinks hardly show."""
+        setting, robot, length = self.setting, self.setting.machine.pentapod, self.setting.machine.tool_length
+        times, weights = self._times(at)
+        rows = np.flatnonzero((weights != 0.0).any(axis=1))
+
+        def legs_and_tips(poses: Poses) -> Floats:
+            tips, axes = poses
+            return np.hstack([robot.leg_lengths(tips + length * axes, -axes), tips])
+
+        by_motion, by_lean = _partials(setting, at, rows, model.moves, legs_and_tips)
+        by_motion = np.einsum("ni,nik->nk", weights[rows], by_motion)
+        by_lean = np.einsum("ni,nik->nk", weights[rows], by_lean)
+        slope = np.concatenate([by_motion.sum(axis=0), (setting.basis[rows].T @ by_lean * setting.cone).ravel()])
+        return np.array([times.sum()]), slope[None]
+
+    def _times(self, at: Candidate) -> tuple[Floats, Floats]:
+        """Return the least time of each interval, (N − 1,), and the derivative of their sum by legs and tip (N, 8)."""
+        setting, machine = self.setting, self.setting.machine
+        tips, axes = setting.task.machine_poses(at.transform, setting.axes(at.coefficients))
+        steps = np.diff(machine.pentapod.leg_lengths(tips + machine.tool_length * axes, -axes), axis=0)
+        by_leg = np.abs(steps) / machine.legs.max_velocity
+        leg = by_leg.argmax(axis=1)
+        index = np.arange(len(leg))
+        chords = np.diff(tips, axis=0)
+        way = np.linalg.norm(chords, axis=1)
+        by_feed, slowest = way / self.feeds, by_leg[index, leg]
+        held = slowest > by_feed
+        by_step = np.zeros((len(chords), 8))
+        by_step[index, leg] = np.where(held, np.sign(steps[index, leg]) / machine.legs.max_velocity[leg], 0.0)
+        by_step[:, 5:] = np.where(held[:, None], 0.0, chords / (np.maximum(way, 1e-12) * self.feeds)[:, None])
+        weights = np.zeros((len(tips), 8))
+        weights[:-1] -= by_step
+        weights[1:] += by_step
+        return np.maximum(slowest, by_feed), weights
+
+
+def aim_of(name: SecondAim, setting: Setting, toolpath: Toolpath) -> Aim:
+    """Return the aim of this name for the setting of a toolpath."""
+    if name == "force":
+        return LeastForce(setting)
+    feeds = np.array([segment.feed for segment in toolpath.segments])[toolpath.segment_of_interval]
+    return LeastTime(setting, np.minimum(feeds, setting.machine.rapid_velocity))
+
+
+def improved(solver: SequentialSolver, start: Candidate, aim: Aim, keep: float) -> Candidate:
+    """Return a candidate near `start`, with the smallest margin `keep` at least, that is better by the aim."""
+    setting, rows = solver.setting, np.arange(len(solver.setting.task.pivots))
+    best, reach, extra = start, 0.3, _NO_ROWS
+    value = aim.value(best)
+    model = solver.model(best, rows, keep)
+    pieces = aim.pieces(best, model)
+    for _ in range(_STEPS):
+        step = _lowest(model, pieces, keep, reach)
+        trial, promise = None, 0.0
+        if step is not None:
+            motion, change, promise = step
+            promise += value - float(pieces[0].max())
+            transform = stepped(best.transform, motion) if model.moves.size else best.transform
+            transform = setting.freedom.nearest_to(transform)
+            trial = setting.candidate(best.margins, transform, setting.within_cone(best.coefficients + change))
+        gain = value - aim.value(trial) if trial is not None else 0.0
+        if trial is not None and trial.smallest >= keep - _SLACK and gain > 0.1 * promise and gain > 0.0:
+            done = gain < _ENOUGH * value
+            best, value, extra = trial, value - gain, _NO_ROWS
+            reach *= 2.0 if gain > 0.6 * promise else 1.0
+            if done:
+                break
+            model = solver.model(best, rows, keep)
+            pieces = aim.pieces(best, model)
+        else:
+            reach *= 0.4
+            if reach < _SMALLEST_REACH:
+                break
+            if trial is not None and trial.smallest < keep:  # what came out worst may not have been in the model
+                values = setting.values(trial.margins, trial.transform, trial.coefficients)
+                extra = np.union1d(extra, valleys(values))
+                model = solver.model(best, rows, keep, extra)
+    return best
+
+
+def _lowest(
+    model: LinearModel, pieces: tuple[Floats, Floats], keep: float, reach: float
+) -> tuple[Floats, Floats, float] | None:
+    """Return step (6,), change of coefficients (size, 2) that make the largest piece least, and by how much."""
+    from scipy.optimize import linprog  # noqa: PLC0415  heavy: only when planning
+
+    count, now = model.matrix.shape[1], float(pieces[0].max())
+    unit = max(abs(now), 1e-12)
+    kept = np.vstack([-model.matrix, model.steep_matrix, -model.room_matrix])
+    answer: Any = linprog(
+        np.append(np.zeros(count), 1.0),
+        A_ub=np.vstack([
+            np.column_stack([pieces[1] / unit, np.full(len(pieces[0]), -1.0)]),
+            np.column_stack([kept, np.zeros(len(kept))]),
+        ]),
+        b_ub=np.concatenate([
+            -pieces[0] / unit,
+            model.values - keep,
+            np.maximum(np.append(1.0 - model.steepness, model.room), 0.0),
+        ]),
+        bounds=[(-reach, reach)] * count + [(None, None)],
+        method="highs-ds",
+    )  # fmt: skip
+    if answer.status != 0:
+        return None
+    x = np.asarray(answer.x, dtype=np.float64)
+    return *model.step_of(x[:-1]), now - float(x[-1]) * unit
+
+
+def _partials(
+    setting: Setting, at: Candidate, rows: Ints, moves: Floats, ingredient: Callable[[Poses], Floats]
+) -> tuple[Floats, Floats]:
+    """Return central differences of ingredients (n, I) by the moves (6, k), (n, I, k), and the lean."""
+    still = np.zeros(2)
+
+    def at_offset(step: Floats, tilt: Floats) -> Floats:
+        b = (setting.basis[rows] @ at.coefficients + tilt) @ setting.domain.lean_plane
+        transform: RigidTransform = stepped(at.transform, step)
+        return ingredient(setting.task.machine_poses(transform, lean(setting.task.nominal[rows], b), rows))
+
+    steps = _STEP * moves
+    by_motion = [at_offset(step, still) - at_offset(-step, still) for step in steps.T]
+    by_lean = [at_offset(np.zeros(6), _STEP * u) - at_offset(np.zeros(6), -_STEP * u) for u in np.eye(2)]
+    shape = (*by_lean[0].shape, 0)
+    first = np.stack(by_motion, axis=-1) if by_motion else np.zeros(shape)
+    return first / (2.0 * _STEP), np.stack(by_lean, axis=-1) / (2.0 * _STEP)
+
+
+def _by_unknowns(setting: Setting, rows: Ints, by_motion: Floats, by_lean: Floats) -> Floats:
+    """Return derivatives (n, k + 2·size) by motion and field of those by motion (n, k) and lean (n, 2)."""
+    return np.hstack([by_motion, by_field(setting.basis[rows], by_lean) * setting.cone])
+
+
+def _amplification(machine: Machine, poses: Poses) -> Floats:
+    tips, axes = poses
+    return tip_force_amplification(machine.pentapod, tips + machine.tool_length * axes, -axes, machine.tool_length)

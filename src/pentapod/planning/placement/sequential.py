@@ -1,0 +1,103 @@
+"""The default solver: small quadratic programs in sequence, on the waypoints and margins that are smallest.
+
+Raising the smallest margin is sequential quadratic programming with a trust region (Fletcher, Practical Methods of
+Optimization, ch. 14: minimax); calming the field is a convex cost under the margins to keep, by feasible steps only.
+Every step is judged by the margins themselves, so a poor model costs a step, never a limit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.planning.placement.curvature import Curvature
+from pentapod.planning.problem.formulation import Room, placement_room, step_slopes, stepped
+from pentapod.planning.problem.linear_model import REACH, LinearModel, valleys
+from pentapod.planning.problem.problem import Candidate, Setting
+from pentapod.planning.tool_axis.smoothing import calmed
+
+_CONSIDERED = 4000
+"""Waypoints whose margins are looked at in every step; all are looked at when the steps have ended."""
+_STEPS, _ROUNDS = 60, 6
+_ENOUGH = 1e-4
+"""A smallest margin over all waypoints that is lower by more than this calls for another round."""
+_LEAST = 1e-5
+"""A promise of less margin, or a trust region smaller than this, ends the climb."""
+_NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
+
+
+@dataclass(eq=False)
+class SequentialSolver:
+    """Improves candidates of one setting; free: whether the placement may move."""
+
+    setting: Setting
+    free: bool
+
+    def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
+        """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one."""
+        rows, best = self._considered(), start
+        for _ in range(_ROUNDS):
+            found = self._climb(best, rows, enough + _ENOUGH)
+            values = self.setting.values(found.margins, found.transform, found.coefficients)
+            smallest = float(values.min())
+            if smallest > best.smallest:
+                best = Candidate(found.margins, found.transform, found.coefficients, smallest)
+            if smallest >= found.smallest - _ENOUGH:
+                break
+            rows = np.union1d(rows, np.argsort(values.min(axis=1), kind="stable")[: _CONSIDERED // 8])
+        return best
+
+    def calm(self, start: Candidate, keep: float) -> Floats | None:
+        """Return coefficients (K, 2) of the calmest course at the placement of `start` that keeps the margin `keep`."""
+        return calmed(self.setting, start, keep)
+
+    def _considered(self) -> Ints:
+        count = len(self.setting.task.pivots)
+        return np.unique(np.linspace(0, count - 1, min(count, _CONSIDERED)).astype(np.intp))
+
+    def _climb(self, start: Candidate, rows: Ints, enough: float) -> Candidate:
+        """Return the candidate that a trust-region method reaches, with its smallest margin over `rows`."""
+        setting, reach, extra = self.setting, 0.5, _NO_ROWS
+        smallest = float(setting.values(start.margins, start.transform, start.coefficients, rows).min())
+        best = Candidate(start.margins, start.transform, start.coefficients, smallest)
+        model, curvature = self.model(best, rows, best.smallest), Curvature(setting, start.margins)
+        for _ in range(_STEPS):
+            if best.smallest >= enough:
+                break
+            step, change, promise = curvature.best_step(model, best, reach)
+            if promise < _LEAST:
+                break
+            transform = setting.freedom.nearest_to(stepped(best.transform, step)) if self.free else best.transform
+            coefficients = setting.within_cone(best.coefficients + change)
+            values = setting.values(best.margins, transform, coefficients, rows)
+            gain = float(values.min()) - best.smallest
+            reach *= 2.0 if gain > 0.6 * promise else 1.0 if gain > 0.25 * promise else 0.4
+            if gain > 0.05 * promise:
+                best = Candidate(best.margins, transform, coefficients, float(values.min()))
+            elif reach < _LEAST:
+                break
+            else:  # what came out worst may not have been in the model
+                steepness = setting.steepness(best.coefficients + change, rows)
+                extra = np.union1d(extra, np.union1d(valleys(values), valleys(-steepness[:, None])))
+            model = self.model(best, rows, best.smallest, extra)
+        return best
+
+    def model(self, at: Candidate, rows: Ints, level: float, extra: Ints = _NO_ROWS) -> LinearModel:
+        """Return the linear model around a candidate of what comes near a margin of `level` among `rows`.
+
+        extra: indices into rows that enter in any case.
+        """
+        slopes = step_slopes(self.setting, at.margins)
+        return LinearModel.of(self.setting, at, rows, level, extra, slopes, self._room(at.transform), self._moves)
+
+    @property
+    def _moves(self) -> Floats:
+        moves = REACH[:, None] * self.setting.freedom.motion
+        return moves if self.free else moves[:, :0]
+
+    @cached_property
+    def _room(self) -> Room:
+        return placement_room(self.setting.freedom, free=self.free)

@@ -1,0 +1,221 @@
+"""Freedom: which placements are allowed, and in which of its six directions a placement may move.
+
+A step of the optimisers moves the workpiece's origin in the machine frame and turns the workpiece about that origin
+(`formulation.stepped`). What a fixture, a table or a box leaves of that is stated here once: for sampling, as a way to
+the nearest allowed placement; for the solvers, as columns of allowed motion and as room that must not become negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.base.arrays import Bools, Floats, as_floats, frozen, set_frozen
+from pentapod.base.errors import ArrayError
+from pentapod.geometry.directions import tangent_frame
+from pentapod.geometry.rigid import RigidTransform
+
+_ALL_MOTION = np.eye(6)
+_NO_MOTION = np.zeros((6, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class Freedom:
+    """The allowed placements, workpiece → machine.
+
+    motion (6, k): orthonormal columns, the allowed steps: shifts of the workpiece's origin in the machine frame, then
+    Cayley vectors in the workpiece frame; each column either shifts or turns. low, high (3,): where the workpiece's
+    origin may lie, metres along the machine's x, y and z; infinite where nothing bounds it. reference (3, 3) and
+    largest_turn: the rotation from which the part may be turned by that angle at most, radians; π bounds nothing.
+    upright: the unit direction (3,) of the workpiece that must point to `normal` (3,), machine frame; zero where none
+    must. poses: the placements to choose from; empty where the origin and the rotation are to be found.
+    """
+
+    motion: Floats
+    low: Floats
+    high: Floats
+    reference: Floats
+    largest_turn: float
+    upright: Floats
+    normal: Floats
+    poses: tuple[RigidTransform, ...] = ()
+
+    def __post_init__(self) -> None:
+        arrays = {name: np.array(getattr(self, name), dtype=np.float64) for name in ("low", "high")}
+        if any(array.shape != (3,) for array in arrays.values()) or not (arrays["low"] <= arrays["high"]).all():
+            bounds = [array.tolist() for array in arrays.values()]
+            raise ArrayError("the bounds of the origin are not low ≤ high", value=bounds, expected="(3,) and (3,)")
+        if not 0.0 <= self.largest_turn <= np.pi:
+            raise ArrayError("the largest turn is out of range", value=self.largest_turn, expected="0 to π")
+        for array in arrays.values():
+            array.setflags(write=False)
+        set_frozen(
+            self,
+            **arrays,
+            **{name: frozen(getattr(self, name), name) for name in ("motion", "reference", "upright", "normal")},
+            poses=tuple(self.poses),
+        )
+
+    @classmethod
+    def free(
+        cls,
+        *,
+        low: ArrayLike = (-np.inf, -np.inf, -np.inf),
+        high: ArrayLike = (np.inf, np.inf, np.inf),
+        reference: RigidTransform | None = None,
+        largest_turn: float = np.pi,
+    ) -> Freedom:
+        """Return all six freedoms, within a box for the origin and a largest turn from a reference (radians)."""
+        rotation = np.eye(3) if reference is None else reference.rotation
+        none = np.zeros(3)
+        return cls(_ALL_MOTION, np.asarray(low), np.asarray(high), rotation, largest_turn, none, none)
+
+    @classmethod
+    def table(
+        cls,
+        height: float,
+        *,
+        x: tuple[float, float] = (-np.inf, np.inf),
+        y: tuple[float, float] = (-np.inf, np.inf),
+        up: ArrayLike = (0.0, 0.0, 1.0),
+        normal: ArrayLike = (0.0, 0.0, -1.0),
+    ) -> Freedom:
+        """Return the freedom of a part that stands on a table parallel to the base plane.
+
+        height: z of the workpiece's origin, machine frame. x, y: least and greatest coordinate of the origin, metres.
+        up (3,): direction of the workpiece that is up on the table. normal (3,): up for the table, ±z of the machine.
+        The part may be shifted along the table and turned about its normal.
+        """
+        upright, upward = as_floats(up, "up", (3,)), as_floats(normal, "normal", (3,))
+        upright, upward = upright / np.linalg.norm(upright), upward / np.linalg.norm(upward)
+        if abs(abs(upward[2]) - 1.0) > 1e-12:
+            raise ArrayError("a table is parallel to the base plane", key="normal", value=upward.tolist())
+        motion = np.zeros((6, 3))
+        motion[0, 0] = motion[1, 1] = 1.0
+        motion[3:, 2] = upright
+        low, high = np.array([x[0], y[0], height]), np.array([x[1], y[1], height])
+        return cls(motion, low, high, np.eye(3), np.pi, upright, upward)
+
+    @classmethod
+    def fixture(cls, poses: Sequence[RigidTransform]) -> Freedom:
+        """Return the choice between given placements. Raises ArrayError where there are none."""
+        if not poses:
+            raise ArrayError("a fixture needs at least one pose", value=0)
+        wide, none = np.full(3, np.inf), np.zeros(3)
+        return cls(_NO_MOTION, -wide, wide, np.eye(3), np.pi, none, none, tuple(poses))
+
+    @property
+    def moves(self) -> bool:
+        """Whether placements may be improved by small steps."""
+        return self.motion.shape[1] > 0
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether anything limits the placements that the motion leads to."""
+        return self.turn_is_bounded or bool(np.isfinite([self.low, self.high]).any())
+
+    @property
+    def turn_is_bounded(self) -> bool:
+        """Whether the largest turn bounds anything."""
+        return self.largest_turn < np.pi
+
+    def within(self, rotations: Floats, origins: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        """Return random placements, rotations (S, 3, 3) and origins (S, 3), brought to where they are allowed.
+
+        What lies beyond a bound is drawn anew, evenly, where both ends of the bound are known: not all put on its edge.
+        """
+        for k in range(3):
+            beyond = (origins[:, k] < self.low[k]) | (origins[:, k] > self.high[k])
+            if beyond.any() and np.isfinite(self.low[k]) and np.isfinite(self.high[k]):
+                drawn = rng.uniform(self.low[k], self.high[k], len(origins))
+                origins = origins.copy()
+                origins[:, k] = np.where(beyond, drawn, origins[:, k])
+        if self.turn_is_bounded:
+            axes, angles = _turns(self.reference.T @ rotations)
+            drawn = np.where(angles > self.largest_turn, angles * self.largest_turn / np.pi, angles)
+            rotations = self.reference @ _rotations(axes, drawn)
+        return self.nearest(rotations, origins)
+
+    def nearest(self, rotations: Floats, origins: Floats) -> tuple[Floats, Floats]:
+        """Return allowed placements near to rotations (S, 3, 3) and origins (S, 3); those allowed stay as they are."""
+        if self.upright.any():
+            rotations = _swing(rotations @ self.upright, self.normal) @ rotations
+        elif self.turn_is_bounded:
+            axes, angles = _turns(self.reference.T @ rotations)
+            beyond = angles > self.largest_turn
+            back = self.reference @ _rotations(axes, np.minimum(angles, self.largest_turn))
+            rotations = np.where(beyond[:, None, None], back, rotations)
+        return rotations, np.clip(origins, self.low, self.high)
+
+    def nearest_to(self, transform: RigidTransform) -> RigidTransform:
+        """Return an allowed placement near to a given one; the same where that is allowed."""
+        if not self.is_bounded:
+            return transform
+        rotations, origins = self.nearest(transform.rotation[None], transform.translation[None])
+        return RigidTransform(rotations[0], origins[0])
+
+    def room(self, rotation: Any, origin: Any) -> list[Any]:
+        """Return what must not be negative of a placement: metres to each bound, and the cosine of the turn to spare.
+
+        The formula serves NumPy arrays and casadi symbols alike. Only what bounds the allowed motion is listed.
+        """
+        rows: list[Any] = []
+        for k in range(3):
+            if self.low[k] == self.high[k]:  # held by the motion's columns
+                continue
+            rows += [origin[k] - float(self.low[k])] if np.isfinite(self.low[k]) else []
+            rows += [float(self.high[k]) - origin[k]] if np.isfinite(self.high[k]) else []
+        if self.turn_is_bounded:
+            trace = sum(float(self.reference[i, j]) * rotation[i, j] for i in range(3) for j in range(3))
+            rows.append(0.5 * (trace - 1.0) - float(np.cos(self.largest_turn)))
+        return rows
+
+
+FREE = Freedom.free()
+"""All six freedoms, without bounds."""
+
+
+def _swing(directions: Floats, target: Floats) -> Floats:
+    """Return the smallest rotations (S, 3, 3) that take unit directions (S, 3) to the unit target (3,)."""
+    cosine = directions @ target
+    across = np.cross(directions, target)
+    opposite = cosine < -1.0 + 1e-9
+    if opposite.any():  # any half turn about a direction across will do
+        across = np.where(opposite[:, None], tangent_frame(target)[0], across)
+    sine = np.asarray(np.linalg.norm(across, axis=1), dtype=np.float64)
+    axes = across / np.maximum(sine, 1e-300)[:, None]
+    return _rotations(axes, np.where(opposite, np.pi, np.arctan2(sine, cosine)))
+
+
+def _rotations(axes: Floats, angles: Floats) -> Floats:
+    """Return rotations (S, 3, 3) about unit axes (S, 3) by angles (S,), radians (Rodrigues)."""
+    skew = np.zeros((len(axes), 3, 3))
+    skew[:, 0, 1], skew[:, 0, 2], skew[:, 1, 2] = -axes[:, 2], axes[:, 1], -axes[:, 0]
+    skew -= skew.transpose(0, 2, 1)
+    sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
+    return np.asarray(np.eye(3) + sine * skew + (1.0 - cosine) * (skew @ skew), dtype=np.float64)
+
+
+def _turns(rotations: Floats) -> tuple[Floats, Floats]:
+    """Return the unit axes (S, 3) and angles (S,) in [0, π] of rotations (S, 3, 3)."""
+    twice = np.stack([
+        rotations[:, 2, 1] - rotations[:, 1, 2],
+        rotations[:, 0, 2] - rotations[:, 2, 0],
+        rotations[:, 1, 0] - rotations[:, 0, 1],
+    ], axis=1)  # fmt: skip
+    sine = 0.5 * np.linalg.norm(twice, axis=1)
+    cosine = 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0)
+    angles = np.asarray(np.arctan2(sine, cosine), dtype=np.float64)
+    axes = twice / np.maximum(2.0 * sine, 1e-300)[:, None]
+    half: Bools = (sine < 1e-6) & (cosine < 0.0)
+    if half.any():  # R + 1 = 2 a aᵀ: its longest column is the axis
+        outer = rotations[half] + np.eye(3)
+        lengths = np.linalg.norm(outer, axis=1)
+        longest = lengths.argmax(axis=1)
+        rows = np.arange(len(outer))
+        axes[half] = outer[rows, :, longest] / lengths[rows, longest][:, None]
+    return axes, angles

@@ -1,0 +1,251 @@
+"""The optimisation problem, stated once in casadi: margins and cone of one waypoint as functions of the unknowns.
+
+Unknowns: a small placement step (3 translations in metres, a Cayley rotation vector) around a given placement, in so
+far as the placement is free, and the lean a (2) of the waypoint, told in a pair of directions. Both solvers build on
+this function: the reference hands it to IPOPT, the default takes its derivatives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.numerics.casadi_vectorised import Vectorised
+from pentapod.planning.limits.margins import Joints, Margins
+from pentapod.planning.problem.constraints import Freedom
+from pentapod.planning.problem.problem import Setting
+from pentapod.planning.problem.weights import weighed
+
+Slopes = Callable[[Floats, Floats, Ints], Floats]
+StepSlopes = Callable[[Margins, RigidTransform, Floats, Ints], Floats]
+Room = Callable[[RigidTransform], tuple[Floats, Floats]]
+
+
+By = Literal["nothing", "lean", "step and lean"]
+
+_MADE: WeakKeyDictionary[Margins, dict[tuple[Any, ...], Any]] = WeakKeyDictionary()
+"""Making a function takes a good part of a second; settings that differ in their path or cone alone share them."""
+
+
+def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, by: By = "nothing") -> Any:
+    """Return the casadi function of one waypoint: margins K, and the square of the lean (of the tangent of its angle).
+
+    Of step 6, lean a 2, pivot 3, nominal 3, pair 3×2, R 3×3, t 3, contacts. The margins are weighed; kinds: which.
+    pair: columns, the directions of the lean's two numbers; what of them lies along the nominal axis does not count.
+    by: also return the margins' derivatives by a, K × 2, or by (step, a), K × 8.
+    """
+    import casadi as ca  # noqa: PLC0415  heavy: only when planning
+
+    inputs, values, square = _point(setting, margins, kinds, None)
+    step, a = inputs[:2]
+    unknowns = {"nothing": [], "lean": [a], "step and lean": [ca.vertcat(step, a)]}[by]
+    slopes = [ca.densify(ca.jacobian(values, x)) for x in unknowns]
+    return ca.Function("point", inputs, [values, square, *slopes], {"cse": True})
+
+
+def guide_function(setting: Setting, margins: Margins) -> Any:
+    """Return the casadi function of one waypoint with the guides free: all margins, and their derivatives M × 13.
+
+    Of slides 5 from where the guides of the margins' machine stand, and then as `point_function`; the derivatives are
+    by (step, slides, a).
+    """
+    import casadi as ca  # noqa: PLC0415
+
+    slides = ca.SX.sym("slides", 5)
+    inputs, values, _ = _point(setting, margins, range(len(margins.limits)), slides)
+    slopes = ca.densify(ca.jacobian(values, ca.vertcat(inputs[0], slides, inputs[1])))
+    return ca.Function("guides", [slides, *inputs], [values, slopes], {"cse": True})
+
+
+def _point(setting: Setting, margins: Margins, kinds: Sequence[int], slides: Any) -> tuple[list[Any], Any, Any]:
+    """Return the symbols of a waypoint, its weighed margins, and the square of the lean; see above."""
+    import casadi as ca  # noqa: PLC0415
+
+    (step, a, *given), (tip, turned, turn, square) = _pose(setting)
+    numbers = ca.SX.sym("contacts", margins.contact_numbers)
+    joints = None if slides is None else _slid(setting, margins, slides)
+    values = margins.symbolic(tip, turned, turn, given[-1] + step[:3], numbers, joints)[list(kinds)]
+    if not setting.weights.are_even:
+        values = weighed(values, ca.DM(setting.weights.of(margins.limits)[list(kinds)]))
+    return [step, a, *given, numbers], values, square
+
+
+def _pose(setting: Setting) -> tuple[list[Any], tuple[Any, Any, Any, Any]]:
+    """Return the symbols step, a, pivot, nominal, pair, R, t of a waypoint; its tip, axis, turn, square of the lean."""
+    import casadi as ca  # noqa: PLC0415
+
+    step, a = ca.SX.sym("step", 6), ca.SX.sym("a", 2)
+    pivot, nominal = ca.SX.sym("pivot", 3), ca.SX.sym("nominal", 3)
+    pair, rotation, translation = ca.SX.sym("pair", 3, 2), ca.SX.sym("R", 3, 3), ca.SX.sym("t", 3)
+    b = ca.mtimes(pair, a)
+    across = b - ca.dot(b, nominal) * nominal
+    square = ca.dot(across, across)
+    turn = ca.mtimes(rotation, _cayley(step[3:]))
+    turned = ca.mtimes(turn, (nominal + across) / ca.sqrt(1.0 + square))
+    tip = ca.mtimes(turn, pivot) + translation + step[:3] - setting.task.pivot * turned
+    return [step, a, pivot, nominal, pair, rotation, translation], (tip, turned, turn, square)
+
+
+def leg_function(setting: Setting, margins: Margins, *, slopes: bool = False) -> Any:
+    """Return the casadi function of one waypoint: its leg lengths 5, metres, for the machine of the margins.
+
+    Of a, pivot, nominal, pair, R, t as in `point_function`. slopes: also return their derivatives by a, 5 × 2.
+    """
+    return _once(margins, ("legs", slopes), setting, lambda: _legs(setting, margins, slopes))
+
+
+def _legs(setting: Setting, margins: Margins, slopes: bool) -> Any:
+    import casadi as ca  # noqa: PLC0415
+
+    (step, a, *given), (tip, turned, _, _) = _pose(setting)
+    bases, offsets = margins.joints
+    reach = [margins.machine.tool_length - z for z in offsets]
+    legs = ca.vertcat(*[
+        ca.norm_2(tip + far * turned - ca.vertcat(x, y, 0.0)) for far, (x, y) in zip(reach, bases, strict=True)
+    ])  # fmt: skip
+    wanted = [legs, ca.jacobian(legs, a)] if slopes else [legs]
+    here = ca.substitute(wanted, [step], [ca.SX.zeros(6)])
+    return ca.Function("legs", [a, *given], [ca.densify(each) for each in here], {"cse": True})
+
+
+def _once(margins: Margins, name: tuple[Any, ...], setting: Setting, make: Callable[[], Any]) -> Any:
+    """Return what `make` returned for these margins, pivot and weights before, or returns now."""
+    made, key = _MADE.setdefault(margins, {}), (*name, setting.task.pivot, setting.weights)
+    if key not in made:
+        made[key] = make()
+    return made[key]
+
+
+def _slid(setting: Setting, margins: Margins, slides: Any) -> Joints:
+    """Return the joints with the guides moved on by slides; a platform joint moves with its guide's part along x."""
+    (bases, offsets), guides = margins.joints, setting.machine.guides
+    ways = np.zeros((5, 2)) if guides is None else guides.guides
+    moved = [[x + slides[k] * ways[k, 0], y + slides[k] * ways[k, 1]] for k, (x, y) in enumerate(bases)]
+    delta = setting.machine.pentapod.delta
+    return moved, [z + delta * slides[k] * ways[k, 0] for k, z in enumerate(offsets)]
+
+
+def curvature_function(setting: Setting, margins: Margins, *, guides: bool = False) -> Any:
+    """Return the casadi function of one waypoint: second derivatives, 8 × 8 by (step, a), of weights · margins.
+
+    Of the arguments of `point_function`, and the weights M, one for each margin. With the guides free: of the arguments
+    of `guide_function` and the weights, 13 × 13 by (step, slides, a).
+    """
+    return _once(margins, ("curvature", guides), setting, lambda: _curvature(setting, margins, guides))
+
+
+def _curvature(setting: Setting, margins: Margins, guides: bool) -> Any:
+    import casadi as ca  # noqa: PLC0415  heavy: only when planning
+
+    slides, weights = ca.SX.sym("slides", 5), ca.SX.sym("weights", len(margins.limits))
+    inputs, values, _ = _point(setting, margins, range(len(margins.limits)), slides if guides else None)
+    free = [slides] if guides else []
+    bent, _ = ca.hessian(ca.dot(weights, values), ca.vertcat(inputs[0], *free, inputs[1]))
+    return ca.Function("curvature", [*free, *inputs, weights], [ca.densify(bent)], {"cse": True})
+
+
+def room_function(freedom: Freedom) -> Any:
+    """Return the casadi function (step 6, R 3×3, t 3) → room L of the stepped placement, ∂ room / ∂ step, L × 6.
+
+    The room within the allowed placements must not become negative.
+    """
+    import casadi as ca  # noqa: PLC0415
+
+    step, rotation, translation = ca.SX.sym("step", 6), ca.SX.sym("R", 3, 3), ca.SX.sym("t", 3)
+    room = ca.vertcat(*freedom.room(ca.mtimes(rotation, _cayley(step[3:])), translation + step[:3]))
+    return ca.Function("room", [step, rotation, translation], [room, ca.densify(ca.jacobian(room, step))])
+
+
+def placement_room(freedom: Freedom, *, free: bool = True) -> Room:
+    """Return the function placement → its room (L,) and derivatives (L, 6) by a step; L = 0 where nothing bounds it."""
+    function = room_function(freedom) if free and freedom.is_bounded else None
+
+    def room(transform: RigidTransform) -> tuple[Floats, Floats]:
+        if function is None:
+            return np.zeros(0), np.zeros((0, 6))
+        found, slopes = function(np.zeros(6), transform.rotation, transform.translation)
+        return np.asarray(found).ravel(), np.asarray(slopes)
+
+    return room
+
+
+def lean_slopes(setting: Setting, margins: Margins, transform: RigidTransform, kinds: Sequence[int]) -> Slopes:
+    """Return the function (frames (n, 2, 3), leans in them (n, 2), waypoints (n,)) → margins' derivatives (n, K, 2)."""
+    point = Vectorised(point_function(setting, margins, kinds, by="lean"))
+    rotation, translation = transform.rotation.T.reshape(-1, 1), transform.translation[:, None]
+    task = setting.task
+
+    def slopes(frames: Floats, leans: Floats, rows: Ints) -> Floats:
+        touching = setting.contacts(margins, transform, np.einsum("nk,nkj->nj", leans, frames), rows)
+        _, _, found = point(
+            np.zeros((6, 1)),
+            leans.T,
+            task.pivots[rows].T,
+            task.nominal[rows].T,
+            frames.reshape(-1, 6).T,
+            rotation,
+            translation,
+            touching.T,
+        )
+        return found.reshape(2, len(kinds), len(rows)).transpose(2, 1, 0)
+
+    return slopes
+
+
+def step_slopes(setting: Setting, margins: Margins, *, guides: bool = False) -> StepSlopes:
+    """Return the function (margins, placement, coefficients, waypoints (n,)) → their derivatives (n, M, 8 or 13).
+
+    By the placement's step and the lean; with the guides free by step, slides and lean, for margins of the setting's
+    machine with its guides anywhere.
+    """
+    kinds, task = range(len(margins.limits)), setting.task
+
+    def made() -> Vectorised:
+        if guides:
+            return Vectorised(guide_function(setting, margins))
+        return Vectorised(point_function(setting, margins, kinds, by="step and lean"))
+
+    point = _once(margins, ("slopes", guides), setting, made)
+
+    def slopes(there: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints) -> Floats:
+        slid = [(there.machine.slides - margins.machine.slides)[:, None]] if guides else []
+        leans = (setting.basis[rows] @ coefficients).T if task.tilt > 0.0 else np.zeros((2, 1))
+        touching = setting.contacts(there, transform, setting.leans(coefficients, rows), rows)
+        found = point(
+            *slid,
+            np.zeros((6, 1)),
+            leans,
+            task.pivots[rows].T,
+            task.nominal[rows].T,
+            setting.domain.lean_plane.reshape(-1, 1),
+            transform.rotation.T.reshape(-1, 1),
+            transform.translation[:, None],
+            touching.T,
+        )[-1]
+        return found.reshape(-1, len(kinds), len(rows)).transpose(2, 1, 0)
+
+    return slopes
+
+
+def stepped(transform: RigidTransform, step: Floats) -> RigidTransform:
+    """Return the placement after a step (6,): translation in metres, Cayley vector of a rotation of the workpiece."""
+    return RigidTransform(transform.rotation @ cayley(step[3:]), transform.translation + step[:3])
+
+
+def cayley(r: Floats) -> Floats:
+    """Return the rotation of Cayley's vector r (3,): tan(angle / 2) times the unit axis."""
+    n = float(r @ r)
+    skew = np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
+    return ((1.0 - n) * np.eye(3) + 2.0 * skew + 2.0 * np.outer(r, r)) / (1.0 + n)
+
+
+def _cayley(r: Any) -> Any:
+    import casadi as ca  # noqa: PLC0415
+
+    n = ca.dot(r, r)
+    return ((1.0 - n) * ca.SX.eye(3) + 2.0 * ca.skew(r) + 2.0 * ca.mtimes(r, r.T)) / (1.0 + n)

@@ -1,0 +1,139 @@
+"""LinearModel: margins and leans around a candidate, to first order, by placement, slides of guides and tilt field."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.planning.limits.margins import Margins
+from pentapod.planning.problem.problem import Candidate, Setting
+
+REACH = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
+"""The unit of a placement step: metres, and tan(angle / 2)."""
+
+_NEAR = 0.4
+"""Margins within this much of the level enter the model."""
+_WORST_OF_KIND, _STEEPEST, _STEEP = 12, 60, 0.3
+_TANGENTS = np.radians([-36.0, -22.0, -12.0, -5.0, 0.0, 5.0, 12.0, 22.0, 36.0])
+
+Slopes = Callable[[Margins, RigidTransform, Floats, Ints], Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    """Unknowns x: along moves (p, q), in their units, and the change of coefficients (2·size), in units of the cone.
+
+    moves: columns of a placement step (p = 6), or of one and of the guides' slides (p = 11).
+    Margins ≈ values + matrix @ x, (R,), of the margins that come near the level, kinds (R,) at waypoints points (R,);
+    leans as shares of the cone ≈ steepness + steep_matrix @ x, several rows for each waypoint of steep; the room of the
+    placement (L,) ≈ room + room_matrix @ x.
+    """
+
+    setting: Setting
+    at: Candidate
+    moves: Floats
+    points: Ints
+    kinds: Ints
+    values: Floats
+    matrix: Floats
+    steep: Ints
+    steepness: Floats
+    steep_matrix: Floats
+    room: Floats
+    room_matrix: Floats
+
+    @classmethod
+    def of(
+        cls,
+        setting: Setting,
+        at: Candidate,
+        rows: Ints,
+        level: float,
+        extra: Ints,
+        slopes: Slopes,
+        room: tuple[Floats, Floats],
+        moves: Floats,
+    ) -> LinearModel:
+        """Return the model of what comes near `level` among waypoints `rows`, and of rows[extra] in any case.
+
+        room (L,) of the placement and the slides, with its derivatives (L, p). slopes: the margins' (n, M, p + 2) by
+        step, slides and lean.
+        """
+        length, count = moves.shape
+        values = setting.values(at.margins, at.transform, at.coefficients, rows)
+        chosen = np.union1d(valleys(values, _WORST_OF_KIND), extra)
+        chosen = chosen[values[chosen].min(axis=1) < level + _NEAR]
+        point, kinds = np.nonzero(values[chosen] < level + _NEAR)
+        few = rows[chosen]
+        slope = (
+            slopes(at.margins, at.transform, at.coefficients, few)[point, kinds]
+            if len(few)
+            else np.zeros((0, length + 2))
+        )
+        field = by_field(setting.basis[few][point], slope[:, length:]) * setting.cone
+        steep, share, steep_by_field = _cone_tangents(setting, at, rows, extra)
+        return cls(
+            setting,
+            at,
+            moves,
+            few[point],
+            kinds,
+            values[chosen][point, kinds],
+            np.hstack([slope[:, :length] @ moves, field]),
+            steep,
+            share,
+            np.hstack([np.zeros((len(share), count)), steep_by_field]),
+            room[0],
+            np.hstack([room[1] @ moves, np.zeros((len(room[0]), field.shape[1]))]),
+        )
+
+    def inequalities(self) -> tuple[Floats, Floats]:
+        """Return A and b of A (x, t) ≤ b: margins not below the smallest plus t, cone and room kept."""
+        rising = np.column_stack([-self.matrix, np.ones(len(self.matrix))])
+        kept = np.vstack([self.steep_matrix, -self.room_matrix])
+        kept = np.column_stack([kept, np.zeros(len(kept))])
+        spare = np.maximum(np.append(1.0 - self.steepness, self.room), 0.0)
+        return np.vstack([rising, kept]), np.concatenate([self.values - self.values.min(), spare])
+
+    def step_of(self, x: Floats) -> tuple[Floats, Floats]:
+        """Return the step (p,) of placement and slides, and the change of coefficients (size, 2), of unknowns x."""
+        count = self.moves.shape[1]
+        return self.moves @ x[:count], (x[count:] * self.setting.cone).reshape(-1, 2)
+
+
+def valleys(values: Floats, count: int = _WORST_OF_KIND) -> Ints:
+    """Return the waypoints where a margin of values (N, M) is smaller than beside it, the worst of each kind."""
+    edge = np.full((1, values.shape[1]), np.inf)
+    padded = np.concatenate([edge, values, edge])
+    valley = (values <= padded[:-2]) & (values < padded[2:])
+    depth = np.where(valley, values, np.inf)
+    worst = np.argpartition(depth, min(count, len(values) - 1), axis=0)[:count]
+    return np.unique(worst[np.take_along_axis(valley, worst, axis=0)])
+
+
+def _cone_tangents(setting: Setting, at: Candidate, rows: Ints, extra: Ints) -> tuple[Ints, Floats, Floats]:
+    """Return tangents of the cone at the steepest leans: waypoints, the share used in that direction, its derivatives.
+
+    Several tangents for each lean, since a lean on the edge may well turn along it.
+    """
+    steepness = setting.steepness(at.coefficients, rows)
+    steep = np.union1d(valleys(-steepness[:, None], _STEEPEST), extra)
+    steep = steep[steepness[steep] > _STEEP]
+    nominal, basis = setting.task.nominal[rows[steep]], setting.basis[rows[steep]]
+    outward = setting.leans(at.coefficients, rows[steep]) / (steepness[steep, None] * setting.cone)
+    aside = np.cross(nominal, outward)
+    shares, derivatives = [np.zeros(0)], [np.zeros((0, 2 * setting.basis.shape[1]))]
+    for turn in _TANGENTS:
+        direction = np.cos(turn) * outward + np.sin(turn) * aside
+        shares.append(np.cos(turn) * steepness[steep])
+        derivatives.append(by_field(basis, direction @ setting.domain.lean_plane.T))
+    return np.tile(rows[steep], len(_TANGENTS)), np.concatenate(shares), np.concatenate(derivatives)
+
+
+def by_field(basis: Floats, by_lean: Floats) -> Floats:
+    """Return derivatives by the coefficients, (R, 2·size), of basis (R, size) and derivatives by the lean (R, 2)."""
+    return (basis[:, :, None] * by_lean[:, None, :]).reshape(len(basis), 2 * basis.shape[1])

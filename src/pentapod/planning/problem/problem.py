@@ -1,0 +1,109 @@
+"""Setting: the task, the machine and the tilt field that all solvers work on; Candidate: what they improve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.machine.machine import Machine
+from pentapod.planning.limits.margins import Margins
+from pentapod.planning.problem.constraints import FREE, Freedom
+from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.tilt_field import FieldDomain, lean
+from pentapod.planning.problem.weights import EVEN, Weights, weighed
+
+CONE_SHARE = 0.98
+"""Share of the tilt cone used by the optimisers; the rest absorbs what happens between waypoints."""
+
+_CELLS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A placement in a component (the margins') with a tilt field's coefficients, and its smallest margin, weighed."""
+
+    margins: Margins
+    transform: RigidTransform
+    coefficients: Floats
+    smallest: float
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """Everything about one planning task that does not change while solvers work on it.
+
+    basis (N, size): the tilt field's spline basis at the waypoints; without a tilt cone it has size 0.
+    """
+
+    task: Task
+    machine: Machine
+    domain: FieldDomain
+    basis: Floats
+    freedom: Freedom
+    weights: Weights
+
+    @classmethod
+    def of(cls, task: Task, machine: Machine, freedom: Freedom = FREE, weights: Weights = EVEN) -> Setting:
+        """Return the setting of a task on a machine, with the allowed placements and the weights of the margins."""
+        domain = FieldDomain.around(task.pivots, task.nominal, _CELLS)
+        basis = domain.basis(task.pivots) if task.tilt > 0.0 else np.zeros((len(task.pivots), 0))
+        return cls(task, machine, domain, basis, freedom, weights)
+
+    @property
+    def cone(self) -> float:
+        """The longest lean (tangent of the angle) that the optimisers use."""
+        return float(np.tan(self.task.tilt) * CONE_SHARE)
+
+    @property
+    def upright(self) -> Floats:
+        """The coefficients (size, 2) of the nominal axes."""
+        return np.zeros((self.basis.shape[1], 2))
+
+    def leans(self, coefficients: Floats, rows: Ints | slice = slice(None)) -> Floats:
+        """Return the leans (n, 3) across the nominal axes, workpiece frame, at waypoints `rows`."""
+        b = self.basis[rows] @ coefficients @ self.domain.lean_plane
+        nominal = self.task.nominal[rows]
+        return np.asarray(b - (b * nominal).sum(axis=1, keepdims=True) * nominal, dtype=np.float64)
+
+    def axes(self, coefficients: Floats, rows: Ints | slice = slice(None)) -> Floats:
+        """Return the tool axes (n, 3), workpiece frame, at waypoints `rows`."""
+        return lean(self.task.nominal[rows], self.leans(coefficients, rows))
+
+    def values(
+        self, margins: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints | slice = slice(None)
+    ) -> Floats:
+        """Return the margins (n, M), weighed, of the tilt field with these coefficients at waypoints `rows`."""
+        return self.values_of(margins, transform, self.leans(coefficients, rows), rows)
+
+    def values_of(
+        self, margins: Margins, transform: RigidTransform, leans: Floats, rows: Ints | slice = slice(None)
+    ) -> Floats:
+        """Return the margins (n, M), weighed, for leans (n, 3), workpiece frame, at waypoints `rows`."""
+        axes = lean(self.task.nominal[rows], leans)
+        plain = margins(*self.task.machine_poses(transform, axes, rows), transform)
+        return plain if self.weights.are_even else weighed(plain, self.weights.of(margins.limits))
+
+    def contacts(self, margins: Margins, transform: RigidTransform, leans: Floats, rows: Ints) -> Floats:
+        """Return the contacts (n, margins.contact_numbers) for leans (n, 3), workpiece frame, at waypoints `rows`.
+
+        What of a lean lies along the nominal axis does not count.
+        """
+        nominal = self.task.nominal[rows]
+        across = leans - (leans * nominal).sum(axis=1, keepdims=True) * nominal
+        return margins.contacts(*self.task.machine_poses(transform, lean(nominal, across), rows), transform)
+
+    def steepness(self, coefficients: Floats, rows: Ints | slice = slice(None)) -> Floats:
+        """Return the share of the cone (n,) that each lean uses: 1 on its edge."""
+        return np.linalg.norm(self.leans(coefficients, rows), axis=1) / max(self.cone, 1e-12)
+
+    def within_cone(self, coefficients: Floats) -> Floats:
+        """Return coefficients scaled down until every waypoint keeps the cone; a lean is linear in them."""
+        return coefficients / max(1.0, float(self.steepness(coefficients).max(initial=0.0)))
+
+    def candidate(self, margins: Margins, transform: RigidTransform, coefficients: Floats) -> Candidate:
+        """Return the candidate with its smallest margin over all waypoints."""
+        smallest = float(self.values(margins, transform, coefficients).min())
+        return Candidate(margins, transform, coefficients, smallest)

@@ -1,0 +1,63 @@
+"""Task: what the planner needs of a toolpath, as arrays; and the few points that represent it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints, frozen, set_frozen
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.toolpath.toolpath import Toolpath
+
+AXIS_LEVER_M = 0.1
+"""How much tip movement one radian of axis counts for when representatives are chosen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Pivots and nominal axes (N, 3), workpiece frame; pivot: metres from tip to pivot; tilt: radians of the cone."""
+
+    pivots: Floats
+    nominal: Floats
+    pivot: float
+    tilt: float
+
+    def __post_init__(self) -> None:
+        set_frozen(
+            self,
+            pivots=frozen(self.pivots, "pivots", (None, 3)),
+            nominal=frozen(self.nominal, "nominal", (None, 3)),
+        )
+
+    @classmethod
+    def of(cls, toolpath: Toolpath, tilt: float) -> Task:
+        """Return the task that a toolpath and a tilt cone (half angle, radians) pose."""
+        return cls(toolpath.pivots, toolpath.axes, toolpath.pivot, tilt)
+
+    def at(self, rows: Ints) -> Task:
+        """Return the task of the waypoints `rows` only."""
+        return Task(self.pivots[rows], self.nominal[rows], self.pivot, self.tilt)
+
+    def machine_poses(
+        self, placement: RigidTransform, axes: Floats, rows: Ints | slice = slice(None)
+    ) -> tuple[Floats, Floats]:
+        """Return tips and axes (..., 3) in the machine frame for axes of the workpiece frame at waypoints `rows`."""
+        turned = placement.rotate(axes)
+        return placement.apply(self.pivots[rows]) - self.pivot * turned, turned
+
+    def representatives(self, count: int) -> Ints:
+        """Return indices of `count` waypoints spread evenly over places and axes (farthest-point sampling)."""
+        features = np.hstack([self.pivots, AXIS_LEVER_M * self.nominal])
+        if len(features) > 20_000:  # a stride first: the choice costs count × N
+            stride = np.linspace(0, len(features) - 1, 20_000).astype(np.intp)
+        else:
+            stride = np.arange(len(features))
+        features = features[stride]
+        count = min(count, len(features))
+        first = int(np.square(features - features.mean(axis=0)).sum(axis=1).argmax())
+        chosen, nearest = [first], np.square(features - features[first]).sum(axis=1)
+        while len(chosen) < count:
+            chosen.append(int(nearest.argmax()))
+            nearest = np.minimum(nearest, np.square(features - features[chosen[-1]]).sum(axis=1))
+        return stride[np.array(chosen, dtype=np.intp)]

@@ -1,0 +1,91 @@
+"""TiltField: how the tool axis leans away from its nominal direction, as a smooth field over the part.
+
+The lean is a vector b(x) in the plane across the mean axis that varies with the place x like a bicubic spline; the
+tool axis is the nominal one plus the part of b perpendicular to it. Neighbouring passes therefore lean alike, and
+the axis along the path is as smooth as the nominal axis is: no jumps, no marks on the surface. The number
+of unknowns depends on the field's mesh, not on the number of waypoints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.geometry.directions import tangent_frame
+
+DEGREE = 3
+
+
+@dataclass(frozen=True, eq=False)
+class FieldDomain:
+    """The rectangle over which a tilt field is spread: the two widest directions of the pivots.
+
+    origin (3,), directions (2, 3) unit rows, lengths (2,) in metres, workpiece frame; cells: spline cells a side.
+    lean_plane (2, 3): unit rows, the plane in which the lean lies.
+    """
+
+    origin: Floats
+    directions: Floats
+    lengths: Floats
+    cells: int
+    lean_plane: Floats
+
+    @classmethod
+    def around(cls, pivots: Floats, nominal: Floats, cells: int) -> FieldDomain:
+        """Return the domain that covers pivots (N, 3) with nominal axes (N, 3)."""
+        centred = pivots - pivots.mean(axis=0)
+        # Directions of largest spread; the sign is fixed so that the same part gives the same field.
+        _, _, rows = np.linalg.svd(centred.T @ centred)
+        directions = rows[:2] * np.where(rows[:2][range(2), np.abs(rows[:2]).argmax(axis=1)] < 0.0, -1.0, 1.0)[:, None]
+        along = pivots @ directions.T
+        low, high = along.min(axis=0), along.max(axis=0)
+        origin = pivots.mean(axis=0)
+        origin = origin + (low - origin @ directions.T) @ directions
+        mean = nominal.mean(axis=0)
+        length = float(np.linalg.norm(mean))
+        plane = np.stack(tangent_frame(mean / length if length > 1e-6 else np.array([0.0, 0.0, 1.0])))
+        return cls(origin, directions, np.maximum(high - low, 1e-6), cells, plane)
+
+    @property
+    def size(self) -> int:
+        """Number of spline coefficients."""
+        return (self.cells + DEGREE) ** 2
+
+    def basis(self, pivots: Floats) -> Floats:
+        """Return the spline basis (N, size) at pivots (N, 3)."""
+        along = np.clip((pivots - self.origin) @ self.directions.T / self.lengths, 0.0, 1.0)
+        knots = np.concatenate([np.zeros(DEGREE), np.linspace(0.0, 1.0, self.cells + 1), np.ones(DEGREE)])
+        first, second = (BSpline.design_matrix(x, knots, DEGREE).toarray() for x in along.T)
+        return (first[:, :, None] * second[:, None, :]).reshape(len(along), self.size)
+
+    def roughness(self) -> Floats:
+        """Return the matrix (R, size) that takes coefficients to their second differences in both directions."""
+        n = self.cells + DEGREE
+        second = np.diff(np.eye(n), 2, axis=0)
+        along_both = [np.kron(second, np.eye(n)), np.kron(np.eye(n), second)]
+        return np.concatenate(along_both, dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class TiltField:
+    """A domain with its coefficients (size, 2): the lean b within the domain's lean plane."""
+
+    domain: FieldDomain
+    coefficients: Floats
+
+    def __post_init__(self) -> None:
+        set_frozen(self, coefficients=frozen(self.coefficients, "coefficients", (self.domain.size, 2)))
+
+    def axes(self, pivots: Floats, nominal: Floats) -> Floats:
+        """Return tool axes (N, 3), unit, workpiece frame, of pivots and nominal axes (N, 3)."""
+        return lean(nominal, self.domain.basis(pivots) @ self.coefficients @ self.domain.lean_plane)
+
+
+def lean(nominal: Floats, b: Floats) -> Floats:
+    """Return unit nominal axes (..., 3) tilted by b (..., 3): normalised n + b − (b·n) n."""
+    across: Floats = b - (b * nominal).sum(axis=-1, keepdims=True) * nominal
+    length = np.sqrt(1.0 + np.square(across).sum(axis=-1, keepdims=True))
+    return (nominal + across) / length

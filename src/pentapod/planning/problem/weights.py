@@ -1,0 +1,53 @@
+"""Weights: how much room beside its limits each group of margins is to have, against the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import ArrayError
+from pentapod.planning.limits.margins import Limit
+
+NEEDED_MARGIN = 0.02
+"""A plan is accepted from this smallest margin on: what rounding corners between waypoints may cost."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Positive weights of leg strokes, singular surfaces, joint cones and gaps between bodies.
+
+    The room that a margin leaves beyond what is needed is divided by its weight: with strokes = 2 and all else 1 the
+    largest smallest margin leaves the strokes twice the room of the others. What fits, fits with any weights.
+    Raises ArrayError for a weight that is not positive.
+    """
+
+    strokes: float = 1.0
+    singularities: float = 1.0
+    joints: float = 1.0
+    bodies: float = 1.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if not 0.0 < getattr(self, field.name) < np.inf:
+                raise ArrayError("a weight must be positive", key=field.name, value=getattr(self, field.name))
+
+    @property
+    def are_even(self) -> bool:
+        """Whether all weights are 1."""
+        return self == EVEN
+
+    def of(self, limits: Sequence[Limit]) -> Floats:
+        """Return the weight (M,) of each limit."""
+        return np.array([getattr(self, limit.group) for limit in limits], dtype=np.float64)
+
+
+EVEN = Weights()
+
+
+def weighed(values: Any, weights: Any) -> Any:
+    """Return margins with the room beyond what is needed divided by weights; NumPy arrays or casadi columns."""
+    return NEEDED_MARGIN + (values - NEEDED_MARGIN) / weights

@@ -1,0 +1,1 @@
+"""The tool axis along the path: its spline, what it costs, and how it is smoothed."""

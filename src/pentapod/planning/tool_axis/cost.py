@@ -1,0 +1,188 @@
+"""AxisCost: what a calm course of the axes costs at a placement; beyond the nominal axes' own swing it costs much more.
+
+The calmest axes alone would be fixed ones. But a nominal axis that turns may carry the platform just the way that the
+legs like, and there a fixed axis asks more of them. So where the axis turns faster, or a leg accelerates more along the
+path, than the nominal axes would have it, the excess is charged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.numerics.casadi_vectorised import Vectorised
+from pentapod.numerics.convex.interior_point import SoftRows
+from pentapod.numerics.divided_differences import as_matrix, differences, divided_differences
+from pentapod.planning.problem.formulation import leg_function
+from pentapod.planning.problem.problem import Candidate, Setting
+from pentapod.planning.tool_axis.spline import BANDS, FORESIGHT_M, AxisCourse
+
+EXCESS_WEIGHT = 1e4
+"""Of the mean square of an excess, as a share of what the nominal axes have there, beside the cost of their rates."""
+_FREE_OF_MIDDLE, _UNIT_OF_MIDDLE = 0.01, 0.5
+"""Of the median that nominal axes have: free beside what they have at a node, and in the unit of excess beside it."""
+_LEAST_RATE, _LEAST_BEND = 0.1, 1e-9
+"""Of an axis, rad/m, and of a leg, 1/m: nominal axes that turn less are as good as fixed."""
+_ANGLES = np.arange(12) * np.pi / 6.0
+_DIRECTIONS = np.array([np.cos(_ANGLES), np.sin(_ANGLES)])
+"""In which rates are looked at, columns: one that exceeds what is free in none of them does so by 3.5 % at most."""
+_NEAR = 0.7
+"""Of what is free: rates and accelerations below it do not enter a program."""
+
+
+_Rows = tuple[Floats, Ints, Floats, Floats]
+"""Windows, starts, upper and weight of soft rows."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Charge:
+    """What a quantity costs at the nodes where it exceeds what is free there; all (n,).
+
+    unit: what an excess is measured by; price: of the square of the excess so measured.
+    """
+
+    free: Floats
+    unit: Floats
+    price: Floats
+
+    @classmethod
+    def beyond(cls, nominal: Floats, least: float, price: Floats) -> _Charge:
+        """Return the charge of exceeding what the nominal axes have; least: less than this is as good as nothing."""
+        middle = max(float(np.median(nominal)) if len(nominal) else 0.0, least)
+        return cls(nominal + _FREE_OF_MIDDLE * middle, nominal + _UNIT_OF_MIDDLE * middle, price)
+
+    def of(self, values: Floats) -> float:
+        """Return the charge of values (n, m)."""
+        excess = np.maximum(values - self.free[:, None], 0.0) / self.unit[:, None]
+        return float(self.price @ np.square(excess).sum(axis=1))
+
+    def symbolic(self, values: Any) -> tuple[Any, Any, Any]:
+        """Return the charge of casadi's values (m, n) by excesses, these as unknowns, and the room left, columns."""
+        import casadi as ca  # noqa: PLC0415  heavy: only for the reference
+
+        free, unit, price = (np.tile(each, (values.shape[0], 1)) for each in (self.free, self.unit, self.price))
+        excess = ca.MX.sym("excess", *values.shape)
+        return ca.dot(price, excess**2), ca.vec(excess), ca.vec(excess - (values - free) / unit)
+
+    def near(self, each: list[Floats]) -> tuple[Ints, Ints]:
+        """Return the nodes and columns at which one of several values (n, m) comes near what is free."""
+        node, column = np.nonzero(np.any([values > _NEAR * self.free[:, None] for values in each], axis=0))
+        return node, column
+
+
+class AxisCost:
+    """The cost of coefficients (K, 2) of a course of the axes, at the placement of a candidate.
+
+    The course's own, and EXCESS_WEIGHT times the excesses. Rates are of nominal plus lean, not normalised, by the way
+    of the course; bends are the second derivatives of the leg lengths by it.
+    """
+
+    def __init__(self, setting: Setting, course: AxisCourse, at: Candidate) -> None:
+        self.course, task = course, setting.task
+        nodes, way = self.course.nodes, self.course.way
+        self.basis = self.course.basis[nodes]
+        self.weights, self.first = self.basis.data.reshape(-1, 4), self.basis.indices[::4].astype(np.intp)
+        self.frames = self.course.frames[nodes]
+        self.given = (
+            task.pivots[nodes].T,
+            task.nominal[nodes].T,
+            self.frames.reshape(-1, 6).T,
+            at.transform.rotation.T.reshape(-1, 1),
+            at.transform.translation[:, None],
+        )
+        self.lengths = leg_function(setting, at.margins)
+        self.legs = Vectorised(leg_function(setting, at.margins, slopes=True))
+        (self.rate, rate_shares), (self.bend, bend_shares) = divided_differences(way, 1), divided_differences(way, 2)
+        turning = differences(self.rate, task.nominal[nodes])
+        self.nominal_rates = np.einsum("nk,nak->na", turning, self.frames[: len(turning)])
+        rates = np.linalg.norm(turning, axis=1)
+        bends = np.abs(self.bends(np.zeros((self.basis.shape[1], 2)))).max(axis=1)
+        price = EXCESS_WEIGHT * FORESIGHT_M**2 * (float(rate_shares @ rates**2) + _LEAST_RATE**2)
+        self.fast = _Charge.beyond(rates, _LEAST_RATE, price * rate_shares)
+        self.hard = _Charge.beyond(bends, _LEAST_BEND, price * bend_shares)
+
+    def of(self, c: Floats) -> float:
+        """Return the cost of coefficients c (K, 2)."""
+        charge = self.fast.of(self.rates(c) @ _DIRECTIONS) + self.hard.of(np.abs(self.bends(c)))
+        return self.course.cost_of(c) + charge
+
+    def symbolic(self, c: Any) -> tuple[Any, Any, Any]:
+        """Return the same for casadi's MX c (2, K), of c transposed: the cost, excesses as unknowns, room for them.
+
+        The cost is that of `of` where each excess (MX, a column) is the least that leaves no room (MX, a column)
+        negative, and is not negative itself.
+        """
+        import casadi as ca  # noqa: PLC0415  heavy: only for the reference
+
+        leans = self.course.cone * ca.mtimes(c, ca.DM(self.basis.T))
+        pivots, nominal, _, rotation, translation = self.given
+        legs = self.lengths.map(len(self.frames))(
+            leans, pivots, nominal, self.frames.transpose(2, 0, 1).reshape(3, -1), rotation.reshape(3, 3).T, translation
+        )
+        rates = self.nominal_rates.T + ca.mtimes(leans, ca.DM(as_matrix(self.rate, len(self.frames)).T))
+        bends = ca.mtimes(legs, ca.DM(as_matrix(self.bend, len(self.frames)).T))
+        x = ca.vec(c)
+        own = 0.5 * ca.bilin(ca.DM(self.course.whole_hessian()), x, x) + ca.dot(ca.DM(self.course.gradient), x)
+        fast, too_fast, room = self.fast.symbolic(ca.mtimes(_DIRECTIONS.T, rates))
+        hard, too_hard, more = self.hard.symbolic(ca.vertcat(bends, -bends))
+        return own + self.course.constant + fast + hard, ca.vertcat(too_fast, too_hard), ca.vertcat(room, more)
+
+    def rates(self, c: Floats) -> Floats:
+        """Return the axes' rates (n − 1, 2), rad/m, in the carried pairs."""
+        return self.nominal_rates + self.course.cone * differences(self.rate, self.basis @ c)
+
+    def bends(self, c: Floats) -> Floats:
+        """Return the leg lengths' second derivatives (n − 2, 5) by the way, 1/m."""
+        return differences(self.bend, self._legs(c)[0])
+
+    def excess(self, c: Floats, *others: Floats) -> SoftRows:
+        """Return what is charged for, around coefficients c (K, 2) to first order, in so far as it comes near there.
+
+        others: coefficients at which it is looked at, too, whether it comes near.
+        """
+        legs, slopes = self._legs(c)
+        rates, bends = self.rates(c) @ _DIRECTIONS, _both_ways(differences(self.bend, legs))
+        near, column = self.fast.near([rates, *(self.rates(x) @ _DIRECTIONS for x in others)])
+        parts = [(near + k, self.rate[near, k, None] * _DIRECTIONS.T[column]) for k in range(2)]
+        fast = self._rows(c, self.fast, near, rates[near, column], parts)
+        near, column = self.hard.near([bends, *(_both_ways(self.bends(x)) for x in others)])
+        towards = _both_ways(slopes)
+        parts = [(near + k, self.bend[near, k, None] * towards[near + k, column]) for k in range(3)]
+        hard = self._rows(c, self.hard, near, bends[near, column], parts)
+        return SoftRows(
+            np.concatenate([fast[0], hard[0]]),
+            np.concatenate([fast[1], hard[1]]),
+            np.concatenate([fast[2], hard[2]]),
+            np.concatenate([fast[3], hard[3]]),
+        )
+
+    def _rows(self, c: Floats, charge: _Charge, near: Ints, values: Floats, parts: list[tuple[Ints, Floats]]) -> _Rows:
+        """Return the rows that keep values (R,) at nodes near (R,): sums over nodes of slopes times leans; around c.
+
+        parts: of nodes (R,) and slopes (R, 2), the first node of each row first.
+        """
+        start, each = self.first[parts[0][0]], np.arange(len(near))
+        windows = np.zeros((len(near), BANDS + 2))  # the last two stay zero, see BANDS
+        for nodes, slopes in parts:
+            for k, a in product(range(4), range(2)):
+                reach = self.course.cone * self.weights[nodes, k] / charge.unit[near]
+                windows[each, 2 * (self.first[nodes] - start + k) + a] += reach * slopes[:, a]
+        windows = np.ascontiguousarray(windows[:, :BANDS])
+        x = np.append(c.ravel(), np.zeros(BANDS))
+        here = (windows * x[2 * start[:, None] + np.arange(BANDS)]).sum(axis=1)
+        room = (charge.free[near] - values) / charge.unit[near]
+        return windows, 2 * start, room + here, charge.price[near]
+
+    def _legs(self, c: Floats) -> tuple[Floats, Floats]:
+        """Return leg lengths (n, 5) at the nodes and their derivatives (n, 5, 2) by the lean."""
+        legs, slopes = self.legs(self.course.cone * (self.basis @ c).T, *self.given)
+        return legs.T, slopes.reshape(2, 5, -1).transpose(2, 1, 0)
+
+
+def _both_ways(values: Floats) -> Floats:
+    """Return values (n, 5, ...) of the legs, and those of the opposite sign after them."""
+    return np.concatenate([values, -values], axis=1)

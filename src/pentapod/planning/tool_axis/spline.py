@@ -1,0 +1,183 @@
+"""AxisCourse: the lean of the tool along a path as one spline, and the cost that a calm course makes small.
+
+The lean is a vector across the nominal axis, told in a pair of directions that is carried along the path; its two
+numbers are a cubic spline over the way of the pivot, with knots at waypoints. The spline stays within the
+convex hull of its coefficients, so a course whose coefficients keep the cone keeps it everywhere, and turns nowhere
+faster than they do.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.interpolate import BSpline
+from scipy.linalg import solveh_banded
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.geometry.transport import carried_frames
+from pentapod.numerics.banded import banded, banded_product
+from pentapod.numerics.divided_differences import as_matrix, divided_differences
+from pentapod.planning.problem.samples import Task
+
+KNOT_SPACING_M = 2e-3
+"""Shortest way between knots; shorter on small parts. Where waypoints are farther apart there is a knot at each."""
+LEVER_M = 10e-3
+"""How much way one radian of the nominal axis counts for, so that a turn on the spot has knots too."""
+FORESIGHT_M = 20e-3
+"""Over what way the axis turns ahead of a corner: rates count with this length, second derivatives with its square."""
+UPRIGHT_WEIGHT = 1e-2
+"""Of the lean itself beside its rates: a lean that serves nothing fades."""
+
+_DEGREE = 3
+_NODES = 2  # at most, a knot interval
+_INTERVALS_PER_EXTENT = 50
+_NOWHERE_M = 1e-9  # as good as standing still
+_LEAST_CURVATURE = 1e-10  # of coefficients that the cost does not see
+BANDS = 10
+"""Diagonals of the cost, main one and below: a second difference reaches over five coefficients of two numbers."""
+
+
+@dataclass(frozen=True, eq=False)
+class AxisCourse:
+    """Leans along a task's path: those at its waypoints are cone · basis @ c, for coefficients c in the unit disc.
+
+    c (K, 2); basis (N, K) sparse, four neighbours a row; frames (N, 2, 3): the pair at each waypoint, workpiece frame.
+    nodes (n,): waypoints that stand for all, as many as the spline can tell apart; there the cost takes derivatives.
+    way (n,): how far along they are, metres.
+    The cost of c is cᵀHc/2 + gᵀc + constant, hessian (BANDS, 2K) in SciPy's lower banded form, in the order of
+    c.ravel().
+    """
+
+    cone: float
+    basis: Any
+    frames: Floats
+    nodes: Ints
+    way: Floats
+    hessian: Floats
+    gradient: Floats
+    constant: float
+
+    @classmethod
+    def of(cls, task: Task, cone: float) -> AxisCourse:
+        """Return the course of a task. cone: the longest lean (tangent of the angle)."""
+        way = _way(task)
+        extent = float(np.linalg.norm(np.ptp(task.pivots, axis=0)))
+        spacing = min(KNOT_SPACING_M, max(extent, LEVER_M) / _INTERVALS_PER_EXTENT)
+        # Between waypoints the tool moves straight on, so derivatives are differences of waypoints. Two nodes for
+        # each knot where there are as many: at the knots alone the cost hardly sees coefficients that alternate.
+        nodes = _apart(way, spacing / _NODES)
+        basis = sparse.csr_matrix(BSpline.design_matrix(way, _knots(way[nodes], spacing), _DEGREE))
+        frames = carried_frames(task.nominal)
+        cost = _cost(task.nominal[nodes], cone * frames[nodes], basis[nodes], way[nodes])
+        return cls(cone, basis, frames, nodes, way[nodes], *cost)
+
+    def leans(self, c: Floats, rows: Ints | slice = slice(None)) -> Floats:
+        """Return the leans (n, 3) at waypoints `rows`, across the nominal axes, workpiece frame."""
+        along: Floats = self.cone * (self.basis[rows] @ c)
+        return np.einsum("na,nak->nk", along, self.frames[rows])
+
+    def cost_of(self, c: Floats) -> float:
+        """Return the cost of coefficients c (K, 2): mean squares of second derivative, rate and lean, in rad²."""
+        x = c.ravel()
+        return float(0.5 * x @ banded_product(self.hessian, x) + self.gradient @ x + self.constant)
+
+    def whole_hessian(self) -> Any:
+        """Return the Hessian as a sparse matrix (2K, 2K)."""
+        size = self.hessian.shape[1]
+        lower = sparse.spdiags(self.hessian, -np.arange(BANDS), size, size)
+        return sparse.csc_matrix(lower + sparse.tril(lower, -1).T)
+
+    def fitted(self, leans: Floats) -> Floats:
+        """Return the coefficients (K, 2) within the cone that come near leans (N, 3), smooth between the waypoints."""
+        wanted = np.einsum("nk,nak->na", leans, self.frames) / self.cone
+        size = self.hessian.shape[1] // 2
+        rate, bend = _differences(size, 1), _differences(size, 2)
+        normal = self.basis.T @ self.basis + 1e-6 * (bend.T @ bend) + 1e-9 * (rate.T @ rate) + 1e-12 * sparse.eye(size)
+        c = solveh_banded(banded(normal, _DEGREE + 1), self.basis.T @ wanted, lower=True)
+        return within_discs(np.asarray(c, dtype=np.float64))
+
+
+def within_discs(c: Floats) -> Floats:
+    """Return coefficients (K, 2) with those outside the unit disc brought to its edge."""
+    return c / np.maximum(1.0, np.linalg.norm(c, axis=1, keepdims=True))
+
+
+def _way(task: Task) -> Floats:
+    """Return the way (N,) in metres to each waypoint: of the pivot, and of the axis by its lever."""
+    moved = np.linalg.norm(np.diff(task.pivots, axis=0), axis=1)
+    turned = np.linalg.norm(np.diff(task.nominal, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(moved + LEVER_M * turned)])
+
+
+def _apart(way: Floats, spacing: float) -> Ints:
+    """Return indices into an ascending way (N,) that are at least about `spacing` apart, both ends among them.
+
+    Only the first where the way is of no length.
+    """
+    places, found = way.tolist(), [0]
+    while (following := bisect_left(places, places[found[-1]] + spacing, found[-1] + 1)) < len(places):
+        found.append(following)
+    if places[-1] - places[found[-1]] > _NOWHERE_M:
+        if len(found) > 1 and places[-1] - places[found[-1]] < 0.5 * spacing:
+            found.pop()
+        found.append(len(places) - 1)
+    return np.array(found, dtype=np.intp)
+
+
+def _knots(way: Floats, spacing: float) -> Floats:
+    """Return the knots: some of the nodes' ways (n,), and three more beyond each end."""
+    inner = way[_apart(way, spacing)]
+    if inner[-1] <= inner[0]:  # the whole path is one place
+        inner = inner[0] + spacing * np.arange(2.0)
+    beyond = np.arange(1.0, _DEGREE + 1.0)
+    return np.concatenate([
+        inner[0] - (inner[1] - inner[0]) * beyond[::-1], inner, inner[-1] + (inner[-1] - inner[-2]) * beyond
+    ])  # fmt: skip
+
+
+def _cost(nominal: Floats, frames: Floats, at_nodes: Any, way: Floats) -> tuple[Floats, Floats, float]:
+    """Return Hessian, gradient and constant of the mean square of the axes' derivatives and leans over the nodes.
+
+    nominal (n, 3); frames (n, 2, 3), the pairs times the cone; at_nodes (n, K): the basis there; way (n,).
+    """
+    lean, axes = _axes_by_lean(frames, at_nodes), nominal.ravel()
+    size = lean.shape[1]
+    hessian: Any = _LEAST_CURVATURE * sparse.identity(size, format="csr")
+    gradient, constant = np.zeros(size), 0.0
+    for order, weight in ((2, FORESIGHT_M**4), (1, FORESIGHT_M**2), (0, UPRIGHT_WEIGHT)):
+        factors, shares = divided_differences(way, order)
+        derivative = sparse.kron(as_matrix(factors, len(way)), sparse.identity(3), format="csr")
+        weighed = sparse.diags(2.0 * weight * np.repeat(shares, 3))
+        by_lean = sparse.csr_matrix(derivative @ lean)
+        fixed = derivative @ axes if order > 0 else np.zeros(len(axes))
+        hessian = hessian + by_lean.T @ weighed @ by_lean
+        gradient = gradient + by_lean.T @ (weighed @ fixed)
+        constant += 0.5 * float(fixed @ (weighed @ fixed))
+    return banded(hessian, BANDS), gradient, constant
+
+
+def _axes_by_lean(frames: Floats, at_nodes: Any) -> Any:
+    """Return the sparse matrix (3n, 2K) from coefficients to axes at the nodes: nominal plus lean, not normalised.
+
+    frames (n, 2, 3), the pairs times the cone; at_nodes (n, K): the basis. That it is linear makes the cost a
+    quadratic.
+    """
+    count = len(frames)
+    pair = sparse.kron(at_nodes, sparse.identity(2), format="csr")  # (2n, 2K): the lean's two numbers at each node
+    node = np.arange(count)
+    rows = np.broadcast_to((3 * node[:, None] + np.arange(3))[:, None, :], frames.shape)
+    columns = np.broadcast_to((2 * node[:, None] + np.arange(2))[:, :, None], frames.shape)
+    spread = sparse.csr_matrix((frames.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * count, 2 * count))
+    return sparse.csr_matrix(spread @ pair)
+
+
+def _differences(count: int, order: int) -> Any:
+    """Return the sparse matrix (count − order, count) that takes values to their differences of this order."""
+    difference: Any = sparse.identity(count, format="csr")
+    for _ in range(order):
+        difference = difference[1:] - difference[:-1]
+    return difference

@@ -1,0 +1,1 @@
+"""Jerk limits: the fastest law whose leg jerks hold."""

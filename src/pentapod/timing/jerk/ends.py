@@ -1,0 +1,110 @@
+"""How the spline of a law limited in jerk begins and ends: out of a rest, at a given speed, or as it likes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.timing.jerk.rows import JerkRows
+
+_JOIN = 0.01
+"""Where the spline begins, as a share of the length over which the first ramp would reach another limit."""
+
+_END_JERK = 0.98
+
+_GENTLER = 0.25
+
+
+class End(Protocol):
+    """One end of a spline x(s). join: the distance in metres from the path's end at which the spline begins."""
+
+    @property
+    def join(self) -> float: ...  # noqa: D102 (described above)
+    def gentler(self) -> End:
+        """Return the end out of which a ramp leads with less jerk."""
+        ...
+
+    def bound(self, distance: Floats) -> Floats:
+        """Return what x (n,) may be at most at distances (n,) from the path's end, by what leads to the spline."""
+        ...
+
+    def coefficients(self, step: float) -> tuple[float, ...]:
+        """Return the outermost coefficients that are given, from the end inwards; step: between the first two knots."""
+        ...
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """Out of a rest with constant jerk: x = c d^(4/3) at the distance d, the spline from the distance `join` on."""
+
+    c: float
+    join: float
+
+    @classmethod
+    def of(cls, rows: JerkRows, s: Floats, reach: float) -> Ramp:
+        """Return the ramp at the rest s[0] of rows at s, at most `reach` long."""
+        jerk = _END_JERK / float(np.abs(2.0 * rows.jerks[0, :, 2]).max())
+        push = 1.0 / max(float(np.abs(rows.first[0]).max()), 1e-300)
+        c = 6.0 ** (4.0 / 3.0) / 4.0 * jerk ** (2.0 / 3.0)
+        # Where the acceleration or the speed that the ramp reaches would be a limit's.
+        length = min(push**3 / (6.0 * jerk**2), reach)
+        within = max(int(np.searchsorted(np.abs(s - s[0]), length)), 1)
+        length = min(length, (0.5 * float(rows.ceiling[:within].min()) / c) ** 0.75)
+        return cls(c, _JOIN * length)
+
+    def gentler(self) -> Ramp:
+        """Return a slower ramp: on a path that bends hard right after the rest the spline must be able to go on."""
+        return Ramp(self.c * _GENTLER, self.join)
+
+    def bound(self, distance: Floats) -> Floats:
+        """Return the ramp's own x (n,), as it would go on."""
+        return self.c * np.maximum(distance, self.join) ** (4.0 / 3.0)
+
+    def coefficients(self, step: float) -> tuple[float, ...]:
+        """Return those of the ramp's speed and acceleration where the spline begins."""
+        x = self.c * self.join ** (4.0 / 3.0)
+        return x, x + 4.0 / 3.0 * self.c * self.join ** (1.0 / 3.0) * step / 3.0
+
+
+@dataclass(frozen=True)
+class Steady:
+    """At a given speed, x = ṡ², without acceleration."""
+
+    x: float
+    join: float = 0.0
+
+    def gentler(self) -> Steady:
+        """Return itself: there is no ramp."""
+        return self
+
+    def bound(self, distance: Floats) -> Floats:
+        """Return no bound (n,)."""
+        return np.full(len(distance), np.inf)
+
+    def coefficients(self, step: float) -> tuple[float, ...]:
+        """Return x with no slope."""
+        del step
+        return self.x, self.x
+
+
+@dataclass(frozen=True)
+class Open:
+    """Where the path goes on beyond the stretch that is looked at."""
+
+    join: float = 0.0
+
+    def gentler(self) -> Open:
+        """Return itself: there is no ramp."""
+        return self
+
+    def bound(self, distance: Floats) -> Floats:
+        """Return no bound (n,)."""
+        return np.full(len(distance), np.inf)
+
+    def coefficients(self, step: float) -> tuple[float, ...]:
+        """Return none."""
+        del step
+        return ()

@@ -1,0 +1,60 @@
+"""Pieces whose law had to be made slower so that its setpoints keep the limits: by how much, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.timing.law.paths import LegPathLike
+from pentapod.timing.law.refusals import segment_at, waypoints_at
+from pentapod.timing.law.time_law import MotionLaw
+
+TOLD = 1.02
+"""A piece that lasts longer than so many times its first law, and a period, is told."""
+
+_PARTS = 512
+
+
+@dataclass(frozen=True)
+class Slowed:
+    """A piece that lasts longer than its first law limited in jerk, so that its setpoints keep the limits.
+
+    piece: its index in the path; first, duration: seconds of its first law and of the one it has; station: global s in
+    metres about which most of the time is lost; segment of the toolpath there; waypoints on both sides.
+    """
+
+    piece: int
+    first: float
+    duration: float
+    station: float
+    segment: int
+    waypoints: tuple[int, int]
+
+    def __str__(self) -> str:
+        longer = self.duration / self.first - 1.0
+        low, high = self.waypoints
+        beside = f"at waypoint {low}" if low == high else f"between waypoints {low} and {high}"
+        by = f"{100.0 * longer:.1f} % longer than" if longer < 1.0 else f"{longer + 1.0:.3g} times as long as"
+        return (
+            f"piece {self.piece} lasts {self.duration:.3f} s, {by} its first law ({self.first:.3f} s), so that its "
+            f"setpoints keep the limits; most is lost {1e3 * self.station:.1f} mm along the path, in segment "
+            f"{self.segment}, {beside}"
+        )
+
+
+def slowed(path: LegPathLike, k: int, first: MotionLaw, law: MotionLaw, period: float) -> Slowed | None:
+    """Return what there is to tell of piece k of a path; None where its law is about as fast as its first one."""
+    if law.duration <= TOLD * first.duration + period:
+        return None
+    piece, s = path.pieces[k], most_lost(first, law)
+    station = float(path.starts[k]) + s
+    return Slowed(k, first.duration, law.duration, station, segment_at(piece, s), waypoints_at(piece, s))
+
+
+def most_lost(first: MotionLaw, law: MotionLaw) -> float:
+    """Return about which station of a piece a law loses most of the time against the one that it began with."""
+    s = np.linspace(0.0, law.length, _PARTS + 1)
+    lost = np.diff(np.interp(s, law.stations, law.times) - np.interp(s, first.stations, first.times))
+    worst = int(lost.argmax())
+    return float((s[worst] + s[worst + 1]) / 2.0)

@@ -1,0 +1,1 @@
+"""The limits of the time law as rows along the path."""

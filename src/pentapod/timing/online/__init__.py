@@ -1,0 +1,1 @@
+"""What happens to a running trajectory: feed override, transitions."""

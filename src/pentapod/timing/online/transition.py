@@ -1,0 +1,190 @@
+"""Transitions: how a running motion leaves its plan, to stop or to pass over to another plan.
+
+How short a transition may be is tried, not assumed: the first one whose setpoints keep every limit is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.geometry.interpolant import Interpolant
+from pentapod.machine.machine import Machine
+from pentapod.timing.certificates import certify
+from pentapod.timing.law.splice import Nodes, joined, times_at
+from pentapod.timing.law.time_law import MotionLaw
+from pentapod.timing.law.trajectory import Trajectory
+
+_LENGTHS = (8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 1024)
+_DELAYS = (0, 4, 8, 16, 32, 64, 128)
+"""Periods: how long a transition may take, and how much later it may begin where the old plan is at its limits."""
+
+_NODES_PER_PERIOD = 4
+_EDGE = 24  # rows beside a transition that the spline through its rows needs to forget where the rows were cut
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """A transition that holds: when the old plan is left, what follows until the end of the piece.
+
+    parts: nodes from that time on: the transition, and what is left of the new plan; none for a hold. slower: how many
+    times slower the new plan is run, for the sake of whole periods.
+    """
+
+    leave: float
+    parts: tuple[Nodes, ...]
+    slower: float = 1.0
+
+    @property
+    def arrival(self) -> float:
+        """Seconds from the start of the piece to the end of the transition."""
+        return self.leave + float(self.parts[0].times[-1])
+
+    @property
+    def duration(self) -> float:
+        """Seconds that the whole piece lasts."""
+        return self.leave + sum(float(part.times[-1] - part.times[0]) for part in self.parts)
+
+
+def stop(trajectory: Trajectory, machine: Machine, k: int, local: float) -> Turn | None:
+    """Return the quickest stop on the path, by a clock that slows down; None: the piece's end comes first."""
+    law, period, jerk = trajectory.laws[k], machine.controller.period, _largest_jerks(trajectory, machine)
+    for delay, length in _tries():
+        leave, seconds = local + delay * period, length * period
+        if leave + seconds > law.duration:
+            continue
+        nodes = np.arange(length * _NODES_PER_PERIOD + 1) / (length * _NODES_PER_PERIOD)
+        clock = np.clip(leave + seconds * _slowing(nodes), 0.0, law.duration)
+        speeds = law(clock, 1) * (1.0 - _blend(nodes))
+        speeds[-1] = 0.0
+        parts = (Nodes.through(seconds * nodes, law(clock), speeds),)
+        turn = Turn(leave, parts)
+        if _keeps(trajectory, machine, k, turn, jerk):
+            return turn
+    return None
+
+
+def passage(trajectory: Trajectory, rest: Trajectory, machine: Machine, k: int, local: float) -> Turn | None:
+    """Return the quickest passage from the old plan to the new one; None: the piece's end comes first."""
+    old, period, jerk = trajectory.laws[k], machine.controller.period, _largest_jerks(trajectory, machine)
+    for delay, length in _tries():
+        leave, seconds = local + delay * period, length * period
+        if leave + seconds > old.duration - _EDGE * period:
+            continue
+        turn = _turn(old, rest.laws[0], leave, seconds, period, 1.0)
+        if turn is None or not _keeps(trajectory, machine, k, turn, jerk):
+            continue
+        whole = _whole(turn, old, rest.laws[0], seconds, period)
+        if whole is not None and _keeps(trajectory, machine, k, whole, jerk):
+            return whole
+    return None
+
+
+def _turn(old: MotionLaw, new: MotionLaw, leave: float, seconds: float, period: float, slower: float) -> Turn | None:
+    """Return the passage to the new plan run `slower`; None where it is all but over by then."""
+    law = new.stretched(new.duration * slower)
+    first = _between(old, law, leave, seconds, period)
+    joins = float(times_at(law, first.stations[-1:])[0])
+    return Turn(leave, (first, Nodes.of(law, joins)), slower) if law.duration - joins >= 4.0 * period else None
+
+
+def _whole(turn: Turn, old: MotionLaw, new: MotionLaw, seconds: float, period: float) -> Turn | None:
+    """Return the passage with the new plan run so much slower that the piece lasts whole periods (secant)."""
+    target = float(np.ceil(turn.duration / period - 1e-7)) * period
+    slope = float(turn.parts[1].times[-1] - turn.parts[1].times[0])
+    for _ in range(12):
+        missing = target - turn.duration
+        if abs(missing) <= 1e-13 * target:
+            return turn
+        step = missing / slope
+        following = _turn(old, new, turn.leave, seconds, period, turn.slower + step)
+        if following is None:
+            return None
+        slope = (following.duration - turn.duration) / step
+        turn = following
+        if slope <= 0.0:
+            return None
+    return turn if abs(target - turn.duration) <= 1e-11 * target else None
+
+
+def _between(old: MotionLaw, new: MotionLaw, leave: float, seconds: float, period: float) -> Nodes:
+    """Return the motion whose speed at each place goes over from the old plan's to the new one's.
+
+    `seconds`: how long the old plan would take for it. Nodes are at the knots of both laws, too.
+    """
+    even = np.linspace(leave, leave + seconds, int(np.ceil(_NODES_PER_PERIOD * seconds / period)) + 1)
+    ends = old(np.array([leave, leave + seconds]))
+    inner = new.stations[(new.stations > ends[0]) & (new.stations < ends[1])]
+    marks = np.concatenate([even, old.times, times_at(old, inner)])
+    clock = np.unique(marks[(marks >= leave) & (marks <= leave + seconds)])
+    clock = clock[np.concatenate([[True], np.diff(clock) > 1e-9 * seconds])]
+    x, w = np.polynomial.legendre.leggauss(5)
+    half = 0.5 * np.diff(clock)
+    at = clock[:-1, None] + half[:, None] * (1.0 + x)
+
+    def speeds(tau: Floats) -> tuple[Floats, Floats]:
+        before = old(tau, 1)
+        after = new(times_at(new, old(tau)), 1)
+        return before, before + _blend((tau - leave) / seconds) * (after - before)
+
+    before, speed = speeds(at.ravel())
+    steps = half * ((before / speed).reshape(at.shape) @ w)
+    return Nodes.through(np.concatenate([[0.0], np.cumsum(steps)]), old(clock), speeds(clock)[1])
+
+
+def _keeps(trajectory: Trajectory, machine: Machine, k: int, turn: Turn, jerk: tuple[Floats, float]) -> bool:
+    """Return whether the setpoints around a transition keep the limits of legs and tool, as the controller joins them.
+
+    jerk: m/s³, of the legs (5,) and of the tip.
+    """
+    period, interpolation = machine.controller.period, machine.controller.interpolation
+    law = joined([Nodes.of(trajectory.laws[k], 0.0, turn.leave), *turn.parts])
+    piece = trajectory.path.pieces[trajectory.indices[k]]
+    first, last = round(turn.leave / period) - 2 * _EDGE, int(np.ceil(turn.arrival / period)) + 2 * _EDGE
+    # The law stands before its start and after its end, as the machine does.
+    stations = law(np.arange(first, last + 1) * period)
+    rows = piece(stations)
+    if not np.isfinite(rows).all():
+        return False
+    motion = Interpolant.through(rows, period, interpolation)
+    inner, tool = slice(_EDGE, -_EDGE), machine.tool_limits
+    kept = bool(
+        (motion.rates[inner] <= machine.legs.max_velocity).all()
+        and (motion.accelerations[inner] <= machine.legs.max_acceleration).all()
+        and (motion.jerks[inner] <= jerk[0]).all()
+    )
+    if not (kept and tool.given()):
+        return kept
+    tip, axis = (Interpolant.through(rows, period, interpolation) for rows in piece.pose(stations))
+    return bool(
+        (np.linalg.norm(tip.second[inner], axis=1) <= tool.max_tip_acceleration).all()
+        and (tip.jerk_lengths[inner] <= jerk[1]).all()
+        and (np.linalg.norm(axis.steps[inner], axis=1) <= tool.max_axis_velocity).all()
+        and (axis.turn_accelerations[inner] <= tool.max_axis_acceleration).all()
+    )
+
+
+def _largest_jerks(trajectory: Trajectory, machine: Machine) -> tuple[Floats, float]:
+    """Return the jerk limits of legs (5,) and tip, or as many times as much as the trajectory itself takes."""
+    shares = {use.quantity: max(1.0, use.share) for use in certify(trajectory, machine)}
+    tip = machine.tool_limits.max_tip_jerk * shares.get("tip jerk", 1.0)
+    return machine.legs.max_jerk * shares["leg jerk"], tip
+
+
+def _tries() -> Iterator[tuple[int, int]]:
+    """Yield (delay, length) in periods, those that end first come first."""
+    yield from sorted(((d, n) for d in _DELAYS for n in _LENGTHS), key=lambda pair: (sum(pair), pair[0]))
+
+
+def _blend(x: Floats) -> Floats:
+    """Return the fraction (n,) that rises from 0 to 1 with two vanishing derivatives at both ends."""
+    x = np.clip(x, 0.0, 1.0)
+    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+
+
+def _slowing(x: Floats) -> Floats:
+    """Return the integral (n,) of 1 − `_blend`."""
+    return x - x**4 * (2.5 - 3.0 * x + x**2)

@@ -1,0 +1,294 @@
+"""The time law of one piece: solved, measured between the gridpoints, mended until it holds there too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.timing.jerk.caps import acceleration_caps
+from pentapod.timing.jerk.rows import JerkRows
+from pentapod.timing.law.paths import PieceLike
+from pentapod.timing.law.time_law import MotionLaw
+from pentapod.timing.limits.constraints import FEED, PUSHES, RAPID, Limits
+from pentapod.timing.limits.path_derivatives import Course
+from pentapod.timing.pieces.grid import first_grid, parts
+from pentapod.timing.topp.engine import Engine, fastest
+from pentapod.timing.topp.stages import Failure
+
+if TYPE_CHECKING:
+    from pentapod.timing.jerk.limited import SmoothProfile
+    from pentapod.timing.jerk.over import Measure
+
+_BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
+_REFINEMENTS = 4
+_SWITCHING_LOSS = 3e-4
+"""Share of the duration that may be lost in stages too long to switch where the law should."""
+
+_EASINGS = 3
+
+_LEAST_PERIODS = 1.0
+"""Periods of the controller below which a law limited in jerk needs no freedom."""
+
+_STAGE_PERIODS = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class PieceProfile:
+    """Squared speeds x (N + 1,) in m²/s² at stations s (N + 1,) in metres of a piece, linear in s between.
+
+    ease_acceleration, ease_speed (N + 1,): factors ≤ 1 on the limits at each gridpoint, where a plan at full limits was
+    measured to exceed them. x_start, x_end: x that is given at the ends, 0 at rests.
+    """
+
+    piece: PieceLike
+    limits: Limits
+    s: Floats
+    x: Floats
+    ease_acceleration: Floats
+    ease_speed: Floats
+    engine: Engine = "core"
+    x_start: float = 0.0
+    x_end: float = 0.0
+
+    @property
+    def moving(self) -> bool:
+        """Whether one of its ends is no rest."""
+        return max(self.x_start, self.x_end) > 0.0
+
+    @cached_property
+    def course(self) -> Course:
+        """How the piece moves at the gridpoints."""
+        return self.limits.course(self.piece, self.s)
+
+    def rows(self) -> tuple[Floats, Floats]:
+        """Return the accelerations' rows (N + 1, R) at the gridpoints, eased."""
+        first, second = self.limits.rows(self.course)
+        return first / self.ease_acceleration[:, None], second / self.ease_acceleration[:, None]
+
+    def solved(self) -> PieceProfile | Failure:
+        """Return the fastest profile on this grid with these easings."""
+        x = fastest(self.s, *self.rows(), self.ceiling(), x_start=self.x_start, x_end=self.x_end, engine=self.engine)
+        if not isinstance(x, Failure):
+            return self.with_(x=x)
+        names = self.limits.row_names
+        limits = tuple(dict.fromkeys(names[row] for row in x.conflict))
+        return replace(x, limits=limits, station=float(self.s[x.gridpoint]) if x.gridpoint >= 0 else None)
+
+    def smooth(self, measure: Measure) -> SmoothProfile | Failure:
+        """Return the fastest profile below this one that keeps the jerk limits too; measure: of its setpoints."""
+        from pentapod.timing.jerk.limited import jerk_limited  # noqa: PLC0415  (compiled: loaded where it is used)
+
+        s, x = self.s, self.x
+        if (self._push_caps < 1.0).any():
+            s = self._fine_grid()
+            x = np.interp(s, self.s, self.x)
+            found = [self._capped_rows(s[part], self.limits.course(self.piece, s[part])) for part in parts(len(s) - 1)]
+            # Each part ends where the next begins.
+            rows = (
+                np.concatenate([*(row[:-1] for row in column), column[-1][-1:]]) for column in zip(*found, strict=True)
+            )
+            capped = fastest(s, *rows, x_start=self.x_start, x_end=self.x_end, engine=self.engine)
+            x = x if isinstance(capped, Failure) else np.minimum(x, capped)
+        least = _LEAST_PERIODS * self.limits.period
+        return jerk_limited(s, x, self._jerk_rows, self.piece.knots, least_step=least, measure=measure)
+
+    def _fine_grid(self) -> Floats:
+        """Return the gridpoints and more between them, so that no stage lasts longer than a period.
+
+        The law below lower accelerations switches where this grid has no points for it.
+        """
+        ds, speed = np.diff(self.s), np.sqrt(self.x)
+        longest = _STAGE_PERIODS * self.limits.period
+        if longest <= 0.0:
+            return self.s
+        counts = np.ceil(2.0 * ds / (speed[:-1] + speed[1:]) / longest).astype(np.intp)
+        stage = np.repeat(np.arange(len(ds)), counts)
+        within = np.arange(len(stage)) - np.repeat(np.cumsum(counts) - counts, counts)
+        return np.append(self.s[stage] + ds[stage] * (within / counts[stage]), self.s[-1])
+
+    @cached_property
+    def _push_caps(self) -> Floats:
+        """Shares (N + 1, 5) of the legs' acceleration limits that no law within the jerk limits exceeds."""
+        limits = self.limits
+        one, ceiling = self.course.legs[0], limits.ceiling(self.course)
+        return (
+            acceleration_caps(self.s, one, ceiling, limits.acceleration, limits.jerk, moving=self.moving)
+            / limits.acceleration
+        )
+
+    @staticmethod
+    def _with_tool(caps: Floats, rows: int) -> Floats:
+        """Return the caps (n, R) of all rows; those of the tool have none."""
+        return np.concatenate([caps, np.ones((len(caps), rows - caps.shape[1]))], axis=1)
+
+    def _jerk_rows(self, s: Floats) -> JerkRows:
+        course = self.limits.course(self.piece, s, 3)
+        first, second, ceiling = self._capped_rows(s, course)
+        return JerkRows(first, second, np.zeros((1, first.shape[1])), self.limits.jerk_rows(course), ceiling)
+
+    def _capped_rows(self, s: Floats, course: Course) -> tuple[Floats, Floats, Floats]:
+        """Return the accelerations' rows (n, R), no looser than laws within the jerk limits can use, and ceilings."""
+        acceleration, speed = (
+            np.interp(s, self.s, ease)[:, None] for ease in (self.ease_acceleration, self.ease_speed)
+        )
+        first, second = self.limits.rows(course)
+        caps = np.stack([np.interp(s, self.s, cap) for cap in self._push_caps.T], axis=1)
+        pushes = self._with_tool(caps, first.shape[1]) * acceleration
+        return first / pushes, second / pushes, self.limits.ceiling(course) * speed[:, 0] ** 2
+
+    def ceiling(self) -> Floats:
+        """Return the largest x (N + 1,) at each gridpoint that any path acceleration allows, m²/s²."""
+        return self.limits.ceiling(self.course) * self.ease_speed**2
+
+    def eased(self, acceleration: Floats, speed: Floats) -> PieceProfile | Failure:
+        """Return the profile solved anew with further factors (N + 1,) on accelerations and speeds."""
+        return self.with_(
+            ease_acceleration=self.ease_acceleration * acceleration, ease_speed=self.ease_speed * speed
+        ).solved()
+
+    def with_(self, **changes: Any) -> PieceProfile:
+        """Return a copy on the same grid, which keeps the path's derivatives."""
+        copy = replace(self, **changes)
+        if "course" in self.__dict__:
+            copy.__dict__["course"] = self.course
+        return copy
+
+    def refined(self, exceeding: Bools, switching: Bools, where: Floats) -> PieceProfile:
+        """Return the problem on a finer grid.
+
+        Exceeding stages (N,) get gridpoints where they were measured, switching ones are split at the
+        fractions `where` (N,).
+        """
+        added = [self.s[:-1][switching] + (where * np.diff(self.s))[switching]]
+        added += [(self.s[:-1] + between * np.diff(self.s))[exceeding] for between in _BETWEEN]
+        s = np.unique(np.concatenate([self.s, *added]))
+        x, *eases = (np.interp(s, self.s, y) for y in (self.x, self.ease_acceleration, self.ease_speed))
+        return PieceProfile(
+            self.piece, self.limits, s, x, *eases, engine=self.engine, x_start=self.x_start, x_end=self.x_end
+        )
+
+    def path_accelerations(self) -> Floats:
+        """Return s̈ (N,) of each stage, m/s²."""
+        return np.diff(self.x) / (2.0 * np.diff(self.s))
+
+    def shares_between(self) -> tuple[Floats, Floats]:
+        """Return the largest shares (N,) of velocities and feed, and of accelerations inside each stage."""
+        found = [self._shares_between(part) for part in parts(len(self.s) - 1)]
+        return np.concatenate([rates for rates, _ in found]), np.concatenate([pushes for _, pushes in found])
+
+    def _shares_between(self, part: slice) -> tuple[Floats, Floats]:
+        ds, dx = np.diff(self.s[part]), np.diff(self.x[part])
+        s = (self.s[part][:-1, None] + _BETWEEN * ds[:, None]).ravel()
+        x = (self.x[part][:-1, None] + _BETWEEN * dx[:, None]).ravel()
+        shares = self.limits.shares(self.limits.course(self.piece, s), x, np.repeat(dx / (2.0 * ds), len(_BETWEEN)))
+        worst = shares.reshape(len(ds), len(_BETWEEN), -1).max(axis=1)
+        return np.delete(worst, PUSHES, axis=1).max(axis=1), worst[:, PUSHES].max(axis=1)
+
+    def switching(self) -> tuple[Bools, Floats]:
+        """Return the stages (N,) within which the law should switch, and at which fraction (N,).
+
+        In a stage of an optimal law either an acceleration is at its limit or the speed is at its ceiling at
+        both ends. Where neither is, time is lost: at most what running at the faster end's speed would
+        save. None are returned where that adds up to little. A stage that ends at the ceiling and uses the
+        share r of the acceleration limit could get there within about the fraction r of its length.
+        """
+        u, ds = self.path_accelerations(), np.diff(self.s)
+        first, second = self.rows()
+        ends = [np.abs(first[k] * u[:, None] + second[k] * self.x[k][:, None]) for k in (slice(0, -1), slice(1, None))]
+        capped = self.x > 0.99 * self.ceiling()
+        share = np.maximum(*ends).max(axis=1)
+        idle = (share < 0.98) & ~(capped[:-1] & capped[1:])
+        speed = np.sqrt(self.x)
+        taken = 2.0 * ds / (speed[:-1] + speed[1:])
+        loss = np.where(idle, taken - ds / np.maximum(speed[:-1], speed[1:]), 0.0)
+        worth = loss > 0.1 * _SWITCHING_LOSS * taken.sum()
+        # On a long grid solving again costs more than it finds: the ends are then a small part.
+        if loss.sum() <= _SWITCHING_LOSS * taken.sum() * min(max(len(self.x) / 4000.0, 1.0), 6.0):
+            worth[:] = False
+        near = (capped[:-1] | capped[1:]) & (share > 1e-3) & (share < 0.6)
+        where = np.where(near, np.where(u > 0.0, share, 1.0 - share), 0.5)
+        return worth, where
+
+    def active(self, law: MotionLaw | None = None) -> tuple[Ints, Floats]:
+        """Return the constraint (N + 1,) that holds each gridpoint back most, and its share of the limit.
+
+        law: the law limited in jerk below this profile, where there is one; what holds it back is then told.
+        """
+        if law is not None:
+            return self._active_in(law)
+        u = self.path_accelerations()
+        before, after = (
+            self.limits.shares(self.course, self.x, pushes) for pushes in (np.append(u[0], u), np.append(u, u[-1]))
+        )
+        shares = np.maximum(before, after)
+        return self._named(shares.argmax(axis=1)), shares.max(axis=1)
+
+    def _active_in(self, law: MotionLaw) -> tuple[Ints, Floats]:
+        """Return the constraint (N + 1,) of which a law limited in jerk uses most, and its share."""
+        t = np.interp(self.s, law.stations, law.times)
+        j = law.jerks[np.clip(np.searchsorted(law.times, t, "right") - 1, 0, len(law.jerks) - 1)]
+        v, a = law(t, 1), law(t, 2)
+        course = self.limits.course(self.piece, self.s, 3)
+        shares, jerks = self.limits.shares(course, v**2, a), self.limits.jerk_shares(course, v, a, j)
+        column = np.concatenate([shares, np.zeros((len(shares), 1)), jerks], axis=1).argmax(axis=1)
+        return self._named(column), np.maximum(shares.max(axis=1), jerks.max(axis=1))
+
+    def _named(self, column: Ints) -> Ints:
+        """Return the constraints (n,) of the columns: feed becomes rapid rate where that is what holds."""
+        speed, feeds = self.course.speed, self.limits.section_speeds(self.piece)[self.course.section]
+        rapid = (speed == self.limits.rapid) & (feeds != speed)
+        return np.where((column == FEED) & rapid, RAPID, column)
+
+
+def time_piece(
+    piece: PieceLike,
+    limits: Limits,
+    velocity_slack: float,
+    acceleration_slack: float,
+    engine: Engine = "core",
+    speeds: tuple[float, float] = (0.0, 0.0),
+) -> PieceProfile | Failure:
+    """Return the fastest profile of a piece that keeps the limits between gridpoints as well.
+
+    The slacks are the shares above 1 that are let pass, part of the margins. Stages that exceed them are
+    halved, those that still do are eased; what is left after that is run slower as a whole. speeds: m/s, at the start
+    and at the end.
+    """
+    s = first_grid(piece, limits)
+    x_start, x_end = speeds[0] ** 2, speeds[1] ** 2
+    ones = (np.ones_like(s) for _ in range(2))
+    problem = PieceProfile(piece, limits, s, np.zeros_like(s), *ones, engine=engine, x_start=x_start, x_end=x_end)
+    profile = problem.solved()
+    for attempt in range(_REFINEMENTS + _EASINGS):
+        if isinstance(profile, Failure):
+            return profile
+        rates, accelerations = profile.shares_between()
+        fast, hard = rates > 1.0 + velocity_slack, accelerations > 1.0 + acceleration_slack
+        if attempt < _REFINEMENTS:
+            switching, where = profile.switching()
+            if not (fast | hard | switching).any():
+                return profile
+            profile = profile.refined(fast | hard, switching & ~(fast | hard), where).solved()
+        elif not (fast | hard).any():
+            return profile
+        else:
+            profile = profile.eased(_at_ends(accelerations, hard), _at_ends(rates, fast))
+    return profile if isinstance(profile, Failure) else _slowed(profile)
+
+
+def _at_ends(shares: Floats, bad: Bools) -> Floats:
+    """Return factors (N + 1,) for the gridpoints of the bad stages (N,)."""
+    factor = np.where(bad, 0.998 / shares, 1.0)
+    return np.minimum(np.append(factor, 1.0), np.append(1.0, factor))
+
+
+def _slowed(profile: PieceProfile) -> PieceProfile | Failure:
+    rates, accelerations = profile.shares_between()
+    slower = max(1.0, float(rates.max()) ** 2, float(accelerations.max()))
+    if slower > 1.0 and profile.moving:
+        return Failure(-1, "the limits do not hold between the gridpoints with the speeds that are given at the ends")
+    return profile.with_(x=profile.x / slower)

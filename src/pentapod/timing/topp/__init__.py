@@ -1,0 +1,1 @@
+"""Time-optimal path parametrisation (TOPP-RA): the two passes, compiled, and the reference."""

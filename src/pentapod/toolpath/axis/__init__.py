@@ -1,0 +1,1 @@
+"""The nominal tool axis along a toolpath."""

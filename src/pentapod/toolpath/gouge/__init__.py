@@ -1,0 +1,1 @@
+"""Gouges: found on every motion, and what is done about them."""

@@ -1,0 +1,98 @@
+"""GougeOptions and GougeReport: what is to be done about gouges, and what was found and done."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from pentapod.base.errors import ToolpathError
+from pentapod.geometry.solids import KINDS
+from pentapod.toolpath.linking.links import LinkStyle
+
+
+class Remedy(StrEnum):
+    """What is done about a gouge: tilt the tool clear within a cone, lift it along its axis, drop the cut, nothing."""
+
+    TILT = "tilt"
+    LIFT = "lift"
+    DROP = "drop"
+    REPORT = "report"
+
+
+@dataclass(frozen=True)
+class GougeOptions:
+    """remedies: tried in this order on what still gouges. tolerance: depth that counts as none, metres.
+
+    cone: half angle in radians within which tilting may turn the axis. highest: most that lifting may lift, metres.
+    links: how ways between cuts are led anew where the old ones meet the part; None: they stay, and are told.
+    Raises ToolpathError for values that make no sense.
+    """
+
+    remedies: tuple[Remedy, ...] = (Remedy.REPORT,)
+    tolerance: float = 20e-6
+    cone: float = float(np.radians(30.0))
+    highest: float = 20e-3
+    links: LinkStyle | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        if not (self.tolerance > 0.0 and 0.0 < self.cone < 0.5 * np.pi and self.highest > 0.0):
+            raise ToolpathError(
+                "impossible limits", key="gouge", value=(self.tolerance, self.cone, self.highest), expected="positive"
+            )
+
+
+@dataclass(frozen=True)
+class GougeReport:
+    """What the check found. motions: cuts' motions between waypoints that were checked.
+
+    gouging: of them too deep at first; depths: the deepest of cutter, shank and holder at first, metres, −inf for none.
+    tilted, lifted: waypoints changed; dropped: motions taken out of the cut; most_lifted: metres.
+    left: motions still too deep, left_depth how deep, metres; places: the first waypoint of each run of those.
+    rejoined: ways between cuts led anew. unclear: links deeper than the tolerance and rapids that touch,
+    unclear_places likewise.
+    """
+
+    motions: int
+    gouging: int
+    depths: tuple[float, float, float]
+    tilted: int = 0
+    lifted: int = 0
+    most_lifted: float = 0.0
+    dropped: int = 0
+    left: int = 0
+    left_depth: float = 0.0
+    places: tuple[int, ...] = ()
+    rejoined: int = 0
+    unclear: int = 0
+    unclear_places: tuple[int, ...] = ()
+
+    def __str__(self) -> str:
+        text = f"gouge check: {self.motions:,} motions"
+        if not self.gouging:
+            return text + ", none gouges" + self._unclear()
+        deep = ", ".join(f"{k} {1e3 * d:.3g} mm" for k, d in zip(KINDS, self.depths, strict=True) if d > 0.0)
+        text += f", {self.gouging:,} gouged: {deep} deep"
+        if self.tilted:
+            text += f"\n  note: {self.tilted:,} waypoints tilted clear"
+        if self.lifted:
+            text += f"\n  note: {self.lifted:,} waypoints lifted, by up to {1e3 * self.most_lifted:.3g} mm"
+        if self.dropped:
+            text += f"\n  note: {self.dropped:,} motions dropped: material is left there"
+        if self.left:
+            worst = 1e3 * self.left_depth
+            text += f"\n  problem: {self.left:,} motions gouge by up to {worst:.3g} mm, from waypoints "
+            text += _some(self.places)
+        return text + self._unclear()
+
+    def _unclear(self) -> str:
+        text = f"\n  note: {self.rejoined:,} ways between cuts led over the clearance level" if self.rejoined else ""
+        if not self.unclear:
+            return text
+        where = _some(self.unclear_places)
+        return text + f"\n  problem: {self.unclear:,} motions of links and rapids meet the part, from waypoints {where}"
+
+
+def _some(places: tuple[int, ...]) -> str:
+    return ", ".join(str(place) for place in places[:5]) + (", ..." if len(places) > 5 else "")

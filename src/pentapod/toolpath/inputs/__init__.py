@@ -1,0 +1,1 @@
+"""Drawings, points, pictures and text to be engraved."""

@@ -1,0 +1,97 @@
+"""Lettering: text as single strokes, with the font that ships with the package."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import ToolpathError
+
+CAPITAL = 10.0
+"""Height of capitals in the font's own units."""
+
+LINE_SPACING = 16.0
+_DEGREES_PER_CHORD = 6.0
+
+
+@dataclass(frozen=True, eq=False)
+class Glyph:
+    """A character as strokes. advance: to the next character. strokes: each (n, 2), in the font's units."""
+
+    advance: float
+    strokes: tuple[Floats, ...]
+
+
+def lettering(text: str, height: float, *, spacing: float = 1.0, align: str = "centre") -> list[Floats]:
+    """Return the strokes (n, 2) of a text with capitals of a height, metres, in reading order.
+
+    Lines are parted by line feeds; the block's middle is the origin. spacing: factor on the advance of characters.
+    align: left, centre or right. Raises ToolpathError for a character that the font does not have, and for no text.
+    """
+    if not text.strip():
+        raise ToolpathError("there is no text", key="text", value=text)
+    shifts = {"left": 0.0, "centre": 0.5, "right": 1.0}
+    if align not in shifts:
+        raise ToolpathError("unknown alignment", key="align", value=align, expected=", ".join(shifts))
+    rows = text.split("\n")
+    widths = [sum(_glyph(c).advance for c in row) * spacing for row in rows]
+    top = 0.5 * LINE_SPACING * (len(rows) - 1) - 0.5 * CAPITAL
+    strokes: list[Floats] = []
+    for number, (row, width) in enumerate(zip(rows, widths, strict=True)):
+        x = (max(widths) - width) * shifts[align] - 0.5 * max(widths)
+        for character in row:
+            glyph = _glyph(character)
+            strokes += [stroke + np.array([x, top - LINE_SPACING * number]) for stroke in glyph.strokes]
+            x += glyph.advance * spacing
+    return [stroke * (height / CAPITAL) for stroke in strokes]
+
+
+def characters() -> str:
+    """Return all characters that the font has."""
+    return "".join(_font())
+
+
+def _glyph(character: str) -> Glyph:
+    glyph = _font().get(character)
+    if glyph is None:
+        raise ToolpathError(
+            "the font has no such character", key="text", value=character, expected=f"one of {characters()!r}"
+        )
+    return glyph
+
+
+@cache
+def _font() -> dict[str, Glyph]:
+    """Return the glyphs of the font's file: see its head for the notation."""
+    text = files("pentapod.toolpath.inputs.fonts").joinpath("strokes.txt").read_text(encoding="utf-8")
+    glyphs: dict[str, Glyph] = {}
+    for line in text.splitlines():
+        if not line or line.startswith("# "):
+            continue
+        head, *strokes = line.split(" | ")
+        name, advance = head.rsplit(" ", 1)
+        character = chr(int(name[2:], 16)) if name.startswith("U+") else name
+        glyphs[character] = Glyph(float(advance), tuple(_stroke(stroke) for stroke in strokes))
+    return glyphs
+
+
+def _stroke(text: str) -> Floats:
+    """Return the points (n, 2) of a stroke: points as they are, arcs in chords of a few degrees."""
+    parts: list[Floats] = []
+    for word in text.split():
+        if word.startswith("("):
+            cx, cy, rx, ry, first, last = (float(number) for number in word.strip("()").split(","))
+            count = max(2, round(abs(last - first) / _DEGREES_PER_CHORD))
+            angle = np.radians(np.linspace(first, last, count + 1))
+            parts.append(np.stack([cx + rx * np.cos(angle), cy + ry * np.sin(angle)], axis=1))
+        else:
+            x, y = word.split(",")
+            parts.append(np.array([[float(x), float(y)]]))
+    points = np.concatenate(parts)
+    # Where an arc begins at the point before it, the point is there once.
+    apart = np.abs(np.diff(points, axis=0)).max(axis=1) > 1e-9
+    return points[np.concatenate([[True], apart])]

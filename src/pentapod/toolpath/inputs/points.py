@@ -1,0 +1,105 @@
+"""Points in: polylines from a CSV file, straight down on a surface or onto the nearest point of it."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import ToolpathError, nearest
+from pentapod.base.input_files import number_in
+from pentapod.toolpath.inputs.files import small_file
+
+_TOLD = re.compile(r"#\s*points\s*=\s*([0-9]{1,12})")
+
+UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 25.4e-3}
+
+
+def read_points(path: str | Path) -> list[Floats]:
+    """Return the polylines (n, 3), metres, of a CSV file.
+
+    The first row names the columns with their unit: x_mm, y_mm, z_mm (or cm, m, inch), and perhaps `line`, whose value
+    changes where a new polyline begins; so does an empty row. Lines that begin with # are remarks; one that says
+    "# points = 120" tells how many rows there must be, so that a file that was cut off shows. Raises ToolpathError with
+    file and line.
+    """
+    path = Path(path)
+    try:
+        text = small_file(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ToolpathError("not a text file in UTF-8", file=path, expected="a CSV file") from error
+    if "\0" in text:
+        raise ToolpathError("not a text file", file=path, expected="a CSV file")
+    if not text.endswith("\n"):
+        what = "the last line has no end: the file was cut off"
+        remedy = "export it again, or end the last line"
+        raise ToolpathError(what, file=path, line=text.count("\n") + 1, remedy=remedy)
+    columns: dict[str, tuple[int, float]] | None = None
+    lines: list[list[list[float]]] = [[]]
+    name, told = "", None
+    for number, row in _rows(path, text):
+        if row and row[0].lstrip().startswith("#"):
+            told = _TOLD.fullmatch(row[0].strip()) or told
+            continue
+        if not any(cell.strip() for cell in row):
+            lines.append([])
+            continue
+        if columns is None:
+            columns = _columns(path, number, row)
+            continue
+        if len(row) != len(columns):
+            what = "the row has another number of columns than the first"
+            raise ToolpathError(what, file=path, line=number, value=len(row), expected=str(len(columns)))
+        if "line" in columns and row[columns["line"][0]].strip() != name:
+            name = row[columns["line"][0]].strip()
+            lines.append([])
+        lines[-1].append([_number(path, number, axis, row[columns[axis][0]]) * columns[axis][1] for axis in "xyz"])
+    count = sum(map(len, lines))
+    if told is not None and int(told[1]) != count:
+        what = "the number of rows is not that of the remark: the file was cut off or rows were added"
+        raise ToolpathError(what, file=path, key="points", value=count, expected=told[1])
+    found = [np.array(line) for line in lines if len(line) > 1]
+    if not found:
+        raise ToolpathError("the file holds no polyline", file=path, expected="at least two rows of numbers in a line")
+    return found
+
+
+def _columns(path: Path, number: int, row: list[str]) -> dict[str, tuple[int, float]]:
+    """Return the place and the unit of each column, by what it is. Raises ToolpathError for unknown or missing ones."""
+    known = [f"{axis}_{unit}" for axis in "xyz" for unit in UNITS] + ["line"]
+    columns: dict[str, tuple[int, float]] = {}
+    for place, cell in enumerate(row):
+        key = cell.strip()
+        if key not in known:
+            raise ToolpathError("unknown column", file=path, line=number, value=key, remedy=nearest(key, known))
+        what, _, unit = key.partition("_")
+        if what in columns:
+            raise ToolpathError("the column is there twice", file=path, line=number, value=key)
+        columns[what] = (place, UNITS.get(unit, 1.0))
+    missing = [axis for axis in "xyz" if axis not in columns]
+    if missing:
+        names = ", ".join(f"{axis}_mm" for axis in missing)
+        raise ToolpathError("a column is missing", file=path, line=number, expected=names)
+    return columns
+
+
+def _number(path: Path, line: int, key: str, cell: str) -> float:
+    value = number_in(cell)
+    if value is None:
+        raise ToolpathError("not a finite number", file=path, line=line, key=key, value=cell.strip()[:40])
+    return value
+
+
+def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield the cells of each line, with its number. Raises ToolpathError for what is no CSV."""
+    reader = csv.reader(text.split("\n")[:-1], strict=True)
+    try:
+        for row in reader:
+            yield reader.line_num, row
+    except csv.Error as error:
+        what = f"not a row of a CSV file: {error}"
+        raise ToolpathError(what, file=path, line=max(reader.line_num, 1), remedy="export it again") from error

@@ -1,0 +1,1 @@
+"""Lines on a surface: how far apart, over gaps, projected."""

@@ -1,0 +1,1 @@
+"""From lines to a toolpath: waypoints, order, links, pieces."""

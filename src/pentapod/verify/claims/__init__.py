@@ -1,0 +1,1 @@
+"""Claims: each judges one thing of a replay; a file for each."""

@@ -1,0 +1,139 @@
+"""Claims that legs, spindle and tool body keep clear of the part, its fixture and the table, and legs of the tool."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.geometry.solids import Solid
+from pentapod.machine.clearance.collision_world import (
+    LEGS,
+    TOOL_BODY,
+    MovingBodies,
+    Obstacle,
+    Surroundings,
+    spindle_ends,
+)
+from pentapod.machine.clearance.tool_clearance import leg_tool_gaps
+from pentapod.machine.machine import Machine
+from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
+from pentapod.verify.replay.clearance_bounds import Stray, approach
+from pentapod.verify.replay.replay import Replay
+
+_FAR_M, _TOOL_FAR_M = 0.1, 0.01
+"""Gaps are not looked at beyond these: farther is as good."""
+
+_PROVEN = (
+    "less what the platform can move until the next moment looked at, by the leg equations (Banach): for all times, as "
+    "long as the component is kept"
+)
+
+
+def claims(surroundings: Surroundings | None) -> tuple[Claim, ...]:
+    """Return the claims about these surroundings, in the order of a verdict; none where nobody told them."""
+    if surroundings is None:
+        return ()
+    made: list[Claim] = []
+    if surroundings.tool:
+        made.append(Claim(f"legs clear of the {TOOL_BODY}", partial(_legs_and_tool, tool=surroundings.tool)))
+    for obstacle in surroundings.obstacles:
+        for title, columns in _groups(surroundings):
+            judge = partial(_clear, obstacle=obstacle, surroundings=surroundings, columns=columns)
+            made.append(Claim(f"{title} clear of the {obstacle.name}", judge))
+    return tuple(made)
+
+
+def told(replay: Replay) -> Idle:
+    """Judge nothing but whether the surroundings are known: each of them has claims of its own."""
+    known = replay.specification.surroundings is not None
+    return Idle("there is nothing more") if known else Idle("nobody told what is there", unknown=True)
+
+
+def _groups(surroundings: Surroundings) -> tuple[tuple[str, list[int]], ...]:
+    legs = ("legs", list(range(LEGS)))
+    tool = ((TOOL_BODY, [LEGS + 1]),) if surroundings.tool else ()
+    return (legs, ("spindle", [LEGS]), *tool)
+
+
+def _clear(replay: Replay, *, obstacle: Obstacle, surroundings: Surroundings, columns: list[int]) -> Finding:
+    """Judge that some of what moves keeps clear of one obstacle."""
+    machine = replay.machine
+    frame = replay.program.placement if obstacle.clamped else None
+    tool = surroundings.tool if LEGS + 1 in columns else ()
+    bound = -obstacle.allowance if tool else 0.0
+
+    def gaps(samples: Ints) -> Floats:
+        position, direction = (x[samples] for x in replay.pose)
+        bodies = MovingBodies.at(machine, position, direction, frame)
+        if tool:
+            return obstacle.surface.bodies(tool, bodies.tips, bodies.axes, _TOOL_FAR_M)[0][:, None]
+        chosen = MovingBodies(
+            bodies.starts[:, columns], bodies.ends[:, columns], bodies.tips, bodies.axes, bodies.radii[columns]
+        )
+        return chosen.segments(obstacle.surface, _FAR_M).distance.reshape(-1, len(columns))
+
+    offsets = _offsets(machine, surroundings.tool)
+    found = approach(replay, gaps, lambda stray: _moves(stray, surroundings.tool)[:, columns], offsets, bound=bound)
+    name, most = surroundings.names[columns[found.column]], _TOOL_FAR_M if tool else _FAR_M
+    if found.least > bound and _enclosed(replay, obstacle, frame, columns):
+        return Finding(False, None, MM * bound, "mm", replay.place(0), f"{name} is inside the {obstacle.name}")
+    method = f"{name} comes closest; exact distance of its body from the mesh's facets, {_PROVEN}"
+    if not found.proven:
+        method = f"{name}: not proven; {method}"
+    elif found.least <= bound:
+        method = f"{name} is in the {obstacle.name}; exact at this moment, others may be worse"
+    elif found.least >= 0.5 * most:
+        method = f"nothing comes near; distances were looked at up to {MM * most:g} mm; {_PROVEN}"
+    value = MM * found.least
+    return Finding(found.least > bound, value, MM * bound, "mm", replay.place(found.sample), method)
+
+
+def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
+    """Judge that no leg touches shank or holder."""
+    machine = replay.machine
+
+    def gaps(samples: Ints) -> Floats:
+        position, direction = (x[samples] for x in replay.pose)
+        return leg_tool_gaps(machine, tool, position, direction)
+
+    def moves(stray: Stray) -> Floats:
+        both = _moves(stray, tool)
+        return both[:, :LEGS] + both[:, LEGS + 1 :]
+
+    found = approach(replay, gaps, moves, _offsets(machine, tool))
+    method = (
+        f"leg {found.column + 1} comes closest; distance of its body from shank and holder in the plane of leg and "
+        f"tool axis, {_PROVEN}"
+    )
+    return Finding(found.least > 0.0, MM * found.least, 0.0, "mm", replay.place(found.sample), method)
+
+
+def _offsets(machine: Machine, tool: tuple[Solid, ...]) -> Floats:
+    """Return the offsets along the platform line that bodies move by: joints, spindle's ends, tool body's ends."""
+    ends = [machine.tool_length - height for solid in tool for height in (solid.low, solid.high)]
+    return np.array([*machine.pentapod.offsets, *spindle_ends(machine), *([min(ends), max(ends)] if ends else [])])
+
+
+def _moves(stray: Stray, tool: tuple[Solid, ...]) -> Floats:
+    """Return by how much (n, K) the bodies move at most: a point of a leg never more than its platform joint."""
+    line = stray.line
+    moved = [line[:, :LEGS], line[:, LEGS : LEGS + 2].max(axis=1, keepdims=True)]
+    if tool:
+        wide = max(max(s.low_radius, s.high_radius) + s.rounding for s in tool)
+        moved.append((line[:, LEGS + 2 :].max(axis=1) + wide * stray.turn)[:, None])
+    return np.concatenate(moved, axis=1)
+
+
+def _enclosed(replay: Replay, obstacle: Obstacle, frame: RigidTransform | None, columns: list[int]) -> bool:
+    """Return whether a body is wholly inside, at the start: one that never touches the surface stays on its side."""
+    position, direction = (x[:1] for x in replay.pose)
+    bodies = MovingBodies.at(replay.machine, position, direction, frame)
+    points = np.concatenate([bodies.starts[0], bodies.tips])[columns]
+    return bool(obstacle.surface.contains(points).any())
+
+
+CLAIMS = (Claim("legs, spindle and tool clear of the surroundings", told, needs_pose=False),)
+"""One that stands for all where nobody told the surroundings; `claims` makes the others."""

@@ -1,0 +1,179 @@
+"""Claims that the program is not slower than it has to be: a lowest feed, and no stop that nothing asks for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.geometry.directions import angle_between
+from pentapod.geometry.polyline import arc_length
+from pentapod.geometry.runs import marked_runs
+from pentapod.toolpath.toolpath import SegmentKind
+from pentapod.verify.claims.stops_and_dwells import STILL_M, asked_stops
+from pentapod.verify.replay.claim import Claim, Finding, Idle
+from pentapod.verify.replay.replay import Replay
+
+LOWEST_SHARE = 0.9
+"""Of the feed, where the job says nothing: slower is a cut or a link only where a limit of machine or job is used."""
+
+LOWEST_SHARE_STANDOFF = 0.95
+"""The same for what works from a stand-off, a laser or a spray, where what it does depends on the feed."""
+
+_USED = 0.5
+"""A limit of which this share is used explains why the motion is slower than the feed."""
+
+_AROUND_S, _AROUND_ROWS = 0.02, 5
+"""So near in time it must be used, or in so many rows where these are longer."""
+
+_CORNER = math.radians(20.0)
+"""Where the toolpath turns by more within the path tolerance, the motion is next to rest for a moment however the
+corner is rounded; standing there longer than `_SPARE_S` has no reason. A job's angle for exact stops may be less."""
+
+_SPARE_S = 0.05
+"""By so much a robot may stand longer than asked."""
+
+_CREEP = 0.01
+"""Of the slowest feed: what moves no leg faster is at rest."""
+
+
+def lowest_feed(replay: Replay) -> Finding | Idle:
+    """Judge that cuts and links are not slower than the feed where no limit asks for it."""
+    standoff, bound = replay.toolpath.pivot < 0.0, replay.specification.lowest_share
+    if bound is None:
+        bound = LOWEST_SHARE_STANDOFF if standoff else LOWEST_SHARE
+    if bound == 0.0:
+        return Idle("the job asks for no lowest feed")
+    feeds = _feeds(replay)
+    judged = np.isfinite(feeds)
+    if not judged.any():
+        return Idle("no moment belongs to a cut or a link alone")
+    period = replay.program.period
+    tip = _speeds(replay, 0.0)
+    share = (_speeds(replay, replay.toolpath.pivot) if standoff else tip) / feeds
+    used = np.maximum(_used(replay), tip / replay.machine.rapid_velocity if standoff else 0.0)
+    around = max(math.ceil(_AROUND_S / period), _AROUND_ROWS)
+    judged &= maximum_filter1d(used, 2 * around + 1) < _USED
+    row = int(np.argmin(np.where(judged, share, np.inf)))
+    value = min(float(share[row]), 1.0) if judged[row] else 1.0
+    slow = judged & (share < bound)
+    whose = "the spot on the surface" if standoff else "the tip"
+    method = (
+        f"least share of the feed at which {whose} moves from row to row, on cuts and links farther than the path "
+        f"tolerance from their ends, where within {1e3 * around * period:g} ms no leg and no tool limit (rate, "
+        f"acceleration, jerk) is used by more than {_USED:.0%}: such slowness has no cause in machine or job"
+    )
+    if slow.any():
+        method += f"; slower than that for {np.count_nonzero(slow) * period:.3g} s in all"
+    return Finding(value >= bound, 100.0 * value, 100.0 * bound, "%", replay.place(2 * row), method)
+
+
+def unasked_stop(replay: Replay) -> Finding:
+    """Judge that the robot comes to rest only where the toolpath gives a reason, and no longer than it asks."""
+    period, legs = replay.program.period, replay.machine.legs
+    feeds = [min(segment.feed, replay.machine.rapid_velocity) for segment in replay.toolpath.segments]
+    # The row nearest to a stop is within half a period of it: by then a leg has gained at most this.
+    rest = np.minimum(legs.max_jerk * period**2, _CREEP * min(feeds))
+    steps = np.abs(np.diff(replay.program.legs, axis=0))
+    runs = marked_runs(np.asarray((steps <= np.maximum(rest * period, STILL_M)).all(axis=1)))
+    corner = min(_CORNER, replay.specification.stop_angle or _CORNER)
+    reasons, asked = _reasons(replay, runs, corner)
+    seconds = (runs[:, 1] - runs[:, 0]) * period
+    beyond = np.where(reasons, np.maximum(seconds - asked - _SPARE_S, 0.0), seconds)
+    worst = int(np.argmax(beyond)) if len(beyond) else 0
+    value = float(beyond[worst]) if len(beyond) else 0.0
+    row = int(runs[worst, 0]) if value > 0.0 else 0
+    method = (
+        f"longest time at rest without a reason: any at all, but at dwells, ends of segments and corners of more than "
+        f"{math.degrees(corner):g} deg within the path tolerance only what exceeds the dwell asked for and "
+        f"{_SPARE_S:g} s; at rest is what moves no leg faster than its jerk allows within a period, or than "
+        f"{_CREEP:.0%} of the slowest feed"
+    )
+    if value > 0.0:
+        method += f"; {np.count_nonzero(beyond)} such stops"
+    return Finding(value <= 0.0, value, 0.0, "s", replay.place(2 * row), method)
+
+
+def _feeds(replay: Replay) -> Floats:
+    """Return the feed (N − 1,) from row to row, m/s; infinite where it is not a cut's or a link's alone."""
+    toolpath, arcs = replay.toolpath, replay.match.arcs[::2]
+    ends, rapid = arc_length(toolpath.pivots)[toolpath.starts], replay.machine.rapid_velocity
+    first = np.searchsorted(ends, arcs[:-1] - replay.path_tolerance, side="right")
+    behind = np.searchsorted(ends, arcs[1:] + replay.path_tolerance, side="left")
+    feeds = [np.inf if s.kind is SegmentKind.RAPID else min(s.feed, rapid) for s in toolpath.segments]
+    # Nothing before the first end and nothing behind the last one: there a program may stand.
+    of_gap = np.array([np.inf, *feeds, np.inf])
+    return np.where(first == behind, of_gap[first], np.inf)
+
+
+def _speeds(replay: Replay, pivot: float) -> Floats:
+    """Return the mean speed (N − 1,) from row to row of the point that far from the tip along the axis, m/s."""
+    position, direction = replay.pose
+    points = (position + (replay.machine.tool_length - pivot) * direction)[::2]
+    return np.linalg.norm(np.diff(points, axis=0), axis=1) / replay.program.period
+
+
+def _used(replay: Replay) -> Floats:
+    """Return the largest share (N − 1,) of any limit of legs and tool that is used from row to row."""
+    machine, period = replay.machine, replay.program.period
+    legs, tool = machine.legs, machine.tool_limits
+    used = (np.abs(np.diff(replay.program.legs, axis=0)) / (period * legs.max_velocity)).max(axis=1)
+    _raise(used, _differences(replay.program.legs, 2, period) / legs.max_acceleration)
+    _raise(used, _differences(replay.program.legs, 3, period) / legs.max_jerk)
+    if tool.given():
+        position, direction = replay.pose
+        tips, axes = (position + machine.tool_length * direction)[::2], direction[::2]
+        for points, order, limit in (
+            (tips, 2, tool.max_tip_acceleration),
+            (tips, 3, tool.max_tip_jerk),
+            (axes, 1, tool.max_axis_velocity),
+            (axes, 2, tool.max_axis_acceleration),
+        ):
+            _raise(used, np.linalg.norm(_differences(points, order, period), axis=1, keepdims=True) / limit)
+    return used
+
+
+def _differences(points: Floats, order: int, period: float) -> Floats:
+    """Return differences (N − order, K) of rows (N, K), by the period: the derivative of that order."""
+    return np.abs(np.diff(points, order, axis=0)) / period**order
+
+
+def _raise(used: Floats, shares: Floats) -> None:
+    """Raise `used` (N − 1,) to shares (N − order, K) of differences, each at the step in its middle."""
+    first = (len(used) - len(shares)) // 2
+    part = used[first : first + len(shares)]
+    np.maximum(part, shares.max(axis=1), out=part)
+
+
+def _reasons(replay: Replay, runs: Ints, least: float) -> tuple[Bools, Floats]:
+    """Return for each run of steps whether the robot may rest there at all, and for how many seconds it is asked to.
+
+    least: corners of more radians are a reason.
+    """
+    path, match = replay.toolpath, replay.match
+    way = arc_length(path.pivots)
+    arcs, within = match.arcs[::2], replay.path_tolerance
+    low, high = arcs[runs[:, 0]] - within, arcs[np.minimum(runs[:, 1], len(arcs) - 1)] + within
+    ends = way[path.starts]
+    reasons = np.searchsorted(ends, high, "right") > np.searchsorted(ends, low, "left")
+    # How far the path turns between its waypoints, by direction and by axis, summed up to each of them.
+    step = np.diff(path.pivots, axis=0)
+    moving = np.linalg.norm(step, axis=1) > 0.0
+    corner = np.zeros(len(way))
+    at = np.flatnonzero(moving)
+    corner[at[1:]] = angle_between(step[at[:-1]], step[at[1:]])
+    turned = np.append(0.0, np.cumsum(corner + np.append(0.0, angle_between(path.axes[:-1], path.axes[1:]))))
+    first, behind = np.searchsorted(way, low, "left"), np.searchsorted(way, high, "right")
+    reasons |= turned[behind] - turned[np.minimum(first, behind)] > least
+    asked = np.zeros(len(runs))
+    for begin, end, seconds in asked_stops(replay):
+        asked += np.where((runs[:, 0] < end) & (runs[:, 1] > begin), seconds, 0.0)
+    return np.asarray(reasons), asked
+
+
+CLAIMS = (
+    Claim("lowest feed", lowest_feed),
+    Claim("no unasked stop", unasked_stop),
+)

@@ -1,0 +1,107 @@
+"""Claims about how fast the tool goes: feed on cuts and links, rapid rate, rest at both ends."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.geometry.polyline import arc_length
+from pentapod.toolpath.toolpath import SegmentKind
+from pentapod.verify.replay.claim import ALLOWANCE, MM, Claim, Finding, Idle, with_allowance
+from pentapod.verify.replay.replay import Replay
+
+_MM_MIN = 60e3  # mm/min in 1 m/s
+
+
+def feed(replay: Replay, kind: SegmentKind) -> Finding | Idle:
+    """Judge the speed on the segments of one kind; idle where the program has no such motion.
+
+    A cutter's feed is the speed of its tip. What works from a stand-off meets the surface at the pivot: there the
+    feed is the speed of that spot, while the tip may go as fast as on rapids, and has to keep to that everywhere.
+    """
+    limit, governing = _limits(replay)
+    standoff, rapid = replay.toolpath.pivot < 0.0, kind == SegmentKind.RAPID
+    kinds = np.array([segment.kind == kind for segment in replay.toolpath.segments])
+    chords = np.flatnonzero(kinds[governing])
+    if standoff and rapid:
+        chords, limit = np.arange(len(governing)), np.full(len(governing), replay.machine.rapid_velocity)
+    if not len(chords):
+        return Idle(f"no moment belongs to a {kind}")
+    spot = standoff and not rapid
+    linear = replay.program.interpolation == "linear"
+    speed = (_between_rows(replay, spot=spot) if linear else replay.survey.speeds[:, 1 if spot else 0])[chords]
+    worst = int(np.argmax(speed / limit[chords]))
+    value, bound = float(speed[worst]), float(limit[chords[worst]])
+    whose = "the spot that the program's tool meets on the surface" if spot else "the program's own tip"
+    which = "on every segment" if standoff and rapid else f"where the matched place is on a {kind}"
+    method = (
+        f"speed of {whose}, {'from row to row' if linear else 'proven bound for all times'}, {which}; within the path "
+        f"tolerance of a segment's end the faster of both feeds counts; {ALLOWANCE:.1%} allowed"
+    )
+    allowed, where = with_allowance(bound), replay.place(int(chords[worst]))
+    told = (_MM_MIN * value, _MM_MIN * bound, "mm/min", where, method, _MM_MIN * allowed)
+    return Finding(value <= allowed, *told)
+
+
+def _between_rows(replay: Replay, *, spot: bool) -> Floats:
+    """Return the mean speed (M − 1,) of tip or spot over the period that each chord belongs to.
+
+    With linear interpolation the legs' speeds step at each row, and the tip's wavers within each period about its mean:
+    that is the controller's doing, at its own pace, and no feed that anybody set.
+    """
+    position, direction = replay.pose
+    arm = replay.machine.tool_length - (replay.toolpath.pivot if spot else 0.0)
+    points = (position + arm * direction)[::2]
+    return np.repeat(np.linalg.norm(np.diff(points, axis=0), axis=1) / replay.program.period, 2)
+
+
+def _limits(replay: Replay) -> tuple[Floats, Ints]:
+    """Return the speed limit (M − 1,) in m/s between consecutive samples, and the segment that sets it.
+
+    A chord that comes within the path tolerance of another segment, along the path, may go at the faster
+    limit: which side of a rounded corner belongs to which segment is not defined more closely than that.
+    """
+    segments, arcs = replay.toolpath.segments, replay.match.arcs
+    rapid = replay.machine.rapid_velocity
+    limits = np.array([rapid if s.kind == SegmentKind.RAPID else min(s.feed, rapid) for s in segments])
+    bounds = arc_length(replay.toolpath.pivots)[replay.toolpath.starts]
+    low = np.searchsorted(bounds[1:], arcs[:-1] - replay.path_tolerance, side="left")
+    high = np.searchsorted(bounds[1:-1], arcs[1:] + replay.path_tolerance, side="right")
+    governing = low.copy()
+    for step in range(int((high - low).max()) + 1):
+        other = np.minimum(low + step, high)
+        governing = np.where(limits[other] > limits[governing], other, governing)
+    return limits[governing], governing
+
+
+def rest(replay: Replay, *, at_end: bool) -> Finding:
+    """Judge that the robot stands at one end of the program."""
+    rows = replay.program.legs
+    step = rows[-1] - rows[-2] if at_end else rows[1] - rows[0]
+    period, limit = replay.program.period, replay.machine.legs.max_acceleration
+    speed = np.abs(step) / period
+    leg = int(np.argmax(speed / limit))
+    value, bound = float(speed[leg]), float(limit[leg]) * period
+    method = (
+        f"speed of leg {leg + 1} over the {'last' if at_end else 'first'} period; the bound is what its "
+        f"greatest acceleration changes in one period; {ALLOWANCE:.1%} allowed"
+    )
+    where = replay.place(2 * len(rows) - 2 if at_end else 0)
+    allowed = with_allowance(bound)
+    return Finding(value <= allowed, MM * value, MM * bound, "mm/s", where, method, MM * allowed)
+
+
+CLAIMS = (
+    *(
+        Claim(name, partial(feed, kind=kind), needs_proof=True)
+        for name, kind in (
+            ("feed on cuts", SegmentKind.CUT),
+            ("feed on links", SegmentKind.LINK),
+            ("rapid rate", SegmentKind.RAPID),
+        )
+    ),
+    Claim("starts at rest", partial(rest, at_end=False), needs_pose=False),
+    Claim("ends at rest", partial(rest, at_end=True), needs_pose=False),
+)

@@ -1,0 +1,1 @@
+"""The program as the controller runs it, and bounds that hold at every time."""

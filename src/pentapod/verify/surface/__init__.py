@@ -1,0 +1,1 @@
+"""What the replayed cutter leaves on the surface."""

@@ -1,0 +1,134 @@
+"""SweptCutter: where a cutter has been in the course of a replay, for questions about what it leaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.geometry.solids import Solid
+from pentapod.mesh.query.tree import along_morton_curve
+from pentapod.verify.replay.replay import Replay
+from pentapod.verify.replay.stretches import CUT, LONGEST, Stretches, strays
+
+if TYPE_CHECKING:
+    from pentapod.verify.surface.swept_cutter_kernels import Swept
+
+_PER_LEAF = 4
+
+
+@dataclass(frozen=True, eq=False)
+class SweptSolid:
+    """The way of one solid, in straight stretches, in a tree of boxes.
+
+    stretches (S, 13): start and way of the point at the tip (of a ball: of its centre), axis at start and end, and by
+    how much the solid may be off. boxes (2 L − 1, 6): around the solid's axis. starts (L + 1,): of the leaves.
+    numbers (5,): of the solid, as `Solid.numbers`; wide: farthest that it reaches from its axis, metres.
+    """
+
+    stretches: Floats
+    boxes: Floats
+    starts: Ints
+    numbers: Floats
+    wide: float
+    is_ball: bool
+
+    @classmethod
+    def of(cls, replay: Replay, solid: Solid, chords: Bools, near: float) -> SweptSolid | None:
+        """Return the sweep of a solid over some chords (M − 1,) of a replay; None where nothing is known of any.
+
+        near: stretches are cut until the motion is no farther off them, metres, or they are single chords.
+        """
+        pivot, wide = replay.toolpath.pivot, max(solid.low_radius, solid.high_radius) + solid.rounding
+        # The path of a ball about the pivot does not know how the tool turns.
+        at_pivot = solid.is_ball and solid.low == pivot
+        lever = 0.0 if at_pivot else max(abs(solid.low - pivot), abs(solid.high - pivot)) + wide
+        of, off = _stretches(replay, chords, lever, near)
+        known = off < wide
+        of, off = of.where(known), off[known]
+        if not len(off):
+            return None
+        first, last = replay.axes[of.starts], replay.axes[of.ends]
+        drop = solid.low - pivot if solid.is_ball else -pivot
+        start, end = replay.pivots[of.starts] + drop * first, replay.pivots[of.ends] + drop * last
+        low, high = (0.0, 0.0) if solid.is_ball else (solid.low, solid.high)
+        ends = np.stack([start + low * first, start + high * first, end + low * last, end + high * last])
+        middles = ends.mean(axis=0)
+        order = along_morton_curve(middles, np.stack([middles.min(axis=0), middles.max(axis=0)]))
+        rows = np.concatenate([start, end - start, first, last, off[:, None]], axis=1)[order]
+        # An axis that turns evenly bulges by no more than this out of the hull of its ends.
+        bulge = 0.125 * max(abs(low), abs(high)) * float(np.sum((last - first) ** 2, axis=1).max())
+        boxes, starts = _boxes(ends.min(axis=0)[order] - bulge, ends.max(axis=0)[order] + bulge)
+        numbers = np.array((0.0, 0.0, 0.0, 0.0, wide) if solid.is_ball else solid.numbers)
+        return cls(np.ascontiguousarray(rows), boxes, starts, numbers, wide, solid.is_ball)
+
+    @property
+    def _swept(self) -> Swept:
+        return self.stretches, self.boxes, self.starts, self.numbers, self.wide, self.is_ball
+
+    def entries(self, points: Floats, normals: Floats, heights: Floats) -> None:
+        """Lower heights (N,), metres, to where rays from points along unit normals (N, 3) first meet the solid."""
+        from pentapod.verify.surface.swept_cutter_kernels import entries  # noqa: PLC0415  loads numba
+
+        entries(points, normals, self._swept, heights)
+
+    def distances(self, points: Floats, gaps: Floats) -> None:
+        """Lower gaps (N,), metres, to how far points (N, 3) are from where the solid has been."""
+        from pentapod.verify.surface.swept_cutter_kernels import distances  # noqa: PLC0415  loads numba
+
+        distances(points, self._swept, gaps)
+
+    def uncovered(
+        self, corners: Floats, normals: Floats, height: float, coarse: float, fine: float
+    ) -> tuple[Floats, Floats]:
+        """Return the cells of triangles (N, 3, 3) with normals (N, 3) that are not proven covered, as (K, 12).
+
+        Corners and normal of each. Also what is left at most at the middles of the cells that are covered, metres, and
+        where (4,). See the kernel of the same name.
+        """
+        from pentapod.verify.surface.surface_left_kernels import uncovered  # noqa: PLC0415  loads numba
+
+        room = max(2 * len(corners), 1 << 14)
+        while True:
+            found, deepest = np.empty((room, 12)), np.array([0.0, np.nan, np.nan, np.nan])
+            count = uncovered(corners, normals, height, coarse, fine, self._swept, deepest, found)
+            if count <= room:
+                return found[:count], deepest
+            room = count
+
+
+def _stretches(replay: Replay, chords: Bools, lever: float, near: float) -> tuple[Stretches, Floats]:
+    """Return the longest stretches that are near enough to the motion, and how far (n,) it is off them."""
+    size, todo = LONGEST, Stretches.along(chords).cut(LONGEST)
+    starts, ends, off = list[Ints](), list[Ints](), list[Floats]()
+    while len(todo.starts):
+        far = strays(replay, todo, lever)
+        good = (far <= near) | (size == 1)
+        starts.append(todo.starts[good])
+        ends.append(todo.ends[good])
+        off.append(far[good])
+        size = max(size // CUT, 1)
+        todo = todo.where(~good).cut(size)
+    if not starts:
+        return todo, np.empty(0)
+    return Stretches(np.concatenate(starts), np.concatenate(ends)), np.concatenate(off)
+
+
+def _boxes(low: Floats, high: Floats) -> tuple[Floats, Ints]:
+    """Return the boxes (2 L − 1, 6) of a complete tree over boxes (S, 3) to (S, 3), and where its leaves begin."""
+    count = len(low)
+    leaves = 1 << max(0, (count // _PER_LEAF).bit_length() - 1)
+    starts = (np.arange(leaves + 1) * count) // leaves
+    boxes = np.empty((2 * leaves - 1, 6))
+    boxes[leaves - 1 :, :3] = np.minimum.reduceat(low, starts[:-1], axis=0)
+    boxes[leaves - 1 :, 3:] = np.maximum.reduceat(high, starts[:-1], axis=0)
+    first = leaves - 1
+    while first > 0:
+        above = (first - 1) // 2
+        level = boxes[first : 2 * first + 1]
+        boxes[above:first, :3] = np.minimum(level[::2, :3], level[1::2, :3])
+        boxes[above:first, 3:] = np.maximum(level[::2, 3:], level[1::2, 3:])
+        first = above
+    return boxes, starts

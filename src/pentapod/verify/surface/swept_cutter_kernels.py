@@ -1,0 +1,207 @@
+"""Kernels for how far points are from where a solid of revolution has been, and where rays first meet that.
+
+The cutter is some convex solids of revolution. On each *stretch* of the motion a solid goes straight while its axis
+turns evenly. Every place looked at is one that the solid really takes, within the `stray` of its stretch, by which it
+is made smaller here. So what counts as removed is removed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.mesh.query.box_kernels import open_node
+from pentapod.numerics.kernels import kernel
+
+STACK = 128
+"""Nodes of a tree, or cells, that may wait to be looked at."""
+Swept = tuple[Floats, Floats, Ints, Floats, float, bool]
+"""One solid and where it has been: stretches (S, 13), boxes (2 L − 1, 6), starts (L + 1,), the solid (5,), wide, and
+whether it is a ball. Boxes are around the axis of the solid; nothing of it is farther from there than `wide`."""
+
+Room = tuple[Ints, Floats]
+"""Of a search: nodes and their lower bounds, both (STACK,)."""
+
+_GOLDEN = 0.6180339887498949
+_ROUNDS = 12
+_MET = 1e-7  # metres: a ray that comes so near has entered
+_STEPS = 200
+
+
+@kernel
+def _to_solid(h: float, out: float, solid: Floats) -> float:
+    """Return the signed distance from a solid (5,) of a point at height h, `out` from the axis; negative inside."""
+    low, high, first, last = solid[0], solid[1], solid[2], solid[3]
+    # The wall from (low, first) to (high, last) in the half plane through the axis.
+    along, across = high - low, last - first
+    square = along * along + across * across
+    t = 0.0
+    if square > 0.0:
+        t = min(max(((h - low) * along + (out - first) * across) / square, 0.0), 1.0)
+    dh, dr = h - low - t * along, out - first - t * across
+    wall = math.sqrt(dh * dh + dr * dr)
+    if low <= h <= high and along > 0.0 and out <= first + (h - low) / along * across:
+        side = (first + (h - low) / along * across - out) * along / math.sqrt(square)
+        return -min(side, h - low, high - h) - solid[4]
+    best = wall
+    for end in range(2):
+        level, radius = (low, first) if end == 0 else (high, last)
+        over, above = max(out - radius, 0.0), h - level
+        best = min(best, math.sqrt(over * over + above * above))
+    return best - solid[4]
+
+
+@kernel
+def at_share(x: Floats, stretch: Floats, solid: Floats, share: float) -> float:
+    """Return the signed distance of a point from a solid at a share of a stretch (13,)."""
+    rest = 1.0 - share
+    ax = rest * stretch[6] + share * stretch[9]
+    ay = rest * stretch[7] + share * stretch[10]
+    az = rest * stretch[8] + share * stretch[11]
+    length = math.sqrt(ax * ax + ay * ay + az * az)
+    ax, ay, az = ax / length, ay / length, az / length
+    dx = x[0] - stretch[0] - share * stretch[3]
+    dy = x[1] - stretch[1] - share * stretch[4]
+    dz = x[2] - stretch[2] - share * stretch[5]
+    h = dx * ax + dy * ay + dz * az
+    out = math.sqrt(max(dx * dx + dy * dy + dz * dz - h * h, 0.0))
+    return _to_solid(h, out, solid)
+
+
+@kernel
+def to_stretch(x: Floats, stretch: Floats, solid: Floats, is_ball: bool) -> tuple[float, float]:
+    """Return the signed distance of a point from a solid on a stretch, and the share of it where that is least.
+
+    stretch (13,): start and way of the solid's origin, axis at start and end, stray.
+    """
+    if is_ball:
+        dx, dy, dz = x[0] - stretch[0], x[1] - stretch[1], x[2] - stretch[2]
+        wx, wy, wz = stretch[3], stretch[4], stretch[5]
+        square = wx * wx + wy * wy + wz * wz
+        t = 0.0
+        if square > 0.0:
+            t = min(max((dx * wx + dy * wy + dz * wz) / square, 0.0), 1.0)
+        dx, dy, dz = dx - t * wx, dy - t * wy, dz - t * wz
+        return math.sqrt(dx * dx + dy * dy + dz * dz) - solid[4] + stretch[12], t
+    # The distance from a convex body is convex along the way.
+    low, high = 0.0, 1.0
+    a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    fa, fb = at_share(x, stretch, solid, a), at_share(x, stretch, solid, b)
+    for _ in range(_ROUNDS):
+        if fa <= fb:
+            high, b, fb = b, a, fa
+            a = high - _GOLDEN * (high - low)
+            fa = at_share(x, stretch, solid, a)
+        else:
+            low, a, fa = a, b, fb
+            b = low + _GOLDEN * (high - low)
+            fb = at_share(x, stretch, solid, b)
+    best, share = (fa, a) if fa <= fb else (fb, b)
+    for end in range(2):
+        value = at_share(x, stretch, solid, float(end))
+        if value < best:
+            best, share = value, float(end)
+    return best + stretch[12], share
+
+
+@kernel
+def _to_box(x: Floats, box: Floats) -> float:
+    square = 0.0
+    for j in range(3):
+        over = max(box[j] - x[j], 0.0, x[j] - box[3 + j])
+        square += over * over
+    return math.sqrt(square)
+
+
+@kernel
+def nearest_stretch(
+    x: Floats,
+    warm: int,
+    enough: float,
+    swept: Swept,
+    room: Room,
+) -> tuple[float, int, float]:
+    """Return the signed distance of a point from the sweep of a solid, the stretch, and the share of it.
+
+    Ends at the first place that is not farther than `enough`. warm: a stretch to look at first, −1 for none.
+    """
+    stretches, boxes, starts, solid, wide, is_ball = swept
+    nodes, bounds = room
+    best, facet, where = math.inf, -1, 0.0
+    if warm >= 0:
+        best, where = to_stretch(x, stretches[warm], solid, is_ball)
+        facet = warm
+        if best <= enough:
+            return best, facet, where
+    leaves = len(starts) - 1
+    nodes[0], bounds[0] = 0, _to_box(x, boxes[0]) - wide
+    count = 1
+    while count > 0:
+        count -= 1
+        node = nodes[count]
+        if bounds[count] >= best:
+            continue
+        leaf = node - (leaves - 1)
+        if leaf < 0:
+            near, far = _to_box(x, boxes[2 * node + 1]) - wide, _to_box(x, boxes[2 * node + 2]) - wide
+            count = open_node(node, near, far, best, count, nodes, bounds)
+        else:
+            for k in range(starts[leaf], starts[leaf + 1]):
+                distance, share = to_stretch(x, stretches[k], solid, is_ball)
+                if distance < best:
+                    best, facet, where = distance, k, share
+                    if best <= enough:
+                        return best, facet, where
+    return best, facet, where
+
+
+@kernel
+def entry(
+    q: Floats,
+    n: Floats,
+    most: float,
+    warm: int,
+    swept: Swept,
+    room: Room,
+) -> tuple[float, int]:
+    """Return at which height along a normal a ray from q first enters the sweep, at most `most`; and the stretch."""
+    t, x = 0.0, np.empty(3)
+    for _ in range(_STEPS):
+        for i in range(3):
+            x[i] = q[i] + t * n[i]
+        gap, warm, _ = nearest_stretch(x, warm, _MET, swept, room)
+        if gap <= _MET:
+            return t, warm
+        t += gap
+        if t >= most:
+            return most, warm
+    return t, warm
+
+
+@kernel
+def entries(
+    points: Floats,
+    normals: Floats,
+    swept: Swept,
+    heights: Floats,
+) -> None:
+    """Lower heights (N,) to where rays from points along normals (N, 3) first enter the sweep of a solid."""
+    room, warm = (np.empty(STACK, dtype=np.intp), np.empty(STACK)), -1
+    for k in range(len(points)):
+        height, warm = entry(points[k], normals[k], heights[k], warm, swept, room)
+        heights[k] = min(heights[k], height)
+
+
+@kernel
+def distances(
+    points: Floats,
+    swept: Swept,
+    gaps: Floats,
+) -> None:
+    """Lower gaps (N,) to how far points (N, 3) are from the sweep of a solid; negative inside."""
+    room, warm = (np.empty(STACK, dtype=np.intp), np.empty(STACK)), -1
+    for k in range(len(points)):
+        gap, warm, _ = nearest_stretch(points[k], warm, -math.inf, swept, room)
+        gaps[k] = min(gaps[k], gap)

@@ -1,0 +1,1 @@
+"""What a verdict is about, and what it says."""

@@ -1,0 +1,119 @@
+"""Coverage: which surface a program is to machine, and how much it may leave there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.errors import ArrayError
+from pentapod.cutters.stand_off import StandOff
+from pentapod.cutters.tool import Tool
+from pentapod.geometry.directions import normalised
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.patch import Patch
+from pentapod.toolpath.lines.scallop import ridge
+from pentapod.toolpath.linking.partition import Piece, cutting_intervals
+from pentapod.toolpath.options import CoverOptions, PathOptions
+from pentapod.toolpath.strategies.waterline import WaterlineOptions
+from pentapod.toolpath.toolpath import Toolpath
+
+_MOST_FACETS = 1_000_000
+_HIGHER = 1.25
+"""Ridges may be so much higher than on a plane before somebody must say so."""
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """What a program is to machine, and what it may leave there.
+
+    region: the surface, workpiece frame; None where the program draws lines and covers none, `why` says so. left:
+    height above it, along its normal, up to which it counts as finished, metres; of a tool that keeps its distance, how
+    far the surface may be from the line that its beam or spray draws. share: of the region's area, 0 to 1, on which
+    more may be left. view (3,): towards the tool, any length. whole: makes the toolpath that covers all of the region,
+    where a program may be a piece of it. Raises ArrayError unless `left` is positive and `share` from 0 to 1.
+    """
+
+    region: Patch | None
+    left: float
+    share: float = 0.0
+    view: Floats | tuple[float, float, float] = (0.0, 0.0, 1.0)
+    whole: Callable[[], Toolpath] | None = None
+    why: str = ""
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.left) and self.left > 0.0):
+            raise ArrayError("must be positive", key="left", value=self.left)
+        if not 0.0 <= self.share <= 1.0:
+            raise ArrayError("must be from 0 to 1", key="share", value=self.share)
+        set_frozen(self, view=frozen(normalised(frozen(self.view, "view", (3,))), "view"))
+
+    @classmethod
+    def nothing(cls, why: str) -> Coverage:
+        """Return that there is no surface to cover, and why."""
+        return cls(None, np.finfo(float).max, why=why)
+
+    @classmethod
+    def of(
+        cls,
+        part: Mesh,
+        tool: Tool,
+        options: PathOptions,
+        *,
+        path_tolerance: float,
+        left: float | None = None,
+        share: float = 1e-3,
+        whole: Callable[[], Toolpath] | None = None,
+    ) -> Coverage:
+        """Return what a strategy with these options is to cover; nothing, where it draws lines, unless `left` is given.
+
+        left: when None, the ridge between passes on a plane and a quarter of it, for what is curved, and tolerances of
+        chords and path; of a beam or spray half the distance between the lines instead of the ridge.
+        """
+        if left is None and not isinstance(options, CoverOptions):
+            return cls.nothing(f"{type(options).__name__.removesuffix('Options').lower()}: lines that cover no region")
+        region = Patch.of(part, options.region)
+        if isinstance(options, WaterlineOptions):
+            region = region.steeper(np.asarray(options.upright), options.shallowest)
+        if left is None:
+            left = _HIGHER * _ridge(options, tool) + options.chordal + path_tolerance
+        return cls(region, left, share, options.up, whole)
+
+    @property
+    def up(self) -> Floats:
+        """The view direction (3,), unit, towards the tool."""
+        return np.asarray(self.view)
+
+    def of_piece(self, piece: Piece) -> Coverage:
+        """Return what a piece of the whole toolpath is to machine: where the nearest cut of the whole is the piece's.
+
+        Raises ArrayError where the whole is not known.
+        """
+        if self.region is None or not len(self.region.faces):
+            return self
+        if self.whole is None:
+            raise ArrayError("the whole toolpath is not known", key="whole", value=piece)
+        whole = self.whole()
+        mine, size = piece.cuts(whole), max(0.5 * self.left, float(np.sqrt(self.region.areas.sum() / _MOST_FACETS)))
+        cutting = np.flatnonzero(cutting_intervals(whole))
+        start, end = whole.pivots[cutting], whole.pivots[cutting + 1]
+        counts = np.ceil(np.linalg.norm(end - start, axis=1) / size).astype(np.intp) + 1
+        owner = np.repeat(np.arange(len(cutting)), counts)
+        number = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
+        share = ((number + 0.5) / counts[owner])[:, None]
+        fine = self.region.refined(size)
+        middles = fine.vertices[fine.faces].mean(axis=1) + max(whole.pivot, 0.0) * fine.facet_normals
+        nearest = KDTree(start[owner] + share * (end - start)[owner]).query(middles)[1]
+        own = mine[cutting[owner[np.asarray(nearest)]]]
+        return replace(self, region=Patch(fine.vertices, fine.faces[own], fine.normals[own]))
+
+
+def _ridge(options: PathOptions, tool: Tool) -> float:
+    """Return the height of the ridge between passes on a plane; of a beam, half the distance between its lines."""
+    scallop, stepover = getattr(options, "scallop", None), getattr(options, "stepover", None)
+    if isinstance(tool, StandOff):
+        return 0.5 * float(stepover or 0.0)
+    return ridge(float(stepover or 0.0), tool) if scallop is None else float(scallop)

@@ -1,0 +1,84 @@
+"""Specification: everything that a program is judged against."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Required, TypedDict
+
+import numpy as np
+
+from pentapod.base.errors import ArrayError
+from pentapod.machine.machine import Machine
+from pentapod.toolpath.toolpath import Toolpath
+from pentapod.verify.verdict.cutting import Cutting
+from pentapod.verify.verdict.sources import UNTOLD, Sources
+
+if TYPE_CHECKING:
+    from pentapod.kinematics.component import Component
+    from pentapod.machine.clearance.collision_world import Surroundings
+    from pentapod.planning.problem.constraints import Freedom
+
+
+@dataclass(frozen=True, eq=False)
+class Specification:
+    """What a program is judged against. A field that is None was told by nobody: what needs it is not judged.
+
+    machine: with its tool length and controller. toolpath: in the workpiece frame, as the job asks for it.
+    tilt: half angle in radians of the cone about the nominal axis in which the tool may stand; axis_tolerance:
+    radians beyond that; path_tolerance: metres. job_digest: of the job that the header must name. surroundings: what
+    legs, spindle and tool must not touch. cutting: what cuts, and into which part. freedom: where the part may be
+    placed. component: in which the program must be, None where any will do. lowest_share: of the feed, that cuts and
+    links must reach where no limit is used; None for the default of the tool, 0 where it does not matter.
+    stop_angle: radians; where the toolpath turns by more the program may stop (anyway from 20 degrees on); None where
+    nobody says. setups: most programs into which the work may be split; missed: how many intervals of the whole
+    toolpath should be cut and are
+    cut in none of them, or in more than one; None where the other programs are not known. waived: names of claims
+    without which the verdict may pass where they cannot be judged. sources: the files that all this is from.
+    Raises ArrayError where a tolerance is not a sensible number.
+    """
+
+    machine: Machine
+    toolpath: Toolpath
+    tilt: float
+    path_tolerance: float
+    axis_tolerance: float
+    job_digest: str | None = None
+    surroundings: Surroundings | None = None
+    cutting: Cutting | None = None
+    freedom: Freedom | None = None
+    component: Component | None = None
+    lowest_share: float | None = None
+    stop_angle: float | None = None
+    setups: int = 1
+    missed: int | None = None
+    waived: tuple[str, ...] = ()
+    sources: Sources = UNTOLD
+
+    def __post_init__(self) -> None:
+        for name in ("tilt", "path_tolerance", "axis_tolerance"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and (value >= 0.0 if name != "path_tolerance" else value > 0.0)):
+                raise ArrayError("must be a positive number", key=name, value=value)
+        if self.lowest_share is not None and not 0.0 <= self.lowest_share <= 1.0:
+            raise ArrayError("must be a share", key="lowest_share", value=self.lowest_share, expected="0 to 1")
+        if self.stop_angle is not None and not 0.0 < self.stop_angle <= np.pi:
+            raise ArrayError("must be an angle", key="stop_angle", value=self.stop_angle, expected="0 to π, not 0")
+
+
+class Asked(TypedDict, total=False):
+    """The fields of a `Specification` after machine and toolpath, as keywords."""
+
+    tilt: Required[float]
+    path_tolerance: Required[float]
+    axis_tolerance: Required[float]
+    job_digest: str | None
+    surroundings: Surroundings | None
+    cutting: Cutting | None
+    freedom: Freedom | None
+    component: Component | None
+    lowest_share: float | None
+    stop_angle: float | None
+    setups: int
+    missed: int | None
+    waived: tuple[str, ...]
+    sources: Sources

@@ -1,0 +1,160 @@
+"""Jobs with other tools, axes and toolpath files: from the job file to a judged program."""
+
+from __future__ import annotations
+
+import json
+import re
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from pentapod.base.errors import JobError
+from pentapod.cli.main import run as run_cli
+from pentapod.geometry import angle_between
+from pentapod.job import Job, run
+from pentapod.job.build.values import job_mesh, job_toolpath
+from pentapod.toolpath import SegmentKind
+from pentapod.toolpath.formats import read_toolpath
+
+BALL = 'type = "ball"\ndiameter_mm = 10'
+STRATEGY = "stepover_mm = 15\nspacing_mm = 4"
+
+
+@pytest.mark.parametrize("name", ["path.apt", "path.ngc", "path.nc", "path.robodk.csv", "path.csv", "path.npz"])
+def test_toolpath_writes_by_suffix_and_a_job_reads_it(make_job, tmp_path, name):
+    out = tmp_path / name
+    job = make_job()
+    assert run_cli(["toolpath", str(job), "-o", str(out), "-q"]) == 0
+    made = job_toolpath(Job.load(job), job_mesh(Job.load(job)))[0]
+    again = make_job((STRATEGY, f'strategy = "file"\nfile = "{name}"'), name="again.toml")
+    path, report = job_toolpath(Job.load(again), job_mesh(Job.load(again)))
+    np.testing.assert_allclose(path.pivots, made.pivots, atol=1e-9)
+    np.testing.assert_allclose(path.axes, made.axes, atol=1e-9)
+    assert path.pivot == 5e-3
+    assert f"{name}: " in str(report)
+    assert "gouge check" in str(report)
+
+
+def test_a_toolpath_file_goes_through_the_whole_of_plan(make_job, tmp_path):
+    assert run_cli(["toolpath", str(make_job()), "-o", str(tmp_path / "path.apt"), "-q"]) == 0
+    job = make_job((STRATEGY, 'strategy = "file"\nfile = "path.apt"'), name="again.toml")
+    outcome = run(Job.load(job), tmp_path / "out")
+    assert outcome.passed
+    assert json.loads((tmp_path / "out" / "verdict.json").read_text())["passed"]
+    assert len(read_toolpath(tmp_path / "path.apt")) > 20
+
+
+def test_the_digest_follows_the_toolpath_file(make_job, tmp_path):
+    assert run_cli(["toolpath", str(make_job()), "-o", str(tmp_path / "path.csv"), "-q"]) == 0
+    job = make_job((STRATEGY, 'strategy = "file"\nfile = "path.csv"'), name="again.toml")
+    before = Job.load(job).digest
+    with (tmp_path / "path.csv").open("a") as stream:
+        stream.write("\n")
+    assert Job.load(job).digest != before
+
+
+def test_long_work_on_a_toolpath_shows_its_progress(make_job, tmp_path, monkeypatch):
+    told = []
+
+    @contextmanager
+    def recorder(*, quiet):
+        assert not quiet
+        yield lambda stage, fraction, note="": told.append((stage, fraction, note))
+
+    monkeypatch.setattr("pentapod.cli.commands.toolpath.progress_bar", recorder)
+    assert run_cli(["toolpath", str(make_job()), "-o", str(tmp_path / "path.csv")]) == 0
+    assert [note for stage, _, note in told if stage == "mesh" and note] == ["reading", "welding", "edges"]
+    assert {stage for stage, _, _ in told} == {"mesh", "toolpath", "gouge", "writing"}
+    assert all(0.0 <= fraction <= 1.0 for _, fraction, _ in told)
+
+
+@pytest.mark.parametrize(
+    ("tool", "pivot"),
+    [
+        ('type = "bull"\ndiameter_mm = 10\ncorner_mm = 2\nflute_mm = 15', 0.0),
+        ('type = "flat"\ndiameter_mm = 6\nshank_mm = [[20, 6, 6]]\nholder_mm = [[10, 12, 20], [30, 20, 20]]', 0.0),
+        ('type = "lollipop"\ndiameter_mm = 8\nneck_mm = 4\nreach_mm = 25', 4e-3),
+        ('type = "standoff"\nstandoff_mm = 5\nshank_mm = [[20, 1, 10]]', -5e-3),
+    ],
+)
+def test_every_tool_makes_a_toolpath(make_job, tool, pivot):
+    job = Job.load(make_job((BALL, tool)))
+    path, report = job_toolpath(job, job_mesh(job))
+    assert path.pivot == pivot
+    assert "gouge check" in str(report)
+
+
+def test_axes_and_remedies_of_the_job_are_used(make_job):
+    fixed = ("tilt_deg = 0", 'tilt_deg = 0\nmode = "fixed"\ndirection = [0, 0, 1]')
+    job = Job.load(make_job(fixed))
+    path, _ = job_toolpath(job, job_mesh(job))
+    np.testing.assert_allclose(path.axes, np.tile([0.0, 0.0, 1.0], (len(path), 1)), atol=1e-12)
+    # A wide holder just over the ball hits the dome's top while the ball is at its foot: lifted, or else dropped.
+    wide = (BALL, BALL + "\nflute_mm = 5.1\nholder_mm = [[20, 40, 40]]")
+    job = Job.load(make_job(fixed, wide, ("[feed]", '[gouge]\nremedy = ["lift", "drop"]\n\n[feed]')))
+    path, report = job_toolpath(job, job_mesh(job))
+    assert "holder" in str(report)
+    assert "problem" not in str(report).splitlines()[-1]
+    assert "ways between cuts led over" in str(report)
+    assert any(segment.kind is SegmentKind.CUT for segment in path.segments)
+
+
+def test_what_gouges_is_dropped_but_never_out_of_somebody_elses_toolpath(make_job, tmp_path):
+    """A job that says nothing of gouges: of its own path the cuts in the way of the holder go, from a file none."""
+    fixed = ("tilt_deg = 0", 'tilt_deg = 0\nmode = "fixed"\ndirection = [0, 0, 1]')
+    wide = (BALL, BALL + "\nflute_mm = 5.1\nholder_mm = [[20, 40, 40]]")
+    job = Job.load(make_job(fixed, wide))
+    _, report = job_toolpath(job, job_mesh(job))
+    assert "motions dropped" in str(report)
+    assert "motions gouge by" not in str(report)
+    assert run_cli(["toolpath", str(make_job(fixed)), "-o", str(tmp_path / "path.csv"), "-q"]) == 0
+    given = read_toolpath(tmp_path / "path.csv")
+    job = Job.load(make_job(fixed, wide, (STRATEGY, 'strategy = "file"\nfile = "path.csv"')))
+    path, report = job_toolpath(job, job_mesh(job))
+    assert "motions gouge by" in str(report)
+    np.testing.assert_array_equal(path.tips, given.tips)
+
+
+def test_a_tilt_that_breaks_the_cap_on_turning_is_told(make_job):
+    """A holder just over the ball meets the dome; tilting clear turns the axis fast, the cap is slow."""
+    fixed = ("tilt_deg = 0", 'tilt_deg = 0\nmode = "fixed"\ndirection = [0, 0, 1]\nrate_deg_mm = 0.1')
+    wide = (BALL, BALL + "\nflute_mm = 5.1\nholder_mm = [[20, 40, 40]]")
+    job = Job.load(make_job(fixed, wide, ("[feed]", '[gouge]\nremedy = ["tilt"]\ncone_deg = 60\n\n[feed]')))
+    path, report = job_toolpath(job, job_mesh(job))
+    assert "waypoints tilted clear" in str(report)
+    assert re.search(r"problem: tilted clear, the axis turns by up to \S+ deg/mm, the cap is 0.1", str(report))
+    assert angle_between(path.axes[1:], path.axes[:-1]).max() <= np.radians(3.0) * (1 + 1e-8)
+
+
+@pytest.mark.parametrize("lead", [0, 12])
+def test_the_cap_on_steps_holds_in_every_axis_mode(make_job, lead):
+    """Near the point that the axis is turned from, the axis turns fast; and with a lead, at every turn of a pass."""
+    near = f'tilt_deg = 0\nmode = "toward"\npoint_mm = [0, 0, -30]\nlead_deg = {lead}'
+    job = Job.load(make_job(("tilt_deg = 0", near), (STRATEGY, STRATEGY + "\naxis_step_deg = 2")))
+    path, _ = job_toolpath(job, job_mesh(job))
+    assert angle_between(path.axes[1:], path.axes[:-1]).max() <= np.radians(2.0) * (1 + 1e-8)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ((BALL, BALL + "\ncorner_mm = 1"), r"tool\.corner_mm: means nothing"),
+        ((BALL, 'type = "bull"\ndiameter_mm = 10'), r"tool\.corner_mm: missing"),
+        ((BALL, BALL + "\nshank_mm = [[0, 1, 1]]"), r"tool\.shank_mm: an impossible piece"),
+        (("tilt_deg = 0", 'tilt_deg = 0\nmode = "fixed"'), r"axis\.direction: missing for axis mode"),
+        (("tilt_deg = 0", "tilt_deg = 0\npoint_mm = [0, 0, 1]"), r"axis\.point_mm: means nothing"),
+        ((STRATEGY, 'strategy = "file"'), r"toolpath\.file: the key is missing"),
+        ((STRATEGY, STRATEGY + '\nfile = "part.stl"'), r'toolpath\.file: the strategy "raster" has no such key'),
+        ((STRATEGY, 'strategy = "file"\nfile = "none.apt"'), r"toolpath\.file: no such file"),
+        (("[feed]", '[gouge]\nremedy = ["pray"]\n\n[feed]'), r"gouge\.remedy"),
+    ],
+)
+def test_mistakes_name_their_key(make_job, change, message):
+    with pytest.raises(JobError, match=message):
+        Job.load(make_job(change))
+
+
+def test_a_flat_end_may_not_lean(make_job):
+    with pytest.raises(JobError, match="cannot lean"):
+        Job.load(make_job((BALL, 'type = "flat"\ndiameter_mm = 6'), ("tilt_deg = 0", "tilt_deg = 5")))

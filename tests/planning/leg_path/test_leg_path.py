@@ -1,0 +1,281 @@
+"""LegPath: true to inverse kinematics, over the tip's arc length, within tolerance, resting where it must."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from pentapod.base.errors import ToolpathError
+from pentapod.base.refusal import Refusal
+from pentapod.geometry.directions import angle_between
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import Component
+from pentapod.planning.leg_path.leg_path import LegPath, leg_path
+from pentapod.planning.limits.margins import Limit
+from pentapod.planning.placement.placed_path import PlacedPath
+from pentapod.planning.placement.placement import Placement
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+
+TOLERANCE, AXIS_TOLERANCE = 20e-6, np.radians(0.1)
+
+
+def placed_on(machine, toolpath):
+    """The toolpath with its nominal axes, its origin in the middle of the work volume, z up towards the base."""
+    turn = RigidTransform(np.diag([1.0, -1.0, -1.0]), machine.work.centre)
+    axes = turn.rotate(toolpath.axes)
+    tips = turn.apply(toolpath.tips)
+    margins, limits = np.ones((len(tips), 1)), (Limit("none", "mm", abs),)
+    return PlacedPath(toolpath, Placement(turn, "test"), Component(1, 1), tips, axes, margins, limits)
+
+
+def fan(points, lean):
+    axes = np.c_[lean, np.zeros(len(lean)), np.ones(len(lean))]
+    return np.asarray(points, dtype=float), axes / np.linalg.norm(axes, axis=1, keepdims=True)
+
+
+@pytest.fixture(scope="module")
+def mixed(desk):
+    """Rapid down, a cut round two corners while the axis turns, rapid up."""
+    up = np.array([0.0, 0.0, 0.02])
+    x = np.linspace(0.0, 0.05, 26)
+    side = np.c_[np.full(2, 0.05), [0.002, 0.004], np.zeros(2)]
+    cut = np.concatenate([np.c_[x, 0 * x, 0 * x], side, np.c_[x[::-1], 0 * x + 0.006, 0 * x]])
+    tips, axes = fan(cut, 0.2 * np.sin(np.linspace(0.0, 2.0, len(cut))))
+    segments = (
+        Segment(SegmentKind.RAPID, np.stack([tips[0] + up, tips[0] + 0.2 * up]), axes[[0, 0]], np.inf),
+        Segment(SegmentKind.LINK, np.stack([tips[0] + 0.2 * up, tips[0]]), axes[[0, 0]], 0.01),
+        Segment(SegmentKind.CUT, tips, axes, 0.02),
+        Segment(SegmentKind.LINK, np.stack([tips[-1], tips[-1] + 0.2 * up]), axes[[-1, -1]], 0.01),
+        Segment(SegmentKind.RAPID, np.stack([tips[-1] + 0.2 * up, tips[-1] + up]), axes[[-1, -1]], np.inf),
+    )
+    placed = placed_on(desk, Toolpath(segments, 0.003))
+    path = leg_path(placed, desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    return placed, path
+
+
+def test_legs_are_the_inverse_kinematics_of_the_pose(desk, mixed):
+    _, path = mixed
+    s = np.linspace(0.0, path.length, 3001)
+    tips, axes = path.pose(s)
+    expected = desk.pentapod.leg_lengths(tips + desk.tool_length * axes, -axes)
+    np.testing.assert_allclose(path(s), expected, atol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(axes, axis=1), 1.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_derivatives_by_finite_differences_inside_each_span(mixed, order):
+    _, path = mixed
+    for piece in path.pieces:
+        knots = piece.knots
+        wide = np.diff(knots) > 1e-4
+        s = (0.5 * (knots[:-1] + knots[1:]))[wide]
+        h = 1e-2 * np.diff(knots)[wide]
+        up, down = piece(s + h, order - 1), piece(s - h, order - 1)
+        up2, down2 = piece(s + 2 * h, order - 1), piece(s - 2 * h, order - 1)
+        fd = (8.0 * (up - down) - (up2 - down2)) / (12.0 * h[:, None])
+        np.testing.assert_allclose(piece(s, order), fd, rtol=2e-5, atol=2e-5)
+
+
+def test_parameter_is_the_arc_length_of_the_tip(mixed):
+    _, path = mixed
+    for piece in path.pieces:
+        s = np.linspace(0.0, piece.length, 500)
+        speed = np.linalg.norm(piece.pose(s, 1)[0], axis=1)
+        assert speed.max() <= 1.0 + 1e-6
+        assert speed.min() >= 1.0 - 1e-3  # what the lever of the axis takes
+
+        def rate(x, piece=piece):
+            return float(np.linalg.norm(piece.pose(np.array([x]), 1)[0]))
+
+        measured, _ = quad(rate, 0.0, piece.length, limit=400, points=piece.knots[1:-1:3][:100])
+        assert measured == pytest.approx(piece.length, rel=1e-4)
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 3])
+def test_legs_are_c3_across_knots(mixed, order):
+    """Jumps at the knots shrink with the step across them, up to the third derivative."""
+    _, path = mixed
+    for piece in path.pieces:
+        knots = piece.knots[1:-1]
+        if len(knots) == 0:
+            continue
+        h = 1e-4 * np.minimum(np.diff(piece.knots)[:-1], np.diff(piece.knots)[1:])
+        jump = np.abs(piece(knots + h, order) - piece(knots - h, order)).max(axis=1)
+        change = np.abs(piece(knots, order)).max()
+        assert (jump <= 5e-3 * max(change, 1e-9)).all()
+
+
+def test_all_derivatives_at_once_are_those_one_by_one(mixed):
+    _, path = mixed
+    piece = path.pieces[1]
+    s = np.linspace(0.0, piece.length, 100)
+    for order, values in enumerate(piece.derivatives(s, 3)):
+        np.testing.assert_array_equal(values, piece(s, order))
+
+
+def test_waypoints_have_stations(mixed):
+    placed, path = mixed
+    seen = np.concatenate([piece.waypoints for piece in path.pieces])
+    assert set(seen) == set(range(len(placed.toolpath)))
+    for piece in path.pieces:
+        assert len(piece.waypoints) == len(piece.waypoint_stations)
+        assert piece.waypoint_stations[[0, -1]] == pytest.approx([0.0, piece.length], abs=1e-15)
+        tips, axes = piece.pose(piece.waypoint_stations)
+        pivots = tips + placed.toolpath.pivot * axes
+        assert np.linalg.norm(pivots - placed.pivots[piece.waypoints], axis=1).max() <= TOLERANCE
+
+
+def test_pivot_and_axis_stay_within_their_tolerances(mixed):
+    placed, path = mixed
+    s = np.linspace(0.0, path.length, 20_000)
+    tips, axes = path.pose(s)
+    pivots = tips + placed.toolpath.pivot * axes
+    a, b = placed.pivots[:-1], placed.pivots[1:]
+    share = np.einsum("nkj,kj->nk", pivots[:, None] - a, b - a) / np.maximum(np.square(b - a).sum(axis=1), 1e-30)
+    foot = a + np.clip(share, 0.0, 1.0)[..., None] * (b - a)
+    distance = np.linalg.norm(pivots[:, None] - foot, axis=2)
+    assert distance.min(axis=1).max() <= TOLERANCE
+    assert distance.min(axis=1).max() >= 0.3 * TOLERANCE  # corners use the tolerance: else needlessly slow
+    nearest = distance.argmin(axis=1)
+    either = np.minimum(angle_between(axes, placed.axes[nearest]), angle_between(axes, placed.axes[nearest + 1]))
+    assert either.max() <= AXIS_TOLERANCE + angle_between(placed.axes[:-1], placed.axes[1:]).max()
+
+
+def test_it_rests_between_rapids_and_feeds_and_nowhere_else(mixed):
+    _, path = mixed
+    assert [set(piece.section_kinds) for piece in path.pieces] == [
+        {SegmentKind.RAPID},
+        {SegmentKind.LINK, SegmentKind.CUT},
+        {SegmentKind.RAPID},
+    ]
+    for piece in path.pieces:
+        assert piece.section_ends[-1] == pytest.approx(piece.length, abs=1e-15)
+        assert (np.diff(piece.section_ends) > 0).all()
+    assert list(path.pieces[1].section_segments) == [1, 2, 3]
+    assert path.pieces[1].section_ends[0] == pytest.approx(0.004, abs=1e-4)
+
+
+def test_a_turn_on_the_spot_that_sends_the_tip_back_stops(desk):
+    """The pivot stands while the axis turns, and the tip reverses although the pivot's path has no sharp corner."""
+    tips, axes = fan([[0, 0, 0], [0.02, 0, 0], [0.02, 0, 0], [0.02, 0.02, 0]], [0.0, 0.0, 0.2, 0.2])
+    pivot = 0.003
+    toolpath = Toolpath((Segment(SegmentKind.CUT, tips - pivot * axes, axes, 0.01),), pivot)
+    path = leg_path(placed_on(desk, toolpath), desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    assert len(path.pieces) == 2
+    speed = np.linalg.norm(path.pieces[1].pose(np.linspace(0.0, path.pieces[1].length, 999), 1)[0], axis=1)
+    assert speed.min() > 0.3
+
+
+def test_pieces_join(mixed):
+    _, path = mixed
+    for a, b in zip(path.pieces, path.pieces[1:], strict=False):
+        np.testing.assert_allclose(a(np.array([a.length])), b(np.zeros(1)), atol=1e-14)
+
+
+def test_turning_on_the_spot_has_length(desk):
+    tips, axes = fan([[0.0, 0, 0]] * 5, np.linspace(0.0, 0.2, 5))
+    path = leg_path(
+        placed_on(desk, Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),))),
+        desk,
+        path_tolerance=TOLERANCE,
+        axis_tolerance=AXIS_TOLERANCE,
+    )
+    assert isinstance(path, LegPath)
+    assert path.length == pytest.approx(1e-3 * np.arctan(0.2), rel=1e-3)
+    np.testing.assert_allclose(path.pose([path.length])[1][0] * [1, -1, -1], axes[-1], atol=1e-12)
+
+
+def test_the_way_of_the_tip_alone_is_kept(desk):
+    """Half way with the axis turning as the tip moves, then turning on the spot: against scipy's quadrature."""
+    tips, axes = fan([[0, 0, 0], [0.002, 0, 0], [0.004, 0, 0], [0.004, 0, 0]], [0.0, 0.3, 0.1, 0.4])
+    toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),))
+    path = leg_path(placed_on(desk, toolpath), desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    (piece,) = path.pieces
+    s = np.linspace(0.0, piece.length, 300)
+    way = piece.tip_length(s)
+    assert way[0] == 0.0
+    assert (np.diff(way) >= -1e-15).all()
+    fine = piece.pose(np.linspace(0.0, piece.length, 400_001))[0]
+    expected = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(fine, axis=0), axis=1))])
+    np.testing.assert_allclose(way, np.interp(s, np.linspace(0.0, piece.length, 400_001), expected), atol=2e-9)
+    assert way[-1] < piece.length - 1e-4  # the turn on the spot
+
+
+def test_the_pivots_way_is_its_derivative(mixed):
+    placed, path = mixed
+    s = np.linspace(0.001, path.length - 0.001, 400)
+    h = 1e-7
+
+    def pivots(at):
+        tips, axes = path.pose(at)
+        return tips + placed.toolpath.pivot * axes
+
+    inside = np.abs(s[:, None] - path.starts).min(axis=1) > 1e-5
+    fd = np.linalg.norm(pivots(s + h) - pivots(s - h), axis=1) / (2 * h)
+    np.testing.assert_allclose(path.surface_rate(s)[inside], fd[inside], rtol=1e-5)
+
+
+def test_a_sharp_reversal_stops(desk):
+    tips, axes = fan([[0, 0, 0], [0.03, 0, 0], [0.0, 0.002, 0]], np.zeros(3))
+    toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),))
+    path = leg_path(placed_on(desk, toolpath), desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    assert len(path.pieces) == 2
+
+
+def test_duplicate_waypoints_are_passed_over(desk):
+    tips, axes = fan([[0, 0, 0], [0.01, 0, 0], [0.01, 0, 0], [0.03, 0, 0]], np.zeros(4))
+    toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),))
+    path = leg_path(placed_on(desk, toolpath), desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    assert path.length == pytest.approx(0.03, rel=1e-12)
+
+
+def test_a_path_that_does_not_move_is_refused(desk):
+    tips, axes = fan([[0, 0, 0], [0, 0, 0]], np.zeros(2))
+    placed = placed_on(desk, Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),)))
+    answer = leg_path(placed, desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(answer, Refusal)
+    assert "does not move" in answer.cause
+
+
+@pytest.mark.parametrize("bad", [0.0, -1e-6, np.nan])
+def test_tolerances_must_be_positive(desk, mixed, bad):
+    with pytest.raises(ToolpathError, match="path_tolerance"):
+        leg_path(mixed[0], desk, path_tolerance=bad, axis_tolerance=AXIS_TOLERANCE)
+
+
+def test_stops_and_dwells_where_the_toolpath_asks(desk, mixed):
+    """The path goes exactly through these waypoints, which no rounding of corners would let it."""
+    placed, free = mixed
+    toolpath = placed.toolpath
+    cut = toolpath.segments[2]
+    halves = (
+        replace(cut, tips=cut.tips[:26], axes=cut.axes[:26], dwell=0.0),
+        replace(cut, tips=cut.tips[25:], axes=cut.axes[25:]),
+    )
+    last = replace(toolpath.segments[-1], dwell=2.0)
+    asked = replace(toolpath, segments=(*toolpath.segments[:2], *halves, toolpath.segments[3], last), wait=0.25)
+    path = leg_path(placed_on(desk, asked), desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    assert len(path.pieces) == len(free.pieces) + 1
+    assert path.dwells.tolist() == [0.25, *[0.0] * (len(path.pieces) - 1), 2.0]
+    corner = placed.tips[toolpath.starts[2] + 25]
+    at = [
+        np.linalg.norm(path.pose(path.starts)[0] - corner, axis=1).min(),
+        np.linalg.norm(free.pose(np.linspace(0, free.length, 20_001))[0] - corner, axis=1).min(),
+    ]
+    assert at[0] < 1e-9
+    assert at[1] > 1e-6
+
+
+def test_stops_at_corners_as_sharp_as_asked(desk, mixed):
+    placed, free = mixed
+    path = leg_path(placed, desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE, stop_angle=np.radians(80.0))
+    assert isinstance(path, LegPath)
+    assert len(path.pieces) == len(free.pieces) + 4  # two corners of the cut, and where links lead into it and out
+    assert not path.dwells.any()

@@ -1,0 +1,239 @@
+"""Margins of bodies against meshes: true gaps, their formula at contacts, and plans that keep clear of a fixture."""
+
+import casadi as ca
+import numpy as np
+import pytest
+import trimesh
+
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.geometry.solids import Solid
+from pentapod.kinematics.component import Component
+from pentapod.machine.clearance.collision_world import Obstacle, Surroundings
+from pentapod.machine.clearance.leg_clearance import clearances
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.query.distance import MeshDistance
+from pentapod.planning.diagnosis import blame
+from pentapod.planning.limits.contacts import comforts, names
+from pentapod.planning.limits.margins import TOOL_COMFORTABLE_M, Margins
+from pentapod.planning.placement.ipopt import IpoptSolver
+from pentapod.planning.placement.sampling import first_candidate, first_guesses
+from pentapod.planning.placement.sequential import SequentialSolver
+from pentapod.planning.problem.formulation import step_slopes, stepped
+from pentapod.planning.problem.problem import Setting
+from pentapod.planning.problem.samples import Task
+from pentapod.planning.tool_axis.spline import AxisCourse
+
+PLUS = Component(1, 1)
+TILT = np.radians(15.0)
+TOOL = (Solid("shank", 0.006, 0.03, 0.002, 0.003), Solid("holder", 0.03, 0.055, 0.012, 0.02))
+
+
+def surface_of(shape: trimesh.Trimesh) -> MeshDistance:
+    return MeshDistance.of(Mesh.of(np.asarray(shape.vertices), np.asarray(shape.faces)))
+
+
+def post(x: float, y: float, foot: float, height: float, radius: float = 0.01) -> trimesh.Trimesh:
+    """A closed upright post of the workpiece frame."""
+    shape = trimesh.creation.cylinder(radius, height, sections=16)
+    shape.apply_translation([x, y, foot + 0.5 * height])
+    return shape
+
+
+def poses(machine, count, seed=0):
+    rng = np.random.default_rng(seed)
+    tips = machine.work.centre + rng.uniform(-0.05, 0.05, (count, 3))
+    axes = np.c_[rng.uniform(-0.3, 0.3, (count, 2)), -np.ones(count)]
+    return tips, axes / np.linalg.norm(axes, axis=1, keepdims=True)
+
+
+@pytest.fixture(scope="module")
+def crowd():
+    """A post that moves with the part and a fence that does not, with shank and holder on the tool."""
+    fence = trimesh.creation.box((0.02, 0.3, 0.2))
+    fence.apply_translation([0.25, 0.0, 0.35])
+    return Surroundings(
+        (
+            Obstacle("fixture", surface_of(post(0.06, 0.02, -0.02, 0.06)), clamped=True),
+            Obstacle("table", surface_of(fence), clamped=False),
+        ),
+        TOOL,
+    )
+
+
+@pytest.fixture(scope="module")
+def place(desk):
+    turn = np.diag([1.0, -1.0, -1.0])
+    return RigidTransform(turn, desk.work.centre)
+
+
+def test_limits_are_named_in_the_order_of_the_values(desk, crowd, place):
+    margins = Margins.of(desk, PLUS, crowd)
+    listed = [limit.name for limit in margins.limits]
+    assert listed[-14:] == list(names(crowd))
+    assert "leg 3 touches the fixture" in listed
+    assert "tool body touches the table" in listed
+    tips, axes = poses(desk, 7)
+    assert margins(tips, axes, place).shape == (7, len(listed))
+    assert margins(tips.reshape(1, 7, 3), axes.reshape(1, 7, 3), place).shape == (1, 7, len(listed))
+
+
+def test_gaps_between_legs_and_spindle_are_those_of_the_machine(desk):
+    """Against distances of segments in space, which know of no plane of leg and axis."""
+    tips, axes = poses(desk, 500, seed=1)
+    found = Margins.of(desk, PLUS)(tips, axes)[:, -5:] * TOOL_COMFORTABLE_M
+    np.testing.assert_allclose(found, clearances(desk, tips + desk.tool_length * axes, -axes)[:, 10:], atol=1e-7)
+
+
+def test_margins_are_distances_of_samples(desk, crowd, place):
+    tips, axes = poses(desk, 5, seed=2)
+    outer = Margins.of(desk, PLUS, crowd)(tips, axes, place)[:, -14:] * np.array(comforts(crowd))
+    caps = 1.2 * np.array(comforts(crowd))
+    fixture = post(0.06, 0.02, -0.02, 0.06).apply_transform(place.matrix)
+    position = tips + desk.tool_length * axes
+    t = np.linspace(0.0, 1.0, 200)[:, None]
+    for row in range(len(tips)):
+        for leg in range(5):
+            start = np.append(desk.pentapod.base[leg], 0.0)
+            joint = position[row] - desk.pentapod.offsets[leg] * axes[row]
+            samples = start + t * (joint - start)
+            large = fixture.copy().apply_scale(1e4)
+            oracle = -trimesh.proximity.signed_distance(large, 1e4 * samples).max() / 1e4 - desk.bodies.leg_radius
+            assert outer[row, leg] == pytest.approx(min(oracle, caps[leg]), abs=2e-3)
+
+
+def test_the_formula_equals_the_margins_and_their_slopes(desk, crowd, place):
+    """At the poses where contacts were taken: the value, and central differences of the true margins."""
+    margins = Margins.of(desk, PLUS, crowd)
+    tips, axes = poses(desk, 80, seed=3)
+    count = len(names(crowd))
+    tip, axis, turn, shift = (ca.SX.sym("x", *size) for size in ((3,), (3,), (3, 3), (3,)))
+    numbers = ca.SX.sym("c", margins.contact_numbers)
+    whole = margins.symbolic(tip, axis, turn, shift, numbers)[-count:]
+    function = ca.Function("f", [tip, axis, turn, shift, numbers], [whole, ca.jacobian(whole, ca.vertcat(tip, axis))])
+    contacts, values = margins.contacts(tips, axes, place), margins(tips, axes, place)[:, -count:]
+    rng, close, seen = np.random.default_rng(4), 0, 0
+    for row in range(len(tips)):
+        value, slope = function(tips[row], axes[row], place.rotation, place.translation, contacts[row])
+        np.testing.assert_allclose(np.asarray(value).ravel(), values[row], atol=1e-9)
+        way, turned = rng.normal(size=3), np.cross(rng.normal(size=3), axes[row])
+
+        def moved(h, row=row, way=way, turned=turned):
+            axis = axes[row] + h * turned
+            pose = (tips[row] + h * way)[None], (axis / np.linalg.norm(axis))[None]
+            return margins(*pose, place)[0, -count:]
+
+        h = 1e-4
+        differences = (moved(h) - moved(-h)) / (2.0 * h)
+        near = (values[row] < 1.15) & (values[row] > 0.05)
+        promised = np.asarray(slope) @ np.concatenate([way, turned])
+        close += int((np.abs(promised - differences) < 0.02 * (1.0 + np.abs(differences)))[near].sum())
+        seen += int(near.sum())
+    assert seen > 50
+    assert close > 0.95 * seen  # the rest have two nearest points, or a tool's distance known to 10 µm only
+
+
+def test_without_obstacles_nothing_changes(desk, cap):
+    plain, empty = Margins.of(desk, PLUS), Margins.of(desk, PLUS, Surroundings())
+    tips, axes = poses(desk, 20)
+    np.testing.assert_array_equal(plain(tips, axes), empty(tips, axes))
+    assert plain.contacts(tips, axes, RigidTransform(np.eye(3), np.zeros(3))).shape == (20, 0)
+
+
+@pytest.fixture(scope="module")
+def setting(desk, cap):
+    return Setting.of(Task.of(cap, TILT), desk)
+
+
+@pytest.fixture(scope="module")
+def free(desk, setting):
+    """A first guess where nothing is in the way."""
+    guess = first_guesses(setting.task, desk, (PLUS,), 0, samples=2000)[0]
+    return first_candidate(setting, Margins.of(desk, PLUS), guess.transform)
+
+
+def beside(desk, setting, free, leg, away):
+    """A post of the workpiece frame, its middle `away` metres across from a leg in the middle of the path."""
+    row = len(setting.task.pivots) // 2
+    tip, axis = (
+        x[0] for x in setting.task.machine_poses(free.transform, setting.axes(free.coefficients, [row]), [row])
+    )
+    start = np.append(desk.pentapod.base[leg], 0.0)
+    joint = tip + (desk.tool_length - desk.pentapod.offsets[leg]) * axis
+    across = np.cross(joint - start, free.transform.rotation[:, 2])
+    at = start + 0.9 * (joint - start) + away * across / np.linalg.norm(across)
+    x, y, z = free.transform.inverse().apply(at)
+    return Obstacle("fixture", surface_of(post(x, y, z - 0.05, 0.1, 0.006)), clamped=True)
+
+
+@pytest.fixture(scope="module")
+def grazing(desk, setting, free):
+    """Margins with a post that a leg runs through, a little, somewhere on the path."""
+    for away in np.arange(-0.05, -0.3, -0.004):
+        margins = Margins.of(desk, PLUS, Surroundings((beside(desk, setting, free, 1, away),)))
+        if setting.values(margins, free.transform, free.coefficients)[:, -6:].min() > -0.15:
+            return margins
+    raise AssertionError("the post is never out of the way")
+
+
+def test_the_solver_moves_away_from_a_fixture(setting, free, grazing):
+    start = setting.candidate(grazing, free.transform, free.coefficients)
+    found = SequentialSolver(setting, True).raise_margin(start)
+    assert start.smallest < 0.0 < found.smallest
+
+
+def test_the_reference_moves_away_from_a_fixture(desk, cap, free, grazing):
+    """On few waypoints: what takes IPOPT long is not what is tested here."""
+    few = Setting.of(Task.of(cap, TILT).at(np.arange(0, len(cap), 20)), desk)
+    start = few.candidate(grazing, free.transform, few.upright)
+    found = IpoptSolver(few, True).raise_margin(start)
+    ours = SequentialSolver(few, True).raise_margin(start)
+    assert start.smallest < 0.0 < found.smallest
+    assert ours.smallest > 0.7 * found.smallest
+
+
+def test_the_linear_model_knows_contacts(desk, cap, setting, free):
+    crowded = Surroundings((beside(desk, setting, free, 1, -0.09),), TOOL)
+    margins = Margins.of(desk, PLUS, crowded)
+    rows = np.arange(0, len(cap), 8)
+    slopes = step_slopes(setting, margins)(margins, free.transform, free.coefficients, rows)
+    step = 1e-5 * np.random.default_rng(5).normal(size=6)
+
+    def values(sign):
+        return setting.values(margins, stepped(free.transform, sign * step), free.coefficients, rows)
+
+    differences, promised = 0.5 * (values(1.0) - values(-1.0)), slopes[..., :6] @ step
+    smooth = np.abs(promised - differences) < 1e-3 * np.abs(step).max() * (1.0 + np.abs(slopes).sum(axis=2))
+    assert smooth[:, 37:].mean() > 0.97
+    assert np.abs(slopes[:, -7:, :6]).max() > 1.0
+
+
+def test_calming_keeps_clear_of_a_fixture(desk, setting, free):
+    margins = Margins.of(desk, PLUS, Surroundings((beside(desk, setting, free, 1, -0.09),)))
+    start = setting.candidate(margins, free.transform, free.coefficients)
+    keep = start.smallest - 0.05
+    calm = SequentialSolver(setting, False).calm(start, keep)
+    if calm is not None:
+        assert (
+            setting.values_of(margins, free.transform, AxisCourse.of(setting.task, setting.cone).leans(calm)).min()
+            >= keep - 1e-4
+        )
+
+
+def test_a_refusal_names_the_fixture(desk, setting, free):
+    """A wide plate across the legs."""
+    plate = trimesh.creation.box((0.5, 0.5, 0.01))
+    plate.apply_translation([0.0, 0.0, 0.16])
+    margins = Margins.of(desk, PLUS, Surroundings((Obstacle("fixture", surface_of(plate), clamped=True),)))
+    values = setting.values(margins, free.transform, free.coefficients)
+    blamed = {b.constraint: b for b in blame(values, margins, 0.02) if b.constraint.endswith("touches the fixture")}
+    assert "spindle touches the fixture" in blamed
+    assert all(b.unit == "mm" and b.shortfall > 0.0 and b.waypoints for b in blamed.values())
+    depth = blamed["spindle touches the fixture"].shortfall
+    assert depth >= 1e3 * desk.bodies.shaft_radius
+
+
+def test_first_guesses_see_the_fixture(desk, setting, free):
+    crowded = Surroundings((beside(desk, setting, free, 1, 0.0),))
+    plain = first_guesses(setting.task, desk, (PLUS,), 0, samples=1500)
+    seen = first_guesses(setting.task, desk, (PLUS,), 0, samples=1500, surroundings=crowded)
+    assert seen[0].margin <= plain[0].margin

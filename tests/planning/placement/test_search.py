@@ -1,0 +1,67 @@
+"""The search for a placement: what cannot fit with nothing around is refused before its surroundings are looked at."""
+
+import signal
+
+import numpy as np
+import pytest
+import trimesh
+
+from pentapod.kinematics.component import Component
+from pentapod.machine.clearance.collision_world import Obstacle, Surroundings
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.query.distance import MeshDistance
+from pentapod.planning.limits.margins import Margins
+from pentapod.planning.placement.search import search
+from pentapod.planning.problem.problem import Setting
+from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.weights import NEEDED_MARGIN
+
+PLUS = Component(1, 1)
+
+
+@pytest.fixture(scope="module")
+def surroundings():
+    """A small post beside the part, far below the path."""
+    shape = trimesh.creation.cylinder(0.01, 0.04, sections=12)
+    shape.apply_translation([0.1, 0.1, -0.2])
+    surface = MeshDistance.of(Mesh.of(np.asarray(shape.vertices), np.asarray(shape.faces)))
+    return Surroundings((Obstacle("fixture", surface, clamped=True),))
+
+
+def names(margins):
+    return [limit.name for limit in margins.limits]
+
+
+def test_what_does_not_fit_alone_is_answered_without_surroundings(desk, wide, surroundings, monkeypatch):
+    monkeypatch.setattr("pentapod.planning.placement.search.TRIED", 2)
+    setting = Setting.of(Task.of(wide, 0.2), desk)
+    alone = search(setting, PLUS)
+    monkeypatch.setattr("pentapod.planning.placement.search.HOPELESS", np.inf)
+    found = search(setting, PLUS, surroundings)
+    assert found.best.smallest == alone.best.smallest < NEEDED_MARGIN
+    assert names(found.best.margins) == names(Margins.of(desk, PLUS))
+
+
+def test_what_fits_alone_is_placed_among_its_surroundings(desk, cap, surroundings, monkeypatch):
+    monkeypatch.setattr("pentapod.planning.placement.search.REFINED", 1)
+    setting = Setting.of(Task.of(cap, 0.2), desk)
+    promising = search(setting, PLUS, surroundings)
+    monkeypatch.setattr("pentapod.planning.placement.search.HOPELESS", np.inf)
+    found = search(setting, PLUS, surroundings)
+    assert names(found.best.margins) == names(Margins.of(desk, PLUS, surroundings))
+    assert found.best.smallest == promising.best.smallest >= NEEDED_MARGIN
+    assert np.array_equal(found.best.transform.matrix, promising.best.transform.matrix)
+
+
+def test_an_interruption_of_the_look_without_surroundings_ends_the_search(desk, cap, surroundings, monkeypatch):
+    monkeypatch.setattr("pentapod.planning.placement.search.HOPELESS", np.inf)
+    improved = []
+
+    def progress(stage: str, fraction: float, note: str = "") -> None:
+        if note.startswith("component"):
+            improved.append(note)
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        search(Setting.of(Task.of(cap, 0.2), desk), PLUS, surroundings, progress=progress)
+    assert len(improved) == 1

@@ -1,0 +1,57 @@
+"""Vectorised casadi functions against casadi's own evaluation, number by number."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import COMPONENTS
+from pentapod.numerics.casadi_vectorised import Vectorised
+from pentapod.planning.limits.margins import Margins
+from pentapod.planning.problem.formulation import point_function
+from pentapod.planning.problem.problem import Setting
+from pentapod.planning.problem.samples import Task
+
+UNARY = (ca.sqrt, ca.fabs, ca.sign, ca.sin, ca.cos, ca.exp, ca.log, ca.logic_not, lambda a: -a, lambda a: a * a)
+BINARY = (
+    ca.fmin, ca.fmax, lambda a, b: a + b, lambda a, b: a - b, lambda a, b: a * b, lambda a, b: a / b,
+    lambda a, b: a < b, lambda a, b: a <= b, lambda a, b: a == b, lambda a, b: a != b, ca.logic_and, ca.logic_or,
+    lambda a, b: ca.if_else(a < b, 2.0 * a, 1.0 / b),
+)  # fmt: skip
+
+
+@given(st.integers(0, 10_000))
+def test_every_operation_is_casadis(seed):
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    function = ca.Function("f", [a, b], [ca.vertcat(*[op(a) for op in UNARY], *[op(a, b) for op in BINARY])])
+    values = np.random.default_rng(seed).choice([-2.5, -1.0, 0.0, 0.3, 1.0, 7.0], size=(2, 5000))
+    (found,) = Vectorised(function)(values[:1], values[1:])
+    few = values[:, :64]
+    expected = np.asarray(function.map(64)(few[:1], few[1:]))
+    np.testing.assert_allclose(found[:, :64], expected, rtol=1e-15, atol=0.0)
+    assert found.shape == (len(UNARY) + len(BINARY), 5000)
+
+
+@pytest.mark.parametrize("by", ["nothing", "lean", "step and lean"])
+def test_margins_and_slopes_are_casadis(desk, cap, by):
+    setting = Setting.of(Task.of(cap, 0.2), desk)
+    function = point_function(setting, Margins.of(desk, COMPONENTS[0]), range(20), by=by)
+    task, rng = setting.task, np.random.default_rng(1)
+    transform = RigidTransform(np.eye(3), desk.work.centre)
+    count = len(task.pivots)
+    leans, pair = 0.1 * rng.normal(size=(2, count)), setting.domain.lean_plane.T
+    fixed = np.zeros((6, 1)), pair.T.reshape(-1, 1), transform.rotation.T.reshape(-1, 1), transform.translation[:, None]
+    touching = np.zeros((0, count))  # there is nothing to touch
+    found = Vectorised(function)(fixed[0], leans, task.pivots.T, task.nominal.T, *fixed[1:], touching)
+    for k in range(0, count, 37):
+        row = [fixed[0], leans[:, k], task.pivots[k], task.nominal[k], pair, transform.rotation, transform.translation]
+        for ours, theirs in zip(found, function(*row, touching[:, k]), strict=True):
+            np.testing.assert_array_equal(ours[:, k], np.asarray(theirs).ravel(order="F"))
+
+
+def test_an_operation_without_counterpart_is_named():
+    a = ca.SX.sym("a")
+    with pytest.raises(NotImplementedError, match="operation"):
+        Vectorised(ca.Function("f", [a], [ca.erf(a)]))

@@ -1,0 +1,1 @@
+"""Makes the motions of this folder importable from those below it."""

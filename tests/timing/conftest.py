@@ -1,0 +1,1 @@
+"""Makes the paths of this folder importable from those below it."""

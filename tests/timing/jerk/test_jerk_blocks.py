@@ -1,0 +1,186 @@
+"""Jerk limits block by block: near the law of the whole, within its limits, the same bits from disk, by processes."""
+
+import tracemalloc
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from pentapod.base.errors import InputError
+from pentapod.timing.jerk import limited as jerk
+from pentapod.timing.jerk.limited import jerk_limited
+from pentapod.timing.jerk.rows import JerkRows
+from pentapod.timing.jerk.stored import StoredProfile, limit_stored
+from pentapod.timing.law.time_law import MotionLaw
+from pentapod.timing.topp.engine import fastest
+from pentapod.timing.topp.stages import Failure
+
+NO_MARKS = np.empty(0)
+SPEED, PUSH, JERK = 0.5, 5.0, 200.0
+
+
+@dataclass
+class Waves:
+    """Rows of five legs that are sums of waves of their own, with a feed; can be pickled."""
+
+    jerk: float = JERK
+
+    def legs(self, s):
+        rng = np.random.default_rng(1)
+        wave, phase = rng.uniform(20, 90, (5, 3)), rng.uniform(0, 6, (5, 3))
+        at = s[:, None, None] * wave + phase
+        return [
+            (k(at) * wave**n / wave[:, :1] / 3).sum(2)
+            for n, k in ((1, np.cos), (2, lambda y: -np.sin(y)), (3, lambda y: -np.cos(y)))
+        ]
+
+    def __call__(self, s):
+        one, two, three = self.legs(s)
+        ceiling = np.minimum(np.square(SPEED / np.abs(one).max(axis=1)), np.where(np.sin(9 * s) > 0, 0.04, 0.01))
+        rows = np.stack([three, 1.5 * two, 0.5 * one], axis=-1) / self.jerk
+        return JerkRows(one / PUSH, two / PUSH, np.zeros((1, 5)), rows, ceiling)
+
+
+def profile(length=1.5, step=1e-4, x_start=0.0, x_end=0.0):
+    s = np.linspace(0.0, length, round(length / step) + 1)
+    rows = Waves()(s)
+    x = fastest(s, rows.first, rows.second, rows.ceiling, x_start=x_start, x_end=x_end)
+    assert not isinstance(x, Failure), x
+    return s, x
+
+
+def duration(law):
+    return MotionLaw.through(law.s, law.x, law.slope).duration
+
+
+@pytest.fixture(scope="module")
+def whole():
+    s, x = profile()
+    return s, x, jerk_limited(s, x, Waves(), NO_MARKS)
+
+
+@pytest.fixture
+def small(monkeypatch):
+    monkeypatch.setattr(jerk, "BLOCK", 2500)
+    monkeypatch.setattr(jerk, "LEAD", 512)
+
+
+def test_blocks_find_the_law_of_the_whole(whole, small):
+    s, x, law = whole
+    blocked = jerk_limited(s, x, Waves(), NO_MARKS)
+    assert len(jerk.blocks(len(s), blocked.lead)) == 6
+    assert not np.array_equal(blocked.x, law.x)
+    assert duration(blocked) == pytest.approx(duration(law), rel=1e-3)
+    assert (np.diff(blocked.s) > 0.0).all()
+    assert blocked.x[0] == blocked.x[-1] == 0.0
+    # Limits by differences of the legs along the law, which know nothing of rows.
+    for found in (law, blocked):
+        rows = Waves()(found.s)
+        above = found.x / np.maximum(np.minimum(np.interp(found.s, s, x), rows.ceiling), 1e-300)
+        assert np.quantile(above, 0.99) < 1 + 1e-6  # at the gridpoints, which are half of them
+        assert above.max() < 1.006  # between them
+        assert np.abs(rows.first * found.slope[:, None] / 2 + rows.second * found.x[:, None]).max() < 1.005
+        motion = MotionLaw.through(found.s, found.x, found.slope)
+        t = np.linspace(0.01, motion.duration - 0.01, 100_001)
+        h = 1e-6
+        push = [
+            Waves().legs(motion(t + d))[0] * motion(t + d, 2)[:, None]
+            + Waves().legs(motion(t + d))[1] * motion(t + d, 1)[:, None] ** 2
+            for d in (-h, h)
+        ]
+        assert np.quantile(np.abs(push[1] - push[0]).max(axis=1) / (2 * h) / JERK, 0.999) < 1.03
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_from_disk_and_by_processes_the_same_bits(whole, small, tmp_path, processes):
+    """Six blocks; where they are cut is said to the processes, which know nothing of a block made smaller here."""
+    s, x, _ = whole
+    law = jerk_limited(s, x, Waves(), NO_MARKS)
+    np.save(tmp_path / "s.npy", s)
+    np.save(tmp_path / "x.npy", x)
+    out = tmp_path / "law.npy"
+    assert len(jerk.blocks(len(s), law.lead)) == 6
+    assert limit_stored(StoredProfile(tmp_path), Waves(), NO_MARKS, out, processes=processes) is None
+    assert np.array_equal(np.load(out), np.column_stack([law.s, law.x, law.slope]))
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["law.npy", "s.npy", "x.npy"]
+
+
+def test_an_interruption_leaves_no_part_of_a_law(tmp_path, monkeypatch):
+    s, x = profile(0.5)
+    np.save(tmp_path / "s.npy", s)
+    np.save(tmp_path / "x.npy", x)
+    (tmp_path / "law.npy").write_bytes(b"the law before")
+    load = np.lib.format.open_memmap
+
+    def interrupted(file, mode="r+", *rest, **options):
+        table = load(file, mode, *rest, **options)
+        if mode == "w+":
+            raise KeyboardInterrupt
+        return table
+
+    monkeypatch.setattr(np.lib.format, "open_memmap", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        limit_stored(StoredProfile(tmp_path), Waves(), NO_MARKS, tmp_path / "law.npy")
+    assert (tmp_path / "law.npy").read_bytes() == b"the law before"
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["law.npy", "s.npy", "x.npy"]
+
+
+@pytest.mark.parametrize("answer", ["none", "another"])
+def test_where_blocks_do_not_agree_leads_get_longer(whole, monkeypatch, answer):
+    """Blocks that know too little of what is beyond their cuts, here by decree: no law, or one that is slower."""
+    s, x, law = whole
+    monkeypatch.setattr(jerk, "BLOCK", 2500)
+    monkeypatch.setattr(jerk, "LEAD", 8)
+    monkeypatch.setattr(jerk, "_PASSAGE", 4)
+    solved = jerk.solved
+
+    def short_sighted(*arguments):
+        block, found = arguments[-1], solved(*arguments)
+        if block.low == 0 or block.begin - block.low >= 32:
+            return found
+        return replace(found, y=0.99 * found.y) if answer == "another" else Failure(-1, jerk.NOT_LIMITED)
+
+    monkeypatch.setattr(jerk, "solved", short_sighted)
+    blocked = jerk_limited(s, x, Waves(), NO_MARKS)
+    assert blocked.lead == 32
+    assert duration(blocked) == pytest.approx(duration(law), rel=1e-3)
+
+
+def test_blocks_that_never_agree_have_no_law(whole, small, monkeypatch):
+    monkeypatch.setattr(jerk, "_AGREED", 0.0)
+    assert jerk_limited(*whole[:2], Waves(), NO_MARKS) == Failure(-1, jerk.APART)
+
+
+def test_memory_does_not_grow_with_the_path(small, tmp_path):
+    peaks = []
+    for k, length in enumerate((3.0, 9.0)):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        s, x = profile(length)
+        np.save(folder / "s.npy", s)
+        np.save(folder / "x.npy", x)
+        tracemalloc.start()
+        assert limit_stored(StoredProfile(folder), Waves(), NO_MARKS, folder / "law.npy", passes=1) is None
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.3 * peaks[0]
+
+
+def test_no_process_is_no_number_of_processes(tmp_path):
+    with pytest.raises(InputError):
+        limit_stored(StoredProfile(tmp_path), Waves(), NO_MARKS, tmp_path / "law.npy", processes=0)
+
+
+@pytest.mark.parametrize(("v", "w"), [(0.02, 0.0), (0.0, 0.03), (0.04, 0.02)])
+def test_given_speeds_at_the_ends(v, w):
+    """Where the rest would be there is the given speed, and no acceleration."""
+    s, x = profile(0.4, x_start=v * v, x_end=w * w)
+    law = jerk_limited(s, x, Waves(), NO_MARKS)
+    assert not isinstance(law, Failure)
+    assert law.s[0] == 0.0
+    assert law.s[-1] == s[-1]
+    for end, speed in ((0, v), (-1, w)):
+        assert law.x[end] == pytest.approx(speed**2, rel=1e-9, abs=1e-300)
+        assert abs(law.slope[end]) < 1e-9
+    resting = jerk_limited(*profile(0.4), Waves(), NO_MARKS)
+    assert duration(law) < duration(resting)

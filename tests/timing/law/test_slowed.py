@@ -1,0 +1,80 @@
+"""Pieces that must be slower than their first law, so that their setpoints keep the limits, are told or refused."""
+
+import numpy as np
+import pytest
+from timing_paths import Path, Piece, machine, straight
+
+from pentapod.base.refusal import Refusal
+from pentapod.timing import Trajectory, certify, explain, retime
+from pentapod.toolpath.toolpath import SegmentKind
+
+AT, OVER, LENGTH = 0.1, 0.01, 0.2
+
+
+def bent(bend, corner=0.0):
+    """Leg 2 with an acceleration, or a velocity, that jumps between gridpoints: no derivative there says so."""
+
+    def legs(s):
+        u, beyond, after = np.clip(s - AT, 0.0, OVER), np.maximum(s - AT - OVER, 0.0), np.maximum(s - AT, 0.0)
+        q = np.full((len(s), 5), 0.8) + s[:, None] * np.array([1.0, 0.1, 0.0, 0.0, 0.0])
+        q1, q2 = np.tile([1.0, 0.1, 0.0, 0.0, 0.0], (len(s), 1)), np.zeros((len(s), 5))
+        q[:, 1] += bend * (u * u / 2.0 + OVER * beyond) + corner * after
+        q1[:, 1] += bend * u + corner * (s > AT)
+        q2[:, 1] = bend * ((s > AT) & (s < AT + OVER))
+        return q, q1, q2
+
+    return Piece(legs, LENGTH, sections=[(LENGTH, 0.1, SegmentKind.CUT, 7)], inner_knots=(AT, AT + OVER))
+
+
+def two_pieces(*shape):
+    first = straight([1.0, 0.1, 0.0, 0.0, 0.0], 0.05, start=[0.75, 0.795, 0.8, 0.8, 0.8])
+    return Path((first, bent(*shape)))
+
+
+def timed(*shape):
+    return retime(two_pieces(*shape), machine(interpolation="cubic"))
+
+
+def test_a_piece_that_is_slower_than_its_first_law_is_told_with_its_place_and_both_durations():
+    trajectory = timed(300.0)
+    assert isinstance(trajectory, Trajectory), str(trajectory)
+    (told,) = trajectory.slowed
+    assert told.piece == 1
+    assert told.duration == pytest.approx(trajectory.laws[1].duration, abs=1e-12)
+    assert told.duration > 1.02 * told.first
+    assert (told.segment, told.waypoints) == (7, (1, 2))
+    # The ends of the bend are 150 and 160 mm along the path.
+    assert 0.145 < told.station < 0.165
+    words = (
+        f"piece 1 lasts {told.duration:.3f} s, {100 * (told.duration / told.first - 1):.1f} % longer than its first law"
+    )
+    assert words in str(told)
+    assert f"({told.first:.3f} s)" in str(told)
+    assert "in segment 7, between waypoints 1 and 2" in str(told)
+    assert max(use.share for use in certify(trajectory, machine(interpolation="cubic"))) < 1.0
+
+
+def test_what_is_told_reaches_the_explanation_that_a_plan_prints():
+    trajectory = timed(300.0)
+    assert isinstance(trajectory, Trajectory), str(trajectory)
+    story = explain(trajectory, machine(interpolation="cubic"))
+    assert story.slowed == trajectory.slowed
+    assert str(trajectory.slowed[0]) in str(story).splitlines()
+    (told,) = story.to_dict()["slowed"]
+    assert told["piece"] == 1
+
+
+def test_nothing_is_told_of_pieces_that_keep_their_first_law():
+    trajectory = timed(0.0)
+    assert isinstance(trajectory, Trajectory), str(trajectory)
+    assert trajectory.slowed == ()
+
+
+def test_a_piece_that_would_last_more_than_20_times_its_first_law_is_refused_with_the_place():
+    refusal = timed(0.0, 400.0)
+    assert isinstance(refusal, Refusal)
+    assert "times slower than the law it is made of; piece 1, " in refusal.cause
+    place = float(refusal.cause.split(" mm along the path")[0].rsplit(" ", 1)[1])
+    assert place == pytest.approx(150.0, abs=2.0)
+    assert "segment 7" in refusal.cause
+    assert refusal.blames[0].waypoints[0] in ((0, 1), (1, 1), (1, 2))

@@ -1,0 +1,112 @@
+"""Programs that are slower than they have to be, or stand where nothing asks for it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import replay_cases as cases
+
+from pentapod.base.errors import ArrayError
+from pentapod.verify import verify
+
+FEED, STOP = "lowest feed", "no unasked stop"
+
+
+@pytest.fixture(scope="module")
+def linear():
+    return cases.good_case(interpolation="linear")
+
+
+def judged(case, program=None, **changes):
+    asked = {**cases.ASKED, **changes}
+    verdict = verify(program or case.program, changes.pop("machine", case.machine), case.toolpath, **asked)
+    return {c.claim: c for c in verdict.certificates}
+
+
+def standing(case, row, seconds):
+    rows = round(seconds / cases.PERIOD)
+    legs = np.insert(case.program.legs, row, np.repeat(case.program.legs[row : row + 1], rows, axis=0), axis=0)
+    return replace(case.program, legs=legs)
+
+
+def ends_of_strokes():
+    """The row at which each stroke ends."""
+    parts = cases.strokes()
+    return [len(cases.timed(parts[: k + 1])[0]) - 1 for k in range(len(parts))]
+
+
+@pytest.mark.parametrize("lowest_share", [None, 0.5])
+def test_a_pass_at_a_tenth_of_the_feed_fails(linear, lowest_share):
+    slow = cases.program_of(linear.machine, *cases.timed(cases.strokes(), feed_factor=0.098))
+    found = judged(linear, slow, lowest_share=lowest_share)[FEED]
+    assert not found.passed
+    assert found.value < 10.0
+    assert found.bound == (90.0 if lowest_share is None else 50.0)
+    assert "in all" in found.method
+
+
+def test_slowness_that_a_limit_explains_passes(linear):
+    """The same program on a machine whose legs can hardly do more."""
+    legs = linear.machine.legs
+    tight = replace(linear.machine, legs=replace(legs, max_jerk=np.full(5, 1e-3)))
+    assert not judged(linear, lowest_share=None)[FEED].passed
+    replayed = replace(linear.program, provenance=replace(linear.program.provenance, machine_digest=tight.digest))
+    found = {
+        c.claim: c
+        for c in verify(replayed, tight, linear.toolpath, **{**cases.ASKED, "lowest_share": None}).certificates
+    }
+    assert found[FEED].passed
+    assert not found["leg jerks"].passed
+
+
+def test_no_lowest_feed_is_judged_where_the_job_asks_for_none(linear):
+    assert FEED not in judged(linear)
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
+def test_a_lowest_share_is_a_share(linear, share):
+    with pytest.raises(ArrayError, match="lowest_share"):
+        judged(linear, lowest_share=share)
+
+
+@pytest.mark.parametrize("seconds", [0.1, 10.0])
+def test_standing_amid_a_cut_fails(linear, seconds):
+    begin, end = ends_of_strokes()[:2]
+    found = judged(linear, standing(linear, (begin + end) // 2, seconds))[STOP]
+    assert not found.passed
+    assert found.value == pytest.approx(seconds, abs=2e-3)
+    assert abs(found.where.row - (begin + end) // 2) <= 2
+    assert found.where.segment == 1
+    assert judged(linear)[STOP].passed
+
+
+def resting_amid(case):
+    """Not for long: the motion slows down to rest and goes on."""
+    parts = cases.strokes()
+    forth = parts[1]
+    halves = [
+        replace(forth, pose=lambda f: forth.pose(0.5 * f), count=31),
+        replace(forth, pose=lambda f: forth.pose(0.5 + 0.5 * f), count=31),
+    ]
+    tips, axes = cases.timed([parts[0], *halves, *parts[2:]])
+    return cases.program_of(case.machine, tips, axes, interpolation="linear")
+
+
+@pytest.mark.parametrize(("stop_angle", "passed"), [(None, False), (1e-3, True), (0.1, False), (2.0, False)])
+def test_coming_to_rest_amid_a_cut_fails_where_the_toolpath_does_not_turn_enough(linear, stop_angle, passed):
+    """At the hill's crest: the toolpath turns there by some milliradians from waypoint to waypoint."""
+    assert judged(linear, resting_amid(linear), stop_angle=stop_angle)[STOP].passed is passed
+
+
+@pytest.mark.parametrize("angle", [0.0, -0.1, 4.0, float("nan")])
+def test_a_stop_angle_is_an_angle(linear, angle):
+    with pytest.raises(ArrayError, match="stop_angle"):
+        judged(linear, stop_angle=angle)
+
+
+@pytest.mark.parametrize(("dwell", "passed"), [(None, False), (0.3, False), (0.5, True), (10.0, True)])
+def test_a_dwell_is_as_long_as_it_is_asked(linear, dwell, passed):
+    segments = list(linear.toolpath.segments)
+    segments[1] = replace(segments[1], dwell=dwell)
+    asked = replace(linear, toolpath=replace(linear.toolpath, segments=tuple(segments)))
+    assert judged(asked, standing(linear, ends_of_strokes()[1], 0.5))[STOP].passed is passed

@@ -1,0 +1,293 @@
+"""What a cutter leaves on a region: against closed forms, and against dense samples in plain NumPy."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pentapod.base.errors import ArrayError
+from pentapod.cutters.ball import BallCutter
+from pentapod.cutters.bull_nose import BullNose
+from pentapod.cutters.flat_end import FlatEnd
+from pentapod.cutters.lollipop import Lollipop
+from pentapod.cutters.stand_off import StandOff
+from pentapod.geometry.polyline import arc_length
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.patch import Patch
+from pentapod.mesh.query.distance import MeshDistance
+from pentapod.mesh.region import Region
+from pentapod.toolpath.linking.partition import Piece
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+from pentapod.verify import Coverage, Cutting
+from pentapod.verify.replay.claim import Idle
+from pentapod.verify.surface.surface_left import surface_left
+from pentapod.verify.verdict.verdict import Place
+
+R = 3e-3
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def plate(low=(0.0, 0.0), high=(0.02, 0.012), cells=4):
+    """A flat sheet at z = 0."""
+    return sheet(lambda x, y: 0.0 * x, low, high, cells)
+
+
+def sheet(height, low=(0.0, 0.0), high=(0.02, 0.012), cells=40):
+    x, y = np.meshgrid(np.linspace(low[0], high[0], cells + 1), np.linspace(low[1], high[1], cells + 1), indexing="ij")
+    k = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
+    points = np.stack([x.ravel(), y.ravel(), height(x, y).ravel()], axis=1)
+    return Mesh.of(points, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]))
+
+
+NARROW = plate(high=(0.006, 0.012))
+"""Lines along x leave the same on it."""
+
+
+def pocket(depth=0.01, size=0.02):
+    """A floor at z = 0 with four walls that are square to it, open above."""
+    corners = np.array([[x, y, z] for z in (0.0, depth) for x, y in ((0, 0), (size, 0), (size, size), (0, size))])
+    facets = [(0, 1, 2), (0, 2, 3)]
+    for k in range(4):
+        n = (k + 1) % 4
+        facets += [(k, 4 + k, 4 + n), (k, 4 + n, n)]
+    return Mesh.of(corners, facets)
+
+
+def along(*lines, tool, axes=None):
+    """A replay that goes along lines of tips (n, 3) in turn, jumping between them, as the claim sees one."""
+    tips = np.concatenate(lines)
+    axes = np.tile(UP, (len(tips), 1)) if axes is None else np.concatenate(axes)
+    kinds = [kind for line in lines for kind in [SegmentKind.CUT] * (len(line) - 1) + [SegmentKind.RAPID]][:-1]
+    segments = [Segment(kind, tips[k : k + 2], axes[k : k + 2], 0.02) for k, kind in enumerate(kinds)]
+    path = Toolpath(tuple(segments), tool.pivot)
+    chords = len(tips) - 1
+    return SimpleNamespace(
+        pivots=path.pivots,
+        axes=axes,
+        toolpath=path,
+        survey=SimpleNamespace(away=np.zeros(chords), turned=np.zeros(chords)),
+        match=SimpleNamespace(arcs=arc_length(path.pivots)),
+        program=SimpleNamespace(provenance=SimpleNamespace(piece=None)),
+        place=lambda sample: Place(None, int(sample), None),
+    )
+
+
+def raster(step, low=-0.004, high=0.024, y0=0.0, y1=0.012, z=0.0, lift=0.02):
+    """Lines along x with z above them between: a retract, a crossing and a plunge at each end."""
+    lines = []
+    for y in np.arange(y0, y1 + 1e-9, step):
+        lines.append(np.array([[low, y, lift], [low, y, z], [high, y, z], [high, y, lift]]))
+    return lines
+
+
+def judged(replay, mesh, tool, left, share=0.0, region=None, **more):
+    patch = Patch.of(mesh, region or Region())
+    cutting = Cutting(MeshDistance.of(mesh), tool.solids, 0.0, Coverage(patch, left, share, UP, **more))
+    replay.specification = SimpleNamespace(cutting=cutting)
+    return surface_left(replay)
+
+
+def deepest(finding):
+    return 1e-3 * float(finding.method.split("deepest found ")[1].removeprefix("more than ").split(" mm")[0])
+
+
+@pytest.mark.parametrize(
+    ("make", "step"),
+    [
+        (BallCutter, 1e-3),
+        (BallCutter, 4e-3),
+        (lambda r: BallCutter(r, 0.02), 2e-3),
+        (lambda r: Lollipop(r, 1e-3, 0.02), 2e-3),
+    ],
+)
+def test_a_ball_raster_on_a_plane_leaves_its_scallop(make, step):
+    """r − √(r² − s²/4): all is covered a hair above it; below it the share is that of strips in closed form."""
+    tool, scallop = make(R), R - np.sqrt(R**2 - step**2 / 4)
+    replay = along(*raster(step), tool=tool)
+    found = judged(replay, NARROW, tool, 1.02 * scallop)
+    assert found.passed
+    assert found.value == 0.0
+    assert 0.95 * scallop < deepest(found) < 1.01 * scallop
+    low = 0.5 * scallop
+    held = 2.0 * np.sqrt(R**2 - (R - low) ** 2)
+    found = judged(replay, NARROW, tool, low, share=0.01)
+    assert not found.passed
+    assert found.value == pytest.approx(100.0 * (1.0 - held / step), rel=0.06)
+    assert 0.9 * scallop < deepest(found) < 1.01 * scallop
+
+
+def test_a_flat_end_leaves_nothing_between_passes_that_overlap_and_strips_between_those_that_do_not():
+    tool = FlatEnd(2e-3, flute=0.01)
+    assert judged(along(*raster(3.9e-3), tool=tool), NARROW, tool, 2e-5).value == 0.0
+    found = judged(along(*raster(6e-3), tool=tool), NARROW, tool, 2e-5)
+    assert found.value == pytest.approx(100.0 * 4.0 / 12.0, rel=0.03)
+    assert deepest(found) == pytest.approx(8e-3)  # nothing was met as far as one looks
+
+
+def test_a_bull_nose_leaves_the_scallop_of_its_corner():
+    """Between discs that are a gap apart the corner's circles meet at its own scallop."""
+    radius, corner, gap = 3e-3, 1e-3, 1.2e-3
+    tool, scallop = BullNose(radius, corner), corner - np.sqrt(corner**2 - gap**2 / 4)
+    step = 2.0 * (radius - corner) + gap
+    replay = along(*raster(step, y1=0.016), tool=tool)
+    assert judged(replay, plate(), tool, 1.05 * scallop).value == 0.0
+    assert not judged(replay, plate(), tool, 0.9 * scallop).passed
+
+
+def test_passes_on_a_sphere_leave_the_ridge_of_the_law_of_cosines():
+    """Ball of r on a sphere of ρ, passes in planes through its axis, s apart at the equator of the region."""
+    rho, step = 0.02, 2e-3
+    ball = BallCutter(R)
+    mesh = sheet(lambda x, y: np.sqrt(rho**2 - x**2 - y**2), (-5e-3, -5e-3), (5e-3, 5e-3), 60)
+    turns = (step / rho) * np.arange(-5, 6)
+    lean = np.linspace(-0.45, 0.45, 400)
+    lines, axes = [], []
+    for a in turns:
+        across = np.array([0.0, np.sin(a), np.cos(a)])
+        axis = np.sin(lean)[:, None] * np.array([1.0, 0, 0]) + np.cos(lean)[:, None] * across
+        axis = axis[:: -1 if len(lines) % 2 else 1]  # to and fro
+        lines.append(rho * axis)
+        axes.append(axis)
+    half = 0.5 * step / rho
+    centre = rho + R
+    ridge = centre * np.cos(half) - np.sqrt(R**2 - (centre * np.sin(half)) ** 2) - rho
+    found = judged(along(*lines, tool=ball, axes=axes), mesh, ball, 1.05 * ridge)
+    assert found.value == 0.0
+    assert deepest(found) == pytest.approx(ridge, rel=0.03)
+    assert not judged(along(*lines, tool=ball, axes=axes), mesh, ball, 0.95 * ridge).passed
+
+
+def test_the_fillet_at_a_wall_is_out_of_reach_and_a_strip_left_out_is_not():
+    """On the floor, a distance d < r from a wall, the ball leaves r − √(r² − (r − d)²) at best: told apart."""
+    size, left = 0.02, 0.5e-3
+    tool, mesh = BallCutter(R), pocket(size=size)
+    floor = Region(angle=0.5)
+    ends = {"low": R, "high": size - R, "y1": size - R}
+    whole = along(*raster(1e-3, y0=R, **ends), tool=tool)
+    found = judged(whole, mesh, tool, left, region=floor)
+    strip = R - np.sqrt(R**2 - (R - left) ** 2)
+    # Corners too: there the ball stands off both walls.
+    inner = (size - 2.0 * strip) ** 2
+    beyond = 100.0 * (1.0 - inner / size**2)
+    assert found.value == pytest.approx(0.0, abs=0.3)
+    told = float(found.method.split("; ")[-1].split(" %")[0])
+    assert told == pytest.approx(beyond, rel=0.05)
+    short = along(*raster(1e-3, y0=R + 2e-3, **ends), tool=tool)
+    found = judged(short, mesh, tool, left, region=floor, share=0.01)
+    assert not found.passed
+    assert found.value == pytest.approx(100.0 * 2e-3 * (size - 2.0 * strip) / size**2, rel=0.12)
+
+
+@pytest.mark.parametrize("make", [FlatEnd, lambda r: BullNose(r, 5e-4)])
+def test_a_flat_end_that_could_clear_a_floor_up_to_the_wall_must(make):
+    size, tool, mesh = 0.02, make(R), pocket()
+    ends = {"low": R, "high": size - R, "y1": size - R}
+    short = along(*raster(2e-3, y0=R + 2e-3, **ends), tool=tool)
+    found = judged(short, mesh, tool, 2e-4, region=Region(angle=0.5))
+    assert found.value == pytest.approx(100.0 * 2e-3 * size / size**2, rel=0.15)
+
+
+def test_what_the_view_does_not_see_is_told_apart():
+    """A plate with another one above half of it."""
+    low, lid = plate(), plate(high=(0.01, 0.012))
+    points = np.concatenate([low.vertices, lid.vertices + 0.012 * UP])
+    mesh = Mesh.of(points, np.concatenate([low.faces, lid.faces + len(low.vertices)]))
+    tool = BallCutter(R)
+    lines = raster(1e-3, low=0.013 + R)
+    found = judged(along(*lines, tool=tool), mesh, tool, 1e-4, region=Region(box=((-1, -1, -1e-3), (1, 1, 1e-3))))
+    # Left are 0 to 16 mm but for what the ball's end takes; its centre may stand 3 mm from the lid's edge.
+    assert 8.0 < found.value < 15.0
+    assert "out of reach" in found.method
+
+
+def test_a_beam_covers_what_is_near_its_lines_on_cuts_alone():
+    jet = StandOff(5e-3)
+    lines = [line[1:3] + 5e-3 * UP for line in raster(2e-3)]
+    lines = [line if k % 2 == 0 else line[::-1] for k, line in enumerate(lines)]
+    assert judged(along(*lines, tool=jet), plate(), jet, 1.1e-3).value == 0.0
+    wide = judged(along(*lines[::2], tool=jet), plate(), jet, 1.1e-3)
+    assert wide.value == pytest.approx(100.0 * (4.0 - 2.2) / 4.0, rel=0.06)
+    assert "beam's line" in wide.method
+
+
+def test_dense_samples_agree_on_a_wavy_sheet_with_a_leaning_tool():
+    """Heights by brute force: many balls along the path, the first that a ray up the normal meets."""
+    rng = np.random.default_rng(5)
+    mesh = sheet(lambda x, y: 1e-3 * np.sin(x / 3e-3) * np.cos(y / 4e-3), cells=24)
+    tool = BallCutter(2e-3)
+    lines, axes = [], []
+    for y in np.arange(0.0, 0.0121, 2.4e-3):
+        x = np.linspace(-1e-3, 0.021, 60)
+        z = 1e-3 * np.sin(x / 3e-3) * np.cos(y / 4e-3) + 2e-4
+        axis = np.stack([0.2 * np.sin(x / 5e-3), 0.1 + 0 * x, np.ones_like(x)], axis=1)
+        lines.append(np.stack([x, y + 0 * x, z], axis=1))
+        axes.append(axis / np.linalg.norm(axis, axis=1)[:, None])
+    replay = along(*lines, tool=tool, axes=axes)
+    patch = Patch.of(mesh, Region())
+    facet = rng.choice(len(patch.faces), 3000, p=patch.areas / patch.areas.sum())
+    w = rng.dirichlet([1, 1, 1], 3000)
+    q, n = np.einsum("ni,nij->nj", w, patch.vertices[patch.faces[facet]]), patch.facet_normals[facet]
+    share = np.linspace(0, 1, 60, endpoint=False)[:, None]
+    c = np.concatenate([a + share * (b - a) for a, b in zip(replay.pivots[:-1], replay.pivots[1:], strict=True)])
+    heights = np.full(len(q), np.inf)
+    for part in np.array_split(np.arange(len(q)), 60):
+        d = c[None] - q[part, None]
+        t = np.einsum("nkj,nj->nk", d, n[part])
+        off = np.einsum("nkj,nkj->nk", d, d) - t**2
+        root = np.sqrt(np.maximum(4e-6 - off, 0.0))
+        first = np.where((off < 4e-6) & (t + root > 0.0), np.maximum(t - root, 0.0), np.inf)
+        heights[part] = first.min(axis=1)
+    for left in (4e-4, 6e-4, 8e-4):
+        found = judged(replay, mesh, tool, left)
+        expected = 100.0 * np.mean(heights > left)
+        assert found.value >= expected - 300.0 * np.sqrt(max(expected, 1.0) / 100.0 / 3000)
+        assert found.value <= 1.1 * expected + 1.0
+        assert deepest(found) == pytest.approx(min(heights.max(), 8e-3), rel=0.1) or found.value < 0.1
+
+
+def test_motion_that_is_not_known_exactly_counts_for_less():
+    """A motion that may be 50 µm off leaves 50 µm more, as far as is proven."""
+    tool, step = BallCutter(R), 2e-3
+    scallop = R - np.sqrt(R**2 - step**2 / 4)
+    replay = along(*raster(step), tool=tool)
+    replay.survey.away[:] = 5e-5
+    assert not judged(replay, plate(), tool, 1.02 * scallop).passed
+    assert judged(replay, plate(), tool, scallop + 6e-5).value == 0.0
+
+
+def test_each_piece_answers_for_its_own_part():
+    """Three passes each for two set-ups; a piece without one of its passes fails, whatever the other does."""
+    tool, lines = BallCutter(R), [line[1:3] for line in raster(2e-3)]
+    lines = [line if k % 2 == 0 else line[::-1] for k, line in enumerate(lines)]
+    whole = along(*lines, tool=tool)
+    scallop = R - np.sqrt(R**2 - 1e-6)
+
+    def part(rows, piece):
+        replay = along(*[lines[k] for k in rows], tool=tool)
+        replay.program.provenance.piece = piece
+        return judged(replay, plate(), tool, 1.1 * scallop, share=2e-3, whole=lambda: whole.toolpath)
+
+    first, second = Piece(0, 7), Piece(8, len(whole.toolpath) - 1)
+    assert part([0, 1, 2, 3], first).passed
+    assert part([4, 5, 6], second).passed
+    assert not part([0, 1, 3], first).passed
+    assert not part([4, 5, 6], first).passed
+
+
+def test_lines_that_cover_nothing_are_not_judged_and_silence_is_not_consent():
+    tool = BallCutter(R)
+    replay = along(*raster(1e-3), tool=tool)
+    surface = MeshDistance.of(plate())
+    cutting = Cutting(surface, tool.solids, 0.0, Coverage.nothing("it is text"))
+    replay.specification = SimpleNamespace(cutting=cutting)
+    assert surface_left(replay) == Idle("it is text")
+    for cutting in (None, Cutting(surface, tool.solids, 0.0)):
+        replay.specification = SimpleNamespace(cutting=cutting)
+        assert surface_left(replay) == Idle("nobody says which surface is to be machined", unknown=True)
+
+
+@pytest.mark.parametrize(("key", "options"), [("left", {"left": 0.0}), ("share", {"left": 1e-4, "share": 1.5})])
+def test_impossible_bounds_are_bad_input(key, options):
+    with pytest.raises(ArrayError, match=key):
+        Coverage(Patch.whole(plate()), **options)
