@@ -4,10 +4,9 @@ Files named `*_kernels.py` hold them, each function marked with `kernel`; they a
 so that `import pentapod` stays light. The machine code is cached on disk (`kernel_cache`): only the first run of a
 version on a machine compiles, and says so to the log `pentapod`.
 
-Loading numba takes about as long as NumPy needs for ten million poses. So work that NumPy can do as well, to the
-last bit, asks `kernels_pay` before it loads kernels: like a skier who rents until the rents add up to a pair of skis,
-it stays with NumPy until the time lost so far would have paid for loading. Which of the two did the work cannot be
-told from the result.
+Loading numba takes half a second, as long as NumPy needs for ten million poses. A few functions of kinematics can be
+computed by NumPy as well, to the last bit. They ask `kernels_pay`, which adds up the time that kernels would have
+saved so far, and loads them once that is more than loading takes. The results do not tell which of the two was used.
 """
 
 from __future__ import annotations
