@@ -15,7 +15,8 @@ _JOIN = 0.01
 
 _END_JERK = 0.98
 
-_GENTLER = 0.25
+_SHORTER = 0.125
+"""By how much shorter a ramp is tried where no law was found."""
 
 
 class End(Protocol):
@@ -23,8 +24,8 @@ class End(Protocol):
 
     @property
     def join(self) -> float: ...  # noqa: D102 (described above)
-    def gentler(self) -> End:
-        """Return the end out of which a ramp leads with less jerk."""
+    def shorter(self) -> End:
+        """Return the end with a shorter ramp."""
         ...
 
     def bound(self, distance: Floats) -> Floats:
@@ -55,9 +56,9 @@ class Ramp:
         length = min(length, (0.5 * float(rows.ceiling[:within].min()) / c) ** 0.75)
         return cls(c, _JOIN * length)
 
-    def gentler(self) -> Ramp:
-        """Return a slower ramp: on a path that bends hard right after the rest the spline must be able to go on."""
-        return Ramp(self.c * _GENTLER, self.join)
+    def shorter(self) -> Ramp:
+        """Return a shorter ramp: on a path that bends hard right beside the rest the spline must begin sooner."""
+        return Ramp(self.c, self.join * _SHORTER)
 
     def bound(self, distance: Floats) -> Floats:
         """Return the ramp's own x (n,), as it would go on."""
@@ -76,7 +77,7 @@ class Steady:
     x: float
     join: float = 0.0
 
-    def gentler(self) -> Steady:
+    def shorter(self) -> Steady:
         """Return itself: there is no ramp."""
         return self
 
@@ -96,7 +97,7 @@ class Open:
 
     join: float = 0.0
 
-    def gentler(self) -> Open:
+    def shorter(self) -> Open:
         """Return itself: there is no ramp."""
         return self
 

@@ -45,6 +45,6 @@ class Part:
         """Metres."""
         return float(self.s[-1])
 
-    def gentler(self) -> Part:
-        """Return it with slower ramps out of its rests."""
-        return replace(self, begin=self.begin.gentler(), end=self.end.gentler())
+    def shorter(self) -> Part:
+        """Return it with shorter ramps out of its rests."""
+        return replace(self, begin=self.begin.shorter(), end=self.end.shorter())

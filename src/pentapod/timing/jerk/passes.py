@@ -18,7 +18,7 @@ _FIRST_KNOTS = 0.5
 """Passes that find out how hard the law pushes, and how many knots they have beside the last ones."""
 
 _RAMPS = 5
-"""Ramps out of rests that are tried, each slower than the one before."""
+"""Ramps out of rests that are tried, each shorter than the one before."""
 
 _ROUNDS = 3
 _JERK, _PUSH, _FAST, _SLOW = 1.03, 1.005, 1.005, 0.2
@@ -30,12 +30,12 @@ _REACHED = 0.995
 
 
 def answer_of(part: Part, passes: int = PASSES) -> Answer | None:
-    """Return the fastest law of a part, None where none is found; ramps out of rests are slower where they must be."""
+    """Return the fastest law of a part, None where none is found; ramps out of rests are shorter where they must be."""
     for _ in range(_RAMPS):
         answer = _answer_of(part, passes)
         if answer is not None:
             return answer
-        part = part.gentler()
+        part = part.shorter()
     return None
 
 

@@ -166,7 +166,8 @@ class Limits:
         one, two = np.abs(course.legs[0]), course.legs[1]
         above = a[i] * one[:, j] + a[j] * one[:, i]
         below = np.abs(two[:, i] * course.legs[0][:, j] - two[:, j] * course.legs[0][:, i])
-        with np.errstate(divide="ignore", invalid="ignore"):
+        # Where legs hardly bend at all a quotient beyond all numbers is no bound, as it should be.
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             bounds = [
                 np.where(below > 0.0, above / below, np.inf).min(axis=1),
                 np.square(self.velocity / one).min(axis=1),  # the limit over 0 is infinite, as it should be
