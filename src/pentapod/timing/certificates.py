@@ -11,7 +11,7 @@ from pentapod.base.arrays import Floats
 from pentapod.geometry.interpolant import Interpolant, largest_length
 from pentapod.machine.machine import Machine
 from pentapod.timing.law.trajectory import Trajectory
-from pentapod.timing.pieces.spline_padding import run_in
+from pentapod.timing.pieces.spline_padding import spline_padding
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def certify(
     stations, segments = trajectory.station(times), trajectory.segment(times)
     # A motion that starts or ends at a speed is part of a longer one, which the controller's spline goes through.
     limits = machine.tool_limits.given()
-    before, after = _run_ins(trajectory, period, tool=tips is not None or bool(limits))
+    before, after = _spline_paddings(trajectory, period, tool=tips is not None or bool(limits))
 
     def joined(rows: Floats, columns: slice) -> Interpolant:
         parts = [y[:, columns] for y in (before,) if len(y)] + [rows] + [y[:, columns] for y in (after,) if len(y)]
@@ -129,13 +129,13 @@ _TOOL = {
 }
 
 
-def _run_ins(trajectory: Trajectory, period: float, *, tool: bool) -> tuple[Floats, Floats]:
+def _spline_paddings(trajectory: Trajectory, period: float, *, tool: bool) -> tuple[Floats, Floats]:
     """Return the rows (n, 6 or 12) before the start and after the end, none where these are rests."""
     pieces = [trajectory.path.pieces[k] for k in (trajectory.indices[0], trajectory.indices[-1])]
     speeds = trajectory.laws[0].speeds[0], trajectory.laws[-1].speeds[-1]
     none = np.zeros((0, 12))
-    before = run_in(pieces[0], speeds[0], period, start=True, tool=tool)[:-1] if speeds[0] > 0.0 else none
-    after = run_in(pieces[1], speeds[1], period, start=False, tool=tool)[1:] if speeds[1] > 0.0 else none
+    before = spline_padding(pieces[0], speeds[0], period, start=True, tool=tool)[:-1] if speeds[0] > 0.0 else none
+    after = spline_padding(pieces[1], speeds[1], period, start=False, tool=tool)[1:] if speeds[1] > 0.0 else none
     return before, after
 
 
@@ -144,7 +144,7 @@ def _of_tool(
 ) -> tuple[tuple[str, str, Floats], ...]:
     """Return name, unit and values (N or N − 1,) of what may be limited in the motion of tips and axes.
 
-    own: takes the values of run-ins away.
+    own: takes the values of the padding away.
     """
     steps = own(axis.steps)
     fastest, row = largest_length(steps)

@@ -5,7 +5,7 @@ import pytest
 
 from pentapod.machine.tool_limits import ToolLimits
 from pentapod.timing.limits.constraints import Limits
-from pentapod.timing.limits.path_derivatives import Course
+from pentapod.timing.limits.path_derivatives import PathDerivatives
 from pentapod.timing.topp.engine import fastest
 from pentapod.timing.topp.stages import Failure
 
@@ -38,7 +38,7 @@ def test_ceiling_is_the_largest_x_with_a_common_acceleration():
     rng = np.random.default_rng(3)
     limits = Limits(rng.uniform(0.1, 1, 5), rng.uniform(1, 9, 5), np.ones(5), ToolLimits(), 1.0, 1.0, 0.0)
     first, second = rng.normal(size=(300, 5)), 10 * rng.normal(size=(300, 5))
-    x = limits.ceiling(Course((first, second), (), (), np.full(300, 0.7), np.zeros(300, int)))
+    x = limits.ceiling(PathDerivatives((first, second), (), (), np.full(300, 0.7), np.zeros(300, int)))
 
     def room(x):  # by brute force over u
         u = np.linspace(-60, 60, 20_001)

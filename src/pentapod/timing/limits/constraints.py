@@ -14,7 +14,7 @@ from pentapod.machine.machine import Machine
 from pentapod.machine.rounding import TIP_ROUNDING, jerk_of_rounding
 from pentapod.machine.tool_limits import ToolLimits
 from pentapod.timing.law.paths import PieceLike
-from pentapod.timing.limits.path_derivatives import Course, legs_along, tip_along, turn_along
+from pentapod.timing.limits.path_derivatives import PathDerivatives, legs_along, tip_along, turn_along
 from pentapod.timing.limits.polytopes import DIRECTIONS, across_path, polygon, polyhedron
 
 CONSTRAINTS = (
@@ -95,10 +95,10 @@ class Limits:
         axis = ("axis acceleration",) * (DIRECTIONS if self.tool.limits_axis_acceleration else 0)
         return (*CONSTRAINTS[5:10], *tip, *axis)
 
-    def course(self, piece: PieceLike, s: Floats, order: int = 2) -> Course:
+    def derivatives(self, piece: PieceLike, s: Floats, order: int = 2) -> PathDerivatives:
         """Return what the limits need to know of a piece at sorted stations s (n,), legs and tip up to `order`."""
         tip = self.tool.limits_tip_acceleration or (order > 2 and self.tool.limits_tip_jerk)
-        return Course(
+        return PathDerivatives(
             legs_along(piece, s, order),
             tip_along(piece, s, order) if tip else (),
             turn_along(piece, s) if self.tool.limits_axis else (),
@@ -134,28 +134,26 @@ class Limits:
             speed[here] = np.minimum(speed[here], speeds[m])
         return self._by_feed(speed, piece.feed_rate(s)), section
 
-    def rows(self, course: Course) -> tuple[Floats, Floats]:
+    def rows(self, path: PathDerivatives) -> tuple[Floats, Floats]:
         """Return the accelerations' rows (n, R), |first u + second x| ≤ 1: five of the legs, polygons of the tool."""
-        first, second = [course.legs[0] / self.acceleration], [course.legs[1] / self.acceleration]
+        first, second = [path.legs[0] / self.acceleration], [path.legs[1] / self.acceleration]
         if self.tool.limits_tip_acceleration:
-            parts = polygon(course.tip[0], course.tip[1], self.tool.max_tip_acceleration)
+            parts = polygon(path.tip[0], path.tip[1], self.tool.max_tip_acceleration)
             first, second = [*first, parts[0]], [*second, parts[1]]
         if self.tool.limits_axis_acceleration:
-            parts = polygon(course.turn[0], course.turn[1], self.tool.max_axis_acceleration)
+            parts = polygon(path.turn[0], path.turn[1], self.tool.max_axis_acceleration)
             first, second = [*first, parts[0]], [*second, parts[1]]
         return np.concatenate(first, axis=1), np.concatenate(second, axis=1)
 
-    def jerk_rows(self, course: Course) -> Floats:
+    def jerk_rows(self, path: PathDerivatives) -> Floats:
         """Return the jerks' rows (n, K, 3) of x, x′, x″, by √x: five of the legs, a polyhedron around the tip's."""
-        one, two, three = (y / self.jerk for y in course.legs)
+        one, two, three = (y / self.jerk for y in path.legs)
         legs = np.stack([three, 1.5 * two, 0.5 * one], axis=-1)
         if not self.tool.limits_tip_jerk:
             return legs
-        return np.concatenate(
-            [legs, polyhedron(course.tip[0], course.tip[1], course.tip[2], self.tool.max_tip_jerk)], axis=1
-        )
+        return np.concatenate([legs, polyhedron(path.tip[0], path.tip[1], path.tip[2], self.tool.max_tip_jerk)], axis=1)
 
-    def ceiling(self, course: Course) -> Floats:
+    def ceiling(self, path: PathDerivatives) -> Floats:
         """Return a bound of x (n,): what speeds allow, and accelerations at their best u.
 
         Leg accelerations are strips in the (u, x) plane. For one x each strip leaves an interval of u, and
@@ -163,41 +161,41 @@ class Limits:
         (a_i |q_j′| + a_j |q_i′|) / |q_i″ q_j′ − q_j″ q_i′|. Of the tool each limit counts alone.
         """
         a, (i, j) = self.acceleration, _PAIRS
-        one, two = np.abs(course.legs[0]), course.legs[1]
+        one, two = np.abs(path.legs[0]), path.legs[1]
         above = a[i] * one[:, j] + a[j] * one[:, i]
-        below = np.abs(two[:, i] * course.legs[0][:, j] - two[:, j] * course.legs[0][:, i])
+        below = np.abs(two[:, i] * path.legs[0][:, j] - two[:, j] * path.legs[0][:, i])
         # Where legs hardly bend at all a quotient beyond all numbers is no bound, as it should be.
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             bounds = [
                 np.where(below > 0.0, above / below, np.inf).min(axis=1),
                 np.square(self.velocity / one).min(axis=1),  # the limit over 0 is infinite, as it should be
-                np.square(course.speed),
+                np.square(path.speed),
             ]
             if self.tool.limits_tip_acceleration:
-                bounds.append(self.tool.max_tip_acceleration / across_path(course.tip[0], course.tip[1]))
+                bounds.append(self.tool.max_tip_acceleration / across_path(path.tip[0], path.tip[1]))
             if self.tool.limits_axis:
-                bounds.append(np.square(self.tool.max_axis_velocity / np.linalg.norm(course.turn[0], axis=1)))
-                bounds.append(self.tool.max_axis_acceleration / across_path(course.turn[0], course.turn[1]))
+                bounds.append(np.square(self.tool.max_axis_velocity / np.linalg.norm(path.turn[0], axis=1)))
+                bounds.append(self.tool.max_axis_acceleration / across_path(path.turn[0], path.turn[1]))
         return np.min(bounds, axis=0)
 
-    def shares(self, course: Course, x: Floats, u: Floats) -> Floats:
+    def shares(self, path: PathDerivatives, x: Floats, u: Floats) -> Floats:
         """Return how much of each limit is used (n, 14), in the order of `CONSTRAINTS`; nothing of those not set."""
         root, x, u = np.sqrt(x)[:, None], x[:, None], u[:, None]
         shares = np.zeros((len(x), FEED + 1))
-        shares[:, :5] = np.abs(course.legs[0]) * root / self.velocity
-        shares[:, 5:10] = np.abs(course.legs[0] * u + course.legs[1] * x) / self.acceleration
+        shares[:, :5] = np.abs(path.legs[0]) * root / self.velocity
+        shares[:, 5:10] = np.abs(path.legs[0] * u + path.legs[1] * x) / self.acceleration
         tool = self.tool
         if tool.limits_tip_acceleration:
-            pushes = course.tip[0] * u + course.tip[1] * x
+            pushes = path.tip[0] * u + path.tip[1] * x
             shares[:, 10] = np.linalg.norm(pushes, axis=1) / tool.max_tip_acceleration
         if tool.limits_axis:
-            pushes = course.turn[0] * u + course.turn[1] * x
+            pushes = path.turn[0] * u + path.turn[1] * x
             shares[:, 11] = np.linalg.norm(pushes, axis=1) / tool.max_axis_acceleration
-            shares[:, 12] = np.linalg.norm(course.turn[0], axis=1) * root[:, 0] / tool.max_axis_velocity
-        shares[:, FEED] = root[:, 0] / course.speed
+            shares[:, 12] = np.linalg.norm(path.turn[0], axis=1) * root[:, 0] / tool.max_axis_velocity
+        shares[:, FEED] = root[:, 0] / path.speed
         return shares
 
-    def jerk_shares(self, course: Course, v: Floats, a: Floats, j: Floats) -> Floats:
+    def jerk_shares(self, path: PathDerivatives, v: Floats, a: Floats, j: Floats) -> Floats:
         """Return how much of each jerk limit is used (n, 6) at ṡ, s̈ and s⃛ (n,): legs, tip."""
         v, a, j = v[:, None], a[:, None], j[:, None]
 
@@ -205,9 +203,9 @@ class Limits:
             return one * j + 3.0 * two * v * a + three * v**3
 
         shares = np.zeros((len(v), 6))
-        shares[:, :5] = np.abs(jerk(*course.legs)) / self.jerk
+        shares[:, :5] = np.abs(jerk(*path.legs)) / self.jerk
         if self.tool.limits_tip_jerk:
-            shares[:, 5] = np.linalg.norm(jerk(*course.tip), axis=1) / self.tool.max_tip_jerk
+            shares[:, 5] = np.linalg.norm(jerk(*path.tip), axis=1) / self.tool.max_tip_jerk
         return shares
 
 

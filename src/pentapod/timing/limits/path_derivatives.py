@@ -1,4 +1,4 @@
-"""Course: how a piece of the path moves at given stations, as far as something limits it."""
+"""PathDerivatives: how a piece of the path moves at given stations, as far as something limits it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pentapod.timing.law.paths import PieceLike
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class PathDerivatives:
     """Derivatives by s at stations (n,), order 1 first: the rates of what moves along the path.
 
     legs: (n, 5) each. tip: (n, 3) each, where something limits the tip's acceleration or jerk. turn: (n, 3) each,

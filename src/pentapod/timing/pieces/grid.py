@@ -7,7 +7,7 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats
 from pentapod.timing.law.paths import PieceLike
 from pentapod.timing.limits.constraints import Limits
-from pentapod.timing.limits.path_derivatives import Course
+from pentapod.timing.limits.path_derivatives import PathDerivatives
 
 LEAST_STAGES = 24
 """Stages of a piece at least."""
@@ -63,8 +63,8 @@ def _base_grid(piece: PieceLike, limits: Limits) -> Floats:
 
 def _bent(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
     """Return at which stations (n,) the path's bend alone takes part of an acceleration limit at the largest speed."""
-    course = limits.course(piece, s)
-    use = np.abs(limits.rows(course)[1]).max(axis=1) * limits.ceiling(course)
+    path = limits.derivatives(piece, s)
+    use = np.abs(limits.rows(path)[1]).max(axis=1) * limits.ceiling(path)
     return np.asarray(use > _BENT)
 
 
@@ -75,7 +75,7 @@ def _ramps(piece: PieceLike, limits: Limits) -> Floats:
     """
     begins, ends, speeds = limits.guarded_sections(piece)
     before, after = np.append(0.0, speeds), np.append(speeds, 0.0)
-    slope = limits.rows(limits.course(piece, np.append(0.0, piece.section_ends)))[0]
+    slope = limits.rows(limits.derivatives(piece, np.append(0.0, piece.section_ends)))[0]
     reach = 0.5 * np.abs(after**2 - before**2) * np.abs(slope).max(axis=1)
     up, down = np.append(0.0, ends) + reach, np.append(begins, piece.length) - reach
     return np.where(after > before, up, down)
@@ -97,9 +97,9 @@ def _rough(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
 def _rough_part(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
     points = np.empty(2 * len(s) - 1)
     points[0::2], points[1::2] = s, (s[:-1] + s[1:]) / 2.0
-    course = limits.course(piece, points)
-    first, second = limits.rows(course)
-    ceiling = limits.ceiling(course)
+    path = limits.derivatives(piece, points)
+    first, second = limits.rows(path)
+    ceiling = limits.ceiling(path)
     with np.errstate(divide="ignore"):
         pushes = ((1.0 + np.abs(second) * ceiling[:, None]) / np.abs(first)).min(axis=1)
     a, m, b = slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2)
@@ -114,7 +114,7 @@ def _rough_part(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
     )
     # x is linear within the stage, its ceiling v²/q′² is not: the chord between two ceilings lies above.
     low, high = np.minimum(ceiling[a], ceiling[b]), np.maximum(ceiling[a], ceiling[b])
-    fast = _slowness(course, limits)[m] * np.sqrt(np.minimum(low + gain[:, 0], high) / 2.0 + low / 2.0)
+    fast = _slowness(path, limits)[m] * np.sqrt(np.minimum(low + gain[:, 0], high) / 2.0 + low / 2.0)
     # What a feed allows is its square by that of the rate: 1 for cutters, curved for a spot on the surface.
     square = np.square(piece.feed_rate(points))
     bow = np.abs(square[m] - (square[a] + square[b]) / 2.0)
@@ -126,9 +126,9 @@ def _rough_part(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
     )
 
 
-def _slowness(course: Course, limits: Limits) -> Floats:
+def _slowness(path: PathDerivatives, limits: Limits) -> Floats:
     """Return 1/ṡ (n,) where the first of legs and axis is at its largest velocity, s/m."""
-    slowness = (np.abs(course.legs[0]) / limits.velocity).max(axis=1)
-    if course.turn:
-        slowness = np.maximum(slowness, np.linalg.norm(course.turn[0], axis=1) / limits.tool.max_axis_velocity)
+    slowness = (np.abs(path.legs[0]) / limits.velocity).max(axis=1)
+    if path.turn:
+        slowness = np.maximum(slowness, np.linalg.norm(path.turn[0], axis=1) / limits.tool.max_axis_velocity)
     return slowness

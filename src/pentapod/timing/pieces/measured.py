@@ -40,10 +40,10 @@ def _measured(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, k
         rows = _rows(pieces, begins, lengths, first, last)
         first_row = low - first
         if first == 0 and pieces[0].profile.x_start > 0.0:
-            ahead = pieces[0].run_in(start=True)[:-1]
+            ahead = pieces[0].spline_padding(start=True)[:-1]
             rows, first_row = np.concatenate([ahead, rows]), first_row + len(ahead)
         if last == begins[-1] and pieces[-1].profile.x_end > 0.0:
-            behind = pieces[-1].run_in(start=False)[1:]
+            behind = pieces[-1].spline_padding(start=False)[1:]
             behind[:, 5] += lengths[-2]
             rows = np.concatenate([rows, behind])
         rows[:, 5] -= lengths[k]

@@ -14,7 +14,7 @@ from pentapod.timing.jerk.rows import JerkRows
 from pentapod.timing.law.paths import PieceLike
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.limits.constraints import FEED, PUSHES, RAPID, Limits
-from pentapod.timing.limits.path_derivatives import Course
+from pentapod.timing.limits.path_derivatives import PathDerivatives
 from pentapod.timing.pieces.grid import first_grid, parts
 from pentapod.timing.topp.engine import Engine, fastest
 from pentapod.timing.topp.stages import Failure
@@ -60,13 +60,13 @@ class PieceProfile:
         return max(self.x_start, self.x_end) > 0.0
 
     @cached_property
-    def course(self) -> Course:
+    def derivatives(self) -> PathDerivatives:
         """How the piece moves at the gridpoints."""
-        return self.limits.course(self.piece, self.s)
+        return self.limits.derivatives(self.piece, self.s)
 
     def rows(self) -> tuple[Floats, Floats]:
         """Return the accelerations' rows (N + 1, R) at the gridpoints, eased."""
-        first, second = self.limits.rows(self.course)
+        first, second = self.limits.rows(self.derivatives)
         return first / self.ease_acceleration[:, None], second / self.ease_acceleration[:, None]
 
     def solved(self) -> PieceProfile | Failure:
@@ -86,7 +86,9 @@ class PieceProfile:
         if (self._push_caps < 1.0).any():
             s = self._fine_grid()
             x = np.interp(s, self.s, self.x)
-            found = [self._capped_rows(s[part], self.limits.course(self.piece, s[part])) for part in parts(len(s) - 1)]
+            found = [
+                self._capped_rows(s[part], self.limits.derivatives(self.piece, s[part])) for part in parts(len(s) - 1)
+            ]
             # Each part ends where the next begins.
             rows = (
                 np.concatenate([*(row[:-1] for row in column), column[-1][-1:]]) for column in zip(*found, strict=True)
@@ -114,7 +116,7 @@ class PieceProfile:
     def _push_caps(self) -> Floats:
         """Shares (N + 1, 5) of the legs' acceleration limits that no law within the jerk limits exceeds."""
         limits = self.limits
-        one, ceiling = self.course.legs[0], limits.ceiling(self.course)
+        one, ceiling = self.derivatives.legs[0], limits.ceiling(self.derivatives)
         return (
             acceleration_caps(self.s, one, ceiling, limits.acceleration, limits.jerk, moving=self.moving)
             / limits.acceleration
@@ -126,23 +128,23 @@ class PieceProfile:
         return np.concatenate([caps, np.ones((len(caps), rows - caps.shape[1]))], axis=1)
 
     def _jerk_rows(self, s: Floats) -> JerkRows:
-        course = self.limits.course(self.piece, s, 3)
-        first, second, ceiling = self._capped_rows(s, course)
-        return JerkRows(first, second, np.zeros((1, first.shape[1])), self.limits.jerk_rows(course), ceiling)
+        path = self.limits.derivatives(self.piece, s, 3)
+        first, second, ceiling = self._capped_rows(s, path)
+        return JerkRows(first, second, np.zeros((1, first.shape[1])), self.limits.jerk_rows(path), ceiling)
 
-    def _capped_rows(self, s: Floats, course: Course) -> tuple[Floats, Floats, Floats]:
+    def _capped_rows(self, s: Floats, path: PathDerivatives) -> tuple[Floats, Floats, Floats]:
         """Return the accelerations' rows (n, R), no looser than laws within the jerk limits can use, and ceilings."""
         acceleration, speed = (
             np.interp(s, self.s, ease)[:, None] for ease in (self.ease_acceleration, self.ease_speed)
         )
-        first, second = self.limits.rows(course)
+        first, second = self.limits.rows(path)
         caps = np.stack([np.interp(s, self.s, cap) for cap in self._push_caps.T], axis=1)
         pushes = self._with_tool(caps, first.shape[1]) * acceleration
-        return first / pushes, second / pushes, self.limits.ceiling(course) * speed[:, 0] ** 2
+        return first / pushes, second / pushes, self.limits.ceiling(path) * speed[:, 0] ** 2
 
     def ceiling(self) -> Floats:
         """Return the largest x (N + 1,) at each gridpoint that any path acceleration allows, m²/s²."""
-        return self.limits.ceiling(self.course) * self.ease_speed**2
+        return self.limits.ceiling(self.derivatives) * self.ease_speed**2
 
     def eased(self, acceleration: Floats, speed: Floats) -> PieceProfile | Failure:
         """Return the profile solved anew with further factors (N + 1,) on accelerations and speeds."""
@@ -153,8 +155,8 @@ class PieceProfile:
     def with_(self, **changes: Any) -> PieceProfile:
         """Return a copy on the same grid, which keeps the path's derivatives."""
         copy = replace(self, **changes)
-        if "course" in self.__dict__:
-            copy.__dict__["course"] = self.course
+        if "derivatives" in self.__dict__:
+            copy.__dict__["derivatives"] = self.derivatives
         return copy
 
     def refined(self, exceeding: Bools, switching: Bools, where: Floats) -> PieceProfile:
@@ -184,7 +186,9 @@ class PieceProfile:
         ds, dx = np.diff(self.s[part]), np.diff(self.x[part])
         s = (self.s[part][:-1, None] + _BETWEEN * ds[:, None]).ravel()
         x = (self.x[part][:-1, None] + _BETWEEN * dx[:, None]).ravel()
-        shares = self.limits.shares(self.limits.course(self.piece, s), x, np.repeat(dx / (2.0 * ds), len(_BETWEEN)))
+        shares = self.limits.shares(
+            self.limits.derivatives(self.piece, s), x, np.repeat(dx / (2.0 * ds), len(_BETWEEN))
+        )
         worst = shares.reshape(len(ds), len(_BETWEEN), -1).max(axis=1)
         return np.delete(worst, PUSHES, axis=1).max(axis=1), worst[:, PUSHES].max(axis=1)
 
@@ -222,7 +226,7 @@ class PieceProfile:
             return self._active_in(law)
         u = self.path_accelerations()
         before, after = (
-            self.limits.shares(self.course, self.x, pushes) for pushes in (np.append(u[0], u), np.append(u, u[-1]))
+            self.limits.shares(self.derivatives, self.x, pushes) for pushes in (np.append(u[0], u), np.append(u, u[-1]))
         )
         shares = np.maximum(before, after)
         return self._named(shares.argmax(axis=1)), shares.max(axis=1)
@@ -232,14 +236,14 @@ class PieceProfile:
         t = np.interp(self.s, law.stations, law.times)
         j = law.jerks[np.clip(np.searchsorted(law.times, t, "right") - 1, 0, len(law.jerks) - 1)]
         v, a = law(t, 1), law(t, 2)
-        course = self.limits.course(self.piece, self.s, 3)
-        shares, jerks = self.limits.shares(course, v**2, a), self.limits.jerk_shares(course, v, a, j)
+        path = self.limits.derivatives(self.piece, self.s, 3)
+        shares, jerks = self.limits.shares(path, v**2, a), self.limits.jerk_shares(path, v, a, j)
         column = np.concatenate([shares, np.zeros((len(shares), 1)), jerks], axis=1).argmax(axis=1)
         return self._named(column), np.maximum(shares.max(axis=1), jerks.max(axis=1))
 
     def _named(self, column: Ints) -> Ints:
         """Return the constraints (n,) of the columns: feed becomes rapid rate where that is what holds."""
-        speed, feeds = self.course.speed, self.limits.section_speeds(self.piece)[self.course.section]
+        speed, feeds = self.derivatives.speed, self.limits.section_speeds(self.piece)[self.derivatives.section]
         rapid = (speed == self.limits.rapid) & (feeds != speed)
         return np.where((column == FEED) & rapid, RAPID, column)
 

@@ -12,7 +12,7 @@ from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine.machine import Machine
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.pieces.piece import PieceProfile
-from pentapod.timing.pieces.spline_padding import run_in
+from pentapod.timing.pieces.spline_padding import spline_padding
 from pentapod.timing.pieces.use import Use
 from pentapod.timing.topp.stages import Failure
 
@@ -61,11 +61,11 @@ class Setpoints:
         tool = piece.pose(s) if self.profile.limits.tool.given() else ()
         return np.column_stack([piece(s, 0), s, *tool])
 
-    def run_in(self, *, start: bool) -> Floats:
+    def spline_padding(self, *, start: bool) -> Floats:
         """Return rows (n, 6 or 12) that come to the start, or leave the end, at the speed that is given there."""
         profile = self.profile
         speed = (profile.x_start if start else profile.x_end) ** 0.5
-        return run_in(profile.piece, speed, self.period, start=start, tool=bool(profile.limits.tool.given()))
+        return spline_padding(profile.piece, speed, self.period, start=start, tool=bool(profile.limits.tool.given()))
 
     def use(self, rows: Floats, machine: Machine, first: int, count: int) -> Use:
         """Return what the piece uses of the limits in `count` intervals from `first` on of rows (n, 6 or 12)."""

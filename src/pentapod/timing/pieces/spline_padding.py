@@ -1,4 +1,4 @@
-"""Run-in: rows before a motion that is given a speed to start with, and after one that ends at a speed."""
+"""Spline padding: rows before a motion that is given a speed to start with, and after one that ends at a speed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ROWS = 16
 """Rows that the spline through all rows needs to forget where they begin: 0.27 of a row's say is left in the next."""
 
 
-def run_in(piece: PieceLike, speed: float, period: float, *, start: bool, tool: bool = False) -> Floats:
+def spline_padding(piece: PieceLike, speed: float, period: float, *, start: bool, tool: bool = False) -> Floats:
     """Return rows (ROWS + 1, 6 or 12) that come to a piece's start, or leave its end, at constant speed.
 
     Legs, station and, where `tool` asks for them, tip and axis: by the Taylor polynomials of degree 3 there, through
