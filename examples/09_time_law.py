@@ -21,7 +21,6 @@ from pentapod.geometry.interpolant import Interpolant
 from pentapod.kinematics import Component
 from pentapod.machine import Machine
 from pentapod.planning import LegPath, PlacedPath, Placement, leg_path
-from pentapod.planning.limits.margins import Limit
 from pentapod.timing import Trajectory, certify, explain, override, retime
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
@@ -40,7 +39,7 @@ def placed_raster(machine: Machine) -> PlacedPath:
     toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, FEED),), pivot=0.003)
     turn = RigidTransform(np.diag([1.0, -1.0, -1.0]), machine.work.centre)
     margins = np.ones((len(tips), 1))
-    limits = (Limit("none", "mm", abs),)
+    limits = ()
     return PlacedPath(
         toolpath, Placement(turn, "by hand"), Component(1, 1), turn.apply(tips), turn.rotate(axes), margins, limits
     )

@@ -12,7 +12,6 @@ from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.planning.leg_path.leg_path import LegPath, leg_path
-from pentapod.planning.limits.margins import Limit
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.planning.placement.placement import Placement
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
@@ -25,7 +24,7 @@ def placed_on(machine, toolpath):
     turn = RigidTransform(np.diag([1.0, -1.0, -1.0]), machine.work.centre)
     axes = turn.rotate(toolpath.axes)
     tips = turn.apply(toolpath.tips)
-    margins, limits = np.ones((len(tips), 1)), (Limit("none", "mm", abs),)
+    margins, limits = np.ones((len(tips), 1)), ()
     return PlacedPath(toolpath, Placement(turn, "test"), Component(1, 1), tips, axes, margins, limits)
 
 

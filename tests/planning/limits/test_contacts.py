@@ -13,8 +13,8 @@ from pentapod.machine.clearance.leg_clearance import clearances
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning.diagnosis import blame
-from pentapod.planning.limits.contacts import comforts, names
-from pentapod.planning.limits.margins import TOOL_COMFORTABLE_M, Margins
+from pentapod.planning.limits.limit import Comforts
+from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.ipopt import IpoptSolver
 from pentapod.planning.placement.sampling import first_candidate, first_guesses
 from pentapod.planning.placement.sequential import SequentialSolver
@@ -69,7 +69,8 @@ def place(desk):
 def test_limits_are_named_in_the_order_of_the_values(desk, crowd, place):
     margins = Margins.of(desk, PLUS, crowd)
     listed = [limit.name for limit in margins.limits]
-    assert listed[-14:] == list(names(crowd))
+    bodies = [*(f"leg {k}" for k in range(1, 6)), "spindle", "tool body"]
+    assert listed[-14:] == [f"{body} touches the {obstacle}" for obstacle in ("fixture", "table") for body in bodies]
     assert "leg 3 touches the fixture" in listed
     assert "tool body touches the table" in listed
     tips, axes = poses(desk, 7)
@@ -80,14 +81,15 @@ def test_limits_are_named_in_the_order_of_the_values(desk, crowd, place):
 def test_gaps_between_legs_and_spindle_are_those_of_the_machine(desk):
     """Against distances of segments in space, which know of no plane of leg and axis."""
     tips, axes = poses(desk, 500, seed=1)
-    found = Margins.of(desk, PLUS)(tips, axes)[:, -5:] * TOOL_COMFORTABLE_M
+    found = Margins.of(desk, PLUS)(tips, axes)[:, -5:] * Comforts().tool
     np.testing.assert_allclose(found, clearances(desk, tips + desk.tool_length * axes, -axes)[:, 10:], atol=1e-7)
 
 
 def test_margins_are_distances_of_samples(desk, crowd, place):
     tips, axes = poses(desk, 5, seed=2)
-    outer = Margins.of(desk, PLUS, crowd)(tips, axes, place)[:, -14:] * np.array(comforts(crowd))
-    caps = 1.2 * np.array(comforts(crowd))
+    room = Comforts()
+    comforts = np.tile([*[room.leg_obstacle] * 5, room.spindle_obstacle, room.tool_obstacle], 2)
+    outer, caps = Margins.of(desk, PLUS, crowd)(tips, axes, place)[:, -14:] * comforts, 1.2 * comforts
     fixture = post(0.06, 0.02, -0.02, 0.06).apply_transform(place.matrix)
     position = tips + desk.tool_length * axes
     t = np.linspace(0.0, 1.0, 200)[:, None]
@@ -105,7 +107,7 @@ def test_the_formula_equals_the_margins_and_their_slopes(desk, crowd, place):
     """At the poses where contacts were taken: the value, and central differences of the true margins."""
     margins = Margins.of(desk, PLUS, crowd)
     tips, axes = poses(desk, 80, seed=3)
-    count = len(names(crowd))
+    count = 14
     tip, axis, turn, shift = (ca.SX.sym("x", *size) for size in ((3,), (3,), (3, 3), (3,)))
     numbers = ca.SX.sym("c", margins.contact_numbers)
     whole = margins.symbolic(tip, axis, turn, shift, numbers)[-count:]

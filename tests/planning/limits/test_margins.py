@@ -8,7 +8,8 @@ import pytest
 from scipy.optimize import minimize
 
 from pentapod.kinematics.component import COMPONENTS, Component
-from pentapod.planning.limits.margins import CLEARANCE_COMFORTABLE_M, Margins
+from pentapod.planning.limits.limit import Comforts
+from pentapod.planning.limits.margins import Margins
 
 PLUS = Component(1, 1)
 
@@ -85,7 +86,7 @@ def test_gaps_between_legs_match_a_numerical_search(desk):
                 minimize(between, start, bounds=[(0, 1), (0, 1)], options={"ftol": 1e-16}).fun
                 for start in ((0.1, 0.1), (0.9, 0.9), (0.5, 0.5))
             )
-            gap = values[n, column] * CLEARANCE_COMFORTABLE_M + 2 * desk.bodies.leg_radius
+            gap = values[n, column] * Comforts().legs + 2 * desk.bodies.leg_radius
             assert abs(gap) == pytest.approx(np.sqrt(least), abs=2e-6)
 
 

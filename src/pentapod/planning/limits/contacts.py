@@ -8,9 +8,8 @@ contact was taken. Both solvers work with that formula, and are judged by the tr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -19,107 +18,64 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.solids import Solid
 from pentapod.machine.clearance.collision_world import (
     LEGS,
-    TOOL_BODY,
     MovingBodies,
     Obstacle,
-    Surroundings,
     spindle_ends,
 )
 from pentapod.machine.machine import Machine
-
-COMFORTABLE_M = {"leg": 0.05, "spindle": 0.01, TOOL_BODY: 0.005}
-"""Gaps that count as margin 1: a spindle and a tool work near the part by nature."""
+from pentapod.planning.limits.limit import Scene
 
 NUMBERS = 8
 """Of a contact: place on the body's line, normal (3), mesh point (3), radius of the ball."""
 
-_CAP = 1.2  # margins are not looked at beyond this
+_CAP = 1.2  # larger margins are not computed
 _FLAT = 1e-3  # sine of the angle to the axis below which a nearest part counts as flat
 
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """margins (N, C) of poses, and the contacts (N, C · NUMBERS) that they come from; C: as many as `names`."""
+    """margins (N, C) of poses, and the contacts (N, C · NUMBERS) that they come from; C: all bodies by obstacle."""
 
     margins: Floats
     numbers: Floats
 
 
-def names(surroundings: Surroundings) -> tuple[str, ...]:
-    """Return what each margin stands for, (C,): "leg 3 touches the part"."""
-    return tuple(f"{body} touches the {o.name}" for o in surroundings.obstacles for body in surroundings.names)
+def body_comforts(scene: Scene) -> tuple[float, ...]:
+    """Return the gaps (K,) in metres that count as margin 1, in the order of `Surroundings.names`."""
+    comforts = scene.comforts
+    tool = (comforts.tool_obstacle,) if scene.surroundings.tool else ()
+    return (*[comforts.leg_obstacle] * LEGS, comforts.spindle_obstacle, *tool)
 
 
-def comforts(surroundings: Surroundings) -> tuple[float, ...]:
-    """Return the gaps (C,) in metres that count as margin 1."""
-    return tuple(COMFORTABLE_M[body.rstrip(" 12345")] for _ in surroundings.obstacles for body in surroundings.names)
-
-
-def contacts(
-    machine: Machine, surroundings: Surroundings, tips: Floats, axes: Floats, placement: RigidTransform
-) -> Contacts:
+def contacts(scene: Scene, tips: Floats, axes: Floats, placement: RigidTransform) -> Contacts:
     """Return the contacts of tool poses (N, 3), machine frame, with the workpiece placed."""
+    machine, tool, obstacles = scene.machine, scene.surroundings.tool, scene.surroundings.obstacles
     position, direction = tips + machine.tool_length * axes, -axes
-    comfortable, moving = np.array(comforts(surroundings)), len(surroundings.names)
+    comforts = body_comforts(scene)
+    comfortable, moving = np.tile(comforts, len(obstacles)), len(comforts)
     both = np.zeros((len(tips), len(comfortable), 1 + NUMBERS))
     both[..., 0], both[..., -1] = _CAP * comfortable, -_CAP * comfortable
-    for k, obstacle in enumerate(surroundings.obstacles):
+    for k, obstacle in enumerate(obstacles):
         frame = placement if obstacle.clamped else None
-        rows = _near(machine, obstacle, surroundings.tool, tips, axes, frame)
+        rows = _near(scene, obstacle, tips, axes, frame)
         if not len(rows):
             continue
         bodies = MovingBodies.at(machine, position[rows], direction[rows], frame)
-        columns = _lines(machine, obstacle, bodies)
-        if surroundings.tool:
-            columns.append(_tool(obstacle, surroundings.tool, bodies))
+        columns = _lines(machine, obstacle, bodies, comforts)
+        if tool:
+            columns.append(_tool(obstacle, tool, bodies, _CAP * comforts[-1]))
         both[rows, k * moving : (k + 1) * moving] = np.stack(columns, axis=1)
     return Contacts(both[..., 0] / comfortable, both[..., 1:].reshape(len(tips), -1))
 
 
-def margin_formulas(
-    machine: Machine,
-    surroundings: Surroundings,
-    pose: tuple[Sequence[Any], Sequence[Any]],
-    placement: tuple[Callable[[int, int], Any], Sequence[Any]],
-    numbers: Sequence[Any],
-    joints: tuple[Sequence[Sequence[Any]], Sequence[Any]],
-) -> list[Any]:
-    """Return the margins (C,) as formulas of the pose, contacts given.
-
-    pose: components of tip and axis, machine frame. placement: the entries of its rotation, and its translation.
-    numbers: of all contacts, one after the other. joints: base attachments (5) of two, and platform offsets (5). NumPy
-    arrays or casadi symbols.
-    """
-    tip, axis = pose
-    turn, shift = placement
-    base, lever = joints[0], [machine.tool_length - z for z in joints[1]]
-    formulas: list[Any] = []
-    for obstacle in surroundings.obstacles:
-        for body in range(len(surroundings.names)):
-            column = len(formulas)
-            s, *rest = numbers[NUMBERS * column : NUMBERS * (column + 1)]
-            normal, point, radius = rest[:3], rest[3:6], rest[6]
-            if body < LEGS:
-                start = [*base[body], 0.0]
-                x = [start[k] + s * (tip[k] + lever[body] * axis[k] - start[k]) for k in range(3)]
-            else:
-                x = [tip[k] + s * axis[k] for k in range(3)]
-            if obstacle.clamped:
-                off = [x[k] - shift[k] for k in range(3)]
-                x = [sum(turn(k, j) * off[k] for k in range(3)) for j in range(3)]
-            gap = sum(normal[k] * (x[k] - point[k]) for k in range(3)) - radius
-            formulas.append(gap / comforts(surroundings)[column])
-    return formulas
-
-
-def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies) -> list[Floats]:
-    """Return for legs and spindle the gaps and the numbers of their contacts, six of (N, 1 + NUMBERS)."""
+def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts: Sequence[float]) -> list[Floats]:
+    """Return for legs and spindle the gaps and the numbers of their contacts, each (N, 1 + NUMBERS)."""
     count = len(bodies.tips)
     top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
     columns: list[Floats] = []
     for body in range(LEGS + 1):
         radius = float(bodies.radii[body])
-        cap = _CAP * COMFORTABLE_M["leg" if body < LEGS else "spindle"]
+        cap = _CAP * comforts[body]
         column = np.zeros((count, 1 + NUMBERS))
         column[:, 0], column[:, -1] = cap, -cap
         columns.append(column)
@@ -139,15 +95,9 @@ def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies) -> list[F
     return columns
 
 
-def _near(
-    machine: Machine,
-    obstacle: Obstacle,
-    tool: Sequence[Solid],
-    tips: Floats,
-    axes: Floats,
-    frame: RigidTransform | None,
-) -> Ints:
+def _near(scene: Scene, obstacle: Obstacle, tips: Floats, axes: Floats, frame: RigidTransform | None) -> Ints:
     """Return the poses (N, 3) in which the box around any body comes near the obstacle's box: most do not."""
+    machine, tool, comforts = scene.machine, scene.surroundings.tool, scene.comforts
     robot, bodies = machine.pentapod, machine.bodies
     base = np.column_stack([robot.base, np.zeros(LEGS)])
     if frame is not None:
@@ -156,14 +106,14 @@ def _near(
     low, high = obstacle.surface.bounds
     top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
     lines = [(base[k], tips + (machine.tool_length - robot.offsets[k]) * axes) for k in range(LEGS)]
-    reaches = [_CAP * COMFORTABLE_M["leg"] + bodies.leg_radius] * LEGS
+    reaches = [_CAP * comforts.leg_obstacle + bodies.leg_radius] * LEGS
     lines.append((tips + nose * axes, tips + top * axes))
-    reaches.append(_CAP * COMFORTABLE_M["spindle"] + bodies.shaft_radius)
+    reaches.append(_CAP * comforts.spindle_obstacle + bodies.shaft_radius)
     if tool:
         least, most = min(s.low - s.rounding for s in tool), max(s.top for s in tool)
         lines.append((tips + least * axes, tips + most * axes))
         wide = max(max(s.low_radius, s.high_radius) + s.rounding for s in tool)
-        reaches.append(_CAP * COMFORTABLE_M[TOOL_BODY] + wide)
+        reaches.append(_CAP * comforts.tool_obstacle + wide)
     near = np.zeros(len(tips), dtype=np.bool_)
     for (a, b), reach in zip(lines, reaches, strict=True):
         apart = np.maximum(np.minimum(a, b) - high, low - np.maximum(a, b)).max(axis=1)
@@ -178,11 +128,10 @@ def _boxed(obstacle: Obstacle, starts: Floats, ends: Floats, within: float) -> I
     return np.flatnonzero(apart < within)
 
 
-def _tool(obstacle: Obstacle, solids: tuple[Solid, ...], bodies: MovingBodies) -> Floats:
-    """Return for the tool body the gaps and the numbers of its contacts (N, 1 + NUMBERS)."""
+def _tool(obstacle: Obstacle, solids: tuple[Solid, ...], bodies: MovingBodies, cap: float) -> Floats:
+    """Return for the tool body the gaps, at most `cap`, and the numbers of its contacts (N, 1 + NUMBERS)."""
     from pentapod.mesh.query.sweep_kernels import meridian_distance  # noqa: PLC0415  loads numba
 
-    cap = _CAP * COMFORTABLE_M[TOOL_BODY]
     gaps, points = obstacle.surface.bodies(solids, bodies.tips, bodies.axes, cap)
     gaps = np.minimum(gaps + obstacle.allowance, cap)
     column = np.zeros((len(gaps), 1 + NUMBERS))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.refusal import Refusal
 from pentapod.kinematics.component import Component
-from pentapod.planning.limits.margins import Limit
+from pentapod.planning.limits.limit import Limit
 from pentapod.planning.placement.placement import Placement
 from pentapod.toolpath.toolpath import Toolpath
 

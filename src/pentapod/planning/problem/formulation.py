@@ -16,7 +16,8 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.numerics.casadi_vectorised import Vectorised
-from pentapod.planning.limits.margins import Joints, Margins
+from pentapod.planning.limits.margins import Margins
+from pentapod.planning.limits.tool_pose import Joints
 from pentapod.planning.problem.constraints import Freedom
 from pentapod.planning.problem.problem import Setting
 from pentapod.planning.problem.weights import weighed

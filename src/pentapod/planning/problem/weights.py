@@ -10,7 +10,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ArrayError
-from pentapod.planning.limits.margins import Limit
+from pentapod.planning.limits.limit import Limit
 
 NEEDED_MARGIN = 0.02
 """A plan is accepted from this smallest margin on: what rounding corners between waypoints may cost."""

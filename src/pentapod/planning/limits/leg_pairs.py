@@ -1,0 +1,84 @@
+"""Leg pairs: clearance of two legs, signed so that legs that passed through each other do not count as apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from pentapod.machine.clearance.tool_clearance import Arithmetic
+from pentapod.planning.limits.limit import LengthLimit, Scene
+from pentapod.planning.limits.tool_pose import ToolPose
+
+
+@dataclass(frozen=True, kw_only=True)
+class LegPairClearance(LengthLimit):
+    """The gap between two legs. thickness: of a leg, metres; side: see `signed_leg_clearance`."""
+
+    first: int
+    second: int
+    side: float
+    thickness: float
+
+    @classmethod
+    def of(cls, scene: Scene) -> list[LegPairClearance]:
+        """Return all pairs; each must pass on the side on which it does in the middle of the work volume."""
+        machine = scene.machine
+        direction = np.array([0.0, 0.0, float(scene.component.w)])
+        position = machine.work.centre - machine.tool_length * direction
+        legs, base = machine.pentapod.leg_vectors(position, direction), machine.pentapod.base
+        found: list[LegPairClearance] = []
+        for j, k in combinations(range(len(legs)), 2):
+            side = float(np.sign(np.dot([*(base[k] - base[j]), 0.0], np.cross(legs[j], legs[k]))))
+            found.append(
+                cls(
+                    name=f"legs {j + 1} and {k + 1} touch", comfort=scene.comforts.legs,
+                    first=j, second=k, side=side, thickness=2.0 * machine.bodies.leg_radius,
+                )
+            )  # fmt: skip
+        return found
+
+    def margin(self, pose: ToolPose) -> Any:
+        """Return the margin of the gap."""
+        j, k = self.first, self.second
+        offset = [b - a for a, b in zip(pose.bases[j], pose.bases[k], strict=True)]
+        gap = signed_leg_clearance(offset, pose.vectors[j], pose.vectors[k], self.side, pose.xp)
+        return (gap - self.thickness) / self.comfort
+
+
+def signed_leg_clearance(
+    offset: Sequence[Any],
+    d1: Sequence[Any],
+    d2: Sequence[Any],
+    side: float,
+    xp: Arithmetic,
+) -> Any:
+    """Return the distance of segments α d1 and offset + β d2, α, β in [0, 1]; offset in the base plane.
+
+    It is negative where one has passed through the other: where the nearest points lie inside both and
+    the second runs on the other side of the first than `side`, the sign of offset · (d1 × d2), says.
+    The quadratic in (α, β) is minimised on the unit square by clamping α, then β, then α again.
+    """
+    ox, oy = offset
+    a = d1[0] * d1[0] + d1[1] * d1[1] + d1[2] * d1[2]
+    e = d2[0] * d2[0] + d2[1] * d2[1] + d2[2] * d2[2]
+    b = d1[0] * d2[0] + d1[1] * d2[1] + d1[2] * d2[2]
+    c, f = -(d1[0] * ox + d1[1] * oy), -(d2[0] * ox + d2[1] * oy)
+    area = a * e - b * b + 1e-12 * a * e  # parallel legs: any α will do, the later clamps repair it
+
+    def clamp(x: Any) -> Any:
+        return xp.least(xp.most(x, 0.0), 1.0)
+
+    alpha = clamp((b * f - c * e) / area)
+    beta = clamp((b * alpha + f) / e)
+    alpha = clamp((b * beta - c) / a)
+    gx = alpha * d1[0] - beta * d2[0] - ox
+    gy = alpha * d1[1] - beta * d2[1] - oy
+    gz = alpha * d1[2] - beta * d2[2]
+    gap = xp.sqrt(gx * gx + gy * gy + gz * gz + 1e-18)  # the last term keeps the derivative finite at contact
+    triple = ox * (d1[1] * d2[2] - d1[2] * d2[1]) + oy * (d1[2] * d2[0] - d1[0] * d2[2])
+    inside = alpha * (1.0 - alpha) * beta * (1.0 - beta)
+    return xp.where(side * triple * inside < 0.0, -gap, gap)
