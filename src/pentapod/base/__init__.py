@@ -11,7 +11,9 @@ from pentapod.base.errors import (
     ToolpathError,
 )
 from pentapod.base.progress import Progress
-from pentapod.base.refusal import Blame, Refusal
+from pentapod.base.refusal import Blame, Refusal, RefusalError, stage
+from pentapod.base.registry import Registry
+from pentapod.base.values import Result, Value
 
 __all__ = [
     "ArrayError",
@@ -24,5 +26,10 @@ __all__ = [
     "ProgramError",
     "Progress",
     "Refusal",
+    "RefusalError",
+    "Registry",
+    "Result",
     "ToolpathError",
+    "Value",
+    "stage",
 ]

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
+from typing import Any, Concatenate, Never, ParamSpec, Protocol, TypeVar, cast, overload
+
+from pentapod.base.errors import PentapodError
+from pentapod.base.values import Value
+
+Given_contra = TypeVar("Given_contra", contravariant=True)
+Answer_co = TypeVar("Answer_co", covariant=True)
+Options = ParamSpec("Options")
 
 
 @dataclass(frozen=True)
-class Blame:
+class Blame(Value):
     """One constraint that cannot be met, the waypoints where, and the shortfall.
 
     constraint: a name a user knows, "leg 2 too long". waypoints: inclusive index ranges into the
@@ -27,8 +37,11 @@ class Blame:
 
 
 @dataclass(frozen=True)
-class Refusal:
-    """A stage's answer when it cannot be done. stage: "placement", "timing", ...; cause: one sentence."""
+class Refusal(Value):
+    """A stage's answer when it cannot be done. stage: "placement", "timing", ...; cause: one sentence.
+
+    The stages after it return it unchanged, so a chain of stages needs one `unwrap` at its end.
+    """
 
     stage: str
     cause: str
@@ -41,3 +54,37 @@ class Refusal:
             text += ": " + "; ".join(str(blame) for blame in self.blames[:3])
             text += f"; and {len(self.blames) - 3} more limits" if len(self.blames) > 3 else ""
         return text + (f". {self.remedy}" if self.remedy else "")
+
+    def unwrap(self) -> Never:
+        """Raise RefusalError with this refusal; a result of a stage returns itself instead."""
+        raise RefusalError(self)
+
+
+class RefusalError(PentapodError):
+    """A stage refused, and `unwrap` was called on its answer; `refusal` is that answer."""
+
+    def __init__(self, refusal: Refusal) -> None:
+        super().__init__(str(refusal))
+        self.refusal = refusal
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.refusal,)
+
+
+class Stage(Protocol[Given_contra, Options, Answer_co]):
+    """A stage that returns a refusal of the stage before it unchanged."""
+
+    @overload
+    def __call__(self, given: Given_contra, /, *args: Options.args, **options: Options.kwargs) -> Answer_co: ...
+    @overload
+    def __call__(self, given: Refusal, /, *args: Options.args, **options: Options.kwargs) -> Refusal: ...
+
+
+def stage(function: Callable[Concatenate[Given_contra, Options], Answer_co]) -> Stage[Given_contra, Options, Answer_co]:
+    """Decorate a stage: where its first argument is a `Refusal`, that is its answer, and nothing else happens."""
+
+    @wraps(function)
+    def passed(*args: Any, **options: Any) -> Any:
+        return args[0] if args and isinstance(args[0], Refusal) else function(*args, **options)
+
+    return cast("Stage[Given_contra, Options, Answer_co]", passed)

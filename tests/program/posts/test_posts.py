@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.metadata
 import json
-from importlib.metadata import EntryPoint
 
 import numpy as np
 import pytest
@@ -29,6 +27,7 @@ from pentapod.program.posts import (
 )
 from pentapod.toolpath.formats.npz import toolpath_arrays
 from pentapod.toolpath.linking.partition import Piece
+from plugins import install
 
 
 def available(name):
@@ -181,28 +180,23 @@ def test_a_velocity_that_is_not_the_splines_is_refused(tmp_path):
         read_post(tmp_path, "pvt")
 
 
-MINE = table_post(
-    "mine",
-    "a table of a user",
-    Table(
-        {"legs.txt": (Column("t", "time", "ms", 3), *leg_columns("L{leg}", "length", "um", 5))},
-        separator=";",
-        comment="%",
-    ),
-)
+OTHERS = """
+from pentapod.program.posts import Column, Table, leg_columns, table_post
+
+COLUMNS = (Column("t", "time", "ms", 3), *leg_columns("L{leg}", "length", "um", 5))
+MINE = table_post("mine", "a table of a user", Table({"legs.txt": COLUMNS}, separator=";", comment="%"))
+BAD = 3
 
 
-class FakeEntry(EntryPoint):
-    def load(self):
-        return {"good": MINE, "maker": lambda: MINE, "bad": 3}[self.value]
+def make():
+    return MINE
+"""
 
 
 @pytest.fixture
-def others(monkeypatch):
-    entries = [FakeEntry(name, name, "pentapod.posts") for name in ("good", "maker", "bad")]
-    real = importlib.metadata.entry_points
-    found = lambda **query: entries if query == {"group": "pentapod.posts"} else real(**query)  # noqa: E731
-    monkeypatch.setattr("pentapod.program.posts.registry.entry_points", found)
+def others(tmp_path, monkeypatch):
+    names = {"good": "others:MINE", "maker": "others:make", "bad": "others:BAD"}
+    install(tmp_path / "site", monkeypatch, {"pentapod.posts": names}, others=OTHERS)
 
 
 @pytest.mark.parametrize("name", ["good", "maker"])
@@ -215,7 +209,7 @@ def test_a_post_of_ones_own(name, others, tmp_path):
 
 
 def test_posts_that_are_none(others):
-    with pytest.raises(InputError, match="cannot be loaded"):
+    with pytest.raises(InputError, match="names no post"):
         find_post("bad")
     with pytest.raises(InputError, match='did you mean "halstreamer"'):
         find_post("halstreamr")

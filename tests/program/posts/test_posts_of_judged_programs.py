@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from hashlib import sha256
+from textwrap import dedent
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from short_motion import given, passed, post
 from pentapod.base.errors import InputError, ProgramError
 from pentapod.cli.main import run
 from pentapod.program import Program, read_csv, write_csv
-from pentapod.program.posts import POSTS, PostInput, Table, leg_columns, read_post, register, table_post, write_post
+from pentapod.program.posts import POSTS, PostInput, read_post, write_post
+from plugins import install
 
 MARK = "UNVERIFIED: no verdict has passed this program"
 WITHOUT_COMMENTS = ("cam", "robodk")
@@ -213,8 +215,12 @@ def test_python_says_it_by_an_argument(tmp_path):
 
 
 def test_a_post_of_ones_own_says_so_as_well(tmp_path, monkeypatch):
-    monkeypatch.setattr("pentapod.program.posts.registry.POSTS", dict(POSTS))
-    register(table_post("mine", "", Table({"legs.txt": leg_columns("L{leg}", "length", "mm", 8)}, comment="%")))
+    code = """
+    from pentapod.program.posts import Table, leg_columns, table_post
+
+    MINE = table_post("mine", "", Table({"legs.txt": leg_columns("L{leg}", "length", "mm", 8)}, comment="%"))
+    """
+    install(tmp_path / "site", monkeypatch, {"pentapod.posts": {"mine": "mine:MINE"}}, mine=dedent(code))
     (file,) = write_post(given(duration=0.1), "mine", tmp_path, unverified=True)
     assert file.read_text().splitlines()[0] == f"% {MARK}"
     assert read_post(tmp_path, "mine").provenance.unverified

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import cast
 
-from pentapod.base.errors import InputError, ProgramError, nearest
+from pentapod.base.errors import InputError, ProgramError
 from pentapod.base.files import atomic_write
 from pentapod.base.input_files import read_bytes
+from pentapod.base.registry import Registry
+from pentapod.base.values import Value
 from pentapod.machine.machine import Machine
 from pentapod.program.csv import csv_bytes
 from pentapod.program.judged import Judgement, check_passed
@@ -26,7 +26,7 @@ _INSIST = "name the verdict.json of the program, or insist with unverified=True"
 
 
 @dataclass(frozen=True, eq=False)
-class PostInput:
+class PostInput(Value):
     """What there is to write. machine: as the program was made for it. toolpath: as placed, machine frame.
 
     sha256: of the file that the program was read from; None where it is what `write_csv` writes.
@@ -60,7 +60,7 @@ class PostInput:
 
 
 @dataclass(frozen=True)
-class Post:
+class Post(Value):
     """A format that a controller or another program takes.
 
     write: what there is → contents by file name, "folder/name" for files in folders; same input, same bytes. A
@@ -78,40 +78,23 @@ class Post:
     takes_toolpath: bool = False
 
 
-POSTS: dict[str, Post] = {}
-"""The posts that pentapod brings; `post_names` knows those of other packages as well."""
+POSTS = Registry("post", GROUP, Post)
+"""The posts by name: those that pentapod brings, then those of other packages."""
 
 
 def register(post: Post) -> Post:
     """Add a post to `POSTS` and return it."""
-    POSTS[post.name] = post
-    return post
+    return POSTS.register(post.name, post)
 
 
 def post_names() -> list[str]:
     """Return the names of all posts, those of other packages last."""
-    return [*POSTS, *(name for name in _others() if name not in POSTS)]
+    return list(POSTS)
 
 
 def find_post(name: str) -> Post:
     """Return the post of this name. Raises InputError: unknown, or another package's that cannot be loaded."""
-    if name in POSTS:
-        return POSTS[name]
-    others = _others()
-    if name not in others:
-        raise InputError("unknown post", key="to", value=name, remedy=nearest(name, [*POSTS, *others]))
-    entry = others[name]
-    try:
-        loaded: object = entry.load()
-        post = loaded if isinstance(loaded, Post) else cast(Callable[[], object], loaded)()
-    except Exception as error:
-        raise InputError(
-            f"this post cannot be loaded: {type(error).__name__}: {error}", key=name, value=entry.value,
-            remedy="mend or remove the package that names it",
-        ) from error  # fmt: skip
-    if not isinstance(post, Post):
-        raise InputError("the entry point names no post", key=name, value=entry.value, expected="a pentapod Post")
-    return post
+    return POSTS.find(name, key="to")
 
 
 def write_post(
@@ -165,7 +148,3 @@ def read_post(folder: str | Path, name: str) -> Program | Toolpath:
 def read_file(path: Path) -> bytes:
     """Return the bytes of a file. Raises ProgramError where it cannot be read."""
     return read_bytes(path, ProgramError, "a file of this post")
-
-
-def _others() -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group=GROUP)}

@@ -1,0 +1,86 @@
+"""Registry: things by name, those that pentapod brings and those of other packages, found by entry points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from pentapod.base.errors import InputError, nearest
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+T = TypeVar("T")
+
+
+class Registry(Mapping[str, T], Generic[T]):
+    """Things of one kind by name: pentapod's own, then those that installed packages name by entry points.
+
+    kind: what the things are, in messages ("post"); group: of the entry points; type_: what each must be. An entry
+    point names such a thing, or a function without arguments that returns one. Entry points are read when a name is
+    looked up that is not pentapod's own, or when all are listed; a plug-in is loaded when it is used.
+    """
+
+    def __init__(self, kind: str, group: str, type_: type[T], wrong: type[InputError] = InputError) -> None:
+        self.kind, self.group, self._type, self._wrong = kind, group, type_, wrong
+        self._own: dict[str, T] = {}
+
+    @property
+    def own(self) -> Mapping[str, T]:
+        """The things that pentapod brings; no other package is looked for."""
+        return self._own
+
+    def register(self, name: str, thing: T) -> T:
+        """Add one of pentapod's own, and return it."""
+        self._own[name] = thing
+        return thing
+
+    def find(self, name: str, key: str | None = None) -> T:
+        """Return the thing of this name. Raises InputError: unknown, or a package's that cannot be loaded.
+
+        key: of the job, machine or call that names it, for the message.
+        """
+        if name in self._own:
+            return self._own[name]
+        entries = self._entries()
+        if name not in entries:
+            raise self._wrong(f"unknown {self.kind}", key=key, value=name, remedy=nearest(name, [*self._own, *entries]))
+        return self._loaded(entries[name])
+
+    def __getitem__(self, name: str) -> T:
+        if name not in self:
+            raise KeyError(name)
+        return self.find(name)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._own or name in self._entries()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(dict.fromkeys((*self._own, *self._entries())))
+
+    def __len__(self) -> int:
+        return len(tuple(iter(self)))
+
+    def _entries(self) -> dict[str, EntryPoint]:
+        from importlib.metadata import entry_points  # noqa: PLC0415 - a plain command does not read them
+
+        return {entry.name: entry for entry in entry_points(group=self.group)}
+
+    def _loaded(self, entry: EntryPoint) -> T:
+        """Return what an entry point names. Raises InputError that names the package."""
+        package = f'the package "{entry.dist.name}"' if entry.dist else "the package that names it"
+        try:
+            thing: Any = entry.load()
+            if not isinstance(thing, self._type) and callable(thing):
+                thing = thing()
+        except Exception as error:
+            raise self._wrong(
+                f"this {self.kind} cannot be loaded: {type(error).__name__}: {error}", key=entry.name,
+                value=entry.value, remedy=f"mend or remove {package}",
+            ) from error  # fmt: skip
+        if isinstance(thing, self._type):
+            return thing
+        raise self._wrong(
+            f"the entry point names no {self.kind}", key=entry.name, value=entry.value,
+            expected=f"a pentapod {self._type.__name__}", remedy=f"mend or remove {package}",
+        )  # fmt: skip
