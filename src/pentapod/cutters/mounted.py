@@ -9,11 +9,12 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
+from pentapod.base.values import Value
 from pentapod.geometry.solids import Cone, Solid, stacked
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mounted(ABC):
+class Mounted(Value, ABC):
     """shank, holder: what follows on the cutting part, from the tip towards the spindle; heights in metres."""
 
     shank: tuple[Cone, ...] = field(default=())

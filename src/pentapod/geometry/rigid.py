@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, as_floats, frozen, set_frozen
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 
 
 @dataclass(frozen=True, eq=False)
-class RigidTransform:
+class RigidTransform(Value):
     """x ↦ rotation @ x + translation. rotation (3, 3) proper orthogonal; translation (3,) in metres.
 
     Raises ArrayError where the rotation is not a rotation to 1e-9.

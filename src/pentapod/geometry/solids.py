@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.errors import ToolpathError
+from pentapod.base.values import Value
 
 KINDS = ("cutter", "shank", "holder")
 """What a solid is part of, in the order of reports."""
@@ -61,7 +62,7 @@ class Solid:
 
 
 @dataclass(frozen=True)
-class Cone:
+class Cone(Value):
     """One piece of a shank or holder: a cylinder, or a frustum where the radii differ. Metres.
 
     Raises ToolpathError unless the height and a radius are positive.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from pentapod.base.refusal import Refusal
+from pentapod.base.values import Result
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.planning.placement.placed_path import PlacedPath
@@ -33,7 +34,7 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(Result):
     """What a run reached. stages: in the order of the flow, as far as it came; a refusal ends it.
 
     machine: with the job's own tool length and controller settings.

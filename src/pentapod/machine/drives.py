@@ -8,11 +8,12 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import MachineError
+from pentapod.base.values import Value
 from pentapod.machine.fields import not_negative, per_leg, positive
 
 
 @dataclass(frozen=True, eq=False)
-class Drives:
+class Drives(Value):
     """Five servo drives: a proportional position loop around a velocity loop with an integrator, and feed-forward.
 
         rate error = position_gain · (wanted − x) + velocity_feedforward · rate wanted − rate
@@ -56,7 +57,7 @@ class Drives:
 
 
 @dataclass(frozen=True, eq=False)
-class Masses:
+class Masses(Value):
     """Masses for the rigid-body simulation.
 
     cylinder, rod: of the fixed and of the moving part of each leg, kg; platform: of the spindle with all that it

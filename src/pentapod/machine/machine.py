@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import MachineError
+from pentapod.base.values import Value
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.kinematics.families.singularities import architectural_measure
@@ -28,7 +29,7 @@ ARCHITECTURAL_LIMIT = 0.005
 
 
 @dataclass(frozen=True, eq=False)
-class Machine:
+class Machine(Value):
     """A robot that was built.
 
     tool_length: metres from p (the platform line's origin, where offset = 0) along i to the tool tip.

@@ -9,13 +9,14 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import MachineError
+from pentapod.base.values import Value
 from pentapod.machine.fields import per_leg, positive
 
 Interpolation = Literal["linear", "cubic"]
 
 
 @dataclass(frozen=True, eq=False)
-class LegLimits:
+class LegLimits(Value):
     """Limits of each leg, arrays (5,): lengths in m, rates in m/s, accelerations in m/s², jerks in m/s³.
 
     Scalars hold for all legs. Raises MachineError: not positive and finite, min_length ≥ max_length.
@@ -46,7 +47,7 @@ class LegLimits:
 
 
 @dataclass(frozen=True, eq=False)
-class JointLimits:
+class JointLimits(Value):
     """Cones within which the joints let the legs move.
 
     base_axes (5, 3): unit axis of each base joint's cone, machine frame. base_cone (5,): largest angle of the
@@ -79,7 +80,7 @@ class JointLimits:
 
 
 @dataclass(frozen=True)
-class Bodies:
+class Bodies(Value):
     """Simple bodies around the legs and the platform line, metres.
 
     leg_radius: each leg is a capsule from base joint to platform joint. shaft_radius: the platform (spindle)
@@ -98,7 +99,7 @@ class Bodies:
 
 
 @dataclass(frozen=True)
-class ControllerSettings:
+class ControllerSettings(Value):
     """period: seconds between setpoints. interpolation: how the controller moves between them."""
 
     period: float
@@ -116,7 +117,7 @@ class ControllerSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class WorkVolume:
+class WorkVolume(Value):
     """What the machine is advertised for: a cylinder of tips and a cone of tool axes, machine frame.
 
     centre (3,) metres; diameter and height (along z) in metres; tilt: largest angle in radians between the

@@ -8,6 +8,7 @@ from math import radians
 from typing import Protocol
 
 from pentapod.base.errors import MachineError
+from pentapod.base.values import Value
 
 
 class ToolLimitKeys(Protocol):
@@ -24,7 +25,7 @@ class ToolLimitKeys(Protocol):
 
 
 @dataclass(frozen=True)
-class ToolLimits:
+class ToolLimits(Value):
     """Limits of the tool's own motion, infinite where there is none: spindles, hoses and workpieces may set them.
 
     max_tip_acceleration in m/s², max_tip_jerk in m/s³; max_axis_velocity in rad/s and max_axis_acceleration in rad/s²,

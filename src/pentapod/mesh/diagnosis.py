@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pentapod.base.values import Value
+
 
 @dataclass(frozen=True)
-class MeshDiagnosis:
+class MeshDiagnosis(Value):
     """What was found in a mesh, and what was mended.
 
     facets, vertices: after welding and repairs. watertight: every edge has exactly two facets. consistent:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Bools, Floats, Ints, as_batch, frozen, set_frozen
 from pentapod.base.errors import MeshError
 from pentapod.base.progress import Progress, silent
+from pentapod.base.values import Value
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.mesh import normals
 from pentapod.mesh import repair as mending
@@ -26,7 +27,7 @@ CREASE_ANGLE = np.radians(40.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(Value):
     """A surface of triangles. Make one with `Mesh.of` or `load_mesh`; the constructor takes what is sound.
 
     vertices (V, 3): metres, workpiece frame. faces (F, 3): vertex indices, counterclockwise seen from

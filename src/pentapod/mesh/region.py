@@ -8,11 +8,12 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
+from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class Region(Value):
     """Surface points within a box whose normal is within an angle of a direction.
 
     direction (3,): any length; angle: radians in (0, π/2], so that of a closed solid one side is

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats
+from pentapod.base.values import Value
 from pentapod.numerics.bernstein import split
 
 _RESOLUTION = 6  # halvings: to 1/64
 
 
 @dataclass(frozen=True, eq=False)
-class Positivity:
+class Positivity(Value):
     """Answers about N polynomials on [0, 1].
 
     low (N,): a proven positive lower bound, 0 where positivity is not proven. refuted (N,): proven to be

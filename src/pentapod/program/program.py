@@ -10,6 +10,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ProgramError
+from pentapod.base.values import Result, Value
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import Machine
@@ -19,7 +20,7 @@ FORMAT_VERSION = 1
 
 
 @dataclass(frozen=True)
-class Provenance:
+class Provenance(Value):
     """What a program was made from: names and hashes, as they stand in its header.
 
     piece: of the toolpath, where the program is one of several set-ups. processor, libraries: on which it was made; the
@@ -38,7 +39,7 @@ class Provenance:
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class Program(Result):
     """Setpoints for the five legs.
 
     legs (N, 5): lengths in metres, row k is due at k · period seconds. interpolation: how the controller

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, frozen, set_frozen
+from pentapod.base.values import Value
 from pentapod.geometry.directions import angle_between
 from pentapod.simulate.contour import contour_errors
 from pentapod.simulate.played import Played
@@ -22,7 +23,7 @@ _TIME_CONSTANTS = 3.0  # of the position loop: so much later than due the tool i
 
 
 @dataclass(frozen=True, eq=False)
-class Measure:
+class Measure(Value):
     """One quantity at each row of the program. values (N,) in `unit`, as in files; none negative."""
 
     name: str
@@ -55,7 +56,7 @@ class Measure:
 
 
 @dataclass(frozen=True, eq=False)
-class Tracking:
+class Tracking(Value):
     """A program as it was played, beside what it asks and the toolpath behind it.
 
     tolerance: metres, of the path; it tells the search how near to look. more: what else was measured.

@@ -12,6 +12,7 @@ from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ArrayError, InputError
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal
+from pentapod.base.values import Result, Value
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.families.as_built_forward import as_built_pose
 from pentapod.simulate.load import leg_loads
@@ -27,7 +28,7 @@ _NEWS = 500  # rows between two reports of progress
 
 
 @dataclass(frozen=True, eq=False)
-class Physics:
+class Physics(Value):
     """A program as MuJoCo played it.
 
     leg_forces (N, 5): with which each leg pushes its platform joint away from its base joint, newtons: what bends and
@@ -56,7 +57,7 @@ class Physics:
 
 
 @dataclass(frozen=True, eq=False)
-class Plant:
+class Plant(Result):
     """The machine that stands there, at the start of a program. xml: as MJCF, standing at position, direction (3,)."""
 
     xml: str

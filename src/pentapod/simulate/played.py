@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.values import Result
 
 
 @dataclass(frozen=True, eq=False)
-class Played:
+class Played(Result):
     """Where the tool really was at each row of the program, machine frame.
 
     legs (N, 5): leg lengths; tips (N, 3), metres; directions (N, 3) of the platform. forces (N, 5): of the drives on

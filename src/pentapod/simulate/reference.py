@@ -9,13 +9,14 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ProgramError
+from pentapod.base.values import Value
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine.machine import Machine
 from pentapod.program.program import Program
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
+class Reference(Value):
     """A program on its machine. Samples are the rows and the moments halfway between them: M = 2N − 1.
 
     Raises ProgramError where the program's leg lengths have no pose on this machine.

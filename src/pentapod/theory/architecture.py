@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.values import Value
 from pentapod.kinematics.families.conics import Conic, conic_determinant, forbidden_conic
 
 
 @dataclass(frozen=True, eq=False)
-class ArchitecturalDistance:
+class ArchitecturalDistance(Value):
     """How far base attachments can move before the design is singular in every pose. Metres.
 
     alone (5,): the distance of each attachment from its `forbidden_conic`, the others staying. together: the smallest

@@ -18,6 +18,7 @@ import numpy as np
 
 from pentapod.base.arrays import Bools, as_floats
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.kinematics.component import COMPONENTS, Component
 
 Signs: TypeAlias = tuple[int | None, int | None, int | None, int | None, int | None]
@@ -27,7 +28,7 @@ _WORDS = (("w", "0"), ("S", "0"), ("pz", "0"), ("px", "0"), ("δu", "1"))
 
 
 @dataclass(frozen=True)
-class Cell:
+class Cell(Value):
     """One cell: where w, S, pz, px and T = 1 − δu have given signs.
 
     equations and inequalities say so in words; the dimension is 5 less the number of equations. components: those in
@@ -54,7 +55,7 @@ class Cell:
 
 
 @dataclass(frozen=True, eq=False)
-class CellDecomposition:
+class CellDecomposition(Value):
     """All cells for a class of δ, by falling dimension, and how they hang together.
 
     kind: "|δ| < 1", "|δ| = 1" or "|δ| > 1". incidence (n, n): [a, b] says that cell a lies in the boundary of cell b.

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, as_floats, frozen, set_frozen
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
 from pentapod.kinematics.batches import broadcast
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
@@ -62,7 +63,7 @@ def stiffness_criterion(leg_stiffness: ArrayLike, tool_length: float) -> Criteri
 
 
 @dataclass(frozen=True, eq=False)
-class GuideChoice:
+class GuideChoice(Value):
     """Slides (5,) in metres, the criterion's least value over the poses there, and at the start."""
 
     slides: Floats

@@ -8,6 +8,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints, set_frozen
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.geometry.level_set import enclosed_volume, zero_surface
 from pentapod.numerics.blocks import blocks
 from pentapod.theory.cuboid import largest_cuboid
@@ -15,7 +16,7 @@ from pentapod.theory.workspace import Workspace
 
 
 @dataclass(frozen=True, eq=False)
-class ReachField:
+class ReachField(Value):
     """The slack of a workspace at the nodes origin + step · (i, j, k) of a grid; metres.
 
     slack (nx, ny, nz): see `Workspace.slack`; the voxel about a node is reachable where it is not negative.

@@ -23,6 +23,7 @@ from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, Ints
+from pentapod.base.values import Value
 from pentapod.kinematics.batches import joined_poses
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.numerics.blocks import blocks
@@ -31,7 +32,7 @@ _GRID = 32  # angles tried besides the eight roots, should roots coincide
 
 
 @dataclass(frozen=True, eq=False)
-class SingularityFreeSphere:
+class SingularityFreeSphere(Value):
     """Spheres about poses (...) that hold no singular pose, and the singular pose that each touches.
 
     radius (...): metres, in the metric d² = (1/5) Σ |Δb_i|²; 0 on a singularity, NaN for a pose that is NaN.

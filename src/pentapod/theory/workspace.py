@@ -15,13 +15,14 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, as_batch, as_floats, frozen, set_frozen
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
 from pentapod.kinematics.component import Component, as_component
 from pentapod.kinematics.families.quadratic import LinearPentapod
 
 
 @dataclass(frozen=True, eq=False)
-class Workspace:
+class Workspace(Value):
     """The tips that can be reached with every direction of a cone, in one component, within leg limits.
 
     direction (3,): the middle of the cone of platform directions i (platform → tip); half_angle: of the cone, radians,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.base.values import Value
 from pentapod.geometry.interpolant import Interpolant, largest_length
 from pentapod.machine.machine import Machine
 from pentapod.timing.law.trajectory import Trajectory
@@ -15,7 +16,7 @@ from pentapod.timing.pieces.spline_padding import spline_padding
 
 
 @dataclass(frozen=True)
-class LimitUse:
+class LimitUse(Value):
     """The largest share of one limit. quantity: "leg velocity", ...; value and bound in `unit` (SI).
 
     leg: 1 to 5 where the limit is a leg's. time: seconds, of the row at or after which the share is reached; segment:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
+from pentapod.base.values import Value
 from pentapod.machine.machine import Machine
 from pentapod.timing.certificates import LimitUse
 from pentapod.timing.law.slowed import Slowed
@@ -24,7 +25,7 @@ _WORTH = 1e-4  # of the gap: what costs less is not told
 
 
 @dataclass(frozen=True)
-class Cause:
+class Cause(Value):
     """A limit: seconds during which it is the one that holds the motion back, and what that costs in seconds.
 
     cost: beyond the least time that these stretches of the path could take.
@@ -36,7 +37,7 @@ class Cause:
 
 
 @dataclass(frozen=True)
-class CostlyPlace:
+class CostlyPlace(Value):
     """A stretch of the path where one cause costs time.
 
     cost in seconds; segments: first and last of the toolpath; stations: from and to, global s in metres; time: when it
@@ -57,7 +58,7 @@ class CostlyPlace:
 
 
 @dataclass(frozen=True)
-class Explanation:
+class Explanation(Value):
     """Why a trajectory takes as long as it does.
 
     duration (s); lower_bound (s): ∫ max(1/feed, max_i |l_i′|/v_i) ds, which no motion along this path can beat; causes:

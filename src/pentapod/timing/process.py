@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.base.values import Value
 from pentapod.geometry.runs import equal_runs, marked_runs
 from pentapod.timing.law.trajectory import Trajectory
 from pentapod.toolpath.toolpath import SegmentKind
@@ -17,7 +18,7 @@ HELD = 0.98
 
 
 @dataclass(frozen=True)
-class Unheld:
+class Unheld(Value):
     """A stretch of a cut whose surface speed is below the feed.
 
     segment: of the toolpath; stations: from and to, global s in metres; seconds: how long; share: the least speed over

@@ -15,13 +15,14 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Floats, as_floats, frozen, set_frozen
 from pentapod.base.errors import InputError
 from pentapod.base.refusal import Blame, Refusal
+from pentapod.base.values import Result
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.topp.engine import Engine, fastest
 from pentapod.timing.topp.stages import Failure
 
 
 @dataclass(frozen=True, eq=False)
-class WaypointMotion:
+class WaypointMotion(Result):
     """Rows (n, d) each `period` seconds, from the first waypoint at rest to the last at rest, and the law between.
 
     The last row is the first one at or after the law's end.

@@ -10,6 +10,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError, nearest
+from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
 from pentapod.mesh.region import Region
 
@@ -25,7 +26,7 @@ class Entry(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PathOptions:
+class PathOptions(Value):
     """What every strategy is told. Lengths in metres, angles in radians, feeds in m/s.
 
     region: what is machined. view (3,): towards the tool, along which rapids rise; the region's direction when

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pentapod.base.values import Value
+
 
 @dataclass(frozen=True)
-class PathReport:
+class PathReport(Value):
     """What a toolpath came to. Lengths in metres.
 
     stepover: between passes along the surface, at most; 0 for lines that do not cover it. stay_downs: links on

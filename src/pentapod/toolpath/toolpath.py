@@ -11,6 +11,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
+from pentapod.base.values import Value
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.runs import run_starts
 
@@ -26,7 +27,7 @@ class SegmentKind(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Segment:
+class Segment(Value):
     """A run of tool poses of one kind.
 
     tips (N, 3): tool tips, metres, workpiece frame. axes (N, 3): unit, tip → spindle. feed: speed of the
@@ -64,7 +65,7 @@ class Segment:
 
 
 @dataclass(frozen=True, eq=False)
-class Toolpath:
+class Toolpath(Value):
     """One continuous motion in the workpiece frame: each segment begins where the one before ends.
 
     pivot: distance in metres from the tip along the axis to the point about which the tool may tilt

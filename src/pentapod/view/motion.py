@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.machine import Machine
@@ -34,7 +35,7 @@ class Stance:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(Value):
     """Tool poses over time, workpiece frame: times (N,) in seconds, tips and axes (N, 3), tip → spindle."""
 
     times: Floats

@@ -13,6 +13,7 @@ from pentapod.base.archives import check_array, read_arrays
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress, silent
+from pentapod.base.values import Value
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
@@ -47,7 +48,7 @@ _FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Opened:
+class Opened(Value):
     """A run. placement: workpiece → machine. axes (N, 3): the chosen tool axes, workpiece frame.
 
     machine: as the program wants it.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pentapod.base.arrays import Floats, Ints
+from pentapod.base.values import Value
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.sampling import best_tilted_margins
@@ -35,7 +36,7 @@ class Worst(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Reach:
+class Reach(Value):
     """What a placement comes to at waypoints `rows` (n,), of all. margins (n,): the smallest one at each.
 
     beyond: share of the rows at which a limit is broken.
@@ -57,7 +58,7 @@ class Reach:
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class Study(Value):
     """A path that may be placed anywhere, with the tool axes that were chosen. shown (n,): waypoints that are drawn.
 
     axes (N, 3): workpiece frame; they turn with the part.

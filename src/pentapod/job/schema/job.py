@@ -17,6 +17,7 @@ from pydantic_core import ErrorDetails
 
 from pentapod.base.errors import JobError, nearest
 from pentapod.base.toml import first_of, line_of, parsed, read_toml, wrong_value
+from pentapod.base.values import Value
 from pentapod.job.schema.placement import FixtureTable, PlacementTable
 from pentapod.job.schema.strategies import FILE_KEYS, TABLES, ToolpathTable
 from pentapod.job.schema.tables import (
@@ -36,7 +37,7 @@ _VARIABLE = re.compile(r"\$\{(\w+)\}")
 
 
 @dataclass(frozen=True)
-class Job:
+class Job(Value):
     """What a job file says. Units are as in the file; `pentapod.job.build.values` and its neighbours turn them into SI.
 
     path: the job file. mesh_path, fixture_mesh, machine_file and files, by their keys in [toolpath]: resolved against

@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, as_floats, set_frozen
 from pentapod.base.errors import ArrayError, MachineError
+from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_poses
 from pentapod.kinematics.five_legs import FiveLegs
 
 
 @dataclass(frozen=True, eq=False)
-class AsBuiltPentapod:
+class AsBuiltPentapod(Value):
     """Five legs from a_k in space to rings around the platform line; all in metres, machine frame.
 
     base (5, 3): where the base joints are, off the plane z = 0 too. offsets (5,): z_k, the heights of the platform

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats, Ints, as_batch
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.kinematics.batches import broadcast
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
@@ -29,7 +30,7 @@ _SHORTEST = 2.0**-16  # of the way from the nominal geometry: where shorter step
 
 
 @dataclass(frozen=True, eq=False)
-class ProvenPoses:
+class ProvenPoses(Value):
     """Poses of a machine as built, and what is known of them.
 
     position, direction (..., 3): metres, machine frame; NaN where there is no nominal pose, a reading is no longer than

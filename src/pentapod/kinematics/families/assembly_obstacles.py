@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pentapod.base.arrays import Bools, Floats, as_batch
+from pentapod.base.values import Value
 from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.six_leg import SixLegPlatform
@@ -52,7 +53,7 @@ _INEQUALITIES = {
 
 
 @dataclass(frozen=True, eq=False)
-class AssemblyObstacles:
+class AssemblyObstacles(Value):
     """What keeps legs (..., 5) from being assembled: an `Obstacle` (...) for each, and the shortfall (...).
 
     The shortfall is by how much the inequality fails where it fails least, relative to its right-hand side; for

@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, as_floats, frozen, set_frozen
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 
 
 @dataclass(frozen=True, eq=False)
-class Conic:
+class Conic(Value):
     """The curve A x² + B xy + C y² + D x + E y + G = 0 in the base plane.
 
     coefficients (6,): A, B, C, D, E, G for x, y in metres, relative to `origin` (2,), metres in the machine frame.

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pentapod.base.arrays import Bools, Floats, as_batch, frozen, set_frozen
 from pentapod.base.errors import MachineError
+from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_poses, broadcast, joined_poses
 from pentapod.kinematics.five_legs import FiveLegs, given
 from pentapod.kinematics.forward.line_equations import LineEquations, line_condition
@@ -25,7 +26,7 @@ _SINGULAR = 1e-12  # below this reciprocal condition no digits are left
 
 
 @dataclass(frozen=True, eq=False)
-class GeneralPentapod(FiveLegs):
+class GeneralPentapod(Value, FiveLegs):
     """Five base attachments a_i = (x_i, y_i, 0) and any offsets z_i along the platform line, b_i = p + z_i i.
 
     base (5, 2) and offsets (5,) in metres, machine frame: the base plane is z = 0. Leg lengths have at most four

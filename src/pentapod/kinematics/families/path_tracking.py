@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats, as_batch
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.kinematics.families.general import GeneralPentapod
 
 _NEAR = 0.25 * np.pi  # between two samples (pz/l_3, w) may turn by this; mirror images are π apart
@@ -16,7 +17,7 @@ _HALVINGS = 30
 
 
 @dataclass(frozen=True, eq=False)
-class FollowedPath:
+class FollowedPath(Value):
     """Positions and directions (N, 3) along a path. lost_at: the first row that could not be reached, or None.
 
     Rows from lost_at on are NaN: before it the legs have no pose, or the motion comes so near a

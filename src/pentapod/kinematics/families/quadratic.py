@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pentapod.base.arrays import Floats, Ints, as_batch, frozen, set_frozen
 from pentapod.base.errors import MachineError
+from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_poses, broadcast
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.kinematics.families.offsets import check_offsets, fit_delta
@@ -30,7 +31,7 @@ _SINGULAR = 1e-12  # below this reciprocal condition the closed form has no digi
 
 
 @dataclass(frozen=True, eq=False)
-class LinearPentapod(FiveLegs):
+class LinearPentapod(Value, FiveLegs):
     """Five base attachments a_i = (x_i, y_i, 0) and offsets z_i along the platform line, b_i = p + z_i i.
 
     base (5, 2) and offsets (5,) in metres; delta: the constant z_i − z_3 = δ (x_i − x_3) of the quadratic

@@ -15,12 +15,13 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, as_floats, frozen, set_frozen
 from pentapod.base.errors import MachineError
+from pentapod.base.values import Value
 from pentapod.kinematics.families.conics import conic_determinant, forbidden_conic
 from pentapod.kinematics.families.quadratic import LinearPentapod
 
 
 @dataclass(frozen=True, eq=False)
-class ReconfigurablePentapod:
+class ReconfigurablePentapod(Value):
     """A pentapod of the quadratic family whose base joints slide on straight guides in the base plane.
 
     pentapod: the machine with all slides at 0. guides (5, 2): unit directions, (0, 0) for a joint that is fixed.

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pentapod.base.arrays import Floats, as_batch, frozen, set_frozen
 from pentapod.base.errors import MachineError
+from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_poses, broadcast, common_batch
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.kinematics.families.general import GeneralPentapod
@@ -19,7 +20,7 @@ from pentapod.kinematics.mode import MODES, as_labels
 
 
 @dataclass(frozen=True, eq=False)
-class SixLegPlatform:
+class SixLegPlatform(Value):
     """A linear pentapod's line made a platform by a sixth leg from sixth_base to sixth_joint.
 
     sixth_base (3,), machine frame; sixth_joint (3,), platform frame: its origin is p, its third axis the line's

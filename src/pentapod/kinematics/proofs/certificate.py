@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats, as_batch, set_frozen
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.component import Component, as_component
 from pentapod.kinematics.families.quadratic import LinearPentapod
@@ -29,7 +30,7 @@ _SANE = (1e-40, 1e40)  # metres; within these nothing below can underflow or ove
 
 
 @dataclass(frozen=True, eq=False)
-class ComponentProof(Answers):
+class ComponentProof(Value, Answers):
     """What is proven of N intervals, each of a motion of the legs given by polynomials.
 
     proven (N,): from the pose of `component` at the start of the interval (and from no other: lengths alone

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats, as_batch, as_floats
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.component import as_component
 from pentapod.kinematics.families.quadratic import LinearPentapod
@@ -29,7 +30,7 @@ Pose = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, eq=False)
-class Chords:
+class Chords(Value):
     """What is proven of H chords, for all times t in [0, 1] of each, and for A points p + arm · i of the line.
 
     proven (H,): on the whole chord the legs give one continuous motion in the component.

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats, Ints, as_batch, as_floats
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.proofs.answers import Answers
@@ -32,7 +33,7 @@ from pentapod.numerics.blocks import blocks
 
 
 @dataclass(frozen=True, eq=False)
-class MotionProof(Answers):
+class MotionProof(Value, Answers):
     """What is proven of N intervals of a motion of the legs.
 
     proven (N,): from the exact pose next to the interval's first one in `position` and `direction` the motion is

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats, Ints, as_floats
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.component import as_component
 from pentapod.kinematics.families.quadratic import LinearPentapod
@@ -36,7 +37,7 @@ _UP = 1.0 + 2.0**-48
 
 
 @dataclass(frozen=True, eq=False)
-class TipTube:
+class TipTube(Value):
     """What is proven of N intervals, in M pieces of them.
 
     proven (N,): on the whole interval the legs give one continuous motion in the component, inside the tube.

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, as_floats
 from pentapod.base.errors import ArrayError, nearest
+from pentapod.base.values import Value
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.machine.calibration.leg_noise import restricted_sigma
@@ -37,7 +38,7 @@ _DEPENDENT = 1e-7  # of a column's length: what is left of it beside the others 
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
+class Calibration(Value):
     """What a calibration found.
 
     machine: the geometry; what could not be identified is nominal. covariance (30, 30): of the `PARAMETERS`, m²; rows

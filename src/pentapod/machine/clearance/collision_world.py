@@ -9,6 +9,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import MachineError
+from pentapod.base.values import Value
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.solids import Solid
@@ -23,7 +24,7 @@ LEGS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Obstacle:
+class Obstacle(Value):
     """One thing in the way. name: "part", "fixture", "table". surface: its mesh.
 
     clamped: whether it moves with the workpiece, and its mesh is in the workpiece frame; else in the machine frame.
@@ -37,7 +38,7 @@ class Obstacle:
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
+class Surroundings(Value):
     """obstacles, and the tool's solids above its cutting part (shank and holder; none where the spindle is all)."""
 
     obstacles: tuple[Obstacle, ...] = ()

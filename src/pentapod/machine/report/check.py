@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.base.values import Value
 from pentapod.geometry.directions import angle_between
 from pentapod.kinematics.component import Component
 from pentapod.kinematics.families.singularities import orientation_distance, position_distance, singularity_values
@@ -20,7 +21,7 @@ AMPLIFICATION_LIMIT = 10.0
 
 
 @dataclass(frozen=True)
-class Finding:
+class Finding(Value):
     """One worst value over the work volume.
 
     value and limit in `unit`; `kind` says how they compare: "at most", "at least", or "more than". where: tip
@@ -43,7 +44,7 @@ class Finding:
 
 
 @dataclass(frozen=True, eq=False)
-class MachineReport:
+class MachineReport(Value):
     """What `check` found: the worst over all sampled poses.
 
     length_range (5, 2) metres; base_angle (5,) largest angle to the base joint's axis, radians;

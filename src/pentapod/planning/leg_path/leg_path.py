@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Bools, Floats, Ints, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.refusal import Blame, Refusal
+from pentapod.base.values import Result, Value
 from pentapod.geometry.fillet import TooFar, rounded
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.machine.machine import Machine
@@ -29,7 +30,7 @@ _AXIS_LEVER_M = 0.01  # metres of spline parameter per radian: keeps the paramet
 
 
 @dataclass(frozen=True, eq=False)
-class LegPiece:
+class LegPiece(Value):
     """A C3 stretch of the leg path between two exact stops, parametrised by s in metres, as `ToolCurve` says.
 
     section_ends (M,): s at which the toolpath's segments end, the last is `length`;
@@ -101,7 +102,7 @@ class LegPiece:
 
 
 @dataclass(frozen=True, eq=False)
-class LegPath:
+class LegPath(Result):
     """Pieces in order; the machine rests between them.
 
     starts (P + 1,): station where each begins, and the end. dwells (P + 1,): seconds for which it stands there.

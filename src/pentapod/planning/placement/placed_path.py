@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.refusal import Refusal
+from pentapod.base.values import Result
 from pentapod.kinematics.component import Component
 from pentapod.planning.limits.limit import Limit
 from pentapod.planning.placement.placement import Placement
@@ -13,7 +14,7 @@ from pentapod.toolpath.toolpath import Toolpath
 
 
 @dataclass(frozen=True, eq=False)
-class PlacedPath:
+class PlacedPath(Result):
     """Tool poses in the machine frame, one for each waypoint of the toolpath.
 
     tips (N, 3) metres; axes (N, 3) unit, tip → spindle; margins (N, M), normalised, 0 at a limit; limits (M,): what

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pentapod.base.values import Value
 from pentapod.geometry.rigid import RigidTransform
 
 
 @dataclass(frozen=True)
-class Placement:
+class Placement(Value):
     """Rigid transform workpiece → machine, and what it was chosen by ("job", "largest smallest margin", ...).
 
     slides (5,): where the guides of a reconfigurable machine are to stand, metres; None for other machines.

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats, as_floats, frozen, set_frozen
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
 
@@ -24,7 +25,7 @@ _NO_MOTION = np.zeros((6, 0))
 
 
 @dataclass(frozen=True, eq=False)
-class Freedom:
+class Freedom(Value):
     """The allowed placements, workpiece → machine.
 
     motion (6, k): orthonormal columns, the allowed steps: shifts of the workpiece's origin in the machine frame, then

@@ -10,6 +10,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.planning.limits.limit import Limit
 
 NEEDED_MARGIN = 0.02
@@ -17,7 +18,7 @@ NEEDED_MARGIN = 0.02
 
 
 @dataclass(frozen=True)
-class Weights:
+class Weights(Value):
     """Positive weights of leg strokes, singular surfaces, joint cones and gaps between bodies.
 
     The room that a margin leaves beyond what is needed is divided by its weight: with strokes = 2 and all else 1 the

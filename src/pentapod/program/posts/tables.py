@@ -23,6 +23,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError, ProgramError
 from pentapod.base.input_files import number_in
+from pentapod.base.values import Value
 from pentapod.program.header import Header, header_text
 from pentapod.program.posts.motion import velocities
 from pentapod.program.posts.registry import Post, PostInput, read_file
@@ -44,7 +45,7 @@ SIDECAR = "program.header"
 
 
 @dataclass(frozen=True)
-class Column:
+class Column(Value):
     """A column: title, kind, unit, decimals; leg 1 to 5 for lengths and velocities.
 
     Raises InputError for an unknown kind, a unit that the kind does not have, or a leg missing or too much.
@@ -86,7 +87,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class Table(Value):
     """What the files of a post look like: columns by file name, and how rows are written.
 
     comment: begins a line that the controller skips; there the header goes, without it into a file beside.

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pentapod.base.values import Value
 from pentapod.timing.law.paths import LegPathLike
 from pentapod.timing.law.refusals import segment_at, waypoints_at
 from pentapod.timing.law.time_law import MotionLaw
@@ -17,7 +18,7 @@ _PARTS = 512
 
 
 @dataclass(frozen=True)
-class Slowed:
+class Slowed(Value):
     """A piece that lasts longer than its first law limited in jerk, so that its setpoints keep the limits.
 
     piece: its index in the path; first, duration: seconds of its first law and of the one it has; station: global s in

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.values import Value
 
 
 @dataclass(frozen=True, eq=False)
-class MotionLaw:
+class MotionLaw(Value):
     """s(t) as cubics in t between knots; s, ṡ continuous, ṡ ≥ 0.
 
     times (K,) seconds from 0; stations (K,) metres; speeds (K,) m/s; accelerations (K - 1,) m/s² just

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats, Ints, as_floats, frozen, set_frozen
+from pentapod.base.values import Result, Value
 from pentapod.timing.law.paths import LegPathLike, PieceLike
 from pentapod.timing.law.slowed import Slowed
 from pentapod.timing.law.time_law import MotionLaw
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class Profile(Value):
     """The plan at its gridpoints, for explanation: what holds the motion back, and where.
 
     times (K,) s; stations (K,) global tip arc length, m; speeds (K,) tip, m/s; active (K,): index into
@@ -48,7 +49,7 @@ class Profile:
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Result):
     """Legs as functions of time, at rest at each stop between pieces, and at the ends unless these have given speeds.
 
     path: the leg path; indices: those of its pieces that move; laws: their motion laws, one after the other.

@@ -9,6 +9,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
+from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
 
 
@@ -21,7 +22,7 @@ class AxisMode(Protocol):
 
 
 @dataclass(frozen=True)
-class Normal:
+class Normal(Value):
     """Along the surface's normal."""
 
     def axes(self, contacts: Floats, normals: Floats) -> Floats:
@@ -31,7 +32,7 @@ class Normal:
 
 
 @dataclass(frozen=True, eq=False)
-class Fixed:
+class Fixed(Value):
     """The same everywhere. direction (3,): any length."""
 
     direction: Floats | tuple[float, float, float]
@@ -46,7 +47,7 @@ class Fixed:
 
 
 @dataclass(frozen=True, eq=False)
-class Pointed:
+class Pointed(Value):
     """Toward or from a point, or a line where `along` is given: the tool stands square to the line.
 
     point, along (3,): metres, workpiece frame. toward: the tip points there, as into a hollow; otherwise it points
@@ -79,7 +80,7 @@ class Pointed:
 
 
 @dataclass(frozen=True, eq=False)
-class Between:
+class Between(Value):
     """Interpolated between directions given at places (K, 3), metres: exact there, smooth between (Shepard 1968)."""
 
     places: Floats

@@ -9,13 +9,14 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
+from pentapod.base.values import Value
 from pentapod.geometry.runs import run_starts
 from pentapod.toolpath.axis.modes import AxisMode, Normal, leaned
 from pentapod.toolpath.axis.smoothing import rate_capped, smoothed, tangents
 
 
 @dataclass(frozen=True)
-class Orientation:
+class Orientation(Value):
     """How the tool stands. mode: the direction; lead, tilt: radians from it, forwards and to the left of the feed.
 
     smoothing: radians by which smoothing may turn an axis, 0 for none; reach: metres over which it works, along and

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pentapod.base.errors import ToolpathError, nearest
 from pentapod.base.files import atomic_write
+from pentapod.base.values import Value
 from pentapod.toolpath.toolpath import Toolpath
 
 
@@ -20,7 +21,7 @@ class Defaults:
 
 
 @dataclass(frozen=True)
-class Format:
+class Format(Value):
     """A file format. suffixes: those that mean it, lower case. loses: what a file of it cannot tell.
 
     read: file → Toolpath, in metres, workpiece frame; raises ToolpathError with file, line and word.

@@ -8,6 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from pentapod.base.errors import ToolpathError
+from pentapod.base.values import Value
 from pentapod.geometry.solids import KINDS
 from pentapod.toolpath.linking.links import LinkStyle
 
@@ -22,7 +23,7 @@ class Remedy(StrEnum):
 
 
 @dataclass(frozen=True)
-class GougeOptions:
+class GougeOptions(Value):
     """remedies: tried in this order on what still gouges. tolerance: depth that counts as none, metres.
 
     cone: half angle in radians within which tilting may turn the axis. highest: most that lifting may lift, metres.
@@ -44,7 +45,7 @@ class GougeOptions:
 
 
 @dataclass(frozen=True)
-class GougeReport:
+class GougeReport(Value):
     """What the check found. motions: cuts' motions between waypoints that were checked.
 
     gouging: of them too deep at first; depths: the deepest of cutter, shank and holder at first, metres, −inf for none.

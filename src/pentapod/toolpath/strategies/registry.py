@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pentapod.base.errors import ToolpathError, nearest
+from pentapod.base.values import Value
 from pentapod.cutters.tool import Tool
 from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.drawing import Drawing
@@ -26,7 +27,7 @@ from pentapod.toolpath.toolpath import Toolpath
 
 
 @dataclass(frozen=True)
-class Strategy:
+class Strategy(Value):
     """A way to machine a surface. options: what it is told; draw: surface, tool and options → lines on it."""
 
     name: str

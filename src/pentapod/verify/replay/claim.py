@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pentapod.base.values import Value
 from pentapod.verify.replay.replay import Replay
 from pentapod.verify.verdict.verdict import Certificate, Place
 
@@ -46,7 +47,7 @@ class Idle:
 
 
 @dataclass(frozen=True)
-class Claim:
+class Claim(Value):
     """name as a user reads it; judge returns what it found, or that there is nothing to judge.
 
     needs_pose: the claim means something only where the leg lengths have a pose at every sample; it fails

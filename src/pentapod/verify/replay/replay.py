@@ -10,6 +10,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.progress import Progress, silent
+from pentapod.base.values import Value
 from pentapod.geometry.interpolant import clamped_slopes
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.machine import Machine
@@ -29,7 +30,7 @@ SURVEY_SHARE = 0.6
 
 
 @dataclass(frozen=True, eq=False)
-class Replay:
+class Replay(Value):
     """What the claims look at. Derived values are computed when first asked for, and kept.
 
     specification: what the program is judged against; its machine's guides stand where the program wants them.

@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.cutters.stand_off import StandOff
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
@@ -27,7 +28,7 @@ _HIGHER = 1.25
 
 
 @dataclass(frozen=True, eq=False)
-class Coverage:
+class Coverage(Value):
     """What a program is to machine, and what it may leave there.
 
     region: the surface, workpiece frame; None where the program draws lines and covers none, `why` says so. left:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.solids import Solid
 from pentapod.mesh.mesh import Mesh
@@ -15,7 +16,7 @@ from pentapod.verify.verdict.coverage import Coverage
 
 
 @dataclass(frozen=True, eq=False)
-class Cutting:
+class Cutting(Value):
     """surface: of the finished part, workpiece frame. solids: of the tool; those of kind "cutter" cut.
 
     depth: metres by which cuts and links may go into the part: what counts as no gouge, and what is engraved on

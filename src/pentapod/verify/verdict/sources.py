@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pentapod.base.values import Value
+
 
 @dataclass(frozen=True)
-class Sources:
+class Sources(Value):
     """SHA-256 of each file that a verdict is about, as hex digits; None where there is none, or nobody told.
 
     machine: of the machine's file, also where it is one that ships. fixture: of its mesh. toolpath_file and

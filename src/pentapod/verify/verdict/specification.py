@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Required, TypedDict
 import numpy as np
 
 from pentapod.base.errors import ArrayError
+from pentapod.base.values import Value
 from pentapod.machine.machine import Machine
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify.verdict.cutting import Cutting
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Specification:
+class Specification(Value):
     """What a program is judged against. A field that is None was told by nobody: what needs it is not judged.
 
     machine: with its tool length and controller. toolpath: in the workpiece frame, as the job asks for it.

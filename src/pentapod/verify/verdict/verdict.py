@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from pentapod.base.values import Result, Value
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.verify.verdict.sources import UNTOLD, Sources
 
 
 @dataclass(frozen=True)
-class Place:
+class Place(Value):
     """Where in the program a claim is closest to its bound: seconds, row (0-based), toolpath segment."""
 
     time_s: float | None = None
@@ -19,7 +20,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Certificate:
+class Certificate(Value):
     """One claim: what was measured, what it must not exceed (or fall below), where, and by which method.
 
     unit is as in files: mm, deg, mm/s, ...; method says in words how value was computed, and what it
@@ -45,7 +46,7 @@ class Certificate:
 
 
 @dataclass(frozen=True)
-class NotJudged:
+class NotJudged(Value):
     """A claim that the job implies and that could not be judged, and why. waived: the job lets it go unjudged."""
 
     claim: str
@@ -54,7 +55,7 @@ class NotJudged:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(Result):
     """All certificates of a program, what was not judged, and the files that it is about.
 
     passed: there is at least one claim, every claim holds, and what was not judged is waived.
