@@ -75,7 +75,7 @@ def case(rows: int, waypoints: int) -> tuple[Machine, Toolpath, Program]:
     place = RigidTransform(np.diag([1.0, -1.0, -1.0]), machine.work.centre)
     tips, axes = curve(s, length)
     direction = -place.rotate(axes)
-    legs = machine.pentapod.leg_lengths(place.apply(tips) - machine.tool_length * direction, direction)
+    legs = machine.robot.leg_lengths(place.apply(tips) - machine.tool_length * direction, direction)
     source = Provenance(machine.name, machine.digest, "bench", "0")
     program = Program(period, quantised(legs), machine.controller.interpolation, Component(1, 1), place, source)
     cut = Segment(SegmentKind.CUT, *curve(np.linspace(0.0, length, waypoints), length), FEED)
@@ -127,7 +127,7 @@ def main() -> None:
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         reading, _ = timed(lambda: read_csv(path))
         loading, _ = timed(lambda: np.loadtxt(path, delimiter=",", comments="#", skiprows=11))
-        ball, _ = timed(lambda: prove_tip_tube(machine.pentapod, part, component))
+        ball, _ = timed(lambda: prove_tip_tube(machine.robot, part, component))
         size = path.stat().st_size
     rows, words = given.rows, "passed" if verdict.passed else "FAILED"
     print(f"{platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}")

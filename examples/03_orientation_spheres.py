@@ -31,7 +31,7 @@ def components(pentapod: LinearPentapod, position, pixels: int = 241) -> np.ndar
     u, w = np.meshgrid(np.linspace(-1.0, 1.0, pixels), np.linspace(-1.0, 1.0, pixels))
     inside = u * u + w * w <= 1.0
     v = np.sqrt(np.maximum(1.0 - u * u - w * w, 0.0))
-    signs = pentapod.component(position, np.stack([u, v, w], axis=-1))
+    signs = pentapod.branch(position, np.stack([u, v, w], axis=-1))
     number = np.full(u.shape, np.nan)
     for k, component in enumerate(COMPONENTS):
         number[(signs == component).all(axis=-1) & inside] = k

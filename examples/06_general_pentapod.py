@@ -45,7 +45,7 @@ def main() -> None:
     swing = np.stack([0.6 * np.cos(elevation), 0.8 * np.cos(elevation), np.sin(elevation)], axis=-1)
     path = follow(pentapod, pentapod.leg_lengths(position, swing), position, swing[0])
     print("a swing through the horizontal, w and the mode:")
-    for i, mode in zip(path.direction, pentapod.mode(path.position, path.direction), strict=True):
+    for i, mode in zip(path.direction, pentapod.branch(path.position, path.direction), strict=True):
         print(f"  w = {i[2]:+.3f}  order {mode[0]:+d}  image {mode[1]:+d}")
 
     for change in (0.05, 0.2, 1.0):

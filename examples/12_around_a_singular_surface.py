@@ -42,8 +42,8 @@ def dome() -> Toolpath:
 def distances(machine: Machine, tips: np.ndarray, axes: np.ndarray) -> np.ndarray:
     """Return how far (N,), metres, each pose can shift before S = 0; negative on the other side."""
     position, direction = tips + machine.tool_length * axes, -axes
-    _, s = singularity_values(machine.pentapod, position, direction)
-    return np.sign(s) * position_distance(machine.pentapod, position, direction)
+    _, s = singularity_values(machine.robot, position, direction)
+    return np.sign(s) * position_distance(machine.robot, position, direction)
 
 
 def naive_placement(machine: Machine, toolpath: Toolpath) -> RigidTransform:

@@ -45,7 +45,7 @@ def draw(machine: Machine, out: str, count: int) -> None:
     x, y, gaps = gaps_over_plane(machine, count)
     shown = left.pcolormesh(1e3 * x, 1e3 * y, 1e3 * gaps, cmap="RdYlGn", vmin=-20.0, vmax=60.0, shading="auto")
     left.contour(1e3 * x, 1e3 * y, gaps, [0.0], colors="k", linewidths=1.2)
-    for k, (px, py) in enumerate(1e3 * machine.pentapod.base):
+    for k, (px, py) in enumerate(1e3 * machine.robot.base):
         left.plot(px, py, "k+")
         left.annotate(f"{k + 1}", (px, py), textcoords="offset points", xytext=(6, 6))
     circle = plt.Circle(1e3 * machine.work.centre[:2], 500.0 * machine.work.diameter, fill=False, linestyle="--")
@@ -54,8 +54,8 @@ def draw(machine: Machine, out: str, count: int) -> None:
     left.set_title("gap of the nearest leg from the spindle")
     figure.colorbar(shown, ax=left, label="mm; black: 0; +: base joints; dashed: work volume", shrink=0.8)
 
-    leg = int(np.argmax(machine.pentapod.offsets))
-    joint = 1e3 * (machine.tool_length - machine.pentapod.offsets[leg])
+    leg = int(np.argmax(machine.robot.offsets))
+    joint = 1e3 * (machine.tool_length - machine.robot.offsets[leg])
     radius, end = 1e3 * machine.bodies.shaft_radius, 1e3 * machine.bodies.shaft_end
     right.add_patch(Rectangle((-radius, end), 2.0 * radius, 300.0, color="0.8", label="spindle"))
     for solid, colour, name in ((SLIM, "tab:blue", "slim holder"), (WIDE, "tab:orange", "wide holder")):

@@ -101,7 +101,7 @@ def test_machine_files_with_guides(machine_file):
     np.testing.assert_allclose(machine.guides.travel[:, 0], -0.04)
     np.testing.assert_allclose(machine.guides.travel[:, 1], [0.04, 0.04, 0.04, 0.0, 0.04])
     moved = machine.at([0.01, 0.0, 0.0, 0.0, -0.02])
-    np.testing.assert_allclose(moved.pentapod.base - machine.pentapod.base, [[0, 0.01], *[[0, 0]] * 3, [0, -0.02]])
+    np.testing.assert_allclose(moved.robot.base - machine.robot.base, [[0, 0.01], *[[0, 0]] * 3, [0, -0.02]])
     assert moved.digest != machine.digest
     assert moved.at(np.zeros(5)).digest == machine.digest
     assert Machine.load("desk").guides is None

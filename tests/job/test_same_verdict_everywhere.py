@@ -73,10 +73,10 @@ def test_a_program_sunk_into_the_part_passes_nowhere(planned, tmp_path):
     """Two millimetres too deep, with the header as it was."""
     job, outcome, folder = planned
     program, machine = read_csv(folder / "program.csv"), outcome.machine
-    position, direction = machine.pentapod.pose(program.legs, program.component)
+    position, direction = machine.robot.pose(program.legs, program.component)
     down = program.placement.rotation @ [0.0, 0.0, -2e-3]
     sunk = write_csv(
-        dataclasses.replace(program, legs=machine.pentapod.leg_lengths(position + down, direction)),
+        dataclasses.replace(program, legs=machine.robot.leg_lengths(position + down, direction)),
         tmp_path / "sunk.csv",
     )
     assert command(["verify", str(sunk), "--job", str(job.path), "--quiet"]) == 1

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from pentapod.kinematics import AsBuiltPentapod, LinearPentapod
+from pentapod.kinematics import AsBuiltPentapod, FiveLegs
 
 
-def with_errors(nominal: LinearPentapod, size: float, seed: int) -> AsBuiltPentapod:
+def with_errors(nominal: FiveLegs, size: float, seed: int) -> AsBuiltPentapod:
     rng = np.random.default_rng(seed)
     return AsBuiltPentapod.of(
         nominal,

@@ -92,7 +92,7 @@ def test_kinematics_and_proofs_are_about_one_machine() -> None:
     pentapod = LinearPentapod(BASE, given, 0.5)
     np.testing.assert_array_equal(pentapod.offsets, exact)
     p, i = np.array([0.1, 0.05, 0.6]), np.array([0.36, 0.48, 0.8])
-    q, j = pentapod.pose(pentapod.leg_lengths(p, i), pentapod.component(p, i))
+    q, j = pentapod.pose(pentapod.leg_lengths(p, i), pentapod.branch(p, i))
     assert np.abs(np.r_[q - p, j - i]).max() < 1e-14, (
         "the closed form, from δ, and the lengths, from the offsets, agree"
     )

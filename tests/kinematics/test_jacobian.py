@@ -7,7 +7,6 @@ from pentapod.geometry import normalised
 from pentapod.kinematics import (
     LinearPentapod,
     leg_force_map,
-    leg_jacobian,
     pose_jacobian,
     square_jacobian,
     tip_force_amplification,
@@ -27,7 +26,7 @@ def poses(pentapod: LinearPentapod, random_poses) -> tuple[np.ndarray, np.ndarra
     return p[far][:300], i[far][:300]
 
 
-def test_leg_jacobian_is_the_slope_of_the_leg_lengths(pentapod: LinearPentapod, poses) -> None:
+def test_jacobian_is_the_slope_of_the_leg_lengths(pentapod: LinearPentapod, poses) -> None:
     p, i = poses
     step = 1e-6
     columns = []
@@ -36,14 +35,14 @@ def test_leg_jacobian_is_the_slope_of_the_leg_lengths(pentapod: LinearPentapod, 
     for axis in np.eye(3):
         columns.append(pentapod.leg_lengths(p, i + step * axis) - pentapod.leg_lengths(p, i - step * axis))
     slopes = np.stack(columns, axis=-1) / (2 * step)
-    jacobian = leg_jacobian(pentapod, p, i)
+    jacobian = pentapod.jacobian(p, i)
     assert jacobian.shape == (300, 5, 6)
     np.testing.assert_allclose(jacobian, slopes, atol=2e-8)
 
 
 def test_pose_jacobian_is_the_slope_of_the_forward_kinematics(pentapod: LinearPentapod, poses) -> None:
     p, i = poses
-    legs, component = pentapod.leg_lengths(p, i), pentapod.component(p, i)
+    legs, component = pentapod.leg_lengths(p, i), pentapod.branch(p, i)
     jacobian = pose_jacobian(pentapod, p, i)
     step = 1e-6 * np.abs(pentapod.base - pentapod.base[2]).max()
     for leg in range(5):
@@ -58,7 +57,7 @@ def test_pose_jacobian_is_the_slope_of_the_forward_kinematics(pentapod: LinearPe
 def test_the_jacobians_undo_each_other(pentapod: LinearPentapod, poses) -> None:
     p, i = poses
     np.testing.assert_allclose(
-        leg_jacobian(pentapod, p, i) @ pose_jacobian(pentapod, p, i),
+        pentapod.jacobian(p, i) @ pose_jacobian(pentapod, p, i),
         np.broadcast_to(np.eye(5), (300, 5, 5)),
         atol=1e-9,
     )

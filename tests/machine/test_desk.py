@@ -26,8 +26,8 @@ def leg_forces(machine, tips, axes):
     """
     result = []
     for tip, axis in zip(tips, axes, strict=True):
-        joints = tip + (machine.tool_length - machine.pentapod.offsets)[:, None] * axis
-        e = joints - np.column_stack([machine.pentapod.base, np.zeros(5)])
+        joints = tip + (machine.tool_length - machine.robot.offsets)[:, None] * axis
+        e = joints - np.column_stack([machine.robot.base, np.zeros(5)])
         e /= np.linalg.norm(e, axis=1, keepdims=True)
         wrench = np.concatenate([e, np.cross(joints, e)], axis=1).T
         load = np.concatenate([np.eye(3), np.cross(np.tile(tip, (3, 1)), np.eye(3)).T])
@@ -39,7 +39,7 @@ def leg_forces(machine, tips, axes):
 
 
 def test_is_a_plausible_machine(desk):
-    legs, robot = desk.legs, desk.pentapod
+    legs, robot = desk.legs, desk.robot
     assert legs.max_length.max() <= 1.9 * legs.min_length.min()
     assert np.ptp(legs.min_length) == np.ptp(legs.max_length) == 0.0  # identical legs
     assert np.linalg.norm(robot.base, axis=1).max() <= 0.6
@@ -92,11 +92,11 @@ def test_random_poses_in_the_volume_are_no_worse_than_the_sampled_ones(desk):
     lean, azimuth = desk.work.tilt * np.sqrt(rng.random(n)), rng.uniform(0, 2 * np.pi, n)
     axes = np.stack([np.sin(lean) * np.cos(azimuth), np.sin(lean) * np.sin(azimuth), -np.cos(lean)], axis=1)
     p = tips + desk.tool_length * axes
-    lengths = desk.pentapod.leg_lengths(p, -axes)
+    lengths = desk.robot.leg_lengths(p, -axes)
     assert lengths.min() >= desk.legs.min_length[0]
     assert lengths.max() <= desk.legs.max_length[0]
     assert clearances(desk, p, -axes).min() >= 0.002
-    assert (desk.pentapod.component(p, -axes) == [1, 1]).all()
+    assert (desk.robot.branch(p, -axes) == [1, 1]).all()
 
 
 @pytest.mark.parametrize("degrees", [0.0, 15.0, 75.0])
@@ -122,7 +122,7 @@ def test_reaches_a_dome_of_150_mm_with_40_degree_slopes(desk, degrees):
     def fits(shift):
         at = tips + desk.work.centre + shift
         p = at + desk.tool_length * axes
-        vectors = desk.pentapod.leg_vectors(p, -axes)
+        vectors = desk.robot.leg_vectors(p, -axes)
         lengths = np.linalg.norm(vectors, axis=-1)
         e = vectors / lengths[..., None]
         base = np.arccos(np.einsum("nki,ki->nk", e, desk.joints.base_axes))

@@ -37,8 +37,8 @@ def refusal(text):
 def test_units_become_si():
     m = read_machine(DESK, "desk.toml")
     raw = tomllib.loads(DESK)
-    np.testing.assert_array_equal(m.pentapod.base, np.array(raw["geometry"]["base_mm"]) / 1000)
-    assert m.pentapod.delta == raw["geometry"]["delta"]
+    np.testing.assert_array_equal(m.robot.base, np.array(raw["geometry"]["base_mm"]) / 1000)
+    assert m.robot.delta == raw["geometry"]["delta"]
     np.testing.assert_array_equal(m.legs.max_jerk, np.full(5, raw["legs"]["max_jerk_mm_s3"] / 1000))
     assert m.rapid_velocity * 60000 == pytest.approx(raw["tool"]["rapid_mm_min"])
     assert m.bodies.leg_radius == raw["bodies"]["leg_diameter_mm"] / 2000
@@ -79,13 +79,13 @@ def test_five_numbers_or_one():
 
 def test_platform_alone_gives_the_same_machine():
     m = read_machine(DESK, "m")
-    platform = [round(1000 * z, 7) for z in m.pentapod.offsets.tolist()]
+    platform = [round(1000 * z, 7) for z in m.robot.offsets.tolist()]
     other = read_machine(replaced("delta", None).replace("[legs]", f"platform_mm = {platform}\n[legs]", 1), "m")
     # The insertion lands before the header of [legs], so still in [geometry].
-    assert other.pentapod.delta == pytest.approx(m.pentapod.delta, rel=1e-6)
-    np.testing.assert_allclose(other.pentapod.offsets, m.pentapod.offsets, atol=1e-9)
+    assert other.robot.delta == pytest.approx(m.robot.delta, rel=1e-6)
+    np.testing.assert_allclose(other.robot.offsets, m.robot.offsets, atol=1e-9)
     both = read_machine(DESK.replace("[legs]", f"platform_mm = {platform}\n[legs]", 1), "m")
-    np.testing.assert_allclose(both.pentapod.offsets, m.pentapod.offsets, atol=1e-9)
+    np.testing.assert_allclose(both.robot.offsets, m.robot.offsets, atol=1e-9)
 
 
 @settings(max_examples=60, deadline=None)
@@ -203,7 +203,7 @@ def test_keys_are_found_again_in_the_file():
 
 def test_offsets_that_are_not_proportional():
     m = read_machine(DESK, "m")
-    platform = (1000 * m.pentapod.offsets).tolist()
+    platform = (1000 * m.robot.offsets).tolist()
     platform[1] += 0.5
     claimed = refusal(DESK.replace("[legs]", f"platform_mm = {platform}\n[legs]", 1))
     assert "leg 2" in str(claimed)

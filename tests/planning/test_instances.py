@@ -45,9 +45,9 @@ def check(instance: Instance, samples: int, folder: Path) -> bool:
         return brute_force(instance, robot, samples) < CLEARLY_FEASIBLE
     assert isinstance(answer, PlacedPath)
     p, i = answer.tips + robot.tool_length * answer.axes, -answer.axes
-    legs = robot.pentapod.leg_lengths(p, i)
+    legs = robot.robot.leg_lengths(p, i)
     assert ((legs > robot.legs.min_length) & (legs < robot.legs.max_length)).all()
-    np.testing.assert_array_equal(robot.pentapod.component(p, i), np.tile(answer.component, (len(p), 1)))
+    np.testing.assert_array_equal(robot.robot.branch(p, i), np.tile(answer.component, (len(p), 1)))
     nominal = answer.placement.transform.rotate(instance.toolpath.axes)
     assert (np.cross(answer.axes, nominal) ** 2).sum(axis=1).max() <= np.sin(instance.tilt) ** 2 + 1e-12
     return answer.smallest_margin >= 0.8 * NEEDED_MARGIN and certified(answer, robot, instance, folder)

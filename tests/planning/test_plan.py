@@ -28,11 +28,11 @@ def placed(cap_placed):
 def test_every_waypoint_keeps_every_limit(desk, placed):
     """Limits from the robot's own kinematics, not from the margins' formula."""
     p = placed.tips + desk.tool_length * placed.axes
-    legs = desk.pentapod.leg_lengths(p, -placed.axes)
+    legs = desk.robot.leg_lengths(p, -placed.axes)
     assert (legs > desk.legs.min_length).all()
     assert (legs < desk.legs.max_length).all()
-    np.testing.assert_array_equal(desk.pentapod.component(p, -placed.axes), np.tile(placed.component, (len(p), 1)))
-    back_p, back_i = desk.pentapod.pose(legs, placed.component)
+    np.testing.assert_array_equal(desk.robot.branch(p, -placed.axes), np.tile(placed.component, (len(p), 1)))
+    back_p, back_i = desk.robot.pose(legs, placed.component)
     np.testing.assert_allclose(back_p, p, atol=1e-10)
     np.testing.assert_allclose(back_i, -placed.axes, atol=1e-10)
     assert placed.smallest_margin >= NEEDED_MARGIN - 1e-3
@@ -109,7 +109,7 @@ def test_placement_out_of_reach_is_refused_with_the_true_shortfall(desk, cap, pl
     answer = plan(cap, desk, freedom=Freedom.fixture([far]), component=placed.component)
     assert isinstance(answer, Refusal)
     tips, axes = far.apply(cap.tips), far.rotate(cap.axes)
-    legs = desk.pentapod.leg_lengths(tips + desk.tool_length * axes, -axes)
+    legs = desk.robot.leg_lengths(tips + desk.tool_length * axes, -axes)
     for blame in answer.blames:
         if "too long" in blame.constraint:
             k = int(blame.constraint.split()[1]) - 1

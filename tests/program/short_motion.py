@@ -37,7 +37,7 @@ def motion(duration=1.2, interpolation="cubic", component=COMPONENTS[0]):
     period = machine.controller.period
     count = round(duration / period)
     tips, i = poses(np.arange(count + 1) / count)
-    legs = machine.pentapod.leg_lengths(tips - machine.tool_length * i, i)
+    legs = machine.robot.leg_lengths(tips - machine.tool_length * i, i)
     placement = RigidTransform(np.diag([1.0, -1.0, -1.0]), np.array([0.085, -0.017, 0.1 + 1 / 3]))
     source = Provenance("desk", machine.digest, "job µ", "0.1.0", None, "x86_64 znver4", "numpy 2.4.0")
     return Program(period, quantised(legs), interpolation, component, placement, source), machine

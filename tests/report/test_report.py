@@ -169,7 +169,7 @@ def test_a_refusal_is_drawn_in_the_machine_where_it_came_nearest(make_job, tmp_p
     # The legs stand at the waypoint with the smallest margin, as long as the pose there needs them.
     worst = int(attempt.margins.min(axis=1).argmin())
     tip, axis = attempt.tips[worst], attempt.axes[worst]
-    lengths = np.linalg.norm(machine.pentapod.leg_vectors(tip + machine.tool_length * axis, -axis), axis=-1)
+    lengths = np.linalg.norm(machine.robot.leg_vectors(tip + machine.tool_length * axis, -axis), axis=-1)
     for k in range(5):
         ends = np.stack([unpacked(traces[f"leg {k + 1}"][axis]) for axis in "xyz"], axis=1)
         assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(1e3 * lengths[k], abs=0.01)
@@ -318,7 +318,7 @@ def test_the_setup_sheet_names_the_limit_at_every_place(make_job, tmp_path):
     # The base hangs above: seen from above, with x to the right, y comes towards one. No mirror image.
     assert "y down" in views[0][0]
     circles = np.array(re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', views[0][1]), dtype=float)
-    base = 1e3 * outcome.machine.pentapod.base
+    base = 1e3 * outcome.machine.robot.base
     assert circles - circles[0] == pytest.approx(base - base[0], abs=0.2)
     assert re.findall(r">(\d)</text>", views[0][1]) == list("12345")
     assert "nearest limits" in page.text

@@ -163,7 +163,7 @@ def test_the_slider_moves_the_legs_and_the_tool(opened, report):
     # The legs that are drawn have the lengths of the program's first row.
     from pentapod.program import Program
 
-    base = np.column_stack([1e3 * outcome.machine.pentapod.base, np.zeros(5)])
+    base = np.column_stack([1e3 * outcome.machine.robot.base, np.zeros(5)])
     lengths = np.linalg.norm(np.array(after) - base, axis=1)
     assert lengths == pytest.approx(1e3 * outcome.find(Program).legs[0], abs=5e-3)
     assert page.locator("#readout").text_content().startswith("0.00 s")

@@ -30,7 +30,7 @@ def program_along(tips, i):
     """A program through tips (N, 3) and directions (N, 3), a row each millisecond."""
     short, machine = motion(0.1)
     i = i / np.linalg.norm(i, axis=1, keepdims=True)
-    legs = machine.pentapod.leg_lengths(machine.work.centre + tips - machine.tool_length * i, i)
+    legs = machine.robot.leg_lengths(machine.work.centre + tips - machine.tool_length * i, i)
     return Program(1e-3, quantised(legs), "cubic", COMPONENTS[0], short.placement, short.provenance)
 
 

@@ -58,15 +58,15 @@ def test_a_millimetre_at_a_base_joint_shows(leg):
     """Along its leg, where it counts in full; and our own forward kinematics as built says what MuJoCo finds."""
     reference = reference_of(0.8)
     machine, program = reference.machine, reference.program
-    position, direction = machine.pentapod.pose(program.legs[400], program.component)
-    along = machine.pentapod.leg_vectors(position, direction)[leg]
+    position, direction = machine.robot.pose(program.legs[400], program.component)
+    along = machine.robot.leg_vectors(position, direction)[leg]
     errors = np.zeros((5, 3))
     errors[leg] = 1e-3 * along / np.linalg.norm(along)
     physics = play(reference, base_errors=errors)
     tip, _ = off(physics, reference)
     assert tip.max() >= 0.5e-3
-    real = AsBuiltPentapod.of(machine.pentapod, base_errors=errors)
-    foretold = as_built_pose(real, machine.pentapod, program.legs[::50], program.component)
+    real = AsBuiltPentapod.of(machine.robot, base_errors=errors)
+    foretold = as_built_pose(real, machine.robot, program.legs[::50], program.component)
     tips = foretold.position + machine.tool_length * foretold.direction
     assert foretold.proven.all()
     assert np.linalg.norm(physics.played.tips[::50] - tips, axis=1).max() <= 20e-6
@@ -89,7 +89,7 @@ def test_the_load_feeds_the_energy_of_the_bodies():
     gravity = machine.masses.gravity
     direction = reference.directions[::2]
     position = reference.tips[::2] - machine.tool_length * direction
-    vectors = machine.pentapod.leg_vectors(position, direction)
+    vectors = machine.robot.leg_vectors(position, direction)
     lengths = np.linalg.norm(vectors, axis=2)
 
     def energy(name, points, axes):
@@ -102,7 +102,7 @@ def test_the_load_feeds_the_energy_of_the_bodies():
 
     total = energy("platform", position, direction)
     for leg in range(5):
-        along, base = vectors[:, leg] / lengths[:, leg, None], np.append(machine.pentapod.base[leg], 0.0)
+        along, base = vectors[:, leg] / lengths[:, leg, None], np.append(machine.robot.base[leg], 0.0)
         total = total + energy(f"leg{leg + 1}", np.tile(base, (len(along), 1)), along)
         total = total + energy(f"rod{leg + 1}", base + vectors[:, leg], along)
     power = np.diff(total) / h
@@ -135,8 +135,8 @@ def test_leg_forces_are_those_of_statics():
     reference = still(gravity=np.zeros(3))
     push = np.array([30.0, -20.0, 50.0])
     physics = play(reference, tip_forces=push)
-    position, direction = reference.machine.pentapod.pose(reference.program.legs[0], COMPONENTS[0])
-    foretold = leg_force_map(reference.machine.pentapod, position, direction, reference.machine.tool_length) @ push
+    position, direction = reference.machine.robot.pose(reference.program.legs[0], COMPONENTS[0])
+    foretold = leg_force_map(reference.machine.robot, position, direction, reference.machine.tool_length) @ push
     np.testing.assert_allclose(physics.leg_forces[-1], foretold, rtol=1e-3, atol=0.05)
     assert np.abs(foretold).max() > 50.0
     # At rest the drives push as the legs do.
@@ -148,8 +148,8 @@ def test_without_loads_a_still_machine_carries_its_weight_alone():
     assert np.abs(weightless.leg_forces[-1]).max() < 1e-3
     # The base is above, +z down: the five legs' pull along z is the weight of the platform and part of the legs'.
     reference = still()
-    position, direction = reference.machine.pentapod.pose(reference.program.legs[0], COMPONENTS[0])
-    vectors = reference.machine.pentapod.leg_vectors(position, direction)
+    position, direction = reference.machine.robot.pose(reference.program.legs[0], COMPONENTS[0])
+    vectors = reference.machine.robot.leg_vectors(position, direction)
     unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     pull = -float(unit[:, 2] @ heavy.leg_forces[-1])
     assert 3.0 * 9.81 < pull < (3.0 + 5 * 2.2) * 9.81
@@ -179,7 +179,7 @@ def test_the_model_is_the_machine():
     np.testing.assert_allclose(data.ctrl[:5], program.legs[0], atol=1e-12)
     np.testing.assert_allclose(data.site("tip").xpos, reference.tips[0], atol=1e-12)
     for leg in range(5):
-        base = np.append(machine.pentapod.base[leg], 0.0)
+        base = np.append(machine.robot.base[leg], 0.0)
         np.testing.assert_allclose(data.body(f"leg{leg + 1}").xpos, base, atol=1e-15)
         ends = [data.site(f"{kind}{leg + 1}").xpos for kind in ("rod", "platform")]
         np.testing.assert_allclose(ends[0], ends[1], atol=1e-12)
@@ -193,7 +193,7 @@ def test_any_way_up():
     """A machine whose tool points towards its own base plane's other side: the turn from z is half a turn."""
     reference = reference_of(0.3)
     program, machine = reference.program, reference.machine
-    _, direction = machine.pentapod.pose(program.legs[0], (-1, 1))
+    _, direction = machine.robot.pose(program.legs[0], (-1, 1))
     assert direction[2] < -0.9
     flipped = Program(
         program.period, np.tile(program.legs[0], (50, 1)), "cubic", COMPONENTS[2], program.placement, program.provenance

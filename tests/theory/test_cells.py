@@ -142,7 +142,7 @@ def test_sampled_poses_lie_in_their_cell(delta: Fraction, shifted: bool) -> None
         np.testing.assert_allclose(np.linalg.norm(i, axis=1), 1.0, rtol=1e-14)
         np.testing.assert_array_equal(cell_of(pentapod, p, i), index)
         if cell.dimension == 5:
-            assert (pentapod.component(p, i) == COMPONENTS[index]).all()
+            assert (pentapod.branch(p, i) == COMPONENTS[index]).all()
 
 
 @pytest.mark.parametrize("delta", DELTAS[:3])

@@ -70,14 +70,14 @@ def distance_to_the_equator(pentapod: LinearPentapod, i: np.ndarray) -> float:
 def test_displacements_within_the_sphere_keep_the_component(pentapod: LinearPentapod, random_poses) -> None:
     p, i = random_poses(pentapod, 400, seed=24)
     sphere = singularity_free_sphere(pentapod, p, i)
-    component = pentapod.component(p, i)
+    component = pentapod.branch(p, i)
     rng = np.random.default_rng(25)
     size = sphere.radius[:, None] * rng.uniform(0.0, 2.0, size=(400, 500))
     j = normalised(i[:, None] + size[..., None] / pentapod.offsets.std() * rng.normal(size=(400, 500, 3)))
     q = p[:, None] + size[..., None] * rng.normal(size=(400, 500, 3))
     inside = joint_distance(pentapod, p[:, None], i[:, None], q, j) < sphere.radius[:, None]
     assert inside.sum() > 5000
-    same = (pentapod.component(q, j) == component[:, None]).all(axis=-1)
+    same = (pentapod.branch(q, j) == component[:, None]).all(axis=-1)
     assert same[inside].all()
     assert not same.all()
 

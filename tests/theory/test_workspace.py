@@ -36,7 +36,7 @@ def reachable(workspace: Workspace, tips: np.ndarray) -> np.ndarray:
         p = tips - workspace.tool_length * i
         legs = ROBOT.leg_lengths(p, i)
         answer &= ((legs >= workspace.shortest) & (legs <= workspace.longest)).all(axis=1)
-        answer &= (ROBOT.component(p, i) == workspace.component).all(axis=1)
+        answer &= (ROBOT.branch(p, i) == workspace.component).all(axis=1)
     return answer
 
 

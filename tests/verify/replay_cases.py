@@ -177,7 +177,7 @@ def program_of(machine, tips, axes, *, lean=0.0, interpolation="cubic"):
     place = placement(machine)
     direction = -place.rotate(leaned)
     position = place.apply(leaned_tips) - machine.tool_length * direction
-    legs = quantised(machine.pentapod.leg_lengths(position, direction))
+    legs = quantised(machine.robot.leg_lengths(position, direction))
     provenance = Provenance(machine.name, machine.digest, "job-1", "0")
     return Program(PERIOD, legs, interpolation, Component(1, 1), place, provenance)
 

@@ -57,7 +57,7 @@ def test_the_feed_of_lines_between_rows_is_that_of_the_tips(linear):
     """The fastest step between two tips of either cut, at the pace of the rows."""
     verdict = verify(linear.program, linear.machine, linear.toolpath, **cases.TOLERANCES)
     (found,) = (c for c in verdict.certificates if c.claim == "feed on cuts")
-    position, direction = linear.machine.pentapod.pose(linear.program.legs, linear.program.component)
+    position, direction = linear.machine.robot.pose(linear.program.legs, linear.program.component)
     tips = position + linear.machine.tool_length * direction
     speeds = np.linalg.norm(np.diff(tips, axis=0), axis=1) / cases.PERIOD
     parts = cases.strokes()

@@ -34,10 +34,10 @@ def dense_times(program, per_interval):
 
 def newton_pose(machine, legs, guess):
     """Position and direction by least squares on b_i − a_i, from a nearby pose."""
-    base = np.column_stack([machine.pentapod.base, np.zeros(5)])
+    base = np.column_stack([machine.robot.base, np.zeros(5)])
 
     def residual(x):
-        joints = x[:3] + machine.pentapod.offsets[:, None] * x[3:]
+        joints = x[:3] + machine.robot.offsets[:, None] * x[3:]
         return np.append(np.linalg.norm(joints - base, axis=1) - legs, x[3:] @ x[3:] - 1.0)
 
     solved = least_squares(residual, guess, xtol=1e-15, ftol=1e-15, gtol=1e-15)
@@ -119,7 +119,7 @@ def test_fastest_moment_by_finite_differences(good, found):
     moments = (np.arange(len(bounds)) + np.linspace(0.01, 0.99, 7)[:, None]) * 0.5 * good.program.period
     tips = []
     for shift in (-0.5 * step, 0.5 * step):
-        position, direction = good.machine.pentapod.pose(spline(moments.ravel() + shift), good.program.component)
+        position, direction = good.machine.robot.pose(spline(moments.ravel() + shift), good.program.component)
         tips.append(position + good.machine.tool_length * direction)
     speeds = (np.linalg.norm(tips[1] - tips[0], axis=1) / step).reshape(7, -1).max(axis=0)
     assert (bounds >= speeds - 2e-6).all()  # what rounding does to the differences
@@ -136,9 +136,9 @@ def test_feeds_are_those_of_the_time_law(good, found, kind):
 
 def test_joints_and_bodies_by_dense_sampling(good, found):
     spline, machine = interpolant(good.program), good.machine
-    position, direction = machine.pentapod.pose(spline(dense_times(good.program, 5)), good.program.component)
-    base = np.column_stack([machine.pentapod.base, np.zeros(5)])
-    joints = position[:, None] + machine.pentapod.offsets[:, None] * direction[:, None]
+    position, direction = machine.robot.pose(spline(dense_times(good.program, 5)), good.program.component)
+    base = np.column_stack([machine.robot.base, np.zeros(5)])
+    joints = position[:, None] + machine.robot.offsets[:, None] * direction[:, None]
     unit = (joints - base) / np.linalg.norm(joints - base, axis=2, keepdims=True)
     cone = np.degrees(np.arccos((unit * machine.joints.base_axes).sum(axis=2))).max()
     platform = np.degrees(np.arccos((-unit * -direction[:, None]).sum(axis=2)))
@@ -154,9 +154,9 @@ def test_component_bounds_by_dense_sampling(good, found):
     from pentapod.kinematics import position_distance
 
     legs = interpolant(good.program)(dense_times(good.program, 5))
-    position, direction = good.machine.pentapod.pose(legs, good.program.component)
+    position, direction = good.machine.robot.pose(legs, good.program.component)
     upright = np.degrees(np.arcsin(np.abs(direction[:, 2]))).min()
-    away = 1e3 * np.abs(position_distance(good.machine.pentapod, position, direction)).min()
+    away = 1e3 * np.abs(position_distance(good.machine.robot, position, direction)).min()
     assert 0.98 * upright <= found["component kept, w"].value <= upright
     # The claim divides by 1 + δ, the largest that the norm of the plane's normal can be.
     assert 0.7 * away <= found["component kept, S"].value <= away

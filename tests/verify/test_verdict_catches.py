@@ -125,10 +125,10 @@ def test_wrong_machine_by_digest(good):
 
 
 def test_wrong_machine_by_geometry(good):
-    base = np.array(good.machine.pentapod.base)
+    base = np.array(good.machine.robot.base)
     base[3, 0] += 200e-6
-    pentapod = type(good.machine.pentapod).quadratic(base, good.machine.pentapod.delta)
-    other = replace(good.machine, pentapod=pentapod)
+    pentapod = type(good.machine.robot).quadratic(base, good.machine.robot.delta)
+    other = replace(good.machine, robot=pentapod)
     assert failed(judge(replace(good, machine=other))) >= {"machine", "tip deviation"}
 
 
@@ -229,12 +229,12 @@ def test_turn_on_the_spot_left_out(good):
 
 
 def through(case, position, direction):
-    legs = case.machine.pentapod.leg_lengths(position, direction)
+    legs = case.machine.robot.leg_lengths(position, direction)
     return judge(with_legs(case, legs))
 
 
 def test_path_through_s_zero(good):
-    robot, delta = good.machine.pentapod, good.machine.pentapod.delta
+    robot, delta = good.machine.robot, good.machine.robot.delta
     position, direction = robot.pose(good.program.legs[0], good.program.component)
     u, _, w = direction
     normal = np.array([delta * w, 0.0, 1.0 - delta * u])
@@ -247,7 +247,7 @@ def test_path_through_s_zero(good):
 
 
 def test_path_through_w_zero(good):
-    position, direction = good.machine.pentapod.pose(good.program.legs[0], good.program.component)
+    position, direction = good.machine.robot.pose(good.program.legs[0], good.program.component)
     angle = np.linspace(0.0, 0.55 * np.pi, 4000)[:, None]
     side = np.array([0.0, 1.0, 0.0]) - direction[1] * direction
     side /= np.linalg.norm(side)

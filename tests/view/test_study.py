@@ -46,8 +46,8 @@ def test_strokes_are_told_in_millimetres(opened, study, shift):
     machine = opened.machine
     tips = opened.toolpath.pivots - opened.toolpath.pivot * opened.axes
     tips, axes = tips @ placement.rotation.T + placement.translation, opened.axes @ placement.rotation.T
-    joints = tips[:, None] + (machine.tool_length - machine.pentapod.offsets)[:, None] * axes[:, None]
-    lengths = np.linalg.norm(joints - np.column_stack([machine.pentapod.base, np.zeros(5)]), axis=2)
+    joints = tips[:, None] + (machine.tool_length - machine.robot.offsets)[:, None] * axes[:, None]
+    lengths = np.linalg.norm(joints - np.column_stack([machine.robot.base, np.zeros(5)]), axis=2)
     room = np.minimum(lengths - machine.legs.min_length, machine.legs.max_length - lengths).min(axis=1)
     assert (reach.margins[room < 0.0] < 0.0).all(), "a leg out of its stroke is a place beyond a limit"
     assert reach.beyond == pytest.approx((reach.margins < 0.0).mean())

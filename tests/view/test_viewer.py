@@ -139,7 +139,7 @@ def test_the_slider_moves_legs_and_tool(viewer):
         assert legs == pytest.approx(program.legs[row], abs=2e-4)
         lengths.append(legs)
         tip = np.asarray(viewer._scene._tool.position)
-        position, direction = viewer.run.machine.pentapod.pose(program.legs[row], program.component)
+        position, direction = viewer.run.machine.robot.pose(program.legs[row], program.component)
         assert tip == pytest.approx(position + viewer.run.machine.tool_length * direction, abs=2e-4)
     assert np.abs(np.subtract(*lengths)).max() > 1e-3
 

@@ -211,7 +211,7 @@ class _Task:
         return program
 
     def _explanation(self, path: LegPath, trajectory: Trajectory, program: Program) -> Explanation:
-        position, direction = self.machine.pentapod.pose(program.legs, program.component)
+        position, direction = self.machine.robot.pose(program.legs, program.component)
         tips = position + self.machine.tool_length * direction
         # A beam or a spray works at a rate: it wants constant speed on the surface. A cutter only wants no more.
         beam, period = self.toolpath.pivot < 0.0, self.machine.controller.period

@@ -34,13 +34,14 @@ from pentapod.kinematics.forces import (
     tip_moment_amplification,
 )
 from pentapod.kinematics.forward.singularity_polynomial import singularity_cofactors, singularity_polynomial
-from pentapod.kinematics.jacobian import leg_jacobian, pose_jacobian, square_jacobian
+from pentapod.kinematics.jacobian import pose_jacobian, square_jacobian
 from pentapod.kinematics.mode import MODES, Mode
 from pentapod.kinematics.proofs.certificate import ComponentProof, certify_component
 from pentapod.kinematics.proofs.chords import Chords, prove_chords
 from pentapod.kinematics.proofs.motion import MotionProof, certify_motion
 from pentapod.kinematics.proofs.pose_enclosure import roaming
 from pentapod.kinematics.proofs.tip_tube import TipTube, prove_tip_tube
+from pentapod.kinematics.robot import Branch, Robot, SingularSurface
 from pentapod.kinematics.stiffness import tip_compliance, tip_stiffness
 
 __all__ = [
@@ -48,6 +49,7 @@ __all__ = [
     "MODES",
     "AsBuiltPentapod",
     "AssemblyObstacles",
+    "Branch",
     "Chords",
     "Component",
     "ComponentProof",
@@ -61,6 +63,8 @@ __all__ = [
     "Obstacle",
     "ProvenPoses",
     "ReconfigurablePentapod",
+    "Robot",
+    "SingularSurface",
     "SixLegPlatform",
     "TipTube",
     "architectural_measure",
@@ -73,7 +77,6 @@ __all__ = [
     "follow",
     "forbidden_conic",
     "leg_force_map",
-    "leg_jacobian",
     "leg_load_map",
     "leg_moment_map",
     "orientation_distance",

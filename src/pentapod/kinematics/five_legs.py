@@ -1,14 +1,17 @@
-"""FiveLegs: what every linear pentapod has, whatever its offsets: joints, leg vectors and leg lengths."""
+"""FiveLegs: what every linear pentapod has, whatever its offsets: joints, leg vectors, lengths and their slopes."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.base.arrays import Floats, as_floats
+from pentapod.base.arrays import Floats, as_floats, frozen
 from pentapod.base.errors import ArrayError, MachineError
+from pentapod.kinematics.arithmetic import Arithmetic, Joints, Vector, dot
 from pentapod.kinematics.batches import as_poses, joined_poses
 from pentapod.numerics.blocks import blocks
 from pentapod.numerics.kernels import kernels_pay
@@ -25,6 +28,32 @@ class FiveLegs:
 
     base: Floats
     offsets: Floats
+    n_legs = 5
+
+    @property
+    def base_joints(self) -> Floats:
+        """The base attachments (5, 3)."""
+        return frozen(np.column_stack([self.base, np.zeros(5)]), "base_joints")
+
+    @property
+    def line_heights(self) -> Floats:
+        """The offsets (5,)."""
+        return self.offsets
+
+    @property
+    def radii(self) -> Floats:
+        """No rings: (5,) zeros, metres."""
+        return np.zeros(5)
+
+    @property
+    def zeros(self) -> Floats:
+        """What the scales read is the lengths: (5,) zeros, metres."""
+        return np.zeros(5)
+
+    @property
+    def scale(self) -> float:
+        """The power of two nearest to the largest distance of a base joint from their centre: metres per radian."""
+        return length_scale(self.base_joints)
 
     def leg_vectors(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return b_i − a_i (..., 5, 3) in metres for positions p and unit directions i (..., 3)."""
@@ -32,6 +61,45 @@ class FiveLegs:
         legs = p[..., None, :] + self.offsets[:, None] * i[..., None, :]
         legs[..., :2] -= self.base
         return legs
+
+    def jacobian(self, position: ArrayLike, direction: ArrayLike) -> Floats:
+        """Return ∂legs/∂(p, i) (..., 5, 6) at poses (..., 3): rows [e_i, z_i e_i], e_i the leg's unit vector.
+
+        The first three columns have no unit (m/m), the last three metres. i is taken as a free vector of R³; a
+        change of a unit direction is perpendicular to it.
+        """
+        vectors = self.leg_vectors(position, direction)
+        unit = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+        return np.concatenate([unit, self.offsets[:, None] * unit], axis=-1)
+
+    def leg_derivatives(self, tips: Sequence[tuple[Floats, Floats]], tool_length: float) -> list[Floats]:
+        """Return leg lengths (n, 5) and their derivatives along a curve, of as many orders as are given.
+
+        tips: at [k] the derivatives of order k ≤ 3 of the tip and of the tool axis (tip → spindle), (n, 3) each.
+        """
+        lever = (tool_length - self.offsets)[:, None]
+        # From the base joints to the platform joints b_i = tip + (tool length − z_i) axis.
+        d = [tip[:, None, :] + lever * axis[:, None, :] for tip, axis in tips]
+        d[0][..., :2] -= self.base
+        legs, order = [np.sqrt(_dot(d[0], d[0]))], len(tips) - 1
+        if order >= 1:
+            legs.append(_dot(d[0], d[1]) / legs[0])
+        if order >= 2:
+            legs.append((_dot(d[1], d[1]) + _dot(d[0], d[2]) - legs[1] * legs[1]) / legs[0])
+        if order >= 3:
+            legs.append((3.0 * _dot(d[1], d[2]) + _dot(d[0], d[3]) - 3.0 * legs[1] * legs[2]) / legs[0])
+        return legs
+
+    def vectors_of(self, p: Vector, i: Vector, do: Arithmetic, joints: Joints | None = None) -> list[Vector]:
+        """Return `leg_vectors`, one for each leg, by a formula for numbers and symbols alike; joints: as moved."""
+        base, offsets = (self.base.tolist(), self.offsets.tolist()) if joints is None else joints
+        return [
+            [p[0] + z * i[0] - x, p[1] + z * i[1] - y, p[2] + z * i[2]] for (x, y), z in zip(base, offsets, strict=True)
+        ]
+
+    def lengths_of(self, vectors: Sequence[Vector], do: Arithmetic) -> list[Any]:
+        """Return the lengths of vectors."""
+        return [do.sqrt(dot(d, d)) for d in vectors]
 
     def levers(self, tool_length: float) -> Floats:
         """Return z_i − h (5,): the platform joints from the tip, along the line; metres. Raises ArrayError."""
@@ -59,6 +127,16 @@ class FiveLegs:
             squared += np.square(z * w + pz)
             legs[block] = np.sqrt(squared, out=squared).T
         return legs.reshape(*batch, 5)
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.einsum("nij,nij->ni", a, b)
+
+
+def length_scale(base_joints: Floats) -> float:
+    """Return the power of two nearest to the largest distance of a joint (n, 3) from their centre, metres."""
+    size = np.linalg.norm(base_joints - base_joints.mean(axis=0), axis=1).max()
+    return float(2.0 ** np.round(np.log2(size)))
 
 
 def outputs(out: tuple[Floats, ...] | None, batch: tuple[int, ...], *tails: tuple[int, ...]) -> tuple[Floats, ...]:

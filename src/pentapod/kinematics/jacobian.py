@@ -5,36 +5,31 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.base.arrays import Floats, as_batch
+from pentapod.base.arrays import Floats, as_batch, as_floats
 from pentapod.geometry.directions import tangent_frame
-from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.kinematics.robot import Robot
 
 
-def leg_jacobian(pentapod: FiveLegs, position: ArrayLike, direction: ArrayLike) -> Floats:
-    """Return ∂legs/∂(p, i) (..., 5, 6) at poses (..., 3): rows [e_i, z_i e_i], e_i the leg's unit vector.
-
-    The first three columns have no unit (m/m), the last three metres. i is taken as a free vector of R³; a
-    change of a unit direction is perpendicular to it.
-    """
-    vectors = pentapod.leg_vectors(position, direction)
-    unit = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.concatenate([unit, pentapod.offsets[:, None] * unit], axis=-1)
-
-
-def square_jacobian(pentapod: FiveLegs, position: ArrayLike, direction: ArrayLike) -> Floats:
+def square_jacobian(robot: Robot, position: ArrayLike, direction: ArrayLike) -> Floats:
     """Return ∂legs/∂(p, α, β) (..., 5, 5): di = α t1 + β t2, with (t1, t2) = `tangent_frame(direction)`.
 
     Columns 1-3 m/m, columns 4-5 m/rad. Singular exactly on the singularities.
     """
-    unit = leg_jacobian(pentapod, position, direction)[..., :3]
+    by_pose = robot.jacobian(position, direction)
     tangents = line_tangents(as_batch(direction, "direction", (3,)))
-    return np.concatenate([unit, pentapod.offsets[:, None] * (unit @ tangents)], axis=-1)
+    return np.concatenate([by_pose[..., :3], by_pose[..., 3:] @ tangents], axis=-1)
 
 
-def pose_jacobian(pentapod: FiveLegs, position: ArrayLike, direction: ArrayLike) -> Floats:
+def tip_jacobian(robot: Robot, position: ArrayLike, direction: ArrayLike, tool_length: ArrayLike) -> Floats:
+    """Return ∂legs/∂(tip, i) (..., n_legs, 6) at poses (..., 3), the tip at p + tool_length · i. Raises ArrayError."""
+    by_pose, length = robot.jacobian(position, direction), as_floats(tool_length, "tool_length")
+    return np.concatenate([by_pose[..., :3], by_pose[..., 3:] - length * by_pose[..., :3]], axis=-1)
+
+
+def pose_jacobian(robot: Robot, position: ArrayLike, direction: ArrayLike) -> Floats:
     """Return ∂(p, i)/∂legs (..., 6, 5) at poses (..., 3): rows m/m, then 1/m. NaN on a singularity."""
     i = as_batch(direction, "direction", (3,))
-    inverse = invert(square_jacobian(pentapod, position, i), np.nan)
+    inverse = invert(square_jacobian(robot, position, i), np.nan)
     tangents = line_tangents(i)
     return np.concatenate([inverse[..., :3, :], tangents @ inverse[..., 3:, :]], axis=-2)
 

@@ -23,6 +23,11 @@ class Mode(NamedTuple):
     order: int
     image: int
 
+    @property
+    def w(self) -> int:
+        """The sign of the direction's z component: the image."""
+        return self.image
+
     def __str__(self) -> str:
         return "".join("+" if sign > 0 else "-" for sign in self)
 

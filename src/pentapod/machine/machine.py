@@ -16,7 +16,6 @@ from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
-from pentapod.kinematics.families.singularities import architectural_measure
 from pentapod.machine import reader
 from pentapod.machine.digest import digest_of
 from pentapod.machine.drives import Drives, Masses
@@ -25,7 +24,7 @@ from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegL
 from pentapod.machine.tool_limits import ToolLimits
 
 ARCHITECTURAL_LIMIT = 0.005
-"""Least `architectural_measure` of a machine: below it, leg lengths say almost nothing about some motion."""
+"""Least `conditioning` of a machine's robot: below it, leg lengths say almost nothing about some motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +34,7 @@ class Machine(Value):
     tool_length: metres from p (the platform line's origin, where offset = 0) along i to the tool tip.
     rapid_velocity: largest tip speed in m/s on rapids. drives, masses: for simulation alone; a program does not
     depend on them. tool_limits: of the motion of tip and axis, none unless set. guides: of a reconfigurable machine, on
-    which the base joints are set before a program runs; slides (5,) metres: where they stand, `pentapod` is that
+    which the base joints are set before a program runs; slides (5,) metres: where they stand, `robot` is that
     geometry.
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
@@ -43,7 +42,7 @@ class Machine(Value):
     """
 
     name: str
-    pentapod: LinearPentapod
+    robot: LinearPentapod
     legs: LegLimits
     joints: JointLimits
     bodies: Bodies
@@ -61,7 +60,7 @@ class Machine(Value):
     def __post_init__(self) -> None:
         positive(self, "tool_length", "rapid_velocity")
         set_frozen(self, slides=frozen(self.slides, "slides", (5,)))
-        measure = architectural_measure(self.pentapod)
+        measure = self.robot.conditioning
         set_frozen(self, architecture=measure)
         if measure < ARCHITECTURAL_LIMIT:
             raise MachineError(
@@ -71,7 +70,7 @@ class Machine(Value):
                 expected=f"a reciprocal condition number of at least {ARCHITECTURAL_LIMIT:g}",
                 remedy="spread the base joints: no four near one line, no x or y shared by many",
             )
-        room = self.tool_length - float(self.pentapod.offsets.max()) - self.bodies.shaft_end
+        room = self.tool_length - float(self.robot.line_heights.max()) - self.bodies.shaft_end
         if room < 0.0:
             raise MachineError(
                 f"the tool is {-room * 1e3:.4g} mm too short: the spindle would end above a platform joint",
@@ -104,7 +103,7 @@ class Machine(Value):
         """
         if self.guides is None:
             raise MachineError("this machine has no guides", key="guides", value=np.asarray(slides).tolist())
-        return dataclasses.replace(self, pentapod=self.guides.at(slides), slides=np.asarray(slides, dtype=np.float64))
+        return dataclasses.replace(self, robot=self.guides.at(slides), slides=np.asarray(slides, dtype=np.float64))
 
 
 def load_machine(name_or_path: str | Path) -> Machine:
@@ -122,8 +121,7 @@ def read_machine(text: str, file: str | Path) -> Machine:
 
 
 def _numbers(machine: Machine) -> Iterator[tuple[str, object]]:
-    robot = machine.pentapod
-    yield from (("base", robot.base), ("offsets", robot.offsets), ("delta", robot.delta))
+    yield from machine.robot.numbers.items()
     for part in (machine.legs, machine.joints, machine.bodies, machine.controller, machine.work):
         for item in dataclasses.fields(part):
             yield f"{type(part).__name__}.{item.name}", getattr(part, item.name)

@@ -62,7 +62,7 @@ class Maker(Protocol[_Made_co]):
         self,
         *,
         name: str,
-        pentapod: LinearPentapod,
+        robot: LinearPentapod,
         legs: LegLimits,
         joints: JointLimits,
         bodies: Bodies,
@@ -154,7 +154,7 @@ def _made(tables: MachineTables, make: Maker[_Made_co]) -> _Made_co:
     pentapod = _geometry(tables.geometry)
     return make(
         name=tables.name,
-        pentapod=pentapod,
+        robot=pentapod,
         legs=LegLimits(
             min_length=_si(legs.min_length_mm),
             max_length=_si(legs.max_length_mm),

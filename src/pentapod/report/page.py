@@ -181,8 +181,8 @@ def _poses(outcome: Outcome, signals: Signals | None) -> dict[str, Any]:
         "around": _around(signals),
         "moving": scene.MACHINE_TRACES,
         "colours": scene.CUTS_BY,
-        "base": (1e3 * machine.pentapod.base).tolist(),
-        "offsets": (1e3 * machine.pentapod.offsets).tolist(),
+        "base": (1e3 * machine.robot.base).tolist(),
+        "offsets": (1e3 * machine.robot.offsets).tolist(),
         "tool_length": 1e3 * machine.tool_length,
         "shaft_end": 1e3 * machine.bodies.shaft_end,
     }

@@ -62,7 +62,7 @@ def _subject(
 ) -> _Subject:
     transform, worst = placed.placement.transform, int(placed.margins.min(axis=1).argmin())
     axis, tip = placed.axes[worst], placed.tips[worst]
-    joints = tip + (machine.tool_length - machine.pentapod.offsets)[:, None] * axis
+    joints = tip + (machine.tool_length - machine.robot.offsets)[:, None] * axis
     starts = placed.toolpath.starts
     even = np.linspace(0, len(placed.tips) - 1, min(len(placed.tips), _POINTS)).astype(np.intp)
     tips = placed.tips[np.unique(np.concatenate([even, starts[:: -(-len(starts) // _POINTS)]]))]
@@ -70,8 +70,8 @@ def _subject(
     if mesh is not None:
         vertices, faces = thinned_mesh(mesh.vertices, mesh.faces, _FACETS)
         facets = transform.apply(vertices)[faces]
-    base = np.column_stack([machine.pentapod.base, np.zeros(5)])
-    far, hangs = joints[int(np.argmin(machine.pentapod.offsets))], bool(machine.work.centre[2] > 0.0)
+    base = np.column_stack([machine.robot.base, np.zeros(5)])
+    far, hangs = joints[int(np.argmin(machine.robot.offsets))], bool(machine.work.centre[2] > 0.0)
     around = np.zeros((0, 3, 3))
     if held is not None:
         vertices, faces = thinned_mesh(held.vertices, held.faces, _FACETS)

@@ -162,7 +162,7 @@ def piece_traces(toolpath: Toolpath, pieces: Sequence[Piece]) -> list[dict[str, 
 
 def machine_traces(machine: Machine, tip: Floats, axis: Floats) -> list[dict[str, Any]]:
     """Return the base, and then the traces that move: legs, platform line, tool and tip, at one pose."""
-    base = np.column_stack([machine.pentapod.base, np.zeros(5)]) * 1e3
+    base = np.column_stack([machine.robot.base, np.zeros(5)]) * 1e3
     radius = 1.12 * float(np.linalg.norm(base - base.mean(axis=0), axis=1).max())
     angle = np.linspace(0.0, 2.0 * np.pi, 73)
     rim = base.mean(axis=0) + radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(73)])
@@ -188,7 +188,7 @@ _LOOKS: tuple[tuple[str, str, float], ...] = (
 
 def _pose_lines(machine: Machine, tip: Floats, axis: Floats) -> list[Floats]:
     """Return the two ends of each moving line, mm; the page's script does the same for other poses."""
-    robot = machine.pentapod
+    robot = machine.robot
     joints = tip + (machine.tool_length - robot.offsets)[:, None] * axis
     base = np.column_stack([robot.base, np.zeros(5)])
     nose = tip + machine.bodies.shaft_end * axis

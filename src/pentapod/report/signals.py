@@ -95,5 +95,5 @@ class Signals:
 
 def _poses(program: Program, machine: Machine) -> tuple[Floats, Floats]:
     """Return tips and tool axes (N, 3), machine frame, by the forward kinematics in the program's component."""
-    position, direction = machine.pentapod.pose(program.legs, program.component)
+    position, direction = machine.robot.pose(program.legs, program.component)
     return position + machine.tool_length * direction, -direction

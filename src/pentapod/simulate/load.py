@@ -43,7 +43,7 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
         """Return m (ẍ − g) for places (n + 2, ..., 3) at the rows."""
         return mass * (np.diff(places, n=2, axis=0) / period**2 - gravity)
 
-    robot = machine.pentapod
+    robot = machine.robot
     vectors = robot.leg_vectors(position, direction)
     lengths = np.linalg.norm(vectors, axis=2, keepdims=True)
     along = vectors / lengths

@@ -81,8 +81,8 @@ def plant(reference: Reference, *, base_errors: ArrayLike = 0.0, offset_errors: 
     for all. A Refusal says that the real machine has no pose there that can be trusted.
     """
     program, machine = reference.program, reference.machine
-    real = AsBuiltPentapod.of(machine.pentapod, base_errors=base_errors, offset_errors=offset_errors)
-    start = as_built_pose(real, machine.pentapod, program.legs[0], program.component)
+    real = AsBuiltPentapod.of(machine.robot, base_errors=base_errors, offset_errors=offset_errors)
+    start = as_built_pose(real, machine.robot, program.legs[0], program.component)
     if not start.proven:
         return Refusal(
             "simulation",

@@ -87,4 +87,4 @@ class Reference(Value):
 
     @cached_property
     def _pose(self) -> tuple[Floats, Floats]:
-        return self.machine.pentapod.pose(self._motion.halves, self.program.component)
+        return self.machine.robot.pose(self._motion.halves, self.program.component)

@@ -33,7 +33,7 @@ def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False
     if seed < 0:
         raise InputError("must not be negative", key="seed", value=seed)
     program, machine = reference.program, reference.machine
-    drives, robot = machine.drives, machine.pentapod
+    drives, robot = machine.drives, machine.robot
     parts = max(1, round(program.period / drives.period))
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 5)
     delay = round(drives.dead_time * parts / program.period)

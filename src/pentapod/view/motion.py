@@ -53,7 +53,7 @@ class Motion(Value):
     def of_program(cls, program: Program, machine: Machine) -> Motion:
         """Return the motion of a program; a long one is thinned to two hundred thousand rows."""
         rows = np.unique(np.linspace(0, len(program.legs) - 1, min(len(program.legs), _ROWS)).astype(np.intp))
-        position, direction = machine.pentapod.pose(program.legs[rows], program.component)
+        position, direction = machine.robot.pose(program.legs[rows], program.component)
         back = program.placement.inverse()
         tips = back.apply(position + machine.tool_length * direction)
         return cls(program.times[rows], tips, back.rotate(-direction))
@@ -81,8 +81,8 @@ class Motion(Value):
         tip, axis = self.pose(time)
         tip, axis = placement.apply(tip), placement.rotate(axis)
         position = tip + machine.tool_length * axis
-        bases = np.column_stack([machine.pentapod.base, np.zeros(5)])
-        joints = position - machine.pentapod.offsets[:, None] * axis
+        bases = np.column_stack([machine.robot.base, np.zeros(5)])
+        joints = position - machine.robot.offsets[:, None] * axis
         legs = np.linalg.norm(joints - bases, axis=1)
         within = (legs >= machine.legs.min_length) & (legs <= machine.legs.max_length)
         return Stance(tip, axis, legs, tuple(bool(k) for k in within), bases, joints)

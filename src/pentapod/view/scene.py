@@ -94,7 +94,7 @@ class Scene:
         camera.up = (0.0, 0.0, upward)
 
     def _add_base(self) -> None:
-        base = np.column_stack([self._run.machine.pentapod.base, np.zeros(5)])
+        base = np.column_stack([self._run.machine.robot.base, np.zeros(5)])
         centre = base.mean(axis=0)
         radius = 1.12 * float(np.linalg.norm(base - centre, axis=1).max())
         turn = np.linspace(0.0, 2.0 * np.pi, 97)
@@ -109,7 +109,7 @@ class Scene:
     def _add_tool(self) -> None:
         """Everything that is fixed to the tool: spindle, platform joints, shank and cutter, beam."""
         run, api = self._run, self._server.scene
-        machine, offsets = run.machine, run.machine.pentapod.offsets
+        machine, offsets = run.machine, run.machine.robot.offsets
         heights = machine.tool_length - offsets
         top, nose = float(heights.max()), machine.bodies.shaft_end
         self._cylinder("/tool/spindle", machine.bodies.shaft_radius, _STEEL, nose, top)

@@ -104,14 +104,14 @@ def test_jacobian_is_the_derivative(built, random_poses, paper):
 
     h = 1e-3
     slope = (8 * (legs_at(h) - legs_at(-h)) - (legs_at(2 * h) - legs_at(-2 * h))) / (12 * h)
-    rates = built.leg_jacobian(p, i) @ np.concatenate([dp, di], axis=1)[..., None]
+    rates = built.jacobian(p, i) @ np.concatenate([dp, di], axis=1)[..., None]
     assert np.abs(slope - rates[..., 0]).max() < 1e-8
     assert np.abs(rates).max() > 1.0
 
 
 def test_a_ring_around_its_own_base_joint_has_no_derivative(paper):
     machine = AsBuiltPentapod.of(paper, radii=[0, 0, 0.1, 0, 0])
-    jacobian = machine.leg_jacobian([0.0, 0.0, 3.0], [0.0, 0.0, 1.0])  # the line passes through base joint 3
+    jacobian = machine.jacobian([0.0, 0.0, 3.0], [0.0, 0.0, 1.0])  # the line passes through base joint 3
     assert np.isnan(jacobian[2]).all()
     assert np.isfinite(np.delete(jacobian, 2, axis=0)).all()
     assert machine.leg_lengths([0.0, 0.0, 3.0], [0.0, 0.0, 1.0])[2] == pytest.approx(np.hypot(3.0, 0.1))

@@ -33,7 +33,7 @@ def work_poses(n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 def test_round_trip_with_proof(nominal, size, share):
     p, i = work_poses(1500, seed=1)
     machine = with_errors(nominal, size, seed=2)
-    found = as_built_pose(machine, nominal, machine.leg_lengths(p, i), nominal.component(p, i))
+    found = as_built_pose(machine, nominal, machine.leg_lengths(p, i), nominal.branch(p, i))
     assert found.proven.mean() >= share
     sure = found.proven
     assert (np.abs(found.position - p).max(axis=1)[sure] <= found.position_error[sure] + 1e-14).all()
@@ -53,7 +53,7 @@ def test_each_component_has_its_own_pose(nominal):
     sure = found.proven
     again = machine.leg_lengths(found.position, found.direction)
     assert np.abs(again - legs[:, None])[sure].max() < 1e-14
-    assert (nominal.component(found.position, found.direction) == signs)[sure].all()
+    assert (nominal.branch(found.position, found.direction) == signs)[sure].all()
     apart = np.abs(found.position[:, 0] - found.position[:, 1]).max(axis=1)
     assert (apart[sure[:, 0] & sure[:, 1]] > 1e-3).all()
 
@@ -120,7 +120,7 @@ def test_never_proven_where_the_closed_form_loses_the_path(nominal, n, machines)
         zeros = rng.normal(size=5) * size
         machine = AsBuiltPentapod(np.c_[end_base, np.zeros(5)], end_delta * end_base[:, 0], np.zeros(5), zeros)
         start = near_singular_poses(nominal, n // machines, seed)
-        legs, signs = nominal.leg_lengths(*start), nominal.component(*start)
+        legs, signs = nominal.leg_lengths(*start), nominal.branch(*start)
         connected = np.ones(len(legs), dtype=bool)
         pose, margin = start, np.full(len(legs), np.inf)
         for s in np.linspace(0.0, 1.0, 101):
@@ -198,7 +198,7 @@ def test_rings_are_followed_to_the_pose_that_small_steps_lead_to(nominal):
         )
         p, i = work_poses(1, int(rng.integers(1 << 30)))
         legs = nominal.leg_lengths(p, i)[0]
-        found = as_built_pose(machine, nominal, legs, nominal.component(p, i)[0])
+        found = as_built_pose(machine, nominal, legs, nominal.branch(p, i)[0])
         x = np.r_[p[0], np.arcsin(-i[0, 1]), np.arctan2(i[0, 0], i[0, 2])]
         flat = np.c_[nominal.base, np.zeros(5)]
         for s in np.linspace(0.0, 1.0, 201)[1:]:

@@ -49,7 +49,7 @@ def round_trip_ratio(designs: int, poses: int, seed: int) -> float:
     for _ in range(designs):
         pentapod = random_design(rng)
         p, i = random_poses(rng, poses)
-        found = pentapod.pose(pentapod.leg_lengths(p, i), pentapod.mode(p, i))
+        found = pentapod.pose(pentapod.leg_lengths(p, i), pentapod.branch(p, i))
         worst = max(worst, (distance(pentapod, found, (p, i)) / inherent_error(pentapod, p, i)).max())
     return float(worst)
 
@@ -128,7 +128,7 @@ def test_all_modes_have_the_leg_lengths_and_their_own_labels() -> None:
         )
         np.testing.assert_allclose(np.linalg.norm(directions, axis=-1), 1.0, rtol=1e-14)
         for k, mode in enumerate(MODES):
-            assert (pentapod.mode(positions[:, k], directions[:, k]) == mode).all()
+            assert (pentapod.branch(positions[:, k], directions[:, k]) == mode).all()
             position, direction = pentapod.pose(legs, mode)
             np.testing.assert_allclose(position, positions[:, k], atol=1e-12)
             np.testing.assert_allclose(direction, directions[:, k], atol=1e-12)
@@ -183,7 +183,7 @@ def test_proportional_offsets_give_the_four_modes_of_the_closed_form() -> None:
     closed = LinearPentapod.from_offsets(0.2 * PAPER + (0.31, -0.17), 0.07 - 0.16 * PAPER[:, 0], -0.8)
     pentapod = GeneralPentapod(closed.base, closed.offsets)
     p, i = random_poses(rng, 2000)
-    legs, mode, component = closed.leg_lengths(p, i), pentapod.mode(p, i), closed.component(p, i)
+    legs, mode, component = closed.leg_lengths(p, i), pentapod.branch(p, i), closed.branch(p, i)
     ours, theirs = pentapod.pose(legs, mode), closed.pose(legs, component)
     assert (distance(pentapod, ours, theirs) < 20 * inherent_error(pentapod, p, i)).all()
     # the order of the roots is the sign of w S, up to the sign of the geometry's F
@@ -199,12 +199,12 @@ def test_proportional_offsets_give_the_four_modes_of_the_closed_form() -> None:
 def test_the_image_is_named_by_w_and_by_pz_where_w_vanishes() -> None:
     pentapod = random_design(np.random.default_rng(6))
     p = np.array([0.3, 0.2, 0.9 - pentapod.offsets[2] * 0.8])
-    assert pentapod.mode(p, [0.6, 0.0, 0.8])[1] == 1
-    assert pentapod.mode(p, [0.6, 0.0, -0.8])[1] == -1
-    assert pentapod.mode(p, [0.6, 0.8, 0.0])[1] == np.sign(p[2])
+    assert pentapod.branch(p, [0.6, 0.0, 0.8])[1] == 1
+    assert pentapod.branch(p, [0.6, 0.0, -0.8])[1] == -1
+    assert pentapod.branch(p, [0.6, 0.8, 0.0])[1] == np.sign(p[2])
     a, b = pentapod.mirror(p, [0.6, 0.0, 0.8])
     np.testing.assert_allclose(pentapod.leg_lengths(a, b), pentapod.leg_lengths(p, [0.6, 0.0, 0.8]), rtol=1e-15)
-    assert pentapod.mode(a, b)[0] == pentapod.mode(p, [0.6, 0.0, 0.8])[0]
+    assert pentapod.branch(a, b)[0] == pentapod.branch(p, [0.6, 0.0, 0.8])[0]
 
 
 @pytest.mark.parametrize("height", [0.0, 1e-15, 1e-9, 1e-6, 1e-3])
@@ -219,7 +219,7 @@ def test_poses_with_w_or_pz_near_zero_are_as_accurate_as_others(what: str, heigh
         i /= np.linalg.norm(i, axis=1)[:, None]
     else:
         p[:, 2] = height * rng.uniform(-1, 1, 500) - pentapod.offsets[2] * i[:, 2]
-    found = pentapod.pose(pentapod.leg_lengths(p, i), pentapod.mode(p, i))
+    found = pentapod.pose(pentapod.leg_lengths(p, i), pentapod.branch(p, i))
     error = distance(pentapod, found, (p, i))
     if height < 1e-12:  # the sign that names the image is lost in rounding
         error = np.minimum(error, distance(pentapod, pentapod.mirror(*found), (p, i)))
@@ -234,7 +234,7 @@ def test_a_batch_is_its_elements(count: int, shape: tuple) -> None:
     n = int(np.prod(shape)) if shape else count
     batch = shape or (n,)
     p, i = random_poses(rng, n)
-    legs, mode = pentapod.leg_lengths(p, i), pentapod.mode(p, i)
+    legs, mode = pentapod.leg_lengths(p, i), pentapod.branch(p, i)
     position, direction = pentapod.pose(legs.reshape(*batch, 5), mode.reshape(*batch, 2))
     assert position.shape == direction.shape == (*batch, 3)
     for k in {0, n // 2, n - 1} if n else ():
@@ -253,7 +253,7 @@ def test_lengths_without_a_pose_and_labels_without_a_meaning_give_nan() -> None:
         assert np.isfinite(values[[0, 5]]).all()
     position, _ = pentapod.pose(good, [[0, 1], [1, 0], [np.nan, 1], [1, 1]])
     np.testing.assert_array_equal(np.isnan(position[:, 0]), [True, True, True, False])
-    np.testing.assert_array_equal(pentapod.mode([[0.1, np.nan, 0.6]], [0.0, 0.0, 1.0]), [[0, 0]])
+    np.testing.assert_array_equal(pentapod.branch([[0.1, np.nan, 0.6]], [0.0, 0.0, 1.0]), [[0, 0]])
 
 
 def test_bad_input_is_refused_with_what_was_received() -> None:
@@ -266,7 +266,7 @@ def test_bad_input_is_refused_with_what_was_received() -> None:
     with pytest.raises(ArrayError, match="mode is out of range"):
         pentapod.pose(legs, (2, 1))
     with pytest.raises(ArrayError, match=r"position has shape \(2,\)"):
-        pentapod.mode([0.0, 0.0], [0.0, 0.0, 1.0])
+        pentapod.branch([0.0, 0.0], [0.0, 0.0, 1.0])
     with pytest.raises(MachineError, match="not finite at index"):
         GeneralPentapod(0.2 * PAPER, [0.31, np.nan, 0.05, 0.14, -0.1])
     with pytest.raises(MachineError, match=r"offsets has shape \(4,\)"):

@@ -61,8 +61,8 @@ def test_near_the_quadratic_family_it_is_as_good_as_the_better_of_both(exponent:
     p, i = random_poses(12, 2)
     legs = pentapod.leg_lengths(p, i)
     exact = tuple(np.array(c) for c in zip(*map(exact_pose, [pentapod] * 12, legs, p, i), strict=True))
-    ours = error(pentapod.pose(legs, pentapod.mode(p, i)), exact)
-    theirs = error(closed.pose(legs, closed.component(p, i)), exact)
+    ours = error(pentapod.pose(legs, pentapod.branch(p, i)), exact)
+    theirs = error(closed.pose(legs, closed.branch(p, i)), exact)
     bound = inherent_error(pentapod, p, i)
     # no worse than what the rounding of the lengths does; so the closed form can win by rounding only
     assert (ours < 10 * bound).all()
@@ -106,7 +106,7 @@ def test_nothing_happens_where_c1_vanishes(change: float) -> None:
     assert (c1 == 0.0) == (change == 0.0)
     p, i = random_poses(5000, 6)
     legs = pentapod.leg_lengths(p, i)
-    found = pentapod.pose(legs, pentapod.mode(p, i))
+    found = pentapod.pose(legs, pentapod.branch(p, i))
     assert (error(found, (p, i)) < 10 * inherent_error(pentapod, p, i)).all()
     positions, directions = pentapod.assembly_modes(legs)
     np.testing.assert_allclose(
@@ -128,14 +128,14 @@ def test_near_a_singularity_the_error_is_that_of_the_rounded_lengths(metres: flo
         if value(-1.0) * value(1.0) > 0:
             continue
         p = p + (float(brentq(value, -1.0, 1.0, xtol=1e-16)) + metres) * way  # noqa: PLW2901
-        mode = pentapod.mode(p, i)
+        mode = pentapod.branch(p, i)
         bound = float(inherent_error(pentapod, p[None], i[None])[0])
         found = pentapod.pose(pentapod.leg_lengths(p, i), mode)
         tried += 1
         assert error(found, (p, i)) < 10 * bound  # and so not NaN
-        assert pentapod.mode(*found)[0] == mode[0]
+        assert pentapod.branch(*found)[0] == mode[0]
         if bound < 1e-2 * metres:  # and w = 0 is not within rounding either
-            np.testing.assert_array_equal(pentapod.mode(*found), mode)
+            np.testing.assert_array_equal(pentapod.branch(*found), mode)
     assert tried > 100
 
 
@@ -159,7 +159,7 @@ def test_the_order_is_always_the_one_that_was_asked_for(metres: float) -> None:
             found = pentapod.pose(legs, (order, 1))
             known = np.isfinite(found[0][:, 0])
             assert known.mean() > 0.99
-            assert (pentapod.mode(*found)[known, 0] == order).all()
+            assert (pentapod.branch(*found)[known, 0] == order).all()
             worst.append(np.abs(pentapod.leg_lengths(*found) - legs)[known].max(axis=1))
         tried += len(p)
     assert tried > 1500

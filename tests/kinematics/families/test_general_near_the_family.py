@@ -21,12 +21,12 @@ def test_every_pose_of_a_pose_s_legs_is_found(deviation: float, count: int) -> N
         i /= np.linalg.norm(i, axis=1)[:, None]
         p = rng.uniform((-0.3, -0.3, 0.3), (0.3, 0.3, 1.0), (count, 3))
         legs = robot.leg_lengths(p, i)
-        mode = robot.mode(p, i)
+        mode = robot.branch(p, i)
         found = robot.pose(legs, np.where(mode == 0, 1, mode))
         assert np.isfinite(found[0]).all()
         assert assembly_obstacles(robot, legs).exists.all()
         assert np.abs(robot.leg_lengths(*found) - legs).max() < 64.0 * EPS * legs.max()
-        assert (robot.mode(*found)[:, 0] == np.where(mode == 0, 1, mode)[:, 0]).all()
+        assert (robot.branch(*found)[:, 0] == np.where(mode == 0, 1, mode)[:, 0]).all()
 
 
 def test_obstacles_and_poses_agree_whatever_the_size_of_the_batch() -> None:

@@ -32,7 +32,7 @@ def swing(pentapod: GeneralPentapod, n: int, upto: float) -> tuple[np.ndarray, n
 def test_the_mirror_image_is_followed_through_w_equal_to_zero(pentapod: GeneralPentapod, rows: int) -> None:
     p, i = swing(pentapod, 1000, 0.4)
     assert (i[0, 2], np.sign(i[-1, 2])) == (pytest.approx(np.sin(0.5)), -1)
-    assert (pentapod.mode(p, i)[:, 0] == pentapod.mode(p[0], i[0])[0]).all()
+    assert (pentapod.branch(p, i)[:, 0] == pentapod.branch(p[0], i[0])[0]).all()
     legs = pentapod.leg_lengths(p, i)
     if rows < 1000:  # the legs then move linearly in between: another motion with the same ends
         chosen = np.linspace(0, 999, rows).round().astype(int)
@@ -42,7 +42,7 @@ def test_the_mirror_image_is_followed_through_w_equal_to_zero(pentapod: GeneralP
     np.testing.assert_allclose(path.position, p, atol=1e-10)
     np.testing.assert_allclose(path.direction, i, atol=1e-10)
     # the mode's name for the image has changed, the mode's order has not
-    modes = pentapod.mode(path.position, path.direction)
+    modes = pentapod.branch(path.position, path.direction)
     assert tuple(modes[0]) == Mode(int(modes[0, 0]), 1)
     assert tuple(modes[-1]) == Mode(int(modes[0, 0]), -1)
 

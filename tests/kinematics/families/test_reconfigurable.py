@@ -35,7 +35,7 @@ def test_the_singular_locus_stays(pentapod: LinearPentapod, random_poses, leg_de
             ratio = conic_determinant(moved) / conic_determinant(pentapod)
             after = leg_determinant(moved, p, i)
             np.testing.assert_allclose(after, ratio * before, rtol=1e-6, atol=1e-9 * np.abs(after).max())
-            np.testing.assert_array_equal(moved.component(p, i), pentapod.component(p, i))
+            np.testing.assert_array_equal(moved.branch(p, i), pentapod.branch(p, i))
 
 
 def test_the_identity_behind_it_over_the_rationals() -> None:

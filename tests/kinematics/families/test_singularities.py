@@ -113,7 +113,7 @@ def test_the_plane_of_singular_tips(
     tips = p + tool_length * i
     height = (normal * tips).sum(axis=-1) - offset
     np.testing.assert_allclose(np.abs(height), position_distance(pentapod, p, i), rtol=1e-9, atol=1e-12)
-    np.testing.assert_array_equal(np.sign(height), pentapod.component(p, i)[:, 1])
+    np.testing.assert_array_equal(np.sign(height), pentapod.branch(p, i)[:, 1])
     foot = tips - height[:, None] * normal - tool_length * i
     scale = np.abs(leg_determinant(pentapod, p, i)).max()
     np.testing.assert_allclose(leg_determinant(pentapod, foot, i), 0.0, atol=1e-12 * scale)

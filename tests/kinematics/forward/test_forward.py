@@ -41,7 +41,7 @@ def test_leg_lengths_are_distances_between_the_joints(pentapod: LinearPentapod, 
 
 def test_every_pose_is_found_again_in_its_own_component(pentapod: LinearPentapod, random_poses) -> None:
     p, i = random_poses(pentapod, 100_000)
-    component = pentapod.component(p, i)
+    component = pentapod.branch(p, i)
     assert component.dtype == np.int8
     legs = pentapod.leg_lengths(p, i)
     position, direction = pentapod.pose(legs, component)
@@ -69,7 +69,7 @@ def test_all_four_modes_have_the_leg_lengths_and_their_own_signs(pentapod: Linea
     np.testing.assert_allclose(again, np.repeat(legs[:, None, :], 4, axis=1), rtol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(directions, axis=-1), 1.0, rtol=1e-14)
     for mode, component in enumerate(COMPONENTS):
-        assert (pentapod.component(positions[:, mode], directions[:, mode]) == component).all()
+        assert (pentapod.branch(positions[:, mode], directions[:, mode]) == component).all()
         position, direction = pentapod.pose(legs, component)
         np.testing.assert_allclose(position, positions[:, mode], atol=1e-13)
         np.testing.assert_allclose(direction, directions[:, mode], atol=1e-13)
@@ -80,7 +80,7 @@ def test_newton_from_nearby_finds_the_same_pose(pentapod: LinearPentapod, random
     w, s = np.abs(i[:, 2]), np.abs(p[:, 2])
     keep = (w > 0.3) & (s > 0.3 * np.abs(pentapod.base).max())
     legs = pentapod.leg_lengths(p, i)
-    component = pentapod.component(p, i)
+    component = pentapod.branch(p, i)
     rng = np.random.default_rng(0)
     attachments, z = np.c_[pentapod.base, np.zeros(5)], pentapod.offsets
     tried = 0
@@ -111,7 +111,7 @@ def test_round_trip_for_any_frame(p, i, delta: float, shift, start: float) -> No
     pentapod = LinearPentapod.from_offsets(base, start + delta * base[:, 0], delta)
     assume(np.linalg.norm(i) > 0.1)
     direction = np.array(i) / np.linalg.norm(i)
-    signs = pentapod.component(p, direction)
+    signs = pentapod.branch(p, direction)
     w, s = singularity_values(pentapod, p, direction)
     assume(abs(w) > 0.05)
     assume(abs(s) > 0.05)
@@ -131,7 +131,7 @@ def test_a_batch_is_its_elements(count: int, shape: tuple) -> None:
     batch = shape or (n,)
     legs = pentapod.leg_lengths(p.reshape(*batch, 3), i.reshape(*batch, 3))
     assert legs.shape == (*batch, 5)
-    signs = pentapod.component(p.reshape(*batch, 3), i.reshape(*batch, 3))
+    signs = pentapod.branch(p.reshape(*batch, 3), i.reshape(*batch, 3))
     position, direction = pentapod.pose(legs, signs)
     modes, _ = pentapod.assembly_modes(legs)
     assert (position.shape, direction.shape, modes.shape) == ((*batch, 3), (*batch, 3), (*batch, 4, 3))
@@ -174,7 +174,7 @@ def test_a_sign_of_zero_names_no_pose_and_other_numbers_no_sign(paper: LinearPen
 def test_component_is_zero_on_each_singularity_and_without_a_pose(paper: LinearPentapod) -> None:
     p = np.array([[0.5, 0.25, 3.0], [0.0, 0.7, 0.0], [0.5, np.nan, 3.0], [0.5, 0.25, np.nan]])
     i = np.array([[0.6, 0.8, 0.0], [0.36, 0.48, 0.8], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]])
-    np.testing.assert_array_equal(paper.component(p, i), [[0, 1], [1, 0], [0, 0], [0, 0]])
+    np.testing.assert_array_equal(paper.branch(p, i), [[0, 1], [1, 0], [0, 0], [0, 0]])
 
 
 def test_wrong_shapes_are_refused(paper: LinearPentapod) -> None:

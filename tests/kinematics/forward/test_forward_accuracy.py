@@ -72,7 +72,7 @@ def check(pentapod: LinearPentapod, surface: str, distance: float, count: int, s
         s = delta * i[2] * p[0] + (1 - delta * i[0]) * p[2] + (z3 - delta * x3) * i[2]
         component = (int(mp.sign(i[2])), int(mp.sign(s)))
         position, direction = pentapod.pose([float(x) for x in lengths], component)
-        assert tuple(pentapod.component(position, direction)) == component
+        assert tuple(pentapod.branch(position, direction)) == component
         error = norm([mp.mpf(a) - b for a, b in zip(position.tolist(), p, strict=True)])
         turned = norm([mp.mpf(a) - b for a, b in zip(direction.tolist(), i, strict=True)])
         assert error <= 10 * norm(bounds[:3])
@@ -94,7 +94,7 @@ def test_error_within_ten_times_the_condition_number_on_many_poses(
     with mp.workdps(DIGITS):
         for k, distance in enumerate(DISTANCES):
             check(pentapod, surface, distance, 100, 100 + k)
-            check(desk.pentapod, surface, distance, 30, 200 + k)
+            check(desk.robot, surface, distance, 30, 200 + k)
 
 
 @pytest.mark.parametrize("policy", ["never", "always"])
@@ -115,7 +115,7 @@ def test_the_named_component_never_flips_on_a_singularity(pentapod: LinearPentap
         for component in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
             with kernels_used(policy):
                 position, direction = pentapod.pose(legs, component)
-            assert (pentapod.component(position, direction) == component).all()
+            assert (pentapod.branch(position, direction) == component).all()
             residual = np.abs(pentapod.leg_lengths(position, direction) - legs).max(axis=1)
             assert (residual <= known).all()
             assert np.median(residual) <= 2e-15 * size
@@ -140,8 +140,8 @@ def test_every_pose_of_a_machines_work_volume_is_found_again_to_nine_digits(desk
     tips, axes = sample_work_volume(desk.work, rings=7, around=24, levels=4)
     p, i = tips + desk.tool_length * axes, -axes
     assert len(p) > 100_000
-    robot = desk.pentapod
-    position, direction = robot.pose(robot.leg_lengths(p, i), robot.component(p, i))
+    robot = desk.robot
+    position, direction = robot.pose(robot.leg_lengths(p, i), robot.branch(p, i))
     # relative: to the distance from the origin, and to the unit length of the direction
     assert (np.linalg.norm(position - p, axis=1) <= 1e-9 * np.linalg.norm(p, axis=1)).all()
     assert (np.linalg.norm(direction - i, axis=1) <= 1e-9).all()
@@ -151,12 +151,12 @@ def test_a_hundred_thousand_random_poses_all_around_the_paper_machine_to_nine_di
     paper: LinearPentapod, random_poses
 ) -> None:
     p, i = random_poses(paper, 100_000)
-    position, direction = paper.pose(paper.leg_lengths(p, i), paper.component(p, i))
+    position, direction = paper.pose(paper.leg_lengths(p, i), paper.branch(p, i))
     error = np.maximum(
         np.linalg.norm(position - p, axis=1) / np.abs(paper.base).max(), np.linalg.norm(direction - i, axis=1)
     )
     assert (error <= 1e-9).all()
-    assert (paper.component(position, direction) == paper.component(p, i)).all()
+    assert (paper.branch(position, direction) == paper.branch(p, i)).all()
 
 
 @pytest.mark.parametrize(("least_measure", "share"), [(0.01, 0.9999), (0.0, 0.999)])
@@ -170,11 +170,11 @@ def test_random_poses_of_random_designs_to_nine_digits_but_for_the_nearly_singul
         if architectural_measure(robot) < least_measure:
             continue
         p, i = random_poses(robot, 1000, seed=total)
-        position, direction = robot.pose(robot.leg_lengths(p, i), robot.component(p, i))
+        position, direction = robot.pose(robot.leg_lengths(p, i), robot.branch(p, i))
         size = np.abs(robot.base - robot.base[2]).max()
         error = np.maximum(np.linalg.norm(position - p, axis=1) / size, np.linalg.norm(direction - i, axis=1))
         right, total = right + int((error <= 1e-9).sum()), total + 1000
-        assert (robot.component(position, direction) == robot.component(p, i)).all()
+        assert (robot.branch(position, direction) == robot.branch(p, i)).all()
     assert right >= share * total
 
 
@@ -190,7 +190,7 @@ def test_legs_of_the_answer_are_those_asked_for_as_far_as_the_design_is_well_con
         p, i = random_poses(robot, 200, seed=k)
         p, i = p[np.abs(i[:, 1]) > 0.05], i[np.abs(i[:, 1]) > 0.05]
         legs = robot.leg_lengths(p, i)
-        position, direction = robot.pose(legs, robot.component(p, i))
+        position, direction = robot.pose(legs, robot.branch(p, i))
         found = np.isfinite(position).all(axis=1)
         longest = np.maximum(legs.max(axis=1), max(np.abs(base).max(), np.abs(robot.offsets).max()))
         off = np.abs(robot.leg_lengths(position, direction) - legs).max(axis=1) / longest * 2.0**53

@@ -33,7 +33,7 @@ def test_kernels_equal_numpy_to_the_last_bit(pentapod: LinearPentapod, random_po
     assert same(plain, compiled)
     legs = np.concatenate([plain, plain[: n // 2] * 1.4])  # many of the latter have no pose
     legs[::17, 2] *= -1.0
-    signs = pentapod.component(*np.concatenate([[p, i], [p, i]], axis=1)[:, : len(legs)])
+    signs = pentapod.branch(*np.concatenate([[p, i], [p, i]], axis=1)[:, : len(legs)])
     for component in (*COMPONENTS, signs):
         expected, found = both(lambda c=component: pentapod.pose(legs, c))
         assert same(expected[0], found[0])
@@ -75,7 +75,7 @@ def test_results_are_written_where_asked(paper: LinearPentapod, random_poses, po
 @pytest.mark.parametrize("policy", ["never", "always"])
 def test_temporaries_stay_below_three_times_the_input(paper: LinearPentapod, random_poses, policy: str) -> None:
     p, i = random_poses(paper, 200_000)
-    legs, signs = paper.leg_lengths(p, i), paper.component(p, i)
+    legs, signs = paper.leg_lengths(p, i), paper.branch(p, i)
     position, direction = np.empty_like(p), np.empty_like(i)
     with kernels_used(policy):
         for action, size in (

@@ -42,7 +42,7 @@ def test_poses_have_their_legs_or_are_named(delta: float, lever: float, count: i
         found = np.isfinite(p).all(axis=1)
         np.testing.assert_array_equal(found, obstacles.exists)
         assert residual(robot, p[found], i[found], legs[found]).max() <= 8.0
-        assert (robot.component(p[found], i[found]) == component).all()
+        assert (robot.branch(p[found], i[found]) == component).all()
 
 
 @pytest.mark.slow

@@ -68,7 +68,7 @@ def test_in_the_quadratic_family_it_is_the_product_of_the_notes(paper: LinearPen
 def test_its_sign_orders_the_roots_and_is_the_modes_order(general: GeneralPentapod) -> None:
     p, i = poses(500)
     value = singularity_polynomial(general, p, i)
-    np.testing.assert_array_equal(np.sign(value), general.mode(p, i)[:, 0])
+    np.testing.assert_array_equal(np.sign(value), general.branch(p, i)[:, 0])
     ratio = value / general.order_value(p, i)
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-6)
     # the two roots have opposite signs: a double root is a singularity

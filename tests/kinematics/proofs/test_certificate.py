@@ -98,7 +98,7 @@ def test_motions_through_a_singularity_are_not_proven(pentapod: LinearPentapod) 
     above = np.array([0.2, 0.1, 1.5]) * size
     for positions, directions in ((falling, i[None]), (above[None], turning)):
         w, s = singularity_values(pentapod, positions, directions)
-        component = pentapod.component(positions, directions)
+        component = pentapod.branch(positions, directions)
         legs = pentapod.leg_lengths(positions, directions)
         proof = certify_component(pentapod, np.stack([legs[:-1], legs[1:]], axis=-1), component[0])
         assert (component[0] * component[-1] == (1, -1)).all() or (component[0] * component[-1] == (-1, 1)).all()

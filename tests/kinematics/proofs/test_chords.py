@@ -28,7 +28,7 @@ def motions(seed, count, degree, step=1e-3):
     pose = pose + step * random.uniform(-1, 1, (count, degree + 1, 5))
     i = direction(pose[..., 3], pose[..., 4])
     component = Component.parse("++")
-    assert (ROBOT.component(pose[..., :3], i) == component).all()
+    assert (ROBOT.branch(pose[..., :3], i) == component).all()
     return ROBOT.leg_lengths(pose[..., :3], i).swapaxes(1, 2), component
 
 

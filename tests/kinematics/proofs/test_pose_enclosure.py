@@ -18,7 +18,7 @@ def well_posed(pentapod, random_poses, leg_determinant):
 @pytest.mark.parametrize("half", [1e-6, 1e-4, 1e-3])
 def test_no_lengths_in_the_hull_lead_further(pentapod, random_poses, leg_determinant, half):
     p, i = well_posed(pentapod, random_poses, leg_determinant)
-    legs, component = pentapod.leg_lengths(p, i), pentapod.component(p, i)
+    legs, component = pentapod.leg_lengths(p, i), pentapod.branch(p, i)
     size, rng = float(np.abs(pentapod.base).max()), np.random.default_rng(2)
     corners = legs[:, None] + half * size * rng.uniform(-1.0, 1.0, (len(p), 12, 5))
     corners[:, 0] = legs

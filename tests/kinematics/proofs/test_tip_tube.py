@@ -47,7 +47,7 @@ def test_bounds_hold_at_all_samples_and_are_close(pentapod: LinearPentapod, k: i
     n, u = 30, np.linspace(0.0, 1.0, 41)
     legs = interval_legs(pentapod, n, 0.02, k)
     tips, directions = course(pentapod, n, 0.02)
-    component = pentapod.component(tips[0] - ABOUT * directions[0], directions[0])
+    component = pentapod.branch(tips[0] - ABOUT * directions[0], directions[0])
     path, axes = (np.stack([a[:-1], a[1:]], axis=-1) for a in (tips, directions))
     tube = prove_tip_tube(pentapod, legs, component)
     assert tube.proven.all()
@@ -70,7 +70,7 @@ def test_bounds_hold_at_all_samples_and_are_close(pentapod: LinearPentapod, k: i
 def test_the_true_pose_in_fifty_digits_is_inside(pentapod: LinearPentapod) -> None:
     legs = interval_legs(pentapod, 4, 0.05, 3)
     tips, directions = course(pentapod, 4, 0.05)
-    component = pentapod.component(tips[0] - ABOUT * directions[0], directions[0])
+    component = pentapod.branch(tips[0] - ABOUT * directions[0], directions[0])
     tube = prove_tip_tube(pentapod, legs, component)
     with mp.workdps(50):
         attachments = [[mp.mpf(float(c)) for c in (*xy, 0.0)] for xy in pentapod.base]
@@ -103,7 +103,7 @@ def mp_value(coefficients: np.ndarray, t: mp.mpf) -> mp.mpf:
 def test_long_intervals_are_halved_until_they_are_proven(paper: LinearPentapod) -> None:
     legs = interval_legs(paper, 5, 1.0, 5)
     tips, directions = course(paper, 5, 1.0)
-    component = paper.component(tips[0] - ABOUT * directions[0], directions[0])
+    component = paper.branch(tips[0] - ABOUT * directions[0], directions[0])
     tube = prove_tip_tube(paper, legs, component)
     assert tube.proven.all()
     assert len(tube.start) > 5
@@ -121,7 +121,7 @@ def test_long_intervals_are_halved_until_they_are_proven(paper: LinearPentapod) 
 def test_a_leg_error_covers_every_motion_within_it(paper: LinearPentapod) -> None:
     legs, error = interval_legs(paper, 6, 0.02, 1), 1e-4
     tips, directions = course(paper, 6, 0.02)
-    component = paper.component(tips[0] - ABOUT * directions[0], directions[0])
+    component = paper.branch(tips[0] - ABOUT * directions[0], directions[0])
     path = np.stack([tips[:-1], tips[1:]], axis=-1)
     sharp, covered = (prove_tip_tube(paper, legs, component, leg_error=e) for e in (0.0, error))
     assert covered.proven.all()
@@ -145,7 +145,7 @@ def test_what_meets_a_singularity_or_has_no_pose_is_not_proven(paper: LinearPent
     through = np.stack([paper.leg_lengths(above, i), 2.0 * there - paper.leg_lengths(above, i)], axis=-1)
     still = np.repeat(paper.leg_lengths(above, i)[:, None], 2, axis=1)
     nowhere = np.array([1.0, 1.0, 9.0, 1.0, 1.0])[:, None] * np.ones(2)
-    tube = prove_tip_tube(paper, np.stack([through, still, nowhere]), paper.component(above, i))
+    tube = prove_tip_tube(paper, np.stack([through, still, nowhere]), paper.branch(above, i))
     np.testing.assert_array_equal(tube.proven, [False, True, False])
     path = np.broadcast_to((above + ABOUT * i)[:, None], (3, 3, 1))
     np.testing.assert_array_equal(np.isinf(tube.tip_deviation(path, ABOUT)), [True, False, True])
@@ -161,7 +161,7 @@ def test_the_component_is_the_one_named(paper: LinearPentapod) -> None:
         tube = prove_tip_tube(paper, legs, component)
         assert tube.proven.all()
         p, i = np.moveaxis(tube.position[0], 0, -1), np.moveaxis(tube.direction[0], 0, -1)
-        assert (paper.component(p, i) == component).all()
+        assert (paper.branch(p, i) == component).all()
 
 
 def test_a_program_of_a_machine_at_its_period() -> None:
@@ -170,9 +170,9 @@ def test_a_program_of_a_machine_at_its_period() -> None:
     tips = np.array(machine.work.centre) + np.c_[0.04 * np.cos(3 * t), 0.04 * np.sin(2 * t), 0.02 * np.sin(4 * t)]
     directions = np.c_[0.2 * np.sin(2 * t), 0.2 * np.cos(3 * t), np.ones(500)]
     directions /= np.linalg.norm(directions, axis=1)[:, None]
-    robot, position = machine.pentapod, tips - machine.tool_length * directions
+    robot, position = machine.robot, tips - machine.tool_length * directions
     legs = robot.leg_lengths(position, directions)
-    tube = prove_tip_tube(robot, np.stack([legs[:-1], legs[1:]], axis=-1), robot.component(position[0], directions[0]))
+    tube = prove_tip_tube(robot, np.stack([legs[:-1], legs[1:]], axis=-1), robot.branch(position[0], directions[0]))
     bound = tube.tip_deviation(np.stack([tips[:-1], tips[1:]], axis=-1), machine.tool_length)
     assert 0.0 < bound.max() < 1e-7
 

@@ -13,7 +13,7 @@ def desk():
 
 def by_points(machine, p, i, count=1500):
     """Brute force: all pairs of points on two axes."""
-    bodies, robot = machine.bodies, machine.pentapod
+    bodies, robot = machine.bodies, machine.robot
     s = np.linspace(0.0, 1.0, count)[:, None]
     feet = [np.array([x, y, 0.0]) for x, y in robot.base]
     heads = [p + z * i for z in robot.offsets]

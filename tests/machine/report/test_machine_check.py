@@ -35,8 +35,8 @@ def test_report_equals_poses_looked_at_one_by_one(desk):
     for tip, axis in zip(tips, axes, strict=True):
         p = tip + desk.tool_length * axis
         for k in range(5):
-            foot = np.append(desk.pentapod.base[k], 0.0)
-            leg = p - desk.pentapod.offsets[k] * axis - foot
+            foot = np.append(desk.robot.base[k], 0.0)
+            leg = p - desk.robot.offsets[k] * axis - foot
             length = np.sqrt(leg @ leg)
             lengths.append(length)
             cones.append(np.arccos(leg @ desk.joints.base_axes[k] / length))

@@ -58,7 +58,7 @@ def test_legs_are_the_inverse_kinematics_of_the_pose(desk, mixed):
     _, path = mixed
     s = np.linspace(0.0, path.length, 3001)
     tips, axes = path.pose(s)
-    expected = desk.pentapod.leg_lengths(tips + desk.tool_length * axes, -axes)
+    expected = desk.robot.leg_lengths(tips + desk.tool_length * axes, -axes)
     np.testing.assert_allclose(path(s), expected, atol=1e-14)
     np.testing.assert_allclose(np.linalg.norm(axes, axis=1), 1.0, atol=1e-14)
 

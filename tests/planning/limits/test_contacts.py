@@ -95,8 +95,8 @@ def test_margins_are_distances_of_samples(desk, crowd, place):
     t = np.linspace(0.0, 1.0, 200)[:, None]
     for row in range(len(tips)):
         for leg in range(5):
-            start = np.append(desk.pentapod.base[leg], 0.0)
-            joint = position[row] - desk.pentapod.offsets[leg] * axes[row]
+            start = np.append(desk.robot.base[leg], 0.0)
+            joint = position[row] - desk.robot.offsets[leg] * axes[row]
             samples = start + t * (joint - start)
             large = fixture.copy().apply_scale(1e4)
             oracle = -trimesh.proximity.signed_distance(large, 1e4 * samples).max() / 1e4 - desk.bodies.leg_radius
@@ -159,8 +159,8 @@ def beside(desk, setting, free, leg, away):
     tip, axis = (
         x[0] for x in setting.task.machine_poses(free.transform, setting.axes(free.coefficients, [row]), [row])
     )
-    start = np.append(desk.pentapod.base[leg], 0.0)
-    joint = tip + (desk.tool_length - desk.pentapod.offsets[leg]) * axis
+    start = np.append(desk.robot.base[leg], 0.0)
+    joint = tip + (desk.tool_length - desk.robot.offsets[leg]) * axis
     across = np.cross(joint - start, free.transform.rotation[:, 2])
     at = start + 0.9 * (joint - start) + away * across / np.linalg.norm(across)
     x, y, z = free.transform.inverse().apply(at)

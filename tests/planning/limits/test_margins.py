@@ -38,12 +38,12 @@ def test_signs_are_those_of_the_limits_themselves(desk):
     tips, axes = poses(desk, 2000, spread=0.3, seed=1)
     values = Margins.of(desk, PLUS)(tips, axes)
     p = tips + desk.tool_length * axes
-    joints = p[:, None, :] - desk.pentapod.offsets[:, None] * axes[:, None, :]
-    legs = joints - np.c_[desk.pentapod.base, np.zeros(5)]
+    joints = p[:, None, :] - desk.robot.offsets[:, None] * axes[:, None, :]
+    legs = joints - np.c_[desk.robot.base, np.zeros(5)]
     length = np.linalg.norm(legs, axis=2)
     np.testing.assert_array_equal(values[:, 0:5] > 0, length > desk.legs.min_length)
     np.testing.assert_array_equal(values[:, 5:10] > 0, length < desk.legs.max_length)
-    signs = desk.pentapod.component(p, -axes)
+    signs = desk.robot.branch(p, -axes)
     np.testing.assert_array_equal(values[:, 10] > 0, signs[:, 0] > 0)
     np.testing.assert_array_equal(values[:, 11] > 0, signs[:, 1] > 0)
     base = np.arccos(np.einsum("nij,ij->ni", legs, desk.joints.base_axes) / length)
@@ -56,7 +56,7 @@ def test_signs_are_those_of_the_limits_themselves(desk):
 def test_what_cannot_be_exceeded_is_no_limit(desk):
     """A platform joint that may close or open wholly: a leg along the tool axis does not come near a limit."""
     free = dataclasses.replace(desk, joints=dataclasses.replace(desk.joints, platform_range=np.array([0.0, np.pi])))
-    foot, tip = np.array([*desk.pentapod.base[2], 0.0]), desk.work.centre
+    foot, tip = np.array([*desk.robot.base[2], 0.0]), desk.work.centre
     for way in (tip - foot, foot - tip):
         along = np.repeat(way[None] / np.linalg.norm(way), 50, axis=0) + np.random.default_rng(4).normal(
             0.0, 0.05, (50, 3)
@@ -73,8 +73,8 @@ def test_what_cannot_be_exceeded_is_no_limit(desk):
 def test_gaps_between_legs_match_a_numerical_search(desk):
     tips, axes = poses(desk, 12, seed=2)
     values = Margins.of(desk, PLUS)(tips, axes)[:, 27:]
-    a = np.c_[desk.pentapod.base, np.zeros(5)]
-    b = (tips + desk.tool_length * axes)[:, None] - desk.pentapod.offsets[:, None] * axes[:, None]
+    a = np.c_[desk.robot.base, np.zeros(5)]
+    b = (tips + desk.tool_length * axes)[:, None] - desk.robot.offsets[:, None] * axes[:, None]
     pairs = [(j, k) for j in range(5) for k in range(j + 1, 5)]
     for n in range(len(tips)):
         for column, (j, k) in enumerate(pairs):
@@ -107,7 +107,7 @@ def test_shortfalls_are_in_the_units_of_the_limit(desk):
     axis = np.array([0.0, 0.0, -1.0])
     tip = desk.work.centre + np.array([0.0, 0.0, 0.4])  # too deep: the legs are too short for it
     values = margins(tip, axis)
-    length = desk.pentapod.leg_lengths(tip + desk.tool_length * axis, -axis)
+    length = desk.robot.leg_lengths(tip + desk.tool_length * axis, -axis)
     k = int(np.argmax(length - desk.legs.max_length))
     row = by_name[f"leg {k + 1} too long"]
     excess_mm = (length[k] - desk.legs.max_length[k]) * 1e3
@@ -115,7 +115,7 @@ def test_shortfalls_are_in_the_units_of_the_limit(desk):
     assert margins.limits[row].shortfall(values[row]) == pytest.approx(excess_mm, rel=1e-9)
     tilted = np.array([np.sin(1.4), 0.0, -np.cos(1.4)])
     values = margins(desk.work.centre, tilted)
-    legs = desk.pentapod.leg_vectors(desk.work.centre + desk.tool_length * tilted, -tilted)
+    legs = desk.robot.leg_vectors(desk.work.centre + desk.tool_length * tilted, -tilted)
     for leg in range(5):
         row = by_name[f"base joint {leg + 1} beyond its cone"]
         if values[row] < 0:

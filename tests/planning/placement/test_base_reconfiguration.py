@@ -29,9 +29,7 @@ def sliding(desk):
     """The desk machine with its base joints on guides, some of them askew."""
     turns = np.radians([90.0, 90.0, 60.0, 90.0, 120.0])
     guides = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    return dataclasses.replace(
-        desk, guides=ReconfigurablePentapod(desk.pentapod, guides, np.tile((-0.06, 0.06), (5, 1)))
-    )
+    return dataclasses.replace(desk, guides=ReconfigurablePentapod(desk.robot, guides, np.tile((-0.06, 0.06), (5, 1))))
 
 
 @pytest.fixture(scope="module")
@@ -143,7 +141,7 @@ def test_slides_that_cannot_be_reached_are_not_taken(sliding, here):
     """F = 0 on the way from where the guides stand: no setting there."""
     wide = dataclasses.replace(
         sliding,
-        guides=ReconfigurablePentapod(sliding.pentapod, sliding.guides.guides, np.tile((-2.0, 2.0), (5, 1))),
+        guides=ReconfigurablePentapod(sliding.robot, sliding.guides.guides, np.tile((-2.0, 2.0), (5, 1))),
     )
     setting = setting_of(wide, here)
     forbidden = wide.guides.forbidden_slides(0, np.zeros(5))

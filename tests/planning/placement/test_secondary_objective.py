@@ -41,9 +41,9 @@ def by_hand(name: str, machine, setting, at) -> float:
         rng = np.random.default_rng(0)
         pushes = rng.normal(size=(2000, 3))
         pushes /= np.linalg.norm(pushes, axis=1, keepdims=True)
-        legs = np.einsum("nij,dj->ndi", leg_force_map(machine.pentapod, p, -axes, machine.tool_length), pushes)
+        legs = np.einsum("nij,dj->ndi", leg_force_map(machine.robot, p, -axes, machine.tool_length), pushes)
         return float(np.linalg.norm(legs, axis=-1).max())
-    legs = machine.pentapod.leg_lengths(p, -axes)
+    legs = machine.robot.leg_lengths(p, -axes)
     total = 0.0
     for k in range(len(tips) - 1):
         way = float(np.linalg.norm(tips[k + 1] - tips[k]))

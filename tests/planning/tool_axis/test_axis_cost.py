@@ -49,7 +49,7 @@ def legs_of(setting, at, desk, c):
     rows = course_of(setting).nodes
     axes = lean(setting.task.nominal, course_of(setting).leans(c))[rows]
     tips, turned = setting.task.machine_poses(at.transform, axes, rows)
-    return desk.pentapod.leg_lengths(tips + desk.tool_length * turned, -turned)
+    return desk.robot.leg_lengths(tips + desk.tool_length * turned, -turned)
 
 
 def test_strict_normals_are_not_charged(made):

@@ -168,7 +168,7 @@ def test_pentakins_leads_the_tool_along_the_toolpath(tmp_path):
     moving = np.flatnonzero(joints[:, 5] > 0)
     legs = joints[moving[0] :, :5] / MM
     machine = what.machine
-    p, i = machine.pentapod.pose(legs, what.program.component)
+    p, i = machine.robot.pose(legs, what.program.component)
     tips, axes = p + machine.tool_length * i, -i
     # As far as six decimals of halsampler go.
     assert np.abs(tips[-1] - what.toolpath.tips[-1]).max() < 5e-9

@@ -73,9 +73,9 @@ def test_legs_by_differences_of_the_rows(linear, found, claim, unit, measure, li
     [("base joint cones", 1), ("platform joints not too closed", -1), ("platform joints not too open", 1)],
 )
 def test_joints_by_angles_at_the_samples(linear, found, claim, sign):
-    position, direction = linear.machine.pentapod.pose(linear.program.legs, linear.program.component)
-    base = np.column_stack([linear.machine.pentapod.base, np.zeros(5)])
-    legs = position[:, None] + linear.machine.pentapod.offsets[:, None] * direction[:, None] - base
+    position, direction = linear.machine.robot.pose(linear.program.legs, linear.program.component)
+    base = np.column_stack([linear.machine.robot.base, np.zeros(5)])
+    legs = position[:, None] + linear.machine.robot.offsets[:, None] * direction[:, None] - base
     axes = linear.machine.joints.base_axes if "base" in claim else direction[:, None]
     cosine = (legs * axes).sum(axis=2) / np.linalg.norm(legs, axis=2) / np.linalg.norm(axes, axis=-1)
     value, row, leg = worst(sign * np.degrees(np.arccos(cosine)))
@@ -254,7 +254,7 @@ def test_component_findings_keep_the_first(linear):
     rows = np.stack([legs[:-1], legs[1:]], axis=-1)
     found = ComponentFindings()
     for first in (0, 20):
-        found.see(certify_component(linear.machine.pentapod, rows[first : first + 20], (1, 1)), first)
+        found.see(certify_component(linear.machine.robot, rows[first : first + 20], (1, 1)), first)
     assert found.refuted == 2
     assert found.undecided == 0
     assert found.first_refuted is not None

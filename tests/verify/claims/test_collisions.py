@@ -54,15 +54,15 @@ def failed(case, surroundings):
 def dense_gaps(case, shape, every=40, samples=200):
     """Smallest gaps (6,) of legs and spindle from a closed mesh, sampled; negative inside."""
     machine = case.machine
-    position, direction = machine.pentapod.pose(case.program.legs[::every], case.program.component)
-    joints = position[:, None] + machine.pentapod.offsets[:, None] * direction[:, None]
-    bases = np.c_[machine.pentapod.base, np.zeros(5)]
+    position, direction = machine.robot.pose(case.program.legs[::every], case.program.component)
+    joints = position[:, None] + machine.robot.offsets[:, None] * direction[:, None]
+    bases = np.c_[machine.robot.base, np.zeros(5)]
     t = np.linspace(0.0, 1.0, samples)[:, None]
     least = []
     for k in range(5):
         points = (bases[k] + t[:, :, None] * (joints[None, :, k] - bases[k])).reshape(-1, 3)
         least.append(-signed(shape, points).max() - machine.bodies.leg_radius)
-    top, nose = machine.pentapod.offsets.min(), machine.tool_length - machine.bodies.shaft_end
+    top, nose = machine.robot.offsets.min(), machine.tool_length - machine.bodies.shaft_end
     spindle = position[None] + (top + t[:, :, None] * (nose - top)) * direction[None]
     return np.array([*least, -signed(shape, spindle.reshape(-1, 3)).max() - machine.bodies.shaft_radius])
 
@@ -78,9 +78,9 @@ def signed(shape, points):
 
 def beside_leg(case, leg, share, away):
     """A point of the machine frame `away` metres across from leg `leg` at a share of its length, first row."""
-    position, direction = (x[0] for x in case.machine.pentapod.pose(case.program.legs[:1], case.program.component))
-    base = np.append(case.machine.pentapod.base[leg], 0.0)
-    joint = position + case.machine.pentapod.offsets[leg] * direction
+    position, direction = (x[0] for x in case.machine.robot.pose(case.program.legs[:1], case.program.component))
+    base = np.append(case.machine.robot.base[leg], 0.0)
+    joint = position + case.machine.robot.offsets[leg] * direction
     across = np.cross(joint - base, [0.0, 0.0, 1.0])
     return base + share * (joint - base) + away * across / np.linalg.norm(across)
 
@@ -185,7 +185,7 @@ def test_a_longer_holder_is_caught(cubic, holder, caught):
 
 def test_a_holder_up_to_the_joints_is_caught(cubic):
     machine = cubic.machine
-    lowest = machine.tool_length - machine.pentapod.offsets.max()
+    lowest = machine.tool_length - machine.robot.offsets.max()
     tall = Solid("holder", 0.03, lowest - 0.002, 0.06, 0.06)
     assert "legs clear of the tool body" in failed(cubic, Surroundings((), (tall,)))
 
@@ -193,10 +193,10 @@ def test_a_holder_up_to_the_joints_is_caught(cubic):
 def test_the_gap_of_legs_and_tool_is_proven_and_close(cubic):
     """Against distances between many points of leg and holder."""
     machine = cubic.machine
-    lowest = machine.tool_length - machine.pentapod.offsets.max()
+    lowest = machine.tool_length - machine.robot.offsets.max()
     holder = Solid("holder", 0.5 * lowest, lowest - 0.03, 0.02, 0.03)
     value = certificates(cubic, Surroundings((), (holder,)))["legs clear of the tool body"].value * 1e-3
-    position, direction = machine.pentapod.pose(cubic.program.legs[::100], cubic.program.component)
+    position, direction = machine.robot.pose(cubic.program.legs[::100], cubic.program.component)
     turn = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
     share = np.linspace(0.0, 1.0, 40)
     least = np.inf
@@ -208,7 +208,7 @@ def test_the_gap_of_legs_and_tool_is_proven_and_close(cubic):
         heights, radii = np.append(heights, np.full(40, holder.high)), np.append(radii, share * holder.high_radius)
         shell = p + (machine.tool_length - heights[:, None, None]) * i + radii[:, None, None] * around
         for k in range(5):
-            start, joint = np.append(machine.pentapod.base[k], 0.0), p + machine.pentapod.offsets[k] * i
+            start, joint = np.append(machine.robot.base[k], 0.0), p + machine.robot.offsets[k] * i
             along = (joint - start) / np.linalg.norm(joint - start)
             at = np.clip((shell - start) @ along, 0.0, np.linalg.norm(joint - start))
             least = min(least, np.linalg.norm(shell - start - at[..., None] * along, axis=-1).min())

@@ -24,7 +24,7 @@ def replay_of(upright=-0.5, away=-0.3, delta=0.0, **found):
         setattr(component, name, value)
     return SimpleNamespace(
         survey=SimpleNamespace(component=component),
-        machine=SimpleNamespace(pentapod=SimpleNamespace(delta=delta)),
+        machine=SimpleNamespace(robot=SimpleNamespace(delta=delta)),
         program=SimpleNamespace(component=Component.parse("+-"), period=PERIOD),
         path_tolerance=2e-5,
         place=lambda sample: sample,

@@ -59,8 +59,8 @@ def across(direction):
 @pytest.mark.parametrize("gap", [3e-3, 2e-2])
 def test_a_corner_beside_a_leg(still, pose, leg, gap):
     machine, (position, direction) = still.machine, pose
-    base = np.append(machine.pentapod.base[leg], 0.0)
-    joint = position + machine.pentapod.offsets[leg] * direction
+    base = np.append(machine.robot.base[leg], 0.0)
+    joint = position + machine.robot.offsets[leg] * direction
     out = across((joint - base) / np.linalg.norm(joint - base))
     at = base + 0.3 * (joint - base) + (machine.bodies.leg_radius + gap) * out
     found = judged(still, corner(at, out))["legs clear of the fixture"]
@@ -109,13 +109,13 @@ def test_what_is_far_is_told_as_far(still, pose):
 def test_legs_and_holder_of_a_machine_that_stands(still, pose):
     """Against a search for the nearest points of leg and holder."""
     machine, (position, direction) = still.machine, pose
-    high = machine.tool_length - machine.pentapod.offsets.max() - 0.02
+    high = machine.tool_length - machine.robot.offsets.max() - 0.02
     holder = Solid("holder", 0.5 * high, high, 0.02, 0.02)
     found = judged(still, tool=(holder,))["legs clear of the tool body"]
     side = np.linalg.svd(direction[None])[2][1:]
     gaps = []
     for k in range(5):
-        start, joint = np.append(machine.pentapod.base[k], 0.0), position + machine.pentapod.offsets[k] * direction
+        start, joint = np.append(machine.robot.base[k], 0.0), position + machine.robot.offsets[k] * direction
 
         def apart(x, start=start, joint=joint):
             height, radius, turn, share = x
@@ -135,7 +135,7 @@ def test_which_points_bodies_move_by(still):
     machine = still.machine
     cone = Solid("holder", 0.03, 0.07, 8e-3, 9e-3, rounding=1e-3)
     offsets = _offsets(machine, (SHANK, cone))
-    np.testing.assert_allclose(offsets[:5], machine.pentapod.offsets)
+    np.testing.assert_allclose(offsets[:5], machine.robot.offsets)
     ends = machine.tool_length - np.array([0.07, 0.006])
     np.testing.assert_allclose(np.sort(offsets[7:]), ends)
     np.testing.assert_allclose(offsets[5:7], _offsets(machine, ())[5:])
@@ -206,7 +206,7 @@ def test_stretches_are_seen_from_their_middle_by_all_their_legs(cubic, interpola
         if interpolation == "linear"
         else CubicSpline(np.arange(70), legs, bc_type="clamped").derivative()(np.arange(70)),
         pose=(np.arange(139.0)[:, None] * [1.0, 0.0, 0.0], np.arange(139.0)[:, None] * [0.0, 0.0, 1.0]),
-        machine=SimpleNamespace(pentapod="robot"),
+        machine=SimpleNamespace(robot="robot"),
     )
 
     def told(*given):

@@ -64,7 +64,7 @@ def moments(case, every=1, parts=2):
     n, t = b.shape[-1] - 1, np.arange(parts) / parts
     basis = np.array([[_choose(n, k) * x**k * (1 - x) ** (n - k) for k in range(n + 1)] for x in t])
     legs = np.einsum("nlk,tk->ntl", b, basis).reshape(-1, 5)
-    position, direction = machine.pentapod.pose(legs, program.component)
+    position, direction = machine.robot.pose(legs, program.component)
     home = program.placement.inverse()
     return home.apply(position + machine.tool_length * direction), home.rotate(-direction)
 

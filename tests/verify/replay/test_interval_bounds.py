@@ -49,8 +49,8 @@ def test_what_is_proven_of_chords_holds_at_dense_moments(turning):
     b = Interpolant.through(program.legs, program.period, program.interpolation).bernstein
     degree, t = b.shape[-1] - 1, np.linspace(0.0, 1.0, 41)
     basis = {1: [1 - t, t], 3: [(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3]}[degree]
-    position, direction = machine.pentapod.pose(np.einsum("nlk,kt->ntl", b, np.array(basis)), program.component)
-    offsets, tip = machine.pentapod.offsets, machine.tool_length
+    position, direction = machine.robot.pose(np.einsum("nlk,kt->ntl", b, np.array(basis)), program.component)
+    offsets, tip = machine.robot.offsets, machine.tool_length
 
     def halves(arm):
         """Points (118, 21, 3) at moments of each chord: of half a period."""
@@ -83,11 +83,11 @@ def test_poses_and_extremes_of_joints_are_those_of_the_samples(turning):
     """Rows and halfway between: the extremes are at their chords."""
     program, machine, found = turning
     motion = Interpolant.through(program.legs, program.period, program.interpolation)
-    position, direction = machine.pentapod.pose(motion.halves, program.component)
+    position, direction = machine.robot.pose(motion.halves, program.component)
     np.testing.assert_allclose(found.position, position, atol=1e-14)
     np.testing.assert_allclose(found.direction, direction, atol=1e-14)
-    base = np.column_stack([machine.pentapod.base, np.zeros(5)])
-    legs = position[:, None] + machine.pentapod.offsets[:, None] * direction[:, None] - base
+    base = np.column_stack([machine.robot.base, np.zeros(5)])
+    legs = position[:, None] + machine.robot.offsets[:, None] * direction[:, None] - base
     legs /= np.linalg.norm(legs, axis=2, keepdims=True)
     at_base = (legs * (machine.joints.base_axes / np.linalg.norm(machine.joints.base_axes, axis=1)[:, None])).sum(
         axis=2

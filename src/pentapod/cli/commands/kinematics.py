@@ -53,10 +53,10 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -
         raise InputError("the tool axis is zero", key="i, j, k", expected="a direction from the tip to the spindle")
     direction = -rows[:, 3:] / length
     position = rows[:, :3] * 1e-3 - machine.tool_length * direction
-    legs = machine.pentapod.leg_lengths(position, direction)
+    legs = machine.robot.leg_lengths(position, direction)
     limits = machine.legs
     within = ((legs >= limits.min_length) & (legs <= limits.max_length)).all(axis=1)
-    components = [_component(signs) for signs in machine.pentapod.component(position, direction)]
+    components = [_component(signs) for signs in machine.robot.branch(position, direction)]
     columns: dict[str, Any] = {name: legs[:, k] * 1e3 for k, name in enumerate(LEGS)}
     columns |= {"component": components, "within_strokes": within.tolist()}
     _print(columns, as_json=as_json, one=bool(pose), quiet=quiet)
@@ -83,15 +83,15 @@ def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_jso
     machine = _machine(machine_name)
     rows = _rows(legs, LEGS) * 1e-3
     chosen = list(COMPONENTS) if component is None else [Component.parse(component)]
-    position, direction = machine.pentapod.pose(rows[:, None, :], np.array(chosen))
+    position, direction = machine.robot.pose(rows[:, None, :], np.array(chosen))
     position, direction = position.reshape(-1, 3), direction.reshape(-1, 3)
     tips = (position + machine.tool_length * direction) * 1e3
     columns: dict[str, Any] = {"row": np.repeat(np.arange(len(rows)), len(chosen)).tolist()}
     columns["component"] = [str(c) for c in chosen] * len(rows)
     columns |= {name: tips[:, k] for k, name in enumerate(POSE[:3])}
     columns |= {name: -direction[:, k] for k, name in enumerate(POSE[3:])}
-    columns["singularity_mm"] = position_distance(machine.pentapod, position, direction) * 1e3
-    columns["singularity_deg"] = np.degrees(orientation_distance(machine.pentapod, position, direction))
+    columns["singularity_mm"] = position_distance(machine.robot, position, direction) * 1e3
+    columns["singularity_deg"] = np.degrees(orientation_distance(machine.robot, position, direction))
     _print(columns, as_json=as_json, one=bool(legs) and component is not None, quiet=quiet)
     return 0 if np.isfinite(tips).all() else 1
 

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pentapod.base.arrays import Floats, as_floats, set_frozen
 from pentapod.base.errors import ArrayError, MachineError
 from pentapod.base.values import Value
+from pentapod.kinematics.arithmetic import Arithmetic, Joints, Vector, dot
 from pentapod.kinematics.batches import as_poses
-from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.kinematics.families.as_built_forward import as_built_pose
+from pentapod.kinematics.families.general import GeneralPentapod
+from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.kinematics.five_legs import FiveLegs, length_scale
+from pentapod.kinematics.leibniz import cross_products, root, scalar_products
+from pentapod.kinematics.robot import Branch, SingularSurface
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,17 +29,21 @@ class AsBuiltPentapod(Value):
     base (5, 3): where the base joints are, off the plane z = 0 too. offsets (5,): z_k, the heights of the platform
     joints along the line. radii (5,), none negative: leg k ends on a circle of this radius that turns freely about the
     line at z_k (LinuxCNC's pentakins; 0 is a joint on the line itself). zeros (5,): what a leg's scale reads is its
-    length plus this.
+    length plus this. nominal: the machine that it was built to be; poses are named by its branches, and distances from
+    singularities are those of its.
 
         reading_k = √((i·(a_k − p) − z_k)² + (ρ_k − r_k)²) + zero_k,   ρ_k the distance of a_k from the line
 
-    Raises MachineError: wrong shapes, numbers that are not finite, negative radii.
+    Raises MachineError: wrong shapes, numbers that are not finite, negative radii; branches and poses asked of one that
+    knows no nominal machine.
     """
 
     base: Floats
     offsets: Floats
     radii: Floats
     zeros: Floats
+    nominal: LinearPentapod | GeneralPentapod | None = None
+    n_legs = 5
 
     @classmethod
     def of(
@@ -44,9 +56,10 @@ class AsBuiltPentapod(Value):
         zeros: ArrayLike = 0.0,
     ) -> AsBuiltPentapod:
         """Return a nominal machine with errors (metres) added: base_errors (5, 3), the others (5,), or one for all."""
-        base = np.c_[nominal.base, np.zeros(5)] + _given(base_errors, "base_errors", (5, 3))
+        base = nominal.base_joints + _given(base_errors, "base_errors", (5, 3))
         offsets = nominal.offsets + _given(offset_errors, "offset_errors", (5,))
-        return cls(base, offsets, _given(radii, "radii", (5,)), _given(zeros, "zeros", (5,)))
+        known = nominal if isinstance(nominal, LinearPentapod | GeneralPentapod) else None
+        return cls(base, offsets, _given(radii, "radii", (5,)), _given(zeros, "zeros", (5,)), known)
 
     def __post_init__(self) -> None:
         for name, shape in (("base", (5, 3)), ("offsets", (5,)), ("radii", (5,)), ("zeros", (5,))):
@@ -56,7 +69,7 @@ class AsBuiltPentapod(Value):
             array = _given(value, name, shape).copy()
             array.flags.writeable = False
             set_frozen(self, **{name: array})
-        if not self.size > 0.0:
+        if not np.ptp(self.base, axis=0).any():
             raise MachineError("all base joints are in one place", key="base")
         if (self.radii < 0.0).any():
             leg = int(np.argmin(self.radii))
@@ -68,14 +81,60 @@ class AsBuiltPentapod(Value):
             )
 
     @property
-    def size(self) -> float:
-        """The largest distance of a base joint from their centre, metres."""
-        return float(np.linalg.norm(self.base - self.base.mean(axis=0), axis=1).max())
+    def base_joints(self) -> Floats:
+        """The base joints (5, 3)."""
+        return self.base
+
+    @property
+    def line_heights(self) -> Floats:
+        """The offsets (5,)."""
+        return self.offsets
 
     @property
     def scale(self) -> float:
-        """The power of two nearest to `size`: metres that count as much as a radian."""
-        return float(2.0 ** np.round(np.log2(self.size)))
+        """The power of two nearest to the largest distance of a base joint from their centre: metres per radian."""
+        return length_scale(self.base)
+
+    @property
+    def branches(self) -> tuple[Branch, ...]:
+        """Those of the nominal machine."""
+        return self._nominal.branches
+
+    @property
+    def singularities(self) -> tuple[SingularSurface, ...]:
+        """Those of the nominal machine."""
+        return self._nominal.singularities
+
+    @property
+    def conditioning(self) -> float:
+        """That of the nominal machine."""
+        return self._nominal.conditioning
+
+    @property
+    def numbers(self) -> Mapping[str, object]:
+        """All numbers of this machine, and those of the nominal one."""
+        own = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "nominal"}
+        return {"family": "as built", **own, **{f"nominal {k}": v for k, v in self._nominal.numbers.items()}}
+
+    def branch(self, position: ArrayLike, direction: ArrayLike) -> NDArray[np.int8]:
+        """Return the signs (..., 2) of the nominal machine's branch in the same poses (..., 3)."""
+        return self._nominal.branch(position, direction)
+
+    def pose(self, legs: ArrayLike, branch: ArrayLike) -> tuple[Floats, Floats]:
+        """Return the proven poses (..., 3) of leg readings (..., 5) in a branch: `as_built_pose`. NaN without proof."""
+        found = as_built_pose(self, self._nominal, legs, branch)
+        known = found.proven[..., None]
+        return np.where(known, found.position, np.nan), np.where(known, found.direction, np.nan)
+
+    @property
+    def _nominal(self) -> LinearPentapod | GeneralPentapod:
+        if self.nominal is None:
+            raise MachineError(
+                "a machine as built has poses only beside its nominal geometry",
+                key="nominal",
+                remedy="AsBuiltPentapod.of(nominal, ...)",
+            )
+        return self.nominal
 
     def leg_lengths(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return the readings of the legs (..., 5), metres, of positions p and unit directions i (..., 3)."""
@@ -83,7 +142,56 @@ class AsBuiltPentapod(Value):
         t, _, normal = self._in_tool_frame(p, i)
         return np.hypot(t - self.offsets, np.linalg.norm(normal, axis=-1) - self.radii) + self.zeros
 
-    def leg_jacobian(self, position: ArrayLike, direction: ArrayLike) -> Floats:
+    def leg_vectors(self, position: ArrayLike, direction: ArrayLike) -> Floats:
+        """Return the vectors (..., 5, 3) from the base joints to the nearest points of the rings, metres."""
+        p, i = as_poses(position, direction)
+        t, ratio, normal = self._in_tool_frame(p, i)
+        return (self.offsets - t)[..., None] * i[..., None, :] - (1.0 - ratio)[..., None] * normal
+
+    def leg_derivatives(self, tips: Sequence[tuple[Floats, Floats]], tool_length: float) -> list[Floats]:
+        """Return readings (n, 5) and their derivatives along a curve, of as many orders as are given.
+
+        tips: at [k] the derivatives of order k ≤ 3 of the tip and of the tool axis (tip → spindle), (n, 3) each.
+        """
+        lever = (tool_length - self.offsets)[:, None]
+        axes = [np.broadcast_to(axis[:, None, :], (len(axis), 5, 3)) for _, axis in tips]
+        e = [tip[:, None, :] + lever * axis for (tip, _), axis in zip(tips, axes, strict=True)]
+        e[0] -= self.base
+        squares = scalar_products(e, e)
+        ringed = np.flatnonzero(self.radii)
+        if ringed.size:
+            normal = cross_products([x[:, ringed] for x in e], [x[:, ringed] for x in axes])
+            radii, rho = self.radii[ringed], root(scalar_products(normal, normal))
+            for square, by in zip(squares, rho, strict=True):
+                square[:, ringed] -= 2.0 * radii * by
+            squares[0][:, ringed] += radii**2
+        lengths = root(squares)
+        lengths[0] += self.zeros
+        return lengths
+
+    def vectors_of(self, p: Vector, i: Vector, do: Arithmetic, joints: Joints | None = None) -> list[Vector]:
+        """Return `leg_vectors`, one for each leg, by a formula for numbers and symbols alike; joints: as moved."""
+        base, offsets = (self.base.tolist(), self.offsets.tolist()) if joints is None else joints
+        vectors: list[Vector] = []
+        for a, z, radius in zip(base, offsets, self.radii.tolist(), strict=True):
+            d = [p[k] - a[k] for k in range(3)]
+            if radius:
+                along = dot(d, i)
+                across = [d[k] - along * i[k] for k in range(3)]
+                share = radius / do.sqrt(dot(across, across))
+                d = [d[k] - share * across[k] for k in range(3)]
+            vectors.append([d[k] + z * i[k] for k in range(3)])
+        return vectors
+
+    def lengths_of(self, vectors: Sequence[Vector], do: Arithmetic) -> list[Any]:
+        """Return the readings of legs along vectors: their lengths and zeros."""
+        return [do.sqrt(dot(d, d)) + zero for d, zero in zip(vectors, self.zeros.tolist(), strict=True)]
+
+    def singularity_margins(self, p: Vector, i: Vector, branch: Branch, do: Arithmetic) -> list[Any]:
+        """Return those of the nominal machine in the same pose; the proofs are of the machine as built."""
+        return self._nominal.singularity_margins(p, i, branch, do)
+
+    def jacobian(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return ∂readings/∂(p, i) (..., 5, 6) at poses (..., 3): m/m, then metres per change of i.
 
         i counts as a free vector of R³; a change of a unit direction is perpendicular to it, and for such a change the

@@ -18,14 +18,16 @@ from pentapod.base.arrays import Bools, Floats, Ints, as_batch
 from pentapod.base.errors import ArrayError
 from pentapod.base.values import Value
 from pentapod.kinematics.batches import broadcast
-from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.tubes.continuation import Pose, carry
-from pentapod.kinematics.tubes.leg_equations import Legs
+from pentapod.kinematics.tubes.jacobian_sign import determinant_sign
+from pentapod.kinematics.tubes.leg_equations import BuiltLegs, Legs
 from pentapod.kinematics.tubes.tube import LegFamily, Tube
 from pentapod.numerics.balls import Ball
 from pentapod.numerics.blocks import blocks
 
+_SIDE = 1  # of det ∂G/∂(p, i) where a general pentapod's order is +1
 _SHORTEST = 2.0**-16  # of the way from the nominal geometry: where shorter steps are needed, there is no proof
 
 
@@ -51,13 +53,14 @@ class ProvenPoses(Value):
 
 
 def as_built_pose(
-    machine: AsBuiltPentapod, nominal: LinearPentapod, legs: ArrayLike, component: ArrayLike
+    machine: BuiltLegs, nominal: LinearPentapod | GeneralPentapod, legs: ArrayLike, component: ArrayLike
 ) -> ProvenPoses:
-    """Return the poses of leg readings (..., 5), metres, that belong to a component of the nominal machine.
+    """Return the poses of leg readings (..., 5), metres, that belong to a branch of the nominal machine.
 
-    component: as for `LinearPentapod.pose`, a `Component` or signs (..., 2). A pose that comes without proof may be
-    right (near a singularity nothing can tell) or belong to another assembly mode: do not move on it. The proof holds
-    for the machines whose numbers are exactly the given ones, the nominal offsets being z_3 + δ (x_i − x_3).
+    component: as for the nominal `pose`, a `Component` or a `Mode`, or signs (..., 2). A pose that comes without proof
+    may be right (near a singularity nothing can tell) or belong to another assembly mode: do not move on it. The proof
+    holds for the machines whose numbers are exactly the given ones, nominal offsets of the quadratic family being
+    z_3 + δ (x_i − x_3).
     Raises ArrayError for a wrong shape, legs that are infinite or not positive, wrong signs.
     """
     readings, signs = as_batch(legs, "legs", (5,)), as_batch(component, "component", (2,))
@@ -89,15 +92,16 @@ def as_built_pose(
 class _Way:
     """The straight way from a nominal geometry to one as built, for leg readings (5, N)."""
 
-    def __init__(self, machine: AsBuiltPentapod, nominal: LinearPentapod, readings: Floats) -> None:
+    def __init__(self, machine: BuiltLegs, nominal: LinearPentapod | GeneralPentapod, readings: Floats) -> None:
         self.nominal, self.readings = nominal, readings
         self.scale = machine.scale
         self.rings = (machine.radii != 0.0)[:, None]
-        x = nominal.base[:, 0]
-        flat = np.concatenate([nominal.base.T, np.zeros((1, 5))])[..., None]
-        family_offsets = (Ball.exact(x) - x[2]) * nominal.delta + nominal.offsets[2]
-        self.start = (Ball.exact(flat), family_offsets[:, None], Ball.exact(np.zeros((5, 1))))
-        end = (machine.base.T[..., None], machine.offsets[:, None], machine.radii[:, None])
+        offsets = Ball.exact(nominal.offsets)
+        if isinstance(nominal, LinearPentapod):
+            x = nominal.base[:, 0]
+            offsets = (Ball.exact(x) - x[2]) * nominal.delta + nominal.offsets[2]
+        self.start = (Ball.exact(nominal.base_joints.T[..., None]), offsets[:, None], Ball.exact(np.zeros((5, 1))))
+        end = (machine.base_joints.T[..., None], machine.line_heights[:, None], machine.radii[:, None])
         self.end = tuple(Ball.exact(array) for array in end)
         self.shift = tuple(b - a for a, b in zip(self.start, self.end, strict=True))
         self.zeros = machine.zeros[:, None]
@@ -125,12 +129,19 @@ class _Way:
         return LegFamily(middle, hull, slope, np.zeros((5, 1)))
 
     def in_component(self, nominal_pose: Pose, tube: Tube) -> Bools:
-        """Return where w and S keep their signs (N,) within the tube's ball around the nominal pose."""
+        """Return where the exact nominal pose is of the branch (N,): all that is in the tube's ball is.
+
+        w and S keep their signs there; of a general pentapod w and the Jacobian's determinant, whose sign is the order.
+        """
         (x, _, z), (u, _, w) = (
             Ball(centre, np.broadcast_to(tube.radius * size * (1.0 + 2.0**-48), centre.shape))
             for centre, size in zip(nominal_pose, (self.scale, 1.0), strict=True)
         )
+        same_image = np.abs(w.mid) > w.rad
+        if isinstance(self.nominal, GeneralPentapod):
+            computed = np.sign(self.nominal.order_value(nominal_pose[0].T, nominal_pose[1].T))
+            return same_image & (determinant_sign(tube.inverse) == _SIDE * computed)
         delta, x3 = self.nominal.delta, float(self.nominal.base[2, 0])
         lever = Ball.exact(self.nominal.offsets[2]) - Ball.exact(delta) * x3
         s = w * x * delta + (1.0 - delta * u) * z + lever * w
-        return (np.abs(w.mid) > w.rad) & (np.abs(s.mid) > s.rad)
+        return same_image & (np.abs(s.mid) > s.rad)

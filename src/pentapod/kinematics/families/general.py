@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pentapod.base.arrays import Bools, Floats, as_batch, frozen, set_frozen
 from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
+from pentapod.kinematics.arithmetic import Arithmetic, Vector
 from pentapod.kinematics.batches import as_poses, broadcast, joined_poses
 from pentapod.kinematics.five_legs import FiveLegs, given
 from pentapod.kinematics.forward.line_equations import LineEquations, line_condition
@@ -17,7 +20,8 @@ from pentapod.kinematics.forward.line_roots import interior, root
 from pentapod.kinematics.forward.newton_refinement import polish
 from pentapod.kinematics.forward.singularity_polynomial import polynomial_terms
 from pentapod.kinematics.forward.solution_line import SolutionLine
-from pentapod.kinematics.mode import MODES, as_labels
+from pentapod.kinematics.mode import MODES, Mode, as_labels
+from pentapod.kinematics.robot import Branch, SingularSurface
 from pentapod.numerics.blocks import blocks
 
 _LEAST_STEP = 2.0**-40  # of the solution line's size; a double root is uncertain by about 2⁻²⁶ of it
@@ -42,6 +46,8 @@ class GeneralPentapod(Value, FiveLegs):
     base: Floats
     offsets: Floats
     equations: LineEquations = field(init=False, repr=False)
+    branches = MODES
+    singularities = (SingularSurface("mirror plane w = 0", "deg"), SingularSurface("singular surface", "mm"))
 
     def __post_init__(self) -> None:
         base, offsets = given(self.base, "base", (5, 2)), given(self.offsets, "offsets", (5,))
@@ -90,13 +96,42 @@ class GeneralPentapod(Value, FiveLegs):
         direction = np.where(mirrored, other_direction, direction)
         return position.reshape(*batch, 3), direction.reshape(*batch, 3)
 
-    def mode(self, position: ArrayLike, direction: ArrayLike) -> NDArray[np.int8]:
+    def branch(self, position: ArrayLike, direction: ArrayLike) -> NDArray[np.int8]:
         """Return the labels (..., 2) of the mode of each pose (..., 3): order and image; 0 where singular or NaN."""
         p, i = joined_poses(position, direction)
         pz, w = p[..., 2] + self.offsets[2] * i[..., 2], i[..., 2]
         labels = np.stack([self.order_value(p, i), np.where(w == 0.0, pz, w)], axis=-1)
         known = np.isfinite(p.sum(axis=-1) + i.sum(axis=-1))
         return np.where(known[..., None], np.sign(labels), 0.0).astype(np.int8)
+
+    @property
+    def conditioning(self) -> float:
+        """The reciprocal condition number of the four linear equations: 0 is singular in every pose."""
+        return line_condition(self.base, self.offsets)
+
+    @property
+    def numbers(self) -> Mapping[str, object]:
+        """base, offsets and the family's name."""
+        return {"family": "general", "base": self.base, "offsets": self.offsets}
+
+    def singularity_margins(self, p: Vector, i: Vector, branch: Branch, do: Arithmetic) -> list[Any]:
+        """Return w by the sign of the image, and a lower bound of the distance to the singular surface by the order's.
+
+        w = 0 is not singular, but the two images of a pose change their names there. At one orientation the polynomial
+        (2) is quadratic in p, with gradient g and Hessian H: within 2 |P| / (|g| + √(|g|² + 2 ‖H‖ |P|)) it has no zero.
+        """
+        mode, (x3, y3), z3 = Mode(*branch), self.base[2].tolist(), float(self.offsets[2])
+        n, nx, ny, nu, nv = (self.equations.null_vector * (1.0, -1.0, -1.0, -1.0, -1.0)).tolist()
+        (u, v, w), pz = i, p[2] + z3 * i[2]
+        ax, ay = pz * u - (p[0] + z3 * u - x3) * w, pz * v - (p[1] + z3 * v - y3) * w
+        value = w * (n * pz + nx * ax + ny * ay) - pz * (nu * ax + nv * ay)
+        by_x, by_y, along = w * (nu * pz - nx * w), w * (nv * pz - ny * w), nu * u + nv * v
+        by_z = w * (n + nx * u + ny * v) - (nu * ax + nv * ay) - pz * along
+        bent = do.sqrt(2.0 * (nu * nu + nv * nv) * w * w + 4.0 * along * along + 1e-60)
+        squared = by_x * by_x + by_y * by_y + by_z * by_z + 1e-60
+        size = do.most(value, -value)
+        distance = 2.0 * value / (do.sqrt(squared) + do.sqrt(squared + 2.0 * bent * size))
+        return [mode.image * w, mode.order * distance]
 
     def order_value(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return the polynomial (2) (...) of poses (..., 3), m², its cofactors scaled to the length of the null vector.

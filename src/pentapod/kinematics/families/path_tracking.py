@@ -45,7 +45,7 @@ def follow(pentapod: GeneralPentapod, legs: ArrayLike, position: ArrayLike, dire
     error = float(np.abs(pentapod.leg_lengths(p, i) - rows[0]).max())
     if not error <= 1e-6 * float(rows[0].max()):
         raise ArrayError("the pose does not have the legs of the first row", value=error, expected="no difference")
-    order = int(pentapod.mode(p, i)[0])
+    order = int(pentapod.branch(p, i)[0])
     rows, given_row = _refined(pentapod, rows, order)
     q, j = pentapod.pose(rows, (order, 1))
     angles = _angles(pentapod, rows, q, j)

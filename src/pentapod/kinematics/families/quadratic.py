@@ -1,8 +1,10 @@
-"""LinearPentapod: the robot's pure geometry and its kinematics. No limits, no bodies."""
+"""LinearPentapod: the quadratic family's geometry and its kinematics. No limits, no bodies."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from pentapod.base.arrays import Floats, Ints, as_batch, frozen, set_frozen
 from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
+from pentapod.kinematics.arithmetic import Arithmetic, Vector
 from pentapod.kinematics.batches import as_poses, broadcast
-from pentapod.kinematics.component import COMPONENTS
+from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.families.offsets import check_offsets, fit_delta
 from pentapod.kinematics.five_legs import SAVED_BY_KERNELS, FiveLegs, given, outputs
 from pentapod.kinematics.forward.quadratic import (
@@ -24,6 +27,7 @@ from pentapod.kinematics.forward.quadratic import (
 )
 from pentapod.kinematics.forward.quadratic_near import solve_near
 from pentapod.kinematics.mode import as_labels
+from pentapod.kinematics.robot import Branch, SingularSurface
 from pentapod.numerics.blocks import blocks
 from pentapod.numerics.kernels import kernels_pay
 
@@ -47,6 +51,11 @@ class LinearPentapod(Value, FiveLegs):
     offsets: Floats
     delta: float
     linear_part: LinearPart = field(init=False, repr=False)
+    branches = COMPONENTS
+    singularities = (
+        SingularSurface("singular surface w = 0", "deg"),
+        SingularSurface("singular surface S = 0", "mm"),
+    )
 
     @classmethod
     def quadratic(cls, base: ArrayLike, delta: float) -> LinearPentapod:
@@ -122,7 +131,32 @@ class LinearPentapod(Value, FiveLegs):
         self._solve(lengths.reshape(-1, 5), signs.reshape(-1, 2), position, direction)
         return position.reshape(*batch, 3), direction.reshape(*batch, 3)
 
-    def component(self, position: ArrayLike, direction: ArrayLike) -> NDArray[np.int8]:
+    @property
+    def conditioning(self) -> float:
+        """The reciprocal condition number of the 4×4 matrix [x, y, δx², δxy], joints relative to leg 3's, in its size.
+
+        0 is singular in every pose, above 0.01 is sound; the same for a machine of any size.
+        """
+        return reciprocal_condition(self.base, self.delta)
+
+    @property
+    def numbers(self) -> Mapping[str, object]:
+        """base, offsets and delta."""
+        return {"base": self.base, "offsets": self.offsets, "delta": self.delta}
+
+    def singularity_margins(self, p: Vector, i: Vector, branch: Branch, do: Arithmetic) -> list[Any]:
+        """Return w, and the distance to S = 0 at this orientation (`position_distance`), by the signs of the branch.
+
+        S is taken in the reduced frame of leg 3, in which the formula of the notes holds.
+        """
+        component = Component(*branch)
+        u, w, (x3, _), z3 = i[0], i[2], self.base[2].tolist(), float(self.offsets[2])
+        px, pz = p[0] + z3 * u - x3, p[2] + z3 * w
+        s = self.delta * w * px - (self.delta * u - 1.0) * pz
+        across, along = self.delta * w, 1.0 - self.delta * u
+        return [component.w * w, component.s * (s / do.sqrt(across * across + along * along))]
+
+    def branch(self, position: ArrayLike, direction: ArrayLike) -> NDArray[np.int8]:
         """Return the signs (..., 2) of w and S: the component of each pose; 0 on a singularity and for NaN.
 
         position and direction (..., 3), machine frame. Compare with a `Component`, or hand it to `pose`.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Floats, as_batch
 from pentapod.kinematics.batches import as_poses
 from pentapod.kinematics.families.quadratic import LinearPentapod
-from pentapod.kinematics.forward.quadratic import reciprocal_condition, w_and_s
+from pentapod.kinematics.forward.quadratic import w_and_s
 
 
 def singularity_values(pentapod: LinearPentapod, position: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:
@@ -80,9 +80,5 @@ def orientation_distance(
 
 
 def architectural_measure(pentapod: LinearPentapod) -> float:
-    """Return how far the geometry is from being singular in every pose: 0 is singular, above 0.01 is sound.
-
-    It is the reciprocal 2-norm condition number of the 4×4 matrix [x, y, δx², δxy] with the base attachments
-    relative to leg 3's, in units of the largest distance from it: the same for a machine of any size.
-    """
-    return reciprocal_condition(pentapod.base, pentapod.delta)
+    """Return how far the geometry is from being singular in every pose: `LinearPentapod.conditioning`."""
+    return pentapod.conditioning

@@ -11,12 +11,11 @@ from pentapod.base.arrays import Floats, as_batch, frozen, set_frozen
 from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_poses, broadcast, common_batch
-from pentapod.kinematics.component import COMPONENTS
 from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.five_legs import given
 from pentapod.kinematics.forward.turning import dihedral, frame_of, twist
-from pentapod.kinematics.mode import MODES, as_labels
+from pentapod.kinematics.mode import as_labels
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +54,7 @@ class SixLegPlatform(Value):
     @property
     def labels(self) -> NDArray[np.int8]:
         """The labels (8, 3) of the modes, in the order in which `assembly_modes` returns them."""
-        line = COMPONENTS if isinstance(self.pentapod, LinearPentapod) else MODES
-        return np.array([(*label, turn) for label in line for turn in (1, -1)], dtype=np.int8)
+        return np.array([(*label, turn) for label in self.pentapod.branches for turn in (1, -1)], dtype=np.int8)
 
     def leg_vectors(self, position: ArrayLike, rotation: ArrayLike) -> Floats:
         """Return b_k − a_k (..., 6, 3), metres, of positions (..., 3) and rotations (..., 3, 3)."""
@@ -93,10 +91,8 @@ class SixLegPlatform(Value):
     def label(self, position: ArrayLike, rotation: ArrayLike) -> NDArray[np.int8]:
         """Return the signs (..., 3) of each pose's mode: the line's two and the twist's; 0 where singular or NaN."""
         p, r = _pose(position, rotation)
-        robot = self.pentapod
-        line = robot.component if isinstance(robot, LinearPentapod) else robot.mode
         turn = np.nan_to_num(np.sign(self.twist(p, r)))[..., None]
-        return np.concatenate([line(p, r[..., 2]), turn.astype(np.int8)], axis=-1)
+        return np.concatenate([self.pentapod.branch(p, r[..., 2]), turn.astype(np.int8)], axis=-1)
 
     def pose(self, legs: ArrayLike, label: ArrayLike) -> tuple[Floats, Floats]:
         """Return positions (..., 3) and rotations (..., 3, 3) in a mode: three signs (..., 3).

@@ -20,11 +20,10 @@ from pentapod.base.arrays import Bools, Floats, Ints, as_batch, as_floats
 from pentapod.base.errors import ArrayError
 from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_motion
-from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.proofs.answers import Answers
 from pentapod.kinematics.tubes.continuation import carry
 from pentapod.kinematics.tubes.jacobian_sign import proven_sides
-from pentapod.kinematics.tubes.leg_equations import Legs, mids
+from pentapod.kinematics.tubes.leg_equations import BuiltLegs, Legs, mids
 from pentapod.kinematics.tubes.newton import newton
 from pentapod.kinematics.tubes.tube import LegFamily
 from pentapod.numerics.ball_bernstein import blossom, hull, restricted, stack
@@ -67,7 +66,7 @@ class MotionProof(Value, Answers):
 
 
 def certify_motion(
-    machine: AsBuiltPentapod,
+    machine: BuiltLegs,
     leg_coefficients: ArrayLike,
     position: ArrayLike,
     direction: ArrayLike,
@@ -126,9 +125,9 @@ def certify_motion(
 class _Motion:
     """The legs of a machine on intervals, from Bernstein coefficients (5, k + 1, N) of their readings."""
 
-    def __init__(self, machine: AsBuiltPentapod, coefficients: Floats, leg_error: float) -> None:
-        self.base = Ball.exact(machine.base.T[..., None])
-        self.offsets, self.radii = Ball.exact(machine.offsets[:, None]), Ball.exact(machine.radii[:, None])
+    def __init__(self, machine: BuiltLegs, coefficients: Floats, leg_error: float) -> None:
+        self.base = Ball.exact(machine.base_joints.T[..., None])
+        self.offsets, self.radii = Ball.exact(machine.line_heights[:, None]), Ball.exact(machine.radii[:, None])
         self.rings = (machine.radii != 0.0)[:, None]
         readings = np.moveaxis(coefficients, 1, 0)  # (k + 1, 5, N)
         self.coefficients = Ball.exact(readings) - machine.zeros[:, None]
@@ -155,7 +154,7 @@ class _Motion:
         return LegFamily(middle, self.legs(hull(c)), slope, self.slack)
 
 
-def _check(machine: AsBuiltPentapod, c: Floats, p: Floats, i: Floats, leg_error: float, depth: int) -> None:
+def _check(machine: BuiltLegs, c: Floats, p: Floats, i: Floats, leg_error: float, depth: int) -> None:
     for name, array in (("position", p), ("direction", i)):
         if array.shape != (len(c) + 1, 3):
             expected = f"shape ({len(c) + 1}, 3): the poses at the ends of {len(c)} intervals"

@@ -14,7 +14,7 @@ components on the first axis, legs are on the second, the batch is last: (3, 5, 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Generic, TypeVar, cast
+from typing import Generic, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -24,6 +24,35 @@ from pentapod.numerics.balls import Ball
 Q = TypeVar("Q", Floats, Ball)
 
 _NEXT, _AFTER = [1, 2, 0], [2, 0, 1]
+
+
+class BuiltLegs(Protocol):
+    """A robot whose legs satisfy the equations; all in metres."""
+
+    @property
+    def base_joints(self) -> Floats:
+        """The joints on the base (5, 3)."""
+        ...
+
+    @property
+    def line_heights(self) -> Floats:
+        """The heights of the platform joints along the line (5,)."""
+        ...
+
+    @property
+    def radii(self) -> Floats:
+        """The radii of the rings on which legs end (5,)."""
+        ...
+
+    @property
+    def zeros(self) -> Floats:
+        """What the readings are more than the lengths (5,)."""
+        ...
+
+    @property
+    def scale(self) -> float:
+        """Metres that count as much as a radian."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

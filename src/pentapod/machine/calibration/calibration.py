@@ -6,7 +6,7 @@ point p on the line as equal changes of all offsets. What the measured poses can
 value, and is named.
 
 The fit is generalised least squares: errors of a measured pose enter all five readings, so they are weighed by the
-readings' 5 × 5 covariance Σ = σ_l² 1 + σ_p² J_p J_pᵀ + σ_i² J_i J_iᵀ at each pose, J = `leg_jacobian` of the nominal
+readings' 5 × 5 covariance Σ = σ_l² 1 + σ_p² J_p J_pᵀ + σ_i² J_i J_iᵀ at each pose, J = `jacobian` of the nominal
 machine with J_i restricted to changes of a unit direction. Where σ_l is not given, `leg_noise` estimates it.
 """
 
@@ -196,13 +196,13 @@ class _Fit:
         rho = np.linalg.norm(d - t[..., None] * self.i[:, None], axis=-1)
         along, across = t - machine.offsets, rho - machine.radii
         length = np.hypot(along, across)
-        by_base = -machine.leg_jacobian(self.p, self.i)[..., :3]
+        by_base = -machine.jacobian(self.p, self.i)[..., :3]
         rest = np.stack([-along / length, -across / length, np.ones_like(length)], axis=-1)
         return np.concatenate([by_base, rest], axis=-1)
 
     def _pose_covariances(self) -> Floats:
         """Return the covariance (N, 5, 5) of readings that the errors of the measured poses alone would give."""
-        jacobian = self.start.leg_jacobian(self.p, self.i)
+        jacobian = self.start.jacobian(self.p, self.i)
         by_p, by_i = jacobian[..., :3], jacobian[..., 3:]
         by_i = by_i - np.einsum("nkc,nc->nk", by_i, self.i)[..., None] * self.i[:, None]
         s_p, s_i = self.pose_sigmas

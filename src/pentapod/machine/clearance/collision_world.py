@@ -61,7 +61,7 @@ class Surroundings(Value):
         be in the part and still count as clear. Raises MachineError where the tool is too long for the machine.
         """
         body = mounted(tool.solids, machine)
-        room = machine.tool_length - float(machine.pentapod.offsets.max())
+        room = machine.tool_length - float(machine.robot.offsets.max())
         if body and max(solid.high for solid in body) > room:
             raise MachineError(
                 "the tool stands above the lowest platform joint",
@@ -105,7 +105,7 @@ class MovingBodies:
         cls, machine: Machine, position: Floats, direction: Floats, frame: RigidTransform | None = None
     ) -> MovingBodies:
         """Return the bodies at poses (N, 3) of the machine; frame: that of the obstacle → machine, if another."""
-        robot, top, nose = machine.pentapod, *spindle_ends(machine)
+        robot, top, nose = machine.robot, *spindle_ends(machine)
         count = len(position)
         bases = np.broadcast_to(np.column_stack([robot.base, np.zeros(LEGS)]), (count, LEGS, 3))
         joints = position[:, None] + robot.offsets[:, None] * direction[:, None]
@@ -138,7 +138,7 @@ class MovingBodies:
 
 def spindle_ends(machine: Machine) -> tuple[float, float]:
     """Return the offsets along the platform line of the spindle's top and of its nose, metres."""
-    return float(machine.pentapod.offsets.min()), machine.tool_length - machine.bodies.shaft_end
+    return float(machine.robot.offsets.min()), machine.tool_length - machine.bodies.shaft_end
 
 
 def mounted(solids: Sequence[Solid], machine: Machine) -> tuple[Solid, ...]:

@@ -16,7 +16,7 @@ _PAIRS = np.array(list(combinations(range(5), 2)))
 
 def pair_names(machine: Machine) -> tuple[str, ...]:
     """Return the names of the 15 pairs, in the order of `clearances`: "legs 1-2" ... "leg 5-shaft"."""
-    count = len(machine.pentapod.base)
+    count = len(machine.robot.base)
     legs = tuple(f"legs {a + 1}-{b + 1}" for a, b in combinations(range(count), 2))
     return legs + tuple(f"leg {k + 1}-shaft" for k in range(count))
 
@@ -29,7 +29,7 @@ def clearances(machine: Machine, position: ArrayLike, direction: ArrayLike) -> F
     shaft. Between capsules whose axes cross the depth is not measured further: −(sum of the radii) is least.
     """
     p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
-    robot, bodies = machine.pentapod, machine.bodies
+    robot, bodies = machine.robot, machine.bodies
     vectors = robot.leg_vectors(p, i)
     base = np.zeros((5, 3))
     base[:, :2] = robot.base

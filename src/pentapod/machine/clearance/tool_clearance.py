@@ -12,7 +12,6 @@ arithmetic only: they serve NumPy arrays and casadi symbols alike.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
@@ -20,22 +19,10 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.geometry.solids import Solid
+from pentapod.kinematics.arithmetic import NUMPY, Arithmetic
 from pentapod.machine.machine import Machine
 
 _TINY = 1e-18
-
-
-@dataclass(frozen=True)
-class Arithmetic:
-    """The functions that differ between NumPy and casadi: square root, smaller and larger of two, choice."""
-
-    sqrt: Any
-    least: Any
-    most: Any
-    where: Any
-
-
-NUMPY = Arithmetic(np.sqrt, np.minimum, np.maximum, np.where)
 
 
 def leg_spindle_gap(machine: Machine, leg: int, cosine: Any, do: Arithmetic) -> Any:
@@ -43,10 +30,10 @@ def leg_spindle_gap(machine: Machine, leg: int, cosine: Any, do: Arithmetic) -> 
 
     The leg counts from `joint_radius` on. Its distance from the line grows along it, so its nearest point is there.
     """
-    bodies, robot = machine.bodies, machine.pentapod
+    bodies, robot = machine.bodies, machine.robot
     sine = _sine(cosine, do)
-    height = machine.tool_length - float(robot.offsets[leg]) + bodies.joint_radius * cosine
-    top = machine.tool_length - float(robot.offsets.min())
+    height = machine.tool_length - float(robot.line_heights[leg]) + bodies.joint_radius * cosine
+    top = machine.tool_length - float(robot.line_heights.min())
     beyond = do.most(do.most(height - top, bodies.shaft_end - height), 0.0)
     aside = bodies.joint_radius * sine
     return do.sqrt(aside * aside + beyond * beyond + _TINY) - bodies.shaft_radius - bodies.leg_radius
@@ -58,7 +45,7 @@ def leg_tool_gap(machine: Machine, solids: Sequence[Solid], leg: int, cosine: An
     cosine: of θ; length: of the leg, metres. Negative: by how much the leg runs below a rim of the solid, or the
     solid stands above the platform joint.
     """
-    joint = machine.tool_length - float(machine.pentapod.offsets[leg])
+    joint = machine.tool_length - float(machine.robot.line_heights[leg])
     sine = _sine(cosine, do)
     end_r, end_h = length * sine, joint + length * cosine
     gaps: list[Any] = []
@@ -87,7 +74,7 @@ def leg_tool_gaps(machine: Machine, solids: Sequence[Solid], position: Floats, d
 
 def _cosines(machine: Machine, position: Floats, direction: Floats) -> tuple[Floats, Floats]:
     """Return the cosines of θ and the lengths of the legs, (N, 5)."""
-    vectors = machine.pentapod.leg_vectors(position, direction)
+    vectors = machine.robot.leg_vectors(position, direction)
     lengths = np.linalg.norm(vectors, axis=-1)
     return np.einsum("nji,ni->nj", vectors, direction) / lengths, lengths
 

@@ -123,7 +123,7 @@ class _Met:
     @classmethod
     def at(cls, machine: Machine, tips: Floats, axes: Floats) -> _Met:
         position, direction = tips + machine.tool_length * axes, -axes
-        robot = machine.pentapod
+        robot = machine.robot
         vectors = robot.leg_vectors(position, direction)
         w, s = singularity_values(robot, position, direction)
         return cls(

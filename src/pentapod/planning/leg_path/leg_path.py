@@ -205,7 +205,7 @@ def leg_path(
         pieces.append(
             LegPiece(
                 curve,
-                machine.pentapod,
+                machine.robot,
                 machine.tool_length,
                 section_ends=curve.arc_length(u[a + ends] - u[a]),
                 section_feeds=np.array([toolpath.segments[k].feed for k in which]),

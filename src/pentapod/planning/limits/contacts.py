@@ -98,7 +98,7 @@ def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts:
 def _near(scene: Scene, obstacle: Obstacle, tips: Floats, axes: Floats, frame: RigidTransform | None) -> Ints:
     """Return the poses (N, 3) in which the box around any body comes near the obstacle's box: most do not."""
     machine, tool, comforts = scene.machine, scene.surroundings.tool, scene.comforts
-    robot, bodies = machine.pentapod, machine.bodies
+    robot, bodies = machine.robot, machine.bodies
     base = np.column_stack([robot.base, np.zeros(LEGS)])
     if frame is not None:
         back = frame.inverse()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.machine.clearance.tool_clearance import Arithmetic
+from pentapod.kinematics.arithmetic import Arithmetic
 from pentapod.planning.limits.limit import LengthLimit, Scene
 from pentapod.planning.limits.tool_pose import ToolPose
 
@@ -29,7 +29,7 @@ class LegPairClearance(LengthLimit):
         machine = scene.machine
         direction = np.array([0.0, 0.0, float(scene.component.w)])
         position = machine.work.centre - machine.tool_length * direction
-        legs, base = machine.pentapod.leg_vectors(position, direction), machine.pentapod.base
+        legs, base = machine.robot.leg_vectors(position, direction), machine.robot.base
         found: list[LegPairClearance] = []
         for j, k in combinations(range(len(legs)), 2):
             side = float(np.sign(np.dot([*(base[k] - base[j]), 0.0], np.cross(legs[j], legs[k]))))

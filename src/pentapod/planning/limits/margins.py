@@ -15,9 +15,9 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ArrayError
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.arithmetic import NUMPY, Arithmetic
 from pentapod.kinematics.component import Component
 from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
-from pentapod.machine.clearance.tool_clearance import NUMPY, Arithmetic
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.base_joints import BaseJointCone
 from pentapod.planning.limits.contacts import NUMBERS, contacts
@@ -147,5 +147,5 @@ class Margins:
     @property
     def joints(self) -> Joints:
         """Where the joints are: base attachments (5) of two, and platform offsets (5), metres."""
-        robot = self.machine.pentapod
+        robot = self.machine.robot
         return robot.base.tolist(), robot.offsets.tolist()

@@ -51,7 +51,7 @@ class SurfaceDistance(LengthLimit):
 
     def margin(self, pose: ToolPose) -> Any:
         """Return the margin of the distance, from p and i in the reduced frame of leg 3."""
-        robot, p, (u, _, w) = pose.machine.pentapod, pose.position, pose.direction
+        robot, p, (u, _, w) = pose.machine.robot, pose.position, pose.direction
         delta, (x3, _), z3 = robot.delta, robot.base[2].tolist(), float(robot.offsets[2])
         px, pz = p[0] + z3 * u - x3, p[2] + z3 * w
         s = delta * w * px - (delta * u - 1.0) * pz

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from pentapod.machine.clearance.tool_clearance import Arithmetic
+from pentapod.kinematics.arithmetic import Arithmetic
 from pentapod.machine.machine import Machine
 
 Joints = tuple[Sequence[Sequence[Any]], Sequence[Any]]
@@ -54,12 +54,12 @@ class ToolPose:
     @cached_property
     def bases(self) -> Sequence[Sequence[Any]]:
         """The base joints (n) of two or three components."""
-        return self.machine.pentapod.base.tolist() if self.joints is None else self.joints[0]
+        return self.machine.robot.base.tolist() if self.joints is None else self.joints[0]
 
     @cached_property
     def heights(self) -> Sequence[Any]:
         """The platform joints' places (n) along the line."""
-        return self.machine.pentapod.offsets.tolist() if self.joints is None else self.joints[1]
+        return self.machine.robot.offsets.tolist() if self.joints is None else self.joints[1]
 
     @cached_property
     def vectors(self) -> list[list[Any]]:

@@ -172,7 +172,7 @@ def _rotations(mean_axis: Floats, side: float, count: int, rng: np.random.Genera
 
 def _places(machine: Machine, count: int, rng: np.random.Generator) -> Floats:
     """Return places (count, 3) for the path's centre: a third near the advertised work, the rest anywhere in reach."""
-    base, reach = machine.pentapod.base, float(machine.legs.max_length.max()) + abs(machine.tool_length)
+    base, reach = machine.robot.base, float(machine.legs.max_length.max()) + abs(machine.tool_length)
     low, high = base.min(axis=0), base.max(axis=0)
     side = np.sign(machine.joints.base_axes[:, 2].sum()) or 1.0
     wide = np.column_stack([rng.uniform(low, high, (count, 2)), side * rng.uniform(0.1, 1.0, count) * reach])

@@ -92,7 +92,7 @@ class LeastTime:
 
     def pieces(self, at: Candidate, model: LinearModel) -> tuple[Floats, Floats]:
         """Return the bound as one piece: a sum of so many maxima that its kinks hardly show."""
-        setting, robot, length = self.setting, self.setting.machine.pentapod, self.setting.machine.tool_length
+        setting, robot, length = self.setting, self.setting.machine.robot, self.setting.machine.tool_length
         times, weights = self._times(at)
         rows = np.flatnonzero((weights != 0.0).any(axis=1))
 
@@ -110,7 +110,7 @@ class LeastTime:
         """Return the least time of each interval, (N − 1,), and the derivative of their sum by legs and tip (N, 8)."""
         setting, machine = self.setting, self.setting.machine
         tips, axes = setting.task.machine_poses(at.transform, setting.axes(at.coefficients))
-        steps = np.diff(machine.pentapod.leg_lengths(tips + machine.tool_length * axes, -axes), axis=0)
+        steps = np.diff(machine.robot.leg_lengths(tips + machine.tool_length * axes, -axes), axis=0)
         by_leg = np.abs(steps) / machine.legs.max_velocity
         leg = by_leg.argmax(axis=1)
         index = np.arange(len(leg))
@@ -226,4 +226,4 @@ def _by_unknowns(setting: Setting, rows: Ints, by_motion: Floats, by_lean: Float
 
 def _amplification(machine: Machine, poses: Poses) -> Floats:
     tips, axes = poses
-    return tip_force_amplification(machine.pentapod, tips + machine.tool_length * axes, -axes, machine.tool_length)
+    return tip_force_amplification(machine.robot, tips + machine.tool_length * axes, -axes, machine.tool_length)

@@ -127,7 +127,7 @@ def _slid(setting: Setting, margins: Margins, slides: Any) -> Joints:
     (bases, offsets), guides = margins.joints, setting.machine.guides
     ways = np.zeros((5, 2)) if guides is None else guides.guides
     moved = [[x + slides[k] * ways[k, 0], y + slides[k] * ways[k, 1]] for k, (x, y) in enumerate(bases)]
-    delta = setting.machine.pentapod.delta
+    delta = setting.machine.robot.delta
     return moved, [z + delta * slides[k] * ways[k, 0] for k, z in enumerate(offsets)]
 
 

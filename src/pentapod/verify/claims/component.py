@@ -25,7 +25,7 @@ def off_singular_plane(replay: Replay) -> Finding:
     """Judge that S keeps the sign of the component: no configuration with det J = 0 because of S = 0."""
     found = replay.survey.component.away
     # |S| / √(δ²w² + (1 − δu)²) is the distance to S = 0 at fixed orientation; the root is ≤ 1 + |δ|.
-    least = -MM * float(found.values.item()) / (1.0 + abs(replay.machine.pentapod.delta))
+    least = -MM * float(found.values.item()) / (1.0 + abs(replay.machine.robot.delta))
     what = "lower bound of the position's distance to S = 0,"
     return _finding(replay, least, int(found.at.item()), "mm", what)
 

@@ -104,7 +104,7 @@ def _stray(replay: Replay, starts: Ints, size: int, offsets: Floats) -> Stray:
         intervals = np.minimum(starts[rows, None] + np.arange(size), last)
         lengths = _controls(replay, intervals)
         middle = starts[rows] + np.minimum(starts[rows] + size, last + 1)
-        line[rows], turn[rows] = roaming(replay.machine.pentapod, position[middle], direction[middle], lengths, offsets)
+        line[rows], turn[rows] = roaming(replay.machine.robot, position[middle], direction[middle], lengths, offsets)
     return Stray(line, turn)
 
 

@@ -125,10 +125,10 @@ def survey(
         wide = Interpolant.along(program.legs[rows], None if slopes is None else slopes[rows], program.period)
         _legs(found, wide, first, slice(first - low, last - low))
         part = Interpolant(wide.bernstein[first - low : last - low], program.period)
-        proof = certify_component(machine.pentapod, part.bernstein, program.component, leg_error=leg_error)
+        proof = certify_component(machine.robot, part.bernstein, program.component, leg_error=leg_error)
         found.component.see(proof, first)
         samples = slice(2 * first, 2 * last + 1)
-        found.position[samples], found.direction[samples] = machine.pentapod.pose(part.halves, program.component)
+        found.position[samples], found.direction[samples] = machine.robot.pose(part.halves, program.component)
         between = slice(2 * first, 2 * last)
         chords = _chords(found, machine, program, part, between, pivot)
         found.away[between], found.turned[between] = chords.away[:, 1], chords.turned
@@ -178,12 +178,12 @@ def _chords(
 
     Of the tip, the pivot, and both ends of what the platform's line carries.
     """
-    tip, offsets = machine.tool_length, machine.pentapod.offsets
+    tip, offsets = machine.tool_length, machine.robot.offsets
     halves = split(part.bernstein)
     legs = np.stack(halves, axis=1).reshape(-1, 5, part.degree + 1)
     start, end = between, slice(between.start + 1, between.stop + 1)
     return prove_chords(
-        machine.pentapod,
+        machine.robot,
         legs,
         (found.position[start], found.direction[start]),
         (found.position[end], found.direction[end]),

@@ -50,7 +50,7 @@ def pentakins_files(given: PostInput) -> dict[str, bytes]:
     limits = machine.legs
     upright = frame.inverse().rotate([0.0, 0.0, 1.0])
     tip = frame.inverse().apply([0.0, 0.0, 0.0])
-    home = 1e3 * machine.pentapod.leg_lengths(tip + machine.tool_length * upright, -upright)
+    home = 1e3 * machine.robot.leg_lengths(tip + machine.tool_length * upright, -upright)
     velocity, acceleration = 1e3 * limits.max_velocity, 1e3 * limits.max_acceleration
     rate, gain = 1e3 * machine.rapid_velocity, _SHARE * float(acceleration.min())
     turn = np.degrees(1e-3 / machine.tool_length)
@@ -90,8 +90,8 @@ def controller_frame(machine: Machine, component: Component) -> RigidTransform:
 
 def parameters(machine: Machine, frame: RigidTransform) -> dict[str, float]:
     """Return pentakins' parameters, mm; legs are numbered from 0, and no more than five may be named."""
-    base = 1e3 * frame.apply(np.column_stack([machine.pentapod.base, np.zeros(5)]))
-    joints = 1e3 * (machine.tool_length - machine.pentapod.offsets)
+    base = 1e3 * frame.apply(np.column_stack([machine.robot.base, np.zeros(5)]))
+    joints = 1e3 * (machine.tool_length - machine.robot.offsets)
     found: dict[str, float] = {}
     for k in range(5):
         found |= {f"pentakins.base.{k}.{letter}": float(base[k, j]) for j, letter in enumerate("xyz")}
