@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.geometry import elevate
+from pentapod.numerics.bernstein import elevate
 from pentapod.kinematics import (
     AsBuiltPentapod,
     Component,

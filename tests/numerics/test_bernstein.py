@@ -7,17 +7,13 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from scipy.interpolate import BPoly
 
-from pentapod.geometry import (
+from pentapod.numerics.bernstein import (
     convolve,
-    derivative,
     elevate,
-    evaluate,
     from_power,
-    hull,
     multiply,
     scaled,
     split,
-    to_power,
     unscaled,
 )
 
@@ -28,11 +24,6 @@ coefficients = st.lists(st.floats(-10.0, 10.0), min_size=1, max_size=9).map(np.a
 def reference(c: np.ndarray, t: np.ndarray) -> np.ndarray:
     """scipy's value of the polynomial with coefficients (n + 1,) at t."""
     return BPoly(c[:, None], [0.0, 1.0])(t)
-
-
-@given(coefficients)
-def test_evaluate_agrees_with_scipy(c: np.ndarray) -> None:
-    np.testing.assert_allclose(evaluate(c, T), reference(c, T), atol=1e-12)
 
 
 @given(coefficients, coefficients)
@@ -48,8 +39,8 @@ def test_elevate_changes_no_value_and_tightens_the_hull(c: np.ndarray, by: int) 
     higher = elevate(c, by)
     assert len(higher) == len(c) + by
     np.testing.assert_allclose(reference(higher, T), reference(c, T), atol=1e-11)
-    assert hull(higher)[0] >= hull(c)[0] - 1e-12
-    assert hull(higher)[1] <= hull(c)[1] + 1e-12
+    assert higher.min() >= c.min() - 1e-12
+    assert higher.max() <= c.max() + 1e-12
 
 
 @given(coefficients, st.floats(0.05, 0.95))
@@ -64,23 +55,8 @@ def test_split_gives_both_halves(c: np.ndarray, at: float) -> None:
 
 
 @given(coefficients)
-def test_power_form_agrees_with_numpy_and_goes_back(c: np.ndarray) -> None:
+def test_power_form_agrees_with_numpy(c: np.ndarray) -> None:
     np.testing.assert_allclose(reference(from_power(c), T), Polynomial(c)(T), atol=1e-11)
-    np.testing.assert_allclose(to_power(from_power(c)), c, atol=1e-8)
-
-
-@given(coefficients, st.floats(0.1, 10.0))
-def test_derivative_agrees_with_scipy(c: np.ndarray, width: float) -> None:
-    expected = BPoly(c[:, None], [0.0, width]).derivative()(width * T)
-    np.testing.assert_allclose(reference(derivative(c, width), T), expected, atol=1e-8)
-
-
-@given(coefficients)
-def test_hull_holds_every_value(c: np.ndarray) -> None:
-    low, high = hull(c)
-    values = reference(c, T)
-    assert low - 1e-12 <= values.min()
-    assert values.max() <= high + 1e-12
 
 
 def test_scaled_and_back() -> None:
@@ -99,8 +75,6 @@ def test_batches_broadcast() -> None:
     np.testing.assert_allclose(multiply(b, a), product, rtol=1e-13)
     left, _ = split(product)
     assert left.shape == product.shape
-    assert evaluate(b, np.zeros((2, 1))).shape == (2, 6)
-    assert derivative(b, np.ones(6)).shape == (6, 4)
 
 
 @pytest.mark.parametrize("shape", [(0, 3), (2, 0, 4)])

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from pentapod.geometry import Positivity, from_power, positivity
+from pentapod.numerics.bernstein import from_power
+from pentapod.numerics.positivity import Positivity, positivity
 
 
 def true_minimum(powers: np.ndarray) -> float:

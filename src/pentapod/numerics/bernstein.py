@@ -28,15 +28,6 @@ def elevate(a: ArrayLike, by: int) -> Floats:
     return unscaled(convolve(scaled(a), binomials(by)))
 
 
-def derivative(a: ArrayLike, width: ArrayLike = 1.0) -> Floats:
-    """Return the derivatives (..., n) of polynomials (..., n + 1) over an interval of this width (...)."""
-    c = _coefficients(a)
-    n = c.shape[-1] - 1
-    if n == 0:
-        return np.zeros_like(c)
-    return n * np.diff(c, axis=-1) / np.asarray(width, dtype=np.float64)[..., None]
-
-
 def split(a: ArrayLike, at: float = 0.5) -> tuple[Floats, Floats]:
     """Return the coefficients (..., n + 1) of each polynomial on [0, at] and on [at, 1] (de Casteljau).
 
@@ -53,31 +44,10 @@ def split(a: ArrayLike, at: float = 0.5) -> tuple[Floats, Floats]:
     return np.moveaxis(left, 0, -1), np.moveaxis(work, 0, -1)
 
 
-def evaluate(a: ArrayLike, t: ArrayLike) -> Floats:
-    """Return the values of polynomials (..., n + 1) at t (...) by de Casteljau; batches broadcast."""
-    c, t = _coefficients(a), np.asarray(t, dtype=np.float64)[..., None]
-    c = np.broadcast_to(c, np.broadcast_shapes(c.shape[:-1], t.shape[:-1]) + c.shape[-1:])
-    while c.shape[-1] > 1:
-        c = (1.0 - t) * c[..., :-1] + t * c[..., 1:]
-    return c[..., 0].copy()
-
-
-def hull(a: ArrayLike) -> tuple[Floats, Floats]:
-    """Return the least and the largest coefficient (...): no value on [0, 1] lies outside them."""
-    c = _coefficients(a)
-    return c.min(axis=-1), c.max(axis=-1)
-
-
 def from_power(powers: ArrayLike) -> Floats:
     """Return Bernstein coefficients (..., n + 1) of Σ powers[..., j] t^j, t in [0, 1]."""
     c = _coefficients(powers)
     return c @ _power_to_bernstein(c.shape[-1] - 1).T
-
-
-def to_power(a: ArrayLike) -> Floats:
-    """Return the coefficients of 1, t, t², ... (..., n + 1); ill-conditioned for large n."""
-    c = _coefficients(a)
-    return c @ _bernstein_to_power(c.shape[-1] - 1).T
 
 
 def scaled(a: ArrayLike) -> Floats:
@@ -125,12 +95,6 @@ def binomials(n: int) -> Floats:
 def _power_to_bernstein(n: int) -> Floats:
     # t^j = Σ_i C(i, j) / C(n, j) B_i
     return np.array([[comb(i, j) / comb(n, j) for j in range(n + 1)] for i in range(n + 1)])
-
-
-@cache
-def _bernstein_to_power(n: int) -> Floats:
-    signed = [[comb(n, i) * comb(i, j) * (-1) ** (i - j) if j <= i else 0 for j in range(n + 1)] for i in range(n + 1)]
-    return np.array(signed, dtype=np.float64)
 
 
 def _coefficients(value: ArrayLike) -> Floats:

@@ -4,9 +4,10 @@ Files named `*_kernels.py` hold them, each function marked with `kernel`; they a
 so that `import pentapod` stays light. The machine code is cached on disk (`kernel_cache`): only the first run of a
 version on a machine compiles, and says so to the log `pentapod`.
 
-Loading numba takes half a second, as long as NumPy needs for ten million poses. A few functions of kinematics can be
-computed by NumPy as well, to the last bit. They ask `kernels_pay`, which adds up the time that kernels would have
-saved so far, and loads them once that is more than loading takes. The results do not tell which of the two was used.
+Loading numba and a kernel takes 0.4 s, as long as NumPy needs for ten million poses. So leg lengths and poses of the
+quadratic family have a second form in NumPy, equal to the last bit: with kernels alone `pentapod ik` would take 1.1 s
+for 0.7 s, with NumPy alone a million poses 90 ms for 14 ms. They ask `kernels_pay`, which adds up the time that kernels
+would have saved so far, and loads them once that is more than loading takes. Results do not tell which form was used.
 """
 
 from __future__ import annotations

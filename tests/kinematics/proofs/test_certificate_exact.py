@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from leg_motions import Exact, grazing, segments
 
-from pentapod.geometry import elevate
+from pentapod.numerics.bernstein import elevate
 from pentapod.kinematics import LinearPentapod, certify_component
 
 Poly = flint.fmpq_poly

@@ -6,7 +6,7 @@ import pytest
 from numpy.polynomial import chebyshev
 
 from pentapod.base.errors import ArrayError
-from pentapod.geometry import elevate, from_power
+from pentapod.numerics.bernstein import elevate, from_power
 from pentapod.kinematics import LinearPentapod, prove_tip_tube
 from pentapod.machine import Machine
 

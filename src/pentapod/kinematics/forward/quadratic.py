@@ -57,8 +57,8 @@ class LinearPart:
         size = float(np.hypot(*(base - base[2]).T).max())
         return cls(exact.high[:, :5].copy(), exact.high[:, 5].copy(), exact.low, (NEAR_S * size) ** 2)
 
-    def __call__(self, squared_legs: Floats, one: Floats | float = 1.0) -> Floats:
-        """Return (4, ...): q, py, u, v of squared leg lengths (5, ...); one (...) is what the constant is counted in.
+    def __call__(self, squared_legs: Floats) -> Floats:
+        """Return (4, ...): q, py, u, v of squared leg lengths (5, ...).
 
         Summed leg by leg, not by a matrix product: there the order, and so the last bit, is the library's choice.
         """
@@ -67,7 +67,7 @@ class LinearPart:
         product = np.empty_like(forms)
         for leg in range(1, 5):
             forms += np.multiply(self.linear_map[:, leg][column], squared_legs[leg], out=product)
-        forms += self.constant[column] * one
+        forms += self.constant[column]
         return forms
 
     def largest(self, squared_legs: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""`discriminants` compiled: the same operations in the same order, equal to the last bit.
+"""The discriminants of the quadratic family in scaled Bernstein form, compiled.
 
 Polynomials are (n + 1, lanes): the loops over the coefficients are short, those over the intervals become vector
 instructions.
