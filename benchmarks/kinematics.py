@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.numerics.bernstein import elevate
 from pentapod.kinematics import (
     AsBuiltPentapod,
     Component,
@@ -26,6 +25,7 @@ from pentapod.kinematics import (
     certify_motion,
     prove_tip_tube,
 )
+from pentapod.numerics.bernstein import elevate
 from pentapod.numerics.kernels import kernels_used
 
 BASE = 0.2 * np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)])

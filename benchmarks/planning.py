@@ -1,6 +1,6 @@
 """The planner's own solver against IPOPT on the same problems, in the same run. Run ``make bench-planning``.
 
-Smallest margin and time of both from the same start; the cost and the time of the calmest axes at the same placement;
+Smallest margin and time of both from the same start; the cost and the time of the smoothest axes at the same placement;
 the same on 1,000 and 10,000 waypoints, the axes also against plain IPOPT. Then what a tilt cone gains over strict
 normals, how fast the axes turn beside strict normals, how long refusals take beside plans, and how time and memory grow
 with the number of waypoints.
@@ -35,15 +35,15 @@ from pentapod.planning.placement.placement import Placement
 from pentapod.planning.placement.sampling import first_candidate, first_guesses
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.plan import plan
-from pentapod.planning.problem.problem import Candidate, Setting
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.problem import Candidate, PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.problem.weights import NEEDED_MARGIN
 from pentapod.planning.tool_axis.cost import AxisCost
-from pentapod.planning.tool_axis.spline import AxisCourse
+from pentapod.planning.tool_axis.spline import AxisSpline
 from pentapod.toolpath.toolpath import Toolpath
 
-CALM_SHARE = 0.9
+KEPT_SHARE = 0.9
 EVEN_PLACES = 4_000
 Value = TypeVar("Value")
 
@@ -54,10 +54,10 @@ def timed(action: Callable[[], Value]) -> tuple[Value, float]:
     return action(), time.process_time() - start
 
 
-def start_of(setting: Setting) -> Candidate:
+def start_of(problem: PlacementProblem) -> Candidate:
     """Return the first candidate of the best first guess."""
-    guess = first_guesses(setting.task, setting.machine, COMPONENTS, 0)[0]
-    return first_candidate(setting, Margins.of(setting.machine, guess.component), guess.transform)
+    guess = first_guesses(problem.samples, problem.machine, COMPONENTS, 0)[0]
+    return first_candidate(problem, Margins.of(problem.machine, guess.component), guess.transform)
 
 
 def against_ipopt(tasks: list[Instance], machine: Machine) -> None:
@@ -65,25 +65,25 @@ def against_ipopt(tasks: list[Instance], machine: Machine) -> None:
     print(f"{'task':58s} {'margin':>8s} {'IPOPT':>8s} {'faster':>7s} {'cost':>9s} {'IPOPT':>9s} {'faster':>7s}")
     ratios: list[tuple[float, float]] = []
     for task in tasks:
-        setting = Setting.of(Task.of(task.toolpath, task.tilt), machine)
-        start = start_of(setting)
-        ours, seconds = timed(lambda s=setting, c=start: SequentialSolver(s, True).raise_margin(c))
-        theirs, their_seconds = timed(lambda s=setting, c=start: IpoptSolver(s, True).raise_margin(c))
+        problem = PlacementProblem.of(ToolpathSamples.of(task.toolpath, task.tilt), machine)
+        start = start_of(problem)
+        ours, seconds = timed(lambda s=problem, c=start: SequentialSolver(s, True).raise_margin(c))
+        theirs, their_seconds = timed(lambda s=problem, c=start: IpoptSolver(s, True).raise_margin(c))
         line = f"{task.name:58s} {ours.smallest:8.4f} {theirs.smallest:8.4f} {their_seconds / seconds:6.1f}x"
         ratios.append((ours.smallest - theirs.smallest, their_seconds / seconds))
         if task.tilt > 0.0 and ours.smallest > 0.0:
-            line += calm_against(setting, ours, whole=False)
+            line += calm_against(problem, ours, whole=False)
         print(line, flush=True)
     gain, faster = np.median(np.array(ratios), axis=0)
     print(f"median: margin {gain:+.4f} against IPOPT's, {faster:.1f}x as fast\n")
 
 
-def calm_against(setting: Setting, at: Candidate, *, whole: bool) -> str:
-    """Return the columns that compare the calmest axes of both solvers."""
-    keep = CALM_SHARE * at.smallest
-    ours, seconds = timed(lambda: SequentialSolver(setting, False).calm(at, keep))
-    theirs, their_seconds = timed(lambda: IpoptSolver(setting, False, whole).calm(at, keep))
-    cost = AxisCost(setting, AxisCourse.of(setting.task, setting.cone), at)
+def calm_against(problem: PlacementProblem, at: Candidate, *, whole: bool) -> str:
+    """Return the columns that compare the smoothest axes of both solvers."""
+    keep = KEPT_SHARE * at.smallest
+    ours, seconds = timed(lambda: SequentialSolver(problem, False).smooth(at, keep))
+    theirs, their_seconds = timed(lambda: IpoptSolver(problem, False, whole).smooth(at, keep))
+    cost = AxisCost(problem, AxisSpline.of(problem.samples, problem.cone), at)
     costs = [f"{'none':>9s}" if c is None else f"{cost.of(c):9.6f}" for c in (ours, theirs)]
     return f" {' '.join(costs)} {their_seconds / seconds:6.1f}x"
 
@@ -94,20 +94,20 @@ def against_ipopt_on_many(tasks: list[Instance], machine: Machine) -> None:
     For the axes IPOPT gets all waypoints and margins at once, and finishes.
     """
     for task, count in ((tasks[0], 1_000), (tasks[1], 1_000), (tasks[0], 10_000)):
-        setting = Setting.of(visited(task, count, 0.0), machine)
-        start = start_of(setting)
-        ours, seconds = timed(lambda s=setting, c=start: SequentialSolver(s, True).raise_margin(c))
-        theirs, their_seconds = timed(lambda s=setting, c=start: IpoptSolver(s, True).raise_margin(c))
+        problem = PlacementProblem.of(visited(task, count, 0.0), machine)
+        start = start_of(problem)
+        ours, seconds = timed(lambda s=problem, c=start: SequentialSolver(s, True).raise_margin(c))
+        theirs, their_seconds = timed(lambda s=problem, c=start: IpoptSolver(s, True).raise_margin(c))
         print(
             f"{task.name:58s} placement, {count:6,d} waypoints: {ours.smallest:.4f} {theirs.smallest:.4f} "
             f"{seconds:.2f} s, {their_seconds / seconds:.1f}x as fast as IPOPT with constraint generation",
             flush=True,
         )
     for task in tasks[:4]:
-        setting = Setting.of(visited(task, 1_000, max(task.tilt, np.radians(5.0))), machine)
-        raised = SequentialSolver(setting, True).raise_margin(start_of(setting))
+        problem = PlacementProblem.of(visited(task, 1_000, max(task.tilt, np.radians(5.0))), machine)
+        raised = SequentialSolver(problem, True).raise_margin(start_of(problem))
         print(
-            f"{task.name:58s} axes, 1,000 waypoints, plain IPOPT: {calm_against(setting, raised, whole=True)}",
+            f"{task.name:58s} axes, 1,000 waypoints, plain IPOPT: {calm_against(problem, raised, whole=True)}",
             flush=True,
         )
     print()
@@ -119,8 +119,8 @@ def tilt_gain(tasks: list[Instance], machine: Machine) -> None:
     for task in tasks:
         found: list[float] = []
         for tilt in (0.0, np.radians(15.0)):
-            setting = Setting.of(Task.of(task.toolpath, tilt), machine)
-            found.append(SequentialSolver(setting, True).raise_margin(start_of(setting)).smallest)
+            problem = PlacementProblem.of(ToolpathSamples.of(task.toolpath, tilt), machine)
+            found.append(SequentialSolver(problem, True).raise_margin(start_of(problem)).smallest)
         if found[0] > 0.0:
             gains.append(found[1] / found[0])
     print(
@@ -134,14 +134,14 @@ def rates(tasks: list[Instance], machine: Machine) -> None:
     print(f"{'':58s} {'median':>7s} {'peak':>6s} {'above':>7s} {'median':>7s} {'peak':>6s} {'above':>7s}")
     columns: list[list[float]] = []
     for task in [t for t in tasks if t.tilt > 0.0]:
-        setting = Setting.of(Task.of(task.toolpath, task.tilt), machine)
-        at = SequentialSolver(setting, True).raise_margin(start_of(setting))
-        calm = SequentialSolver(setting, False).calm(at, CALM_SHARE * at.smallest) if at.smallest > 0.0 else None
-        if calm is None:
+        problem = PlacementProblem.of(ToolpathSamples.of(task.toolpath, task.tilt), machine)
+        at = SequentialSolver(problem, True).raise_margin(start_of(problem))
+        smooth = SequentialSolver(problem, False).smooth(at, KEPT_SHARE * at.smallest) if at.smallest > 0.0 else None
+        if smooth is None:
             continue
-        found = [along_path(task, setting, at, axes) for axes in (setting.task.nominal, calm_axes(setting, calm))]
+        found = [along_path(task, problem, at, axes) for axes in (problem.samples.nominal, calm_axes(problem, smooth))]
         row: list[float] = []
-        for strict, turned, fits in zip(*found, strict_fits(setting, at), strict=True):
+        for strict, turned, fits in zip(*found, strict_fits(problem, at), strict=True):
             above = (fits & (turned > 1.1 * strict + 0.01 * strict.max())).mean()
             row += [float(np.median(turned) / np.median(strict)), float(turned.max() / strict.max()), float(above)]
         columns.append(row)
@@ -154,14 +154,14 @@ def rates(tasks: list[Instance], machine: Machine) -> None:
     print("above: share of the path where strict normals fit and theirs is exceeded by 10 % and by 1 % of its peak\n")
 
 
-def calm_axes(setting: Setting, calm: np.ndarray) -> np.ndarray:
-    """Return the axes (N, 3) of a course, workpiece frame."""
-    return lean(setting.task.nominal, AxisCourse.of(setting.task, setting.cone).leans(calm))
+def calm_axes(problem: PlacementProblem, smooth: np.ndarray) -> np.ndarray:
+    """Return the axes (N, 3) of a spline, workpiece frame."""
+    return lean(problem.samples.nominal, AxisSpline.of(problem.samples, problem.cone).leans(smooth))
 
 
-def strict_fits(setting: Setting, at: Candidate) -> tuple[np.ndarray, np.ndarray]:
+def strict_fits(problem: PlacementProblem, at: Candidate) -> tuple[np.ndarray, np.ndarray]:
     """Return where strict normals are within all limits: for each interval of waypoints, and each even place."""
-    task = setting.task
+    task = problem.samples
     fits = at.margins(*task.machine_poses(at.transform, task.nominal), at.transform).min(axis=1) >= NEEDED_MARGIN
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(task.pivots, axis=0), axis=1))])
     between = fits[1:] & fits[:-1]
@@ -169,26 +169,30 @@ def strict_fits(setting: Setting, at: Candidate) -> tuple[np.ndarray, np.ndarray
     return between, between[np.clip(np.searchsorted(way, even) - 1, 0, len(between) - 1)]
 
 
-def along_path(task: Instance, setting: Setting, at: Candidate, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def along_path(
+    task: Instance, problem: PlacementProblem, at: Candidate, axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return axis rates and second derivatives of the legs along the path, at one density, for axes (N, 3)."""
-    tips, turned = setting.task.machine_poses(at.transform, axes)
+    tips, turned = problem.samples.machine_poses(at.transform, axes)
     component = at.margins.component
     values, limits = at.margins(tips, turned, at.transform), at.margins.limits
     placed = PlacedPath(task.toolpath, Placement(at.transform, "benchmark"), component, tips, turned, values, limits)
-    path = leg_path(placed, setting.machine, path_tolerance=20e-6, axis_tolerance=np.radians(0.5))
+    path = leg_path(placed, problem.machine, path_tolerance=20e-6, axis_tolerance=np.radians(0.5))
     if isinstance(path, Refusal):
         raise SystemExit(f"no leg path for {task.name}: {path}")
-    moved = np.linalg.norm(np.diff(setting.task.pivots, axis=0), axis=1)
+    moved = np.linalg.norm(np.diff(problem.samples.pivots, axis=0), axis=1)
     rate = np.linalg.norm(np.diff(axes, axis=0), axis=1) / np.maximum(moved, 1e-9)
     parameter = np.linspace(0.0, path.length, 20_000)
     tip, axis = path.pose(parameter)
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip + setting.task.pivot * axis, axis=0), axis=1))])
+    way = np.concatenate(
+        [[0.0], np.cumsum(np.linalg.norm(np.diff(tip + problem.samples.pivot * axis, axis=0), axis=1))]
+    )
     even = np.linspace(0.0, way[-1], EVEN_PLACES)
     legs = np.stack([np.interp(even, way, leg) for leg in path(parameter).T], axis=1)
     return rate, np.abs(np.diff(legs, 2, axis=0)).max(axis=1) / even[1] ** 2
 
 
-def visited(task: Instance, count: int, tilt: float) -> Task:
+def visited(task: Instance, count: int, tilt: float) -> ToolpathSamples:
     """Return a task visited at `count` waypoints, evenly along the same path."""
     path = task.toolpath
     at = np.linspace(0.0, len(path) - 1.0, count)
@@ -197,10 +201,10 @@ def visited(task: Instance, count: int, tilt: float) -> Task:
     axes = (1.0 - share) * path.axes[low] + share * path.axes[low + 1]
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     pivots = (1.0 - share) * path.pivots[low] + share * path.pivots[low + 1]
-    return Task(pivots, axes, path.pivot, tilt)
+    return ToolpathSamples(pivots, axes, path.pivot, tilt)
 
 
-def dense_dome(count: int) -> Task:
+def dense_dome(count: int) -> ToolpathSamples:
     """Return a dome of 120 mm under a zigzag of `count` waypoints, 0.2 mm apart."""
     half, radius = 0.06, 0.06 / np.sin(np.radians(35.0))
     rows = max(6, int(count * 0.2e-3 / (2.0 * half)))
@@ -211,7 +215,7 @@ def dense_dome(count: int) -> Task:
     xy = np.concatenate(passes)
     z = np.sqrt(radius**2 - np.square(xy).sum(axis=1))
     axes = np.column_stack([xy, z]) / radius
-    return Task(np.column_stack([xy, z - radius]) + 0.003 * axes, axes, 0.003, np.radians(15.0))
+    return ToolpathSamples(np.column_stack([xy, z - radius]) + 0.003 * axes, axes, 0.003, np.radians(15.0))
 
 
 def refusals(tasks: list[Instance], machine: Machine) -> None:
@@ -239,14 +243,14 @@ def enlarged(toolpath: Toolpath, factor: float) -> Toolpath:
 
 def growth(machine: Machine) -> None:
     """Print seconds and memory by the number of waypoints, of one part under ever more passes."""
-    print("waypoints   raise, s   calm, s   waypoints a second of calm   peak memory, kB a waypoint")
+    print("waypoints   raise, s   smooth, s   waypoints a second of smooth   peak memory, kB a waypoint")
     seconds: list[tuple[int, float]] = []
     for count in (1_000, 10_000, 50_000, 100_000, 1_000_000):
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        setting = Setting.of(dense_dome(count), machine)
-        raised, up = timed(lambda s=setting: SequentialSolver(s, True).raise_margin(start_of(s)))
-        keep = CALM_SHARE * raised.smallest
-        _, down = timed(lambda s=setting, c=raised, k=keep: SequentialSolver(s, False).calm(c, k))
+        problem = PlacementProblem.of(dense_dome(count), machine)
+        raised, up = timed(lambda s=problem: SequentialSolver(s, True).raise_margin(start_of(s)))
+        keep = KEPT_SHARE * raised.smallest
+        _, down = timed(lambda s=problem, c=raised, k=keep: SequentialSolver(s, False).smooth(c, k))
         memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / count
         seconds.append((count, up + down))
         print(f"{count:9,d} {up:10.2f} {down:9.2f} {count / down:16,.0f} {memory:28.2f}", flush=True)

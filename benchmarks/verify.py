@@ -111,7 +111,7 @@ def main() -> None:
     surface = MeshDistance.of(hill(given.cells))
     tool = BallCutter(BALL, shank=(Cone(0.03, 2e-3, 2e-3),), holder=(Cone(0.02, 8e-3, 8e-3),))
     around = Surroundings((Obstacle("part", surface, clamped=True, allowance=5e-5),), mounted(tool.solids, machine))
-    tolerances |= {"surroundings": around, "freedom": FREE, "cutting": Cutting(surface, tool.solids, 5e-5)}
+    tolerances |= {"surroundings": around, "constraints": FREE, "cutting": Cutting(surface, tool.solids, 5e-5)}
     with tempfile.TemporaryDirectory() as folder:
         short, path = Path(folder, "short.csv"), Path(folder, "program.csv")
         # Kernels compile and load once on a machine, not for each program.

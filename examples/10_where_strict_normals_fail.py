@@ -16,11 +16,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from pentapod import Component, Machine, PlacedPath, Toolpath, plan
-from pentapod.planning import Freedom
+from pentapod.planning import PlacementConstraints
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.search import search
-from pentapod.planning.problem.problem import Setting
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.problem import PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.toolpath import Segment, SegmentKind
 
 WIDTH, SLOPE, TILT, BALL = 0.17, np.radians(50.0), np.radians(20.0), 0.003
@@ -47,13 +47,15 @@ def main() -> None:
     out = parser.parse_args().out
     machine, toolpath, component = Machine.load("desk"), dome(WIDTH, SLOPE), Component(1, 1)
 
-    strict = search(Setting.of(Task.of(toolpath, 0.0), machine), component).best
-    answer = plan(toolpath, machine, component=component, freedom=Freedom.fixture([strict.transform]))
+    strict = search(PlacementProblem.of(ToolpathSamples.of(toolpath, 0.0), machine), component).best
+    answer = plan(toolpath, machine, component=component, constraints=PlacementConstraints.fixture([strict.transform]))
     print(f"strict normals, at the best placement found:\n  {answer}")
     placed = plan(toolpath, machine, tilt=TILT, component=component)
     if not isinstance(placed, PlacedPath):
         raise SystemExit(f"leaning by up to {np.degrees(TILT):.0f}° is refused as well: {placed}")
-    print(f"leaning by up to {np.degrees(TILT):.0f}°: smallest margin {placed.smallest_margin:.3f}, {placed.binding}")
+    print(
+        f"leaning by up to {np.degrees(TILT):.0f}°: smallest margin {placed.smallest_margin:.3f}, {placed.active_limit}"
+    )
 
     margins = Margins.of(machine, component)
     normals = margins(strict.transform.apply(toolpath.tips), strict.transform.rotate(toolpath.axes)).min(axis=1)

@@ -18,7 +18,7 @@ import numpy as np
 
 from pentapod import Component, Machine, PlacedPath, RigidTransform, Toolpath, plan
 from pentapod.kinematics import position_distance, singularity_values
-from pentapod.planning import Freedom
+from pentapod.planning import PlacementConstraints
 from pentapod.toolpath import Segment, SegmentKind
 
 COMPONENT, TILT, NEAR = Component(1, 1), np.radians(10.0), 5e-3
@@ -70,17 +70,17 @@ def main() -> None:
     print(f"naive placement, strict normals: {1e3 * before.min():.1f} mm from the singular surface at the nearest")
     if not 0.0 < before.min() < NEAR:
         raise SystemExit("the naive placement is not near to the surface")
-    near = Freedom.free(
+    near = PlacementConstraints.free(
         low=naive.translation - SHIFT, high=naive.translation + SHIFT, reference=naive, largest_turn=TURN
     )
-    placed = plan(toolpath, machine, tilt=TILT, freedom=near, component=COMPONENT)
+    placed = plan(toolpath, machine, tilt=TILT, constraints=near, component=COMPONENT)
     if not isinstance(placed, PlacedPath):
         raise SystemExit(f"refused: {placed}")
     after = distances(machine, placed.tips, placed.axes)
     shift = 1e3 * (placed.placement.transform.translation - naive.translation)
     print(f"planned within {1e3 * SHIFT:.0f} mm and {np.degrees(TURN):.0f}°: {1e3 * after.min():.1f} mm at the nearest")
     print(f"the part moved by ({shift[0]:.1f}, {shift[1]:.1f}, {shift[2]:.1f}) mm; smallest margin "
-          f"{placed.smallest_margin:.3f}, {placed.binding}")  # fmt: skip
+          f"{placed.smallest_margin:.3f}, {placed.active_limit}")  # fmt: skip
     draw(before, after, out)
 
 

@@ -12,12 +12,12 @@ from pentapod import (
     Coverage,
     Cutting,
     FlatEnd,
-    Freedom,
     GougeOptions,
     Lollipop,
     Machine,
     Mesh,
     Orientation,
+    PlacementConstraints,
     RasterOptions,
     Remedy,
     RigidTransform,
@@ -80,7 +80,11 @@ def test_a_part_with_tool_body_and_fixture(kind, tmp_path):
 
     here = RigidTransform(np.diag([1.0, -1.0, -1.0]), machine.work.centre)
     bodies = Surroundings.of(machine, tool, part, fixture=vise)
-    asked = {"freedom": Freedom.fixture([here]), "component": Component.parse("++"), "surroundings": bodies}
+    asked = {
+        "constraints": PlacementConstraints.fixture([here]),
+        "component": Component.parse("++"),
+        "surroundings": bodies,
+    }
     limits = {"path_tolerance": 50e-6, "axis_tolerance": np.radians(0.5)}
     placed = plan(toolpath, machine, **asked)
     trajectory = retime(leg_path(placed, machine, **limits), machine)

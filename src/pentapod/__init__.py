@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from pentapod.machine import Surroundings as Surroundings
     from pentapod.mesh import Mesh as Mesh
     from pentapod.mesh import load_mesh as load_mesh
-    from pentapod.planning import Freedom as Freedom
     from pentapod.planning import LegPath as LegPath
     from pentapod.planning import PlacedPath as PlacedPath
     from pentapod.planning import Placement as Placement
+    from pentapod.planning import PlacementConstraints as PlacementConstraints
     from pentapod.planning import leg_path as leg_path
     from pentapod.planning import plan as plan
     from pentapod.program import Program as Program
@@ -82,7 +82,7 @@ _HOMES = {
     "without_gouges": "toolpath",
     "Toolpath": "toolpath",
     "plan": "planning",
-    "Freedom": "planning",
+    "PlacementConstraints": "planning",
     "Placement": "planning",
     "PlacedPath": "planning",
     "leg_path": "planning",
@@ -131,7 +131,7 @@ __all__ = [  # noqa: RUF022 - in the order of the flow
     "without_gouges",
     "Toolpath",
     "plan",
-    "Freedom",
+    "PlacementConstraints",
     "Placement",
     "PlacedPath",
     "leg_path",

@@ -15,7 +15,7 @@ from pentapod.cli.commands.new import dome_stl
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job, judge, pipeline, run
 from pentapod.job.artefacts import check_folder
-from pentapod.job.build.placement import job_freedom
+from pentapod.job.build.placement import job_constraints
 from pentapod.job.build.values import job_machine, job_mesh, job_toolpath
 from pentapod.job.outcome import SetUps
 from pentapod.job.run_folder import staged
@@ -230,7 +230,7 @@ def test_nothing_to_machine_is_bad_input(make_job):
 
 def placement_of(job: Path) -> RigidTransform:
     loaded = Job.load(job)
-    (pose,) = job_freedom(loaded, job_machine(loaded), job_mesh(loaded)).poses
+    (pose,) = job_constraints(loaded, job_machine(loaded), job_mesh(loaded)).poses
     return pose
 
 

@@ -24,7 +24,7 @@ from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.cli.main import run as command
 from pentapod.job import run
 from pentapod.job.artefacts import REPORT
-from pentapod.job.build.placement import job_freedom
+from pentapod.job.build.placement import job_constraints
 from pentapod.job.build.tool import job_tool
 from pentapod.job.build.values import job_toolpath
 from pentapod.kinematics import Component
@@ -46,7 +46,7 @@ def from_python(job, program, sink=0.0):
     coverage = Coverage.of(part, tool, RasterOptions(stepover=15e-3), path_tolerance=50e-6, share=1.0)
     return verify(
         program, machine, toolpath.transformed(RigidTransform(np.eye(3), np.array([0.0, 0.0, -sink]))),
-        tilt=0.0, freedom=job_freedom(job, machine, part), component=Component.parse("++"),
+        tilt=0.0, constraints=job_constraints(job, machine, part), component=Component.parse("++"),
         surroundings=Surroundings.of(machine, tool, part),
         path_tolerance=50e-6, axis_tolerance=np.radians(0.5), job_digest=job.digest,
         cutting=Cutting.of(part, tool, coverage=coverage),

@@ -15,7 +15,7 @@ from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.sampling import best_tilted_margins, first_guesses
 from pentapod.planning.plan import NEEDED_MARGIN
 from pentapod.planning.problem.constraints import FREE
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.program import Provenance, sample, write_csv
 from pentapod.timing import Trajectory, retime
 from pentapod.verify import verify
@@ -27,8 +27,8 @@ AXIS_TOLERANCE = np.radians(0.5)
 
 def brute_force(instance: Instance, machine: Machine, samples: int) -> float:
     """Return the best smallest margin of random placements with each waypoint's tilt chosen by itself."""
-    task = Task.of(instance.toolpath, instance.tilt)
-    guesses = first_guesses(task, machine, COMPONENTS, seed=99, samples=samples)
+    task = ToolpathSamples.of(instance.toolpath, instance.tilt)
+    guesses = first_guesses(task, machine, COMPONENTS, seed=99, tries=samples)
     return max(best_tilted_margins(task, Margins.of(machine, g.component), g.transform)[0].min() for g in guesses)
 
 
@@ -63,7 +63,7 @@ def certified(placed: PlacedPath, robot: Machine, instance: Instance, folder: Pa
     file = folder / "program.csv"
     write_csv(sample(trajectory, robot, placed.placement.transform, placed.component, source), file)
     tolerances = {"path_tolerance": 20e-6, "axis_tolerance": AXIS_TOLERANCE}
-    asked = {"tilt": instance.tilt, "job_digest": "test", "freedom": FREE, "surroundings": NOTHING}
+    asked = {"tilt": instance.tilt, "job_digest": "test", "constraints": FREE, "surroundings": NOTHING}
     of_a_part = ("gouge on cuts and links", "gouge on rapids", "surface left on the region")  # there is none
     verdict = verify(file, robot, instance.toolpath, **asked, **tolerances, waived=of_a_part)
     return verdict.passed

@@ -9,12 +9,12 @@ from pentapod.base.refusal import Refusal
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
-from pentapod.planning import Freedom, PlacedPath, plan
+from pentapod.planning import PlacedPath, PlacementConstraints, plan
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.sampling import best_tilted_margins
 from pentapod.planning.plan import NEEDED_MARGIN
 from pentapod.planning.problem.formulation import cayley
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 TILT = np.radians(15.0)
@@ -56,7 +56,7 @@ def test_placement_is_not_beaten_by_small_moves(desk, cap, placed):
     """Random small placement moves, each with the best tilt at each waypoint alone, gain little."""
     rng = np.random.default_rng(5)
     rows = np.arange(0, len(cap), 4)
-    few = Task(cap.pivots[rows], cap.axes[rows], cap.pivot, TILT)
+    few = ToolpathSamples(cap.pivots[rows], cap.axes[rows], cap.pivot, TILT)
     margins = Margins.of(desk, placed.component)
     t = placed.placement.transform
     here = best_tilted_margins(few, margins, t)[0].min()
@@ -86,8 +86,8 @@ def test_same_task_same_plan(desk, cap, placed):
 
 
 def test_given_placement_and_component_are_honoured(desk, cap, placed):
-    given = Freedom.fixture([placed.placement.transform])
-    answer = plan(cap, desk, tilt=TILT, freedom=given, component=placed.component)
+    given = PlacementConstraints.fixture([placed.placement.transform])
+    answer = plan(cap, desk, tilt=TILT, constraints=given, component=placed.component)
     assert isinstance(answer, PlacedPath)
     assert answer.placement.transform is placed.placement.transform
     assert answer.placement.chosen_by == "job"
@@ -96,8 +96,8 @@ def test_given_placement_and_component_are_honoured(desk, cap, placed):
 
 
 def test_wrong_component_is_refused(desk, cap, placed):
-    given = Freedom.fixture([placed.placement.transform])
-    answer = plan(cap, desk, tilt=TILT, freedom=given, component=Component(1, -1))
+    given = PlacementConstraints.fixture([placed.placement.transform])
+    answer = plan(cap, desk, tilt=TILT, constraints=given, component=Component(1, -1))
     assert isinstance(answer, Refusal)
     assert any("S = 0" in blame.constraint for blame in answer.blames)
 
@@ -106,7 +106,7 @@ def test_placement_out_of_reach_is_refused_with_the_true_shortfall(desk, cap, pl
     """Pushed away along the base normal until legs are too short: the millimetres named are those missing."""
     t = placed.placement.transform
     far = RigidTransform(t.rotation, t.translation + np.array([0.0, 0.0, 0.3]))
-    answer = plan(cap, desk, freedom=Freedom.fixture([far]), component=placed.component)
+    answer = plan(cap, desk, constraints=PlacementConstraints.fixture([far]), component=placed.component)
     assert isinstance(answer, Refusal)
     tips, axes = far.apply(cap.tips), far.rotate(cap.axes)
     legs = desk.robot.leg_lengths(tips + desk.tool_length * axes, -axes)
@@ -153,6 +153,6 @@ def test_the_region_that_a_refusal_names_fits(desk, wide):
 def test_a_fixed_part_is_told_where_to_move(desk, cap, placed):
     t = placed.placement.transform
     off = RigidTransform(t.rotation, t.translation + np.array([0.12, 0.0, 0.0]))
-    answer = plan(cap, desk, tilt=TILT, freedom=Freedom.fixture([off]), component=placed.component)
+    answer = plan(cap, desk, tilt=TILT, constraints=PlacementConstraints.fixture([off]), component=placed.component)
     assert isinstance(answer, Refusal)
     assert "move the part by (" in answer.remedy

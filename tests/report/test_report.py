@@ -18,7 +18,7 @@ from pentapod.cli.commands.new import dome_stl
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job, Outcome, run
 from pentapod.job.build.collision_world import job_surroundings
-from pentapod.job.build.placement import job_freedom, rotation_angles_deg
+from pentapod.job.build.placement import job_constraints, rotation_angles_deg
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.planning import PlacedPath
 from pentapod.program import Program
@@ -276,7 +276,7 @@ def test_the_placement_shown_can_be_used(make_job, tmp_path):
     job = make_job().read_text().split("[placement]")[0] + shown[0].replace("&#34;", '"')
     (tmp_path / "again.toml").write_text(job)
     jobs = outcome.job, Job.load(tmp_path / "again.toml")
-    (first,), (again,) = (job_freedom(job, job_machine(job), job_mesh(job)).poses for job in jobs)
+    (first,), (again,) = (job_constraints(job, job_machine(job), job_mesh(job)).poses for job in jobs)
     assert np.abs(first.matrix - again.matrix).max() < 1e-8
 
 

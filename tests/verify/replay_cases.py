@@ -26,7 +26,7 @@ RAPID = 0.08
 TILT = np.radians(5.0)
 TOLERANCES = {"tilt": TILT, "path_tolerance": 20e-6, "axis_tolerance": np.radians(0.1), "lowest_share": 0.0}
 """The quintic time law is slower than it has to be: no lowest feed is asked for."""
-ASKED = {**TOLERANCES, "job_digest": "job-1", "freedom": FREE, "surroundings": NOTHING}
+ASKED = {**TOLERANCES, "job_digest": "job-1", "constraints": FREE, "surroundings": NOTHING}
 """All that a verdict asks of a program, but for what is cut: the part may stand anywhere, with nothing around it."""
 PERIOD = 1e-3
 TURN_RATE = 0.5

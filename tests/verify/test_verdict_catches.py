@@ -159,7 +159,7 @@ def test_program_without_a_job_is_asked_for_none(good):
     ("untold", "claims"),
     [
         ({"cutting": None}, {"gouge on cuts and links", "gouge on rapids", "surface left on the region"}),
-        ({"freedom": None}, {"placement as the job asks"}),
+        ({"constraints": None}, {"placement as the job asks"}),
         ({"surroundings": None}, {"legs, spindle and tool clear of the surroundings"}),
     ],
 )

@@ -24,7 +24,7 @@ from pentapod.job.stage_runner import Clock
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
 from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
-from pentapod.planning.plan import Wishes, fits
+from pentapod.planning.plan import PlacementOptions, fits
 from pentapod.planning.problem.constraints import FREE
 from pentapod.planning.setups import setups
 from pentapod.program import Program, Provenance, sample, write_csv
@@ -178,16 +178,16 @@ class _Task:
 
     def fits(self, part: Toolpath) -> bool:
         """Return whether a placement for a part of the toolpath is found."""
-        return fits(part, self.machine, **self._wishes())
+        return fits(part, self.machine, **self._options())
 
     def _placed(self) -> PlacedPath | Refusal:
-        then, progress = self.job.placement.then, self.clock.progress
-        return plan(self.toolpath, self.machine, **self._wishes(), then=then, progress=progress)
+        objective, progress = self.job.placement.then, self.clock.progress
+        return plan(self.toolpath, self.machine, **self._options(), secondary_objective=objective, progress=progress)
 
-    def _wishes(self) -> Wishes:
+    def _options(self) -> PlacementOptions:
         return {
             "tilt": self.asked.tilt,
-            "freedom": self.asked.freedom or FREE,
+            "constraints": self.asked.constraints or FREE,
             "component": self.asked.component,
             "surroundings": self.asked.surroundings or NOTHING,
             "weights": job_weights(self.job),

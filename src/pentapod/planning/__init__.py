@@ -4,7 +4,7 @@ from pentapod.planning.leg_path.leg_path import LegPath, LegPiece, leg_path
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.planning.placement.placement import Placement
 from pentapod.planning.plan import plan
-from pentapod.planning.problem.constraints import Freedom
+from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.planning.problem.weights import Weights
 
-__all__ = ["Freedom", "LegPath", "LegPiece", "PlacedPath", "Placement", "Weights", "leg_path", "plan"]
+__all__ = ["LegPath", "LegPiece", "PlacedPath", "Placement", "PlacementConstraints", "Weights", "leg_path", "plan"]

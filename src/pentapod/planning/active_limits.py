@@ -11,7 +11,7 @@ from pentapod.planning.placement.placed_path import PlacedPath
 
 
 @dataclass(frozen=True)
-class Binding:
+class ActiveLimit:
     """One limit. margin: the smallest one, at waypoint `worst`; room: the same in `unit` (mm, deg).
 
     waypoints: inclusive ranges in which no other limit is nearer; share: of all waypoints.
@@ -26,13 +26,13 @@ class Binding:
     waypoints: tuple[tuple[int, int], ...]
 
 
-def bindings(placed: PlacedPath) -> tuple[Binding, ...]:
+def active_limits(placed: PlacedPath) -> tuple[ActiveLimit, ...]:
     """Return every limit of a plan, the nearest first."""
     nearest = placed.margins.argmin(axis=1)
-    found: list[Binding] = []
+    found: list[ActiveLimit] = []
     for k in np.argsort(placed.margins.min(axis=0), kind="stable"):
         limit, column, here = placed.limits[k], placed.margins[:, k], nearest == k
         margin, worst = float(column.min()), int(column.argmin())
         room, share = abs(limit.shortfall(margin)), float(here.mean())
-        found.append(Binding(limit.name, margin, worst, room, limit.unit, share, ranges(here)))
+        found.append(ActiveLimit(limit.name, margin, worst, room, limit.unit, share, ranges(here)))
     return tuple(found)

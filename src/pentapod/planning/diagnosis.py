@@ -9,7 +9,7 @@ from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.placed_path import PlacedPath, UnplacedPath
 
 
-def blame(values: Floats, margins: Margins, needed: float) -> tuple[Blame, ...]:
+def diagnose(values: Floats, margins: Margins, needed: float) -> tuple[Blame, ...]:
     """Return what falls short of the `needed` margin, worst first. values (N, M): each waypoint's margins."""
     blames: list[tuple[float, Blame]] = []
     for column, limit in zip((values - needed).T, margins.limits, strict=True):
@@ -25,10 +25,10 @@ def ranges(mask: Bools) -> tuple[tuple[int, int], ...]:
 
 
 def refusal(
-    values: Floats, attempt: PlacedPath, margins: Margins, needed: float, remedies: tuple[str, ...], *, fixed: bool
+    values: Floats, attempt: PlacedPath, margins: Margins, needed: float, suggestions: tuple[str, ...], *, fixed: bool
 ) -> UnplacedPath:
-    """Return the refusal of a placement whose best margins are values (N, M); remedies: phrases for "Try to …"."""
-    blames = blame(values, margins, needed)
+    """Return the refusal of a placement whose best margins are values (N, M); suggestions: phrases for "Try to …"."""
+    blames = diagnose(values, margins, needed)
     short = int((values.min(axis=1) < needed).sum())
     where = "at the given placement" if fixed else "at the best placement found"
     otherwise = "turn or move the part" if fixed else "scale the part down; no wider cone or large region of it fits"
@@ -36,6 +36,6 @@ def refusal(
         "placement",
         f"the part does not fit the machine {where}: {short} of {len(values)} waypoints are out of limits",
         blames,
-        remedy="Try to " + (", or to ".join(remedies) or otherwise),
+        remedy="Try to " + (", or to ".join(suggestions) or otherwise),
         attempt=attempt,
     )

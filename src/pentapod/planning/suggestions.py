@@ -8,27 +8,27 @@ import numpy as np
 
 from pentapod.planning.placement.sampling import first_candidate
 from pentapod.planning.problem.constraints import FREE
-from pentapod.planning.problem.problem import Candidate, Setting
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.problem import Candidate, PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
 
-Raise = Callable[[Setting, Candidate], Candidate]
-"""Improves a candidate of a setting, its placement free, until it fits."""
+Raise = Callable[[PlacementProblem, Candidate], Candidate]
+"""Improves a candidate of a problem, its placement free, until it fits."""
 
 _WIDER = np.radians([5.0, 10.0, 20.0])
 _WIDEST = np.radians(45.0)
 _SMALLEST_SHARE, _HALVINGS = 0.25, 4
 
 
-def remedies(setting: Setting, best: Candidate, improve: Raise, needed: float) -> tuple[str, ...]:
+def suggestions(problem: PlacementProblem, best: Candidate, improve: Raise, needed: float) -> tuple[str, ...]:
     """Return what was tried near the best candidate and would do, each a phrase for "Try to …"; maybe nothing."""
-    phrases = [_move(setting, best, improve, needed)] if setting.freedom is not FREE else []
-    if setting.freedom.moves:
-        phrases += [_cone(setting, best, improve, needed), _region(setting, best, improve, needed)]
+    phrases = [_move(problem, best, improve, needed)] if problem.constraints is not FREE else []
+    if problem.constraints.moves:
+        phrases += [_cone(problem, best, improve, needed), _region(problem, best, improve, needed)]
     return tuple(phrase for phrase in phrases if phrase)
 
 
-def _move(setting: Setting, best: Candidate, improve: Raise, needed: float) -> str:
-    moved = improve(Setting.of(setting.task, setting.machine, weights=setting.weights), best)
+def _move(problem: PlacementProblem, best: Candidate, improve: Raise, needed: float) -> str:
+    moved = improve(PlacementProblem.of(problem.samples, problem.machine, weights=problem.weights), best)
     if moved.smallest < needed:
         return ""
     shift = (moved.transform.translation - best.transform.translation) * 1e3
@@ -38,14 +38,17 @@ def _move(setting: Setting, best: Candidate, improve: Raise, needed: float) -> s
     return f'move the part by ({x:.0f}, {y:.0f}, {z:.0f}) mm and turn it by {angle:.0f}° (mode = "free" finds where)'
 
 
-def _cone(setting: Setting, best: Candidate, improve: Raise, needed: float) -> str:
+def _cone(problem: PlacementProblem, best: Candidate, improve: Raise, needed: float) -> str:
     """Return the least of a few wider cones that was found to do; the widest is tried first: it may not do either."""
-    task = setting.task
-    wider = [float(tilt) for tilt in task.tilt + _WIDER if tilt <= _WIDEST]
+    samples = problem.samples
+    wider = [float(tilt) for tilt in samples.tilt + _WIDER if tilt <= _WIDEST]
 
     def fits(tilt: float) -> bool:
-        there = Setting.of(
-            Task(task.pivots, task.nominal, task.pivot, tilt), setting.machine, setting.freedom, setting.weights
+        there = PlacementProblem.of(
+            ToolpathSamples(samples.pivots, samples.nominal, samples.pivot, tilt),
+            problem.machine,
+            problem.constraints,
+            problem.weights,
         )
         return improve(there, first_candidate(there, best.margins, best.transform)).smallest >= needed
 
@@ -59,17 +62,19 @@ def _cone(setting: Setting, best: Candidate, improve: Raise, needed: float) -> s
     return f"allow a tilt of {np.degrees(enough):.0f}°, which is enough"
 
 
-def _region(setting: Setting, best: Candidate, improve: Raise, needed: float) -> str:
+def _region(problem: PlacementProblem, best: Candidate, improve: Raise, needed: float) -> str:
     """Return the largest box about the path's middle, in proportion to its extents, that was found to fit."""
-    low, high = setting.task.pivots.min(axis=0), setting.task.pivots.max(axis=0)
+    low, high = problem.samples.pivots.min(axis=0), problem.samples.pivots.max(axis=0)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     fits, too_large, start = 0.0, 1.0, best
     share = 0.6
     for _ in range(_HALVINGS):
-        inside = np.flatnonzero((np.abs(setting.task.pivots - middle) <= share * half + 1e-9).all(axis=1))
+        inside = np.flatnonzero((np.abs(problem.samples.pivots - middle) <= share * half + 1e-9).all(axis=1))
         found = None
         if len(inside) > 0:
-            part = Setting.of(setting.task.at(inside), setting.machine, setting.freedom, setting.weights)
+            part = PlacementProblem.of(
+                problem.samples.at(inside), problem.machine, problem.constraints, problem.weights
+            )
             found = improve(part, first_candidate(part, start.margins, start.transform))
         if found is not None and found.smallest >= needed:
             fits, start = share, found

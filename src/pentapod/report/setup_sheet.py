@@ -6,7 +6,7 @@ from html import escape
 
 from pentapod.job.outcome import Outcome
 from pentapod.mesh.mesh import Mesh
-from pentapod.planning.active_limits import Binding, bindings
+from pentapod.planning.active_limits import ActiveLimit, active_limits
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.report.held import held_mesh
 from pentapod.report.margin_band import margin_band
@@ -27,7 +27,7 @@ def setup_sheet(outcome: Outcome) -> str:
     told = "" if height is None else f"<p>It stands on the table, whose surface is at z = {number(height, 'mm')}.</p>"
     held = held_mesh(outcome, placed)
     views = placement_views(outcome.find(Mesh), placed, outcome.machine, surface, held)
-    rows = "".join(_row(binding) for binding in bindings(placed)[:_ROWS])
+    rows = "".join(_row(limit) for limit in active_limits(placed)[:_ROWS])
     return (
         f'{told}<div class="views">{views}</div>'
         f"<h3>Margins along the path</h3>{margin_band(placed)}"
@@ -39,9 +39,9 @@ def setup_sheet(outcome: Outcome) -> str:
     )
 
 
-def _row(binding: Binding) -> str:
-    room = number(binding.room, binding.unit) if binding.unit else "–"
+def _row(limit: ActiveLimit) -> str:
+    room = number(limit.room, limit.unit) if limit.unit else "–"
     return (
-        f'<tr><td>{escape(binding.limit)}</td><td class="n">{number(binding.margin)}</td><td class="n">{room}</td>'
-        f'<td class="n">{binding.worst}</td><td class="n">{100.0 * binding.share:.1f} %</td></tr>'
+        f'<tr><td>{escape(limit.limit)}</td><td class="n">{number(limit.margin)}</td><td class="n">{room}</td>'
+        f'<td class="n">{limit.worst}</td><td class="n">{100.0 * limit.share:.1f} %</td></tr>'
     )

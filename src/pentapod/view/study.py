@@ -13,7 +13,7 @@ from pentapod.base.values import Value
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.sampling import best_tilted_margins
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.view.opened import Opened
 
 COMFORTABLE = 0.4
@@ -64,7 +64,7 @@ class Study(Value):
     axes (N, 3): workpiece frame; they turn with the part.
     """
 
-    task: Task
+    samples: ToolpathSamples
     axes: Floats
     margins: Margins
     shown: Ints
@@ -72,9 +72,9 @@ class Study(Value):
     @classmethod
     def of(cls, run: Opened) -> Study:
         """Return the study of a run."""
-        task = Task.of(run.toolpath, float(np.radians(run.job.axis.tilt_deg)))
+        samples = ToolpathSamples.of(run.toolpath, float(np.radians(run.job.axis.tilt_deg)))
         margins = Margins.of(run.machine, run.component, run.surroundings)
-        return cls(task, run.axes, margins, _shown(run.toolpath.starts))
+        return cls(samples, run.axes, margins, _shown(run.toolpath.starts))
 
     def at(self, placement: RigidTransform, *, tilted: bool = False, thorough: bool = False) -> Reach:
         """Return what a placement comes to, quickly: at the waypoints that are drawn.
@@ -85,9 +85,9 @@ class Study(Value):
         rows = self._thorough_rows if thorough else self.shown
         if tilted:
             rows = rows[:: -(-len(rows) // _TILTED)] if not thorough else self.shown
-            values, _ = best_tilted_margins(self.task.at(rows), self.margins, placement)
+            values, _ = best_tilted_margins(self.samples.at(rows), self.margins, placement)
         else:
-            values = self.margins(*self.task.machine_poses(placement, self.axes[rows], rows), placement)
+            values = self.margins(*self.samples.machine_poses(placement, self.axes[rows], rows), placement)
         smallest = values.min(axis=1)
         row, limit = (int(k) for k in np.unravel_index(int(values.argmin()), values.shape))
         named, margin = self.margins.limits[limit], float(values[row, limit])
@@ -97,7 +97,7 @@ class Study(Value):
 
     @property
     def _thorough_rows(self) -> Ints:
-        count = len(self.task.pivots)
+        count = len(self.samples.pivots)
         return np.unique(np.linspace(0, count - 1, min(count, _THOROUGH)).astype(np.intp))
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from pentapod.base.errors import JobError
 from pentapod.job import Job
-from pentapod.job.build.placement import job_freedom
+from pentapod.job.build.placement import job_constraints
 from pentapod.job.build.values import job_machine, job_mesh
-from pentapod.planning import Freedom
+from pentapod.planning import PlacementConstraints
 from pentapod.planning.problem.constraints import FREE
 
 HEAD = "[placement]\n"
@@ -21,32 +21,32 @@ def load(make_job, placement: str) -> Job:
     return Job.load(path)
 
 
-def freedom_of(job: Job) -> Freedom:
-    return job_freedom(job, job_machine(job), job_mesh(job))
+def constraints_of(job: Job) -> PlacementConstraints:
+    return job_constraints(job, job_machine(job), job_mesh(job))
 
 
 def test_free_is_free(make_job):
-    assert freedom_of(load(make_job, 'mode = "free"\n')) is FREE
+    assert constraints_of(load(make_job, 'mode = "free"\n')) is FREE
 
 
 def test_box_and_turn(make_job):
-    freedom = freedom_of(
+    constraints = constraints_of(
         load(make_job, "box_mm = [[10, 90, 500], [-10, 20, 600]]\nrotation_deg = [180, 0, 0]\nlargest_turn_deg = 30\n")
     )
-    np.testing.assert_allclose(freedom.low, [-0.01, 0.02, 0.5])
-    np.testing.assert_allclose(freedom.high, [0.01, 0.09, 0.6])
-    np.testing.assert_allclose(freedom.reference, np.diag([1.0, -1.0, -1.0]), atol=1e-15)
-    assert freedom.largest_turn == pytest.approx(np.pi / 6.0)
+    np.testing.assert_allclose(constraints.low, [-0.01, 0.02, 0.5])
+    np.testing.assert_allclose(constraints.high, [0.01, 0.09, 0.6])
+    np.testing.assert_allclose(constraints.reference, np.diag([1.0, -1.0, -1.0]), atol=1e-15)
+    assert constraints.largest_turn == pytest.approx(np.pi / 6.0)
 
 
 @pytest.mark.parametrize("up", [(0, 0, 1), (0, -1, 0), (1, 2, -2)])
 def test_the_lowest_point_rests_on_the_table(up, make_job):
     """Every allowed placement: the mesh touches the table's surface from above and is nowhere below it."""
     job = load(make_job, f'mode = "table"\ntable_z_mm = 640\ntable_x_mm = [-50, 50]\nup = {list(up)}\n')
-    freedom, rng = freedom_of(job), np.random.default_rng(0)
+    constraints, rng = constraints_of(job), np.random.default_rng(0)
     random = np.linalg.qr(rng.normal(size=(20, 3, 3)))[0]
     random *= np.linalg.det(random)[:, None, None]
-    rotations, origins = freedom.within(random, rng.normal(size=(20, 3)), rng)
+    rotations, origins = constraints.within(random, rng.normal(size=(20, 3)), rng)
     vertices = job_mesh(job).vertices
     for rotation, origin in zip(rotations, origins, strict=True):
         z = (vertices @ rotation.T + origin)[:, 2]
@@ -55,11 +55,13 @@ def test_the_lowest_point_rests_on_the_table(up, make_job):
 
 
 def test_fixture(make_job):
-    freedom = freedom_of(load(make_job, 'mode = "fixture"\nposes_mm_deg = [[1, 2, 3, 0, 0, 0], [4, 5, 6, 0, 0, 90]]\n'))
-    first, second = freedom.poses
+    constraints = constraints_of(
+        load(make_job, 'mode = "fixture"\nposes_mm_deg = [[1, 2, 3, 0, 0, 0], [4, 5, 6, 0, 0, 90]]\n')
+    )
+    first, second = constraints.poses
     np.testing.assert_allclose(first.translation, [1e-3, 2e-3, 3e-3])
     np.testing.assert_allclose(second.rotate([1.0, 0.0, 0.0]), [0.0, 1.0, 0.0], atol=1e-15)
-    assert not freedom.moves
+    assert not constraints.moves
 
 
 MISTAKES = {

@@ -8,8 +8,8 @@ from leg_motions import Exact, grazing, segments
 from rational_polynomials import add, at, divided, positive_on_unit_interval, power_form, times
 
 from pentapod.base.errors import ArrayError
-from pentapod.numerics.bernstein import elevate, split
 from pentapod.kinematics import COMPONENTS, LinearPentapod, certify_component, singularity_values
+from pentapod.numerics.bernstein import elevate, split
 
 
 @pytest.mark.parametrize("k", [1, 3])

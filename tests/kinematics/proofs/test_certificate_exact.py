@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from leg_motions import Exact, grazing, segments
 
-from pentapod.numerics.bernstein import elevate
 from pentapod.kinematics import LinearPentapod, certify_component
+from pentapod.numerics.bernstein import elevate
 
 Poly = flint.fmpq_poly
 

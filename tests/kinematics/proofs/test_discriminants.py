@@ -8,7 +8,6 @@ from scipy.interpolate import BPoly
 from pentapod.kinematics import LinearPentapod, certify_component
 from pentapod.kinematics.proofs.discriminants import Discriminants
 
-
 T = np.linspace(0.0, 1.0, 7)
 
 

@@ -6,9 +6,9 @@ import pytest
 from numpy.polynomial import chebyshev
 
 from pentapod.base.errors import ArrayError
-from pentapod.numerics.bernstein import elevate, from_power
 from pentapod.kinematics import LinearPentapod, prove_tip_tube
 from pentapod.machine import Machine
+from pentapod.numerics.bernstein import elevate, from_power
 
 ABOUT = 0.2
 

@@ -12,16 +12,16 @@ from pentapod.machine.clearance.collision_world import Obstacle, Surroundings
 from pentapod.machine.clearance.leg_clearance import clearances
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
-from pentapod.planning.diagnosis import blame
+from pentapod.planning.diagnosis import diagnose
 from pentapod.planning.limits.limit import Comforts
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.ipopt import IpoptSolver
 from pentapod.planning.placement.sampling import first_candidate, first_guesses
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.formulation import step_slopes, stepped
-from pentapod.planning.problem.problem import Setting
-from pentapod.planning.problem.samples import Task
-from pentapod.planning.tool_axis.spline import AxisCourse
+from pentapod.planning.problem.problem import PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
+from pentapod.planning.tool_axis.spline import AxisSpline
 
 PLUS = Component(1, 1)
 TILT = np.radians(15.0)
@@ -142,22 +142,22 @@ def test_without_obstacles_nothing_changes(desk, cap):
 
 
 @pytest.fixture(scope="module")
-def setting(desk, cap):
-    return Setting.of(Task.of(cap, TILT), desk)
+def problem(desk, cap):
+    return PlacementProblem.of(ToolpathSamples.of(cap, TILT), desk)
 
 
 @pytest.fixture(scope="module")
-def free(desk, setting):
+def free(desk, problem):
     """A first guess where nothing is in the way."""
-    guess = first_guesses(setting.task, desk, (PLUS,), 0, samples=2000)[0]
-    return first_candidate(setting, Margins.of(desk, PLUS), guess.transform)
+    guess = first_guesses(problem.samples, desk, (PLUS,), 0, tries=2000)[0]
+    return first_candidate(problem, Margins.of(desk, PLUS), guess.transform)
 
 
-def beside(desk, setting, free, leg, away):
+def beside(desk, problem, free, leg, away):
     """A post of the workpiece frame, its middle `away` metres across from a leg in the middle of the path."""
-    row = len(setting.task.pivots) // 2
+    row = len(problem.samples.pivots) // 2
     tip, axis = (
-        x[0] for x in setting.task.machine_poses(free.transform, setting.axes(free.coefficients, [row]), [row])
+        x[0] for x in problem.samples.machine_poses(free.transform, problem.axes(free.coefficients, [row]), [row])
     )
     start = np.append(desk.robot.base[leg], 0.0)
     joint = tip + (desk.tool_length - desk.robot.offsets[leg]) * axis
@@ -168,24 +168,24 @@ def beside(desk, setting, free, leg, away):
 
 
 @pytest.fixture(scope="module")
-def grazing(desk, setting, free):
+def grazing(desk, problem, free):
     """Margins with a post that a leg runs through, a little, somewhere on the path."""
     for away in np.arange(-0.05, -0.3, -0.004):
-        margins = Margins.of(desk, PLUS, Surroundings((beside(desk, setting, free, 1, away),)))
-        if setting.values(margins, free.transform, free.coefficients)[:, -6:].min() > -0.15:
+        margins = Margins.of(desk, PLUS, Surroundings((beside(desk, problem, free, 1, away),)))
+        if problem.values(margins, free.transform, free.coefficients)[:, -6:].min() > -0.15:
             return margins
     raise AssertionError("the post is never out of the way")
 
 
-def test_the_solver_moves_away_from_a_fixture(setting, free, grazing):
-    start = setting.candidate(grazing, free.transform, free.coefficients)
-    found = SequentialSolver(setting, True).raise_margin(start)
+def test_the_solver_moves_away_from_a_fixture(problem, free, grazing):
+    start = problem.candidate(grazing, free.transform, free.coefficients)
+    found = SequentialSolver(problem, True).raise_margin(start)
     assert start.smallest < 0.0 < found.smallest
 
 
 def test_the_reference_moves_away_from_a_fixture(desk, cap, free, grazing):
     """On few waypoints: what takes IPOPT long is not what is tested here."""
-    few = Setting.of(Task.of(cap, TILT).at(np.arange(0, len(cap), 20)), desk)
+    few = PlacementProblem.of(ToolpathSamples.of(cap, TILT).at(np.arange(0, len(cap), 20)), desk)
     start = few.candidate(grazing, free.transform, few.upright)
     found = IpoptSolver(few, True).raise_margin(start)
     ours = SequentialSolver(few, True).raise_margin(start)
@@ -193,15 +193,15 @@ def test_the_reference_moves_away_from_a_fixture(desk, cap, free, grazing):
     assert ours.smallest > 0.7 * found.smallest
 
 
-def test_the_linear_model_knows_contacts(desk, cap, setting, free):
-    crowded = Surroundings((beside(desk, setting, free, 1, -0.09),), TOOL)
+def test_the_linear_model_knows_contacts(desk, cap, problem, free):
+    crowded = Surroundings((beside(desk, problem, free, 1, -0.09),), TOOL)
     margins = Margins.of(desk, PLUS, crowded)
     rows = np.arange(0, len(cap), 8)
-    slopes = step_slopes(setting, margins)(margins, free.transform, free.coefficients, rows)
+    slopes = step_slopes(problem, margins)(margins, free.transform, free.coefficients, rows)
     step = 1e-5 * np.random.default_rng(5).normal(size=6)
 
     def values(sign):
-        return setting.values(margins, stepped(free.transform, sign * step), free.coefficients, rows)
+        return problem.values(margins, stepped(free.transform, sign * step), free.coefficients, rows)
 
     differences, promised = 0.5 * (values(1.0) - values(-1.0)), slopes[..., :6] @ step
     smooth = np.abs(promised - differences) < 1e-3 * np.abs(step).max() * (1.0 + np.abs(slopes).sum(axis=2))
@@ -209,33 +209,33 @@ def test_the_linear_model_knows_contacts(desk, cap, setting, free):
     assert np.abs(slopes[:, -7:, :6]).max() > 1.0
 
 
-def test_calming_keeps_clear_of_a_fixture(desk, setting, free):
-    margins = Margins.of(desk, PLUS, Surroundings((beside(desk, setting, free, 1, -0.09),)))
-    start = setting.candidate(margins, free.transform, free.coefficients)
+def test_calming_keeps_clear_of_a_fixture(desk, problem, free):
+    margins = Margins.of(desk, PLUS, Surroundings((beside(desk, problem, free, 1, -0.09),)))
+    start = problem.candidate(margins, free.transform, free.coefficients)
     keep = start.smallest - 0.05
-    calm = SequentialSolver(setting, False).calm(start, keep)
-    if calm is not None:
+    smooth = SequentialSolver(problem, False).smooth(start, keep)
+    if smooth is not None:
         assert (
-            setting.values_of(margins, free.transform, AxisCourse.of(setting.task, setting.cone).leans(calm)).min()
+            problem.values_of(margins, free.transform, AxisSpline.of(problem.samples, problem.cone).leans(smooth)).min()
             >= keep - 1e-4
         )
 
 
-def test_a_refusal_names_the_fixture(desk, setting, free):
+def test_a_refusal_names_the_fixture(desk, problem, free):
     """A wide plate across the legs."""
     plate = trimesh.creation.box((0.5, 0.5, 0.01))
     plate.apply_translation([0.0, 0.0, 0.16])
     margins = Margins.of(desk, PLUS, Surroundings((Obstacle("fixture", surface_of(plate), clamped=True),)))
-    values = setting.values(margins, free.transform, free.coefficients)
-    blamed = {b.constraint: b for b in blame(values, margins, 0.02) if b.constraint.endswith("touches the fixture")}
+    values = problem.values(margins, free.transform, free.coefficients)
+    blamed = {b.constraint: b for b in diagnose(values, margins, 0.02) if b.constraint.endswith("touches the fixture")}
     assert "spindle touches the fixture" in blamed
     assert all(b.unit == "mm" and b.shortfall > 0.0 and b.waypoints for b in blamed.values())
     depth = blamed["spindle touches the fixture"].shortfall
     assert depth >= 1e3 * desk.bodies.shaft_radius
 
 
-def test_first_guesses_see_the_fixture(desk, setting, free):
-    crowded = Surroundings((beside(desk, setting, free, 1, 0.0),))
-    plain = first_guesses(setting.task, desk, (PLUS,), 0, samples=1500)
-    seen = first_guesses(setting.task, desk, (PLUS,), 0, samples=1500, surroundings=crowded)
+def test_first_guesses_see_the_fixture(desk, problem, free):
+    crowded = Surroundings((beside(desk, problem, free, 1, 0.0),))
+    plain = first_guesses(problem.samples, desk, (PLUS,), 0, tries=1500)
+    seen = first_guesses(problem.samples, desk, (PLUS,), 0, tries=1500, surroundings=crowded)
     assert seen[0].margin <= plain[0].margin

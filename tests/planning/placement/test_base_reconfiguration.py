@@ -12,14 +12,14 @@ from pentapod.kinematics.component import Component
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.planning import plan
 from pentapod.planning.limits.margins import Margins
-from pentapod.planning.placement.base_reconfiguration import at_slides, guided
+from pentapod.planning.placement.base_reconfiguration import at_slides, reconfigured
 from pentapod.planning.placement.curvature import Curvature
 from pentapod.planning.placement.search import search
-from pentapod.planning.problem.constraints import FREE, Freedom
+from pentapod.planning.problem.constraints import FREE, PlacementConstraints
 from pentapod.planning.problem.formulation import guide_function, step_slopes, stepped
 from pentapod.planning.problem.linear_model import LinearModel
-from pentapod.planning.problem.problem import Setting
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.problem import PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
 
 COMPONENT = Component.parse("++")
 
@@ -39,26 +39,28 @@ def here(desk):
 
 
 def setting_of(machine, here, tilt=0.0, size=0.08, waypoints=80):
-    return Setting.of(Task.of(dome(size, 25.0, waypoints), tilt), machine, Freedom.fixture([here]))
+    return PlacementProblem.of(
+        ToolpathSamples.of(dome(size, 25.0, waypoints), tilt), machine, PlacementConstraints.fixture([here])
+    )
 
 
 def test_derivatives_are_those_of_the_machine_with_its_guides_moved(sliding, here):
     """Against differences of the margins of machines that were built anew at each slide."""
-    setting = setting_of(sliding.at([0.01, -0.02, 0.0, 0.015, -0.005]), here, tilt=0.2)
-    margins, task = Margins.of(setting.machine, COMPONENT), setting.task
+    problem = setting_of(sliding.at([0.01, -0.02, 0.0, 0.015, -0.005]), here, tilt=0.2)
+    margins, task = Margins.of(problem.machine, COMPONENT), problem.samples
     rng, k = np.random.default_rng(1), 7
     slid, step, a = rng.uniform(-0.01, 0.01, 5), rng.uniform(-0.02, 0.02, 6), rng.uniform(-0.1, 0.1, 2)
-    pair = setting.domain.lean_plane.T
+    pair = problem.domain.lean_plane.T
 
     def values(x):
-        machine = sliding.at(setting.machine.slides + x[6:11])
+        machine = sliding.at(problem.machine.slides + x[6:11])
         b = pair @ x[11:]
         axis = task.nominal[k] + b - (b @ task.nominal[k]) * task.nominal[k]
         place = stepped(here, x[:6])
         turned = place.rotate(axis / np.linalg.norm(axis))
         return Margins.of(machine, COMPONENT)(place.apply(task.pivots[k]) - task.pivot * turned, turned)
 
-    point = guide_function(setting, margins)
+    point = guide_function(problem, margins)
     x = np.concatenate([step, slid, a])
     given = (slid, step, a, task.pivots[k], task.nominal[k], pair, here.rotation, here.translation, np.zeros(0))
     found, slopes = (output.full() for output in point.call(list(given)))
@@ -73,11 +75,11 @@ def test_curvature_is_that_of_the_machine_with_its_guides_moved(sliding, here):
     """Second differences, along a line of placement, slides and tilt field, of machines built anew at each slide."""
     start = setting_of(sliding, here, tilt=0.2)
     machine = sliding.at([0.01, -0.02, 0.0, 0.015, -0.005])
-    setting = dataclasses.replace(start, machine=machine)
-    at = setting.candidate(Margins.of(machine, COMPONENT), here, setting.upright + 0.05)
-    rows, moves, none = np.arange(len(setting.task.pivots)), 0.1 * np.eye(11), np.zeros(0, dtype=np.intp)
+    problem = dataclasses.replace(start, machine=machine)
+    at = problem.candidate(Margins.of(machine, COMPONENT), here, problem.upright + 0.05)
+    rows, moves, none = np.arange(len(problem.samples.pivots)), 0.1 * np.eye(11), np.zeros(0, dtype=np.intp)
     slopes = step_slopes(start, Margins.of(sliding, COMPONENT), guides=True)
-    model = LinearModel.of(setting, at, rows, np.inf, none, slopes, (np.zeros(0), np.zeros((0, 11))), moves)
+    model = LinearModel.of(problem, at, rows, np.inf, none, slopes, (np.zeros(0), np.zeros((0, 11))), moves)
     rng = np.random.default_rng(5)
     strokes = np.flatnonzero(["too" in at.margins.limits[k].name for k in model.kinds])  # smooth everywhere
     multipliers = np.zeros(len(model.values) + len(model.steep))
@@ -88,7 +90,7 @@ def test_curvature_is_that_of_the_machine_with_its_guides_moved(sliding, here):
     def weighed(x):
         step, change = model.step_of(x)
         there = sliding.at(machine.slides + step[6:])
-        found = setting.values(Margins.of(there, COMPONENT), stepped(here, step[:6]), at.coefficients + change)
+        found = problem.values(Margins.of(there, COMPONENT), stepped(here, step[:6]), at.coefficients + change)
         return multipliers[: len(model.values)] @ found[model.points, model.kinds]
 
     assert values[0] > -1e-9 * values[-1]
@@ -100,20 +102,20 @@ def test_curvature_is_that_of_the_machine_with_its_guides_moved(sliding, here):
 
 def test_slides_as_good_as_those_of_another_method(sliding, here):
     """A fixed placement, strict normals: slides alone are left to choose; against differential evolution."""
-    setting = setting_of(sliding, here)
-    task, least, greatest = setting.task, *sliding.guides.travel.T
+    problem = setting_of(sliding, here)
+    task, least, greatest = problem.samples, *sliding.guides.travel.T
     few = task.at(task.representatives(30))
     poses = few.machine_poses(here, few.nominal)
 
     def cost(slides):
-        there = at_slides(setting, slides)
+        there = at_slides(problem, slides)
         return 1.0 if there is None else -float(Margins.of(there.machine, COMPONENT)(*poses).min())
 
     other = differential_evolution(
         cost, list(zip(least, greatest, strict=True)), maxiter=12, popsize=6, rng=3, tol=0.0, polish=False
     )
-    there, found = guided(setting, COMPONENT)
-    home = search(setting, COMPONENT).best.smallest
+    there, found = reconfigured(problem, COMPONENT)
+    home = search(problem, COMPONENT).best.smallest
     assert found.best.smallest >= -other.fun - 2e-3
     assert found.best.smallest > home + 0.01
     slides = there.machine.slides
@@ -124,7 +126,7 @@ def test_slides_as_good_as_those_of_another_method(sliding, here):
 
 def test_a_plan_says_where_the_guides_stand(sliding, here, desk):
     path = dome(0.08, 25.0, 80)
-    options = {"freedom": Freedom.fixture([here]), "component": COMPONENT}
+    options = {"constraints": PlacementConstraints.fixture([here]), "component": COMPONENT}
     placed = [plan(path, sliding, **options) for _ in range(2)]
     assert placed[0].placement == placed[1].placement  # the same again
     slides = placed[0].placement.slides
@@ -138,23 +140,23 @@ def test_a_plan_says_where_the_guides_stand(sliding, here, desk):
 
 
 def test_slides_that_cannot_be_reached_are_not_taken(sliding, here):
-    """F = 0 on the way from where the guides stand: no setting there."""
+    """F = 0 on the way from where the guides stand: no problem there."""
     wide = dataclasses.replace(
         sliding,
         guides=ReconfigurablePentapod(sliding.robot, sliding.guides.guides, np.tile((-2.0, 2.0), (5, 1))),
     )
-    setting = setting_of(wide, here)
+    problem = setting_of(wide, here)
     forbidden = wide.guides.forbidden_slides(0, np.zeros(5))
     assert len(forbidden) > 0
     beyond = np.zeros(5)
     beyond[0] = forbidden[np.abs(forbidden).argmin()] * 1.5
-    assert at_slides(setting, beyond) is None
-    assert at_slides(setting, 0.2 * beyond) is not None
+    assert at_slides(problem, beyond) is None
+    assert at_slides(problem, 0.2 * beyond) is not None
 
 
 @pytest.mark.slow
 def test_free_placement_and_guides(sliding):
     """Everything free: more margin than with the guides as they stand."""
-    setting = Setting.of(Task.of(dome(0.12, 35.0), np.radians(10.0)), sliding, FREE)
-    _, found = guided(setting, COMPONENT)
-    assert found.best.smallest > search(setting, COMPONENT).best.smallest + 0.02
+    problem = PlacementProblem.of(ToolpathSamples.of(dome(0.12, 35.0), np.radians(10.0)), sliding, FREE)
+    _, found = reconfigured(problem, COMPONENT)
+    assert found.best.smallest > search(problem, COMPONENT).best.smallest + 0.02

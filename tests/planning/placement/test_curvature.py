@@ -12,8 +12,8 @@ from pentapod.planning.placement.curvature import Curvature
 from pentapod.planning.placement.sampling import first_candidate, first_guesses
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.formulation import stepped
-from pentapod.planning.problem.problem import Setting
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.problem import PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
 
 
 def program(seed, bent):
@@ -53,20 +53,20 @@ def test_without_an_interior_there_is_no_answer():
 
 def test_curvature_against_differences(desk, cap):
     """The Lagrangian of the margins, weighed by multipliers, along a line: second differences of the margins."""
-    setting = Setting.of(Task.of(cap, np.radians(15.0)), desk)
-    guess = first_guesses(setting.task, desk, (Component(1, 1),), 0, samples=2000)[0]
-    at = first_candidate(setting, Margins.of(desk, guess.component), guess.transform)
-    rows = np.arange(len(setting.task.pivots))
-    model = SequentialSolver(setting, free=True).model(at, rows, at.smallest)
+    problem = PlacementProblem.of(ToolpathSamples.of(cap, np.radians(15.0)), desk)
+    guess = first_guesses(problem.samples, desk, (Component(1, 1),), 0, tries=2000)[0]
+    at = first_candidate(problem, Margins.of(desk, guess.component), guess.transform)
+    rows = np.arange(len(problem.samples.pivots))
+    model = SequentialSolver(problem, free=True).model(at, rows, at.smallest)
     rng = np.random.default_rng(5)
     strokes = np.flatnonzero(["too" in at.margins.limits[k].name for k in model.kinds])  # smooth everywhere
     multipliers = np.zeros(len(model.values))
     multipliers[rng.choice(strokes, 8, replace=False)] = rng.uniform(0.1, 1.0, 8)
-    bent = Curvature(setting, at.margins)._of_margins(model, at, multipliers)
+    bent = Curvature(problem, at.margins)._of_margins(model, at, multipliers)
 
     def weighed(x):
         step, change = model.step_of(x)
-        values = setting.values(at.margins, stepped(at.transform, step), at.coefficients + change)
+        values = problem.values(at.margins, stepped(at.transform, step), at.coefficients + change)
         return multipliers @ values[model.points, model.kinds]
 
     for _ in range(5):

@@ -12,8 +12,8 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.search import search
-from pentapod.planning.problem.problem import Setting
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.problem import PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.weights import NEEDED_MARGIN
 
 PLUS = Component(1, 1)
@@ -34,20 +34,20 @@ def names(margins):
 
 def test_what_does_not_fit_alone_is_answered_without_surroundings(desk, wide, surroundings, monkeypatch):
     monkeypatch.setattr("pentapod.planning.placement.search.TRIED", 2)
-    setting = Setting.of(Task.of(wide, 0.2), desk)
-    alone = search(setting, PLUS)
+    problem = PlacementProblem.of(ToolpathSamples.of(wide, 0.2), desk)
+    alone = search(problem, PLUS)
     monkeypatch.setattr("pentapod.planning.placement.search.HOPELESS", np.inf)
-    found = search(setting, PLUS, surroundings)
+    found = search(problem, PLUS, surroundings)
     assert found.best.smallest == alone.best.smallest < NEEDED_MARGIN
     assert names(found.best.margins) == names(Margins.of(desk, PLUS))
 
 
 def test_what_fits_alone_is_placed_among_its_surroundings(desk, cap, surroundings, monkeypatch):
     monkeypatch.setattr("pentapod.planning.placement.search.REFINED", 1)
-    setting = Setting.of(Task.of(cap, 0.2), desk)
-    promising = search(setting, PLUS, surroundings)
+    problem = PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk)
+    promising = search(problem, PLUS, surroundings)
     monkeypatch.setattr("pentapod.planning.placement.search.HOPELESS", np.inf)
-    found = search(setting, PLUS, surroundings)
+    found = search(problem, PLUS, surroundings)
     assert names(found.best.margins) == names(Margins.of(desk, PLUS, surroundings))
     assert found.best.smallest == promising.best.smallest >= NEEDED_MARGIN
     assert np.array_equal(found.best.transform.matrix, promising.best.transform.matrix)
@@ -63,5 +63,5 @@ def test_an_interruption_of_the_look_without_surroundings_ends_the_search(desk, 
             signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
-        search(Setting.of(Task.of(cap, 0.2), desk), PLUS, surroundings, progress=progress)
+        search(PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk), PLUS, surroundings, progress=progress)
     assert len(improved) == 1

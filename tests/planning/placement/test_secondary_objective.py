@@ -8,12 +8,12 @@ from pentapod.kinematics.forces import leg_force_map
 from pentapod.planning import PlacedPath, Weights, plan
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.search import search
-from pentapod.planning.placement.secondary_objective import aim_of, improved
+from pentapod.planning.placement.secondary_objective import improved, objective_of
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.formulation import stepped
 from pentapod.planning.problem.linear_model import REACH
-from pentapod.planning.problem.problem import Setting
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.problem import PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.weights import NEEDED_MARGIN
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
@@ -29,13 +29,13 @@ def quick(cap) -> Toolpath:
 
 @pytest.fixture(scope="module")
 def found(desk, quick):
-    setting = Setting.of(Task.of(quick, TILT), desk)
-    return setting, search(setting).best
+    problem = PlacementProblem.of(ToolpathSamples.of(quick, TILT), desk)
+    return problem, search(problem).best
 
 
-def by_hand(name: str, machine, setting, at) -> float:
+def by_hand(name: str, machine, problem, at) -> float:
     """The aim from its meaning: the worst force of 2000 directions, or a sum over the intervals."""
-    tips, axes = setting.task.machine_poses(at.transform, setting.axes(at.coefficients))
+    tips, axes = problem.samples.machine_poses(at.transform, problem.axes(at.coefficients))
     p = tips + machine.tool_length * axes
     if name == "force":
         rng = np.random.default_rng(0)
@@ -53,30 +53,30 @@ def by_hand(name: str, machine, setting, at) -> float:
 
 @pytest.mark.parametrize("name", AIMS)
 def test_the_second_aim_gains_and_keeps_the_margin(name, desk, quick, found):
-    setting, best = found
-    aim, keep = aim_of(name, setting, quick), 0.9 * best.smallest
-    after = improved(SequentialSolver(setting, True), best, aim, keep)
+    problem, best = found
+    aim, keep = objective_of(name, problem, quick), 0.9 * best.smallest
+    after = improved(SequentialSolver(problem, True), best, aim, keep)
     assert after.smallest >= keep - 1e-5
-    assert setting.steepness(after.coefficients).max() <= 1.0 + 1e-12
+    assert problem.steepness(after.coefficients).max() <= 1.0 + 1e-12
     assert aim.value(after) < 0.99 * aim.value(best)
     for candidate in (best, after):
-        assert by_hand(name, desk, setting, candidate) == pytest.approx(aim.value(candidate), rel=2e-3)
+        assert by_hand(name, desk, problem, candidate) == pytest.approx(aim.value(candidate), rel=2e-3)
 
 
 @pytest.mark.parametrize("name", AIMS)
 def test_derivatives_of_the_aims(name, quick, found):
     """Along random directions of all unknowns, by differences of the whole aim."""
-    setting, best = found
-    aim = aim_of(name, setting, quick)
-    model = SequentialSolver(setting, True).model(best, np.arange(len(quick)), best.smallest)
+    problem, best = found
+    aim = objective_of(name, problem, quick)
+    model = SequentialSolver(problem, True).model(best, np.arange(len(quick)), best.smallest)
     pieces, slopes = aim.pieces(best, model)
     piece = int(pieces.argmax())
     assert aim.value(best) == pytest.approx(pieces[piece], rel=1e-12)
     for x in np.random.default_rng(1).normal(size=(3, slopes.shape[1])):
 
         def moved(h, x=x):
-            change = (h * x[6:] * setting.cone).reshape(-1, 2)
-            return setting.candidate(
+            change = (h * x[6:] * problem.cone).reshape(-1, 2)
+            return problem.candidate(
                 best.margins, stepped(best.transform, h * REACH * x[:6]), best.coefficients + change
             )
 

@@ -14,41 +14,41 @@ from pentapod.planning.placement.search import search
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.formulation import stepped
 from pentapod.planning.problem.linear_model import REACH
-from pentapod.planning.problem.problem import Setting
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.problem import PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.tool_axis.smoothing import SLACK
-from pentapod.planning.tool_axis.spline import AxisCourse
+from pentapod.planning.tool_axis.spline import AxisSpline
 
 TILT = np.radians(15.0)
 
 
 @pytest.fixture(scope="module")
-def setting(desk):
-    return Setting.of(Task.of(dome(0.12, 35.0, waypoints=160), TILT), desk)
+def problem(desk):
+    return PlacementProblem.of(ToolpathSamples.of(dome(0.12, 35.0, waypoints=160), TILT), desk)
 
 
 @pytest.fixture(scope="module")
-def start(setting, desk):
-    guess = first_guesses(setting.task, desk, COMPONENTS, 0, samples=2000)[0]
-    return first_candidate(setting, Margins.of(desk, guess.component), guess.transform)
+def start(problem, desk):
+    guess = first_guesses(problem.samples, desk, COMPONENTS, 0, tries=2000)[0]
+    return first_candidate(problem, Margins.of(desk, guess.component), guess.transform)
 
 
 @pytest.fixture(scope="module")
-def raised(setting, start):
-    return SequentialSolver(setting, free=True).raise_margin(start)
+def raised(problem, start):
+    return SequentialSolver(problem, free=True).raise_margin(start)
 
 
-def test_a_first_candidate_keeps_the_cone(setting, start):
-    assert setting.steepness(start.coefficients).max() <= 1.0 + 1e-12
+def test_a_first_candidate_keeps_the_cone(problem, start):
+    assert problem.steepness(start.coefficients).max() <= 1.0 + 1e-12
 
 
-def test_raising_the_margin_matches_the_reference(setting, start, raised):
+def test_raising_the_margin_matches_the_reference(problem, start, raised):
     """Both end in a local optimum of a problem with kinks; the default may not be the poorer one by much."""
-    reference = IpoptSolver(setting, free=True).raise_margin(start)
+    reference = IpoptSolver(problem, free=True).raise_margin(start)
     assert raised.smallest > start.smallest
     assert raised.smallest >= 0.97 * reference.smallest
-    assert setting.steepness(raised.coefficients).max() <= 1.0 + 1e-12
+    assert problem.steepness(raised.coefficients).max() <= 1.0 + 1e-12
 
 
 @pytest.mark.slow
@@ -56,51 +56,51 @@ def test_raising_the_margin_matches_the_reference(setting, start, raised):
 def test_a_search_with_either_solver_ends_alike(desk, number):
     """From one start they may reach different tops of a landscape with many; from several the best is the same."""
     instance = instances(7)[number]
-    setting = Setting.of(Task.of(instance.toolpath, instance.tilt), desk)
-    ours, reference = search(setting), search(setting, solver="ipopt")
+    problem = PlacementProblem.of(ToolpathSamples.of(instance.toolpath, instance.tilt), desk)
+    ours, reference = search(problem), search(problem, solver="ipopt")
     assert ours.best.smallest >= 0.999 * reference.best.smallest
 
 
-def test_the_result_recomputed_is_what_was_claimed(setting, raised):
-    values = setting.values(raised.margins, raised.transform, raised.coefficients)
+def test_the_result_recomputed_is_what_was_claimed(problem, raised):
+    values = problem.values(raised.margins, raised.transform, raised.coefficients)
     assert values.min() == pytest.approx(raised.smallest, abs=1e-12)
 
 
-def test_calm_axes_match_the_reference(setting, raised):
+def test_calm_axes_match_the_reference(problem, raised):
     """The same problem at a given placement: the same optimum to 0.1 %."""
-    keep, course = 0.9 * raised.smallest, AxisCourse.of(setting.task, setting.cone)
-    ours = SequentialSolver(setting, free=False).calm(raised, keep)
-    reference = IpoptSolver(setting, free=False).calm(raised, keep)
-    assert setting.values_of(raised.margins, raised.transform, course.leans(ours)).min() >= keep - SLACK
-    assert np.linalg.norm(course.leans(ours), axis=1).max() <= setting.cone * (1.0 + 1e-12)
-    assert course.cost_of(ours) <= 1.001 * course.cost_of(reference)
-    assert course.cost_of(ours) < course.cost_of(course.fitted(setting.leans(raised.coefficients)))
+    keep, spline = 0.9 * raised.smallest, AxisSpline.of(problem.samples, problem.cone)
+    ours = SequentialSolver(problem, free=False).smooth(raised, keep)
+    reference = IpoptSolver(problem, free=False).smooth(raised, keep)
+    assert problem.values_of(raised.margins, raised.transform, spline.leans(ours)).min() >= keep - SLACK
+    assert np.linalg.norm(spline.leans(ours), axis=1).max() <= problem.cone * (1.0 + 1e-12)
+    assert spline.cost_of(ours) <= 1.001 * spline.cost_of(reference)
+    assert spline.cost_of(ours) < spline.cost_of(spline.fitted(problem.leans(raised.coefficients)))
 
 
-def test_calm_axes_turn_slower_than_strict_normals(setting, raised):
-    ours = SequentialSolver(setting, free=False).calm(raised, 0.9 * raised.smallest)
-    axes = lean(setting.task.nominal, AxisCourse.of(setting.task, setting.cone).leans(ours))
-    strict, turned = (np.linalg.norm(np.diff(x, axis=0), axis=1) for x in (setting.task.nominal, axes))
+def test_calm_axes_turn_slower_than_strict_normals(problem, raised):
+    ours = SequentialSolver(problem, free=False).smooth(raised, 0.9 * raised.smallest)
+    axes = lean(problem.samples.nominal, AxisSpline.of(problem.samples, problem.cone).leans(ours))
+    strict, turned = (np.linalg.norm(np.diff(x, axis=0), axis=1) for x in (problem.samples.nominal, axes))
     assert np.median(turned) < np.median(strict)
     assert turned.max() <= 1.1 * strict.max()
 
 
-def test_no_axes_keep_a_margin_beyond_reach(setting, raised):
-    assert SequentialSolver(setting, free=False).calm(raised, raised.smallest + 0.5) is None
+def test_no_axes_keep_a_margin_beyond_reach(problem, raised):
+    assert SequentialSolver(problem, free=False).smooth(raised, raised.smallest + 0.5) is None
 
 
-def test_the_linear_model_is_the_derivative(setting, raised):
+def test_the_linear_model_is_the_derivative(problem, raised):
     """Against central differences of the margins themselves, along random directions of all unknowns."""
-    rows = np.arange(len(setting.task.pivots))
-    model = SequentialSolver(setting, free=True).model(raised, rows, raised.smallest)
+    rows = np.arange(len(problem.samples.pivots))
+    model = SequentialSolver(problem, free=True).model(raised, rows, raised.smallest)
     rng = np.random.default_rng(3)
     for _ in range(5):
         x = rng.normal(size=model.matrix.shape[1])
 
         def all_values(h, x=x):
-            step, change = h * x[:6] * REACH, (h * x[6:] * setting.cone).reshape(-1, 2)
+            step, change = h * x[:6] * REACH, (h * x[6:] * problem.cone).reshape(-1, 2)
             transform = stepped(raised.transform, step)
-            return setting.values(raised.margins, transform, raised.coefficients + change)
+            return problem.values(raised.margins, transform, raised.coefficients + change)
 
         slope = (all_values(1e-6) - all_values(-1e-6)) / 2e-6
         here = all_values(0.0)
@@ -111,8 +111,8 @@ def test_the_linear_model_is_the_derivative(setting, raised):
         assert smooth.mean() > 0.98  # gaps between legs have kinks
 
 
-def test_a_fixed_placement_stays(setting, start):
-    held = SequentialSolver(setting, free=False).raise_margin(start)
+def test_a_fixed_placement_stays(problem, start):
+    held = SequentialSolver(problem, free=False).raise_margin(start)
     np.testing.assert_array_equal(held.transform.matrix, start.transform.matrix)
     assert held.smallest >= start.smallest
 

@@ -11,8 +11,8 @@ from pentapod.kinematics.component import COMPONENTS
 from pentapod.numerics.casadi_vectorised import Vectorised
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.problem.formulation import point_function
-from pentapod.planning.problem.problem import Setting
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.problem import PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
 
 UNARY = (ca.sqrt, ca.fabs, ca.sign, ca.sin, ca.cos, ca.exp, ca.log, ca.logic_not, lambda a: -a, lambda a: a * a)
 BINARY = (
@@ -36,12 +36,12 @@ def test_every_operation_is_casadis(seed):
 
 @pytest.mark.parametrize("by", ["nothing", "lean", "step and lean"])
 def test_margins_and_slopes_are_casadis(desk, cap, by):
-    setting = Setting.of(Task.of(cap, 0.2), desk)
-    function = point_function(setting, Margins.of(desk, COMPONENTS[0]), range(20), by=by)
-    task, rng = setting.task, np.random.default_rng(1)
+    problem = PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk)
+    function = point_function(problem, Margins.of(desk, COMPONENTS[0]), range(20), by=by)
+    task, rng = problem.samples, np.random.default_rng(1)
     transform = RigidTransform(np.eye(3), desk.work.centre)
     count = len(task.pivots)
-    leans, pair = 0.1 * rng.normal(size=(2, count)), setting.domain.lean_plane.T
+    leans, pair = 0.1 * rng.normal(size=(2, count)), problem.domain.lean_plane.T
     fixed = np.zeros((6, 1)), pair.T.reshape(-1, 1), transform.rotation.T.reshape(-1, 1), transform.translation[:, None]
     touching = np.zeros((0, count))  # there is nothing to touch
     found = Vectorised(function)(fixed[0], leans, task.pivots.T, task.nominal.T, *fixed[1:], touching)

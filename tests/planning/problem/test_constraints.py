@@ -1,4 +1,4 @@
-"""Freedom: what is allowed stays allowed, and what the solvers find keeps table, box, turn and fixture."""
+"""PlacementConstraints: what is allowed stays allowed, and what the solvers find keeps table, box, turn and fixture."""
 
 import re
 
@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from pentapod.base.errors import ArrayError
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.planning import Freedom, PlacedPath, plan
+from pentapod.planning import PlacedPath, PlacementConstraints, plan
 from pentapod.planning.plan import NEEDED_MARGIN
 from pentapod.planning.problem.constraints import FREE
 from pentapod.planning.problem.formulation import room_function, stepped
@@ -24,24 +24,24 @@ def turn_between(a: RigidTransform, b: RigidTransform) -> float:
     return float((Rotation.from_matrix(a.rotation).inv() * Rotation.from_matrix(b.rotation)).magnitude())
 
 
-def freedoms(seed: int) -> list[Freedom]:
+def freedoms(seed: int) -> list[PlacementConstraints]:
     rng = np.random.default_rng(seed)
     corner = rng.normal(size=3)
     reference = RigidTransform(Rotation.random(rng=rng).as_matrix(), np.zeros(3))
     return [
         FREE,
-        Freedom.free(low=corner, high=corner + rng.uniform(0.0, 0.3, 3)),
-        Freedom.free(reference=reference, largest_turn=float(rng.uniform(0.01, 3.0))),
-        Freedom.table(0.6, x=(-0.1, 0.2), y=(0.0, 0.1), up=rng.normal(size=3)),
-        Freedom.table(-0.6, up=(0.0, 1.0, 0.0), normal=(0.0, 0.0, 1.0)),
+        PlacementConstraints.free(low=corner, high=corner + rng.uniform(0.0, 0.3, 3)),
+        PlacementConstraints.free(reference=reference, largest_turn=float(rng.uniform(0.01, 3.0))),
+        PlacementConstraints.table(0.6, x=(-0.1, 0.2), y=(0.0, 0.1), up=rng.normal(size=3)),
+        PlacementConstraints.table(-0.6, up=(0.0, 1.0, 0.0), normal=(0.0, 0.0, 1.0)),
     ]
 
 
-def is_allowed(freedom: Freedom, rotation: np.ndarray, origin: np.ndarray) -> bool:
+def is_allowed(constraints: PlacementConstraints, rotation: np.ndarray, origin: np.ndarray) -> bool:
     """Said afresh, from the meaning of the fields."""
-    inside = (origin >= freedom.low - 1e-12).all() and (origin <= freedom.high + 1e-12).all()
-    turn = Rotation.from_matrix(freedom.reference.T @ rotation).magnitude() <= freedom.largest_turn + 1e-9
-    upright = not freedom.upright.any() or np.abs(rotation @ freedom.upright - freedom.normal).max() < 1e-9
+    inside = (origin >= constraints.low - 1e-12).all() and (origin <= constraints.high + 1e-12).all()
+    turn = Rotation.from_matrix(constraints.reference.T @ rotation).magnitude() <= constraints.largest_turn + 1e-9
+    upright = not constraints.upright.any() or np.abs(rotation @ constraints.upright - constraints.normal).max() < 1e-9
     return bool(inside and turn and upright)
 
 
@@ -50,13 +50,13 @@ def is_allowed(freedom: Freedom, rotation: np.ndarray, origin: np.ndarray) -> bo
 def test_what_is_brought_within_is_allowed_and_stays(seed):
     rng = np.random.default_rng(seed)
     rotations, origins = Rotation.random(40, rng=rng).as_matrix(), rng.normal(size=(40, 3))
-    for freedom in freedoms(seed):
-        r, o = freedom.within(rotations, origins, np.random.default_rng(seed))
-        assert all(is_allowed(freedom, a, b) for a, b in zip(r, o, strict=True))
-        again_r, again_o = freedom.nearest(r, o)
+    for constraints in freedoms(seed):
+        r, o = constraints.within(rotations, origins, np.random.default_rng(seed))
+        assert all(is_allowed(constraints, a, b) for a, b in zip(r, o, strict=True))
+        again_r, again_o = constraints.nearest(r, o)
         np.testing.assert_allclose(again_r, r, atol=1e-9)
         np.testing.assert_array_equal(again_o, o)
-        if freedom is FREE:
+        if constraints is FREE:
             np.testing.assert_array_equal(r, rotations)
             np.testing.assert_array_equal(o, origins)
 
@@ -67,43 +67,44 @@ def test_allowed_motion_and_its_room(seed):
     """A step along the motion keeps what the motion holds; the room is negative just where a placement is not allowed;
     its derivative is that of differences."""
     rng = np.random.default_rng(seed)
-    for freedom in freedoms(seed):
-        r, o = freedom.within(Rotation.random(1, rng=rng).as_matrix(), rng.normal(size=(1, 3)), rng)
+    for constraints in freedoms(seed):
+        r, o = constraints.within(Rotation.random(1, rng=rng).as_matrix(), rng.normal(size=(1, 3)), rng)
         here = RigidTransform(r[0], o[0])
-        step = freedom.motion @ rng.normal(scale=0.05, size=freedom.motion.shape[1])
+        step = constraints.motion @ rng.normal(scale=0.05, size=constraints.motion.shape[1])
         there = stepped(here, step)
-        np.testing.assert_allclose(there.rotation @ freedom.upright, freedom.normal, atol=1e-9)
-        room = freedom.room(there.rotation, there.translation)
-        assert all(x >= 0.0 for x in room) == is_allowed(freedom, there.rotation, there.translation)
+        np.testing.assert_allclose(there.rotation @ constraints.upright, constraints.normal, atol=1e-9)
+        room = constraints.room(there.rotation, there.translation)
+        assert all(x >= 0.0 for x in room) == is_allowed(constraints, there.rotation, there.translation)
         if room:
-            values, slopes = room_function(freedom)(np.zeros(6), here.rotation, here.translation)
+            values, slopes = room_function(constraints)(np.zeros(6), here.rotation, here.translation)
             np.testing.assert_allclose(
-                np.asarray(values).ravel(), freedom.room(here.rotation, here.translation), atol=1e-12
+                np.asarray(values).ravel(), constraints.room(here.rotation, here.translation), atol=1e-12
             )
-            for h in 1e-6 * freedom.motion.T:
+            for h in 1e-6 * constraints.motion.T:
                 ahead, back = stepped(here, h), stepped(here, -h)
                 change = np.subtract(
-                    freedom.room(ahead.rotation, ahead.translation), freedom.room(back.rotation, back.translation)
+                    constraints.room(ahead.rotation, ahead.translation),
+                    constraints.room(back.rotation, back.translation),
                 )
                 np.testing.assert_allclose(np.asarray(slopes) @ h * 2.0, change, atol=1e-13)
 
 
 def test_a_half_turn_is_measured_and_undone():
     half = np.diag([1.0, -1.0, -1.0])
-    freedom = Freedom.free(largest_turn=np.radians(20.0))
-    r, _ = freedom.nearest(half[None], np.zeros((1, 3)))
+    constraints = PlacementConstraints.free(largest_turn=np.radians(20.0))
+    r, _ = constraints.nearest(half[None], np.zeros((1, 3)))
     assert Rotation.from_matrix(r[0]).magnitude() == pytest.approx(np.radians(20.0))
-    table = Freedom.table(0.5, up=(0.0, 0.0, 1.0))
+    table = PlacementConstraints.table(0.5, up=(0.0, 0.0, 1.0))
     r, _ = table.nearest(np.eye(3)[None], np.zeros((1, 3)))
     np.testing.assert_allclose(r[0] @ [0.0, 0.0, 1.0], [0.0, 0.0, -1.0], atol=1e-12)
 
 
 def test_impossible_freedoms_are_errors():
     for wrong in (
-        lambda: Freedom.free(low=(1.0, 0.0, 0.0), high=(0.0, 1.0, 1.0)),
-        lambda: Freedom.free(largest_turn=4.0),
-        lambda: Freedom.table(0.5, normal=(0.1, 0.0, -1.0)),
-        lambda: Freedom.fixture([]),
+        lambda: PlacementConstraints.free(low=(1.0, 0.0, 0.0), high=(0.0, 1.0, 1.0)),
+        lambda: PlacementConstraints.free(largest_turn=4.0),
+        lambda: PlacementConstraints.table(0.5, normal=(0.1, 0.0, -1.0)),
+        lambda: PlacementConstraints.fixture([]),
     ):
         with pytest.raises(ArrayError):
             wrong()
@@ -118,8 +119,8 @@ def best(cap_placed):
 def test_a_table_is_kept_by_both_solvers(desk, cap, best, solver):
     height = best.placement.transform.translation[2]
     x = best.placement.transform.translation[0]
-    freedom = Freedom.table(height, x=(x - 0.02, x + 0.02))
-    answer = plan(cap, desk, tilt=TILT, freedom=freedom, component=best.component, solver=solver)
+    constraints = PlacementConstraints.table(height, x=(x - 0.02, x + 0.02))
+    answer = plan(cap, desk, tilt=TILT, constraints=constraints, component=best.component, solver=solver)
     assert isinstance(answer, PlacedPath), str(answer)
     found = answer.placement.transform
     assert found.translation[2] == height
@@ -134,8 +135,8 @@ def test_box_and_turn_are_kept_by_both_solvers(desk, cap, best, solver):
     there = best.placement.transform
     reference = RigidTransform(there.rotation @ Rotation.from_euler("z", 12, degrees=True).as_matrix(), np.zeros(3))
     low = there.translation + np.array([0.005, -0.05, -0.05])
-    bounds = Freedom.free(low=low, high=low + 0.1, reference=reference, largest_turn=np.radians(6.0))
-    answer = plan(cap, desk, tilt=TILT, freedom=bounds, component=best.component, solver=solver)
+    bounds = PlacementConstraints.free(low=low, high=low + 0.1, reference=reference, largest_turn=np.radians(6.0))
+    answer = plan(cap, desk, tilt=TILT, constraints=bounds, component=best.component, solver=solver)
     assert isinstance(answer, PlacedPath), str(answer)
     found = answer.placement.transform
     assert (found.translation >= low - 1e-12).all()
@@ -148,7 +149,7 @@ def test_the_best_pose_of_a_fixture_is_taken(desk, cap, best):
     there = best.placement.transform
     away = [RigidTransform(there.rotation, there.translation + np.array([d, 0.0, 0.0])) for d in (0.3, 0.02, -0.25)]
     poses = [away[0], away[1], there, away[2]]
-    answer = plan(cap, desk, tilt=TILT, freedom=Freedom.fixture(poses), component=best.component)
+    answer = plan(cap, desk, tilt=TILT, constraints=PlacementConstraints.fixture(poses), component=best.component)
     assert isinstance(answer, PlacedPath)
     assert answer.placement.transform is there
     assert "pose 3 of 4" in answer.placement.chosen_by
@@ -156,8 +157,8 @@ def test_the_best_pose_of_a_fixture_is_taken(desk, cap, best):
 
 def test_a_table_too_low_is_told_where_it_would_do(desk, cap, best):
     """It has to come nearer to the base, by most of what it was lowered."""
-    low = Freedom.table(best.placement.transform.translation[2] + 0.5)
-    answer = plan(cap, desk, tilt=TILT, freedom=low, component=best.component)
+    low = PlacementConstraints.table(best.placement.transform.translation[2] + 0.5)
+    answer = plan(cap, desk, tilt=TILT, constraints=low, component=best.component)
     assert not isinstance(answer, PlacedPath)
     assert "move the part by (" in answer.remedy
     shift = np.array(re.search(r"by \((.*?)\) mm", answer.remedy)[1].split(", "), dtype=float)

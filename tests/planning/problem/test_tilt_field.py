@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import FieldDomain, TiltField, lean
 
 
@@ -38,7 +38,7 @@ def test_roughness_of_a_linear_field_is_zero(cap):
 
 
 def test_representatives_are_distinct_deterministic_and_include_extremes(cap):
-    task = Task.of(cap, 0.1)
+    task = ToolpathSamples.of(cap, 0.1)
     rows = task.representatives(40)
     assert len(np.unique(rows)) == 40
     np.testing.assert_array_equal(rows, task.representatives(40))

@@ -1,4 +1,4 @@
-"""What a course of the axes costs: charges against sums by hand, their linear model, and what they achieve."""
+"""What a spline of the axes costs: charges against sums by hand, their linear model, and what they achieve."""
 
 import casadi as ca
 import numpy as np
@@ -12,65 +12,65 @@ from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.planning.placement.placement import Placement
 from pentapod.planning.placement.sampling import first_candidate, first_guesses
 from pentapod.planning.placement.sequential import SequentialSolver
-from pentapod.planning.problem.problem import Setting
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.problem import PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.tool_axis import cost as axis_cost
 from pentapod.planning.tool_axis.cost import EXCESS_WEIGHT, AxisCost
-from pentapod.planning.tool_axis.spline import BANDS, FORESIGHT_M, AxisCourse
+from pentapod.planning.tool_axis.spline import BANDS, FORESIGHT_M, AxisSpline
 
 KEPT = 0.9
 
 
 def candidate_of(instance, desk):
-    setting = Setting.of(Task.of(instance.toolpath, max(instance.tilt, 0.1)), desk)
-    guess = first_guesses(setting.task, desk, COMPONENTS, 0, samples=2000)[0]
-    return setting, first_candidate(setting, Margins.of(desk, guess.component), guess.transform)
+    problem = PlacementProblem.of(ToolpathSamples.of(instance.toolpath, max(instance.tilt, 0.1)), desk)
+    guess = first_guesses(problem.samples, desk, COMPONENTS, 0, tries=2000)[0]
+    return problem, first_candidate(problem, Margins.of(desk, guess.component), guess.transform)
 
 
 @pytest.fixture(scope="module", params=[0, 6, 11])
 def made(request, desk):
-    """A setting, a candidate and its cost, for a raster, a spiral and a curve."""
-    setting, at = candidate_of(instances(12)[request.param], desk)
-    return setting, at, AxisCost(setting, course_of(setting), at)
+    """A problem, a candidate and its cost, for a raster, a spiral and a curve."""
+    problem, at = candidate_of(instances(12)[request.param], desk)
+    return problem, at, AxisCost(problem, course_of(problem), at)
 
 
-def course_of(setting):
-    return AxisCourse.of(setting.task, setting.cone)
+def course_of(problem):
+    return AxisSpline.of(problem.samples, problem.cone)
 
 
-def random_coefficients(setting, size=0.3):
-    c = np.random.default_rng(0).normal(size=(course_of(setting).hessian.shape[1] // 2, 2))
+def random_coefficients(problem, size=0.3):
+    c = np.random.default_rng(0).normal(size=(course_of(problem).hessian.shape[1] // 2, 2))
     return size * c / np.maximum(1.0, np.linalg.norm(c, axis=1, keepdims=True))
 
 
-def legs_of(setting, at, desk, c):
+def legs_of(problem, at, desk, c):
     """Leg lengths at the nodes, by the robot's own inverse kinematics."""
-    rows = course_of(setting).nodes
-    axes = lean(setting.task.nominal, course_of(setting).leans(c))[rows]
-    tips, turned = setting.task.machine_poses(at.transform, axes, rows)
+    rows = course_of(problem).nodes
+    axes = lean(problem.samples.nominal, course_of(problem).leans(c))[rows]
+    tips, turned = problem.samples.machine_poses(at.transform, axes, rows)
     return desk.robot.leg_lengths(tips + desk.tool_length * turned, -turned)
 
 
 def test_strict_normals_are_not_charged(made):
-    setting, _, cost = made
-    strict = np.zeros((course_of(setting).hessian.shape[1] // 2, 2))
-    assert cost.of(strict) == pytest.approx(course_of(setting).cost_of(strict), rel=1e-12)
-    assert cost.of(random_coefficients(setting)) > 2.0 * course_of(setting).cost_of(random_coefficients(setting))
+    problem, _, cost = made
+    strict = np.zeros((course_of(problem).hessian.shape[1] // 2, 2))
+    assert cost.of(strict) == pytest.approx(course_of(problem).cost_of(strict), rel=1e-12)
+    assert cost.of(random_coefficients(problem)) > 2.0 * course_of(problem).cost_of(random_coefficients(problem))
 
 
 def test_charges_are_sums_over_the_nodes(made, desk):
     """Node by node, from lengths of the robot's own kinematics and axes themselves, in plain loops."""
-    setting, at, cost = made
-    c, way = random_coefficients(setting), course_of(setting).way
+    problem, at, cost = made
+    c, way = random_coefficients(problem), course_of(problem).way
 
     def bent(legs):
         before, after = np.diff(way)[:-1, None], np.diff(way)[1:, None]
         return 2.0 * ((legs[2:] - legs[1:-1]) / after - (legs[1:-1] - legs[:-2]) / before) / (after + before)
 
-    ours, strict = (np.abs(bent(legs_of(setting, at, desk, x))) for x in (c, np.zeros_like(c)))
+    ours, strict = (np.abs(bent(legs_of(problem, at, desk, x))) for x in (c, np.zeros_like(c)))
     worst = strict.max(axis=1)
-    nominal = setting.task.nominal[course_of(setting).nodes]
+    nominal = problem.samples.nominal[course_of(problem).nodes]
     rates = np.linalg.norm(np.diff(nominal, axis=0), axis=1) / np.diff(way)
     price = EXCESS_WEIGHT * FORESIGHT_M**2 * ((np.diff(way) * rates**2).sum() / (way[-1] - way[0]) + 0.1**2)
     charge = 0.0
@@ -82,18 +82,18 @@ def test_charges_are_sums_over_the_nodes(made, desk):
 
 def test_rates_are_those_of_the_axes(made):
     """Told in pairs that are carried along they have the length of the axes' own, but for what lies along the axis."""
-    setting, _, cost = made
-    c = random_coefficients(setting, 0.05)
-    rows, way = course_of(setting).nodes, course_of(setting).way
-    axes = lean(setting.task.nominal, course_of(setting).leans(c))[rows]
+    problem, _, cost = made
+    c = random_coefficients(problem, 0.05)
+    rows, way = course_of(problem).nodes, course_of(problem).way
+    axes = lean(problem.samples.nominal, course_of(problem).leans(c))[rows]
     true = np.linalg.norm(np.diff(axes, axis=0), axis=1) / np.diff(way)
     np.testing.assert_allclose(np.linalg.norm(cost.rates(c), axis=1), true, rtol=0.02, atol=0.02 * true.max())
 
 
 def test_soft_rows_are_the_derivatives_of_what_is_charged(made):
     """Where all comes near, the charge by rows agrees with the charge itself to second order in the step."""
-    setting, _, cost = made
-    c, d = random_coefficients(setting), 1e-5 * random_coefficients(setting)
+    problem, _, cost = made
+    c, d = random_coefficients(problem), 1e-5 * random_coefficients(problem)
     rows = cost.excess(c, 2.0 * c, -2.0 * c)
 
     def by_rows(x):
@@ -102,15 +102,15 @@ def test_soft_rows_are_the_derivatives_of_what_is_charged(made):
         return float(rows.weight @ np.square(np.maximum(values - rows.upper, 0.0)))
 
     def charged(x):
-        return cost.of(x) - course_of(setting).cost_of(x)
+        return cost.of(x) - course_of(problem).cost_of(x)
 
     assert by_rows(c) == pytest.approx(charged(c), rel=1e-9)
     assert by_rows(c + d) - by_rows(c) == pytest.approx(charged(c + d) - charged(c), rel=1e-3)
 
 
 def test_the_reference_sees_the_same_cost(made):
-    setting, _, cost = made
-    c = random_coefficients(setting)
+    problem, _, cost = made
+    c = random_coefficients(problem)
     x = ca.MX.sym("c", 2, len(c))
     spent, excess, room = cost.symbolic(x)
     function = ca.Function("spent", [x, excess], [spent, room])
@@ -139,26 +139,26 @@ def test_without_charges_the_calmest_axes_ask_more_of_the_legs(desk, monkeypatch
 def above_strict(desk, number):
     """Return the share of a path where a leg's acceleration is above what strict normals ask of any leg there."""
     instance = instances(12)[number]
-    setting, at = candidate_of(instance, desk)
-    at = SequentialSolver(setting, free=True).raise_margin(at)
-    calm = SequentialSolver(setting, free=False).calm(at, KEPT * at.smallest)
+    problem, at = candidate_of(instance, desk)
+    at = SequentialSolver(problem, free=True).raise_margin(at)
+    smooth = SequentialSolver(problem, free=False).smooth(at, KEPT * at.smallest)
     strict, ours = (
-        accelerations(instance, setting, at, desk, axes)
-        for axes in (setting.task.nominal, lean(setting.task.nominal, course_of(setting).leans(calm)))
+        accelerations(instance, problem, at, desk, axes)
+        for axes in (problem.samples.nominal, lean(problem.samples.nominal, course_of(problem).leans(smooth)))
     )
     return (ours > 1.1 * strict + 0.01 * strict.max()).mean()
 
 
-def accelerations(instance, setting, at, desk, axes):
+def accelerations(instance, problem, at, desk, axes):
     """Largest second derivative of the legs along the path, at one density."""
-    tips, turned = setting.task.machine_poses(at.transform, axes)
+    tips, turned = problem.samples.machine_poses(at.transform, axes)
     values = at.margins(tips, turned, at.transform)
     placement = Placement(at.transform, "test")
     placed = PlacedPath(instance.toolpath, placement, at.margins.component, tips, turned, values, at.margins.limits)
     path = leg_path(placed, desk, path_tolerance=20e-6, axis_tolerance=np.radians(0.5))
     parameter = np.linspace(0.0, path.length, 20_000)
     tip, axis = path.pose(parameter)
-    pivots = tip + setting.task.pivot * axis
+    pivots = tip + problem.samples.pivot * axis
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(pivots, axis=0), axis=1))])
     even = np.linspace(0.0, way[-1], 4_000)
     legs = np.stack([np.interp(even, way, leg) for leg in path(parameter).T], axis=1)

@@ -1,4 +1,4 @@
-"""The course of the tool axis: its cost against sums by hand, its cone, and the banded program against IPOPT."""
+"""The spline of the tool axis: its cost against sums by hand, its cone, and the banded program against IPOPT."""
 
 import casadi as ca
 import numpy as np
@@ -12,109 +12,109 @@ from pentapod.kinematics.component import COMPONENTS
 from pentapod.numerics.convex.interior_point import AxisProgram, SoftRows
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.sampling import first_candidate, first_guesses
-from pentapod.planning.problem.problem import Setting
-from pentapod.planning.problem.samples import Task
-from pentapod.planning.tool_axis.smoothing import calmed
-from pentapod.planning.tool_axis.spline import BANDS, FORESIGHT_M, UPRIGHT_WEIGHT, AxisCourse
+from pentapod.planning.problem.problem import PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
+from pentapod.planning.tool_axis.smoothing import smoothed
+from pentapod.planning.tool_axis.spline import BANDS, FORESIGHT_M, UPRIGHT_WEIGHT, AxisSpline
 
 CONE = 0.3
 
 
 def course_of(k):
     instance = instances(k + 1)[k]
-    task = Task.of(instance.toolpath, 0.28)
-    return task, AxisCourse.of(task, CONE)
+    task = ToolpathSamples.of(instance.toolpath, 0.28)
+    return task, AxisSpline.of(task, CONE)
 
 
-def random_coefficients(course, rng):
-    c = rng.normal(size=(course.hessian.shape[1] // 2, 2))
+def random_coefficients(spline, rng):
+    c = rng.normal(size=(spline.hessian.shape[1] // 2, 2))
     return c / np.maximum(1.0, np.linalg.norm(c, axis=1, keepdims=True))
 
 
 @given(st.integers(0, 11), st.integers(0, 1000))
 @settings(max_examples=20)
 def test_coefficients_in_the_disc_keep_the_cone(k, seed):
-    task, course = course_of(k)
-    leans = course.leans(random_coefficients(course, np.random.default_rng(seed)))
+    task, spline = course_of(k)
+    leans = spline.leans(random_coefficients(spline, np.random.default_rng(seed)))
     assert np.linalg.norm(leans, axis=1).max() <= CONE * (1.0 + 1e-12)
     np.testing.assert_allclose((leans * task.nominal).sum(axis=1), 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("k", [0, 4, 8])
 def test_a_smooth_field_of_leans_is_fitted(k):
-    task, course = course_of(k)
+    task, spline = course_of(k)
     wave = 0.1 * np.sin(20.0 * task.pivots)
     wanted = wave - (wave * task.nominal).sum(axis=1, keepdims=True) * task.nominal
-    assert np.abs(course.leans(course.fitted(wanted)) - wanted).max() < 0.02 * np.abs(wanted).max()
+    assert np.abs(spline.leans(spline.fitted(wanted)) - wanted).max() < 0.02 * np.abs(wanted).max()
 
 
 def test_the_cost_is_the_mean_square_of_rates_and_bends():
     """On a straight path over a flat part, with a lean of one wavelength: against the integrals by hand."""
     length, wavelength = 0.4, 0.1
     x = np.linspace(0.0, length, 4001)
-    task = Task(np.c_[x, 0.0 * x, 0.0 * x], np.tile([0.0, 0.0, 1.0], (len(x), 1)), 0.0, 0.28)
-    course = AxisCourse.of(task, CONE)
+    task = ToolpathSamples(np.c_[x, 0.0 * x, 0.0 * x], np.tile([0.0, 0.0, 1.0], (len(x), 1)), 0.0, 0.28)
+    spline = AxisSpline.of(task, CONE)
     frequency = 2.0 * np.pi / wavelength
     lean = np.zeros((len(x), 3))
     lean[:, 0] = 0.1 * np.sin(frequency * x)
     share = (FORESIGHT_M * frequency) ** 2
     expected = 0.5 * 0.1**2 * (share**2 + share + UPRIGHT_WEIGHT)
-    assert course.cost_of(course.fitted(lean)) == pytest.approx(expected, rel=0.01)
+    assert spline.cost_of(spline.fitted(lean)) == pytest.approx(expected, rel=0.01)
 
 
 @pytest.mark.parametrize("k", [2, 5])
 def test_the_cost_is_a_quadratic_with_its_gradient(k):
-    _, course = course_of(k)
+    _, spline = course_of(k)
     rng = np.random.default_rng(0)
-    c, d = random_coefficients(course, rng), random_coefficients(course, rng)
+    c, d = random_coefficients(spline, rng), random_coefficients(spline, rng)
     h = 1e-4
-    slope = (course.cost_of(c + h * d) - course.cost_of(c - h * d)) / (2.0 * h)
-    expected = (course.whole_hessian() @ c.ravel() + course.gradient) @ d.ravel()
+    slope = (spline.cost_of(c + h * d) - spline.cost_of(c - h * d)) / (2.0 * h)
+    expected = (spline.whole_hessian() @ c.ravel() + spline.gradient) @ d.ravel()
     assert slope == pytest.approx(expected, rel=1e-6)
-    assert course.cost_of(c) >= 0.0
+    assert spline.cost_of(c) >= 0.0
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_banded_program_is_solved_as_ipopt_solves_it(seed):
     rng = np.random.default_rng(seed)
-    task, course = course_of(seed)
+    task, spline = course_of(seed)
     point = np.sort(rng.integers(0, len(task.pivots), 150))
     slopes, upper = rng.normal(size=(len(point), 2)), rng.uniform(0.05, 0.5, len(point))
-    centre = np.zeros((course.hessian.shape[1] // 2, 2))
-    scale = course.cost_of(centre)
-    program = AxisProgram(course.hessian, course.gradient, scale, course.basis, point, slopes, upper, centre, 0.8)
+    centre = np.zeros((spline.hessian.shape[1] // 2, 2))
+    scale = spline.cost_of(centre)
+    program = AxisProgram(spline.hessian, spline.gradient, scale, spline.basis, point, slopes, upper, centre, 0.8)
     found = program.solved()
-    assert ((slopes * (course.basis @ found)[point]).sum(axis=1) <= upper + 1e-5).all()
+    assert ((slopes * (spline.basis @ found)[point]).sum(axis=1) <= upper + 1e-5).all()
     assert np.linalg.norm(found, axis=1).max() <= 0.8 + 1e-3
 
     c = ca.MX.sym("c", 2, len(centre))
-    x, leans = ca.vec(c), ca.mtimes(c, ca.DM(course.basis[point].T))
+    x, leans = ca.vec(c), ca.mtimes(c, ca.DM(spline.basis[point].T))
     problem = {
         "x": x,
-        "f": (0.5 * ca.bilin(ca.DM(course.whole_hessian()), x, x) + ca.dot(ca.DM(course.gradient), x)) / scale,
+        "f": (0.5 * ca.bilin(ca.DM(spline.whole_hessian()), x, x) + ca.dot(ca.DM(spline.gradient), x)) / scale,
         "g": ca.vertcat(upper - ca.sum1(slopes.T * leans).T, 0.64 - ca.sum1(c * c).T),
     }
     solver = ca.nlpsol("s", "ipopt", problem, {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"})
     theirs = np.asarray(solver(x0=0.0, lbg=0.0)["x"]).reshape(-1, 2)
-    assert course.cost_of(found) == pytest.approx(course.cost_of(theirs), rel=1e-4)
+    assert spline.cost_of(found) == pytest.approx(spline.cost_of(theirs), rel=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_soft_rows_are_exceeded_where_it_pays(seed):
     """Against IPOPT, with excesses as unknowns of its own; cheap and dear rows, the last of them at the path's end."""
     rng = np.random.default_rng(seed)
-    _, course = course_of(seed)
-    centre = np.zeros((course.hessian.shape[1] // 2, 2))
+    _, spline = course_of(seed)
+    centre = np.zeros((spline.hessian.shape[1] // 2, 2))
     starts = 2 * np.append(rng.integers(0, len(centre) - 5, 60), len(centre) - 4)
     windows = rng.normal(size=(61, BANDS))
     windows[-1, 8:] = 0.0
     soft = SoftRows(windows, starts, rng.uniform(-0.3, 0.1, 61), 10.0 ** rng.uniform(-4.0, 2.0, 61))
     none = np.zeros(0, dtype=np.intp)
     program = AxisProgram(
-        course.hessian,
-        course.gradient,
+        spline.hessian,
+        spline.gradient,
         0.01,
-        course.basis[none],
+        spline.basis[none],
         none,
         np.zeros((0, 2)),
         np.zeros(0),
@@ -130,7 +130,7 @@ def test_soft_rows_are_exceeded_where_it_pays(seed):
         row[start : start + BANDS] = window
     matrix = matrix[:, : centre.size]
     c = ca.reshape(x, 2, len(centre))
-    own = 0.5 * ca.bilin(ca.DM(course.whole_hessian()), x, x) + ca.dot(ca.DM(course.gradient), x)
+    own = 0.5 * ca.bilin(ca.DM(spline.whole_hessian()), x, x) + ca.dot(ca.DM(spline.gradient), x)
     problem = {
         "x": ca.vertcat(x, excess),
         "f": own + ca.dot(soft.weight, excess**2),
@@ -143,11 +143,11 @@ def test_soft_rows_are_exceeded_where_it_pays(seed):
 
 
 def test_a_program_without_interior_has_no_answer():
-    _, course = course_of(0)
-    centre = np.zeros((course.hessian.shape[1] // 2, 2))
+    _, spline = course_of(0)
+    centre = np.zeros((spline.hessian.shape[1] // 2, 2))
     point, slopes = np.array([3, 3]), np.array([[1.0, 0.0], [-1.0, 0.0]])
     program = AxisProgram(
-        course.hessian, course.gradient, 1.0, course.basis, point, slopes, np.array([-0.2, -0.2]), centre, 2.0
+        spline.hessian, spline.gradient, 1.0, spline.basis, point, slopes, np.array([-0.2, -0.2]), centre, 2.0
     )
     assert program.solved() is None
 
@@ -156,12 +156,12 @@ def test_a_program_without_interior_has_no_answer():
     "moved", [[0.0, 0.0, 0.0], [0.0, 0.01], [0.0, 0.0, 0.01, 0.01], [0.0, 1e-12], [0.0, 0.01, 0.0]]
 )
 def test_short_paths_and_single_places_have_a_course(moved, desk):
-    """Down to a tool that stands still: calm axes at one place lean as little as the margin lets them."""
+    """Down to a tool that stands still: smooth axes at one place lean as little as the margin lets them."""
     pivots = np.array(moved)[:, None] * [1.0, 0.0, 0.0]
-    task = Task(pivots, np.tile([0.0, 0.0, 1.0], (len(pivots), 1)), 0.003, 0.2)
-    setting = Setting.of(task, desk)
-    guess = first_guesses(task, desk, COMPONENTS, 0, samples=500)[0]
-    start = first_candidate(setting, Margins.of(desk, guess.component), guess.transform)
-    strict = setting.values_of(start.margins, start.transform, np.zeros_like(pivots)).min()
-    calm = calmed(setting, start, strict - 0.01)
-    assert np.linalg.norm(AxisCourse.of(setting.task, setting.cone).leans(calm), axis=1).max() < 1e-3
+    task = ToolpathSamples(pivots, np.tile([0.0, 0.0, 1.0], (len(pivots), 1)), 0.003, 0.2)
+    problem = PlacementProblem.of(task, desk)
+    guess = first_guesses(task, desk, COMPONENTS, 0, tries=500)[0]
+    start = first_candidate(problem, Margins.of(desk, guess.component), guess.transform)
+    strict = problem.values_of(start.margins, start.transform, np.zeros_like(pivots)).min()
+    smooth = smoothed(problem, start, strict - 0.01)
+    assert np.linalg.norm(AxisSpline.of(problem.samples, problem.cone).leans(smooth), axis=1).max() < 1e-3

@@ -8,7 +8,7 @@ import replay_cases as cases
 
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics import Component
-from pentapod.planning.problem.constraints import Freedom
+from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.verify import verify
 from pentapod.verify.claims.pieces import whole
@@ -30,9 +30,9 @@ def moved(shift=(0.0, 0.0, 0.0), angle=0.0, axis=2):
     return RigidTransform(turned(angle, axis) @ PLACED.rotation, PLACED.translation + np.array(shift))
 
 
-def at(case, placed, freedom):
+def at(case, placed, constraints):
     program = replace(case.program, placement=placed)
-    return placement(cases.replay_of(case, program, freedom=freedom))
+    return placement(cases.replay_of(case, program, constraints=constraints))
 
 
 @pytest.mark.parametrize(
@@ -51,14 +51,14 @@ def at(case, placed, freedom):
 )
 def test_fixed_placement_is_kept_to_a_micrometre_and_a_microradian(cubic, placed, passed):
     far = moved((0.5, 0.0, 0.0), angle=1.0)
-    for freedom in (Freedom.fixture([PLACED]), Freedom.fixture([far, PLACED])):
-        assert at(cubic, placed, freedom).passed == passed
+    for constraints in (PlacementConstraints.fixture([PLACED]), PlacementConstraints.fixture([far, PLACED])):
+        assert at(cubic, placed, constraints).passed == passed
 
 
 def test_what_is_off_is_told_in_its_unit(cubic):
-    found = at(cubic, moved((0.01, 0.0, 0.0)), Freedom.fixture([PLACED]))
+    found = at(cubic, moved((0.01, 0.0, 0.0)), PlacementConstraints.fixture([PLACED]))
     assert (found.value, found.bound, found.unit) == (pytest.approx(10.0), pytest.approx(1e-3), "mm")
-    found = at(cubic, moved(angle=np.radians(5.0)), Freedom.fixture([PLACED]))
+    found = at(cubic, moved(angle=np.radians(5.0)), PlacementConstraints.fixture([PLACED]))
     assert (found.value, found.unit) == (pytest.approx(5.0), "deg")
 
 
@@ -68,14 +68,14 @@ def test_what_is_off_is_told_in_its_unit(cubic):
 )
 def test_box_of_the_origin(cubic, shift, passed):
     low, high = PLACED.translation - 1e-3, PLACED.translation + 1e-3
-    assert at(cubic, moved(shift, angle=1.0), Freedom.free(low=low, high=high)).passed == passed
+    assert at(cubic, moved(shift, angle=1.0), PlacementConstraints.free(low=low, high=high)).passed == passed
 
 
 @pytest.mark.parametrize(("angle", "passed"), [(0.0, True), (0.3, True), (0.3001, False), (3.0, False), (-0.2, True)])
 @pytest.mark.parametrize("axis", range(3))
 def test_largest_turn(cubic, angle, passed, axis):
-    freedom = Freedom.free(reference=PLACED, largest_turn=0.3)
-    assert at(cubic, moved((1.0, 0.0, 0.0), angle, axis), freedom).passed == passed
+    constraints = PlacementConstraints.free(reference=PLACED, largest_turn=0.3)
+    assert at(cubic, moved((1.0, 0.0, 0.0), angle, axis), constraints).passed == passed
 
 
 @pytest.mark.parametrize(
@@ -89,8 +89,8 @@ def test_largest_turn(cubic, angle, passed, axis):
     ],
 )
 def test_table(cubic, placed, passed):
-    freedom = Freedom.table(PLACED.translation[2], x=(-0.2, 0.2), y=(-0.2, 0.2))
-    assert at(cubic, placed, freedom).passed == passed
+    constraints = PlacementConstraints.table(PLACED.translation[2], x=(-0.2, 0.2), y=(-0.2, 0.2))
+    assert at(cubic, placed, constraints).passed == passed
 
 
 @pytest.mark.parametrize("name", ["++", "+-", "-+", "--"])

@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pentapod.base.refusal import Refusal
-    from pentapod.planning.active_limits import Binding
+    from pentapod.planning.active_limits import ActiveLimit
 
 _RANGES = 6
 
 
-def bindings_text(found: Sequence[Binding]) -> str:
+def limits_text(found: Sequence[ActiveLimit]) -> str:
     """Return the table of a plan that fits: every limit with its smallest margin, the nearest first."""
     lines = [
         f"{'limit':<46} {'margin':>8} {'room':>12} {'waypoint':>9} {'nearest at':>10}  waypoints where it is nearest"
     ]
-    for binding in found:
-        room = f"{binding.room:.3g} {binding.unit}" if binding.unit else ""
-        share = f"{100.0 * binding.share:.1f} %" if binding.share else "–"
-        where = _ranges(binding.waypoints)
+    for limit in found:
+        room = f"{limit.room:.3g} {limit.unit}" if limit.unit else ""
+        share = f"{100.0 * limit.share:.1f} %" if limit.share else "–"
+        where = _ranges(limit.waypoints)
         lines.append(
-            f"{binding.limit:<46} {binding.margin:>8.4f} {room:>12} {binding.worst:>9} {share:>10}  {where}".rstrip()
+            f"{limit.limit:<46} {limit.margin:>8.4f} {room:>12} {limit.worst:>9} {share:>10}  {where}".rstrip()
         )
     return "\n".join(lines)
 

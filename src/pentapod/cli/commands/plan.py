@@ -37,7 +37,7 @@ def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int
     from pentapod.job.pipeline import run
     from pentapod.job.schema.job import Job
     from pentapod.planning import PlacedPath
-    from pentapod.planning.active_limits import bindings
+    from pentapod.planning.active_limits import active_limits
     from pentapod.report import write_report
     from pentapod.timing import Explanation
 
@@ -50,7 +50,7 @@ def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int
         story = outcome.find(Explanation)
         told: dict[str, Any] = {} if story is None else {"timing": story.to_dict()}
         if explain and (placed := outcome.find(PlacedPath)) is not None:
-            told["limits"] = [dataclasses.asdict(binding) for binding in bindings(placed)]
+            told["limits"] = [dataclasses.asdict(limit) for limit in active_limits(placed)]
         echo_json({**outcome.to_dict(), **told, "out": str(out), "seconds": seconds})
     elif not quiet:
         click.echo("\n".join(stage.said for stage in outcome.stages if stage.said))
@@ -71,14 +71,14 @@ def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int
 
 def _explained(outcome: Outcome) -> str:
     """Return the blame table of a run: of its refusal, or of the plan that fits."""
-    from pentapod.cli.commands.explain import bindings_text, blames_text
+    from pentapod.cli.commands.explain import blames_text, limits_text
     from pentapod.job.outcome import SetUps
     from pentapod.planning import PlacedPath
-    from pentapod.planning.active_limits import bindings
+    from pentapod.planning.active_limits import active_limits
 
     if (setups := outcome.find(SetUps)) is not None:
         return "\n\n".join(f"{part.folder}\n{_explained(part.outcome)}" for part in setups.parts)
     if outcome.refusal is not None and outcome.refusal.blames:
         return blames_text(outcome.refusal)
     placed = outcome.find(PlacedPath)
-    return "" if placed is None else bindings_text(bindings(placed))
+    return "" if placed is None else limits_text(active_limits(placed))

@@ -15,7 +15,7 @@ from pentapod.job.schema.placement import PLACEMENT_KEYS, PlacementTable
 from pentapod.job.schema.table import Vector
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
-from pentapod.planning.problem.constraints import FREE, Freedom
+from pentapod.planning.problem.constraints import FREE, PlacementConstraints
 from pentapod.planning.problem.weights import Weights
 
 _MM = 1e-3
@@ -24,14 +24,14 @@ _PLACE_KEYS = frozenset(("mode", "setups", *(key for keys in PLACEMENT_KEYS.valu
 """What says where the part may go; the other keys say what is wanted of the plan."""
 
 
-def job_freedom(job: Job, machine: Machine, mesh: Mesh) -> Freedom:
+def job_constraints(job: Job, machine: Machine, mesh: Mesh) -> PlacementConstraints:
     """Return the placements that the job allows. Raises JobError where its matrix is not rigid."""
     table = job.placement
     if table.mode == "fixed":
-        return Freedom.fixture([_fixed(job)])
+        return PlacementConstraints.fixture([_fixed(job)])
     if table.mode == "fixture":
         poses = np.array(table.poses_mm_deg, dtype=np.float64)
-        return Freedom.fixture([_pose(pose[:3], pose[3:]) for pose in poses])
+        return PlacementConstraints.fixture([_pose(pose[:3], pose[3:]) for pose in poses])
     if table.mode == "table":
         return _on_table(job, machine, mesh)
     if table.box_mm is None and table.largest_turn_deg is None:
@@ -40,7 +40,7 @@ def job_freedom(job: Job, machine: Machine, mesh: Mesh) -> Freedom:
     turn = 180.0 if table.largest_turn_deg is None else table.largest_turn_deg
     reference = _pose(np.zeros(3), table.rotation_deg or (0.0, 0.0, 0.0))
     low, high = corners.min(axis=0), corners.max(axis=0)
-    return Freedom.free(low=low, high=high, reference=reference, largest_turn=float(np.radians(turn)))
+    return PlacementConstraints.free(low=low, high=high, reference=reference, largest_turn=float(np.radians(turn)))
 
 
 def job_weights(job: Job) -> Weights:
@@ -81,8 +81,8 @@ def rotation_angles_deg(rotation: Floats) -> tuple[float, float, float]:
     return float(np.degrees(x)), float(np.degrees(y)), float(np.degrees(z))
 
 
-def _on_table(job: Job, machine: Machine, mesh: Mesh) -> Freedom:
-    """Return the freedom of the job's part standing on the table with its lowest point."""
+def _on_table(job: Job, machine: Machine, mesh: Mesh) -> PlacementConstraints:
+    """Return the constraints of the job's part standing on the table with its lowest point."""
     table = job.placement
     up = np.array(table.up) / np.linalg.norm(table.up)
     # Up is towards the base: away from where the machine works.
@@ -93,7 +93,7 @@ def _on_table(job: Job, machine: Machine, mesh: Mesh) -> Freedom:
         _EVERYWHERE if values is None else (values[0] * _MM, values[1] * _MM)
         for values in (table.table_x_mm, table.table_y_mm)
     )
-    return Freedom.table(height, x=x, y=y, up=up, normal=(0.0, 0.0, side))
+    return PlacementConstraints.table(height, x=x, y=y, up=up, normal=(0.0, 0.0, side))
 
 
 def _fixed(job: Job) -> RigidTransform:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pentapod.job.build.collision_world import job_surroundings
 from pentapod.job.build.cutting import job_cutting
-from pentapod.job.build.placement import job_freedom
+from pentapod.job.build.placement import job_constraints
 from pentapod.job.build.sources import job_sources
 from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import Component
@@ -26,7 +26,7 @@ def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Cal
     make_toolpath: called last, so that errors of the job's tables are told before the long work.
     Raises JobError where tables of the job do not go with the machine or the mesh.
     """
-    surroundings, freedom = job_surroundings(job, machine, mesh), job_freedom(job, machine, mesh)
+    surroundings, constraints = job_surroundings(job, machine, mesh), job_constraints(job, machine, mesh)
     cutting, component = job_cutting(job, surroundings), job.placement.component
     return Specification(
         machine,
@@ -37,7 +37,7 @@ def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Cal
         job_digest=job.digest,
         surroundings=surroundings,
         cutting=cutting,
-        freedom=freedom,
+        constraints=constraints,
         component=None if component is None else Component.parse(component),
         lowest_share=job.feed.lowest_share,
         stop_angle=float(np.radians(job.feed.stop_angle_deg)),

@@ -1,4 +1,4 @@
-"""guided: where the guides of a reconfigurable machine are to stand, chosen together with the placement.
+"""reconfigured: where the guides of a reconfigurable machine are to stand, chosen together with the placement.
 
 The guides' slides are five more unknowns of the same problem. Which part of their travel is worth a search is told by
 first guesses at a spread of slides; from the best placement found, placement, slides and tilt field climb together, by
@@ -24,7 +24,7 @@ from pentapod.planning.placement.sampling import best_tilted_margins, first_gues
 from pentapod.planning.placement.search import SOLVERS, Search, SolverName, search
 from pentapod.planning.problem.formulation import Room, StepSlopes, placement_room, step_slopes, stepped
 from pentapod.planning.problem.linear_model import REACH, LinearModel
-from pentapod.planning.problem.problem import Candidate, Setting
+from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.problem.weights import NEEDED_MARGIN
 
 SPREAD = 16
@@ -39,27 +39,27 @@ _SLIDE_M = 0.1  # the unit of a slide's step
 _DIGITS = 6  # guides are set to the micrometre, so that people can read them and files hold them
 
 
-def guided(
-    setting: Setting,
+def reconfigured(
+    problem: PlacementProblem,
     component: Component | None = None,
     surroundings: Surroundings = NOTHING,
     *,
     seed: int = 0,
     solver: SolverName = "sequential",
     progress: Progress = silent,
-) -> tuple[Setting, Search]:
-    """Return the setting with the machine's guides where they are to stand, and what the search there found.
+) -> tuple[PlacementProblem, Search]:
+    """Return the problem with the machine's guides where they are to stand, and what the search there found.
 
     Never worse than with the guides as they stand. Only slides are taken that the guides reach by moving evenly without
     an architectural singularity on the way. KeyboardInterrupt as in `search`.
     """
-    home = setting, search(setting, component, surroundings, seed=seed, solver=solver, progress=progress)
+    home = problem, search(problem, component, surroundings, seed=seed, solver=solver, progress=progress)
     if home[1].interrupted:
         return home
     best = home
     try:
-        other = _promising(setting, component, surroundings, seed, progress)
-        if other is not setting:
+        other = _promising(problem, component, surroundings, seed, progress)
+        if other is not problem:
             found = search(other, component, surroundings, seed=seed, solver=solver, progress=progress)
             best = max(home, (other, found), key=lambda each: each[1].best.smallest)
         for k in range(_ROUNDS):
@@ -68,7 +68,7 @@ def guided(
             there, moved = _Climb(there, surroundings).climbed(candidate)
             if moved.smallest < candidate.smallest + _GAIN:
                 break
-            moved = SOLVERS[solver](there, there.freedom.moves).raise_margin(moved)
+            moved = SOLVERS[solver](there, there.constraints.moves).raise_margin(moved)
             best = there, replace(best[1], best=moved)
     except KeyboardInterrupt:
         if best[1].best.smallest < NEEDED_MARGIN:
@@ -77,40 +77,42 @@ def guided(
     return best
 
 
-def at_slides(setting: Setting, slides: Floats) -> Setting | None:
-    """Return the setting with its machine's guides at slides (5,); None where they cannot stand or get there."""
-    guides = setting.machine.guides
+def at_slides(problem: PlacementProblem, slides: Floats) -> PlacementProblem | None:
+    """Return the problem with its machine's guides at slides (5,); None where they cannot stand or get there."""
+    guides = problem.machine.guides
     if guides is None or not guides.stays_regular(np.zeros(5), slides):
         return None
     try:
-        return replace(setting, machine=setting.machine.at(slides))
+        return replace(problem, machine=problem.machine.at(slides))
     except MachineError:
         return None
 
 
 def _promising(
-    setting: Setting, component: Component | None, surroundings: Surroundings, seed: int, progress: Progress
-) -> Setting:
-    """Return the setting whose guides let first guesses of the placement come out best."""
+    problem: PlacementProblem, component: Component | None, surroundings: Surroundings, seed: int, progress: Progress
+) -> PlacementProblem:
+    """Return the problem whose guides let first guesses of the placement come out best."""
     components = COMPONENTS if component is None else (component,)
-    scores: list[tuple[float, Setting]] = []
-    for k, slides in enumerate([setting.machine.slides, *_spread(setting.machine, seed)]):
+    scores: list[tuple[float, PlacementProblem]] = []
+    for k, slides in enumerate([problem.machine.slides, *_spread(problem.machine, seed)]):
         progress("placement", k / SPREAD, "guides")
-        there = at_slides(setting, slides)
+        there = at_slides(problem, slides)
         if there is not None:
             scores.append((_promise(there, components, surroundings, seed), there))
-    return max(scores, key=lambda pair: pair[0])[1] if scores else setting
+    return max(scores, key=lambda pair: pair[0])[1] if scores else problem
 
 
-def _promise(setting: Setting, components: tuple[Component, ...], surroundings: Surroundings, seed: int) -> float:
-    task, machine, freedom = setting.task, setting.machine, setting.freedom
-    if freedom.moves:
+def _promise(
+    problem: PlacementProblem, components: tuple[Component, ...], surroundings: Surroundings, seed: int
+) -> float:
+    samples, machine, constraints = problem.samples, problem.machine, problem.constraints
+    if constraints.moves:
         guesses = first_guesses(
-            task, machine, components, seed, samples=_SAMPLES, freedom=freedom, surroundings=surroundings
+            samples, machine, components, seed, tries=_SAMPLES, constraints=constraints, surroundings=surroundings
         )
         return max(guess.margin for guess in guesses)
-    few = task.at(task.representatives(48))
-    poses = [(Margins.of(machine, c, surroundings), pose) for c in components for pose in freedom.poses]
+    few = samples.at(samples.representatives(48))
+    poses = [(Margins.of(machine, c, surroundings), pose) for c in components for pose in constraints.poses]
     return max(float(best_tilted_margins(few, margins, pose)[0].min()) for margins, pose in poses)
 
 
@@ -128,45 +130,47 @@ def _spread(machine: Machine, seed: int) -> Floats:
 class _Climb:
     """Placement, slides and tilt field climb together from a candidate, by sequential quadratic programming."""
 
-    setting: Setting
+    problem: PlacementProblem
     surroundings: Surroundings
 
-    def climbed(self, start: Candidate) -> tuple[Setting, Candidate]:
-        """Return the setting and the candidate that a trust-region method reaches; never a worse one."""
-        freedom, setting, best, reach = self.setting.freedom, self.setting, start, 0.5
-        slopes = step_slopes(setting, start.margins, guides=True)
-        curvature = Curvature(setting, start.margins, guides=True)
-        room = placement_room(freedom)
+    def climbed(self, start: Candidate) -> tuple[PlacementProblem, Candidate]:
+        """Return the problem and the candidate that a trust-region method reaches; never a worse one."""
+        constraints, problem, best, reach = self.problem.constraints, self.problem, start, 0.5
+        slopes = step_slopes(problem, start.margins, guides=True)
+        curvature = Curvature(problem, start.margins, guides=True)
+        room = placement_room(constraints)
         for _ in range(_STEPS):
-            step, change, promise = curvature.best_step(self._model(setting, best, slopes, room), best, reach)
+            step, change, promise = curvature.best_step(self._model(problem, best, slopes, room), best, reach)
             if promise < _LEAST or reach < _LEAST:
                 break
-            slides = np.clip(np.round(setting.machine.slides + step[6:], _DIGITS), *self._travel)
-            there, gain = at_slides(self.setting, slides), -np.inf
+            slides = np.clip(np.round(problem.machine.slides + step[6:], _DIGITS), *self._travel)
+            there, gain = at_slides(self.problem, slides), -np.inf
             if there is not None:
-                transform = freedom.nearest_to(stepped(best.transform, step[:6])) if freedom.moves else best.transform
+                transform = (
+                    constraints.nearest_to(stepped(best.transform, step[:6])) if constraints.moves else best.transform
+                )
                 margins = Margins.of(there.machine, best.margins.component, self.surroundings)
-                found = there.candidate(margins, transform, setting.within_cone(best.coefficients + change))
+                found = there.candidate(margins, transform, problem.within_cone(best.coefficients + change))
                 gain = found.smallest - best.smallest
                 if gain > 0.05 * promise:
-                    setting, best = there, found
+                    problem, best = there, found
             reach *= 2.0 if gain > 0.6 * promise else 1.0 if gain > 0.25 * promise else 0.4
-        return setting, best
+        return problem, best
 
-    def _model(self, setting: Setting, at: Candidate, slopes: StepSlopes, room: Room) -> LinearModel:
-        values, count = setting.values(at.margins, at.transform, at.coefficients), len(setting.task.pivots)
+    def _model(self, problem: PlacementProblem, at: Candidate, slopes: StepSlopes, room: Room) -> LinearModel:
+        values, count = problem.values(at.margins, at.transform, at.coefficients), len(problem.samples.pivots)
         spread = np.linspace(0, count - 1, min(count, _CONSIDERED)).astype(np.intp)
         rows = np.union1d(spread, values.argmin(axis=0))
         placed, by_step = room(at.transform)
-        slides, (least, greatest) = setting.machine.slides, self._travel
+        slides, (least, greatest) = problem.machine.slides, self._travel
         left = np.concatenate([placed, slides - least, greatest - slides])
         by_both = _block_diagonal(by_step, np.vstack([np.eye(5), -np.eye(5)]))
-        moves = _block_diagonal(REACH[:, None] * setting.freedom.motion, _SLIDE_M * np.eye(5))
-        return LinearModel.of(setting, at, rows, at.smallest, _NO_ROWS, slopes, (left, by_both), moves)
+        moves = _block_diagonal(REACH[:, None] * problem.constraints.motion, _SLIDE_M * np.eye(5))
+        return LinearModel.of(problem, at, rows, at.smallest, _NO_ROWS, slopes, (left, by_both), moves)
 
     @property
     def _travel(self) -> Floats:
-        guides = self.setting.machine.guides
+        guides = self.problem.machine.guides
         return np.zeros((2, 5)) if guides is None else guides.travel.T
 
 

@@ -16,7 +16,7 @@ from pentapod.numerics.convex.dense_program import dense_program
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.problem.formulation import curvature_function
 from pentapod.planning.problem.linear_model import LinearModel, by_field
-from pentapod.planning.problem.problem import Candidate, Setting
+from pentapod.planning.problem.problem import Candidate, PlacementProblem
 
 _BINDING = 1e-6
 """Multipliers from which a limit counts."""
@@ -28,7 +28,7 @@ _MOST_GAIN = 0.1
 class Curvature:
     """The curvature of a climb's problem, whose margins are these or, with guides, these with the guides elsewhere."""
 
-    setting: Setting
+    problem: PlacementProblem
     margins: Margins
     guides: bool = False
 
@@ -60,42 +60,43 @@ class Curvature:
         return _positive(self._of_margins(model, at, margins) + self._of_cone(model, at, leans))
 
     def _of_margins(self, model: LinearModel, at: Candidate, multipliers: Floats) -> Floats:
-        setting, function = self.setting, curvature_function(self.setting, self.margins, guides=self.guides)
+        problem, function = self.problem, curvature_function(self.problem, self.margins, guides=self.guides)
         binding = multipliers > _BINDING
         rows, inverse = np.unique(model.points[binding], return_inverse=True)
         weights = np.zeros((len(rows), len(at.margins.limits)))
         weights[inverse, model.kinds[binding]] = multipliers[binding]
-        task, size, (length, count) = setting.task, 2 * setting.basis.shape[1], model.moves.shape
+        samples, size, (length, count) = problem.samples, 2 * problem.basis.shape[1], model.moves.shape
         total = np.zeros((count + size, count + size))
         if not len(rows):
             return total
-        leans = setting.basis[rows] @ at.coefficients if size else np.zeros((len(rows), 2))
-        touching = setting.contacts(at.margins, at.transform, setting.leans(at.coefficients, rows), rows)
+        leans = problem.basis[rows] @ at.coefficients if size else np.zeros((len(rows), 2))
+        touching = problem.contacts(at.margins, at.transform, problem.leans(at.coefficients, rows), rows)
         slid = [at.margins.machine.slides - self.margins.machine.slides] if self.guides else []
         for k, row in enumerate(rows):
             bent = np.asarray(
                 function(
-                    *slid, np.zeros(6), leans[k], task.pivots[row], task.nominal[row], setting.domain.lean_plane.T,
-                    at.transform.rotation, at.transform.translation, touching[k], weights[k],
+                    *slid, np.zeros(6), leans[k], samples.pivots[row], samples.nominal[row],
+                    problem.domain.lean_plane.T, at.transform.rotation, at.transform.translation,
+                    touching[k], weights[k],
                 )
             )  # fmt: skip
             by_unknowns = np.zeros((length + 2, count + size))
             by_unknowns[:length, :count] = model.moves
-            by_unknowns[length:, count:] = setting.cone * np.kron(setting.basis[row], np.eye(2))
+            by_unknowns[length:, count:] = problem.cone * np.kron(problem.basis[row], np.eye(2))
             total -= by_unknowns.T @ bent @ by_unknowns
         return total
 
     def _of_cone(self, model: LinearModel, at: Candidate, multipliers: Floats) -> Floats:
         """Return how leans on the cone's edge bend: a lean of length r turns with 1/r."""
-        setting, count = self.setting, model.moves.shape[1]
-        size = 2 * setting.basis.shape[1]
+        problem, count = self.problem, model.moves.shape[1]
+        size = 2 * problem.basis.shape[1]
         total = np.zeros((count + size, count + size))
         binding = np.flatnonzero(multipliers > _BINDING)
         rows = model.steep[binding]
-        length = setting.steepness(at.coefficients, rows)
-        aside = np.cross(setting.task.nominal[rows], setting.leans(at.coefficients, rows))
-        aside /= np.maximum(length * setting.cone, 1e-12)[:, None]
-        by_unknowns = by_field(setting.basis[rows], aside @ setting.domain.lean_plane.T)
+        length = problem.steepness(at.coefficients, rows)
+        aside = np.cross(problem.samples.nominal[rows], problem.leans(at.coefficients, rows))
+        aside /= np.maximum(length * problem.cone, 1e-12)[:, None]
+        by_unknowns = by_field(problem.basis[rows], aside @ problem.domain.lean_plane.T)
         total[count:, count:] = (by_unknowns.T * (multipliers[binding] / np.maximum(length, 1e-3))) @ by_unknowns
         return total
 

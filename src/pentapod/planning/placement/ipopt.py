@@ -1,4 +1,4 @@
-"""The reference solver: the same problem handed to IPOPT, with constraint generation.
+"""The reference solver: the same program handed to IPOPT, with constraint generation.
 
 It considers a few waypoints and kinds of margin, and adds those that come out worst until none is worse than what was
 considered. Slower than the default solver by an order of magnitude; it is what the default is measured against.
@@ -15,9 +15,9 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.problem.formulation import point_function, room_function, stepped
 from pentapod.planning.problem.linear_model import valleys
-from pentapod.planning.problem.problem import Candidate, Setting
+from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.tool_axis.cost import AxisCost
-from pentapod.planning.tool_axis.spline import AxisCourse, within_discs
+from pentapod.planning.tool_axis.spline import AxisSpline, within_discs
 
 _POINTS, _ROUNDS = 96, 16
 _NEAR = 0.6
@@ -43,13 +43,13 @@ _OPTIONS: dict[str, Any] = {
 
 @dataclass(eq=False)
 class IpoptSolver:
-    """Improves candidates of one setting with IPOPT; free: whether the placement may move.
+    """Improves candidates of one problem with IPOPT; free: whether the placement may move.
 
     whole: all waypoints and all kinds of margin at once, with no constraint generation: plain, and very slow.
     patience: processor seconds after which IPOPT gives up.
     """
 
-    setting: Setting
+    problem: PlacementProblem
     free: bool
     whole: bool = False
     patience: float = 1e6
@@ -61,8 +61,8 @@ class IpoptSolver:
         touching = bool(start.margins.surroundings.obstacles)
         for _ in range(_ROUNDS):
             transform, raw = self._solve(best, rows, kinds, reach)
-            coefficients = self.setting.within_cone(raw)
-            values = self.setting.values(best.margins, transform, coefficients)
+            coefficients = self.problem.within_cone(raw)
+            values = self.problem.values(best.margins, transform, coefficients)
             considered = float(values[np.ix_(rows, kinds)].min())
             smallest, before = float(values.min()), best.smallest
             if smallest > before:
@@ -77,49 +77,50 @@ class IpoptSolver:
             rows, kinds = more
         return best
 
-    def calm(self, start: Candidate, keep: float) -> Floats | None:
-        """Return coefficients (K, 2) of the calmest course at the placement of `start` that keeps the margin `keep`.
+    def smooth(self, start: Candidate, keep: float) -> Floats | None:
+        """Return coefficients (K, 2) of the smoothest spline at the placement of `start` that keeps the margin `keep`.
 
         All waypoints at once, and all kinds of margin that come near at the start. None where IPOPT found no such
-        course.
+        spline.
         """
         import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
-        setting, task = self.setting, self.setting.task
-        course = AxisCourse.of(task, setting.cone)
-        count, first = len(task.pivots), course.fitted(setting.leans(start.coefficients))
-        margins = setting.values_of(start.margins, start.transform, course.leans(first))
+        problem, samples = self.problem, self.problem.samples
+        spline = AxisSpline.of(samples, problem.cone)
+        count, first = len(samples.pivots), spline.fitted(problem.leans(start.coefficients))
+        margins = problem.values_of(start.margins, start.transform, spline.leans(first))
         kinds = [int(k) for k in np.flatnonzero((margins.min(axis=0) < keep + _NEAR) | self.whole)]
         c = ca.MX.sym("c", 2, len(first))
-        margins, _ = point_function(setting, start.margins, kinds).map(count)(
-            ca.DM.zeros(6, count), course.cone * ca.mtimes(c, ca.DM(course.basis.T)), task.pivots.T, task.nominal.T,
-            course.frames.transpose(2, 0, 1).reshape(3, -1), np.tile(start.transform.rotation, (1, count)),
+        margins, _ = point_function(problem, start.margins, kinds).map(count)(
+            ca.DM.zeros(6, count), spline.cone * ca.mtimes(c, ca.DM(spline.basis.T)),
+            samples.pivots.T, samples.nominal.T, spline.frames.transpose(2, 0, 1).reshape(3, -1),
+            np.tile(start.transform.rotation, (1, count)),
             np.tile(start.transform.translation[:, None], (1, count)),
-            setting.contacts(start.margins, start.transform, course.leans(first), np.arange(count)).T,
+            problem.contacts(start.margins, start.transform, spline.leans(first), np.arange(count)).T,
         )  # fmt: skip
-        cost = AxisCost(setting, course, start)
+        cost = AxisCost(problem, spline, start)
         spent, excess, room = cost.symbolic(c)
-        problem = {
+        program = {
             "x": ca.vertcat(ca.vec(c), excess),
-            "f": spent / max(course.cost_of(first), 1e-9),
+            "f": spent / max(spline.cost_of(first), 1e-9),
             "g": ca.vertcat(ca.vec(margins), 1.0 - ca.sum1(c * c).T, room),
         }
         free, charged = first.size, excess.numel()
         begin = np.concatenate([first.ravel(), np.ones(charged)])
         least = np.concatenate([np.full(len(kinds) * count, keep), np.zeros(len(first) + room.numel())])
-        solver = ca.nlpsol("calm", "ipopt", problem, self._options)
+        solver = ca.nlpsol("smooth", "ipopt", program, self._options)
         lowest = np.concatenate([np.full(free, -np.inf), np.zeros(charged)])
         found = np.asarray(solver(x0=begin, lbx=lowest, lbg=least, ubg=np.inf)["x"], dtype=np.float64)
         found = found.ravel()[:free].reshape(-1, 2)
         found = within_discs(found)
-        values = setting.values_of(start.margins, start.transform, course.leans(found))
+        values = problem.values_of(start.margins, start.transform, spline.leans(found))
         return found if values.min() >= keep - 1e-4 else None
 
     def _first(self, start: Candidate) -> tuple[Ints, Ints]:
         if self.whole:
-            return np.arange(len(self.setting.task.pivots)), np.arange(len(start.margins.limits))
-        rows = self.setting.task.representatives(_POINTS)
-        values = self.setting.values(start.margins, start.transform, start.coefficients, rows).min(axis=0)
+            return np.arange(len(self.problem.samples.pivots)), np.arange(len(start.margins.limits))
+        rows = self.problem.samples.representatives(_POINTS)
+        values = self.problem.values(start.margins, start.transform, start.coefficients, rows).min(axis=0)
         return np.sort(rows), np.flatnonzero(values < values.min() + _NEAR)
 
     def _with_worst(
@@ -127,7 +128,7 @@ class IpoptSolver:
     ) -> tuple[Ints, Ints]:
         worst = valleys(values)
         worst = worst[values[worst].min(axis=1) < level]
-        steepness = self.setting.steepness(coefficients)
+        steepness = self.problem.steepness(coefficients)
         steep = valleys(-steepness[:, None])
         return np.union1d(np.union1d(rows, worst), steep[steepness[steep] > 1.0 + 1e-6]), np.union1d(
             kinds, np.flatnonzero(values.min(axis=0) < level)
@@ -138,27 +139,27 @@ class IpoptSolver:
 
         share: of the longest step of the placement that is allowed.
         """
-        setting, task = self.setting, self.setting.task
+        problem, samples = self.problem, self.problem.samples
         count = 32 * int(np.ceil(len(rows) / 32))  # in buckets, so that few solvers are built
         rows = np.concatenate([rows, np.full(count - len(rows), rows[0], dtype=np.intp)])
-        basis, c = setting.basis[rows], at.coefficients
+        basis, c = problem.basis[rows], at.coefficients
         motion = self._motion
         shifts = np.abs(motion[:3]).sum(axis=0) > 0.0
         reach, moving = share * np.where(shifts, _TRANSLATION_STEP_M, _ROTATION_STEP), motion.shape[1]
         start = np.concatenate([np.zeros(moving), [at.smallest], c.ravel(), (basis @ c).ravel()])
-        if task.tilt == 0.0:
+        if samples.tilt == 0.0:
             start = start[: moving + 1]
-        tilt = np.full(len(start) - moving - 1, 3.0 * setting.cone)
+        tilt = np.full(len(start) - moving - 1, 3.0 * problem.cone)
         solver = self._solver(at, count, tuple(int(k) for k in kinds))
-        equations = 2 * count if task.tilt > 0.0 else 0
+        equations = 2 * count if samples.tilt > 0.0 else 0
         result = solver(
             x0=start,
             p=np.concatenate([
-                np.hstack([task.pivots[rows], task.nominal[rows]]).ravel(),
+                np.hstack([samples.pivots[rows], samples.nominal[rows]]).ravel(),
                 basis.ravel(),
                 at.transform.rotation.T.ravel(),
                 at.transform.translation,
-                setting.contacts(at.margins, at.transform, setting.leans(c, rows), rows).ravel(),
+                problem.contacts(at.margins, at.transform, problem.leans(c, rows), rows).ravel(),
             ]),
             lbg=0.0,
             ubg=np.concatenate([np.zeros(equations), np.full(solver.size1_out("g") - equations, np.inf)]),
@@ -169,7 +170,7 @@ class IpoptSolver:
         coefficients = x[moving + 1 : moving + 1 + c.size].reshape(-1, 2)
         if moving == 0:
             return at.transform, coefficients
-        return setting.freedom.nearest_to(stepped(at.transform, motion @ x[:moving])), coefficients
+        return problem.constraints.nearest_to(stepped(at.transform, motion @ x[:moving])), coefficients
 
     @property
     def _options(self) -> dict[str, Any]:
@@ -177,7 +178,7 @@ class IpoptSolver:
 
     @property
     def _motion(self) -> Floats:
-        motion = self.setting.freedom.motion
+        motion = self.problem.constraints.motion
         return motion if self.free else motion[:, :0]
 
     def _solver(self, at: Candidate, count: int, kinds: tuple[int, ...]) -> Any:
@@ -191,8 +192,8 @@ class IpoptSolver:
             return self._solvers[key]
         import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
-        setting, size = self.setting, self.setting.basis.shape[1]
-        tilts = setting.task.tilt > 0.0
+        problem, size = self.problem, self.problem.basis.shape[1]
+        tilts = problem.samples.tilt > 0.0
         moves, least = ca.MX.sym("moves", self._motion.shape[1]), ca.MX.sym("m")
         step = ca.mtimes(ca.DM(self._motion), moves)
         leans = ca.MX.sym("a", 2, count) if tilts else ca.MX(2, count)
@@ -200,25 +201,25 @@ class IpoptSolver:
         points, basis = ca.MX.sym("points", 6, count), ca.MX.sym("basis", size, count)
         rotation, translation = ca.MX.sym("R", 3, 3), ca.MX.sym("t", 3)
         touching = ca.MX.sym("contacts", at.margins.contact_numbers, count)
-        margins, square = point_function(setting, at.margins, kinds).map(count)(
+        margins, square = point_function(problem, at.margins, kinds).map(count)(
             ca.repmat(step, 1, count), leans, points[:3, :], points[3:, :],
-            np.tile(setting.domain.lean_plane.T, (1, count)),
+            np.tile(problem.domain.lean_plane.T, (1, count)),
             ca.repmat(rotation, 1, count), ca.repmat(translation, 1, count), touching,
         )  # fmt: skip
-        unknowns, constraints, lean = [moves, least], [ca.vec(margins - least)], ca.MX(0.0)
-        if self.free and setting.freedom.is_bounded:
-            constraints.append(room_function(setting.freedom)(step, rotation, translation)[0])
+        unknowns, conditions, lean = [moves, least], [ca.vec(margins - least)], ca.MX(0.0)
+        if self.free and problem.constraints.is_bounded:
+            conditions.append(room_function(problem.constraints)(step, rotation, translation)[0])
         if tilts:
             c = ca.vec(coefficients)
-            lean = ca.sumsqr(c) / setting.cone**2
+            lean = ca.sumsqr(c) / problem.cone**2
             unknowns += [c, ca.vec(leans)]
-            left = 1.0 - square.T / setting.cone**2
-            constraints = [ca.vec(leans - ca.mtimes(coefficients, basis)), *constraints, left]
-        problem = {
+            left = 1.0 - square.T / problem.cone**2
+            conditions = [ca.vec(leans - ca.mtimes(coefficients, basis)), *conditions, left]
+        program = {
             "x": ca.vertcat(*unknowns),
             "p": ca.vertcat(ca.vec(points), ca.vec(basis), ca.vec(rotation), translation, ca.vec(touching)),
             "f": -least + _UPRIGHT_WEIGHT * lean,
-            "g": ca.vertcat(*constraints),
+            "g": ca.vertcat(*conditions),
         }
-        self._solvers[key] = ca.nlpsol("plan", "ipopt", problem, self._options)
+        self._solvers[key] = ca.nlpsol("plan", "ipopt", program, self._options)
         return self._solvers[key]

@@ -44,7 +44,7 @@ class PlacedPath(Result):
         return float(self.margins.min())
 
     @property
-    def binding(self) -> str:
+    def active_limit(self) -> str:
         """The limit with the smallest margin."""
         return self.margin_names[int(self.margins.min(axis=0).argmin())]
 

@@ -13,9 +13,9 @@ from pentapod.kinematics.component import Component
 from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.margins import Margins
-from pentapod.planning.problem.constraints import FREE, Freedom
-from pentapod.planning.problem.problem import Candidate, Setting
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.constraints import FREE, PlacementConstraints
+from pentapod.planning.problem.problem import Candidate, PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
 
 SAMPLES = 12_000
@@ -39,12 +39,12 @@ class Guess:
 
 
 def first_guesses(
-    task: Task,
+    samples: ToolpathSamples,
     machine: Machine,
     components: tuple[Component, ...],
     seed: int,
-    samples: int = SAMPLES,
-    freedom: Freedom = FREE,
+    tries: int = SAMPLES,
+    constraints: PlacementConstraints = FREE,
     surroundings: Surroundings = NOTHING,
 ) -> list[Guess]:
     """Return the best few of the allowed placements for each component, best first.
@@ -54,50 +54,50 @@ def first_guesses(
     with the surroundings.
     """
     rng = np.random.default_rng(seed)
-    rows = task.representatives(12)
-    centre, mean_axis = task.pivots.mean(axis=0), task.nominal.mean(axis=0)
+    rows = samples.representatives(12)
+    centre, mean_axis = samples.pivots.mean(axis=0), samples.nominal.mean(axis=0)
     mean_axis = mean_axis / max(float(np.linalg.norm(mean_axis)), 1e-9)
     guesses: list[Guess] = []
     for component in components:
         margins = Margins.of(machine, component, surroundings)
-        simple = task.tilt == 0.0 and not surroundings.obstacles
-        rotations, places = _rotations(mean_axis, -float(component.w), samples, rng), _places(machine, samples, rng)
-        if freedom.is_bounded:
-            rotations, origins = freedom.within(rotations, places - rotations @ centre, rng)
+        simple = samples.tilt == 0.0 and not surroundings.obstacles
+        rotations, places = _rotations(mean_axis, -float(component.w), tries, rng), _places(machine, tries, rng)
+        if constraints.is_bounded:
+            rotations, origins = constraints.within(rotations, places - rotations @ centre, rng)
             places = origins + rotations @ centre
         for spread in (0.08, 0.03):  # twice closer around the best
-            best = _best(_score(task, margins, rotations, places - rotations @ centre, rows))
-            repeat = samples // 3 // len(best)
+            best = _best(_score(samples, margins, rotations, places - rotations @ centre, rows))
+            repeat = tries // 3 // len(best)
             turned, near = rotations[best].repeat(repeat, axis=0), places[best].repeat(repeat, axis=0)
             rotations = np.concatenate([rotations[best], _turned(turned, spread, rng)])
             places = np.concatenate([places[best], near + rng.normal(scale=spread, size=near.shape)])
-            if freedom.is_bounded:
-                rotations, origins = freedom.nearest(rotations, places - rotations @ centre)
+            if constraints.is_bounded:
+                rotations, origins = constraints.nearest(rotations, places - rotations @ centre)
                 places = origins + rotations @ centre
         translations = places - rotations @ centre
-        score = _score(task, margins, rotations, translations, rows)
+        score = _score(samples, margins, rotations, translations, rows)
         best = _best(score)
         found = [
-            Guess(t, component, float(score[k] if simple else _smallest(task, margins, t, rows)))
+            Guess(t, component, float(score[k] if simple else _smallest(samples, margins, t, rows)))
             for k in best
-            for t in (freedom.nearest_to(RigidTransform(_orthonormal(rotations[k]), translations[k])),)
+            for t in (constraints.nearest_to(RigidTransform(_orthonormal(rotations[k]), translations[k])),)
         ]
         guesses += _different(sorted(found, key=lambda g: -g.margin), centre)
     return sorted(guesses, key=lambda g: -g.margin)
 
 
-def first_candidate(setting: Setting, margins: Margins, transform: RigidTransform) -> Candidate:
+def first_candidate(problem: PlacementProblem, margins: Margins, transform: RigidTransform) -> Candidate:
     """Return the candidate whose smooth field comes near the tilts that are best for each waypoint by itself."""
-    coefficients, task, domain = setting.upright, setting.task, setting.domain
-    if task.tilt > 0.0:
-        rows = task.representatives(_FITTED)
-        _, leans = best_tilted_margins(task.at(rows), margins, transform)
+    coefficients, samples, domain = problem.upright, problem.samples, problem.domain
+    if samples.tilt > 0.0:
+        rows = samples.representatives(_FITTED)
+        _, leans = best_tilted_margins(samples.at(rows), margins, transform)
         # Smoothness, lightly weighed, decides where the representatives do not.
         smooth = np.vstack([0.3 * domain.roughness(), 1e-3 * np.eye(domain.size)])
         wanted = np.vstack([leans @ domain.lean_plane.T, np.zeros((len(smooth), 2))])
-        fitted = np.linalg.lstsq(np.vstack([setting.basis[rows], smooth]), wanted, rcond=None)[0]
-        coefficients = setting.within_cone(np.asarray(fitted, dtype=np.float64))
-    return setting.candidate(margins, transform, coefficients)
+        fitted = np.linalg.lstsq(np.vstack([problem.basis[rows], smooth]), wanted, rcond=None)[0]
+        coefficients = problem.within_cone(np.asarray(fitted, dtype=np.float64))
+    return problem.candidate(margins, transform, coefficients)
 
 
 def tilts(angle: float) -> Floats:
@@ -110,16 +110,16 @@ def tilts(angle: float) -> Floats:
 
 
 def best_tilted_margins(
-    task: Task, margins: Margins, placement: RigidTransform, block: int = 4096
+    samples: ToolpathSamples, margins: Margins, placement: RigidTransform, block: int = 4096
 ) -> tuple[Floats, Floats]:
     """Return margins (N, M) at the best tilt of a grid over the cone, each waypoint by itself, and the lean (N, 3)."""
-    grid = tilts(task.tilt) if task.tilt > 0.0 else np.zeros((1, 2))
-    out, leans = np.empty((len(task.pivots), len(margins.limits))), np.empty((len(task.pivots), 3))
+    grid = tilts(samples.tilt) if samples.tilt > 0.0 else np.zeros((1, 2))
+    out, leans = np.empty((len(samples.pivots), len(margins.limits))), np.empty((len(samples.pivots), 3))
     for start in range(0, len(out), block):
         rows = np.arange(start, min(start + block, len(out)))
-        t1, t2 = tangent_frame(task.nominal[rows])
+        t1, t2 = tangent_frame(samples.nominal[rows])
         b = grid[:, None, :1] * t1 + grid[:, None, 1:] * t2
-        tips, axes = task.machine_poses(placement, lean(task.nominal[rows], b), rows)
+        tips, axes = samples.machine_poses(placement, lean(samples.nominal[rows], b), rows)
         all_margins = margins(tips, axes, placement)
         choice = all_margins.min(axis=-1).argmax(axis=0)
         out[rows] = all_margins[choice, np.arange(len(rows))]
@@ -147,14 +147,14 @@ def _different(guesses: list[Guess], centre: Floats) -> list[Guess]:
     return kept
 
 
-def _score(task: Task, margins: Margins, r: Floats, t: Floats, rows: Ints) -> Floats:
-    turned = np.einsum("sij,nj->sni", r, task.nominal[rows])
-    tips = np.einsum("sij,nj->sni", r, task.pivots[rows]) + t[:, None, :] - task.pivot * turned
+def _score(samples: ToolpathSamples, margins: Margins, r: Floats, t: Floats, rows: Ints) -> Floats:
+    turned = np.einsum("sij,nj->sni", r, samples.nominal[rows])
+    tips = np.einsum("sij,nj->sni", r, samples.pivots[rows]) + t[:, None, :] - samples.pivot * turned
     return margins.own(tips, turned).min(axis=(-1, -2))
 
 
-def _smallest(task: Task, margins: Margins, placement: RigidTransform, rows: Ints) -> float:
-    return float(best_tilted_margins(task.at(rows), margins, placement)[0].min())
+def _smallest(samples: ToolpathSamples, margins: Margins, placement: RigidTransform, rows: Ints) -> float:
+    return float(best_tilted_margins(samples.at(rows), margins, placement)[0].min())
 
 
 def _rotations(mean_axis: Floats, side: float, count: int, rng: np.random.Generator) -> Floats:

@@ -17,8 +17,8 @@ from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.ipopt import IpoptSolver
 from pentapod.planning.placement.sampling import first_candidate, first_guesses
 from pentapod.planning.placement.sequential import SequentialSolver
-from pentapod.planning.problem.constraints import Freedom
-from pentapod.planning.problem.problem import Candidate, Setting
+from pentapod.planning.problem.constraints import PlacementConstraints
+from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.problem.weights import NEEDED_MARGIN
 
 SolverName = Literal["sequential", "ipopt"]
@@ -45,19 +45,19 @@ class Solver(Protocol):
         """Return a candidate near `start` with the largest smallest margin, or with `enough`; never a worse one."""
         ...
 
-    def calm(self, start: Candidate, keep: float) -> Floats | None:
-        """Return coefficients of the course along the setting's task: the calmest one that keeps the margin `keep`.
+    def smooth(self, start: Candidate, keep: float) -> Floats | None:
+        """Return coefficients (K, 2) of the smoothest spline of the axes that keeps the margin `keep`.
 
-        At the placement of `start`, and from its leans on. None where no such course was found.
+        At the placement of `start`, and from its leans on. None where no such spline was found.
         """
         ...
 
 
-SOLVERS: dict[SolverName, Callable[[Setting, bool], Solver]] = {
+SOLVERS: dict[SolverName, Callable[[PlacementProblem, bool], Solver]] = {
     "sequential": SequentialSolver,
     "ipopt": IpoptSolver,
 }
-"""By name: from a setting, and whether the placement may move."""
+"""By name: from a problem, and whether the placement may move."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +68,12 @@ class Search:
     tried: int
     starts: int
     interrupted: bool
-    freedom: Freedom
+    constraints: PlacementConstraints
 
     @property
     def choice(self) -> str:
         """What the placement was chosen by, in words."""
-        poses, aim = self.freedom.poses, "largest smallest margin"
+        poses, aim = self.constraints.poses, "largest smallest margin"
         if len(poses) > 1:
             aim = f"pose {1 + poses.index(self.best.transform)} of {len(poses)} of the fixture: {aim}"
         if self.interrupted:
@@ -82,7 +82,7 @@ class Search:
 
 
 def search(
-    setting: Setting,
+    problem: PlacementProblem,
     component: Component | None = None,
     surroundings: Surroundings = NOTHING,
     *,
@@ -94,22 +94,22 @@ def search(
 
     KeyboardInterrupt ends the search early; it is raised where nothing that fits was found until then.
     """
-    freedom, best, tried, count, interrupted = setting.freedom, None, 0, 1, False
+    constraints, best, tried, count, interrupted = problem.constraints, None, 0, 1, False
     try:
-        starts, promise = _starts(setting, component, surroundings, seed, progress)
+        starts, promise = _starts(problem, component, surroundings, seed, progress)
         if promise < HOPELESS and surroundings is not NOTHING:
             # What does not fit with nothing around does not fit; that is found much sooner.
-            alone = search(setting, component, seed=seed, solver=solver, progress=progress)
+            alone = search(problem, component, seed=seed, solver=solver, progress=progress)
             if alone.best.smallest < NEEDED_MARGIN:
                 return alone
             if alone.interrupted:
                 raise KeyboardInterrupt
-        count = min(len(starts), TRIED) if freedom.moves else len(starts)
-        improver = SOLVERS[solver](setting, freedom.moves)
+        count = min(len(starts), TRIED) if constraints.moves else len(starts)
+        improver = SOLVERS[solver](problem, constraints.moves)
         for margins, transform in starts[:count]:
-            if freedom.moves and tried >= REFINED and best is not None and _is_decided(best):
+            if constraints.moves and tried >= REFINED and best is not None and _is_decided(best):
                 break
-            found = improver.raise_margin(first_candidate(setting, margins, transform))
+            found = improver.raise_margin(first_candidate(problem, margins, transform))
             best = found if best is None or found.smallest > best.smallest else best
             tried += 1
             note = f"component {best.margins.component}, best margin so far {best.smallest:.3f}"
@@ -121,7 +121,7 @@ def search(
         progress("placement", 1.0, f"interrupted: the best so far is kept, margin {best.smallest:.3f}")
     if best is None:  # there are components, and first_guesses returns some for each
         raise RuntimeError("no first guess was made")
-    return Search(best, tried, count, interrupted, freedom)
+    return Search(best, tried, count, interrupted, constraints)
 
 
 def _is_decided(best: Candidate) -> bool:
@@ -129,14 +129,20 @@ def _is_decided(best: Candidate) -> bool:
 
 
 def _starts(
-    setting: Setting, component: Component | None, surroundings: Surroundings, seed: int, progress: Progress
+    problem: PlacementProblem, component: Component | None, surroundings: Surroundings, seed: int, progress: Progress
 ) -> tuple[list[Start], float]:
     """Return where to start, and the smallest margin of the most promising guess (∞ where nothing is guessed)."""
-    components, machine, freedom = COMPONENTS if component is None else (component,), setting.machine, setting.freedom
-    if not freedom.moves:
-        return [(Margins.of(machine, c, surroundings), pose) for pose in freedom.poses for c in components], np.inf
+    components, machine, constraints = (
+        COMPONENTS if component is None else (component,),
+        problem.machine,
+        problem.constraints,
+    )
+    if not constraints.moves:
+        return [(Margins.of(machine, c, surroundings), pose) for pose in constraints.poses for c in components], np.inf
     progress("placement", 0.0, "sampling")
-    guesses = first_guesses(setting.task, machine, components, seed, freedom=freedom, surroundings=surroundings)
+    guesses = first_guesses(
+        problem.samples, machine, components, seed, constraints=constraints, surroundings=surroundings
+    )
     margins = {c: Margins.of(machine, c, surroundings) for c in components}
     starts = [(margins[guess.component], guess.transform) for guess in guesses]
     return starts, max(g.margin for g in guesses)

@@ -20,11 +20,11 @@ from pentapod.machine.machine import Machine
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.formulation import stepped
 from pentapod.planning.problem.linear_model import LinearModel, by_field, valleys
-from pentapod.planning.problem.problem import Candidate, Setting
+from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.problem.tilt_field import lean
 from pentapod.toolpath.toolpath import Toolpath
 
-SecondAim = Literal["force", "time"]
+SecondaryObjective = Literal["force", "time"]
 
 _STEPS = 40
 _WORST, _SPREAD = 48, 96
@@ -36,7 +36,7 @@ Poses = tuple[Floats, Floats]
 """Tips and tool axes (n, 3), machine frame."""
 
 
-class Aim(Protocol):
+class Objective(Protocol):
     """What is to become small: the largest of some pieces, each of which depends on ingredients at waypoints."""
 
     def value(self, at: Candidate) -> float:
@@ -52,7 +52,7 @@ class Aim(Protocol):
 class LeastForce:
     """The largest force in the legs that one newton at the tip calls up anywhere on the path, N/N."""
 
-    setting: Setting
+    problem: PlacementProblem
 
     def value(self, at: Candidate) -> float:
         """Return the worst amplification over all waypoints."""
@@ -62,18 +62,18 @@ class LeastForce:
         """Return the amplification at the worst waypoints, and at some everywhere."""
         values = self._at_all(at)
         worst = np.argsort(-values, kind="stable")[:_WORST]
-        rows = np.union1d(worst, self.setting.task.representatives(_SPREAD))
-        machine = self.setting.machine
+        rows = np.union1d(worst, self.problem.samples.representatives(_SPREAD))
+        machine = self.problem.machine
 
         def amplification(poses: Poses) -> Floats:
             return _amplification(machine, poses)[:, None]
 
-        by_motion, by_lean = _partials(self.setting, at, rows, model.moves, amplification)
-        return values[rows], _by_unknowns(self.setting, rows, by_motion[:, 0], by_lean[:, 0])
+        by_motion, by_lean = _partials(self.problem, at, rows, model.moves, amplification)
+        return values[rows], _by_unknowns(self.problem, rows, by_motion[:, 0], by_lean[:, 0])
 
     def _at_all(self, at: Candidate) -> Floats:
-        poses = self.setting.task.machine_poses(at.transform, self.setting.axes(at.coefficients))
-        return _amplification(self.setting.machine, poses)
+        poses = self.problem.samples.machine_poses(at.transform, self.problem.axes(at.coefficients))
+        return _amplification(self.problem.machine, poses)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ class LeastTime:
     feeds (N − 1,): m/s, at most the machine's rapid rate.
     """
 
-    setting: Setting
+    problem: PlacementProblem
     feeds: Floats
 
     def value(self, at: Candidate) -> float:
@@ -92,7 +92,7 @@ class LeastTime:
 
     def pieces(self, at: Candidate, model: LinearModel) -> tuple[Floats, Floats]:
         """Return the bound as one piece: a sum of so many maxima that its kinks hardly show."""
-        setting, robot, length = self.setting, self.setting.machine.robot, self.setting.machine.tool_length
+        problem, robot, length = self.problem, self.problem.machine.robot, self.problem.machine.tool_length
         times, weights = self._times(at)
         rows = np.flatnonzero((weights != 0.0).any(axis=1))
 
@@ -100,16 +100,16 @@ class LeastTime:
             tips, axes = poses
             return np.hstack([robot.leg_lengths(tips + length * axes, -axes), tips])
 
-        by_motion, by_lean = _partials(setting, at, rows, model.moves, legs_and_tips)
+        by_motion, by_lean = _partials(problem, at, rows, model.moves, legs_and_tips)
         by_motion = np.einsum("ni,nik->nk", weights[rows], by_motion)
         by_lean = np.einsum("ni,nik->nk", weights[rows], by_lean)
-        slope = np.concatenate([by_motion.sum(axis=0), (setting.basis[rows].T @ by_lean * setting.cone).ravel()])
+        slope = np.concatenate([by_motion.sum(axis=0), (problem.basis[rows].T @ by_lean * problem.cone).ravel()])
         return np.array([times.sum()]), slope[None]
 
     def _times(self, at: Candidate) -> tuple[Floats, Floats]:
         """Return the least time of each interval, (N − 1,), and the derivative of their sum by legs and tip (N, 8)."""
-        setting, machine = self.setting, self.setting.machine
-        tips, axes = setting.task.machine_poses(at.transform, setting.axes(at.coefficients))
+        problem, machine = self.problem, self.problem.machine
+        tips, axes = problem.samples.machine_poses(at.transform, problem.axes(at.coefficients))
         steps = np.diff(machine.robot.leg_lengths(tips + machine.tool_length * axes, -axes), axis=0)
         by_leg = np.abs(steps) / machine.legs.max_velocity
         leg = by_leg.argmax(axis=1)
@@ -127,17 +127,17 @@ class LeastTime:
         return np.maximum(slowest, by_feed), weights
 
 
-def aim_of(name: SecondAim, setting: Setting, toolpath: Toolpath) -> Aim:
-    """Return the aim of this name for the setting of a toolpath."""
+def objective_of(name: SecondaryObjective, problem: PlacementProblem, toolpath: Toolpath) -> Objective:
+    """Return the aim of this name for the problem of a toolpath."""
     if name == "force":
-        return LeastForce(setting)
+        return LeastForce(problem)
     feeds = np.array([segment.feed for segment in toolpath.segments])[toolpath.segment_of_interval]
-    return LeastTime(setting, np.minimum(feeds, setting.machine.rapid_velocity))
+    return LeastTime(problem, np.minimum(feeds, problem.machine.rapid_velocity))
 
 
-def improved(solver: SequentialSolver, start: Candidate, aim: Aim, keep: float) -> Candidate:
+def improved(solver: SequentialSolver, start: Candidate, aim: Objective, keep: float) -> Candidate:
     """Return a candidate near `start`, with the smallest margin `keep` at least, that is better by the aim."""
-    setting, rows = solver.setting, np.arange(len(solver.setting.task.pivots))
+    problem, rows = solver.problem, np.arange(len(solver.problem.samples.pivots))
     best, reach, extra = start, 0.3, _NO_ROWS
     value = aim.value(best)
     model = solver.model(best, rows, keep)
@@ -149,8 +149,8 @@ def improved(solver: SequentialSolver, start: Candidate, aim: Aim, keep: float) 
             motion, change, promise = step
             promise += value - float(pieces[0].max())
             transform = stepped(best.transform, motion) if model.moves.size else best.transform
-            transform = setting.freedom.nearest_to(transform)
-            trial = setting.candidate(best.margins, transform, setting.within_cone(best.coefficients + change))
+            transform = problem.constraints.nearest_to(transform)
+            trial = problem.candidate(best.margins, transform, problem.within_cone(best.coefficients + change))
         gain = value - aim.value(trial) if trial is not None else 0.0
         if trial is not None and trial.smallest >= keep - _SLACK and gain > 0.1 * promise and gain > 0.0:
             done = gain < _ENOUGH * value
@@ -165,7 +165,7 @@ def improved(solver: SequentialSolver, start: Candidate, aim: Aim, keep: float) 
             if reach < _SMALLEST_REACH:
                 break
             if trial is not None and trial.smallest < keep:  # what came out worst may not have been in the model
-                values = setting.values(trial.margins, trial.transform, trial.coefficients)
+                values = problem.values(trial.margins, trial.transform, trial.coefficients)
                 extra = np.union1d(extra, valleys(values))
                 model = solver.model(best, rows, keep, extra)
     return best
@@ -201,15 +201,15 @@ def _lowest(
 
 
 def _partials(
-    setting: Setting, at: Candidate, rows: Ints, moves: Floats, ingredient: Callable[[Poses], Floats]
+    problem: PlacementProblem, at: Candidate, rows: Ints, moves: Floats, ingredient: Callable[[Poses], Floats]
 ) -> tuple[Floats, Floats]:
     """Return central differences of ingredients (n, I) by the moves (6, k), (n, I, k), and the lean."""
     still = np.zeros(2)
 
     def at_offset(step: Floats, tilt: Floats) -> Floats:
-        b = (setting.basis[rows] @ at.coefficients + tilt) @ setting.domain.lean_plane
+        b = (problem.basis[rows] @ at.coefficients + tilt) @ problem.domain.lean_plane
         transform: RigidTransform = stepped(at.transform, step)
-        return ingredient(setting.task.machine_poses(transform, lean(setting.task.nominal[rows], b), rows))
+        return ingredient(problem.samples.machine_poses(transform, lean(problem.samples.nominal[rows], b), rows))
 
     steps = _STEP * moves
     by_motion = [at_offset(step, still) - at_offset(-step, still) for step in steps.T]
@@ -219,9 +219,9 @@ def _partials(
     return first / (2.0 * _STEP), np.stack(by_lean, axis=-1) / (2.0 * _STEP)
 
 
-def _by_unknowns(setting: Setting, rows: Ints, by_motion: Floats, by_lean: Floats) -> Floats:
+def _by_unknowns(problem: PlacementProblem, rows: Ints, by_motion: Floats, by_lean: Floats) -> Floats:
     """Return derivatives (n, k + 2·size) by motion and field of those by motion (n, k) and lean (n, 2)."""
-    return np.hstack([by_motion, by_field(setting.basis[rows], by_lean) * setting.cone])
+    return np.hstack([by_motion, by_field(problem.basis[rows], by_lean) * problem.cone])
 
 
 def _amplification(machine: Machine, poses: Poses) -> Floats:

@@ -1,7 +1,7 @@
 """The default solver: small quadratic programs in sequence, on the waypoints and margins that are smallest.
 
 Raising the smallest margin is sequential quadratic programming with a trust region (Fletcher, Practical Methods of
-Optimization, ch. 14: minimax); calming the field is a convex cost under the margins to keep, by feasible steps only.
+Optimization, ch. 14: minimax); smoothing the field is a convex cost under the margins to keep, by feasible steps only.
 Every step is judged by the margins themselves, so a poor model costs a step, never a limit.
 """
 
@@ -16,8 +16,8 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.planning.placement.curvature import Curvature
 from pentapod.planning.problem.formulation import Room, placement_room, step_slopes, stepped
 from pentapod.planning.problem.linear_model import REACH, LinearModel, valleys
-from pentapod.planning.problem.problem import Candidate, Setting
-from pentapod.planning.tool_axis.smoothing import calmed
+from pentapod.planning.problem.problem import Candidate, PlacementProblem
+from pentapod.planning.tool_axis.smoothing import smoothed
 
 _CONSIDERED = 4000
 """Waypoints whose margins are looked at in every step; all are looked at when the steps have ended."""
@@ -31,9 +31,9 @@ _NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
 
 @dataclass(eq=False)
 class SequentialSolver:
-    """Improves candidates of one setting; free: whether the placement may move."""
+    """Improves candidates of one problem; free: whether the placement may move."""
 
-    setting: Setting
+    problem: PlacementProblem
     free: bool
 
     def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
@@ -41,7 +41,7 @@ class SequentialSolver:
         rows, best = self._considered(), start
         for _ in range(_ROUNDS):
             found = self._climb(best, rows, enough + _ENOUGH)
-            values = self.setting.values(found.margins, found.transform, found.coefficients)
+            values = self.problem.values(found.margins, found.transform, found.coefficients)
             smallest = float(values.min())
             if smallest > best.smallest:
                 best = Candidate(found.margins, found.transform, found.coefficients, smallest)
@@ -50,29 +50,29 @@ class SequentialSolver:
             rows = np.union1d(rows, np.argsort(values.min(axis=1), kind="stable")[: _CONSIDERED // 8])
         return best
 
-    def calm(self, start: Candidate, keep: float) -> Floats | None:
-        """Return coefficients (K, 2) of the calmest course at the placement of `start` that keeps the margin `keep`."""
-        return calmed(self.setting, start, keep)
+    def smooth(self, start: Candidate, keep: float) -> Floats | None:
+        """Return coefficients (K, 2) of the smoothest spline at the placement of `start` that keeps `keep`."""
+        return smoothed(self.problem, start, keep)
 
     def _considered(self) -> Ints:
-        count = len(self.setting.task.pivots)
+        count = len(self.problem.samples.pivots)
         return np.unique(np.linspace(0, count - 1, min(count, _CONSIDERED)).astype(np.intp))
 
     def _climb(self, start: Candidate, rows: Ints, enough: float) -> Candidate:
         """Return the candidate that a trust-region method reaches, with its smallest margin over `rows`."""
-        setting, reach, extra = self.setting, 0.5, _NO_ROWS
-        smallest = float(setting.values(start.margins, start.transform, start.coefficients, rows).min())
+        problem, reach, extra = self.problem, 0.5, _NO_ROWS
+        smallest = float(problem.values(start.margins, start.transform, start.coefficients, rows).min())
         best = Candidate(start.margins, start.transform, start.coefficients, smallest)
-        model, curvature = self.model(best, rows, best.smallest), Curvature(setting, start.margins)
+        model, curvature = self.model(best, rows, best.smallest), Curvature(problem, start.margins)
         for _ in range(_STEPS):
             if best.smallest >= enough:
                 break
             step, change, promise = curvature.best_step(model, best, reach)
             if promise < _LEAST:
                 break
-            transform = setting.freedom.nearest_to(stepped(best.transform, step)) if self.free else best.transform
-            coefficients = setting.within_cone(best.coefficients + change)
-            values = setting.values(best.margins, transform, coefficients, rows)
+            transform = problem.constraints.nearest_to(stepped(best.transform, step)) if self.free else best.transform
+            coefficients = problem.within_cone(best.coefficients + change)
+            values = problem.values(best.margins, transform, coefficients, rows)
             gain = float(values.min()) - best.smallest
             reach *= 2.0 if gain > 0.6 * promise else 1.0 if gain > 0.25 * promise else 0.4
             if gain > 0.05 * promise:
@@ -80,7 +80,7 @@ class SequentialSolver:
             elif reach < _LEAST:
                 break
             else:  # what came out worst may not have been in the model
-                steepness = setting.steepness(best.coefficients + change, rows)
+                steepness = problem.steepness(best.coefficients + change, rows)
                 extra = np.union1d(extra, np.union1d(valleys(values), valleys(-steepness[:, None])))
             model = self.model(best, rows, best.smallest, extra)
         return best
@@ -90,14 +90,14 @@ class SequentialSolver:
 
         extra: indices into rows that enter in any case.
         """
-        slopes = step_slopes(self.setting, at.margins)
-        return LinearModel.of(self.setting, at, rows, level, extra, slopes, self._room(at.transform), self._moves)
+        slopes = step_slopes(self.problem, at.margins)
+        return LinearModel.of(self.problem, at, rows, level, extra, slopes, self._room(at.transform), self._moves)
 
     @property
     def _moves(self) -> Floats:
-        moves = REACH[:, None] * self.setting.freedom.motion
+        moves = REACH[:, None] * self.problem.constraints.motion
         return moves if self.free else moves[:, :0]
 
     @cached_property
     def _room(self) -> Room:
-        return placement_room(self.setting.freedom, free=self.free)
+        return placement_room(self.problem.constraints, free=self.free)

@@ -1,4 +1,4 @@
-"""Freedom: which placements are allowed, and in which of its six directions a placement may move.
+"""PlacementConstraints: which placements are allowed, and in which of its six directions a placement may move.
 
 A step of the optimisers moves the workpiece's origin in the machine frame and turns the workpiece about that origin
 (`formulation.stepped`). What a fixture, a table or a box leaves of that is stated here once: for sampling, as a way to
@@ -25,7 +25,7 @@ _NO_MOTION = np.zeros((6, 0))
 
 
 @dataclass(frozen=True, eq=False)
-class Freedom(Value):
+class PlacementConstraints(Value):
     """The allowed placements, workpiece → machine.
 
     motion (6, k): orthonormal columns, the allowed steps: shifts of the workpiece's origin in the machine frame, then
@@ -69,7 +69,7 @@ class Freedom(Value):
         high: ArrayLike = (np.inf, np.inf, np.inf),
         reference: RigidTransform | None = None,
         largest_turn: float = np.pi,
-    ) -> Freedom:
+    ) -> PlacementConstraints:
         """Return all six freedoms, within a box for the origin and a largest turn from a reference (radians)."""
         rotation = np.eye(3) if reference is None else reference.rotation
         none = np.zeros(3)
@@ -84,8 +84,8 @@ class Freedom(Value):
         y: tuple[float, float] = (-np.inf, np.inf),
         up: ArrayLike = (0.0, 0.0, 1.0),
         normal: ArrayLike = (0.0, 0.0, -1.0),
-    ) -> Freedom:
-        """Return the freedom of a part that stands on a table parallel to the base plane.
+    ) -> PlacementConstraints:
+        """Return the constraints of a part that stands on a table parallel to the base plane.
 
         height: z of the workpiece's origin, machine frame. x, y: least and greatest coordinate of the origin, metres.
         up (3,): direction of the workpiece that is up on the table. normal (3,): up for the table, ±z of the machine.
@@ -102,7 +102,7 @@ class Freedom(Value):
         return cls(motion, low, high, np.eye(3), np.pi, upright, upward)
 
     @classmethod
-    def fixture(cls, poses: Sequence[RigidTransform]) -> Freedom:
+    def fixture(cls, poses: Sequence[RigidTransform]) -> PlacementConstraints:
         """Return the choice between given placements. Raises ArrayError where there are none."""
         if not poses:
             raise ArrayError("a fixture needs at least one pose", value=0)
@@ -176,7 +176,7 @@ class Freedom(Value):
         return rows
 
 
-FREE = Freedom.free()
+FREE = PlacementConstraints.free()
 """All six freedoms, without bounds."""
 
 

@@ -18,8 +18,8 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.numerics.casadi_vectorised import Vectorised
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.limits.tool_pose import Joints
-from pentapod.planning.problem.constraints import Freedom
-from pentapod.planning.problem.problem import Setting
+from pentapod.planning.problem.constraints import PlacementConstraints
+from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.weights import weighed
 
 Slopes = Callable[[Floats, Floats, Ints], Floats]
@@ -30,10 +30,10 @@ Room = Callable[[RigidTransform], tuple[Floats, Floats]]
 By = Literal["nothing", "lean", "step and lean"]
 
 _MADE: WeakKeyDictionary[Margins, dict[tuple[Any, ...], Any]] = WeakKeyDictionary()
-"""Making a function takes a good part of a second; settings that differ in their path or cone alone share them."""
+"""Making a function takes a good part of a second; problems that differ in their path or cone alone share them."""
 
 
-def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, by: By = "nothing") -> Any:
+def point_function(problem: PlacementProblem, margins: Margins, kinds: Sequence[int], *, by: By = "nothing") -> Any:
     """Return the casadi function of one waypoint: margins K, and the square of the lean (of the tangent of its angle).
 
     Of step 6, lean a 2, pivot 3, nominal 3, pair 3×2, R 3×3, t 3, contacts. The margins are weighed; kinds: which.
@@ -42,14 +42,14 @@ def point_function(setting: Setting, margins: Margins, kinds: Sequence[int], *, 
     """
     import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
-    inputs, values, square = _point(setting, margins, kinds, None)
+    inputs, values, square = _point(problem, margins, kinds, None)
     step, a = inputs[:2]
     unknowns = {"nothing": [], "lean": [a], "step and lean": [ca.vertcat(step, a)]}[by]
     slopes = [ca.densify(ca.jacobian(values, x)) for x in unknowns]
     return ca.Function("point", inputs, [values, square, *slopes], {"cse": True})
 
 
-def guide_function(setting: Setting, margins: Margins) -> Any:
+def guide_function(problem: PlacementProblem, margins: Margins) -> Any:
     """Return the casadi function of one waypoint with the guides free: all margins, and their derivatives M × 13.
 
     Of slides 5 from where the guides of the margins' machine stand, and then as `point_function`; the derivatives are
@@ -58,25 +58,27 @@ def guide_function(setting: Setting, margins: Margins) -> Any:
     import casadi as ca  # noqa: PLC0415
 
     slides = ca.SX.sym("slides", 5)
-    inputs, values, _ = _point(setting, margins, range(len(margins.limits)), slides)
+    inputs, values, _ = _point(problem, margins, range(len(margins.limits)), slides)
     slopes = ca.densify(ca.jacobian(values, ca.vertcat(inputs[0], slides, inputs[1])))
     return ca.Function("guides", [slides, *inputs], [values, slopes], {"cse": True})
 
 
-def _point(setting: Setting, margins: Margins, kinds: Sequence[int], slides: Any) -> tuple[list[Any], Any, Any]:
+def _point(
+    problem: PlacementProblem, margins: Margins, kinds: Sequence[int], slides: Any
+) -> tuple[list[Any], Any, Any]:
     """Return the symbols of a waypoint, its weighed margins, and the square of the lean; see above."""
     import casadi as ca  # noqa: PLC0415
 
-    (step, a, *given), (tip, turned, turn, square) = _pose(setting)
+    (step, a, *given), (tip, turned, turn, square) = _pose(problem)
     numbers = ca.SX.sym("contacts", margins.contact_numbers)
-    joints = None if slides is None else _slid(setting, margins, slides)
+    joints = None if slides is None else _slid(problem, margins, slides)
     values = margins.symbolic(tip, turned, turn, given[-1] + step[:3], numbers, joints)[list(kinds)]
-    if not setting.weights.are_even:
-        values = weighed(values, ca.DM(setting.weights.of(margins.limits)[list(kinds)]))
+    if not problem.weights.are_even:
+        values = weighed(values, ca.DM(problem.weights.of(margins.limits)[list(kinds)]))
     return [step, a, *given, numbers], values, square
 
 
-def _pose(setting: Setting) -> tuple[list[Any], tuple[Any, Any, Any, Any]]:
+def _pose(problem: PlacementProblem) -> tuple[list[Any], tuple[Any, Any, Any, Any]]:
     """Return the symbols step, a, pivot, nominal, pair, R, t of a waypoint; its tip, axis, turn, square of the lean."""
     import casadi as ca  # noqa: PLC0415
 
@@ -88,22 +90,22 @@ def _pose(setting: Setting) -> tuple[list[Any], tuple[Any, Any, Any, Any]]:
     square = ca.dot(across, across)
     turn = ca.mtimes(rotation, _cayley(step[3:]))
     turned = ca.mtimes(turn, (nominal + across) / ca.sqrt(1.0 + square))
-    tip = ca.mtimes(turn, pivot) + translation + step[:3] - setting.task.pivot * turned
+    tip = ca.mtimes(turn, pivot) + translation + step[:3] - problem.samples.pivot * turned
     return [step, a, pivot, nominal, pair, rotation, translation], (tip, turned, turn, square)
 
 
-def leg_function(setting: Setting, margins: Margins, *, slopes: bool = False) -> Any:
+def leg_function(problem: PlacementProblem, margins: Margins, *, slopes: bool = False) -> Any:
     """Return the casadi function of one waypoint: its leg lengths 5, metres, for the machine of the margins.
 
     Of a, pivot, nominal, pair, R, t as in `point_function`. slopes: also return their derivatives by a, 5 × 2.
     """
-    return _once(margins, ("legs", slopes), setting, lambda: _legs(setting, margins, slopes))
+    return _once(margins, ("legs", slopes), problem, lambda: _legs(problem, margins, slopes))
 
 
-def _legs(setting: Setting, margins: Margins, slopes: bool) -> Any:
+def _legs(problem: PlacementProblem, margins: Margins, slopes: bool) -> Any:
     import casadi as ca  # noqa: PLC0415
 
-    (step, a, *given), (tip, turned, _, _) = _pose(setting)
+    (step, a, *given), (tip, turned, _, _) = _pose(problem)
     bases, offsets = margins.joints
     reach = [margins.machine.tool_length - z for z in offsets]
     legs = ca.vertcat(*[
@@ -114,43 +116,43 @@ def _legs(setting: Setting, margins: Margins, slopes: bool) -> Any:
     return ca.Function("legs", [a, *given], [ca.densify(each) for each in here], {"cse": True})
 
 
-def _once(margins: Margins, name: tuple[Any, ...], setting: Setting, make: Callable[[], Any]) -> Any:
+def _once(margins: Margins, name: tuple[Any, ...], problem: PlacementProblem, make: Callable[[], Any]) -> Any:
     """Return what `make` returned for these margins, pivot and weights before, or returns now."""
-    made, key = _MADE.setdefault(margins, {}), (*name, setting.task.pivot, setting.weights)
+    made, key = _MADE.setdefault(margins, {}), (*name, problem.samples.pivot, problem.weights)
     if key not in made:
         made[key] = make()
     return made[key]
 
 
-def _slid(setting: Setting, margins: Margins, slides: Any) -> Joints:
+def _slid(problem: PlacementProblem, margins: Margins, slides: Any) -> Joints:
     """Return the joints with the guides moved on by slides; a platform joint moves with its guide's part along x."""
-    (bases, offsets), guides = margins.joints, setting.machine.guides
+    (bases, offsets), guides = margins.joints, problem.machine.guides
     ways = np.zeros((5, 2)) if guides is None else guides.guides
     moved = [[x + slides[k] * ways[k, 0], y + slides[k] * ways[k, 1]] for k, (x, y) in enumerate(bases)]
-    delta = setting.machine.robot.delta
+    delta = problem.machine.robot.delta
     return moved, [z + delta * slides[k] * ways[k, 0] for k, z in enumerate(offsets)]
 
 
-def curvature_function(setting: Setting, margins: Margins, *, guides: bool = False) -> Any:
+def curvature_function(problem: PlacementProblem, margins: Margins, *, guides: bool = False) -> Any:
     """Return the casadi function of one waypoint: second derivatives, 8 × 8 by (step, a), of weights · margins.
 
     Of the arguments of `point_function`, and the weights M, one for each margin. With the guides free: of the arguments
     of `guide_function` and the weights, 13 × 13 by (step, slides, a).
     """
-    return _once(margins, ("curvature", guides), setting, lambda: _curvature(setting, margins, guides))
+    return _once(margins, ("curvature", guides), problem, lambda: _curvature(problem, margins, guides))
 
 
-def _curvature(setting: Setting, margins: Margins, guides: bool) -> Any:
+def _curvature(problem: PlacementProblem, margins: Margins, guides: bool) -> Any:
     import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
     slides, weights = ca.SX.sym("slides", 5), ca.SX.sym("weights", len(margins.limits))
-    inputs, values, _ = _point(setting, margins, range(len(margins.limits)), slides if guides else None)
+    inputs, values, _ = _point(problem, margins, range(len(margins.limits)), slides if guides else None)
     free = [slides] if guides else []
     bent, _ = ca.hessian(ca.dot(weights, values), ca.vertcat(inputs[0], *free, inputs[1]))
     return ca.Function("curvature", [*free, *inputs, weights], [ca.densify(bent)], {"cse": True})
 
 
-def room_function(freedom: Freedom) -> Any:
+def room_function(constraints: PlacementConstraints) -> Any:
     """Return the casadi function (step 6, R 3×3, t 3) → room L of the stepped placement, ∂ room / ∂ step, L × 6.
 
     The room within the allowed placements must not become negative.
@@ -158,13 +160,13 @@ def room_function(freedom: Freedom) -> Any:
     import casadi as ca  # noqa: PLC0415
 
     step, rotation, translation = ca.SX.sym("step", 6), ca.SX.sym("R", 3, 3), ca.SX.sym("t", 3)
-    room = ca.vertcat(*freedom.room(ca.mtimes(rotation, _cayley(step[3:])), translation + step[:3]))
+    room = ca.vertcat(*constraints.room(ca.mtimes(rotation, _cayley(step[3:])), translation + step[:3]))
     return ca.Function("room", [step, rotation, translation], [room, ca.densify(ca.jacobian(room, step))])
 
 
-def placement_room(freedom: Freedom, *, free: bool = True) -> Room:
+def placement_room(constraints: PlacementConstraints, *, free: bool = True) -> Room:
     """Return the function placement → its room (L,) and derivatives (L, 6) by a step; L = 0 where nothing bounds it."""
-    function = room_function(freedom) if free and freedom.is_bounded else None
+    function = room_function(constraints) if free and constraints.is_bounded else None
 
     def room(transform: RigidTransform) -> tuple[Floats, Floats]:
         if function is None:
@@ -175,19 +177,19 @@ def placement_room(freedom: Freedom, *, free: bool = True) -> Room:
     return room
 
 
-def lean_slopes(setting: Setting, margins: Margins, transform: RigidTransform, kinds: Sequence[int]) -> Slopes:
+def lean_slopes(problem: PlacementProblem, margins: Margins, transform: RigidTransform, kinds: Sequence[int]) -> Slopes:
     """Return the function (frames (n, 2, 3), leans in them (n, 2), waypoints (n,)) → margins' derivatives (n, K, 2)."""
-    point = Vectorised(point_function(setting, margins, kinds, by="lean"))
+    point = Vectorised(point_function(problem, margins, kinds, by="lean"))
     rotation, translation = transform.rotation.T.reshape(-1, 1), transform.translation[:, None]
-    task = setting.task
+    samples = problem.samples
 
     def slopes(frames: Floats, leans: Floats, rows: Ints) -> Floats:
-        touching = setting.contacts(margins, transform, np.einsum("nk,nkj->nj", leans, frames), rows)
+        touching = problem.contacts(margins, transform, np.einsum("nk,nkj->nj", leans, frames), rows)
         _, _, found = point(
             np.zeros((6, 1)),
             leans.T,
-            task.pivots[rows].T,
-            task.nominal[rows].T,
+            samples.pivots[rows].T,
+            samples.nominal[rows].T,
             frames.reshape(-1, 6).T,
             rotation,
             translation,
@@ -198,32 +200,32 @@ def lean_slopes(setting: Setting, margins: Margins, transform: RigidTransform, k
     return slopes
 
 
-def step_slopes(setting: Setting, margins: Margins, *, guides: bool = False) -> StepSlopes:
+def step_slopes(problem: PlacementProblem, margins: Margins, *, guides: bool = False) -> StepSlopes:
     """Return the function (margins, placement, coefficients, waypoints (n,)) → their derivatives (n, M, 8 or 13).
 
-    By the placement's step and the lean; with the guides free by step, slides and lean, for margins of the setting's
+    By the placement's step and the lean; with the guides free by step, slides and lean, for margins of the problem's
     machine with its guides anywhere.
     """
-    kinds, task = range(len(margins.limits)), setting.task
+    kinds, samples = range(len(margins.limits)), problem.samples
 
     def made() -> Vectorised:
         if guides:
-            return Vectorised(guide_function(setting, margins))
-        return Vectorised(point_function(setting, margins, kinds, by="step and lean"))
+            return Vectorised(guide_function(problem, margins))
+        return Vectorised(point_function(problem, margins, kinds, by="step and lean"))
 
-    point = _once(margins, ("slopes", guides), setting, made)
+    point = _once(margins, ("slopes", guides), problem, made)
 
     def slopes(there: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints) -> Floats:
         slid = [(there.machine.slides - margins.machine.slides)[:, None]] if guides else []
-        leans = (setting.basis[rows] @ coefficients).T if task.tilt > 0.0 else np.zeros((2, 1))
-        touching = setting.contacts(there, transform, setting.leans(coefficients, rows), rows)
+        leans = (problem.basis[rows] @ coefficients).T if samples.tilt > 0.0 else np.zeros((2, 1))
+        touching = problem.contacts(there, transform, problem.leans(coefficients, rows), rows)
         found = point(
             *slid,
             np.zeros((6, 1)),
             leans,
-            task.pivots[rows].T,
-            task.nominal[rows].T,
-            setting.domain.lean_plane.reshape(-1, 1),
+            samples.pivots[rows].T,
+            samples.nominal[rows].T,
+            problem.domain.lean_plane.reshape(-1, 1),
             transform.rotation.T.reshape(-1, 1),
             transform.translation[:, None],
             touching.T,

@@ -10,7 +10,7 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.limits.margins import Margins
-from pentapod.planning.problem.problem import Candidate, Setting
+from pentapod.planning.problem.problem import Candidate, PlacementProblem
 
 REACH = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
 """The unit of a placement step: metres, and tan(angle / 2)."""
@@ -33,7 +33,7 @@ class LinearModel:
     placement (L,) ≈ room + room_matrix @ x.
     """
 
-    setting: Setting
+    problem: PlacementProblem
     at: Candidate
     moves: Floats
     points: Ints
@@ -49,7 +49,7 @@ class LinearModel:
     @classmethod
     def of(
         cls,
-        setting: Setting,
+        problem: PlacementProblem,
         at: Candidate,
         rows: Ints,
         level: float,
@@ -64,7 +64,7 @@ class LinearModel:
         step, slides and lean.
         """
         length, count = moves.shape
-        values = setting.values(at.margins, at.transform, at.coefficients, rows)
+        values = problem.values(at.margins, at.transform, at.coefficients, rows)
         chosen = np.union1d(valleys(values, _WORST_OF_KIND), extra)
         chosen = chosen[values[chosen].min(axis=1) < level + _NEAR]
         point, kinds = np.nonzero(values[chosen] < level + _NEAR)
@@ -74,10 +74,10 @@ class LinearModel:
             if len(few)
             else np.zeros((0, length + 2))
         )
-        field = by_field(setting.basis[few][point], slope[:, length:]) * setting.cone
-        steep, share, steep_by_field = _cone_tangents(setting, at, rows, extra)
+        field = by_field(problem.basis[few][point], slope[:, length:]) * problem.cone
+        steep, share, steep_by_field = _cone_tangents(problem, at, rows, extra)
         return cls(
-            setting,
+            problem,
             at,
             moves,
             few[point],
@@ -102,7 +102,7 @@ class LinearModel:
     def step_of(self, x: Floats) -> tuple[Floats, Floats]:
         """Return the step (p,) of placement and slides, and the change of coefficients (size, 2), of unknowns x."""
         count = self.moves.shape[1]
-        return self.moves @ x[:count], (x[count:] * self.setting.cone).reshape(-1, 2)
+        return self.moves @ x[:count], (x[count:] * self.problem.cone).reshape(-1, 2)
 
 
 def valleys(values: Floats, count: int = _WORST_OF_KIND) -> Ints:
@@ -115,22 +115,22 @@ def valleys(values: Floats, count: int = _WORST_OF_KIND) -> Ints:
     return np.unique(worst[np.take_along_axis(valley, worst, axis=0)])
 
 
-def _cone_tangents(setting: Setting, at: Candidate, rows: Ints, extra: Ints) -> tuple[Ints, Floats, Floats]:
+def _cone_tangents(problem: PlacementProblem, at: Candidate, rows: Ints, extra: Ints) -> tuple[Ints, Floats, Floats]:
     """Return tangents of the cone at the steepest leans: waypoints, the share used in that direction, its derivatives.
 
     Several tangents for each lean, since a lean on the edge may well turn along it.
     """
-    steepness = setting.steepness(at.coefficients, rows)
+    steepness = problem.steepness(at.coefficients, rows)
     steep = np.union1d(valleys(-steepness[:, None], _STEEPEST), extra)
     steep = steep[steepness[steep] > _STEEP]
-    nominal, basis = setting.task.nominal[rows[steep]], setting.basis[rows[steep]]
-    outward = setting.leans(at.coefficients, rows[steep]) / (steepness[steep, None] * setting.cone)
+    nominal, basis = problem.samples.nominal[rows[steep]], problem.basis[rows[steep]]
+    outward = problem.leans(at.coefficients, rows[steep]) / (steepness[steep, None] * problem.cone)
     aside = np.cross(nominal, outward)
-    shares, derivatives = [np.zeros(0)], [np.zeros((0, 2 * setting.basis.shape[1]))]
+    shares, derivatives = [np.zeros(0)], [np.zeros((0, 2 * problem.basis.shape[1]))]
     for turn in _TANGENTS:
         direction = np.cos(turn) * outward + np.sin(turn) * aside
         shares.append(np.cos(turn) * steepness[steep])
-        derivatives.append(by_field(basis, direction @ setting.domain.lean_plane.T))
+        derivatives.append(by_field(basis, direction @ problem.domain.lean_plane.T))
     return np.tile(rows[steep], len(_TANGENTS)), np.concatenate(shares), np.concatenate(derivatives)
 
 

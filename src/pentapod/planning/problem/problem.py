@@ -1,4 +1,4 @@
-"""Setting: the task, the machine and the tilt field that all solvers work on; Candidate: what they improve."""
+"""PlacementProblem: the max-min problem that all placement solvers work on; Candidate: what they improve."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.margins import Margins
-from pentapod.planning.problem.constraints import FREE, Freedom
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.constraints import FREE, PlacementConstraints
+from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import FieldDomain, lean
 from pentapod.planning.problem.weights import EVEN, Weights, weighed
 
@@ -32,30 +32,36 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
-    """Everything about one planning task that does not change while solvers work on it.
+class PlacementProblem:
+    """Everything about one planning samples that does not change while solvers work on it.
 
     basis (N, size): the tilt field's spline basis at the waypoints; without a tilt cone it has size 0.
     """
 
-    task: Task
+    samples: ToolpathSamples
     machine: Machine
     domain: FieldDomain
     basis: Floats
-    freedom: Freedom
+    constraints: PlacementConstraints
     weights: Weights
 
     @classmethod
-    def of(cls, task: Task, machine: Machine, freedom: Freedom = FREE, weights: Weights = EVEN) -> Setting:
-        """Return the setting of a task on a machine, with the allowed placements and the weights of the margins."""
-        domain = FieldDomain.around(task.pivots, task.nominal, _CELLS)
-        basis = domain.basis(task.pivots) if task.tilt > 0.0 else np.zeros((len(task.pivots), 0))
-        return cls(task, machine, domain, basis, freedom, weights)
+    def of(
+        cls,
+        samples: ToolpathSamples,
+        machine: Machine,
+        constraints: PlacementConstraints = FREE,
+        weights: Weights = EVEN,
+    ) -> PlacementProblem:
+        """Return the problem of a samples on a machine, with the allowed placements and the weights of the margins."""
+        domain = FieldDomain.around(samples.pivots, samples.nominal, _CELLS)
+        basis = domain.basis(samples.pivots) if samples.tilt > 0.0 else np.zeros((len(samples.pivots), 0))
+        return cls(samples, machine, domain, basis, constraints, weights)
 
     @property
     def cone(self) -> float:
         """The longest lean (tangent of the angle) that the optimisers use."""
-        return float(np.tan(self.task.tilt) * CONE_SHARE)
+        return float(np.tan(self.samples.tilt) * CONE_SHARE)
 
     @property
     def upright(self) -> Floats:
@@ -65,12 +71,12 @@ class Setting:
     def leans(self, coefficients: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """Return the leans (n, 3) across the nominal axes, workpiece frame, at waypoints `rows`."""
         b = self.basis[rows] @ coefficients @ self.domain.lean_plane
-        nominal = self.task.nominal[rows]
+        nominal = self.samples.nominal[rows]
         return np.asarray(b - (b * nominal).sum(axis=1, keepdims=True) * nominal, dtype=np.float64)
 
     def axes(self, coefficients: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """Return the tool axes (n, 3), workpiece frame, at waypoints `rows`."""
-        return lean(self.task.nominal[rows], self.leans(coefficients, rows))
+        return lean(self.samples.nominal[rows], self.leans(coefficients, rows))
 
     def values(
         self, margins: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints | slice = slice(None)
@@ -82,8 +88,8 @@ class Setting:
         self, margins: Margins, transform: RigidTransform, leans: Floats, rows: Ints | slice = slice(None)
     ) -> Floats:
         """Return the margins (n, M), weighed, for leans (n, 3), workpiece frame, at waypoints `rows`."""
-        axes = lean(self.task.nominal[rows], leans)
-        plain = margins(*self.task.machine_poses(transform, axes, rows), transform)
+        axes = lean(self.samples.nominal[rows], leans)
+        plain = margins(*self.samples.machine_poses(transform, axes, rows), transform)
         return plain if self.weights.are_even else weighed(plain, self.weights.of(margins.limits))
 
     def contacts(self, margins: Margins, transform: RigidTransform, leans: Floats, rows: Ints) -> Floats:
@@ -91,9 +97,9 @@ class Setting:
 
         What of a lean lies along the nominal axis does not count.
         """
-        nominal = self.task.nominal[rows]
+        nominal = self.samples.nominal[rows]
         across = leans - (leans * nominal).sum(axis=1, keepdims=True) * nominal
-        return margins.contacts(*self.task.machine_poses(transform, lean(nominal, across), rows), transform)
+        return margins.contacts(*self.samples.machine_poses(transform, lean(nominal, across), rows), transform)
 
     def steepness(self, coefficients: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """Return the share of the cone (n,) that each lean uses: 1 on its edge."""

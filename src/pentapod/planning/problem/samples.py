@@ -1,4 +1,4 @@
-"""Task: what the planner needs of a toolpath, as arrays; and the few points that represent it."""
+"""ToolpathSamples: what the planner needs of a toolpath, as arrays; and the few points that represent it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ AXIS_LEVER_M = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class ToolpathSamples:
     """Pivots and nominal axes (N, 3), workpiece frame; pivot: metres from tip to pivot; tilt: radians of the cone."""
 
     pivots: Floats
@@ -31,13 +31,13 @@ class Task:
         )
 
     @classmethod
-    def of(cls, toolpath: Toolpath, tilt: float) -> Task:
-        """Return the task that a toolpath and a tilt cone (half angle, radians) pose."""
+    def of(cls, toolpath: Toolpath, tilt: float) -> ToolpathSamples:
+        """Return the samples that a toolpath and a tilt cone (half angle, radians) pose."""
         return cls(toolpath.pivots, toolpath.axes, toolpath.pivot, tilt)
 
-    def at(self, rows: Ints) -> Task:
-        """Return the task of the waypoints `rows` only."""
-        return Task(self.pivots[rows], self.nominal[rows], self.pivot, self.tilt)
+    def at(self, rows: Ints) -> ToolpathSamples:
+        """Return the samples of the waypoints `rows` only."""
+        return ToolpathSamples(self.pivots[rows], self.nominal[rows], self.pivot, self.tilt)
 
     def machine_poses(
         self, placement: RigidTransform, axes: Floats, rows: Ints | slice = slice(None)

@@ -1,6 +1,6 @@
-"""AxisCost: what a calm course of the axes costs at a placement; beyond the nominal axes' own swing it costs much more.
+"""AxisCost: smoothness cost of the tool axes, with a penalty where they turn faster than the nominal axes.
 
-The calmest axes alone would be fixed ones. But a nominal axis that turns may carry the platform just the way that the
+The smoothest axes alone would be fixed ones. But a nominal axis that turns may carry the platform just the way that the
 legs like, and there a fixed axis asks more of them. So where the axis turns faster, or a leg accelerates more along the
 path, than the nominal axes would have it, the excess is charged.
 """
@@ -18,8 +18,8 @@ from pentapod.numerics.casadi_vectorised import Vectorised
 from pentapod.numerics.convex.interior_point import SoftRows
 from pentapod.numerics.divided_differences import as_matrix, differences, divided_differences
 from pentapod.planning.problem.formulation import leg_function
-from pentapod.planning.problem.problem import Candidate, Setting
-from pentapod.planning.tool_axis.spline import BANDS, FORESIGHT_M, AxisCourse
+from pentapod.planning.problem.problem import Candidate, PlacementProblem
+from pentapod.planning.tool_axis.spline import BANDS, FORESIGHT_M, AxisSpline
 
 EXCESS_WEIGHT = 1e4
 """Of the mean square of an excess, as a share of what the nominal axes have there, beside the cost of their rates."""
@@ -75,29 +75,29 @@ class _Charge:
 
 
 class AxisCost:
-    """The cost of coefficients (K, 2) of a course of the axes, at the placement of a candidate.
+    """The cost of coefficients (K, 2) of a spline of the axes, at the placement of a candidate.
 
-    The course's own, and EXCESS_WEIGHT times the excesses. Rates are of nominal plus lean, not normalised, by the way
-    of the course; bends are the second derivatives of the leg lengths by it.
+    The spline's own, and EXCESS_WEIGHT times the excesses. Rates are of nominal plus lean, not normalised, by the way
+    of the spline; bends are the second derivatives of the leg lengths by it.
     """
 
-    def __init__(self, setting: Setting, course: AxisCourse, at: Candidate) -> None:
-        self.course, task = course, setting.task
-        nodes, way = self.course.nodes, self.course.way
-        self.basis = self.course.basis[nodes]
+    def __init__(self, problem: PlacementProblem, spline: AxisSpline, at: Candidate) -> None:
+        self.spline, samples = spline, problem.samples
+        nodes, way = self.spline.nodes, self.spline.way
+        self.basis = self.spline.basis[nodes]
         self.weights, self.first = self.basis.data.reshape(-1, 4), self.basis.indices[::4].astype(np.intp)
-        self.frames = self.course.frames[nodes]
+        self.frames = self.spline.frames[nodes]
         self.given = (
-            task.pivots[nodes].T,
-            task.nominal[nodes].T,
+            samples.pivots[nodes].T,
+            samples.nominal[nodes].T,
             self.frames.reshape(-1, 6).T,
             at.transform.rotation.T.reshape(-1, 1),
             at.transform.translation[:, None],
         )
-        self.lengths = leg_function(setting, at.margins)
-        self.legs = Vectorised(leg_function(setting, at.margins, slopes=True))
+        self.lengths = leg_function(problem, at.margins)
+        self.legs = Vectorised(leg_function(problem, at.margins, slopes=True))
         (self.rate, rate_shares), (self.bend, bend_shares) = divided_differences(way, 1), divided_differences(way, 2)
-        turning = differences(self.rate, task.nominal[nodes])
+        turning = differences(self.rate, samples.nominal[nodes])
         self.nominal_rates = np.einsum("nk,nak->na", turning, self.frames[: len(turning)])
         rates = np.linalg.norm(turning, axis=1)
         bends = np.abs(self.bends(np.zeros((self.basis.shape[1], 2)))).max(axis=1)
@@ -108,7 +108,7 @@ class AxisCost:
     def of(self, c: Floats) -> float:
         """Return the cost of coefficients c (K, 2)."""
         charge = self.fast.of(self.rates(c) @ _DIRECTIONS) + self.hard.of(np.abs(self.bends(c)))
-        return self.course.cost_of(c) + charge
+        return self.spline.cost_of(c) + charge
 
     def symbolic(self, c: Any) -> tuple[Any, Any, Any]:
         """Return the same for casadi's MX c (2, K), of c transposed: the cost, excesses as unknowns, room for them.
@@ -118,7 +118,7 @@ class AxisCost:
         """
         import casadi as ca  # noqa: PLC0415  heavy: only for the reference
 
-        leans = self.course.cone * ca.mtimes(c, ca.DM(self.basis.T))
+        leans = self.spline.cone * ca.mtimes(c, ca.DM(self.basis.T))
         pivots, nominal, _, rotation, translation = self.given
         legs = self.lengths.map(len(self.frames))(
             leans, pivots, nominal, self.frames.transpose(2, 0, 1).reshape(3, -1), rotation.reshape(3, 3).T, translation
@@ -126,14 +126,14 @@ class AxisCost:
         rates = self.nominal_rates.T + ca.mtimes(leans, ca.DM(as_matrix(self.rate, len(self.frames)).T))
         bends = ca.mtimes(legs, ca.DM(as_matrix(self.bend, len(self.frames)).T))
         x = ca.vec(c)
-        own = 0.5 * ca.bilin(ca.DM(self.course.whole_hessian()), x, x) + ca.dot(ca.DM(self.course.gradient), x)
+        own = 0.5 * ca.bilin(ca.DM(self.spline.whole_hessian()), x, x) + ca.dot(ca.DM(self.spline.gradient), x)
         fast, too_fast, room = self.fast.symbolic(ca.mtimes(_DIRECTIONS.T, rates))
         hard, too_hard, more = self.hard.symbolic(ca.vertcat(bends, -bends))
-        return own + self.course.constant + fast + hard, ca.vertcat(too_fast, too_hard), ca.vertcat(room, more)
+        return own + self.spline.constant + fast + hard, ca.vertcat(too_fast, too_hard), ca.vertcat(room, more)
 
     def rates(self, c: Floats) -> Floats:
         """Return the axes' rates (n − 1, 2), rad/m, in the carried pairs."""
-        return self.nominal_rates + self.course.cone * differences(self.rate, self.basis @ c)
+        return self.nominal_rates + self.spline.cone * differences(self.rate, self.basis @ c)
 
     def bends(self, c: Floats) -> Floats:
         """Return the leg lengths' second derivatives (n − 2, 5) by the way, 1/m."""
@@ -169,7 +169,7 @@ class AxisCost:
         windows = np.zeros((len(near), BANDS + 2))  # the last two stay zero, see BANDS
         for nodes, slopes in parts:
             for k, a in product(range(4), range(2)):
-                reach = self.course.cone * self.weights[nodes, k] / charge.unit[near]
+                reach = self.spline.cone * self.weights[nodes, k] / charge.unit[near]
                 windows[each, 2 * (self.first[nodes] - start + k) + a] += reach * slopes[:, a]
         windows = np.ascontiguousarray(windows[:, :BANDS])
         x = np.append(c.ravel(), np.zeros(BANDS))
@@ -179,7 +179,7 @@ class AxisCost:
 
     def _legs(self, c: Floats) -> tuple[Floats, Floats]:
         """Return leg lengths (n, 5) at the nodes and their derivatives (n, 5, 2) by the lean."""
-        legs, slopes = self.legs(self.course.cone * (self.basis @ c).T, *self.given)
+        legs, slopes = self.legs(self.spline.cone * (self.basis @ c).T, *self.given)
         return legs.T, slopes.reshape(2, 5, -1).transpose(2, 1, 0)
 
 

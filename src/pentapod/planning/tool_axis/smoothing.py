@@ -1,7 +1,7 @@
-"""The default solver's second half: the calmest axes along the path that keep a margin, by convex programs in sequence.
+"""Smoothing of the tool axis: the smoothest axes that keep a margin, by sequential convex programming.
 
 Each program holds the margins near the one to keep to first order, and what is charged for; its answer is judged by
-margins and cost themselves, at the waypoints where the course has its nodes. In the end all waypoints are judged: those
+margins and cost themselves, at the waypoints where the spline has its nodes. In the end all waypoints are judged: those
 where the margin came out short are looked at from then on.
 """
 
@@ -15,12 +15,12 @@ from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.numerics.convex.interior_point import NO_ROWS, AxisProgram
 from pentapod.planning.problem.formulation import Slopes, lean_slopes
 from pentapod.planning.problem.linear_model import valleys
-from pentapod.planning.problem.problem import Candidate, Setting
+from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.tool_axis.cost import AxisCost
-from pentapod.planning.tool_axis.spline import AxisCourse, within_discs
+from pentapod.planning.tool_axis.spline import AxisSpline, within_discs
 
 SLACK = 1e-5
-"""How far below the margin to keep calm axes may come: micrometres of a stroke."""
+"""How far below the margin to keep smooth axes may come: micrometres of a stroke."""
 
 _STEPS, _ROUNDS = 40, 8
 _NEAR, _UNREACHED = 0.15, 0.02
@@ -52,46 +52,46 @@ class _Model:
     values: Floats
     slopes: Floats
 
-    def missed(self, course: AxisCourse, trial: Floats, values: Floats) -> Floats:
+    def missed(self, spline: AxisSpline, trial: Floats, values: Floats) -> Floats:
         """Return by how much (R,) the linear model overrated the margins `values` (n, M) at `trial`."""
-        moved = (course.basis @ (trial - self.c))[self.rows]
+        moved = (spline.basis @ (trial - self.c))[self.rows]
         promised = self.values + (self.slopes * moved).sum(axis=1)
         return np.maximum(promised - values[self.looked, self.kinds], 0.0)
 
 
-def calmed(setting: Setting, start: Candidate, keep: float) -> Floats | None:
-    """Return coefficients (K, 2) of the course along the setting's task: the calmest one that keeps the margin `keep`.
+def smoothed(problem: PlacementProblem, start: Candidate, keep: float) -> Floats | None:
+    """Return coefficients (K, 2) of the smoothest spline of the axes that keeps the margin `keep`.
 
-    It starts at the leans of `start`, at whose placement it stays. None where no course of the axes was found to keep
+    It starts at the leans of `start`, at whose placement it stays. None where no spline of the axes was found to keep
     it.
     """
-    run = _Calming(setting, start, keep)
+    run = _Smoothing(problem, start, keep)
     run.begin()
     for _ in range(_ROUNDS):
-        found = run.calmest()
+        found = run.smoothest()
         if found is None or not run.looks_at_more():
             return found
     return None
 
 
-class _Calming:
+class _Smoothing:
     """One run. c: the coefficients so far; short: by how much they miss the margin to keep; spent: what they cost.
 
     rows (n,): the waypoints looked at; margins (n, M): theirs, at c; late (n, M): which of them came out short before;
     kinds (M,): which have come near. reach: the trust region; accuracy: of the next program.
     """
 
-    def __init__(self, setting: Setting, start: Candidate, keep: float) -> None:
-        self.setting, self.start, self.keep = setting, start, keep
-        self.course = AxisCourse.of(setting.task, setting.cone)
-        self.cost = AxisCost(setting, self.course, start)
+    def __init__(self, problem: PlacementProblem, start: Candidate, keep: float) -> None:
+        self.problem, self.start, self.keep = problem, start, keep
+        self.spline = AxisSpline.of(problem.samples, problem.cone)
+        self.cost = AxisCost(problem, self.spline, start)
         self.slopes: dict[tuple[int, ...], Slopes] = {}
         self.kinds: Bools = np.zeros(len(start.margins.limits), dtype=bool)
         self.reach, self.accuracy = _WHOLE, _ROUGH
-        self.c = self.course.fitted(setting.leans(start.coefficients))
+        self.c = self.spline.fitted(problem.leans(start.coefficients))
         self.spent = self.cost.of(self.c)
-        everywhere = self.values(self.c, np.arange(len(self.course.frames)))
-        self.look_at(np.union1d(self.course.nodes, valleys(everywhere)))
+        everywhere = self.values(self.c, np.arange(len(self.spline.frames)))
+        self.look_at(np.union1d(self.spline.nodes, valleys(everywhere)))
 
     def look_at(self, rows: Ints) -> None:
         """Look at these waypoints from now on."""
@@ -102,14 +102,14 @@ class _Calming:
 
     def looks_at_more(self) -> bool:
         """Judge all waypoints; tell whether some came out short that were not looked at, and look at them as well."""
-        margins = self.values(self.c, np.arange(len(self.course.frames)))
+        margins = self.values(self.c, np.arange(len(self.spline.frames)))
         worst = np.flatnonzero(margins.min(axis=1) < self.keep - SLACK)
         if len(worst) > 0:
             self.look_at(np.union1d(self.rows, worst))
         return len(worst) > 0
 
     def begin(self) -> None:
-        """Start from the calmest course without charges, if that costs less: it is near, and its program is easy."""
+        """Start from the smoothest spline without charges, if that costs less: it is near, and its program is easy."""
         trial = self.program(self.model(), None, None).solved()
         if trial is not None:
             trial = within_discs(trial)
@@ -118,8 +118,8 @@ class _Calming:
             if spent < self.spent and short < max(self.short, _NEARLY):
                 self.c, self.margins, self.short, self.spent = trial, margins, short, spent
 
-    def calmest(self) -> Floats | None:
-        """Return the calmest course that keeps the margin at the waypoints looked at, or None."""
+    def smoothest(self) -> Floats | None:
+        """Return the smoothest spline that keeps the margin at the waypoints looked at, or None."""
         model, missed, tried = self.model(), None, list[Floats]()
         for _ in range(_STEPS):
             program = self.program(model, missed, tried)
@@ -143,11 +143,11 @@ class _Calming:
                         min(2.0 * self.reach, _WHOLE) if gain > 0.25 * promise else max(0.5 * way, _LEAST_REACH)
                     )
                     model, missed, tried = self.model(), None, []
-                elif short <= SLACK and promise < _ENOUGH * self.spent:  # no calmer than before, nor to be so
+                elif short <= SLACK and promise < _ENOUGH * self.spent:  # no smoother than before, nor to be so
                     break
                 elif short > SLACK and missed is None:  # once more, with what the model had missed or did not hold
                     model = self.model()
-                    missed = model.missed(self.course, trial, margins)
+                    missed = model.missed(self.spline, trial, margins)
                 elif short <= SLACK and not tried:  # once more, with what it would be charged for
                     tried = [trial]
                 else:
@@ -157,18 +157,18 @@ class _Calming:
         return self.c if self.short <= SLACK else None
 
     def accepts(self, short: float, gain: float) -> bool:
-        """Tell whether a trial is better: calmer while the margin is kept, much calmer and nearly so, or less short."""
+        """Return whether a trial is better: smoother and within limits, much smoother and nearly so, or less short."""
         if short <= SLACK and self.short <= SLACK:
             return gain > 0.0
         return short <= max(SLACK, 0.5 * self.short) or (short < _NEARLY and gain > _MUCH * self.spent)
 
     def values(self, c: Floats, rows: Ints) -> Floats:
         """Return the margins (n, M) at waypoints `rows`."""
-        return self.setting.values_of(self.start.margins, self.start.transform, self.course.leans(c, rows), rows)
+        return self.problem.values_of(self.start.margins, self.start.transform, self.spline.leans(c, rows), rows)
 
     def model(self) -> _Model:
         """Return the linear model of the margins near the one to keep, and of those that came out short before."""
-        course, start, c = self.course, self.start, self.c
+        spline, start, c = self.spline, self.start, self.c
         near = (self.margins < self.keep + _NEAR) | self.late
         looked = np.flatnonzero(near.any(axis=1))
         near, rows = near[looked], self.rows[looked]
@@ -176,8 +176,8 @@ class _Calming:
         kinds = np.flatnonzero(self.kinds)
         key = tuple(kinds.tolist())
         if key not in self.slopes:
-            self.slopes[key] = lean_slopes(self.setting, start.margins, start.transform, key)
-        slopes = course.cone * self.slopes[key](course.frames[rows], course.cone * (course.basis[rows] @ c), rows)
+            self.slopes[key] = lean_slopes(self.problem, start.margins, start.transform, key)
+        slopes = spline.cone * self.slopes[key](spline.frames[rows], spline.cone * (spline.basis[rows] @ c), rows)
         values = self.margins[np.ix_(looked, kinds)]
         reached = values < self.keep + _UNREACHED + self.reach * np.linalg.norm(slopes, axis=2)
         point, kind = np.nonzero(near[:, kinds] & reached)
@@ -189,15 +189,15 @@ class _Calming:
         missed: see `_Model.missed`; tried: coefficients at which charges are looked for, besides the model's; None
         for no charges.
         """
-        course = self.course
+        spline = self.spline
         touched, point = np.unique(model.rows, return_inverse=True)
-        basis = course.basis[touched]
+        basis = spline.basis[touched]
         here = (model.slopes * (basis @ model.c)[point]).sum(axis=1)
         upper = model.values - self.keep - here - (0.0 if missed is None else missed)
         soft = NO_ROWS if tried is None else self.cost.excess(model.c, *tried)
-        # Where charges still dwarf the course's own cost, an answer good for the one need not be so for the other.
-        scale = max(float(np.sqrt(course.cost_of(model.c) * self.spent)), 1e-9)
+        # Where charges still dwarf the spline's own cost, an answer good for the one need not be so for the other.
+        scale = max(float(np.sqrt(spline.cost_of(model.c) * self.spent)), 1e-9)
         return AxisProgram(
-            course.hessian, course.gradient, scale, basis, point, -model.slopes, upper, model.c, self.reach, soft,
+            spline.hessian, spline.gradient, scale, basis, point, -model.slopes, upper, model.c, self.reach, soft,
             self.accuracy,
         )  # fmt: skip

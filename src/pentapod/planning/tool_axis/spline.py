@@ -1,8 +1,8 @@
-"""AxisCourse: the lean of the tool along a path as one spline, and the cost that a calm course makes small.
+"""AxisSpline: the lean of the tool along a path as one spline, and the cost that a smooth spline makes small.
 
 The lean is a vector across the nominal axis, told in a pair of directions that is carried along the path; its two
 numbers are a cubic spline over the way of the pivot, with knots at waypoints. The spline stays within the
-convex hull of its coefficients, so a course whose coefficients keep the cone keeps it everywhere, and turns nowhere
+convex hull of its coefficients, so a spline whose coefficients keep the cone keeps it everywhere, and turns nowhere
 faster than they do.
 """
 
@@ -21,7 +21,7 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.transport import carried_frames
 from pentapod.numerics.banded import banded, banded_product
 from pentapod.numerics.divided_differences import as_matrix, divided_differences
-from pentapod.planning.problem.samples import Task
+from pentapod.planning.problem.samples import ToolpathSamples
 
 KNOT_SPACING_M = 2e-3
 """Shortest way between knots; shorter on small parts. Where waypoints are farther apart there is a knot at each."""
@@ -42,8 +42,8 @@ BANDS = 10
 
 
 @dataclass(frozen=True, eq=False)
-class AxisCourse:
-    """Leans along a task's path: those at its waypoints are cone · basis @ c, for coefficients c in the unit disc.
+class AxisSpline:
+    """Leans along a samples's path: those at its waypoints are cone · basis @ c, for coefficients c in the unit disc.
 
     c (K, 2); basis (N, K) sparse, four neighbours a row; frames (N, 2, 3): the pair at each waypoint, workpiece frame.
     nodes (n,): waypoints that stand for all, as many as the spline can tell apart; there the cost takes derivatives.
@@ -62,17 +62,17 @@ class AxisCourse:
     constant: float
 
     @classmethod
-    def of(cls, task: Task, cone: float) -> AxisCourse:
-        """Return the course of a task. cone: the longest lean (tangent of the angle)."""
-        way = _way(task)
-        extent = float(np.linalg.norm(np.ptp(task.pivots, axis=0)))
+    def of(cls, samples: ToolpathSamples, cone: float) -> AxisSpline:
+        """Return the spline of a samples. cone: the longest lean (tangent of the angle)."""
+        way = _way(samples)
+        extent = float(np.linalg.norm(np.ptp(samples.pivots, axis=0)))
         spacing = min(KNOT_SPACING_M, max(extent, LEVER_M) / _INTERVALS_PER_EXTENT)
         # Between waypoints the tool moves straight on, so derivatives are differences of waypoints. Two nodes for
         # each knot where there are as many: at the knots alone the cost hardly sees coefficients that alternate.
         nodes = _apart(way, spacing / _NODES)
         basis = sparse.csr_matrix(BSpline.design_matrix(way, _knots(way[nodes], spacing), _DEGREE))
-        frames = carried_frames(task.nominal)
-        cost = _cost(task.nominal[nodes], cone * frames[nodes], basis[nodes], way[nodes])
+        frames = carried_frames(samples.nominal)
+        cost = _cost(samples.nominal[nodes], cone * frames[nodes], basis[nodes], way[nodes])
         return cls(cone, basis, frames, nodes, way[nodes], *cost)
 
     def leans(self, c: Floats, rows: Ints | slice = slice(None)) -> Floats:
@@ -106,10 +106,10 @@ def within_discs(c: Floats) -> Floats:
     return c / np.maximum(1.0, np.linalg.norm(c, axis=1, keepdims=True))
 
 
-def _way(task: Task) -> Floats:
+def _way(samples: ToolpathSamples) -> Floats:
     """Return the way (N,) in metres to each waypoint: of the pivot, and of the axis by its lever."""
-    moved = np.linalg.norm(np.diff(task.pivots, axis=0), axis=1)
-    turned = np.linalg.norm(np.diff(task.nominal, axis=0), axis=1)
+    moved = np.linalg.norm(np.diff(samples.pivots, axis=0), axis=1)
+    turned = np.linalg.norm(np.diff(samples.nominal, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(moved + LEVER_M * turned)])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.planning.problem.constraints import Freedom
+from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
 from pentapod.verify.verdict.verdict import Place
@@ -17,16 +17,16 @@ POSITION, ANGLE = 1e-6, 1e-6
 
 def placement(replay: Replay) -> Finding | Idle:
     """Judge that the header's placement is one that the job allows."""
-    freedom, placed = replay.specification.freedom, replay.program.placement
-    if freedom is None:
+    constraints, placed = replay.specification.constraints, replay.program.placement
+    if constraints is None:
         return Idle("nobody told where the part may stand", unknown=True)
-    if freedom.poses:
-        offs = [(_distance(placed, pose), _angle(placed.rotation, pose.rotation)) for pose in freedom.poses]
+    if constraints.poses:
+        offs = [(_distance(placed, pose), _angle(placed.rotation, pose.rotation)) for pose in constraints.poses]
         away, turned = min(offs, key=_excess)
         what = f"of {len(offs)} allowed placements the nearest"
     else:
-        beyond = placed.translation - np.clip(placed.translation, freedom.low, freedom.high)
-        away, turned = float(np.linalg.norm(beyond)), _turned(placed.rotation, freedom)
+        beyond = placed.translation - np.clip(placed.translation, constraints.low, constraints.high)
+        away, turned = float(np.linalg.norm(beyond)), _turned(placed.rotation, constraints)
         what = "the placements that the box, the table and the largest turn allow"
     passed = away <= POSITION and turned <= ANGLE
     method = (
@@ -54,15 +54,15 @@ def _angle(a: Floats, b: Floats) -> float:
     return float(np.arctan2(sine, 0.5 * (np.trace(difference) - 1.0)))
 
 
-def _turned(rotation: Floats, freedom: Freedom) -> float:
+def _turned(rotation: Floats, constraints: PlacementConstraints) -> float:
     """Return by how much a rotation (3, 3) is beyond what a table or a largest turn allows, radians."""
     beyond = 0.0
-    if freedom.turn_is_bounded:
-        beyond = max(_angle(rotation, freedom.reference) - freedom.largest_turn, 0.0)
-    if freedom.upright.any():
-        up = rotation @ freedom.upright
-        sine = float(np.linalg.norm(np.cross(up, freedom.normal)))
-        beyond = max(beyond, float(np.arctan2(sine, up @ freedom.normal)))
+    if constraints.turn_is_bounded:
+        beyond = max(_angle(rotation, constraints.reference) - constraints.largest_turn, 0.0)
+    if constraints.upright.any():
+        up = rotation @ constraints.upright
+        sine = float(np.linalg.norm(np.cross(up, constraints.normal)))
+        beyond = max(beyond, float(np.arctan2(sine, up @ constraints.normal)))
     return beyond
 
 

@@ -17,7 +17,7 @@ from pentapod.verify.verdict.sources import UNTOLD, Sources
 if TYPE_CHECKING:
     from pentapod.kinematics.component import Component
     from pentapod.machine.clearance.collision_world import Surroundings
-    from pentapod.planning.problem.constraints import Freedom
+    from pentapod.planning.problem.constraints import PlacementConstraints
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Specification(Value):
     machine: with its tool length and controller. toolpath: in the workpiece frame, as the job asks for it.
     tilt: half angle in radians of the cone about the nominal axis in which the tool may stand; axis_tolerance:
     radians beyond that; path_tolerance: metres. job_digest: of the job that the header must name. surroundings: what
-    legs, spindle and tool must not touch. cutting: what cuts, and into which part. freedom: where the part may be
+    legs, spindle and tool must not touch. cutting: what cuts, and into which part. constraints: where the part may be
     placed. component: in which the program must be, None where any will do. lowest_share: of the feed, that cuts and
     links must reach where no limit is used; None for the default of the tool, 0 where it does not matter.
     stop_angle: radians; where the toolpath turns by more the program may stop (anyway from 20 degrees on); None where
@@ -46,7 +46,7 @@ class Specification(Value):
     job_digest: str | None = None
     surroundings: Surroundings | None = None
     cutting: Cutting | None = None
-    freedom: Freedom | None = None
+    constraints: PlacementConstraints | None = None
     component: Component | None = None
     lowest_share: float | None = None
     stop_angle: float | None = None
@@ -75,7 +75,7 @@ class Asked(TypedDict, total=False):
     job_digest: str | None
     surroundings: Surroundings | None
     cutting: Cutting | None
-    freedom: Freedom | None
+    constraints: PlacementConstraints | None
     component: Component | None
     lowest_share: float | None
     stop_angle: float | None
