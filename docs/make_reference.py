@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import click
-from pydantic import BaseModel
 
 from pentapod.cli.verbs import VERBS, cli
-from pentapod.job.schema.tables import JobTables
+from pentapod.job.schema.strategies import job_strategies
+from pentapod.job.schema.tables import JobTables, table_model
 from pentapod.machine.tables import MachineTables
 
 HERE = Path(__file__).parent / "reference"
@@ -47,21 +47,29 @@ def pages() -> dict[str, str]:
     """Return the pages by their file names."""
     return {
         "job.md": _file_page(
-            "The job file", "TOML. Paths are relative to the job file; an unknown key is an error.", JobTables
+            "The job file", "TOML. Paths are relative to the job file; an unknown key is an error.", _job_schema()
         ),
         "machine.md": _file_page(
             "The machine file",
             "TOML. Where legs have a number each, one number stands for all. "
             "`pentapod machine check FILE` judges a file.",
-            MachineTables,
+            MachineTables.model_json_schema(),
         ),
         "commands.md": _MADE + "# Commands\n\n" + "\n".join(_commands()),
         "api.md": _MADE + "# Python API\n\nEverything is in metres, radians and seconds.\n\n" + "\n".join(_packages()),
     }
 
 
-def _file_page(title: str, intro: str, model: type[BaseModel]) -> str:
-    schema = model.model_json_schema()
+def _job_schema() -> dict[str, Any]:
+    """Return the schema of job files, with the keys of all strategies and cutters."""
+    schema = JobTables.model_json_schema()
+    variants = [table_model("toolpath", name).model_json_schema() for name in job_strategies()]
+    schema["properties"]["toolpath"] = {"oneOf": variants}
+    schema["properties"]["tool"] = table_model("tool").model_json_schema()
+    return schema
+
+
+def _file_page(title: str, intro: str, schema: dict[str, Any]) -> str:
     required = set(schema.get("required", ()))
     parts = [f"{_MADE}# {title}\n\n{intro}\n"]
     plain = {k: v for k, v in schema["properties"].items() if not (_is_table(v, schema) or "oneOf" in v)}
@@ -93,7 +101,7 @@ def _union(variants: list[dict[str, Any]], schema: dict[str, Any]) -> Iterator[s
     yield _keys(shared, set(), schema)
     for table in variants:
         properties = table["properties"]
-        name = properties["strategy"].get("const", "raster")
+        name = properties["strategy"]["default"]
         lacks = sorted(set(shared) - set(properties))
         yield f'### `strategy = "{name}"`\n\n{table.get("description", "")}\n'
         if lacks:

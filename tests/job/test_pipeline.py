@@ -19,7 +19,7 @@ from pentapod.job.build.placement import job_constraints
 from pentapod.job.build.values import job_machine, job_mesh, job_toolpath
 from pentapod.job.outcome import SetUps
 from pentapod.job.run_folder import staged
-from pentapod.job.schema.strategies import TABLES
+from pentapod.job.schema.strategies import job_strategies
 from pentapod.planning import LegPath, PlacedPath
 from pentapod.program import read_csv
 from pentapod.timing import Explanation, Trajectory
@@ -53,7 +53,7 @@ def usual(tmp_path_factory):
 def test_the_shipped_jobs_show_every_strategy():
     assert len(SHIPPED) >= 12
     shown = {Job.load(TOOLPATHS / f"{name}.toml").toolpath.strategy for name in SHIPPED}
-    assert shown | {"file"} == set(TABLES)
+    assert shown | {"file"} == set(job_strategies())
 
 
 @pytest.mark.parametrize("name", SHIPPED)

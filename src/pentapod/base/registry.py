@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from pentapod.base.errors import InputError, nearest
@@ -18,16 +19,29 @@ class Registry(Mapping[str, T], Generic[T]):
 
     kind: what the things are, in messages ("post"); group: of the entry points; type_: what each must be. An entry
     point names such a thing, or a function without arguments that returns one. Entry points are read when a name is
-    looked up that is not pentapod's own, or when all are listed; a plug-in is loaded when it is used.
+    looked up that is not pentapod's own, or when all are listed; a plug-in is loaded when it is used. homes: modules of
+    pentapod's own things by name, where they do not register themselves; each holds its thing as `constant`.
     """
 
-    def __init__(self, kind: str, group: str, type_: type[T], wrong: type[InputError] = InputError) -> None:
+    def __init__(
+        self,
+        kind: str,
+        group: str,
+        type_: type[T],
+        wrong: type[InputError] = InputError,
+        *,
+        homes: Mapping[str, str] | None = None,
+        constant: str = "",
+    ) -> None:
         self.kind, self.group, self._type, self._wrong = kind, group, type_, wrong
         self._own: dict[str, T] = {}
+        self._homes, self._constant = dict(homes or {}), constant
 
     @property
     def own(self) -> Mapping[str, T]:
         """The things that pentapod brings; no other package is looked for."""
+        for name in self._homes:
+            self.find(name)
         return self._own
 
     def register(self, name: str, thing: T) -> T:
@@ -42,9 +56,11 @@ class Registry(Mapping[str, T], Generic[T]):
         """
         if name in self._own:
             return self._own[name]
+        if name in self._homes:
+            return self.register(name, getattr(import_module(self._homes[name]), self._constant))
         entries = self._entries()
         if name not in entries:
-            raise self._wrong(f"unknown {self.kind}", key=key, value=name, remedy=nearest(name, [*self._own, *entries]))
+            raise self._wrong(f"unknown {self.kind}", key=key, value=name, remedy=nearest(name, self))
         return self._loaded(entries[name])
 
     def __getitem__(self, name: str) -> T:
@@ -53,10 +69,10 @@ class Registry(Mapping[str, T], Generic[T]):
         return self.find(name)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._own or name in self._entries()
+        return name in self._homes or name in self._own or name in self._entries()
 
     def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys((*self._own, *self._entries())))
+        return iter(dict.fromkeys((*self._homes, *self._own, *self._entries())))
 
     def __len__(self) -> int:
         return len(tuple(iter(self)))

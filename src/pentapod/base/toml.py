@@ -6,14 +6,10 @@ import re
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from pentapod.base.errors import InputError
 from pentapod.base.input_files import read_bytes
-
-if TYPE_CHECKING:
-    from pydantic import ValidationError
-    from pydantic_core import ErrorDetails
 
 MOST_BYTES = 1_000_000
 """Files that people write are smaller."""
@@ -113,15 +109,3 @@ def line_of(text: str, where: Sequence[str]) -> int | None:
         if wanted and re.match(rf"\s*{re.escape(wanted[0])}\s*=", line):
             return number
     return header
-
-
-def first_of(error: ValidationError) -> ErrorDetails:
-    """Return the one error to show: an unknown key first, since a misspelling is also a missing key."""
-    return min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
-
-
-def wrong_value(error: ErrorDetails, meaning: str) -> dict[str, Any]:
-    """Return what, value and expected of a value that its schema refuses. meaning: what the schema says of the key."""
-    message = error["msg"].removeprefix("Input should be ").removeprefix("a ").removeprefix("valid ")
-    what = "out of range" if set(error.get("ctx", {})) & {"gt", "ge", "lt", "le"} else "wrong value"
-    return {"what": what, "value": error["input"], "expected": f"{message} ({meaning})"}

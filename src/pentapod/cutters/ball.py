@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
+from pentapod.base.keys import Key
 from pentapod.cutters.mounted import Balled, check_flute, check_positive, rounded_end
 from pentapod.geometry.solids import Solid
 
@@ -15,7 +17,9 @@ class BallCutter(Balled):
     Metres. Raises ToolpathError unless the radius is positive and the flute at least as long.
     """
 
-    flute: float | None = None
+    flute: Annotated[
+        float | None, Key("mm", "cutting length from the tip; above it the shank begins", gt=0.0, le=500.0)
+    ] = None
 
     def __post_init__(self) -> None:
         check_positive("radius", self.radius)
@@ -26,3 +30,6 @@ class BallCutter(Balled):
 
     def _base(self) -> float:
         return super()._base() if self.flute is None else self.flute
+
+
+CUTTER = BallCutter

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.base.keys import Key
 from pentapod.cutters.mounted import Mounted, check_flute, check_positive, rounded_end, wrong
 from pentapod.geometry.solids import Solid
 
@@ -22,9 +24,11 @@ class BullNose(Mounted):
     under the tip. Raises ToolpathError unless 0 ≤ corner < radius and the flute is longer than the corner.
     """
 
-    radius: float
-    corner: float
-    flute: float | None = None
+    radius: Annotated[float, Key("mm", "diameter of the cutter", name="diameter", share=0.5, gt=0.0, le=100.0)]
+    corner: Annotated[float, Key("mm", "bull: radius of the rounded corner", gt=0.0, le=50.0)]
+    flute: Annotated[
+        float | None, Key("mm", "cutting length from the tip; above it the shank begins", gt=0.0, le=500.0)
+    ] = None
 
     def __post_init__(self) -> None:
         check_positive("radius", self.radius)
@@ -61,3 +65,6 @@ class BullNose(Mounted):
 
     def _base(self) -> float:
         return super()._base() if self.flute is None else self.flute
+
+
+CUTTER = BullNose

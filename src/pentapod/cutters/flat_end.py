@@ -12,3 +12,6 @@ class FlatEnd(BullNose):
     """A flat-ended cutter: sharp corner. radius, flute: metres. Raises ToolpathError unless they are positive."""
 
     corner: float = field(default=0.0, init=False)
+
+
+CUTTER = FlatEnd

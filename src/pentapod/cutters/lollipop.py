@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from pentapod.base.keys import Key
 from pentapod.cutters.mounted import Balled, check_positive, wrong
 from pentapod.geometry.solids import Solid
 
@@ -18,8 +20,8 @@ class Lollipop(Balled):
     reach.
     """
 
-    neck_radius: float
-    reach: float
+    neck_radius: Annotated[float, Key("mm", "lollipop: diameter of the neck", name="neck", share=0.5, gt=0.0, le=100.0)]
+    reach: Annotated[float, Key("mm", "lollipop: from the tip to the neck's end", gt=0.0, le=500.0)]
 
     def __post_init__(self) -> None:
         check_positive("radius", self.radius)
@@ -34,3 +36,6 @@ class Lollipop(Balled):
 
     def _base(self) -> float:
         return self.reach
+
+
+CUTTER = Lollipop

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import Key
 from pentapod.base.values import Value
 from pentapod.geometry.solids import Cone, Solid, stacked
 
@@ -41,7 +43,9 @@ class Mounted(Value, ABC):
 class Balled(Mounted):
     """A ball at the lower end. radius: of the ball, metres."""
 
-    radius: float
+    radius: Annotated[
+        float, Key("mm", "diameter of the cutter, or of its ball", name="diameter", share=0.5, gt=0.0, le=100.0)
+    ]
 
     @property
     def pivot(self) -> float:

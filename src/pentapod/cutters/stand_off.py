@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import Key
 from pentapod.cutters.mounted import Mounted
 from pentapod.geometry.solids import Solid
 
@@ -19,7 +21,7 @@ class StandOff(Mounted):
     The nozzle is the shank, from the tip on. Raises ToolpathError for a negative distance.
     """
 
-    distance: float
+    distance: Annotated[float, Key("mm", "from the tip to the surface", name="standoff", gt=0.0, le=200.0)]
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.distance) and self.distance >= 0.0):
@@ -47,3 +49,6 @@ class StandOff(Mounted):
 
     def _cutter(self) -> tuple[Solid, ...]:
         return ()
+
+
+CUTTER = StandOff

@@ -6,8 +6,6 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-import numpy as np
-
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal
 from pentapod.base.version import __version__, library_versions, processor_kind
@@ -200,7 +198,7 @@ class _Task:
             self.machine,
             path_tolerance=self.asked.path_tolerance,
             axis_tolerance=self.asked.axis_tolerance,
-            stop_angle=float(np.radians(self.job.feed.stop_angle_deg)),
+            stop_angle=self.job.feed.si.stop_angle,
         )
 
     def _program(self, placed: PlacedPath, trajectory: Trajectory, file: Path) -> Program:

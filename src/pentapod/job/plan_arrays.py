@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pentapod.base.arrays import Floats
+from pentapod.base.units import from_si, split_key, to_si
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.outcome import Outcome
 from pentapod.planning.leg_path.leg_path import LegPath
@@ -22,7 +23,6 @@ from pentapod.toolpath.linking.partition import Piece
 from pentapod.toolpath.toolpath import Toolpath
 
 Arrays = dict[str, NDArray[Any]]
-_MM = 1e3
 
 JOB_FILE = "job.file"
 """The job file that the run was made from: relative to the run's folder where there is such a way."""
@@ -51,7 +51,7 @@ def arrays_of(outcome: Outcome, folder: Path) -> Arrays:
     if (trajectory := outcome.find(Trajectory)) is not None:
         arrays |= _trajectory(trajectory)
     if (program := outcome.find(Program)) is not None:
-        arrays |= {"program.time_s": program.times, "program.legs_mm": program.legs * _MM}
+        arrays |= _in_units({"program.time_s": program.times, "program.legs_mm": program.legs})
     return arrays
 
 
@@ -65,7 +65,7 @@ def _way(job: Path, folder: Path) -> str:
 def matrix_mm(transform: RigidTransform) -> Floats:
     """Return the homogeneous matrix (4, 4) with its translation in millimetres."""
     matrix = transform.matrix
-    matrix[:3, 3] *= _MM
+    matrix[:3, 3] = from_si(matrix[:3, 3], "mm")
     return matrix
 
 
@@ -85,46 +85,54 @@ def guides_in(arrays: Mapping[str, NDArray[Any]]) -> list[float] | None:
 
 def _metres(values_mm: Floats) -> list[float]:
     """Return metres to the nanometre: those of whole micrometres, as the planner sets them, come back exactly."""
-    return [round(value / _MM, 9) for value in values_mm.tolist()]
+    return [round(value, 9) for value in to_si(values_mm, "mm").tolist()]
+
+
+def _in_units(values: Arrays) -> Arrays:
+    """Return SI arrays in the units at the end of their names."""
+    return {name: from_si(value, split_key(name)[1]) for name, value in values.items()}
 
 
 def _set_up(piece: Piece) -> Arrays:
-    return {WAYPOINTS: np.array([piece.first, piece.last]), BOX: np.array([piece.low, piece.high]) * _MM}
+    return _in_units({WAYPOINTS: np.array([piece.first, piece.last]), BOX: np.array([piece.low, piece.high])})
 
 
 def _placed(placed: PlacedPath) -> Arrays:
     slides = placed.placement.slides
-    return ({} if slides is None else {GUIDES: np.array(slides) * _MM}) | {
-        "placed.placement_mm": matrix_mm(placed.placement.transform),
+    arrays = {
         "placed.component": np.array(placed.component, dtype=np.int8),
-        "placed.tips_mm": placed.tips * _MM,
+        "placed.tips_mm": placed.tips,
         "placed.axes": placed.axes,
         "placed.margins": placed.margins,
         "placed.margin_names": np.array(placed.margin_names),
+        **({} if slides is None else {GUIDES: np.array(slides)}),
     }
+    return {"placed.placement_mm": matrix_mm(placed.placement.transform), **_in_units(arrays)}
 
 
 def _leg_path(path: LegPath) -> Arrays:
     knots = [start + np.asarray(p.knots) for start, p in zip(path.starts, path.pieces, strict=False)]
     values = [[p(np.asarray(p.knots), order) for p in path.pieces] for order in range(3)]
-    return {
-        "leg_path.piece_starts_mm": np.asarray(path.starts) * _MM,
+    arrays = {
+        "leg_path.piece_starts_mm": np.asarray(path.starts),
         "leg_path.dwells_s": path.dwells,
-        "leg_path.knots_mm": np.concatenate(knots) * _MM,
-        "leg_path.legs_mm": np.concatenate(values[0]) * _MM,
+        "leg_path.knots_mm": np.concatenate(knots),
+        "leg_path.legs_mm": np.concatenate(values[0]),
         "leg_path.legs_first": np.concatenate(values[1]),
-        "leg_path.legs_second_per_mm": np.concatenate(values[2]) / _MM,
+        "leg_path.legs_second_per_mm": np.concatenate(values[2]),
     }
+    return _in_units(arrays)
 
 
 def _trajectory(trajectory: Trajectory) -> Arrays:
     profile = trajectory.profile
-    return {
+    arrays = {
         "trajectory.piece_starts_s": trajectory.starts,
         "trajectory.time_s": profile.times,
-        "trajectory.station_mm": profile.stations * _MM,
-        "trajectory.speed_mm_s": profile.speeds * _MM,
+        "trajectory.station_mm": profile.stations,
+        "trajectory.speed_mm_s": profile.speeds,
         "trajectory.active": profile.active,
         "trajectory.shares": profile.shares,
         "trajectory.constraint_names": np.array(profile.constraint_names),
     }
+    return _in_units(arrays)

@@ -8,15 +8,15 @@ from __future__ import annotations
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, cast
+from typing import Protocol, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError, MachineError, nearest
-from pentapod.base.toml import first_of, line_of, parsed, read_toml, wrong_value
+from pentapod.base.tables import problem_of
+from pentapod.base.toml import line_of, parsed, read_toml
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.machine.drives import Drives, Masses
@@ -126,7 +126,8 @@ def read(text: str, file: str | Path, make: Maker[_Made_co]) -> _Made_co:
     try:
         return _made(MachineTables.model_validate(content), make)
     except ValidationError as error:
-        raise _from_pydantic(error, text, file) from error
+        where, details = problem_of(error, MachineTables, _table)
+        raise MachineError(file=file, line=line_of(text, where), **details) from error
     except InputError as error:
         key = _FILE_KEYS.get(error.key or "", error.key)
         raise MachineError(
@@ -251,42 +252,8 @@ def _geometry(table: GeometryTable) -> LinearPentapod:
         ) from error
 
 
-def _from_pydantic(error: ValidationError, text: str, file: str | Path) -> MachineError:
-    first = first_of(error)
-    where = [str(part) for part in first["loc"]]
-    return MachineError(file=file, key=".".join(where[:2]), line=line_of(text, where), **_details(first, where))
-
-
-def _details(error: ErrorDetails, where: list[str]) -> dict[str, Any]:
-    owner = MachineTables if len(where) == 1 else _table(where[0])
-    kind = "table" if len(where) == 1 and where[0] != "name" else "key"
-    if error["type"] == "extra_forbidden":
-        known = list(owner.model_fields)
-        if len(where) == 1 and not isinstance(error["input"], dict):
-            tables = [
-                f"{t}.{key}"
-                for t in MachineTables.model_fields
-                if t not in {"name", "description"}
-                for key in _table(t).model_fields
-            ]
-            known = [*known, *tables]
-            kind = "key"
-        return {"what": f"unknown {kind}", "remedy": nearest(where[-1], known)}
-    described = owner.model_fields[where[min(1, len(where) - 1)]]
-    meaning = described.description or f"[{where[0]}] with " + ", ".join(
-        key for key, item in _table(where[0]).model_fields.items() if item.is_required()
-    )
-    if error["type"] == "missing":
-        return {"what": f"the {kind} is missing", "expected": meaning}
-    context = error.get("ctx", {})
-    if error["type"] == "rule":
-        return {
-            "what": context["what"],
-            "value": error["input"],
-            "expected": f"{context['expected']} ({meaning})",
-        }
-    return wrong_value(error, meaning)
-
-
-def _table(name: str) -> type[BaseModel]:
-    return cast("type[BaseModel]", MachineTables.model_fields[name].annotation)
+def _table(name: str) -> type[BaseModel] | None:
+    """Return the model of a table; None for a key outside the tables."""
+    field = MachineTables.model_fields.get(name)
+    kind = field.annotation if field else None
+    return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job.schema.tables import ToolTable
+from pentapod.job.schema.tool import ToolTable
 
 
 def number(value: float | None, unit: str = "") -> str:
@@ -35,11 +35,7 @@ def opening(sentence: str, most: int = 100) -> str:
 
 def tool_sentence(tool: ToolTable) -> str:
     """Return the job's tool in words: its type and the measures that it has."""
-    measures = [
-        f"{key.removesuffix('_mm')} {value:g} mm"
-        for key in ("diameter_mm", "corner_mm", "neck_mm", "reach_mm", "flute_mm", "standoff_mm")
-        if (value := getattr(tool, key)) is not None
-    ]
+    measures = [f"{key.removesuffix('_mm')} {value:g} mm" for key, value in tool.sizes().items()]
     return ", ".join([f"{tool.type} tool", *measures])
 
 

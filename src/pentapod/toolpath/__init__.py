@@ -28,13 +28,16 @@ from pentapod.toolpath.options import CoverOptions, Entry, PathOptions
 from pentapod.toolpath.path_report import PathReport
 from pentapod.toolpath.strategies.cross_hatch import CrossHatchOptions
 from pentapod.toolpath.strategies.curves import CurveOptions
+from pentapod.toolpath.strategies.drawing import DrawingOptions
 from pentapod.toolpath.strategies.edges import EdgeOptions
 from pentapod.toolpath.strategies.image import ImageOptions
 from pentapod.toolpath.strategies.offset import OffsetOptions
 from pentapod.toolpath.strategies.polyline import PolylineOptions
 from pentapod.toolpath.strategies.raster import Pattern, RasterOptions
-from pentapod.toolpath.strategies.registry import STRATEGIES, Strategy, make_toolpath, toolpath_with_report
+from pentapod.toolpath.strategies.registry import STRATEGIES, make_toolpath, toolpath_with_report
 from pentapod.toolpath.strategies.spiral import SpiralOptions
+from pentapod.toolpath.strategies.strategy import Strategy
+from pentapod.toolpath.strategies.text import TextOptions
 from pentapod.toolpath.strategies.waterline import WaterlineOptions
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
@@ -49,6 +52,7 @@ __all__ = [
     "CoverOptions",
     "CrossHatchOptions",
     "CurveOptions",
+    "DrawingOptions",
     "EdgeOptions",
     "Entry",
     "Fixed",
@@ -76,6 +80,7 @@ __all__ = [
     "SpiralOptions",
     "StandOff",
     "Strategy",
+    "TextOptions",
     "Tool",
     "Toolpath",
     "WaterlineOptions",

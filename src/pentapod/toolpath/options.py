@@ -1,20 +1,22 @@
-"""PathOptions: what every strategy is told, in SI units; CoverOptions: what those are told that cover a surface."""
+"""PathOptions: the options of every strategy, SI; CoverOptions: those of strategies that cover a surface.
+
+The keys of [toolpath] in a job file are declared here and beside each strategy, with the fields.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TypeVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
-from pentapod.base.errors import ToolpathError, nearest
+from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import Key, check_fields
 from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
 from pentapod.mesh.region import Region
-
-_Choice = TypeVar("_Choice", bound=StrEnum)
 
 
 class Entry(StrEnum):
@@ -27,42 +29,39 @@ class Entry(StrEnum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PathOptions(Value):
-    """What every strategy is told. Lengths in metres, angles in radians, feeds in m/s.
+    """What every strategy takes. Lengths in metres, angles in radians, feeds in m/s.
 
     region: what is machined. view (3,): towards the tool, along which rapids rise; the region's direction when
-    None. chordal: how far a chord may leave the line on the mesh. spacing: most between waypoints.
-    axis_step: most turning of the axis between waypoints. closest: points nearer than this are one, as far as
-    the chordal tolerance allows. shortest: shorter passes are dropped, and reported. clearance: of
-    rapids above the part. approach: length of the last stretch to the surface and the first away from it.
-    entry: its form. stay: up to this distance the tool stays on the surface from one pass to the
-    next; three stepovers when None. hop: up to this distance it hops over the part close by, further it
-    retracts to the clearance level; zero: never. feed, link_feed: of the tip. Raises
-    ToolpathError for values that make no sense.
+    None. chordal: how far a chord may leave the line on the mesh. feed, link_feed: of the tip. The other fields are
+    keys of job files, with their meaning. Raises ToolpathError for values out of range.
     """
 
     region: Region = field(default_factory=Region)
     view: Floats | tuple[float, float, float] | None = None
     chordal: float = 10e-6
-    spacing: float = 2e-3
-    axis_step: float = float(np.radians(3.0))
-    closest: float = 10e-6
-    shortest: float = 0.5e-3
-    clearance: float = 10e-3
-    approach: float = 3e-3
-    entry: Entry | str = Entry.AXIS
-    stay: float | None = None
-    hop: float = 20e-3
+    clearance: Annotated[float, Key("mm", "height of rapids above the part", gt=0.0)] = 10e-3
+    approach: Annotated[float, Key("mm", "height of the stretch on feed, to and from a cut", gt=0.0)] = 3e-3
+    entry: Annotated[
+        Entry | str, Key("", 'form of that stretch: along the "axis", a "straight" ramp ahead, or an "arc"')
+    ] = Entry.AXIS
+    stay: Annotated[
+        float | None,
+        Key("mm", "up to this far the tool stays on the surface between passes; 3 stepovers when left out", ge=0.0),
+    ] = None
+    hop: Annotated[float, Key("mm", "up to this far it hops over the part, further it retracts", ge=0.0)] = 20e-3
+    spacing: Annotated[float, Key("mm", "largest distance between waypoints on the surface", gt=0.0)] = 2e-3
+    closest: Annotated[float, Key("mm", "waypoints nearer than this are one, if chordal_mm allows", gt=0.0)] = 10e-6
+    shortest: Annotated[float, Key("mm", "shorter passes are left out, and reported", ge=0.0)] = 0.5e-3
+    axis_step: Annotated[float, Key("deg", "largest turn of the axis between waypoints", gt=0.0, le=30.0)] = float(
+        np.radians(3.0)
+    )
     feed: float = 0.02
     link_feed: float = 0.05
 
     def __post_init__(self) -> None:
-        for name in ("chordal", "spacing", "axis_step", "closest", "clearance", "approach", "feed", "link_feed"):
+        for name in ("chordal", "feed", "link_feed"):
             positive(name, getattr(self, name))
-        not_negative("shortest", self.shortest)
-        not_negative("hop", self.hop)
-        if self.stay is not None:
-            not_negative("stay", self.stay)
-        set_frozen(self, entry=chosen("entry", self.entry, Entry))
+        check_fields(self, ToolpathError)
         view = self.region.direction if self.view is None else self.view
         if not np.linalg.norm(frozen(view, "view", (3,))) > 0.0:
             raise ToolpathError("the view direction has no length", key="view")
@@ -73,52 +72,35 @@ class PathOptions(Value):
         """The view direction (3,), unit, towards the tool."""
         return np.asarray(self.view)
 
+    @classmethod
+    def sink_of(cls, values: Any) -> float:
+        """Return how far below the surface these options, or SI values of their keys, bring the tool: metres."""
+        return float(getattr(values, "depth", 0.0))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CoverOptions(PathOptions):
-    """What strategies are told that cover a surface by passes side by side.
+    """What strategies take that cover a surface by passes side by side: one of stepover and scallop, and fill.
 
-    stepover: most distance between passes, along the surface; or scallop: height of the ridge that is left
-    between them, with the surface's curvature and the cutter taken into account (one of the two). fill: whether
-    what passes at regular places leave uncovered (where the region narrows or ends) gets lines of its own.
+    The scallop takes the surface's curvature and the cutter into account.
     """
 
-    stepover: float | None = None
-    scallop: float | None = None
-    fill: bool = True
+    stepover: Annotated[
+        float | None, Key("mm", "most between passes, along the surface; or scallop_mm", gt=0.0, of_part=1.0)
+    ] = None
+    scallop: Annotated[float | None, Key("mm", "height of the ridge left between passes", gt=0.0, of_part=1.0)] = None
+    fill: Annotated[bool, Key("", "lines of their own for what regular passes leave uncovered")] = True
+
+    one_of: ClassVar[tuple[str, str]] = ("stepover", "scallop")
+    """Fields of which exactly one is given."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if (self.stepover is None) == (self.scallop is None):
             raise ToolpathError("give the distance between passes once", key="stepover", expected="stepover or scallop")
-        for name in ("stepover", "scallop"):
-            if getattr(self, name) is not None:
-                positive(name, getattr(self, name))
 
 
 def positive(name: str, value: float) -> None:
     """Raise ToolpathError unless a number is positive and finite."""
     if not (np.isfinite(value) and value > 0.0):
         raise ToolpathError("must be positive", key=name, value=value)
-
-
-def not_negative(name: str, value: float) -> None:
-    """Raise ToolpathError unless a number is finite and not negative."""
-    if not 0.0 <= value < np.inf:
-        raise ToolpathError("must not be negative", key=name, value=value)
-
-
-def finite(name: str, value: float) -> None:
-    """Raise ToolpathError unless a number is finite."""
-    if not np.isfinite(value):
-        raise ToolpathError("must be finite", key=name, value=value)
-
-
-def chosen(name: str, value: str, choices: type[_Choice]) -> _Choice:
-    """Return the choice of that name. Raises ToolpathError with the known ones."""
-    if value not in tuple(choices):
-        known = [str(choice) for choice in choices]
-        raise ToolpathError(
-            f"unknown {name}", key=name, value=value, expected=" or ".join(known), remedy=nearest(str(value), known)
-        )
-    return choices(value)

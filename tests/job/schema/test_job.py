@@ -7,8 +7,8 @@ import pytest
 from pentapod.base.errors import JobError
 from pentapod.job import Job
 from pentapod.job.build.values import job_mesh
-from pentapod.job.schema.strategies import TABLES
-from pentapod.job.schema.tables import JobTables
+from pentapod.job.schema.strategies import job_strategies
+from pentapod.job.schema.tables import JobTables, table_model
 
 FEED = "cut_mm_min = 3000"
 STEP = "stepover_mm = 15"
@@ -155,8 +155,8 @@ def test_every_key_is_described_and_has_its_unit():
         "towards", "effect", "levels", "threshold", "frame", "waive", "lowest_share", "left_share",
     }  # fmt: skip
     units = ("_mm", "_deg", "_mm_min", "_ms", "_s", "_mm_s2", "_mm_s3", "_deg_s", "_deg_s2")
-    models = [field.annotation for name, field in JobTables.model_fields.items() if name != "toolpath"]
-    for model in [*models, *TABLES.values()]:
+    models = [table_model(name) for name in JobTables.model_fields if name != "toolpath"]
+    for model in [*models, *(table_model("toolpath", name) for name in job_strategies())]:
         assert model.__doc__
         for key, field in model.model_fields.items():
             assert field.description, key

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from pentapod.toolpath import (
     CoverOptions,
     CrossHatchOptions,
     CurveOptions,
+    DrawingOptions,
     EdgeOptions,
     HeightField,
     ImageOptions,
@@ -29,12 +31,14 @@ from pentapod.toolpath import (
     Region,
     SegmentKind,
     SpiralOptions,
+    TextOptions,
     WaterlineOptions,
     lettering,
     load_mesh,
     toolpath_with_report,
 )
 
+DRAWING = Path(__file__).parents[3] / "toolpaths" / "flower.svg"
 DARK = np.clip(1.0 - np.hypot(*np.meshgrid(np.linspace(-1, 1, 16), np.linspace(-1, 1, 12))), 0.0, 1.0)
 
 
@@ -75,6 +79,8 @@ def told(size, step=None, **more):
         "spiral": SpiralOptions(**cover),
         "edges": EdgeOptions(**lengths),
         "curves": CurveOptions(**lengths, lines=lettering("Ag5", 0.2 * size), depth=1e-3 * size),
+        "text": TextOptions(**lengths, text="Ag5", height=0.2 * size, depth=1e-3 * size),
+        "drawing": DrawingOptions(**lengths, file=DRAWING, scale=0.2 * size / 0.07, depth=1e-3 * size),
         "polyline": PolylineOptions(**lengths, lines=[line]),
         "image": ImageOptions(**lengths, darkness=DARK, width=0.4 * size, stepover=step, depth=2e-3 * size),
     }  # fmt: skip
@@ -134,7 +140,7 @@ def generated():
 NOTHING_THERE = {("edges", "ball"), ("edges", "torus"), ("waterline", "box")}
 """Where a strategy finds nothing to do: round parts have no edges, what the box shows from above is flat."""
 
-IN_THE_HOLE = {("curves", "torus"), ("image", "torus")}
+IN_THE_HOLE = {(name, "torus") for name in ("curves", "text", "drawing", "image")}
 """What is laid in the middle of a torus meets nothing; on its ring it does."""
 
 
@@ -186,7 +192,7 @@ def test_every_strategy_on_every_real_part(parts, name, part):
         refusal = str(error)
     if toolpath is None:
         assert "\n" not in refusal
-        assert name in ("edges", "waterline", "polyline", "curves", "image")
+        assert name in ("edges", "waterline", "polyline", "curves", "text", "drawing", "image")
         return
     check_laws(mesh, BallCutter(1e-3), options, toolpath)
 

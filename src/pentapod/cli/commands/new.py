@@ -55,12 +55,11 @@ def new(folder: Path, as_json: bool, quiet: bool) -> int:
 
 def job_text() -> str:
     """Return a job with every key of the schema; those that may be left out are commented out."""
-    from pentapod.job.schema.strategies import RasterTable
-    from pentapod.job.schema.tables import JobTables
+    from pentapod.job.schema.tables import JobTables, table_model
 
     lines = ["# A pentapod job. Keys that are commented out show their defaults, or what they could be.", ""]
-    for table, field in JobTables.model_fields.items():
-        model: Any = RasterTable if table == "toolpath" else field.annotation
+    for table in JobTables.model_fields:
+        model = table_model(table)
         lines += [f"# {(model.__doc__ or '').splitlines()[0]}", f"[{table}]"]
         for key, info in model.model_fields.items():
             lines.append(_line(key, info, _VALUES.get(table, {}).get(key)))

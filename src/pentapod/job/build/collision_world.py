@@ -10,8 +10,6 @@ from pentapod.machine.machine import Machine
 from pentapod.mesh.io.load import load_mesh
 from pentapod.mesh.mesh import Mesh
 
-_MM = 1e-3
-
 
 def job_surroundings(job: Job, machine: Machine, mesh: Mesh) -> Surroundings:
     """Return the surroundings of a job; mesh: the part's.
@@ -22,7 +20,7 @@ def job_surroundings(job: Job, machine: Machine, mesh: Mesh) -> Surroundings:
     name = "fixture" if job.fixture.frame == "part" else "table"
     around = {} if held is None else {name: held}
     try:
-        return Surroundings.of(machine, job_tool(job), mesh, **around, allowance=job.gouge.tolerance_mm * _MM)
+        return Surroundings.of(machine, job_tool(job), mesh, **around, allowance=job.gouge.si.tolerance)
     except MachineError as error:
         remedy = "a longer tool.length_mm, or a shorter holder"
         raise job.error("tool", "holder_mm", error.what, expected=error.expected, remedy=remedy) from error

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from pentapod.job.build.coverage import job_coverage
+from pentapod.job.build.strategy import job_sink
 from pentapod.job.build.tool import job_tool
 from pentapod.job.schema.job import Job
-from pentapod.job.schema.strategies import sunk_mm
 from pentapod.machine.clearance.collision_world import Surroundings
 from pentapod.verify import Cutting
-
-_MM = 1e-3
 
 
 def job_cutting(job: Job, surroundings: Surroundings) -> Cutting | None:
@@ -18,9 +16,9 @@ def job_cutting(job: Job, surroundings: Surroundings) -> Cutting | None:
     What counts as no gouge, and what the job engraves, is no gouge here either. Raises JobError where the tool's
     lengths make no tool.
     """
-    depth = job.gouge.tolerance_mm + sunk_mm(job.toolpath)
+    depth = job.gouge.si.tolerance + job_sink(job)
     for obstacle in surroundings.obstacles:
         if obstacle.name == "part":
             mesh = obstacle.surface.mesh
-            return Cutting(obstacle.surface, job_tool(job).solids, _MM * depth, job_coverage(job, mesh))
+            return Cutting(obstacle.surface, job_tool(job).solids, depth, job_coverage(job, mesh))
     return None

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Sequence
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ArrayError
+from pentapod.base.tables import Vector
+from pentapod.base.units import from_si, to_si
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.schema.job import Job
 from pentapod.job.schema.placement import PLACEMENT_KEYS, PlacementTable
-from pentapod.job.schema.table import Vector
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.problem.constraints import FREE, PlacementConstraints
 from pentapod.planning.problem.weights import Weights
 
-_MM = 1e-3
 _EVERYWHERE = (-np.inf, np.inf)
 _PLACE_KEYS = frozenset(("mode", "setups", *(key for keys in PLACEMENT_KEYS.values() for key in keys)))
 """What says where the part may go; the other keys say what is wanted of the plan."""
@@ -30,17 +31,16 @@ def job_constraints(job: Job, machine: Machine, mesh: Mesh) -> PlacementConstrai
     if table.mode == "fixed":
         return PlacementConstraints.fixture([_fixed(job)])
     if table.mode == "fixture":
-        poses = np.array(table.poses_mm_deg, dtype=np.float64)
-        return PlacementConstraints.fixture([_pose(pose[:3], pose[3:]) for pose in poses])
+        return PlacementConstraints.fixture([_pose(pose[:3], pose[3:]) for pose in table.poses_mm_deg or ()])
     if table.mode == "table":
         return _on_table(job, machine, mesh)
     if table.box_mm is None and table.largest_turn_deg is None:
         return FREE
-    corners = np.array([[-np.inf] * 3, [np.inf] * 3]) if table.box_mm is None else np.array(table.box_mm) * _MM
-    turn = 180.0 if table.largest_turn_deg is None else table.largest_turn_deg
-    reference = _pose(np.zeros(3), table.rotation_deg or (0.0, 0.0, 0.0))
+    corners = np.array([[-np.inf] * 3, [np.inf] * 3]) if table.box_mm is None else table.si.box
+    turn = np.pi if table.largest_turn_deg is None else table.si.largest_turn
+    reference = _pose((0.0, 0.0, 0.0), table.rotation_deg or (0.0, 0.0, 0.0))
     low, high = corners.min(axis=0), corners.max(axis=0)
-    return PlacementConstraints.free(low=low, high=high, reference=reference, largest_turn=float(np.radians(turn)))
+    return PlacementConstraints.free(low=low, high=high, reference=reference, largest_turn=turn)
 
 
 def job_weights(job: Job) -> Weights:
@@ -53,7 +53,7 @@ def job_at(job: Job, placement: RigidTransform) -> Job:
     """Return the job with its part fixed at a placement, told as `placement_toml` tells it; all else stays."""
     table = job.placement
     kept = {name: getattr(table, name) for name in table.model_fields_set - _PLACE_KEYS}
-    position = _rounded(placement.translation / _MM, 6)
+    position = _rounded(from_si(placement.translation, "mm"), 6)
     angles = _rounded(np.array(rotation_angles_deg(placement.rotation)), 8)
     fixed = PlacementTable(mode="fixed", position_mm=position, rotation_deg=angles, **kept)
     return dataclasses.replace(job, tables=job.tables.model_copy(update={"placement": fixed}))
@@ -88,31 +88,28 @@ def _on_table(job: Job, machine: Machine, mesh: Mesh) -> PlacementConstraints:
     # Up is towards the base: away from where the machine works.
     side = -1.0 if machine.work.centre[2] > 0.0 else 1.0
     lowest = float((mesh.vertices @ up).min())
-    height = float(table.table_z_mm or 0.0) * _MM - side * lowest
-    x, y = (
-        _EVERYWHERE if values is None else (values[0] * _MM, values[1] * _MM)
-        for values in (table.table_x_mm, table.table_y_mm)
-    )
+    height = table.si.table_z - side * lowest
+    x, y = (_EVERYWHERE if ends is None else tuple(ends.tolist()) for ends in (table.si.table_x, table.si.table_y))
     return PlacementConstraints.table(height, x=x, y=y, up=up, normal=(0.0, 0.0, side))
 
 
 def _fixed(job: Job) -> RigidTransform:
     table = job.placement
     if table.matrix is None:
-        return _pose(np.array(table.position_mm), table.rotation_deg or (0.0, 0.0, 0.0))
+        return _pose(table.position_mm or (0.0, 0.0, 0.0), table.rotation_deg or (0.0, 0.0, 0.0))
     matrix = np.array(table.matrix)
-    matrix[:3, 3] *= _MM
+    matrix[:3, 3] = to_si(matrix[:3, 3], "mm")
     try:
         return RigidTransform.from_matrix(matrix)
     except ArrayError as error:
         raise job.error("placement", "matrix", error.what, expected=error.expected) from error
 
 
-def _pose(position_mm: Floats, rotation_deg: Vector | Floats) -> RigidTransform:
+def _pose(position_mm: Sequence[float], rotation_deg: Sequence[float]) -> RigidTransform:
     """Return the placement at a position (mm) after turns about the fixed x, then y, then z axis (degrees)."""
-    cx, cy, cz = np.cos(np.radians(rotation_deg))
-    sx, sy, sz = np.sin(np.radians(rotation_deg))
+    turns = to_si(rotation_deg, "deg")
+    (cx, cy, cz), (sx, sy, sz) = np.cos(turns), np.sin(turns)
     about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
     about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    return RigidTransform(about_z @ about_y @ about_x, position_mm * _MM)
+    return RigidTransform(about_z @ about_y @ about_x, to_si(position_mm, "mm"))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from pentapod.job.build.collision_world import job_surroundings
 from pentapod.job.build.cutting import job_cutting
 from pentapod.job.build.placement import job_constraints
@@ -16,8 +14,6 @@ from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify import Specification
-
-_MM = 1e-3
 
 
 def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Callable[[], Toolpath]) -> Specification:
@@ -31,16 +27,16 @@ def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Cal
     return Specification(
         machine,
         make_toolpath(),
-        tilt=float(np.radians(job.axis.tilt_deg)),
-        path_tolerance=job.tolerance.path_mm * _MM,
-        axis_tolerance=float(np.radians(job.tolerance.axis_deg)),
+        tilt=job.axis.si.tilt,
+        path_tolerance=job.tolerance.si.path,
+        axis_tolerance=job.tolerance.si.axis,
         job_digest=job.digest,
         surroundings=surroundings,
         cutting=cutting,
         constraints=constraints,
         component=None if component is None else Component.parse(component),
         lowest_share=job.feed.lowest_share,
-        stop_angle=float(np.radians(job.feed.stop_angle_deg)),
+        stop_angle=job.feed.si.stop_angle,
         setups=job.placement.setups,
         waived=job.verify.waive,
         sources=job_sources(job),

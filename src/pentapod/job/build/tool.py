@@ -6,19 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import fields_from, file_key
 from pentapod.base.progress import Progress, silent
-from pentapod.cutters.ball import BallCutter
-from pentapod.cutters.bull_nose import BullNose
-from pentapod.cutters.flat_end import FlatEnd
-from pentapod.cutters.lollipop import Lollipop
-from pentapod.cutters.stand_off import StandOff
+from pentapod.base.units import from_si
+from pentapod.cutters.registry import CUTTERS
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.solids import Cone
+from pentapod.job.build.strategy import job_sink
 from pentapod.job.schema.job import Job
-from pentapod.job.schema.strategies import FileTable, sunk_mm
-from pentapod.job.schema.table import Vector
+from pentapod.job.schema.strategies import FileTable
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath.axis.modes import AxisMode, Between, Fixed, Normal, Pointed
@@ -28,12 +27,13 @@ from pentapod.toolpath.axis.steps import fastest_turn, stepped
 from pentapod.toolpath.gouge.gouge import checked
 from pentapod.toolpath.gouge.report import GougeOptions, Remedy
 from pentapod.toolpath.linking.links import LinkStyle
+from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.toolpath import Toolpath
 
-_MM = 1e-3
 _SLACK = 1.05
 """The cap counts along the contacts; the pivot's way is a little longer or shorter."""
-_FILE_STYLE_MM = (10.0, 3.0, 2.0)  # clearance, approach and spacing, where the path comes from a file
+_FILE_STYLE = PathOptions()
+"""Clearance, approach and spacing where the path comes from a file."""
 
 
 @dataclass(frozen=True)
@@ -71,34 +71,25 @@ class TurnReport:
 
 def job_tool(job: Job) -> Tool:
     """Return the job's tool. Raises JobError where its lengths make no tool."""
-    table = job.tool
-    mounted = {"shank": _cones(table.shank_mm), "holder": _cones(table.holder_mm)}
-    radius, flute = 0.5 * _MM * (table.diameter_mm or 0.0), None if table.flute_mm is None else _MM * table.flute_mm
+    cutter = CUTTERS[job.tool.type]
+    mounted = {"shank": _cones(job.tool.si.shank), "holder": _cones(job.tool.si.holder)}
     try:
-        if table.type == "ball":
-            return BallCutter(radius, flute, **mounted)
-        if table.type == "bull":
-            return BullNose(radius, _MM * (table.corner_mm or 0.0), flute, **mounted)
-        if table.type == "flat":
-            return FlatEnd(radius, flute=flute, **mounted)
-        if table.type == "lollipop":
-            return Lollipop(radius, 0.5 * _MM * (table.neck_mm or 0.0), _MM * (table.reach_mm or 0.0), **mounted)
-        return StandOff(_MM * (table.standoff_mm or 0.0), **mounted)
+        return cutter(**fields_from(cutter, job.tool), **mounted)
     except ToolpathError as error:
-        key = {"corner": "corner_mm", "flute": "flute_mm", "neck_radius": "neck_mm", "reach": "reach_mm"}
-        raise job.error("tool", key.get(error.key or "", "type"), error.what, expected=error.expected) from error
+        key = file_key(cutter, error.key or "") or "type"
+        raise job.error("tool", key, error.what, expected=error.expected) from error
 
 
 def job_orientation(job: Job) -> Orientation:
     """Return how the job wants the tool to stand."""
-    table = job.axis
+    axis = job.axis.si
     return Orientation(
         mode=_mode(job),
-        lead=float(np.radians(table.lead_deg)),
-        tilt=float(np.radians(table.side_deg)),
-        smoothing=float(np.radians(table.smoothing_deg)),
-        reach=_MM * table.smoothing_reach_mm,
-        rate=None if table.rate_deg_mm is None else float(np.radians(table.rate_deg_mm)) / _MM,
+        lead=axis.lead,
+        tilt=axis.side,
+        smoothing=axis.smoothing,
+        reach=axis.smoothing_reach,
+        rate=axis.rate,
     )
 
 
@@ -106,51 +97,50 @@ def finished_as_asked(
     job: Job, mesh: Mesh, tool: Tool, toolpath: Toolpath, progress: Progress = silent
 ) -> tuple[Toolpath, object]:
     """Return a toolpath with the axes and without the gouges that the job asks for, and what the check found."""
-    axis_step = np.inf if isinstance(job.toolpath, FileTable) else np.radians(job.toolpath.axis_step_deg)
-    if not isinstance(job.toolpath, FileTable):
+    from_file = isinstance(job.toolpath, FileTable)
+    axis_step = np.inf if from_file else job.toolpath.si.axis_step
+    if not from_file:
         toolpath = stepped(oriented(toolpath, tool, job_orientation(job)), axis_step)
-    table = job.gouge
+    gouge = job.gouge.si
     options = GougeOptions(
         # A toolpath from a file is somebody's: nothing is taken out of it unasked.
-        tuple(Remedy(name) for name in table.remedy or ("report" if isinstance(job.toolpath, FileTable) else "drop",)),
+        tuple(Remedy(name) for name in gouge.remedy or ("report" if from_file else "drop",)),
         # What is engraved is meant to be below the surface.
-        tolerance=_MM * (table.tolerance_mm + sunk_mm(job.toolpath)),
-        cone=float(np.radians(table.cone_deg)),
-        highest=_MM * table.highest_mm,
-        links=None if isinstance(job.toolpath, FileTable) else job_link_style(job, mesh, toolpath),
+        tolerance=gouge.tolerance + job_sink(job),
+        cone=gouge.cone,
+        highest=gouge.highest,
+        links=None if from_file else job_link_style(job, mesh, toolpath),
     )
     toolpath, report = checked(toolpath, tool, FacetTree.of(mesh), options, progress)
     if not report.tilted:
         return toolpath, report
     # What was tilted clear may turn faster than before.
     toolpath = stepped(toolpath, axis_step)
-    fastest, most = float(np.degrees(fastest_turn(toolpath))) * _MM, job.axis.rate_deg_mm
+    fastest, most = float(from_si(fastest_turn(toolpath), "deg_mm")), job.axis.rate_deg_mm
     return toolpath, Reports((report, TurnReport(fastest, most))) if most and fastest > most * _SLACK else report
 
 
 def job_link_style(job: Job, mesh: Mesh, toolpath: Toolpath) -> LinkStyle:
     """Return how ways are led that the toolpath did not have: along the axis and over the clearance level."""
-    table, view = job.toolpath, normalised(job.part.region_direction)
+    view = normalised(job.part.region_direction)
     top = max(float((mesh.vertices @ view).max()), float((toolpath.tips @ view).max()))
-    link = job.feed.cut_mm_min if job.feed.link_mm_min is None else job.feed.link_mm_min
-    clearance, approach, spacing = _FILE_STYLE_MM
-    if not isinstance(table, FileTable):
-        clearance, approach, spacing = table.clearance_mm, table.approach_mm, table.spacing_mm
-    level = top + _MM * max(clearance, 2.0 * approach)
-    return LinkStyle(view, level, _MM * approach, spacing=_MM * spacing, feed=_MM * link / 60.0)
+    style = _FILE_STYLE if isinstance(job.toolpath, FileTable) else job.toolpath.si
+    level = top + max(style.clearance, 2.0 * style.approach)
+    feed = job.feed.si.cut if job.feed.link_mm_min is None else job.feed.si.link
+    return LinkStyle(view, level, style.approach, spacing=style.spacing, feed=feed)
 
 
 def _mode(job: Job) -> AxisMode:
-    table = job.axis
-    if table.mode == "fixed":
-        return Fixed(table.direction or (0.0, 0.0, 1.0))
-    if table.mode in ("toward", "from"):
-        point = _MM * np.array(table.point_mm)
-        return Pointed(point, None if table.line is None else np.array(table.line), toward=table.mode == "toward")
-    if table.mode == "between":
-        return Between(_MM * np.array(table.places_mm), np.array(table.directions))
+    axis = job.axis.si
+    if axis.mode == "fixed":
+        return Fixed(axis.direction)
+    if axis.mode in ("toward", "from"):
+        return Pointed(axis.point, None if axis.line is None else np.array(axis.line), toward=axis.mode == "toward")
+    if axis.mode == "between":
+        return Between(axis.places, np.array(axis.directions))
     return Normal()
 
 
-def _cones(pieces: tuple[Vector, ...] | None) -> tuple[Cone, ...]:
-    return tuple(Cone(_MM * height, 0.5 * _MM * low, 0.5 * _MM * high) for height, low, high in pieces or ())
+def _cones(pieces: Floats | None) -> tuple[Cone, ...]:
+    """Return the pieces of a shank or holder, rows of height, lower and upper diameter."""
+    return () if pieces is None else tuple(Cone(height, 0.5 * low, 0.5 * high) for height, low, high in pieces.tolist())

@@ -5,11 +5,9 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-import numpy as np
-
 from pentapod.base.errors import InputError, MachineError, MeshError
 from pentapod.base.progress import Progress, silent
-from pentapod.job.build.strategy import job_options
+from pentapod.job.build.strategy import check_sizes, job_options
 from pentapod.job.build.tool import FileReport, Reports, finished_as_asked, job_link_style, job_tool
 from pentapod.job.schema.job import Job
 from pentapod.job.schema.strategies import FileTable
@@ -21,19 +19,15 @@ from pentapod.toolpath import Mesh, Tool, Toolpath, load_mesh, toolpath_with_rep
 from pentapod.toolpath.formats import read_toolpath
 from pentapod.toolpath.linking.partition import Piece, part_of
 
-_MM = 1e-3
-_MM_MIN = 1e-3 / 60.0
-_LARGEST_TOLERANCE = 0.1  # of the part's largest extent
-
 
 def job_machine(job: Job) -> Machine:
     """Return the job's machine, with its tool length, controller settings and tool limits. Raises MachineError."""
     machine = Machine.load(job.machine_file or str(job.machine.name))
     controller = ControllerSettings(
-        period=machine.controller.period if job.output.period_ms is None else job.output.period_ms * 1e-3,
+        period=machine.controller.period if job.output.period_ms is None else job.output.si.period,
         interpolation=job.output.interpolation or machine.controller.interpolation,
     )
-    length = machine.tool_length if job.tool.length_mm is None else job.tool.length_mm * _MM
+    length = machine.tool_length if job.tool.length_mm is None else job.tool.si.length
     limits = machine.tool_limits.and_(ToolLimits.of(job.feed))
     try:
         return dataclasses.replace(machine, controller=controller, tool_length=length, tool_limits=limits)
@@ -42,7 +36,7 @@ def job_machine(job: Job) -> Machine:
 
 
 def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
-    """Return the job's mesh. Raises MeshError, or JobError where unit or tolerances do not go with it."""
+    """Return the job's mesh. Raises MeshError, or JobError where its unit, or lengths of the job, do not suit it."""
     part = job.part
     try:
         mesh = load_mesh(job.mesh_path, part.unit, scale=part.scale, repair=part.repair, progress=progress)
@@ -50,16 +44,7 @@ def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
         if error.key != "unit":
             raise
         raise job.error("part", "unit", error.what, expected=error.expected, remedy=error.remedy) from error
-    extent = float(np.ptp(mesh.bounds, axis=0).max())
-    for key in ("chordal_mm", "path_mm"):
-        if getattr(job.tolerance, key) * _MM > _LARGEST_TOLERANCE * extent:
-            raise job.error(
-                "tolerance",
-                key,
-                f"the tolerance is too large for the part, whose largest extent is {extent / _MM:.4g} mm",
-                expected=f"at most {_LARGEST_TOLERANCE * extent / _MM:.3g}",
-                remedy="check part.unit and part.scale",
-            )
+    check_sizes(job, mesh)
     return mesh
 
 
@@ -95,7 +80,7 @@ def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
     """Return the toolpath as a strategy lays it or a file tells it, and what that came to."""
     if isinstance(job.toolpath, FileTable):
         file = job.file("file")
-        read = read_toolpath(file, job.toolpath.format, pivot=tool.pivot, feed=job.feed.cut_mm_min * _MM_MIN)
+        read = read_toolpath(file, job.toolpath.format, pivot=tool.pivot, feed=job.feed.si.cut)
         # Whatever the file says of its tool, this job's is the one that moves.
         read = dataclasses.replace(read, pivot=tool.pivot)
         return read, FileReport(file.name, len(read), len(read.segments))

@@ -6,20 +6,21 @@ import hashlib
 import json
 import os
 import re
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, cast
 
 from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
 
 from pentapod.base.errors import JobError, nearest
-from pentapod.base.toml import first_of, line_of, parsed, read_toml, wrong_value
+from pentapod.base.tables import problem_of
+from pentapod.base.toml import line_of, parsed, read_toml
 from pentapod.base.values import Value
 from pentapod.job.schema.placement import FixtureTable, PlacementTable
-from pentapod.job.schema.strategies import FILE_KEYS, TABLES, ToolpathTable
+from pentapod.job.schema.strategies import StrategyTable, file_keys, job_strategies, strategy_table
 from pentapod.job.schema.tables import (
     AxisTable,
     FeedTable,
@@ -29,19 +30,21 @@ from pentapod.job.schema.tables import (
     OutputTable,
     PartTable,
     ToleranceTable,
-    ToolTable,
     VerifyTable,
+    table_model,
 )
+from pentapod.job.schema.tool import ToolTable
 
 _VARIABLE = re.compile(r"\$\{(\w+)\}")
+Content = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Job(Value):
-    """What a job file says. Units are as in the file; `pentapod.job.build.values` and its neighbours turn them into SI.
+    """What a job file says. Values are as in the file; each table gives them in SI units, too: `job.feed.si.cut`.
 
-    path: the job file. mesh_path, fixture_mesh, machine_file and files, by their keys in [toolpath]: resolved against
-    the job file's folder.
+    path: the job file; of a job from values, where it would stand. mesh_path, fixture_mesh, machine_file and files, by
+    their keys in [toolpath]: resolved against its folder. from_file: whether the job is as its file says.
     """
 
     path: Path
@@ -50,32 +53,68 @@ class Job(Value):
     machine_file: Path | None
     files: dict[str, Path] = field(default_factory=dict[str, Path])
     fixture_mesh: Path | None = None
+    from_file: bool = field(default=True, compare=False)
 
     @classmethod
     def load(cls, path: str | Path) -> Job:
         """Return the job of a TOML file. Raises JobError: one line with file, key, value and remedy."""
         path = Path(path)
         text = read_toml(path, "job", JobError, start='"pentapod new DIR" writes one to start from')
-        content = parsed(text, path, JobError)
+        return cls._of(parsed(text, path, JobError), path, text)
+
+    @classmethod
+    def from_dict(cls, content: Content, folder: str | Path = ".") -> Job:
+        """Return the job of nested values: tables of keys, as in a job file, `{"feed": {"cut_mm_min": 1500}, ...}`.
+
+        folder: that relative paths start from. Lists, tuples and arrays may stand for lists, paths for texts. The same
+        values give the same job as their file, with the same digest. Raises JobError as `load`, without a line.
+        """
+        return cls._of(content, Path(folder) / "job.toml", None)
+
+    def with_(self, **changes: Any) -> Job:
+        """Return the job with other values; all else stays.
+
+        Tables of keys, `job.with_(feed={"cut_mm_min": 1200}, tolerance={"path_mm": 0.05})`, or keys with their table,
+        `job.with_(**{"feed.cut_mm_min": 1200})`. A value None takes the key out: its default holds. Raises JobError as
+        `from_dict`.
+        """
+        content = self.tables.model_dump(exclude_unset=True)
+        for name, value in changes.items():
+            table, _, key = name.partition(".")
+            old = content.get(table, {})
+            if key or isinstance(value, Mapping):
+                new = {**old, **({key: value} if key else cast(Content, value))}
+                content[table] = {key: value for key, value in new.items() if value is not None}
+            else:
+                content[table] = value
+        return self._of({name: table for name, table in content.items() if table is not None}, self.path, None)
+
+    @classmethod
+    def _of(cls, content: Content, path: Path, text: str | None) -> Job:
+        """Return the job of parsed content. text: of the file, for the lines in messages; None: there is no file."""
         try:
-            tables = JobTables.model_validate(_tuples(content))
+            tables = JobTables.model_validate(_plain(content))
         except ValidationError as error:
-            raise _job_error(path, text, error) from error
-        mesh = _resolve(path, text, ("part", "mesh"), tables.part.mesh)
-        named = tables.machine.file
-        machine = None if named is None else _resolve(path, text, ("machine", "file"), named)
-        names = {key: getattr(tables.toolpath, key, None) for key in FILE_KEYS}
-        files = {key: _resolve(path, text, ("toolpath", key), name) for key, name in names.items() if name is not None}
-        held = tables.fixture.mesh
-        fixture = None if held is None else _resolve(path, text, ("fixture", "mesh"), held)
-        job = cls(path, tables, mesh, machine, files, fixture)
-        job._check_waived()
+            where, details = _problem(error, content)
+            raise _error(path, text, where, **details) from error
+        resolve = partial(_resolve, path, text)
+        fixture, machine, waive = tables.fixture.mesh, tables.machine.file, tables.verify.waive
+        names = {key: getattr(tables.toolpath, key) for key in file_keys(tables.toolpath.strategy)}
+        job = cls(
+            path,
+            tables,
+            resolve(("part", "mesh"), tables.part.mesh),
+            None if machine is None else resolve(("machine", "file"), machine),
+            {key: resolve(("toolpath", key), name) for key, name in names.items() if name is not None},
+            None if fixture is None else resolve(("fixture", "mesh"), fixture),
+            from_file=text is not None,
+        )
+        if waive:
+            job._check_waived()
         return job
 
     def _check_waived(self) -> None:
         """Raise JobError where [verify] waives a claim that does not exist."""
-        if not self.verify.waive:
-            return
         from pentapod.verify.judge import CLAIM_NAMES  # noqa: PLC0415  most jobs waive nothing, and it is heavy
 
         for name in self.verify.waive:
@@ -98,7 +137,7 @@ class Job(Value):
         return self.tables.tool
 
     @property
-    def toolpath(self) -> ToolpathTable:
+    def toolpath(self) -> StrategyTable:
         """The table [toolpath]."""
         return self.tables.toolpath
 
@@ -168,32 +207,43 @@ class Job(Value):
 
     def error(self, table: str, key: str, what: str, **details: Any) -> JobError:
         """Return the JobError about a key of this job that only shows once the mesh or machine is known."""
-        value, line = getattr(getattr(self.tables, table), key), None
-        with suppress(OSError, UnicodeDecodeError):  # the file may have changed since: then its line is left out
-            line = line_of(self.path.read_text(encoding="utf-8-sig"), (table, key))
-        return JobError(what, file=self.path, line=line, key=f"{table}.{key}", value=value, **details)
+        text = None
+        if self.from_file:
+            with suppress(OSError, UnicodeDecodeError):  # the file may have changed since: then its line is left out
+                text = self.path.read_text(encoding="utf-8-sig")
+        value = getattr(getattr(self.tables, table), key)
+        file = self.path if self.from_file else None
+        line = line_of(text, (table, key)) if text is not None else None
+        return JobError(what, file=file, line=line, key=f"{table}.{key}", value=value, **details)
 
 
 def _sha(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _tuples(value: Any) -> Any:
-    """Return TOML content with its arrays as tuples, which is what the strict tables take."""
-    if isinstance(value, dict):
-        return {key: _tuples(item) for key, item in cast(dict[str, Any], value).items()}
-    if isinstance(value, list):
-        return tuple(_tuples(item) for item in cast(list[Any], value))
-    return value
+def _plain(value: Any) -> Any:
+    """Return content with lists and arrays as tuples, which is what the strict tables take, and paths as texts."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in cast(Content, value).items()}
+    if isinstance(value, list | tuple):
+        return tuple(_plain(item) for item in cast(list[Any], value))
+    return os.fspath(cast(Any, value)) if isinstance(value, os.PathLike) else value
 
 
-def _resolve(job: Path, text: str, where: tuple[str, str], name: str) -> Path:
+def _error(path: Path, text: str | None, where: tuple[str, ...], what: str, **details: Any) -> JobError:
+    """Return an error about a place in a job; text: of its file, None where it comes from values."""
+    if text is None:
+        return JobError(what, **details)
+    return JobError(what, file=path, line=line_of(text, where), **details)
+
+
+def _resolve(job: Path, text: str | None, where: tuple[str, str], name: str) -> Path:
     """Return the file that a key names. Raises JobError where a variable is not set or no file can be read there."""
-    table, key = where
 
     def wrong(what: str, **details: Any) -> JobError:
-        line = line_of(text, (table, key))
-        return JobError(what, file=job, line=line, key=f"{table}.{key}", value=name, **details)
+        return _error(job, text, where, what, key=".".join(where), value=name, **details)
 
     for variable in _VARIABLE.findall(name):
         if variable not in os.environ:
@@ -208,68 +258,21 @@ def _resolve(job: Path, text: str, where: tuple[str, str], name: str) -> Path:
     return path
 
 
-def _job_error(path: Path, text: str, error: ValidationError) -> JobError:
-    first = first_of(error)
-    place = tuple(str(part) for part in first["loc"])
-    # A place within [toolpath] is told with the strategy whose table it is; the file does not nest so.
-    strategy = place[1] if len(place) > 1 and place[0] == "toolpath" and place[1] in TABLES else "raster"
-    where = (place[0], *place[2:]) if len(place) > 1 and place[:2] == ("toolpath", strategy) else place
-    details = _details(first, where, strategy)
-    where = (*where, *details.pop("key").split(".")) if "key" in details else where
-    key = ".".join(where[:2]) + "".join(f"[{index}]" for index in where[2:])
-    return JobError(file=path, line=line_of(text, where), key=key, **details)
+def _problem(error: ValidationError, content: Content) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """Return the place of the first error, and its message."""
+    given = content.get("toolpath")
+    named = cast(Content, given).get("strategy", "raster") if isinstance(given, Mapping) else "raster"
+    strategy = str(named) if named in job_strategies() else "raster"
 
+    def model(name: str) -> type[BaseModel] | None:
+        return table_model(name, strategy) if name in JobTables.model_fields else None
 
-def _details(error: ErrorDetails, where: tuple[str, ...], strategy: str) -> dict[str, Any]:
-    """Return what, value, expected and remedy of one error of pydantic."""
-    context = error.get("ctx", {})
-    if error["type"] == "extra_forbidden":
-        return _unknown(where, strategy, is_table=isinstance(error["input"], dict))
-    if error["type"] == "rule":
-        return {"what": context["what"], "expected": context["expected"], "key": context["key"]}
-    if error["type"] == "union_tag_invalid":
-        tag = str(context["tag"])
-        return {"what": "unknown strategy", "value": tag, "remedy": nearest(tag, TABLES), "key": "strategy"}
-    if error["type"] == "missing" and len(where) > 2:
-        return {"what": "too few numbers", "expected": _description(where, strategy)}
-    if error["type"] == "missing":
-        kind = "table" if len(where) == 1 else "key"
-        return {
-            "what": f"the {kind} is missing",
-            "expected": _description(where, strategy),
-        }
-    return wrong_value(error, _description(where, strategy))
-
-
-def _unknown(where: tuple[str, ...], strategy: str, *, is_table: bool) -> dict[str, Any]:
-    """Return what and remedy of a table or key that is not known, or not with this strategy."""
-    owner = _model(where[:-1], strategy)
-    known = list(owner.model_fields) if owner is not None else []
-    if len(where) == 2 and where[0] == "toolpath" and any(where[1] in table.model_fields for table in TABLES.values()):
-        rest = ", ".join(sorted(known))
-        return {"what": f'the strategy "{strategy}" has no such key', "remedy": f"take it out; known: {rest}"}
-    if len(where) == 1 and not is_table:
-        keys = [f"{table}.{key}" for table in known for key in getattr(_model((table,), strategy), "model_fields", ())]
-        return {"what": "a key outside the tables", "remedy": nearest(where[0], [*known, *keys])}
-    return {"what": f"unknown {'table' if len(where) == 1 else 'key'}", "remedy": nearest(where[-1], known)}
-
-
-def _model(where: tuple[str, ...], strategy: str) -> type[BaseModel] | None:
-    """Return the table that a place in the file belongs to."""
-    if not where:
-        return JobTables
-    if where[0] == "toolpath":
-        return TABLES[strategy]
-    field = JobTables.model_fields.get(where[0])
-    return cast("type[BaseModel] | None", field.annotation if field else None)
-
-
-def _description(where: tuple[str, ...], strategy: str) -> str:
-    """Return what the schema says of a key, or of a table what keys it must have."""
-    model = _model(where[:1], strategy)
-    if model is None:
-        return "see the README"
-    if len(where) == 1:
-        needed = [name for name, field in model.model_fields.items() if field.is_required()]
-        return f"[{where[0]}]" + (" with " + ", ".join(needed) if needed else "")
-    return model.model_fields[where[1]].description or ""
+    where, details = problem_of(error, JobTables, model)
+    if details["what"] == "unknown key" and len(where) == 2 and where[0] == "toolpath":
+        every = {key for name in job_strategies() for key in strategy_table(name).model_fields}
+        if where[1] in every:
+            known = ", ".join(sorted(strategy_table(strategy).model_fields))
+            details["what"], details["remedy"] = (
+                f'the strategy "{strategy}" has no such key', f"take it out; known: {known}",
+            )  # fmt: skip
+    return where, details

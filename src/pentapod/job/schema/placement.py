@@ -6,9 +6,10 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from pentapod.job.schema.table import Positive, Row, Table, Vector, wrong
+from pentapod.base.tables import Positive, Table, Vector, wrong
 
 Pose = tuple[float, float, float, float, float, float]
+Row = tuple[float, float, float, float]
 Range = tuple[float, float]
 
 

@@ -1,18 +1,20 @@
-"""The tables of a job file: every key with its unit, meaning, default and range.
+"""The tables of a job file: every key with its unit, meaning, default and range, stated once.
 
-Documentation and `pentapod new` are generated from the descriptions here, so that there is one source of
-defaults. Units are in the names; values are as in the file (mm, degrees, mm/min), not yet SI.
+The keys of [toolpath] and [tool] are declared beside strategies and cutters (`Key`), all others here. Parser, error
+messages, `pentapod new` and the reference are made from them. Units are in the names; values are as in the file (mm,
+degrees, mm/min), and in SI at `table.si`.
 """
 
 from __future__ import annotations
 
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
 from pydantic import Field, model_validator
 
+from pentapod.base.tables import Positive, Table, Vector, wrong
 from pentapod.job.schema.placement import FixtureTable, PlacementTable
-from pentapod.job.schema.strategies import ToolpathTable
-from pentapod.job.schema.table import Positive, Table, Vector, wrong
+from pentapod.job.schema.strategies import ToolpathTable, strategy_table
+from pentapod.job.schema.tool import AnyTool, tool_table
 
 
 class PartTable(Table):
@@ -63,56 +65,6 @@ class MachineTable(Table):
         if (self.name is None) == (self.file is None):
             wrong("name", "name the machine once", 'either name = "desk" or file = "machine.toml"')
         return self
-
-
-class ToolTable(Table):
-    """The tool: a cutter that touches the surface, or a beam or spray that keeps its distance."""
-
-    type: Literal["ball", "bull", "flat", "lollipop", "standoff"] = Field(
-        description='"ball", "bull" (nose), "flat" or "lollipop" cutter, or "standoff" (laser, spray, water jet)'
-    )
-    diameter_mm: Positive | None = Field(default=None, le=100.0, description="diameter of the cutter, or of its ball")
-    corner_mm: Positive | None = Field(default=None, le=50.0, description="bull: radius of the rounded corner")
-    neck_mm: Positive | None = Field(default=None, le=100.0, description="lollipop: diameter of the neck")
-    reach_mm: Positive | None = Field(default=None, le=500.0, description="lollipop: from the tip to the neck's end")
-    flute_mm: Positive | None = Field(
-        default=None, le=500.0, description="cutting length from the tip; above it the shank begins"
-    )
-    standoff_mm: Positive | None = Field(default=None, le=200.0, description="from the tip to the surface")
-    shank_mm: tuple[Vector, ...] | None = Field(
-        default=None, description="shank or nozzle: [height, lower diameter, upper diameter] of each piece, upwards"
-    )
-    holder_mm: tuple[Vector, ...] | None = Field(default=None, description="holder: pieces as of the shank, above it")
-    length_mm: Positive | None = Field(
-        default=None,
-        le=1000.0,
-        description="from the platform's origin to the tip; the machine's if left out",
-    )
-
-    @model_validator(mode="after")
-    def _own_size(self) -> ToolTable:
-        needed, possible = _TOOL_KEYS[self.type]
-        for key in ("diameter_mm", "corner_mm", "neck_mm", "reach_mm", "flute_mm", "standoff_mm"):
-            given = getattr(self, key) is not None
-            if key in needed and not given:
-                wrong(key, f'missing for a tool of type "{self.type}"', "a length in mm")
-            if given and key not in needed + possible:
-                wrong(key, f'means nothing for a tool of type "{self.type}"', f"{', '.join(needed)} alone")
-        for key in ("shank_mm", "holder_mm"):
-            for piece in getattr(self, key) or ():
-                if piece[0] <= 0.0 or min(piece) < 0.0 or max(piece[1:]) <= 0.0:
-                    wrong(key, "an impossible piece", "[height, lower diameter, upper diameter], all positive")
-        return self
-
-
-_TOOL_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "ball": (("diameter_mm",), ("flute_mm",)),
-    "bull": (("diameter_mm", "corner_mm"), ("flute_mm",)),
-    "flat": (("diameter_mm",), ("flute_mm",)),
-    "lollipop": (("diameter_mm", "neck_mm", "reach_mm"), ()),
-    "standoff": (("standoff_mm",), ()),
-}
-"""Of each type: the keys that it needs, and those that it may have."""
 
 
 class AxisTable(Table):
@@ -260,7 +212,7 @@ class JobTables(Table):
 
     part: PartTable
     machine: MachineTable = Field(default=MachineTable(name="desk"))
-    tool: ToolTable
+    tool: AnyTool
     toolpath: ToolpathTable
     axis: AxisTable = Field(default=AxisTable())
     gouge: GougeTable = Field(default=GougeTable())
@@ -271,16 +223,15 @@ class JobTables(Table):
     output: OutputTable = Field(default=OutputTable())
     verify: VerifyTable = Field(default=VerifyTable())
 
-    @model_validator(mode="before")
-    @classmethod
-    def _raster_unless_said(cls, content: Any) -> Any:
-        """Take a toolpath without a strategy for a raster."""
-        if isinstance(content, dict) and isinstance(table := cast(dict[str, Any], content).get("toolpath"), dict):
-            return {**content, "toolpath": {"strategy": "raster", **cast(dict[str, Any], table)}}
-        return content
-
     @model_validator(mode="after")
     def _leaning(self) -> JobTables:
         if self.tool.type in ("bull", "flat") and self.axis.tilt_deg > 0.0:
             wrong("axis.tilt_deg", f'a tool of type "{self.tool.type}" cannot lean without digging in', "tilt_deg = 0")
         return self
+
+
+def table_model(name: str, strategy: str = "raster") -> type[Table]:
+    """Return the model of a table of job files; strategy: whose keys [toolpath] has. Raises KeyError: no such table."""
+    if name in ("toolpath", "tool"):
+        return strategy_table(strategy) if name == "toolpath" else tool_table()
+    return cast("type[Table]", JobTables.model_fields[name].annotation)

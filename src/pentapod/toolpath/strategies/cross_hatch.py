@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
+from pentapod.base.keys import Key
 from pentapod.cutters.tool import Tool
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.passes import Passes
 from pentapod.toolpath.drawing import Drawing, Order
-from pentapod.toolpath.options import finite
 from pentapod.toolpath.strategies.raster import Pattern, RasterOptions, draw_raster
+from pentapod.toolpath.strategies.strategy import Strategy
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CrossHatchOptions(RasterOptions):
-    """How a surface is covered twice. angle: radians from the first passes' direction to the second's."""
+    """Parallel plane slices, and others across them."""
 
-    angle: float = float(np.radians(90.0))
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        finite("angle", self.angle)
+    angle: Annotated[float, Key("deg", "from the first passes to the second", ge=-360.0, le=360.0)] = float(
+        np.radians(90.0)
+    )
 
 
 def draw_cross_hatch(mesh: Mesh, tool: Tool, options: CrossHatchOptions) -> Drawing:
@@ -35,3 +35,6 @@ def draw_cross_hatch(mesh: Mesh, tool: Tool, options: CrossHatchOptions) -> Draw
     passes = Passes.joined([first.passes, moved])
     order = Order.ZIGZAG if options.pattern is Pattern.ZIGZAG else Order.BY_LEVEL
     return Drawing(passes, first.stepover, order, first.both_ways)
+
+
+STRATEGY = Strategy("cross-hatch", CrossHatchOptions, draw_cross_hatch)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Annotated
 
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import VECTOR, Key
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.mesh import Mesh
@@ -20,7 +22,8 @@ from pentapod.mesh.query.heightfield import HeightField
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.lines.projection import Landing, draped, sunk
 from pentapod.toolpath.nothing_left import nothing_left
-from pentapod.toolpath.options import PathOptions, chosen, finite, not_negative, positive
+from pentapod.toolpath.options import PathOptions, positive
+from pentapod.toolpath.strategies.strategy import Strategy
 
 
 class Laying(StrEnum):
@@ -32,25 +35,28 @@ class Laying(StrEnum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CurveOptions(PathOptions):
-    """How flat lines are laid on a surface.
+    """Flat lines laid on the surface.
 
     lines: each (n, 2), metres, x to the right and y up as seen against the view. laying: see `Laying`. position (3,):
-    where on the surface (or over it, seen along the view) the lines' origin goes, metres, workpiece frame; the
-    middle of the region when None. rotation: of the lines, anticlockwise, radians. scale: of the lines. depth: by how
-    much the tool sinks in along the normal, metres. in_order: whether the lines are cut in their order.
+    on the surface or over it, seen along the view. scale: of the lines. in_order: whether the lines are cut in their
+    order.
     """
 
     lines: Sequence[Floats] = ()
-    laying: Laying | str = Laying.PROJECT
-    position: Floats | tuple[float, float, float] | None = None
-    rotation: float = 0.0
+    laying: Annotated[Laying | str, Key("", '"project" along the region\'s direction, or "wrap" along the surface')] = (
+        Laying.PROJECT
+    )
+    position: Annotated[
+        Floats | tuple[float, float, float] | None,
+        Key("mm", "where the origin goes, mesh frame; the middle of the region if left out", kind=VECTOR),
+    ] = None
+    rotation: Annotated[float, Key("deg", "anticlockwise, as seen against the view", ge=-360.0, le=360.0)] = 0.0
+    depth: Annotated[float, Key("mm", "below the surface, along the normal", ge=0.0, of_part=1.0)] = 0.0
     scale: float = 1.0
-    depth: float = 0.0
     in_order: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        set_frozen(self, laying=chosen("laying", self.laying, Laying))
         lines = tuple(frozen(line, f"lines[{k}]", (None, 2)) for k, line in enumerate(self.lines))
         lines = tuple(line for line in lines if len(line) > 1)
         if not lines:
@@ -58,9 +64,7 @@ class CurveOptions(PathOptions):
         set_frozen(self, lines=lines)
         if self.position is not None:
             set_frozen(self, position=frozen(self.position, "position", (3,)))
-        finite("rotation", self.rotation)
         positive("scale", self.scale)
-        not_negative("depth", self.depth)
 
 
 def draw_curves(mesh: Mesh, tool: Tool, options: CurveOptions) -> Drawing:
@@ -157,3 +161,6 @@ def wrapping(mesh: Mesh, options: CurveOptions) -> Landing:
         return shots.points(patch), normals_at(patch, shots.facets, shots.weights), shots.landed
 
     return land
+
+
+STRATEGY = Strategy("curves", CurveOptions, draw_curves, in_jobs=False)

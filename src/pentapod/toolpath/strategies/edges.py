@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Annotated
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, Ints, set_frozen
+from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import Key
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import angle_between
 from pentapod.mesh.mesh import Mesh
@@ -17,7 +19,8 @@ from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.nothing_left import nothing_left
-from pentapod.toolpath.options import PathOptions, chosen
+from pentapod.toolpath.options import PathOptions
+from pentapod.toolpath.strategies.strategy import Strategy
 
 _CORNER = np.radians(40.0)
 _INSIDE = 1e-7
@@ -36,16 +39,12 @@ class Which(StrEnum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EdgeOptions(PathOptions):
-    """Which edges are followed. sharpest: radians between the normals of two facets from which an edge is sharp."""
+    """Borders and sharp edges, for deburring."""
 
-    which: Which | str = Which.BOTH
-    sharpest: float = float(np.radians(40.0))
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        set_frozen(self, which=chosen("which", self.which, Which))
-        if not 0.0 < self.sharpest < np.pi:
-            raise ToolpathError("the angle is out of range", key="sharpest", value=self.sharpest, expected="(0, pi)")
+    which: Annotated[Which | str, Key("", "which edges are followed")] = Which.BOTH
+    sharpest: Annotated[float, Key("deg", "angle of normals that makes an edge", gt=0.0, lt=180.0)] = float(
+        np.radians(40.0)
+    )
 
 
 def draw_edges(mesh: Mesh, tool: Tool, options: EdgeOptions) -> Drawing:
@@ -185,3 +184,6 @@ def _line(patch: Patch, normals: Floats, walk: list[tuple[int, int]]) -> tuple[F
     if vertices[0] == vertices[-1]:
         first = last = own[:1] + own[-1:]
     return patch.vertices[vertices], unit_or_zero(np.concatenate([first, own[1:] + own[:-1], last]))
+
+
+STRATEGY = Strategy("edges", EdgeOptions, draw_edges)

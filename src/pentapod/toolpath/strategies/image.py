@@ -5,19 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.ndimage import map_coordinates
 
 from pentapod.base.arrays import Bools, Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import VECTOR, Key
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.runs import equal_runs, marked_runs
 from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.drawing import Drawing, Order
+from pentapod.toolpath.inputs.pictures import read_darkness
 from pentapod.toolpath.lines.projection import draped, sunk
-from pentapod.toolpath.options import PathOptions, chosen, finite, not_negative, positive
+from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.strategies.curves import CurveOptions, Laying, flat_turn, projection, wrapping
+from pentapod.toolpath.strategies.strategy import Strategy
 
 _LANE = np.array([[0.0, 0.0], [1.0, 0.0]])
 
@@ -31,24 +36,36 @@ class Effect(StrEnum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ImageOptions(PathOptions):
-    """How a picture is brought onto a surface.
+    """Grey levels as depth or as laser power.
 
-    darkness (rows, columns): 0 for white to 1 for black, the first row on top. width: of the picture, metres; pixels
-    are square. stepover: between lines, metres. effect: see `Effect`. depth: of black, metres. levels: into how
-    many steps of power darkness is divided. threshold: what is lighter is left out. laying, position, rotation: as for
-    curves; the picture's middle goes to the position.
+    darkness (rows, columns): 0 for white to 1 for black, the first row on top; pixels are square. effect: see
+    `Effect`. laying, rotation: as for curves.
     """
 
-    darkness: Floats | None = None
-    width: float = 0.05
-    stepover: float = 0.5e-3
-    effect: Effect | str = Effect.DEPTH
-    depth: float = 0.3e-3
-    levels: int = 8
-    threshold: float = 0.05
-    laying: Laying | str = Laying.PROJECT
-    position: Floats | tuple[float, float, float] | None = None
-    rotation: float = 0.0
+    darkness: Annotated[
+        Floats | None,
+        Key(
+            "", "picture (.png, .jpg, ...), relative to this job file",
+            name="file", kind=Path, read=read_darkness, needed=True,
+        ),
+    ] = None  # fmt: skip
+    width: Annotated[float, Key("mm", "of the picture on the surface", gt=0.0, needed=True)] = 0.05
+    stepover: Annotated[float, Key("mm", "between lines", gt=0.0, of_part=1.0)] = 0.5e-3
+    effect: Annotated[Effect | str, Key("", "what dark means: deep, or full power")] = Effect.DEPTH
+    depth: Annotated[float, Key("mm", "depth of black", ge=0.0, of_part=1.0)] = 0.3e-3
+    levels: Annotated[int, Key("", "steps of power", ge=1, le=256)] = 8
+    threshold: Annotated[float, Key("", "darkness from 0 to 1 up to which is left out", ge=0.0, lt=1.0)] = 0.05
+    laying: Annotated[Laying | str, Key("", "as for drawings")] = Laying.PROJECT
+    position: Annotated[
+        Floats | tuple[float, float, float] | None,
+        Key("mm", "where the picture's middle goes, mesh frame; the middle of the region if left out", kind=VECTOR),
+    ] = None
+    rotation: Annotated[float, Key("deg", "of the picture, anticlockwise", ge=-360.0, le=360.0)] = 0.0
+
+    @classmethod
+    def sink_of(cls, values: Any) -> float:
+        """Return the depth of black; 0 where dark means power."""
+        return 0.0 if values.effect == Effect.POWER else super().sink_of(values)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -57,15 +74,7 @@ class ImageOptions(PathOptions):
         darkness = frozen(self.darkness, "darkness", (None, None))
         if min(darkness.shape) < 2 or darkness.min() < 0.0 or darkness.max() > 1.0:
             raise ToolpathError("the picture must hold darkness from 0 to 1", key="darkness", value=darkness.shape)
-        set_frozen(self, darkness=darkness, effect=chosen("effect", self.effect, Effect))
-        set_frozen(self, laying=chosen("laying", self.laying, Laying))
-        for name in ("width", "stepover"):
-            positive(name, getattr(self, name))
-        not_negative("depth", self.depth)
-        not_negative("threshold", self.threshold)
-        finite("rotation", self.rotation)
-        if self.levels < 1:
-            raise ToolpathError("at least one level is needed", key="levels", value=self.levels)
+        set_frozen(self, darkness=darkness)
 
 
 def draw_image(mesh: Mesh, tool: Tool, options: ImageOptions) -> Drawing:
@@ -100,7 +109,7 @@ def draw_image(mesh: Mesh, tool: Tool, options: ImageOptions) -> Drawing:
         raise ToolpathError("nothing of the picture is dark enough", key="threshold", value=options.threshold)
     if options.effect is Effect.DEPTH:
         landing = sunk(landing, lambda plane: options.depth * _shade(darkness, pixel, plane @ turn.T))
-    sink = options.depth if options.effect is Effect.DEPTH else 0.0
+    sink = options.sink_of(options)
     passes, notes = draped(
         lines,
         landing,
@@ -146,3 +155,6 @@ def _dark_runs(dark: Bools, steps: Floats | None) -> list[tuple[int, int]]:
         ends = [*starts, min(max(b - 1, a + 1), len(dark) - 1)]
         runs += [(p, q) for p, q in pairwise(ends) if q > p]
     return runs
+
+
+STRATEGY = Strategy("image", ImageOptions, draw_image)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import Key
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.polyline import spaced
 from pentapod.mesh.mesh import Mesh
@@ -17,22 +20,30 @@ from pentapod.mesh.query.geodesic import border_vertices, distances, seeds_along
 from pentapod.mesh.query.levels import gradients
 from pentapod.mesh.query.slicing import LevelSet
 from pentapod.toolpath.drawing import Drawing, Order
+from pentapod.toolpath.inputs.points import read_points
 from pentapod.toolpath.lines.gap_filling import FACETS_PER_FRONT, edge_for, rest_covered
 from pentapod.toolpath.lines.scallop import surface_steps
 from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import CoverOptions
+from pentapod.toolpath.strategies.strategy import Strategy
 
 _CURVE_POINTS_PER_EDGE = 8.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OffsetOptions(CoverOptions):
-    """How a surface is covered by lines that follow its border or a curve.
+    """Lines a constant distance apart over the surface.
 
     curve (n, 3): metres, workpiece frame, on the surface or near it; the region's border when None.
     """
 
-    curve: Floats | None = None
+    curve: Annotated[
+        Floats | None,
+        Key(
+            "", "CSV file of a polyline to start from; the region's border if left out",
+            kind=Path, read=lambda file: read_points(file)[0],
+        ),
+    ] = None  # fmt: skip
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -112,3 +123,6 @@ def contours_of(mesh: Mesh, tool: Tool, options: CoverOptions, curve: Floats | N
     if curve is not None:
         seeds = seeds_at(patch, facets, points, slowness)
     return Contours(patch, steps, distances(patch, seeds, slowness))
+
+
+STRATEGY = Strategy("offset", OffsetOptions, draw_offset)

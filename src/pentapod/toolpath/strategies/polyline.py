@@ -5,20 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import Key
 from pentapod.cutters.tool import Tool
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.closest import closest, normals_at
 from pentapod.mesh.query.heightfield import HeightField
 from pentapod.toolpath.drawing import Drawing, Order
+from pentapod.toolpath.inputs.points import read_points
 from pentapod.toolpath.lines.projection import draped, sunk
 from pentapod.toolpath.nothing_left import nothing_left
-from pentapod.toolpath.options import PathOptions, chosen, not_negative
+from pentapod.toolpath.options import PathOptions
+from pentapod.toolpath.strategies.strategy import Strategy
 
 
 class Towards(StrEnum):
@@ -30,20 +35,26 @@ class Towards(StrEnum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PolylineOptions(PathOptions):
-    """Lines that are given. lines: each (n, 3), metres, workpiece frame. towards: see `Towards`. depth: metres."""
+    """Lines given point by point. lines: each (n, 3), metres, workpiece frame. towards: see `Towards`."""
 
-    lines: Sequence[Floats] = ()
-    towards: Towards | str = Towards.VIEW
-    depth: float = 0.0
+    lines: Annotated[
+        Sequence[Floats],
+        Key(
+            "", "CSV file with columns x_mm, y_mm, z_mm, relative to this job file",
+            name="file", kind=Path, read=read_points, needed=True,
+        ),
+    ] = ()  # fmt: skip
+    towards: Annotated[
+        Towards | str, Key("", "taken to the surface along the region's direction, or to its nearest point")
+    ] = Towards.VIEW
+    depth: Annotated[float, Key("mm", "below the surface, along the normal", ge=0.0, of_part=1.0)] = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        set_frozen(self, towards=chosen("towards", self.towards, Towards))
         lines = tuple(frozen(line, f"lines[{k}]", (None, 3)) for k, line in enumerate(self.lines))
         if not any(len(line) > 1 for line in lines):
             raise ToolpathError("there is no line to follow", key="lines")
         set_frozen(self, lines=lines)
-        not_negative("depth", self.depth)
 
 
 def draw_polyline(mesh: Mesh, tool: Tool, options: PolylineOptions) -> Drawing:
@@ -72,3 +83,6 @@ def draw_polyline(mesh: Mesh, tool: Tool, options: PolylineOptions) -> Drawing:
         raise ToolpathError("no line meets the surface", key="lines", remedy="check the unit and the view")
     visible = options.towards is Towards.VIEW
     return Drawing(passes, 0.0, Order.GIVEN, sink=options.depth, visible=visible, notes=notes)
+
+
+STRATEGY = Strategy("polyline", PolylineOptions, draw_polyline)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Annotated
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, set_frozen
+from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import Key
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.mesh import Mesh
@@ -23,7 +25,8 @@ from pentapod.toolpath.lines.gap_filling import edge_for, gap_lines
 from pentapod.toolpath.lines.scallop import surface_steps
 from pentapod.toolpath.lines.slopes import monotone
 from pentapod.toolpath.nothing_left import nothing_left
-from pentapod.toolpath.options import CoverOptions, chosen, finite
+from pentapod.toolpath.options import CoverOptions
+from pentapod.toolpath.strategies.strategy import Strategy
 
 MOST_CROSSINGS = 30_000_000
 STEEPEST = 0.05
@@ -43,19 +46,16 @@ class Pattern(StrEnum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RasterOptions(CoverOptions):
-    """How a surface is covered by parallel passes.
+    """Parallel plane slices.
 
-    direction: of the passes, radians about the view from its x axis towards its y axis; for the view +z these
-    are x and y, for others they are carried along (`geometry.tangent_frame`). pattern: see `Pattern`.
+    direction: of the passes, about the view from its x axis towards its y axis; for the view +z these are x and y, for
+    others they are carried along (`geometry.tangent_frame`). pattern: see `Pattern`.
     """
 
-    direction: float = 0.0
-    pattern: Pattern | str = Pattern.ZIGZAG
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        finite("direction", self.direction)
-        set_frozen(self, pattern=chosen("pattern", self.pattern, Pattern))
+    direction: Annotated[float, Key("deg", "direction of the passes, from +x towards +y", ge=-360.0, le=360.0)] = 0.0
+    pattern: Annotated[Pattern | str, Key("", "cut both ways, one way, or only where passes rise or fall")] = (
+        Pattern.ZIGZAG
+    )
 
 
 def draw_raster(mesh: Mesh, tool: Tool, options: RasterOptions) -> Drawing:
@@ -114,3 +114,6 @@ def _gaps(whole: Patch, steps: Floats, tool: Tool, options: CoverOptions, across
     slowness = 1.0 / surface_steps(patch, tool, ways, options.stepover, options.scallop)
     seeds = seeds_along(LevelSet(patch, patch.vertices @ across, levels), slowness)
     return gap_lines(patch, seeds, slowness, where=near, area=float(whole.areas.sum()))
+
+
+STRATEGY = Strategy("raster", RasterOptions, draw_raster)

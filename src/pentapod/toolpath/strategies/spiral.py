@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Annotated
 
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import VECTOR, Key
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.mesh import Mesh
@@ -20,8 +22,9 @@ from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.lines.gap_filling import FACETS_PER_FRONT, edge_for, rest_covered
 from pentapod.toolpath.lines.scallop import surface_steps
 from pentapod.toolpath.nothing_left import nothing_left
-from pentapod.toolpath.options import CoverOptions, chosen
+from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.strategies.offset import contours_of
+from pentapod.toolpath.strategies.strategy import Strategy
 
 _STEEPEST = 0.05
 
@@ -35,18 +38,19 @@ class Form(StrEnum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SpiralOptions(CoverOptions):
-    """How a surface is covered by a spiral.
+    """One line that winds over the surface.
 
-    form: see `Form`. centre (3,): about what it winds, metres, workpiece frame, seen along the view; None: what is
-    furthest from the border (offset), or the middle of the region (planar).
+    form: see `Form`. centre (3,): metres, workpiece frame, seen along the view; None: what is furthest from the border
+    (offset), or the middle of the region (planar).
     """
 
-    form: Form | str = Form.OFFSET
-    centre: Floats | tuple[float, float, float] | None = None
+    form: Annotated[Form | str, Key("", "along the border, or round from above")] = Form.OFFSET
+    centre: Annotated[
+        Floats | tuple[float, float, float] | None, Key("mm", "about what it winds, mesh frame", kind=VECTOR)
+    ] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        set_frozen(self, form=chosen("form", self.form, Form))
         if self.centre is not None:
             set_frozen(self, centre=frozen(self.centre, "centre", (3,)))
 
@@ -128,3 +132,6 @@ def _winding(patch: Patch, centre: Floats, view: Floats) -> tuple[Patch, Floats,
     smooth = at - turns
     kept = smooth.max(axis=1) - smooth.min(axis=1) < 0.5
     return Patch(patch.vertices, patch.faces[kept], patch.normals[kept]), phase, turns[kept], kept
+
+
+STRATEGY = Strategy("spiral", SpiralOptions, draw_spiral)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import VECTOR, Key
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
 from pentapod.mesh.mesh import Mesh
@@ -16,19 +18,22 @@ from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.strategies.raster import plane_lines
+from pentapod.toolpath.strategies.strategy import Strategy
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WaterlineOptions(CoverOptions):
-    """How a surface is covered by lines of constant height.
+    """Lines of constant height.
 
-    upright (3,): the direction along which height is measured; the view when None. shallowest: radians; where the
-    surface is flatter than that, seen along `upright`, it is left to another strategy, for lines of constant
-    height would be far apart there.
+    upright (3,): the view when None. Where the surface is flatter than `shallowest`, seen along `upright`, lines of
+    constant height would be far apart: it is left to another strategy.
     """
 
-    upright: Floats | tuple[float, float, float] | None = None
-    shallowest: float = float(np.radians(10.0))
+    upright: Annotated[
+        Floats | tuple[float, float, float] | None,
+        Key("", "direction of the heights; the region's when left out", kind=VECTOR),
+    ] = None
+    shallowest: Annotated[float, Key("deg", "flatter surface is left out", gt=0.0, lt=90.0)] = float(np.radians(10.0))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -36,10 +41,6 @@ class WaterlineOptions(CoverOptions):
         if not np.linalg.norm(frozen(upright, "upright", (3,))) > 0.0:
             raise ToolpathError("the direction has no length", key="upright")
         set_frozen(self, upright=frozen(normalised(upright), "upright"))
-        if not 0.0 < self.shallowest < np.pi / 2:
-            raise ToolpathError(
-                "the angle is out of range", key="shallowest", value=self.shallowest, expected="(0, pi/2)"
-            )
 
 
 def draw_waterline(mesh: Mesh, tool: Tool, options: WaterlineOptions) -> Drawing:
@@ -68,3 +69,6 @@ def draw_waterline(mesh: Mesh, tool: Tool, options: WaterlineOptions) -> Drawing
         (f"{100.0 * left:.2g} % of the region is flatter than {degrees:.3g} deg and left out",) if left > 1e-6 else ()
     )
     return Drawing(passes, stepover, Order.ZIGZAG, notes=notes)
+
+
+STRATEGY = Strategy("waterline", WaterlineOptions, draw_waterline)
