@@ -20,6 +20,10 @@ class StrategyTable(Table):
 
     strategy: str = Field(default="raster", description="how the surface is machined")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what is said: the model is made anew from the strategy's options."""
+        return _of_strategy, ({"strategy": self.strategy, **self.model_dump(exclude_unset=True)},)
+
 
 class FileTable(StrategyTable):
     """A toolpath that is there already."""

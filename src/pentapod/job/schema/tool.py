@@ -27,6 +27,10 @@ class ToolTable(Table):
         default=None, le=1000.0, description="from the platform's origin to the tip; the machine's if left out"
     )
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what is said: the model is made anew from the cutters."""
+        return _of_type, (self.model_dump(exclude_unset=True),)
+
     def sizes(self) -> dict[str, float]:
         """Return the sizes of the cutter that are given, by key, in mm."""
         values = {item.file_key: getattr(self, item.file_key) for item in declared(CUTTERS[self.type])}
