@@ -8,7 +8,7 @@ from typing import TypedDict
 from pentapod.base.arrays import Floats
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal
-from pentapod.kinematics.component import Component
+from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
 from pentapod.machine.machine import Machine
 from pentapod.numerics.one_thread import on_one_thread
@@ -38,7 +38,7 @@ class PlacementOptions(TypedDict):
 
     tilt: float
     constraints: PlacementConstraints
-    component: Component | None
+    component: Branch | None
     surroundings: Surroundings
     weights: Weights
     solver: SolverName
@@ -51,7 +51,7 @@ def plan(
     *,
     tilt: float = 0.0,
     constraints: PlacementConstraints = FREE,
-    component: Component | None = None,
+    component: Branch | None = None,
     surroundings: Surroundings = NOTHING,
     weights: Weights = EVEN,
     secondary_objective: SecondaryObjective | None = None,
@@ -95,7 +95,7 @@ def fits(
     *,
     tilt: float,
     constraints: PlacementConstraints,
-    component: Component | None,
+    component: Branch | None,
     surroundings: Surroundings,
     weights: Weights,
     solver: SolverName,
@@ -113,7 +113,7 @@ def fits(
 
 def _searched(
     problem: PlacementProblem,
-    component: Component | None,
+    component: Branch | None,
     surroundings: Surroundings,
     seed: int,
     solver: SolverName,

@@ -8,7 +8,9 @@ must not be 0.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +18,7 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Floats, as_floats, frozen, set_frozen
 from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
+from pentapod.kinematics.arithmetic import Joints
 from pentapod.kinematics.families.conics import conic_determinant, forbidden_conic
 from pentapod.kinematics.families.quadratic import LinearPentapod
 
@@ -61,6 +64,14 @@ class ReconfigurablePentapod(Value):
         """Return the platform offsets (..., 5), metres."""
         moved = as_floats(slides, "slides", (5,)) * self.guides[:, 0]
         return self.pentapod.offsets + self.pentapod.delta * moved
+
+    def moved(self, joints: Joints, slides: Sequence[Any]) -> Joints:
+        """Return joints of this machine after its guides moved on by slides (5), numbers or expressions."""
+        both = list(zip(slides, self.guides.tolist(), strict=True))
+        bases = [[x + slide * gx, y + slide * gy] for (x, y), (slide, (gx, gy)) in zip(joints[0], both, strict=True)]
+        return bases, [
+            z + self.pentapod.delta * slide * gx for z, (slide, (gx, _)) in zip(joints[1], both, strict=True)
+        ]
 
     def at(self, slides: ArrayLike) -> LinearPentapod:
         """Return the pentapod with its guides at slides (5,). Raises MachineError where that one is singular."""

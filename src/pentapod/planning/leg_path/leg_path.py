@@ -14,7 +14,7 @@ from pentapod.base.errors import ToolpathError
 from pentapod.base.refusal import Blame, Refusal
 from pentapod.base.values import Result, Value
 from pentapod.geometry.fillet import TooFar, rounded
-from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.kinematics.robot import Robot
 from pentapod.machine.machine import Machine
 from pentapod.planning.leg_path.tool_curve import ToolCurve
 from pentapod.planning.placement.placed_path import PlacedPath
@@ -39,7 +39,7 @@ class LegPiece(Value):
     """
 
     curve: ToolCurve
-    robot: LinearPentapod
+    robot: Robot
     tool_length: float
     section_ends: Floats
     section_feeds: Floats
@@ -81,24 +81,13 @@ class LegPiece(Value):
         return self.surface_rate(s) if spot else np.ones(np.shape(s))
 
     def __call__(self, s: ArrayLike, order: int = 0) -> Floats:
-        """Return leg lengths (n, 5) in metres at stations s (n,), or their derivatives of order 1 to 3 in s."""
+        """Return leg lengths (n, n_legs) in metres at stations s (n,), or their derivatives of order 1 to 3 in s."""
         return self.derivatives(s, order)[-1]
 
     def derivatives(self, s: ArrayLike, order: int) -> list[Floats]:
-        """Return leg lengths and their derivatives (n, 5) up to `order` ≤ 3: cheaper than one by one."""
+        """Return leg lengths and their derivatives (n, n_legs) up to `order` ≤ 3: cheaper than one by one."""
         poses = self.curve.derivatives(np.asarray(s, dtype=np.float64), order)
-        lever = (self.tool_length - self.robot.offsets)[:, None]
-        # From the base joints to the platform joints b_i = tip + (tool length − z_i) axis.
-        d = [tip[:, None, :] + lever * axis[:, None, :] for tip, axis in poses]
-        d[0][..., :2] -= self.robot.base
-        legs = [np.sqrt(_dot(d[0], d[0]))]
-        if order >= 1:
-            legs.append(_dot(d[0], d[1]) / legs[0])
-        if order >= 2:
-            legs.append((_dot(d[1], d[1]) + _dot(d[0], d[2]) - legs[1] * legs[1]) / legs[0])
-        if order >= 3:
-            legs.append((3.0 * _dot(d[1], d[2]) + _dot(d[0], d[3]) - 3.0 * legs[1] * legs[2]) / legs[0])
-        return legs
+        return self.robot.leg_derivatives(poses, self.tool_length)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +111,8 @@ class LegPath(Result):
         return float(self.starts[-1])
 
     def __call__(self, s: ArrayLike, order: int = 0) -> Floats:
-        """Return leg lengths (n, 5), or derivatives of order 1 to 3, at stations s (n,) of the whole path."""
-        return self._each(s, lambda piece, local: piece(local, order), 5)
+        """Return leg lengths (n, n_legs), or derivatives of order 1 to 3, at stations s (n,) of the whole path."""
+        return self._each(s, lambda piece, local: piece(local, order), self.pieces[0].robot.n_legs)
 
     def pose(self, s: ArrayLike) -> tuple[Floats, Floats]:
         """Return tips and tool axes (n, 3), machine frame, at stations s (n,) of the whole path."""
@@ -257,7 +246,3 @@ def _turns(points: Floats, angle: float) -> Bools:
     moves = length > 1e-9
     sharp = (step[1:] * step[:-1]).sum(axis=1) < np.cos(angle) * length[1:] * length[:-1]
     return sharp & moves[1:] & moves[:-1]
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.einsum("nij,nij->ni", a, b)

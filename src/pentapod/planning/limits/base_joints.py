@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from pentapod.kinematics.arithmetic import dot
 from pentapod.planning.limits.limit import CosineLimit, Scene
-from pentapod.planning.limits.tool_pose import ToolPose, dot
+from pentapod.planning.limits.tool_pose import ToolPose
 
 
 @dataclass(frozen=True, kw_only=True)

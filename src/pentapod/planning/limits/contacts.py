@@ -17,7 +17,6 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.solids import Solid
 from pentapod.machine.clearance.collision_world import (
-    LEGS,
     MovingBodies,
     Obstacle,
     spindle_ends,
@@ -44,7 +43,7 @@ def body_comforts(scene: Scene) -> tuple[float, ...]:
     """Return the gaps (K,) in metres that count as margin 1, in the order of `Surroundings.names`."""
     comforts = scene.comforts
     tool = (comforts.tool_obstacle,) if scene.surroundings.tool else ()
-    return (*[comforts.leg_obstacle] * LEGS, comforts.spindle_obstacle, *tool)
+    return (*[comforts.leg_obstacle] * scene.machine.robot.n_legs, comforts.spindle_obstacle, *tool)
 
 
 def contacts(scene: Scene, tips: Floats, axes: Floats, placement: RigidTransform) -> Contacts:
@@ -72,8 +71,8 @@ def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts:
     """Return for legs and spindle the gaps and the numbers of their contacts, each (N, 1 + NUMBERS)."""
     count = len(bodies.tips)
     top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
-    columns: list[Floats] = []
-    for body in range(LEGS + 1):
+    columns, n_legs = list[Floats](), machine.robot.n_legs
+    for body in range(n_legs + 1):
         radius = float(bodies.radii[body])
         cap = _CAP * comforts[body]
         column = np.zeros((count, 1 + NUMBERS))
@@ -86,7 +85,7 @@ def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts:
         found = obstacle.surface.segments(starts, ends, cap + radius)
         near = found.distance < cap + radius
         at = starts + found.place[:, None] * (ends - starts)
-        place = found.place if body < LEGS else top + found.place * (nose - top)
+        place = found.place if body < n_legs else top + found.place * (nose - top)
         # Where no way out is known the gap is a number that no step changes.
         known, gap = found.normal.any(axis=1), found.distance - radius
         numbers = (gap, place, *found.normal.T, *(at - found.distance[:, None] * found.normal).T)
@@ -99,14 +98,14 @@ def _near(scene: Scene, obstacle: Obstacle, tips: Floats, axes: Floats, frame: R
     """Return the poses (N, 3) in which the box around any body comes near the obstacle's box: most do not."""
     machine, tool, comforts = scene.machine, scene.surroundings.tool, scene.comforts
     robot, bodies = machine.robot, machine.bodies
-    base = np.column_stack([robot.base, np.zeros(LEGS)])
+    base, heights = robot.base_joints, robot.line_heights
     if frame is not None:
         back = frame.inverse()
         tips, axes, base = back.apply(tips), back.rotate(axes), back.apply(base)
     low, high = obstacle.surface.bounds
     top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
-    lines = [(base[k], tips + (machine.tool_length - robot.offsets[k]) * axes) for k in range(LEGS)]
-    reaches = [_CAP * comforts.leg_obstacle + bodies.leg_radius] * LEGS
+    lines = [(base[k], tips + (machine.tool_length - heights[k]) * axes) for k in range(robot.n_legs)]
+    reaches = [_CAP * comforts.leg_obstacle + bodies.leg_radius] * robot.n_legs
     lines.append((tips + nose * axes, tips + top * axes))
     reaches.append(_CAP * comforts.spindle_obstacle + bodies.shaft_radius)
     if tool:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 
-from pentapod.kinematics.arithmetic import Arithmetic
+from pentapod.kinematics.arithmetic import Arithmetic, Vector, dot
 from pentapod.planning.limits.limit import LengthLimit, Scene
 from pentapod.planning.limits.tool_pose import ToolPose
 
@@ -27,12 +26,12 @@ class LegPairClearance(LengthLimit):
     def of(cls, scene: Scene) -> list[LegPairClearance]:
         """Return all pairs; each must pass on the side on which it does in the middle of the work volume."""
         machine = scene.machine
-        direction = np.array([0.0, 0.0, float(scene.component.w)])
+        direction = np.array([0.0, 0.0, float(scene.branch.w)])
         position = machine.work.centre - machine.tool_length * direction
-        legs, base = machine.robot.leg_vectors(position, direction), machine.robot.base
+        legs, base = machine.robot.leg_vectors(position, direction), machine.robot.base_joints
         found: list[LegPairClearance] = []
         for j, k in combinations(range(len(legs)), 2):
-            side = float(np.sign(np.dot([*(base[k] - base[j]), 0.0], np.cross(legs[j], legs[k]))))
+            side = float(np.sign(np.dot(base[k] - base[j], np.cross(legs[j], legs[k]))))
             found.append(
                 cls(
                     name=f"legs {j + 1} and {k + 1} touch", comfort=scene.comforts.legs,
@@ -50,23 +49,24 @@ class LegPairClearance(LengthLimit):
 
 
 def signed_leg_clearance(
-    offset: Sequence[Any],
-    d1: Sequence[Any],
-    d2: Sequence[Any],
+    offset: Vector,
+    d1: Vector,
+    d2: Vector,
     side: float,
     xp: Arithmetic,
 ) -> Any:
-    """Return the distance of segments α d1 and offset + β d2, α, β in [0, 1]; offset in the base plane.
+    """Return the distance of segments α d1 and offset + β d2, α, β in [0, 1].
+
+    offset: of three components, or two where it lies in the base plane.
 
     It is negative where one has passed through the other: where the nearest points lie inside both and
     the second runs on the other side of the first than `side`, the sign of offset · (d1 × d2), says.
     The quadratic in (α, β) is minimised on the unit square by clamping α, then β, then α again.
     """
-    ox, oy = offset
     a = d1[0] * d1[0] + d1[1] * d1[1] + d1[2] * d1[2]
     e = d2[0] * d2[0] + d2[1] * d2[1] + d2[2] * d2[2]
     b = d1[0] * d2[0] + d1[1] * d2[1] + d1[2] * d2[2]
-    c, f = -(d1[0] * ox + d1[1] * oy), -(d2[0] * ox + d2[1] * oy)
+    c, f = -_along(offset, d1), -_along(offset, d2)
     area = a * e - b * b + 1e-12 * a * e  # parallel legs: any α will do, the later clamps repair it
 
     def clamp(x: Any) -> Any:
@@ -75,10 +75,16 @@ def signed_leg_clearance(
     alpha = clamp((b * f - c * e) / area)
     beta = clamp((b * alpha + f) / e)
     alpha = clamp((b * beta - c) / a)
-    gx = alpha * d1[0] - beta * d2[0] - ox
-    gy = alpha * d1[1] - beta * d2[1] - oy
-    gz = alpha * d1[2] - beta * d2[2]
-    gap = xp.sqrt(gx * gx + gy * gy + gz * gz + 1e-18)  # the last term keeps the derivative finite at contact
-    triple = ox * (d1[1] * d2[2] - d1[2] * d2[1]) + oy * (d1[2] * d2[0] - d1[0] * d2[2])
+    g = [alpha * d1[k] - beta * d2[k] for k in range(3)]
+    for k, o in enumerate(offset):
+        g[k] = g[k] - o
+    gap = xp.sqrt(dot(g, g) + 1e-18)  # the last term keeps the derivative finite at contact
+    triple = _along(offset, [d1[k - 2] * d2[k - 1] - d1[k - 1] * d2[k - 2] for k in range(len(offset))])
     inside = alpha * (1.0 - alpha) * beta * (1.0 - beta)
     return xp.where(side * triple * inside < 0.0, -gap, gap)
+
+
+def _along(offset: Vector, d: Vector) -> Any:
+    """Return the scalar product of an offset of two or three components with a vector."""
+    planar = offset[0] * d[0] + offset[1] * d[1]
+    return planar if len(offset) == 2 else planar + offset[2] * d[2]

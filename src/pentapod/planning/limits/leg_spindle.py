@@ -21,7 +21,7 @@ class LegSpindleClearance(LengthLimit):
         """Return the gaps of all legs."""
         return [
             cls(name=f"leg {k + 1} touches the spindle", leg=k, comfort=scene.comforts.tool)
-            for k in range(len(scene.machine.legs.max_length))
+            for k in range(scene.machine.robot.n_legs)
         ]
 
     def margin(self, pose: ToolPose) -> Any:

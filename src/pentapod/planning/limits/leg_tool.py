@@ -25,7 +25,7 @@ class LegToolClearance(LengthLimit):
         solids = scene.surroundings.tool
         return [
             cls(name=f"leg {k + 1} touches the {TOOL_BODY}", leg=k, comfort=scene.comforts.tool, solids=solids)
-            for k in range(len(scene.machine.legs.max_length) if solids else 0)
+            for k in range(scene.machine.robot.n_legs if solids else 0)
         ]
 
     def margin(self, pose: ToolPose) -> Any:

@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from pentapod.kinematics.component import Component
+from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.tool_pose import ToolPose
@@ -65,10 +65,10 @@ class Comforts:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What limits are made for: a machine, the component that it works in, and what it must not touch."""
+    """What limits are made for: a machine, the branch that it works in, and what it must not touch."""
 
     machine: Machine
-    component: Component
+    branch: Branch
     surroundings: Surroundings = NOTHING
     comforts: Comforts = Comforts()
 

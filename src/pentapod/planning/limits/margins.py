@@ -1,4 +1,4 @@
-"""Margins: all limits of a machine in one component as dimensionless numbers, positive inside and 0 at the limit.
+"""Margins: all limits of a machine in one branch as dimensionless numbers, positive inside and 0 at the limit.
 
 The margins are scaled so that 1 is comfortable: the smallest of them is what the planner makes large. Each limit is a
 formula for NumPy arrays and casadi expressions alike.
@@ -15,8 +15,8 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ArrayError
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.arithmetic import NUMPY, Arithmetic
-from pentapod.kinematics.component import Component
+from pentapod.kinematics.arithmetic import NUMPY, Arithmetic, Joints
+from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.base_joints import BaseJointCone
@@ -29,7 +29,7 @@ from pentapod.planning.limits.obstacles import ObstacleClearance
 from pentapod.planning.limits.platform_joints import PlatformJointAngle
 from pentapod.planning.limits.singular_surfaces import SurfaceDistance
 from pentapod.planning.limits.strokes import LegStroke
-from pentapod.planning.limits.tool_pose import Joints, ToolPose, WorkpieceContacts
+from pentapod.planning.limits.tool_pose import ToolPose, WorkpieceContacts
 
 LIMITS: tuple[LimitMaker, ...] = (
     LegStroke.of,
@@ -48,7 +48,7 @@ _BLOCK = 16_384
 
 @dataclass(frozen=True, eq=False)
 class Margins:
-    """The margins of one machine in one component.
+    """The margins of one machine in one branch.
 
     Called with tips and tool axes (..., 3) in the machine frame it returns (..., M), M = len(limits): those of the
     machine itself (`own_limits`), and then those to obstacles, which depend on where the workpiece stands.
@@ -62,12 +62,12 @@ class Margins:
     def of(
         cls,
         machine: Machine,
-        component: Component,
+        branch: Branch,
         surroundings: Surroundings = NOTHING,
         kinds: Sequence[LimitMaker] = LIMITS,
     ) -> Margins:
-        """Build the margins of `machine` in `component`. surroundings: what must not be touched."""
-        scene = Scene(machine, component, surroundings)
+        """Build the margins of `machine` in a branch. surroundings: what must not be touched."""
+        scene = Scene(machine, branch, surroundings)
         own = tuple(limit for kind in kinds for limit in kind(scene))
         return cls(scene, own, (*own, *ObstacleClearance.of(scene)))
 
@@ -77,9 +77,9 @@ class Margins:
         return self.scene.machine
 
     @property
-    def component(self) -> Component:
-        """The component."""
-        return self.scene.component
+    def component(self) -> Branch:
+        """The branch in which the machine works."""
+        return self.scene.branch
 
     @property
     def surroundings(self) -> Surroundings:
@@ -105,7 +105,7 @@ class Margins:
             blocks = range(0, len(tips), _BLOCK)
             return np.concatenate([self.own(tips[k : k + _BLOCK], axes[k : k + _BLOCK]) for k in blocks])
         tip, axis = list(np.moveaxis(tips, -1, 0)), list(np.moveaxis(axes, -1, 0))
-        pose = ToolPose(self.machine, tip, axis, NUMPY)
+        pose = ToolPose(self.machine, self.component, tip, axis, NUMPY)
         return np.stack(np.broadcast_arrays(*(limit.margin(pose) for limit in self.own_limits)), axis=-1)
 
     def contacts(self, tips: Floats, axes: Floats, placement: RigidTransform) -> Floats:
@@ -140,12 +140,6 @@ class Margins:
         touching = None
         if self.surroundings.obstacles:
             touching = WorkpieceContacts(turn, ca.vertsplit(shift), ca.vertsplit(numbers))
-        xp = Arithmetic(ca.sqrt, ca.fmin, ca.fmax, ca.if_else)
-        pose = ToolPose(self.machine, ca.vertsplit(tip), ca.vertsplit(axis), xp, joints, touching)
+        tip, axis = ca.vertsplit(tip), ca.vertsplit(axis)
+        pose = ToolPose(self.machine, self.component, tip, axis, Arithmetic.casadi(), joints, touching)
         return ca.vertcat(*(limit.margin(pose) for limit in self.limits))
-
-    @property
-    def joints(self) -> Joints:
-        """Where the joints are: base attachments (5) of two, and platform offsets (5), metres."""
-        robot = self.machine.robot
-        return robot.base.tolist(), robot.offsets.tolist()

@@ -44,7 +44,7 @@ class ObstacleClearance(LengthLimit):
         normal, point, radius = rest[:3], rest[3:6], rest[6]
         tip, axis = pose.tip, pose.axis
         if self.body < len(pose.heights):
-            start, lever = [*pose.bases[self.body], 0.0], pose.machine.tool_length - pose.heights[self.body]
+            start, lever = [*pose.bases[self.body], 0.0][:3], pose.machine.tool_length - pose.heights[self.body]
             x = [start[k] + s * (tip[k] + lever * axis[k] - start[k]) for k in range(3)]
         else:
             x = [tip[k] + s * axis[k] for k in range(3)]

@@ -33,5 +33,5 @@ class LegStroke(LengthLimit):
 
     def margin(self, pose: ToolPose) -> Any:
         """Return the share of half a stroke that is left."""
-        length = pose.lengths[self.leg]
+        length = pose.readings[self.leg]
         return (self.length - length if self.longest else length - self.length) / self.comfort

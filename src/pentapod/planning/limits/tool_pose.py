@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from pentapod.kinematics.arithmetic import Arithmetic
-from pentapod.machine.machine import Machine
+import numpy as np
 
-Joints = tuple[Sequence[Sequence[Any]], Sequence[Any]]
-"""Base attachments (5) of two and platform offsets (5), metres: numbers or expressions."""
+from pentapod.kinematics.arithmetic import Arithmetic, Joints, Vector, dot
+from pentapod.kinematics.robot import Branch, Robot
+from pentapod.machine.machine import Machine
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,55 +30,65 @@ class WorkpieceContacts:
 class ToolPose:
     """Tip and axis (tip → spindle) of the tool, three components each, as NumPy arrays or casadi expressions.
 
-    xp: the functions of this arithmetic. joints: where the joints are, if not where the machine has them. contacts:
-    with the workpiece and other obstacles, where expressions are asked for.
+    branch: in which the machine works. xp: the functions of this arithmetic. joints: where the joints are, if not where
+    the machine has them. contacts: with the workpiece and other obstacles, where expressions are asked for.
     """
 
     machine: Machine
-    tip: Sequence[Any]
-    axis: Sequence[Any]
+    branch: Branch
+    tip: Vector
+    axis: Vector
     xp: Arithmetic
     joints: Joints | None = None
     contacts: WorkpieceContacts | None = None
 
     @cached_property
-    def position(self) -> list[Any]:
+    def position(self) -> Vector:
         """The platform line's origin p."""
         return [self.tip[k] + self.machine.tool_length * self.axis[k] for k in range(3)]
 
     @cached_property
-    def direction(self) -> list[Any]:
+    def direction(self) -> Vector:
         """The platform line's direction i, to the tip."""
         return [-self.axis[0], -self.axis[1], -self.axis[2]]
 
     @cached_property
-    def bases(self) -> Sequence[Sequence[Any]]:
-        """The base joints (n) of two or three components."""
-        return self.machine.robot.base.tolist() if self.joints is None else self.joints[0]
+    def bases(self) -> Sequence[Vector]:
+        """The base joints (n_legs): two coordinates each where all lie in the base plane."""
+        return joints_of(self.machine.robot)[0] if self.joints is None else self.joints[0]
 
     @cached_property
     def heights(self) -> Sequence[Any]:
-        """The platform joints' places (n) along the line."""
-        return self.machine.robot.offsets.tolist() if self.joints is None else self.joints[1]
+        """The heights (n_legs) of the platform joints along the line."""
+        return joints_of(self.machine.robot)[1] if self.joints is None else self.joints[1]
 
     @cached_property
-    def vectors(self) -> list[list[Any]]:
-        """The legs (n) from base joint to platform joint, three components each."""
-        p, (u, v, w) = self.position, self.direction
-        both = zip(self.bases, self.heights, strict=True)
-        return [[p[0] + z * u - x, p[1] + z * v - y, p[2] + z * w] for (x, y), z in both]
+    def vectors(self) -> list[Vector]:
+        """The legs (n_legs) from base joint to platform joint."""
+        return self.machine.robot.vectors_of(self.position, self.direction, self.xp, self.joints)
+
+    @cached_property
+    def readings(self) -> list[Any]:
+        """The leg lengths (n_legs) as the controller reads them, metres."""
+        return self.machine.robot.lengths_of(self.vectors, self.xp)
 
     @cached_property
     def lengths(self) -> list[Any]:
-        """The distances (n) of the joints of each leg, metres."""
+        """The distances (n_legs) between the joints of each leg, metres."""
         return [self.xp.sqrt(dot(d, d)) for d in self.vectors]
 
     @cached_property
     def cosines(self) -> list[Any]:
-        """The cosines (n) of the angles between legs and tool axis, at the platform joints."""
+        """The cosines (n_legs) of the angles between legs and line, at the platform joints."""
         return [dot(d, self.direction) / length for d, length in zip(self.vectors, self.lengths, strict=True)]
 
+    @cached_property
+    def singularity_margins(self) -> list[Any]:
+        """The distances from the robot's singular surfaces, positive on the branch's side."""
+        return self.machine.robot.singularity_margins(self.position, self.direction, self.branch, self.xp)
 
-def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
-    """Return the scalar product of three components each."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+def joints_of(robot: Robot) -> Joints:
+    """Return where a robot's joints are; without their z where the base joints lie in the base plane."""
+    base = robot.base_joints
+    return (base if np.any(base[:, 2]) else base[:, :2]).tolist(), robot.line_heights.tolist()

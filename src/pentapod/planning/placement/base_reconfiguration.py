@@ -15,7 +15,7 @@ from scipy.linalg import block_diag
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import MachineError
 from pentapod.base.progress import Progress, silent
-from pentapod.kinematics.component import COMPONENTS, Component
+from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.margins import Margins
@@ -41,7 +41,7 @@ _DIGITS = 6  # guides are set to the micrometre, so that people can read them an
 
 def reconfigured(
     problem: PlacementProblem,
-    component: Component | None = None,
+    component: Branch | None = None,
     surroundings: Surroundings = NOTHING,
     *,
     seed: int = 0,
@@ -89,10 +89,10 @@ def at_slides(problem: PlacementProblem, slides: Floats) -> PlacementProblem | N
 
 
 def _promising(
-    problem: PlacementProblem, component: Component | None, surroundings: Surroundings, seed: int, progress: Progress
+    problem: PlacementProblem, component: Branch | None, surroundings: Surroundings, seed: int, progress: Progress
 ) -> PlacementProblem:
     """Return the problem whose guides let first guesses of the placement come out best."""
-    components = COMPONENTS if component is None else (component,)
+    components = problem.machine.robot.branches if component is None else (component,)
     scores: list[tuple[float, PlacementProblem]] = []
     for k, slides in enumerate([problem.machine.slides, *_spread(problem.machine, seed)]):
         progress("placement", k / SPREAD, "guides")
@@ -102,9 +102,7 @@ def _promising(
     return max(scores, key=lambda pair: pair[0])[1] if scores else problem
 
 
-def _promise(
-    problem: PlacementProblem, components: tuple[Component, ...], surroundings: Surroundings, seed: int
-) -> float:
+def _promise(problem: PlacementProblem, components: tuple[Branch, ...], surroundings: Surroundings, seed: int) -> float:
     samples, machine, constraints = problem.samples, problem.machine, problem.constraints
     if constraints.moves:
         guesses = first_guesses(

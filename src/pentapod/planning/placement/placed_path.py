@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.refusal import Refusal
 from pentapod.base.values import Result
-from pentapod.kinematics.component import Component
+from pentapod.kinematics.robot import Branch
 from pentapod.planning.limits.limit import Limit
 from pentapod.planning.placement.placement import Placement
 from pentapod.toolpath.toolpath import Toolpath
@@ -23,7 +23,7 @@ class PlacedPath(Result):
 
     toolpath: Toolpath
     placement: Placement
-    component: Component
+    component: Branch
     tips: Floats
     axes: Floats
     margins: Floats

@@ -9,7 +9,7 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.component import Component
+from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.margins import Margins
@@ -34,14 +34,14 @@ class Guess:
     """A placement, the component, and the smallest margin over the representatives."""
 
     transform: RigidTransform
-    component: Component
+    component: Branch
     margin: float
 
 
 def first_guesses(
     samples: ToolpathSamples,
     machine: Machine,
-    components: tuple[Component, ...],
+    components: tuple[Branch, ...],
     seed: int,
     tries: int = SAMPLES,
     constraints: PlacementConstraints = FREE,
@@ -172,7 +172,7 @@ def _rotations(mean_axis: Floats, side: float, count: int, rng: np.random.Genera
 
 def _places(machine: Machine, count: int, rng: np.random.Generator) -> Floats:
     """Return places (count, 3) for the path's centre: a third near the advertised work, the rest anywhere in reach."""
-    base, reach = machine.robot.base, float(machine.legs.max_length.max()) + abs(machine.tool_length)
+    base, reach = machine.robot.base_joints[:, :2], float(machine.legs.max_length.max()) + abs(machine.tool_length)
     low, high = base.min(axis=0), base.max(axis=0)
     side = np.sign(machine.joints.base_axes[:, 2].sum()) or 1.0
     wide = np.column_stack([rng.uniform(low, high, (count, 2)), side * rng.uniform(0.1, 1.0, count) * reach])

@@ -11,7 +11,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.progress import Progress, silent
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.component import COMPONENTS, Component
+from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.ipopt import IpoptSolver
@@ -83,7 +83,7 @@ class Search:
 
 def search(
     problem: PlacementProblem,
-    component: Component | None = None,
+    component: Branch | None = None,
     surroundings: Surroundings = NOTHING,
     *,
     seed: int = 0,
@@ -129,11 +129,11 @@ def _is_decided(best: Candidate) -> bool:
 
 
 def _starts(
-    problem: PlacementProblem, component: Component | None, surroundings: Surroundings, seed: int, progress: Progress
+    problem: PlacementProblem, component: Branch | None, surroundings: Surroundings, seed: int, progress: Progress
 ) -> tuple[list[Start], float]:
     """Return where to start, and the smallest margin of the most promising guess (∞ where nothing is guessed)."""
     components, machine, constraints = (
-        COMPONENTS if component is None else (component,),
+        problem.machine.robot.branches if component is None else (component,),
         problem.machine,
         problem.constraints,
     )

@@ -107,7 +107,7 @@ class LeastTime:
         return np.array([times.sum()]), slope[None]
 
     def _times(self, at: Candidate) -> tuple[Floats, Floats]:
-        """Return the least time of each interval, (N − 1,), and the derivative of their sum by legs and tip (N, 8)."""
+        """Return the least time (N − 1,) of each interval, and the slope of their sum by legs and tip (N, n + 3)."""
         problem, machine = self.problem, self.problem.machine
         tips, axes = problem.samples.machine_poses(at.transform, problem.axes(at.coefficients))
         steps = np.diff(machine.robot.leg_lengths(tips + machine.tool_length * axes, -axes), axis=0)
@@ -118,10 +118,11 @@ class LeastTime:
         way = np.linalg.norm(chords, axis=1)
         by_feed, slowest = way / self.feeds, by_leg[index, leg]
         held = slowest > by_feed
-        by_step = np.zeros((len(chords), 8))
+        n_legs = machine.robot.n_legs
+        by_step = np.zeros((len(chords), n_legs + 3))
         by_step[index, leg] = np.where(held, np.sign(steps[index, leg]) / machine.legs.max_velocity[leg], 0.0)
-        by_step[:, 5:] = np.where(held[:, None], 0.0, chords / (np.maximum(way, 1e-12) * self.feeds)[:, None])
-        weights = np.zeros((len(tips), 8))
+        by_step[:, n_legs:] = np.where(held[:, None], 0.0, chords / (np.maximum(way, 1e-12) * self.feeds)[:, None])
+        weights = np.zeros((len(tips), n_legs + 3))
         weights[:-1] -= by_step
         weights[1:] += by_step
         return np.maximum(slowest, by_feed), weights

@@ -15,9 +15,10 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.arithmetic import Arithmetic, Joints
 from pentapod.numerics.casadi_vectorised import Vectorised
 from pentapod.planning.limits.margins import Margins
-from pentapod.planning.limits.tool_pose import Joints
+from pentapod.planning.limits.tool_pose import joints_of
 from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.weights import weighed
@@ -52,12 +53,12 @@ def point_function(problem: PlacementProblem, margins: Margins, kinds: Sequence[
 def guide_function(problem: PlacementProblem, margins: Margins) -> Any:
     """Return the casadi function of one waypoint with the guides free: all margins, and their derivatives M × 13.
 
-    Of slides 5 from where the guides of the margins' machine stand, and then as `point_function`; the derivatives are
+    Of the slides from where the guides of the margins' machine stand, and then as `point_function`; the derivatives are
     by (step, slides, a).
     """
     import casadi as ca  # noqa: PLC0415
 
-    slides = ca.SX.sym("slides", 5)
+    slides = ca.SX.sym("slides", len(problem.machine.slides))
     inputs, values, _ = _point(problem, margins, range(len(margins.limits)), slides)
     slopes = ca.densify(ca.jacobian(values, ca.vertcat(inputs[0], slides, inputs[1])))
     return ca.Function("guides", [slides, *inputs], [values, slopes], {"cse": True})
@@ -95,9 +96,9 @@ def _pose(problem: PlacementProblem) -> tuple[list[Any], tuple[Any, Any, Any, An
 
 
 def leg_function(problem: PlacementProblem, margins: Margins, *, slopes: bool = False) -> Any:
-    """Return the casadi function of one waypoint: its leg lengths 5, metres, for the machine of the margins.
+    """Return the casadi function of one waypoint: its leg readings n, metres, for the machine of the margins.
 
-    Of a, pivot, nominal, pair, R, t as in `point_function`. slopes: also return their derivatives by a, 5 × 2.
+    Of a, pivot, nominal, pair, R, t as in `point_function`. slopes: also return their derivatives by a, n × 2.
     """
     return _once(margins, ("legs", slopes), problem, lambda: _legs(problem, margins, slopes))
 
@@ -106,11 +107,12 @@ def _legs(problem: PlacementProblem, margins: Margins, slopes: bool) -> Any:
     import casadi as ca  # noqa: PLC0415
 
     (step, a, *given), (tip, turned, _, _) = _pose(problem)
-    bases, offsets = margins.joints
-    reach = [margins.machine.tool_length - z for z in offsets]
-    legs = ca.vertcat(*[
-        ca.norm_2(tip + far * turned - ca.vertcat(x, y, 0.0)) for far, (x, y) in zip(reach, bases, strict=True)
-    ])  # fmt: skip
+    robot, do = margins.machine.robot, Arithmetic.casadi()
+    bases, heights = joints_of(robot)
+    # Heights from the tip along the tool axis, not from p along the platform line.
+    joints = bases, [margins.machine.tool_length - z for z in heights]
+    vectors = robot.vectors_of(ca.vertsplit(tip), ca.vertsplit(turned), do, joints)
+    legs = ca.vertcat(*robot.lengths_of(vectors, do))
     wanted = [legs, ca.jacobian(legs, a)] if slopes else [legs]
     here = ca.substitute(wanted, [step], [ca.SX.zeros(6)])
     return ca.Function("legs", [a, *given], [ca.densify(each) for each in here], {"cse": True})
@@ -125,12 +127,11 @@ def _once(margins: Margins, name: tuple[Any, ...], problem: PlacementProblem, ma
 
 
 def _slid(problem: PlacementProblem, margins: Margins, slides: Any) -> Joints:
-    """Return the joints with the guides moved on by slides; a platform joint moves with its guide's part along x."""
-    (bases, offsets), guides = margins.joints, problem.machine.guides
-    ways = np.zeros((5, 2)) if guides is None else guides.guides
-    moved = [[x + slides[k] * ways[k, 0], y + slides[k] * ways[k, 1]] for k, (x, y) in enumerate(bases)]
-    delta = problem.machine.robot.delta
-    return moved, [z + delta * slides[k] * ways[k, 0] for k, z in enumerate(offsets)]
+    """Return the joints with the guides moved on by slides."""
+    import casadi as ca  # noqa: PLC0415
+
+    guides, joints = problem.machine.guides, joints_of(margins.machine.robot)
+    return joints if guides is None else guides.moved(joints, ca.vertsplit(slides))
 
 
 def curvature_function(problem: PlacementProblem, margins: Margins, *, guides: bool = False) -> Any:
@@ -145,7 +146,7 @@ def curvature_function(problem: PlacementProblem, margins: Margins, *, guides: b
 def _curvature(problem: PlacementProblem, margins: Margins, guides: bool) -> Any:
     import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
-    slides, weights = ca.SX.sym("slides", 5), ca.SX.sym("weights", len(margins.limits))
+    slides, weights = ca.SX.sym("slides", len(problem.machine.slides)), ca.SX.sym("weights", len(margins.limits))
     inputs, values, _ = _point(problem, margins, range(len(margins.limits)), slides if guides else None)
     free = [slides] if guides else []
     bent, _ = ca.hessian(ca.dot(weights, values), ca.vertcat(inputs[0], *free, inputs[1]))

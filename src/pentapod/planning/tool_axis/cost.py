@@ -136,7 +136,7 @@ class AxisCost:
         return self.nominal_rates + self.spline.cone * differences(self.rate, self.basis @ c)
 
     def bends(self, c: Floats) -> Floats:
-        """Return the leg lengths' second derivatives (n − 2, 5) by the way, 1/m."""
+        """Return the leg lengths' second derivatives (n − 2, n_legs) by the way, 1/m."""
         return differences(self.bend, self._legs(c)[0])
 
     def excess(self, c: Floats, *others: Floats) -> SoftRows:
@@ -178,11 +178,11 @@ class AxisCost:
         return windows, 2 * start, room + here, charge.price[near]
 
     def _legs(self, c: Floats) -> tuple[Floats, Floats]:
-        """Return leg lengths (n, 5) at the nodes and their derivatives (n, 5, 2) by the lean."""
+        """Return leg lengths (n, n_legs) at the nodes and their derivatives (n, n_legs, 2) by the lean."""
         legs, slopes = self.legs(self.spline.cone * (self.basis @ c).T, *self.given)
-        return legs.T, slopes.reshape(2, 5, -1).transpose(2, 1, 0)
+        return legs.T, slopes.reshape(2, len(legs), -1).transpose(2, 1, 0)
 
 
 def _both_ways(values: Floats) -> Floats:
-    """Return values (n, 5, ...) of the legs, and those of the opposite sign after them."""
+    """Return values (n, n_legs, ...) of the legs, and those of the opposite sign after them."""
     return np.concatenate([values, -values], axis=1)
