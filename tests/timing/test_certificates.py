@@ -10,6 +10,8 @@ from timing_paths import Path, Piece, by_tip, line, machine, nodding, raster, st
 
 from pentapod.machine.tool_limits import ToolLimits
 from pentapod.timing import LimitUse, Trajectory, certify, retime
+from pentapod.timing.limits.leg_jerk import LegJerk
+from pentapod.timing.limits.leg_velocity import LegVelocity
 from pentapod.toolpath.toolpath import SegmentKind
 
 
@@ -29,10 +31,10 @@ def shares(uses):
 
 
 def test_a_jerk_beyond_its_limit_says_why():
-    use = LimitUse("leg jerk", 207.4, 200.0, "m/s³", 4, 8.387, 0.2, 7)
+    use = LimitUse("leg jerk", 207.4, 200.0, "m/s³", 4, 8.387, 0.2, 7, LegJerk.above)
     assert str(use).startswith("leg jerk 103.70 % (leg 4: 207.4 of 200 m/s³) at 8.387 s, segment 7: the spline")
     assert str(replace(use, value=199.0)).endswith("segment 7")
-    assert str(replace(use, quantity="leg velocity")).endswith("segment 7")
+    assert str(replace(use, quantity="leg velocity", above=LegVelocity.above)).endswith("segment 7")
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])

@@ -21,8 +21,8 @@ from timing_paths import (
 
 from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal
-from pentapod.timing import CONSTRAINTS, Trajectory, retime
-from pentapod.timing.limits.constraints import Limits
+from pentapod.timing import Trajectory, retime
+from pentapod.timing.limits.limits import Limits
 from pentapod.timing.pieces.grid import first_grid
 from pentapod.toolpath.toolpath import SegmentKind
 
@@ -294,7 +294,8 @@ def test_stops_are_exact_and_fall_on_setpoints():
 def test_profile_is_ordered_and_named():
     trajectory = timed(Path((raster(feed=0.3),)), machine())
     p = trajectory.profile
-    assert p.constraint_names == CONSTRAINTS
+    legs = tuple(f"leg {k} {what}" for what in ("velocity", "acceleration", "jerk") for k in range(1, 6))
+    assert p.constraint_names == (*legs, "feed", "rapid rate")
     assert len(p.times) == len(p.stations) == len(p.speeds) == len(p.active) == len(p.shares)
     assert (np.diff(p.times) > 0).all()
     assert (np.diff(p.stations) > 0).all()

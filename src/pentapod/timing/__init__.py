@@ -2,24 +2,29 @@
 
 from pentapod.timing.certificates import LimitUse, certify
 from pentapod.timing.explain import Cause, CostlyPlace, Explanation, explain
-from pentapod.timing.law.paths import LegPathLike, PieceLike
 from pentapod.timing.law.slowed import Slowed
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.law.trajectory import Profile, Trajectory
-from pentapod.timing.limits.constraints import CONSTRAINTS
+from pentapod.timing.limits.limit import AccelerationRows, Limit
+from pentapod.timing.limits.limits import LIMITS
 from pentapod.timing.online.override import override
+from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.paths import LegPathLike, PieceLike
 from pentapod.timing.process import Unheld, unheld
 from pentapod.timing.retime import retime
 from pentapod.timing.waypoints import WaypointMotion, through_waypoints
 
 __all__ = [
-    "CONSTRAINTS",
+    "LIMITS",
+    "AccelerationRows",
     "Cause",
     "CostlyPlace",
     "Explanation",
     "LegPathLike",
+    "Limit",
     "LimitUse",
     "MotionLaw",
+    "PathDerivatives",
     "PieceLike",
     "Profile",
     "Slowed",

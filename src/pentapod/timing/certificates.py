@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
-from pentapod.geometry.interpolant import Interpolant, largest_length
+from pentapod.geometry.interpolant import largest_length
 from pentapod.machine.machine import Machine
 from pentapod.timing.law.trajectory import Trajectory
+from pentapod.timing.limits.feed import Feed
+from pentapod.timing.limits.limit import Limit, Reading
+from pentapod.timing.limits.limits import machine_limits
+from pentapod.timing.path.joined import Joined, Rows
 from pentapod.timing.pieces.spline_padding import spline_padding
 
 
@@ -19,8 +22,8 @@ from pentapod.timing.pieces.spline_padding import spline_padding
 class LimitUse(Value):
     """The largest share of one limit. quantity: "leg velocity", ...; value and bound in `unit` (SI).
 
-    leg: 1 to 5 where the limit is a leg's. time: seconds, of the row at or after which the share is reached; segment:
-    the toolpath's segment there; station: global s in metres.
+    leg: from 1, where the limit is a leg's. time: seconds, of the row at or after which the share is reached; segment:
+    the toolpath's segment there; station: global s in metres. above: why the value may be above the bound by little.
     """
 
     quantity: str
@@ -31,6 +34,7 @@ class LimitUse(Value):
     time: float
     station: float
     segment: int
+    above: str = ""
 
     @property
     def share(self) -> float:
@@ -39,8 +43,7 @@ class LimitUse(Value):
 
     def __str__(self) -> str:
         whose = f"leg {self.leg}: " if self.leg else ""
-        over = self.share > 1.0 and self.quantity.endswith("jerk")
-        why = ": the spline through the setpoints overshoots where the law's jerk steps" if over else ""
+        why = f": {self.above}" if self.above and self.share > 1.0 else ""
         return (
             f"{self.quantity} {100.0 * self.share:.2f} % ({whose}{self.value:.4g} of {self.bound:.4g} {self.unit}) "
             f"at {self.time:.3f} s, segment {self.segment}{why}"
@@ -56,10 +59,10 @@ def certify(
     axes: Floats | None = None,
     spot: float = 0.0,
 ) -> tuple[LimitUse, ...]:
-    """Return the largest share of leg velocity, acceleration and jerk, of feed, and of the tool's limits where set.
+    """Return the largest share of every limit of the machine and of those added to it, as far as it is set.
 
-    Of the setpoints as the controller joins them: every polynomial's exact extrema, no samples between. legs (N, 5) m,
-    tips (N, 3) m and axes (N, 3): the program's rows, at the controller's period; without them the trajectory is
+    Of the setpoints as the controller joins them: every polynomial's exact extrema, no samples between. legs (N, legs)
+    m, tips (N, 3) m and axes (N, 3): the program's rows, at the controller's period; without them the trajectory is
     sampled, and for the feed its station stands for the tip, which is never faster. spot: metres from the given tips
     along the given axes to where a tool with a stand-off meets the surface, whose speed the feed is; rapids are judged
     by the tip. Jerk counts the step of acceleration at either end over one period. An interval that two sections share
@@ -69,91 +72,71 @@ def certify(
     count = max(1, round(trajectory.duration / period)) if legs is None else len(legs) - 1
     times = np.minimum(np.arange(count + 1) * period, trajectory.duration)
     stations, segments = trajectory.station(times), trajectory.segment(times)
+    limits, given = (*machine_limits(machine), *trajectory.limits), tips
+    tool = tips is not None or any(limit.of_tool for limit in limits)
+    if tool and (tips is None or axes is None):
+        posed = trajectory.pose(times)
+        tips, axes = posed[0] if tips is None else tips, posed[1] if axes is None else axes
     # A motion that starts or ends at a speed is part of a longer one, which the controller's spline goes through.
-    limits = machine.tool_limits.given()
-    before, after = _spline_paddings(trajectory, period, tool=tips is not None or bool(limits))
-
-    def joined(rows: Floats, columns: slice) -> Interpolant:
-        parts = [y[:, columns] for y in (before,) if len(y)] + [rows] + [y[:, columns] for y in (after,) if len(y)]
-        return Interpolant.through(np.concatenate(parts), period, interpolation)
-
-    def own(values: Floats) -> Floats:
-        return values[len(before) : len(values) - len(after)]
-
-    motion = joined(trajectory(times) if legs is None else legs, slice(5))
-    tip = joined(stations[:, None], slice(5, 6)) if tips is None else joined(tips, slice(6, 9))
-
-    def use(quantity: str, unit: str, value: float, bound: float, row: int, leg: int | None = None) -> LimitUse:
-        where = (float(times[row]), float(stations[row]), int(segments[row]))
-        return LimitUse(quantity, value, bound, unit, leg, *where)
-
-    def of_legs(quantity: str, unit: str, values: Floats, limit: Floats) -> LimitUse:
-        row, leg = np.unravel_index(int(np.argmax(values / limit)), values.shape)
-        return use(quantity, unit, float(values[row, leg]), float(limit[leg]), int(row), int(leg) + 1)
-
-    uses = [
-        of_legs("leg velocity", "m/s", own(motion.rates), machine.legs.max_velocity),
-        of_legs("leg acceleration", "m/s²", own(motion.accelerations), machine.legs.max_acceleration),
-        of_legs("leg jerk", "m/s³", own(motion.jerks), machine.legs.max_jerk),
-    ]
-    feeds = _slower(trajectory.feeds(times), machine.rapid_velocity)
-    steps = own(tip.steps)
-    if tips is None:
-        rates = trajectory.feed_rates(times)
-        steps = steps * np.maximum(rates[:-1], rates[1:])[:, None, None]
-    elif axes is not None and spot != 0.0:
-        on_feed = np.isfinite(trajectory.feeds(times))
-        of_spot = own(tip.steps + spot * joined(axes, slice(9, 12)).steps)
-        steps = np.where((on_feed[:-1] | on_feed[1:])[:, None, None], of_spot, steps)
-    share, row = largest_length(steps / feeds[:, None, None])
-    uses.append(use("feed", "m/s", share * float(feeds[row]), float(feeds[row]), row))
-    if limits:
-        posed = trajectory.pose(times) if tips is None or axes is None else (tips, axes)
-        for name, unit, values in _of_tool(joined(posed[0], slice(6, 9)), joined(posed[1], slice(9, 12)), own):
-            if name in limits:
-                row = int(np.argmax(values))
-                uses.append(use(_TOOL[name], unit, float(values[row]), limits[name], row))
+    before, after = _paddings(trajectory, period, tool=tool)
+    rows = Rows(trajectory(times) if legs is None else legs, stations, tips, axes)
+    rows = Rows.concatenated([part for part in (before, rows, after) if part is not None])
+    first = 0 if before is None else len(before)
+    joined = Joined(rows, trajectory.path.pieces[trajectory.indices[0]], period, interpolation, first, count)
+    uses: list[LimitUse] = []
+    for limit in limits:
+        if isinstance(limit, Feed):
+            found = _feed(trajectory, machine, joined, times, spot, of_tip=given is not None)
+        else:
+            added = any(limit is one for one in trajectory.limits)
+            found = _piecewise(limit, trajectory, joined) if added else limit.largest(joined)
+        if found is not None:
+            leg = found.index + 1 if limit.of_legs else None
+            where = (float(times[found.row]), float(stations[found.row]), int(segments[found.row]))
+            uses.append(LimitUse(limit.quantity, found.value, found.bound, limit.unit, leg, *where, limit.above))
     return tuple(uses)
 
 
-def _slower(feeds: Floats, rapid: float) -> Floats:
-    """Return for each interval (N − 1,) the slower of the feeds (N,) at its ends; infinite ones are rapids."""
-    speeds = np.where(np.isfinite(feeds), feeds, rapid)
-    return np.minimum(speeds[:-1], speeds[1:])
-
-
-_TOOL = {
-    "max_tip_acceleration": "tip acceleration",
-    "max_tip_jerk": "tip jerk",
-    "max_axis_velocity": "axis velocity",
-    "max_axis_acceleration": "axis acceleration",
-}
-
-
-def _spline_paddings(trajectory: Trajectory, period: float, *, tool: bool) -> tuple[Floats, Floats]:
-    """Return the rows (n, 6 or 12) before the start and after the end, none where these are rests."""
-    pieces = [trajectory.path.pieces[k] for k in (trajectory.indices[0], trajectory.indices[-1])]
-    speeds = trajectory.laws[0].speeds[0], trajectory.laws[-1].speeds[-1]
-    none = np.zeros((0, 12))
-    before = spline_padding(pieces[0], speeds[0], period, start=True, tool=tool)[:-1] if speeds[0] > 0.0 else none
-    after = spline_padding(pieces[1], speeds[1], period, start=False, tool=tool)[1:] if speeds[1] > 0.0 else none
+def _paddings(trajectory: Trajectory, period: float, *, tool: bool) -> tuple[Rows | None, Rows | None]:
+    """Return the rows before the start and after the end, None where these are rests."""
+    first, last = (trajectory.path.pieces[k] for k in (trajectory.indices[0], trajectory.indices[-1]))
+    start, end = trajectory.laws[0].speeds[0], trajectory.laws[-1].speeds[-1]
+    before = spline_padding(first, start, period, start=True, tool=tool)[:-1] if start > 0.0 else None
+    after = spline_padding(last, end, period, start=False, tool=tool)[1:] if end > 0.0 else None
     return before, after
 
 
-def _of_tool(
-    tip: Interpolant, axis: Interpolant, own: Callable[[Floats], Floats]
-) -> tuple[tuple[str, str, Floats], ...]:
-    """Return name, unit and values (N or N − 1,) of what may be limited in the motion of tips and axes.
+def _feed(
+    trajectory: Trajectory, machine: Machine, joined: Joined, times: Floats, spot: float, *, of_tip: bool
+) -> Reading:
+    """Return the largest share of the feed, or of the rapid rate on rapids."""
+    feeds, own = trajectory.feeds(times), joined.own_intervals
+    speeds = np.where(np.isfinite(feeds), feeds, machine.rapid_velocity)
+    slower = np.minimum(speeds[:-1], speeds[1:])
+    if not of_tip:
+        rates = trajectory.feed_rates(times)
+        steps = joined.station.steps[own] * np.maximum(rates[:-1], rates[1:])[:, None, None]
+    else:
+        steps = joined.tip.steps[own]
+        if spot != 0.0:
+            on_feed = np.isfinite(feeds)
+            of_spot = steps + spot * joined.axis.steps[own]
+            steps = np.where((on_feed[:-1] | on_feed[1:])[:, None, None], of_spot, steps)
+    share, row = largest_length(steps / slower[:, None, None])
+    return Reading(share * float(slower[row]), float(slower[row]), row, 0)
 
-    own: takes the values of the padding away.
-    """
-    steps = own(axis.steps)
-    fastest, row = largest_length(steps)
-    speeds = np.zeros(len(steps))
-    speeds[row] = fastest
-    return (
-        ("max_tip_acceleration", "m/s²", own(np.linalg.norm(tip.second, axis=1))),
-        ("max_tip_jerk", "m/s³", own(tip.jerk_lengths)),
-        ("max_axis_velocity", "rad/s", speeds),
-        ("max_axis_acceleration", "rad/s²", own(axis.turn_accelerations)),
-    )
+
+def _piecewise(limit: Limit, trajectory: Trajectory, joined: Joined) -> Reading | None:
+    """Return the largest share of a limit that asks for the path, piece by piece."""
+    found: list[Reading] = []
+    starts = np.minimum(np.rint(trajectory.starts / joined.period).astype(int), joined.count)
+    starts[0] = 0
+    for index, low, high in zip(trajectory.indices, starts[:-1].tolist(), starts[1:].tolist(), strict=True):
+        piece, rows = trajectory.path.pieces[index], joined.rows.shifted(-float(trajectory.path.starts[index]))
+        own = rows.stations[joined.first + low : joined.first + high + 1]
+        np.clip(own, 0.0, piece.length, out=own)
+        part = replace(joined, rows=rows, piece=piece, first=joined.first + low, count=high - low)
+        reading = limit.largest(part)
+        if reading is not None:
+            found.append(replace(reading, row=reading.row + low))
+    return max(found, key=lambda reading: reading.value / reading.bound, default=None)

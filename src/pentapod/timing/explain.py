@@ -13,6 +13,7 @@ from pentapod.machine.machine import Machine
 from pentapod.timing.certificates import LimitUse
 from pentapod.timing.law.slowed import Slowed
 from pentapod.timing.law.trajectory import Trajectory
+from pentapod.timing.limits.limit import Constraint
 from pentapod.timing.process import Unheld
 
 STANDING = "standing still"
@@ -41,7 +42,7 @@ class CostlyPlace(Value):
     """A stretch of the path where one cause costs time.
 
     cost in seconds; segments: first and last of the toolpath; stations: from and to, global s in metres; time: when it
-    costs most, seconds.
+    costs most, seconds; subject: how a sentence calls the cause.
     """
 
     cause: str
@@ -49,12 +50,13 @@ class CostlyPlace(Value):
     segments: tuple[int, int]
     stations: tuple[float, float]
     time: float
+    subject: str
 
     def __str__(self) -> str:
         (a, b), (low, high) = self.segments, (1e3 * s for s in self.stations)
         where = f"segment {a}" if a == b else f"segments {a}–{b}"
         most = f"{low:.1f} to {high:.1f} mm along the path, most at {self.time:.2f} s"
-        return f"{_possessive(self.cause)} costs {self.cost:.3g} s in {where} ({most})"
+        return f"{self.subject} costs {self.cost:.3g} s in {where} ({most})"
 
 
 @dataclass(frozen=True)
@@ -121,17 +123,17 @@ def explain(
     taken, steps = np.diff(profile.times), np.diff(profile.stations)
     least, segments = _least_times(trajectory, machine, steps)
     cost = taken - least
-    names = (*profile.constraint_names, STANDING)
+    told = (*profile.constraints, Constraint(STANDING, STANDING))
     # A stage belongs by halves to the constraints of its two ends; what stands still belongs to neither.
-    ends = np.where(steps > 0.0, np.stack([profile.active[:-1], profile.active[1:]]), len(names) - 1)
-    times, costs = (np.bincount(ends.ravel(), np.tile(0.5 * y, 2), len(names)) for y in (taken, cost))
+    ends = np.where(steps > 0.0, np.stack([profile.active[:-1], profile.active[1:]]), len(told) - 1)
+    times, costs = (np.bincount(ends.ravel(), np.tile(0.5 * y, 2), len(told)) for y in (taken, cost))
     causes = [
-        Cause(name, float(time), float(lost)) for name, time, lost in zip(names, times, costs, strict=True) if time
+        Cause(one.name, float(time), float(lost)) for one, time, lost in zip(told, times, costs, strict=True) if time
     ]
     places: list[CostlyPlace] = []
     for k in np.flatnonzero(times):
         share = 0.5 * ((ends[0] == k).astype(float) + (ends[1] == k)) * cost
-        places += _places(names[k], share, segments, profile.times, profile.stations, _WORTH * float(cost.sum()))
+        places += _places(told[k], share, segments, profile.times, profile.stations, _WORTH * float(cost.sum()))
     return Explanation(
         float(profile.times[-1]),
         float(least.sum()),
@@ -162,7 +164,7 @@ def _least_times(trajectory: Trajectory, machine: Machine, steps: Floats) -> tup
 
 
 def _places(
-    cause: str, cost: Floats, segments: Ints, times: Floats, stations: Floats, worth: float
+    cause: Constraint, cost: Floats, segments: Ints, times: Floats, stations: Floats, worth: float
 ) -> list[CostlyPlace]:
     """Return the runs of stages, near to each other along the path, in which a cause costs at least `worth` s."""
     rows = np.flatnonzero(cost > 0.0)
@@ -176,11 +178,5 @@ def _places(
         if total > worth:
             reach = (float(stations[run[0]]), float(stations[run[-1] + 1]))
             within = (int(segments[run[0]]), int(segments[run[-1]]))
-            places.append(CostlyPlace(cause, total, within, reach, float(times[worst])))
+            places.append(CostlyPlace(cause.name, total, within, reach, float(times[worst]), cause.subject))
     return places
-
-
-def _possessive(cause: str) -> str:
-    """Return "leg 2's acceleration" for "leg 2 acceleration"; other names as they are."""
-    words = cause.split(" ")
-    return f"leg {words[1]}'s {' '.join(words[2:])}" if words[0] == "leg" and len(words) > 2 else cause

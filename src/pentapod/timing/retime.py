@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pentapod.base.arrays import Floats
@@ -9,12 +11,13 @@ from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal
 from pentapod.machine.machine import Machine
-from pentapod.timing.law.paths import LegPathLike
 from pentapod.timing.law.refusals import STILL_M, refusal, unfit
 from pentapod.timing.law.slowed import slowed
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.law.trajectory import Profile, Trajectory
-from pentapod.timing.limits.constraints import CONSTRAINTS, Limits
+from pentapod.timing.limits.limit import Limit
+from pentapod.timing.limits.limits import Limits
+from pentapod.timing.path.paths import LegPathLike
 from pentapod.timing.pieces.boundary_speeds import whole_periods
 from pentapod.timing.pieces.piece import PieceProfile, time_piece
 from pentapod.timing.pieces.sampled import WINDOW_PERIODS, Unmended, sampled_laws
@@ -33,6 +36,7 @@ def retime(
     limit_jerk: bool = True,
     start_speed: float = 0.0,
     end_speed: float = 0.0,
+    limits: Sequence[Limit] = (),
 ) -> Trajectory | Refusal:
     """Return the fastest trajectory along a path, or the named cause why there is none.
 
@@ -50,6 +54,9 @@ def retime(
     limit_jerk there is no acceleration there. They must be below what the limits less the margins leave; where
     they cannot be kept the refusal says so.
 
+    limits: further ones (`Limit`), which hold beside those of the machine, less the same margins. One that standing
+    still would exceed is a Refusal.
+
     Raises InputError where a margin is not in (0, 0.5), for an unknown engine, for a speed below 0 or next to a dwell,
     or for a speed with a cubic controller whose jerks are not limited.
     """
@@ -61,11 +68,13 @@ def retime(
             "accelerations jump", key="limit_jerk", value=limit_jerk, expected="true",
         )  # fmt: skip
     period = machine.controller.period
-    limits = Limits.of(
+    added = tuple(limits)
+    kept = Limits.of(
         machine,
         velocity_margin,
         acceleration_margin,
-        guard=period * (1.5 + (WINDOW_PERIODS / 2 if cubic else 0.0)),
+        period * (1.5 + (WINDOW_PERIODS / 2 if cubic else 0.0)),
+        added,
     )
     wrong = unfit(path)
     if wrong is not None:
@@ -79,7 +88,7 @@ def retime(
     for k in indices:
         speeds = (start_speed if k == indices[0] else 0.0, end_speed if k == indices[-1] else 0.0)
         slacks = (0.5 * velocity_margin, 0.7 * acceleration_margin)
-        profile = time_piece(path.pieces[k], limits, *slacks, engine, speeds)
+        profile = time_piece(path.pieces[k], kept, *slacks, engine, speeds)
         if isinstance(profile, Failure):
             return refusal(path, k, profile)
         profiles.append(profile)
@@ -94,7 +103,8 @@ def retime(
         firsts = laws = [_plain_law(p, period) for p in profiles]
     profile = _profile(path, indices, profiles, laws, dwells, smooth=limit_jerk)
     told = (slowed(path, *both, period) for both in zip(indices, firsts, laws, strict=True)) if limit_jerk else ()
-    return Trajectory(path, tuple(indices), tuple(laws), profile, dwells, tuple(x for x in told if x is not None))
+    told = tuple(x for x in told if x is not None)
+    return Trajectory(path, tuple(indices), tuple(laws), profile, dwells, told, added)
 
 
 def _check_margins(velocity: float, acceleration: float) -> None:
@@ -150,6 +160,6 @@ def _profile(
         speeds=np.concatenate([law(t, 1) for law, t in zip(laws, times, strict=True)]),
         active=np.concatenate([a for a, _ in active]),
         shares=np.concatenate([share for _, share in active]),
-        constraint_names=CONSTRAINTS,
+        constraints=profiles[0].limits.constraints,
     )
     return profile.standing(0.0, float(starts[-1]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -11,7 +12,7 @@ from limit_matrix import ACCELERATIONS, JERKS, Known
 from timing_paths import Path, machine
 
 from pentapod.timing import Trajectory, retime
-from pentapod.timing.limits.constraints import Limits
+from pentapod.timing.limits.limits import Limits
 
 pytestmark = pytest.mark.slow
 
@@ -94,5 +95,8 @@ def test_laws_are_within_one_percent_of_collocation(seed, jerk, acceleration):
     knots = np.linspace(0.0, path.length, 201)[1:-1]
     trajectory = retime(Path((Known(path.legs, path.length, inner_knots=knots),)), m)
     assert isinstance(trajectory, Trajectory), str(trajectory)
-    limits = Limits.of(m, 0.002, 0.005, 0.0)
+    velocity, acceleration, jerk, _, rapid, *_ = Limits.of(m, 0.002, 0.005, 0.0).of_machine
+    limits = SimpleNamespace(
+        velocity=velocity.limit, acceleration=acceleration.limit, jerk=jerk.limit, rapid=rapid.limit.item()
+    )
     assert trajectory.duration <= 1.01 * optimum(path, limits, trajectory.laws[0]) + PERIOD

@@ -20,17 +20,17 @@ def problem(seed, n=120, rows=5, lively=3.0, cap=1.0, offset=True):
     first = np.sin(w[0] * s[:, None] + phase[0]) * rng.uniform(0.2, 2, rows)
     second = lively * np.cos(w[1] * s[:, None] + phase[1]) * rng.uniform(0.2, 2, rows)
     ceiling = cap * (1.5 + np.sin(7 * s + rng.uniform(0, 6)))
-    middle = 0.4 * np.sin(5 * s[:, None] + np.arange(rows)) if offset else None
-    return {"s": s, "first": first, "second": second, "ceiling": ceiling, "offset": middle}
+    at_rest = 0.4 * np.sin(5 * s[:, None] + np.arange(rows)) if offset else None
+    return {"s": s, "first": first, "second": second, "ceiling": ceiling, "offset": at_rest}
 
 
 def breaks(p, x):
     """By how much x breaks its rows and bounds, in shares of the limits."""
     u = np.diff(x) / (2 * np.diff(p["s"]))
-    middle = 0.0 if p["offset"] is None else p["offset"]
+    at_rest = 0.0 if p["offset"] is None else p["offset"]
     rows = [p["first"][k] * u[:, None] + p["second"][k] * x[k][:, None] for k in (slice(0, -1), slice(1, None))]
-    c = np.broadcast_to(middle, p["first"].shape)
-    worst = max(np.abs(rows[0] - c[:-1]).max(), np.abs(rows[1] - c[1:]).max()) - 1.0
+    c = np.broadcast_to(at_rest, p["first"].shape)
+    worst = max(np.abs(rows[0] + c[:-1]).max(), np.abs(rows[1] + c[1:]).max()) - 1.0
     return max(worst, (x / p["ceiling"]).max() - 1.0, -x.min())
 
 

@@ -1,11 +1,12 @@
 import logging
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from pentapod.machine.tool_limits import ToolLimits
-from pentapod.timing.limits.constraints import Limits
-from pentapod.timing.limits.path_derivatives import PathDerivatives
+from pentapod.timing.limits.leg_acceleration import LegAcceleration
+from pentapod.timing.limits.leg_velocity import LegVelocity
+from pentapod.timing.path.path_derivatives import PathDerivatives
 from pentapod.timing.topp.engine import fastest
 from pentapod.timing.topp.stages import Failure
 
@@ -36,15 +37,17 @@ def test_failures_are_values_and_silent(caplog, recwarn):
 
 def test_ceiling_is_the_largest_x_with_a_common_acceleration():
     rng = np.random.default_rng(3)
-    limits = Limits(rng.uniform(0.1, 1, 5), rng.uniform(1, 9, 5), np.ones(5), ToolLimits(), 1.0, 1.0, 0.0)
+    fast, hard = rng.uniform(0.1, 1, 5), rng.uniform(1, 9, 5)
+    limits = LegVelocity(fast, fast), LegAcceleration(hard, hard, np.ones(5))
     first, second = rng.normal(size=(300, 5)), 10 * rng.normal(size=(300, 5))
-    x = limits.ceiling(PathDerivatives((first, second), (), (), np.full(300, 0.7), np.zeros(300, int)))
+    path = PathDerivatives(SimpleNamespace(derivatives=lambda *_: [first, first, second]), np.zeros(300))
+    x = np.minimum(np.min([limit.ceiling(path) for limit in limits], axis=0), 0.7**2)
 
     def room(x):  # by brute force over u
         u = np.linspace(-60, 60, 20_001)
-        push = np.abs(first[:, None] * u[:, None] + second[:, None] * x[:, None, None]) / limits.acceleration
+        push = np.abs(first[:, None] * u[:, None] + second[:, None] * x[:, None, None]) / hard
         fits = (push.max(2) <= 1.0).any(1) & (x <= 0.49 * 1.0001)
-        return fits & (np.abs(first) * np.sqrt(x)[:, None] <= limits.velocity * 1.0001).all(1)
+        return fits & (np.abs(first) * np.sqrt(x)[:, None] <= fast * 1.0001).all(1)
 
     assert room(0.99 * x).all()
     assert not room(1.01 * x).any()

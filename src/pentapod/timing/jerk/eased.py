@@ -61,9 +61,8 @@ def eased(problem: Problem, y: Floats, measure: Measure, passes: int) -> Eased:
 def _near_limits(problem: Problem, y: Floats) -> Floats:
     """Return stations (2, m) between which a law uses much of its limits."""
     v, rows = problem.values(y), problem.rows
-    jerks = np.abs(np.einsum("nkd,nd->nk", rows.jerks, v)).max(axis=1) * np.sqrt(np.maximum(v[:, 0], 0.0))
-    pushes = np.abs(rows.first * (0.5 * v[:, 1:2]) + rows.second * v[:, :1] - rows.offset).max(axis=1)
-    change = np.diff(np.concatenate([[False], (jerks > _JERK) | (pushes > _PUSH), [False]]).astype(np.int8))
+    near = (rows.jerk_uses(v) > _JERK) | (rows.pushes(v) > _PUSH)
+    change = np.diff(np.concatenate([[False], near, [False]]).astype(np.int8))
     begin, end = np.flatnonzero(change > 0), np.flatnonzero(change < 0) - 1
     return np.stack([problem.s[np.maximum(begin - 1, 0)], problem.s[np.minimum(end + 1, len(problem.s) - 1)]])
 

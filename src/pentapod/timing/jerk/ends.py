@@ -48,7 +48,8 @@ class Ramp:
     def of(cls, rows: JerkRows, s: Floats, reach: float) -> Ramp:
         """Return the ramp at the rest s[0] of rows at s, at most `reach` long."""
         jerk = _END_JERK / float(np.abs(2.0 * rows.jerks[0, :, 2]).max())
-        push = 1.0 / max(float(np.abs(rows.first[0]).max()), 1e-300)
+        room = 1.0 - np.abs(rows.offset[0])
+        push = float((room / np.maximum(np.abs(rows.first[0]), 1e-300)).min())
         c = 6.0 ** (4.0 / 3.0) / 4.0 * jerk ** (2.0 / 3.0)
         # Where the acceleration or the speed that the ramp reaches would be a limit's.
         length = min(push**3 / (6.0 * jerk**2), reach)

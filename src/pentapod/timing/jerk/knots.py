@@ -8,6 +8,7 @@ from scipy.ndimage import maximum_filter1d
 from pentapod.base.arrays import Bools, Floats
 from pentapod.timing.jerk.part import Part
 from pentapod.timing.jerk.rows import JerkRows
+from pentapod.timing.limits.limit import share_of_room
 
 KNOTS_PER_RAMP = 8.0
 _LEAST_KNOTS = 96
@@ -96,7 +97,7 @@ def _calm(x: Floats, rows: JerkRows) -> Bools:
     """Return at which gridpoints (N + 1,) the law x keeps its speed, far from the limits of acceleration and jerk."""
     steady = np.abs(np.diff(x)) <= 1e-6 * x[:-1]
     use = np.maximum(
-        np.abs(rows.second * x[:, None] - rows.offset).max(axis=1),
+        share_of_room(rows.second * x[:, None], rows.offset).max(axis=1),
         np.abs(rows.jerks[:, :, 0]).max(axis=1) * x**1.5,
     )
     return np.append(steady, False) & np.append(False, steady) & (use < _CALM_SHARE)

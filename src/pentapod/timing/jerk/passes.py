@@ -99,20 +99,15 @@ def _exceeding(part: Part, problem: Problem, y: Floats) -> Bools:
     """Return between which inner knots (K − 1,) the spline exceeds a limit, or all but stops, between gridpoints."""
     s = (problem.s[1:] + problem.s[:-1]) / 2.0
     rows, v = part.rows_at(s), problem.at(y, s)
-    x = v[:, 0]
-    jerks = np.abs(np.einsum("nkd,nd->nk", rows.jerks, v)).max(axis=1) * np.sqrt(np.maximum(x, 0.0))
-    pushes = np.abs(rows.first * (0.5 * v[:, 1:2]) + rows.second * v[:, :1] - rows.offset).max(axis=1)
-    ends = problem.values(y)[:, 0]
-    bad = (jerks > _JERK) | (pushes > _PUSH) | (x > _FAST * rows.ceiling)
+    x, ends = v[:, 0], problem.values(y)[:, 0]
+    bad = (rows.jerk_uses(v) > _JERK) | (rows.pushes(v) > _PUSH) | (x > _FAST * rows.ceiling)
     bad |= x < _SLOW * np.minimum(ends[:-1], ends[1:])
-    return bad.reshape(-1, GRIDPOINTS_PER_KNOT).any(axis=1)
+    return np.asarray(bad.reshape(-1, GRIDPOINTS_PER_KNOT).any(axis=1))
 
 
 def _pushed(problem: Problem, y: Floats) -> float:
     """Return the share of an acceleration limit that a law uses, a little more than at its gridpoints, at most 1."""
-    v, rows = problem.values(y), problem.rows
-    pushes = np.abs(rows.first * (0.5 * v[:, 1:2]) + rows.second * v[:, :1] - rows.offset)
-    return min(1.0, _SPARE * float(pushes.max()))
+    return min(1.0, _SPARE * float(problem.rows.pushes(problem.values(y)).max()))
 
 
 def _law_at(part: Part, problem: Problem, y: Floats) -> Floats:

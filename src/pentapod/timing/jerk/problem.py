@@ -155,7 +155,7 @@ class Problem:
             self.first[here] - low,
             rows.second[here],
             0.5 * rows.first[here],
-            rows.offset[here] if moves else rows.offset,
+            -rows.offset[here] if moves else -rows.offset,
             moves,
             rows.jerks[here],
             around[here],

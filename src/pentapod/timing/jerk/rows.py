@@ -8,11 +8,12 @@ from typing import Protocol
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.timing.limits.limit import share_of_room
 
 
 @dataclass(frozen=True, eq=False)
 class JerkRows:
-    """What limits a law at gridpoints (N,): |first u + second x − offset| ≤ 1, |jerks (x, x′, x″)| √x ≤ 1, x ≤ ceiling.
+    """What limits a law at gridpoints (N,): |first u + second x + offset| ≤ 1, |jerks (x, x′, x″)| √x ≤ 1, x ≤ ceiling.
 
     first, second (N, R); offset (N, R) or (1, R); jerks (N, K, 3): q‴, 1.5 q″ and 0.5 q′ over the limit; ceiling (N,).
     """
@@ -22,6 +23,14 @@ class JerkRows:
     offset: Floats
     jerks: Floats
     ceiling: Floats
+
+    def pushes(self, v: Floats) -> Floats:
+        """Return the largest share (N,) of an acceleration limit that x, x′, x″ (N, 3) use, beside the offset."""
+        return share_of_room(self.first * (0.5 * v[:, 1:2]) + self.second * v[:, :1], self.offset).max(axis=1)
+
+    def jerk_uses(self, v: Floats) -> Floats:
+        """Return the largest share (N,) of a jerk limit that x, x′, x″ (N, 3) use."""
+        return np.abs(np.einsum("nkd,nd->nk", self.jerks, v)).max(axis=1) * np.sqrt(np.maximum(v[:, 0], 0.0))
 
 
 _NONE = np.zeros((0, 0))

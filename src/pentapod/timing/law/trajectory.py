@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats, Ints, as_floats, frozen, set_frozen
 from pentapod.base.values import Result, Value
-from pentapod.timing.law.paths import LegPathLike, PieceLike
 from pentapod.timing.law.slowed import Slowed
 from pentapod.timing.law.time_law import MotionLaw
+from pentapod.timing.limits.limit import Constraint, Limit
+from pentapod.timing.path.paths import LegPathLike, PieceLike
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +21,7 @@ class Profile(Value):
     """The plan at its gridpoints, for explanation: what holds the motion back, and where.
 
     times (K,) s; stations (K,) global tip arc length, m; speeds (K,) tip, m/s; active (K,): index into
-    `constraint_names`; shares (K,): how much of that limit (less the margin) is used. Where smoothing
+    `constraints`; shares (K,): how much of that limit (less the margin) is used. Where smoothing
     for a cubic controller follows, active and shares are those of the law before it.
     """
 
@@ -29,7 +30,17 @@ class Profile(Value):
     speeds: Floats
     active: Ints
     shares: Floats
-    constraint_names: tuple[str, ...]
+    constraints: tuple[Constraint, ...]
+
+    @property
+    def constraint_names(self) -> tuple[str, ...]:
+        """Names of the constraints."""
+        return tuple(constraint.name for constraint in self.constraints)
+
+    def at(self, rows: Ints | Bools) -> Profile:
+        """Return some of its gridpoints."""
+        times, stations, speeds, shares = (y[rows] for y in (self.times, self.stations, self.speeds, self.shares))
+        return Profile(times, stations, speeds, self.active[rows], shares, self.constraints)
 
     def standing(self, start: float, end: float) -> Profile:
         """Return the profile from `start` to `end` seconds, with standing where it begins later or ends sooner."""
@@ -38,14 +49,7 @@ class Profile(Value):
             rows, times = np.append(0, rows), np.append(start, times)
         if end > times[-1]:
             rows, times = np.append(rows, rows[-1]), np.append(times, end)
-        return Profile(
-            times,
-            self.stations[rows],
-            self.speeds[rows],
-            self.active[rows],
-            self.shares[rows],
-            self.constraint_names,
-        )
+        return replace(self.at(rows), times=times)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +59,8 @@ class Trajectory(Result):
     path: the leg path; indices: those of its pieces that move; laws: their motion laws, one after the other.
     Each lasts a whole number of the controller's periods, so that exact stops fall on setpoints. dwells (L + 1,):
     seconds for which the machine stands before each law, and after the last; whole periods, too. slowed: pieces that
-    last more than 1.02 times as long as their first law limited in jerk.
+    last more than 1.02 times as long as their first law limited in jerk. limits: those that were added to the
+    machine's.
     """
 
     path: LegPathLike
@@ -64,6 +69,7 @@ class Trajectory(Result):
     profile: Profile
     dwells: Floats
     slowed: tuple[Slowed, ...] = ()
+    limits: tuple[Limit, ...] = ()
 
     def __post_init__(self) -> None:
         set_frozen(self, indices=tuple(self.indices), laws=tuple(self.laws))
@@ -87,8 +93,13 @@ class Trajectory(Result):
         """Seconds."""
         return float(self.starts[-1])
 
+    @property
+    def n_legs(self) -> int:
+        """How many legs the machine has."""
+        return self.path.pieces[self.indices[0]](np.zeros(1)).shape[1]
+
     def __call__(self, t: ArrayLike, order: int = 0) -> Floats:
-        """Return legs in m, m/s or m/s² (n, 5), order 0, 1, 2, at times (n,) in seconds.
+        """Return legs in m, m/s or m/s² (n, legs), order 0, 1, 2, at times (n,) in seconds.
 
         At rest before the start and after the end. Raises ArrayError for times that are not finite.
         """
@@ -101,7 +112,7 @@ class Trajectory(Result):
                 return piece(s, 1) * law(time, 1)[:, None]
             return piece(s, 1) * law(time, 2)[:, None] + piece(s, 2) * np.square(law(time, 1))[:, None]
 
-        return self._piecewise(t, legs, (5,))
+        return self._piecewise(t, legs, (self.n_legs,))
 
     def pose(self, t: ArrayLike) -> tuple[Floats, Floats]:
         """Return tips and tool axes (n, 3), machine frame, at times (n,) in seconds."""

@@ -6,9 +6,11 @@ jerk needs a third direction. Rows say |n · vector| ≤ 1 for normals n spread 
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Floats, Ints
 
 DIRECTIONS = 8
 """Normals of the half circle: a polygon with 16 sides, 1.9 % nearer than the circle where it is nearest."""
@@ -35,6 +37,30 @@ def polygon(f: Floats, g: Floats, limit: float) -> tuple[Floats, Floats]:
     size, along, across = _plane(f, g)
     scale = 1.0 / (limit * _INSIDE)
     return (size * _COS) * scale, (along * _COS + across * _SIN) * scale
+
+
+def common_push(first: Floats, second: Floats, offset: Floats | None = None, size: Floats | float = 1.0) -> Floats:
+    """Return the largest x (n,) for which one u keeps all of |first u + second x + offset| ≤ size.
+
+    first, second, offset (n, R); size (R,). Each row is a strip in the (u, x) plane: for one x it leaves an interval of
+    u, and intervals have a point in common when each two of them have. Hence the minimum over pairs of rows of
+    (size_i |first_j| + size_j |first_i|) / |second_i first_j − second_j first_i| where there is no offset.
+    """
+    size, (i, j) = np.broadcast_to(size, first.shape[1]), _pairs(first.shape[1])
+    one = np.abs(first)
+    above = size[i] * one[:, j] + size[j] * one[:, i]
+    across = second[:, i] * first[:, j] - second[:, j] * first[:, i]
+    if offset is not None and offset.any():
+        above = above - np.sign(across) * (first[:, j] * offset[:, i] - first[:, i] * offset[:, j])
+    below = np.abs(across)
+    # Where rows hardly bend at all a quotient beyond all numbers is no bound, as it should be.
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return np.where(below > 0.0, above / below, np.inf).min(axis=1, initial=np.inf)
+
+
+@lru_cache
+def _pairs(count: int) -> tuple[Ints, Ints]:
+    return np.triu_indices(count, 1)
 
 
 def across_path(f: Floats, g: Floats) -> Floats:

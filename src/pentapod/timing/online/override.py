@@ -17,18 +17,19 @@ from pentapod.base.arrays import Ints
 from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal
 from pentapod.machine.machine import Machine
-from pentapod.timing.law.paths import LegPathLike
 from pentapod.timing.law.refusals import STILL_M
 from pentapod.timing.law.splice import Nodes, joined
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.law.trajectory import Profile, Trajectory
+from pentapod.timing.limits.limit import Constraint
 from pentapod.timing.online.piece_part import PathParts, PiecePart
 from pentapod.timing.online.transition import Turn, passage, stop
+from pentapod.timing.path.paths import LegPathLike
 from pentapod.timing.retime import retime
 
 LEAST_SHARE, LARGEST_SHARE = 0.01, 1.5
-TRANSITION = "feed override"
-"""Name of what holds the motion back during a transition, in the profile."""
+TRANSITION = Constraint("feed override", "feed override")
+"""What holds the motion back during a transition, in the profile."""
 
 
 def override(
@@ -52,6 +53,7 @@ def override(
         raise InputError("an override is a factor on the feeds", key="share", value=share, expected=expected)
     if not (np.isfinite(time) and time >= 0.0):
         raise InputError("must be a time on the trajectory's clock", key="time", value=time, expected="seconds ≥ 0")
+    options = {"limits": trajectory.limits, **options}
     period = machine.controller.period
     start = float(np.ceil(time / period - 1e-6)) * period
     starts = trajectory.starts
@@ -137,9 +139,10 @@ def _ended(trajectory: Trajectory, k: int, period: float) -> Trajectory:
         still = joined([Nodes.resting(period, 0.0)])
         dwells = np.array([trajectory.dwells[0], 0.0])
         profile = _clip(trajectory.profile, 0.0, 0.0, 0.0, 0.0).standing(0.0, float(dwells[0]) + period)
-        return Trajectory(trajectory.path, (begin,), (still,), profile, dwells)
+        return replace(trajectory, indices=(begin,), laws=(still,), profile=profile, dwells=dwells, slowed=())
     profile = _clip(trajectory.profile, 0.0, float(trajectory.starts[k]), 0.0, 0.0)
-    return Trajectory(trajectory.path, trajectory.indices[:k], trajectory.laws[:k], profile, trajectory.dwells[: k + 1])
+    indices, laws, dwells = trajectory.indices[:k], trajectory.laws[:k], trajectory.dwells[: k + 1]
+    return replace(trajectory, indices=indices, laws=laws, profile=profile, dwells=dwells, slowed=())
 
 
 def _turned(trajectory: Trajectory, rest: Trajectory | None, k: int, turn: Turn) -> Trajectory:
@@ -149,7 +152,7 @@ def _turned(trajectory: Trajectory, rest: Trajectory | None, k: int, turn: Turn)
     offset, bridge = float(trajectory.path.starts[index]), turn.parts[0]
     profiles = [
         _clip(trajectory.profile, 0.0, start + turn.leave, 0.0, 0.0),
-        _bridge(bridge, trajectory.profile.constraint_names, start + turn.leave, offset),
+        _bridge(bridge, trajectory.profile.constraints, start + turn.leave, offset),
     ]
     if rest is None:
         return _assembled(trajectory, None, k, index, law, profiles)
@@ -169,41 +172,35 @@ def _assembled(
     """Return the first k laws, then `law` on piece `index`, then the rest's other laws."""
     more: tuple[int, ...] = () if rest is None else tuple(index + i for i in rest.indices[1:])
     laws = () if rest is None else rest.laws[1:]
-    names = (*(n for n in profiles[0].constraint_names if n != TRANSITION), TRANSITION)
-    return Trajectory(
-        trajectory.path,
-        (*trajectory.indices[:k], index, *more),
-        (*trajectory.laws[:k], law, *laws),
-        Profile(
+    constraints = (*(one for one in profiles[0].constraints if one != TRANSITION), TRANSITION)
+    return replace(
+        trajectory,
+        indices=(*trajectory.indices[:k], index, *more),
+        laws=(*trajectory.laws[:k], law, *laws),
+        profile=Profile(
             *(np.concatenate([getattr(p, name) for p in profiles]) for name in ("times", "stations", "speeds")),
-            active=np.concatenate([_renamed(p, names) for p in profiles]),
+            active=np.concatenate([_renumbered(p, constraints) for p in profiles]),
             shares=np.concatenate([p.shares for p in profiles]),
-            constraint_names=names,
+            constraints=constraints,
         ),
-        np.append(trajectory.dwells[: k + 1], 0.0 if rest is None else rest.dwells[1:]),
+        dwells=np.append(trajectory.dwells[: k + 1], 0.0 if rest is None else rest.dwells[1:]),
+        slowed=(),
     )
 
 
-def _renamed(profile: Profile, names: tuple[str, ...]) -> Ints:
-    index = np.array([names.index(name) for name in profile.constraint_names], dtype=np.intp)
+def _renumbered(profile: Profile, constraints: tuple[Constraint, ...]) -> Ints:
+    index = np.array([constraints.index(one) for one in profile.constraints], dtype=np.intp)
     return index[profile.active]
 
 
 def _clip(profile: Profile, start: float, end: float, later: float, further: float) -> Profile:
     """Return a profile between two of its times, moved in time and along the path."""
-    rows = (profile.times >= start) & (profile.times <= end)
-    return Profile(
-        profile.times[rows] + later,
-        profile.stations[rows] + further,
-        profile.speeds[rows],
-        profile.active[rows],
-        profile.shares[rows],
-        profile.constraint_names,
-    )
+    part = profile.at((profile.times >= start) & (profile.times <= end))
+    return replace(part, times=part.times + later, stations=part.stations + further)
 
 
-def _bridge(nodes: Nodes, names: tuple[str, ...], later: float, further: float) -> Profile:
-    names = (*(n for n in names if n != TRANSITION), TRANSITION)
+def _bridge(nodes: Nodes, before: tuple[Constraint, ...], later: float, further: float) -> Profile:
+    constraints = (*(one for one in before if one != TRANSITION), TRANSITION)
     count = len(nodes.times)
-    active = np.full(count, len(names) - 1, dtype=np.intp)
-    return Profile(nodes.times + later, nodes.stations + further, nodes.speeds, active, np.ones(count), names)
+    active = np.full(count, len(constraints) - 1, dtype=np.intp)
+    return Profile(nodes.times + later, nodes.stations + further, nodes.speeds, active, np.ones(count), constraints)

@@ -5,18 +5,19 @@ How short a transition may be is tried, not assumed: the first one whose setpoin
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine.machine import Machine
 from pentapod.timing.certificates import certify
 from pentapod.timing.law.splice import Nodes, joined, times_at
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.law.trajectory import Trajectory
+from pentapod.timing.limits.limits import machine_limits
+from pentapod.timing.path.joined import Joined, Rows
 
 _LENGTHS = (8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 1024)
 _DELAYS = (0, 4, 8, 16, 32, 64, 128)
@@ -51,7 +52,7 @@ class Turn:
 
 def stop(trajectory: Trajectory, machine: Machine, k: int, local: float) -> Turn | None:
     """Return the quickest stop on the path, by a clock that slows down; None: the piece's end comes first."""
-    law, period, jerk = trajectory.laws[k], machine.controller.period, _largest_jerks(trajectory, machine)
+    law, period, allowed = trajectory.laws[k], machine.controller.period, _allowed(trajectory, machine)
     for delay, length in _tries():
         leave, seconds = local + delay * period, length * period
         if leave + seconds > law.duration:
@@ -62,23 +63,23 @@ def stop(trajectory: Trajectory, machine: Machine, k: int, local: float) -> Turn
         speeds[-1] = 0.0
         parts = (Nodes.through(seconds * nodes, law(clock), speeds),)
         turn = Turn(leave, parts)
-        if _keeps(trajectory, machine, k, turn, jerk):
+        if _keeps(trajectory, machine, k, turn, allowed):
             return turn
     return None
 
 
 def passage(trajectory: Trajectory, rest: Trajectory, machine: Machine, k: int, local: float) -> Turn | None:
     """Return the quickest passage from the old plan to the new one; None: the piece's end comes first."""
-    old, period, jerk = trajectory.laws[k], machine.controller.period, _largest_jerks(trajectory, machine)
+    old, period, allowed = trajectory.laws[k], machine.controller.period, _allowed(trajectory, machine)
     for delay, length in _tries():
         leave, seconds = local + delay * period, length * period
         if leave + seconds > old.duration - _EDGE * period:
             continue
         turn = _turn(old, rest.laws[0], leave, seconds, period, 1.0)
-        if turn is None or not _keeps(trajectory, machine, k, turn, jerk):
+        if turn is None or not _keeps(trajectory, machine, k, turn, allowed):
             continue
         whole = _whole(turn, old, rest.laws[0], seconds, period)
-        if whole is not None and _keeps(trajectory, machine, k, whole, jerk):
+        if whole is not None and _keeps(trajectory, machine, k, whole, allowed):
             return whole
     return None
 
@@ -135,43 +136,28 @@ def _between(old: MotionLaw, new: MotionLaw, leave: float, seconds: float, perio
     return Nodes.through(np.concatenate([[0.0], np.cumsum(steps)]), old(clock), speeds(clock)[1])
 
 
-def _keeps(trajectory: Trajectory, machine: Machine, k: int, turn: Turn, jerk: tuple[Floats, float]) -> bool:
-    """Return whether the setpoints around a transition keep the limits of legs and tool, as the controller joins them.
+def _keeps(trajectory: Trajectory, machine: Machine, k: int, turn: Turn, allowed: Mapping[str, float]) -> bool:
+    """Return whether the setpoints around a transition keep the limits but feeds, as the controller joins them.
 
-    jerk: m/s³, of the legs (5,) and of the tip.
+    allowed: shares above 1, by the limit's quantity.
     """
     period, interpolation = machine.controller.period, machine.controller.interpolation
     law = joined([Nodes.of(trajectory.laws[k], 0.0, turn.leave), *turn.parts])
     piece = trajectory.path.pieces[trajectory.indices[k]]
     first, last = round(turn.leave / period) - 2 * _EDGE, int(np.ceil(turn.arrival / period)) + 2 * _EDGE
+    limits = [limit for limit in (*machine_limits(machine), *trajectory.limits) if not limit.sectional]
     # The law stands before its start and after its end, as the machine does.
-    stations = law(np.arange(first, last + 1) * period)
-    rows = piece(stations)
-    if not np.isfinite(rows).all():
+    rows = Rows.at(piece, law(np.arange(first, last + 1) * period), tool=any(limit.of_tool for limit in limits))
+    if not np.isfinite(rows.legs).all():
         return False
-    motion = Interpolant.through(rows, period, interpolation)
-    inner, tool = slice(_EDGE, -_EDGE), machine.tool_limits
-    kept = bool(
-        (motion.rates[inner] <= machine.legs.max_velocity).all()
-        and (motion.accelerations[inner] <= machine.legs.max_acceleration).all()
-        and (motion.jerks[inner] <= jerk[0]).all()
-    )
-    if not (kept and tool.given()):
-        return kept
-    tip, axis = (Interpolant.through(rows, period, interpolation) for rows in piece.pose(stations))
-    return bool(
-        (np.linalg.norm(tip.second[inner], axis=1) <= tool.max_tip_acceleration).all()
-        and (tip.jerk_lengths[inner] <= jerk[1]).all()
-        and (np.linalg.norm(axis.steps[inner], axis=1) <= tool.max_axis_velocity).all()
-        and (axis.turn_accelerations[inner] <= tool.max_axis_acceleration).all()
-    )
+    setpoints = Joined(rows, piece, period, interpolation, _EDGE, len(rows) - 1 - 2 * _EDGE)
+    return all((limit.used(setpoints) <= allowed.get(limit.quantity, 1.0)).all() for limit in limits)
 
 
-def _largest_jerks(trajectory: Trajectory, machine: Machine) -> tuple[Floats, float]:
-    """Return the jerk limits of legs (5,) and tip, or as many times as much as the trajectory itself takes."""
-    shares = {use.quantity: max(1.0, use.share) for use in certify(trajectory, machine)}
-    tip = machine.tool_limits.max_tip_jerk * shares.get("tip jerk", 1.0)
-    return machine.legs.max_jerk * shares["leg jerk"], tip
+def _allowed(trajectory: Trajectory, machine: Machine) -> dict[str, float]:
+    """Return the share of each jerk limit that the trajectory itself takes, where that is above 1."""
+    jerks = {limit.quantity for limit in (*machine_limits(machine), *trajectory.limits) if limit.group == "jerk"}
+    return {use.quantity: max(1.0, use.share) for use in certify(trajectory, machine) if use.quantity in jerks}
 
 
 def _tries() -> Iterator[tuple[int, int]]:

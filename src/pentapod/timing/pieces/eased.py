@@ -25,7 +25,7 @@ def eased(piece: Setpoints, use: Use, machine: Machine, attempt: int) -> PiecePr
     profile, count = piece.profile, piece.count
     between = piece.use(piece.rows(0, count, 0.5), machine, 0, count)
     between = between.without_edges(EDGE * (profile.x_start > 0.0), EDGE * (profile.x_end > 0.0))
-    rows, room = piece.rows(0, count)[:, 5], _EXTRA - attempt * _EXTRA_PER_ROUND
+    rows, room = piece.rows(0, count).stations, _EXTRA - attempt * _EXTRA_PER_ROUND
     speed, acceleration = (
         _factors(profile.s, rows, np.maximum(here, there), room)
         for here, there in ((use.speed, between.speed), (use.acceleration, between.acceleration))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats
-from pentapod.timing.law.paths import PieceLike
-from pentapod.timing.limits.constraints import Limits
-from pentapod.timing.limits.path_derivatives import PathDerivatives
+from pentapod.timing.limits.limits import Limits
+from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.paths import PieceLike
 
 LEAST_STAGES = 24
 """Stages of a piece at least."""
@@ -46,7 +46,7 @@ def first_grid(piece: PieceLike, limits: Limits) -> Floats:
 
 def _base_grid(piece: PieceLike, limits: Limits) -> Floats:
     length = float(piece.length)
-    begins, ends, _ = limits.guarded_sections(piece)
+    begins, ends, _ = limits.feed.guarded_sections(piece)
     marks = np.concatenate([piece.knots, piece.section_ends, begins, ends, _ramps(piece, limits)])
     marks = np.unique(np.concatenate([[0.0], marks[(marks > 0.0) & (marks < length)], [length]]))
     # Marks that rounding holds apart would make stages of no length; the ends stay exact.
@@ -63,8 +63,8 @@ def _base_grid(piece: PieceLike, limits: Limits) -> Floats:
 
 def _bent(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
     """Return at which stations (n,) the path's bend alone takes part of an acceleration limit at the largest speed."""
-    path = limits.derivatives(piece, s)
-    use = np.abs(limits.rows(path)[1]).max(axis=1) * limits.ceiling(path)
+    path = PathDerivatives(piece, s)
+    use = np.abs(limits.rows(path).second).max(axis=1) * limits.ceiling(path)
     return np.asarray(use > _BENT)
 
 
@@ -73,9 +73,9 @@ def _ramps(piece: PieceLike, limits: Limits) -> Floats:
 
     The law switches near there; a stage across that point would waste time.
     """
-    begins, ends, speeds = limits.guarded_sections(piece)
+    begins, ends, speeds = limits.feed.guarded_sections(piece)
     before, after = np.append(0.0, speeds), np.append(speeds, 0.0)
-    slope = limits.rows(limits.derivatives(piece, np.append(0.0, piece.section_ends)))[0]
+    slope = limits.rows(PathDerivatives(piece, np.append(0.0, piece.section_ends))).first
     reach = 0.5 * np.abs(after**2 - before**2) * np.abs(slope).max(axis=1)
     up, down = np.append(0.0, ends) + reach, np.append(begins, piece.length) - reach
     return np.where(after > before, up, down)
@@ -97,11 +97,11 @@ def _rough(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
 def _rough_part(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
     points = np.empty(2 * len(s) - 1)
     points[0::2], points[1::2] = s, (s[:-1] + s[1:]) / 2.0
-    path = limits.derivatives(piece, points)
-    first, second = limits.rows(path)
-    ceiling = limits.ceiling(path)
+    path = PathDerivatives(piece, points)
+    rows, ceiling = limits.rows(path), limits.ceiling(path)
+    first, second, offset = rows.first, rows.second, rows.offset
     with np.errstate(divide="ignore"):
-        pushes = ((1.0 + np.abs(second) * ceiling[:, None]) / np.abs(first)).min(axis=1)
+        pushes = ((1.0 + np.abs(second) * ceiling[:, None] + np.abs(offset)) / np.abs(first)).min(axis=1)
     a, m, b = slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2)
     x = np.maximum(np.maximum(ceiling[a], ceiling[b]), ceiling[m])[:, None]
     # No stage can gain more than the whole of x over its length.
@@ -112,9 +112,11 @@ def _rough_part(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
         + np.abs(second[m] - (second[a] + second[b]) / 2.0) * x
         + np.abs(second[b] - second[a]) * gain / 4.0
     )
+    if len(offset) > 1:
+        bulge += np.abs(offset[m] - (offset[a] + offset[b]) / 2.0)
     # x is linear within the stage, its ceiling v²/q′² is not: the chord between two ceilings lies above.
     low, high = np.minimum(ceiling[a], ceiling[b]), np.maximum(ceiling[a], ceiling[b])
-    fast = _slowness(path, limits)[m] * np.sqrt(np.minimum(low + gain[:, 0], high) / 2.0 + low / 2.0)
+    fast = limits.slowness(path)[m] * np.sqrt(np.minimum(low + gain[:, 0], high) / 2.0 + low / 2.0)
     # What a feed allows is its square by that of the rate: 1 for cutters, curved for a spot on the surface.
     square = np.square(piece.feed_rate(points))
     bow = np.abs(square[m] - (square[a] + square[b]) / 2.0)
@@ -124,11 +126,3 @@ def _rough_part(piece: PieceLike, limits: Limits, s: Floats) -> Bools:
         | (fast > 1.0 + 0.1 * _TOLERANCE)
         | (bow > _TOLERANCE * np.maximum(square[a], square[b]))
     )
-
-
-def _slowness(path: PathDerivatives, limits: Limits) -> Floats:
-    """Return 1/ṡ (n,) where the first of legs and axis is at its largest velocity, s/m."""
-    slowness = (np.abs(path.legs[0]) / limits.velocity).max(axis=1)
-    if path.turn:
-        slowness = np.maximum(slowness, np.linalg.norm(path.turn[0], axis=1) / limits.tool.max_axis_velocity)
-    return slowness

@@ -8,6 +8,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
+from pentapod.timing.path.joined import Rows
 from pentapod.timing.pieces.setpoints import EDGE, Setpoints
 from pentapod.timing.pieces.use import Use
 
@@ -41,20 +42,18 @@ def _measured(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, k
         first_row = low - first
         if first == 0 and pieces[0].profile.x_start > 0.0:
             ahead = pieces[0].spline_padding(start=True)[:-1]
-            rows, first_row = np.concatenate([ahead, rows]), first_row + len(ahead)
+            rows, first_row = Rows.concatenated([ahead, rows]), first_row + len(ahead)
         if last == begins[-1] and pieces[-1].profile.x_end > 0.0:
             behind = pieces[-1].spline_padding(start=False)[1:]
-            behind[:, 5] += lengths[-2]
-            rows = np.concatenate([rows, behind])
-        rows[:, 5] -= lengths[k]
-        use = pieces[k].use(rows, machine, first_row, count)
+            rows = Rows.concatenated([rows, behind.shifted(lengths[-2])])
+        use = pieces[k].use(rows.shifted(-lengths[k]), machine, first_row, count)
         parts.append(use if low + count == begins[k + 1] else use.at(np.arange(count)))
     return Use.joined(parts)
 
 
-def _rows(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, first: int, last: int) -> Floats:
-    """Return the rows (n, 6 or 12) from `first` to `last`, both included, of all pieces one after the other."""
-    parts: list[Floats] = []
+def _rows(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, first: int, last: int) -> Rows:
+    """Return the rows from `first` to `last`, both included, of all pieces one after the other."""
+    parts: list[Rows] = []
     begin = max(int(np.searchsorted(begins, first, "right")) - 1, 0)
     for k in range(min(begin, len(pieces) - 1), len(pieces)):
         low, high = max(first - begins[k], 0), min(last, begins[k + 1]) - begins[k]
@@ -62,7 +61,6 @@ def _rows(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, first
             break
         # Where a piece ends the next begins: that row is the next one's.
         goes_on = last > begins[k + 1]
-        rows = pieces[k].rows(low, high)
-        rows[:, 5] += lengths[k]
+        rows = pieces[k].rows(low, high).shifted(lengths[k])
         parts.append(rows[:-1] if goes_on else rows)
-    return np.concatenate(parts)
+    return Rows.concatenated(parts)

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
-from pentapod.timing.jerk.caps import acceleration_caps
 from pentapod.timing.jerk.rows import JerkRows
-from pentapod.timing.law.paths import PieceLike
 from pentapod.timing.law.time_law import MotionLaw
-from pentapod.timing.limits.constraints import FEED, PUSHES, RAPID, Limits
-from pentapod.timing.limits.path_derivatives import PathDerivatives
+from pentapod.timing.limits.limit import AccelerationRows, Motion, share_of_room
+from pentapod.timing.limits.limits import Limits
+from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.paths import PieceLike
 from pentapod.timing.pieces.grid import first_grid, parts
 from pentapod.timing.topp.engine import Engine, fastest
-from pentapod.timing.topp.stages import Failure
+from pentapod.timing.topp.stages import STANDS_BEYOND, Failure
 
 if TYPE_CHECKING:
     from pentapod.timing.jerk.limited import SmoothProfile
@@ -62,38 +62,43 @@ class PieceProfile:
     @cached_property
     def derivatives(self) -> PathDerivatives:
         """How the piece moves at the gridpoints."""
-        return self.limits.derivatives(self.piece, self.s)
+        return PathDerivatives(self.piece, self.s)
 
-    def rows(self) -> tuple[Floats, Floats]:
+    def rows(self) -> AccelerationRows:
         """Return the accelerations' rows (N + 1, R) at the gridpoints, eased."""
-        first, second = self.limits.rows(self.derivatives)
-        return first / self.ease_acceleration[:, None], second / self.ease_acceleration[:, None]
+        return self.limits.rows(self.derivatives).over(self.ease_acceleration[:, None])
 
     def solved(self) -> PieceProfile | Failure:
         """Return the fastest profile on this grid with these easings."""
-        x = fastest(self.s, *self.rows(), self.ceiling(), x_start=self.x_start, x_end=self.x_end, engine=self.engine)
+        x = self._fastest(self.s, self.rows(), self.ceiling())
         if not isinstance(x, Failure):
             return self.with_(x=x)
-        names = self.limits.row_names
+        names = self.limits.row_names(self.derivatives)
         limits = tuple(dict.fromkeys(names[row] for row in x.conflict))
         return replace(x, limits=limits, station=float(self.s[x.gridpoint]) if x.gridpoint >= 0 else None)
+
+    def _fastest(self, s: Floats, rows: AccelerationRows, ceiling: Floats) -> Floats | Failure:
+        resting = np.abs(rows.offset).max(axis=1)
+        if (resting >= 1.0).any():
+            k = int(resting.argmax())
+            return Failure(k, f"{STANDS_BEYOND}: {resting[k]:.3g} times of it", (int(np.abs(rows.offset[k]).argmax()),))
+        ends = {"x_start": self.x_start, "x_end": self.x_end}
+        return fastest(s, rows.first, rows.second, ceiling, offset=rows.offset, **ends, engine=self.engine)
 
     def smooth(self, measure: Measure) -> SmoothProfile | Failure:
         """Return the fastest profile below this one that keeps the jerk limits too; measure: of its setpoints."""
         from pentapod.timing.jerk.limited import jerk_limited  # noqa: PLC0415  (compiled: loaded where it is used)
 
         s, x = self.s, self.x
-        if (self._push_caps < 1.0).any():
+        if self._capped.any():
             s = self._fine_grid()
             x = np.interp(s, self.s, self.x)
-            found = [
-                self._capped_rows(s[part], self.limits.derivatives(self.piece, s[part])) for part in parts(len(s) - 1)
-            ]
-            # Each part ends where the next begins.
-            rows = (
-                np.concatenate([*(row[:-1] for row in column), column[-1][-1:]]) for column in zip(*found, strict=True)
+            found = [self._capped_rows(PathDerivatives(self.piece, s[part])) for part in parts(len(s) - 1)]
+            first, second, offset, ceiling = (
+                _overlapping(column)
+                for column in zip(*((y.first, y.second, y.offset, top) for y, top in found), strict=True)
             )
-            capped = fastest(s, *rows, x_start=self.x_start, x_end=self.x_end, engine=self.engine)
+            capped = self._fastest(s, AccelerationRows(first, second, offset), ceiling)
             x = x if isinstance(capped, Failure) else np.minimum(x, capped)
         least = _LEAST_PERIODS * self.limits.period
         return jerk_limited(s, x, self._jerk_rows, self.piece.knots, least_step=least, measure=measure)
@@ -114,37 +119,34 @@ class PieceProfile:
 
     @cached_property
     def _push_caps(self) -> Floats:
-        """Shares (N + 1, 5) of the legs' acceleration limits that no law within the jerk limits exceeds."""
-        limits = self.limits
-        one, ceiling = self.derivatives.legs[0], limits.ceiling(self.derivatives)
-        return (
-            acceleration_caps(self.s, one, ceiling, limits.acceleration, limits.jerk, moving=self.moving)
-            / limits.acceleration
-        )
+        """Shares (N + 1, R) of the rows' limits that no law within the jerk limits exceeds."""
+        return self.limits.caps(self.derivatives, self._full_ceiling, moving=self.moving)
 
-    @staticmethod
-    def _with_tool(caps: Floats, rows: int) -> Floats:
-        """Return the caps (n, R) of all rows; those of the tool have none."""
-        return np.concatenate([caps, np.ones((len(caps), rows - caps.shape[1]))], axis=1)
+    @cached_property
+    def _capped(self) -> Bools:
+        """Which of the rows (R,) have such a share below 1 somewhere."""
+        return np.asarray((self._push_caps < 1.0).any(axis=0))
 
     def _jerk_rows(self, s: Floats) -> JerkRows:
-        path = self.limits.derivatives(self.piece, s, 3)
-        first, second, ceiling = self._capped_rows(s, path)
-        return JerkRows(first, second, np.zeros((1, first.shape[1])), self.limits.jerk_rows(path), ceiling)
+        path = PathDerivatives(self.piece, s, 3)
+        rows, ceiling = self._capped_rows(path)
+        return JerkRows(rows.first, rows.second, rows.offset, self.limits.jerk_rows(path), ceiling)
 
-    def _capped_rows(self, s: Floats, path: PathDerivatives) -> tuple[Floats, Floats, Floats]:
+    def _capped_rows(self, path: PathDerivatives) -> tuple[AccelerationRows, Floats]:
         """Return the accelerations' rows (n, R), no looser than laws within the jerk limits can use, and ceilings."""
-        acceleration, speed = (
-            np.interp(s, self.s, ease)[:, None] for ease in (self.ease_acceleration, self.ease_speed)
-        )
-        first, second = self.limits.rows(path)
-        caps = np.stack([np.interp(s, self.s, cap) for cap in self._push_caps.T], axis=1)
-        pushes = self._with_tool(caps, first.shape[1]) * acceleration
-        return first / pushes, second / pushes, self.limits.ceiling(path) * speed[:, 0] ** 2
+        acceleration, speed = (np.interp(path.s, self.s, ease) for ease in (self.ease_acceleration, self.ease_speed))
+        shares = np.repeat(acceleration[:, None], len(self._capped), axis=1)
+        for row in np.flatnonzero(self._capped):
+            shares[:, row] *= np.interp(path.s, self.s, self._push_caps[:, row])
+        return self.limits.rows(path).over(shares), self.limits.ceiling(path) * speed**2
+
+    @cached_property
+    def _full_ceiling(self) -> Floats:
+        return self.limits.ceiling(self.derivatives)
 
     def ceiling(self) -> Floats:
         """Return the largest x (N + 1,) at each gridpoint that any path acceleration allows, m²/s²."""
-        return self.limits.ceiling(self.derivatives) * self.ease_speed**2
+        return self._full_ceiling * self.ease_speed**2
 
     def eased(self, acceleration: Floats, speed: Floats) -> PieceProfile | Failure:
         """Return the profile solved anew with further factors (N + 1,) on accelerations and speeds."""
@@ -155,8 +157,9 @@ class PieceProfile:
     def with_(self, **changes: Any) -> PieceProfile:
         """Return a copy on the same grid, which keeps the path's derivatives."""
         copy = replace(self, **changes)
-        if "derivatives" in self.__dict__:
-            copy.__dict__["derivatives"] = self.derivatives
+        for name in ("derivatives", "_full_ceiling"):
+            if name in self.__dict__:
+                copy.__dict__[name] = self.__dict__[name]
         return copy
 
     def refined(self, exceeding: Bools, switching: Bools, where: Floats) -> PieceProfile:
@@ -186,11 +189,9 @@ class PieceProfile:
         ds, dx = np.diff(self.s[part]), np.diff(self.x[part])
         s = (self.s[part][:-1, None] + _BETWEEN * ds[:, None]).ravel()
         x = (self.x[part][:-1, None] + _BETWEEN * dx[:, None]).ravel()
-        shares = self.limits.shares(
-            self.limits.derivatives(self.piece, s), x, np.repeat(dx / (2.0 * ds), len(_BETWEEN))
-        )
-        worst = shares.reshape(len(ds), len(_BETWEEN), -1).max(axis=1)
-        return np.delete(worst, PUSHES, axis=1).max(axis=1), worst[:, PUSHES].max(axis=1)
+        path, motion = PathDerivatives(self.piece, s), Motion.of(x, np.repeat(dx / (2.0 * ds), len(_BETWEEN)))
+        rates, pushes = (self.limits.largest(group, path, motion) for group in ("speed", "acceleration"))
+        return rates.reshape(len(ds), -1).max(axis=1), pushes.reshape(len(ds), -1).max(axis=1)
 
     def switching(self) -> tuple[Bools, Floats]:
         """Return the stages (N,) within which the law should switch, and at which fraction (N,).
@@ -201,8 +202,12 @@ class PieceProfile:
         share r of the acceleration limit could get there within about the fraction r of its length.
         """
         u, ds = self.path_accelerations(), np.diff(self.s)
-        first, second = self.rows()
-        ends = [np.abs(first[k] * u[:, None] + second[k] * self.x[k][:, None]) for k in (slice(0, -1), slice(1, None))]
+        rows = self.rows()
+        offset = np.broadcast_to(rows.offset, rows.first.shape)
+        ends = [
+            share_of_room(rows.first[k] * u[:, None] + rows.second[k] * self.x[k][:, None], offset[k])
+            for k in (slice(0, -1), slice(1, None))
+        ]
         capped = self.x > 0.99 * self.ceiling()
         share = np.maximum(*ends).max(axis=1)
         idle = (share < 0.98) & ~(capped[:-1] & capped[1:])
@@ -226,26 +231,19 @@ class PieceProfile:
             return self._active_in(law)
         u = self.path_accelerations()
         before, after = (
-            self.limits.shares(self.derivatives, self.x, pushes) for pushes in (np.append(u[0], u), np.append(u, u[-1]))
+            self.limits.shares(self.derivatives, Motion.of(self.x, pushes))
+            for pushes in (np.append(u[0], u), np.append(u, u[-1]))
         )
         shares = np.maximum(before, after)
-        return self._named(shares.argmax(axis=1)), shares.max(axis=1)
+        return shares.argmax(axis=1), shares.max(axis=1)
 
     def _active_in(self, law: MotionLaw) -> tuple[Ints, Floats]:
         """Return the constraint (N + 1,) of which a law limited in jerk uses most, and its share."""
         t = np.interp(self.s, law.stations, law.times)
         j = law.jerks[np.clip(np.searchsorted(law.times, t, "right") - 1, 0, len(law.jerks) - 1)]
         v, a = law(t, 1), law(t, 2)
-        path = self.limits.derivatives(self.piece, self.s, 3)
-        shares, jerks = self.limits.shares(path, v**2, a), self.limits.jerk_shares(path, v, a, j)
-        column = np.concatenate([shares, np.zeros((len(shares), 1)), jerks], axis=1).argmax(axis=1)
-        return self._named(column), np.maximum(shares.max(axis=1), jerks.max(axis=1))
-
-    def _named(self, column: Ints) -> Ints:
-        """Return the constraints (n,) of the columns: feed becomes rapid rate where that is what holds."""
-        speed, feeds = self.derivatives.speed, self.limits.section_speeds(self.piece)[self.derivatives.section]
-        rapid = (speed == self.limits.rapid) & (feeds != speed)
-        return np.where((column == FEED) & rapid, RAPID, column)
+        shares = self.limits.shares(PathDerivatives(self.piece, self.s, 3), Motion(v**2, v, a, j))
+        return shares.argmax(axis=1), shares.max(axis=1)
 
 
 def time_piece(
@@ -282,6 +280,11 @@ def time_piece(
         else:
             profile = profile.eased(_at_ends(accelerations, hard), _at_ends(rates, fast))
     return profile if isinstance(profile, Failure) else _slowed(profile)
+
+
+def _overlapping(parts: tuple[Floats, ...]) -> Floats:
+    """Return the rows of parts of which each ends with the row with which the next begins; one row for all stays."""
+    return parts[0] if len(parts[0]) == 1 else np.concatenate([*(part[:-1] for part in parts), parts[-1][-1:]])
 
 
 def _at_ends(shares: Floats, bad: Bools) -> Floats:

@@ -30,7 +30,7 @@ def backward(stages: Stages, end: tuple[float, float]) -> tuple[Floats, Floats] 
         stages.s,
         stages.first,
         stages.second,
-        stages.offset,
+        stages.middle,
         int(len(stages.offset) > 1),
         stages.ceiling,
         low,
@@ -48,5 +48,5 @@ def forward(stages: Stages, low: Floats, high: Floats, x_start: float) -> Floats
     """Return the largest x (N + 1,) from x_start, within the controllable speeds."""
     x = np.empty(len(stages))
     x[0] = x_start
-    fastest_forward(stages.s, stages.first, stages.second, stages.offset, int(len(stages.offset) > 1), low, high, x)
+    fastest_forward(stages.s, stages.first, stages.second, stages.middle, int(len(stages.offset) > 1), low, high, x)
     return x

@@ -115,7 +115,7 @@ def _constraint(problem: _Problem) -> Any:
             found: Any = canlinear_colloc_to_interpolate(
                 problem.first,
                 problem.second,
-                -problem.offset,
+                problem.offset,
                 unit,
                 np.ones(2 * rows),
                 None,

@@ -13,6 +13,7 @@ NOT_CONTROLLABLE = "from here no law reaches the end (not controllable)"
 UNBOUNDED = "nothing bounds the speed here"
 TOO_FAST_END = "the speed at the end is above a limit"
 TOO_FAST = "the start is faster than any speed from which the end can be reached"
+STANDS_BEYOND = "standing still there would exceed a limit"
 TOO_SLOW = "the start is slower than every speed from which the end can be reached"
 
 
@@ -33,11 +34,11 @@ class Failure:
 
 @dataclass(frozen=True, eq=False)
 class Stages:
-    """What the passes take: |first · u + second · x − offset| ≤ 1 at both ends of each stage, 0 ≤ x ≤ ceiling.
+    """What the passes take: |first · u + second · x + offset| ≤ 1 at both ends of each stage, 0 ≤ x ≤ ceiling.
 
     s (N + 1,) never falls; where it stays, the coefficients jump and x does not. first, second (N + 1, R): with leg
-    derivatives over leg acceleration limits, for instance; offset (N + 1, R) or (1, R), within ±1: limits
-    that are not symmetric, about their middle and over half their width. ceiling (N + 1,) may be infinite. u is s̈,
+    derivatives over leg acceleration limits, for instance; offset (N + 1, R) or (1, R), within ±1: what is there
+    at rest, less the middle of limits that are not symmetric. ceiling (N + 1,) may be infinite. u is s̈,
     constant in each stage. Any units: nothing in the passes is absolute.
     """
 
@@ -67,6 +68,11 @@ class Stages:
                 raise InputError("wrong shape", key=name, value=np.asarray(arrays[name]).shape, expected=str(shape))
         plain = {name: np.require(array, np.float64, ["C", "W"]) for name, array in arrays.items()}
         return cls(s=s, offset=np.require(offset, np.float64, ["C", "W"]), **plain)
+
+    @property
+    def middle(self) -> Floats:
+        """What the rows lie about, (N + 1, R) or (1, R)."""
+        return -self.offset
 
     def fault(self) -> Failure | None:
         """Return the first gridpoint whose coefficients are no numbers."""

@@ -1,0 +1,73 @@
+"""Limit of the feed: the speed, on cuts and links, of the point whose speed the feed is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.machine.machine import Machine
+from pentapod.timing.limits.limit import MachineLimit, Motion, Reserve
+from pentapod.timing.path.joined import Joined
+from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.paths import PieceLike
+
+
+@dataclass(frozen=True, eq=False)
+class Feed(MachineLimit):
+    """The feeds that the path's sections have; nothing on rapids.
+
+    limit, bound (1,): shares of each. guard: seconds by which a section's feed reaches into its neighbours; rapid: m/s,
+    the tip's largest speed, by which that is metres.
+    """
+
+    quantity = "feed"
+    unit = "m/s"
+    group = "speed"
+    sectional = True
+
+    guard: float
+    rapid: float
+
+    @classmethod
+    def of(cls, machine: Machine, reserve: Reserve) -> Feed:
+        """Return the limit that the path itself sets."""
+        return cls(np.array([reserve.slower]), np.ones(1), reserve.guard, machine.rapid_velocity * reserve.slower)
+
+    def guarded_sections(self, piece: PieceLike) -> tuple[Floats, Floats, Floats]:
+        """Return where each section's feed holds, from and to (M,) in metres, and how fast s grows by it (M,)."""
+        feeds = self._feeds(piece)
+        ends = np.asarray(piece.section_ends, dtype=np.float64)
+        begins = np.concatenate([[0.0], ends[:-1]])
+        with np.errstate(divide="ignore"):
+            before, after = (np.minimum(feeds / piece.feed_rate(s), self.rapid) for s in (begins, ends))
+        low, high = np.maximum(begins - self.guard * before, 0.0), np.minimum(ends + self.guard * after, piece.length)
+        return low, high, np.minimum(before, after)
+
+    def speeds(self, piece: PieceLike, s: Floats) -> Floats:
+        """Return the largest ṡ (n,), m/s, that the feeds allow at sorted stations s (n,); infinite on rapids."""
+        speed, feeds = np.full(len(s), np.inf), self._feeds(piece)
+        begins, ends, _ = self.guarded_sections(piece)
+        first, last = np.searchsorted(s, begins, "left"), np.searchsorted(s, ends, "right")
+        for m, feed in enumerate(feeds.tolist()):  # sections are few, and overlap their neighbours
+            here = slice(int(first[m]), int(last[m]))
+            speed[here] = np.minimum(speed[here], feed)
+        with np.errstate(divide="ignore"):
+            return speed / piece.feed_rate(s)
+
+    def _feeds(self, piece: PieceLike) -> Floats:
+        return np.asarray(piece.section_feeds, dtype=np.float64) * self.limit
+
+    def speed_rows(self, path: PathDerivatives) -> Floats:
+        """Return the largest ṡ (n, 1)."""
+        return self.speeds(path.piece, path.s)[:, None]
+
+    def share(self, path: PathDerivatives, motion: Motion) -> Floats:
+        """Return the shares (n, 1)."""
+        return motion.v[:, None] / self.speed_rows(path)
+
+    def measured(self, joined: Joined) -> Floats:
+        """Return the shares (intervals, 1) of the feeds themselves: a plan's reserve is there to be used up."""
+        speed = self.speeds(joined.piece, joined.rows.stations[joined.own_rows]) / self.limit
+        return (joined.station.rates[joined.own_intervals, 0] / np.minimum(speed[:-1], speed[1:]))[:, None]

@@ -1,0 +1,45 @@
+"""Limit of the tip's own speed, which rapids run at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.machine.machine import Machine
+from pentapod.timing.limits.limit import MachineLimit, Motion, Reserve
+from pentapod.timing.path.joined import Joined
+from pentapod.timing.path.path_derivatives import PathDerivatives
+
+
+@dataclass(frozen=True, eq=False)
+class RapidRate(MachineLimit):
+    """limit, bound (1,) m/s."""
+
+    quantity = "rapid rate"
+    unit = "m/s"
+    group = "speed"
+    sectional = True
+
+    @classmethod
+    def of(cls, machine: Machine, reserve: Reserve) -> RapidRate:
+        """Return the machine's limit."""
+        limit = np.atleast_1d(machine.rapid_velocity * reserve.slower)
+        return cls(limit, limit / reserve.slower)
+
+    def speed_rows(self, path: PathDerivatives) -> Floats:
+        """Return the largest ṡ (n, 1): the tip is never faster than s."""
+        return np.broadcast_to(self.limit, (len(path.s), 1))
+
+    def share(self, path: PathDerivatives, motion: Motion) -> Floats:
+        """Return the shares (n, 1)."""
+        return motion.v[:, None] / self.limit
+
+    def measured(self, joined: Joined) -> Floats:
+        """Return the largest rates (intervals, 1) of the station."""
+        return joined.station.rates[joined.own_intervals]
+
+    def largest(self, joined: Joined) -> None:
+        """Return nothing: certificates tell of it with the feed."""
+        return

@@ -1,0 +1,47 @@
+"""Limit of the tip's jerk: |T′ s⃛ + 3 T″ ṡ s̈ + T‴ ṡ³| ≤ j."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.machine.machine import Machine
+from pentapod.machine.rounding import TIP_ROUNDING
+from pentapod.timing.limits.leg_jerk import RINGS, vector_jerk
+from pentapod.timing.limits.limit import MachineLimit, Motion, Reserve
+from pentapod.timing.limits.polytopes import polyhedron
+from pentapod.timing.path.joined import Joined
+from pentapod.timing.path.path_derivatives import PathDerivatives
+
+
+@dataclass(frozen=True, eq=False)
+class TipJerk(MachineLimit):
+    """limit, bound (1,) m/s³: setpoints must keep the bound before they are rounded."""
+
+    quantity = "tip jerk"
+    unit = "m/s³"
+    group = "jerk"
+    of_tool = True
+    above = RINGS
+
+    @classmethod
+    def of(cls, machine: Machine, reserve: Reserve) -> TipJerk | None:
+        """Return the machine's limit, None where it sets none."""
+        limit = np.atleast_1d(reserve.jerk(machine.tool_limits.max_tip_jerk, TIP_ROUNDING) * reserve.smoother)
+        return cls(limit, limit / reserve.smoother) if np.isfinite(limit).all() else None
+
+    def jerk_rows(self, path: PathDerivatives) -> Floats:
+        """Return the rows of a polyhedron around the sphere."""
+        return polyhedron(path.tip[0], path.tip[1], path.tip[2], self.limit.item())
+
+    def share(self, path: PathDerivatives, motion: Motion) -> Floats:
+        """Return the shares (n, 1), none where the motion's jerk is not known."""
+        if motion.jerk is None:
+            return np.zeros((len(path.s), 1))
+        return np.linalg.norm(vector_jerk(path.tip, motion), axis=1, keepdims=True) / self.limit
+
+    def measured(self, joined: Joined) -> Floats:
+        """Return the jerks (intervals, 1)."""
+        return joined.tip.jerk_lengths[joined.own_intervals, None]

@@ -1,0 +1,1 @@
+"""The path as the time law sees it: pieces, their derivatives, and the setpoints on them."""

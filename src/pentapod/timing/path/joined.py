@@ -1,0 +1,100 @@
+"""Setpoints as the controller joins them: polynomials of legs, station, tip and tool axis over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.geometry.interpolant import Interpolant
+from pentapod.timing.path.paths import PieceLike
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Setpoints at equal periods: legs (N, legs) and stations (N,) in metres; tips, axes (N, 3) where they count."""
+
+    legs: Floats
+    stations: Floats
+    tips: Floats | None = None
+    axes: Floats | None = None
+
+    @classmethod
+    def at(cls, piece: PieceLike, s: Floats, *, tool: bool) -> Rows:
+        """Return the rows of a piece at stations s (N,); tool: with tips and axes."""
+        return cls(piece(s, 0), s, *(piece.pose(s) if tool else ()))
+
+    @classmethod
+    def concatenated(cls, parts: Sequence[Rows]) -> Rows:
+        """Return the rows of one part after the other."""
+        if len(parts) == 1:
+            return parts[0]
+        columns = zip(*((part.legs, part.stations, part.tips, part.axes) for part in parts), strict=True)
+        legs, stations, tips, axes = (
+            None if column[0] is None else np.concatenate([y for y in column if y is not None]) for column in columns
+        )
+        return cls(np.asarray(legs), np.asarray(stations), tips, axes)
+
+    def __getitem__(self, rows: slice) -> Rows:
+        """Return some of the rows."""
+        tips, axes = (None if y is None else y[rows] for y in (self.tips, self.axes))
+        return Rows(self.legs[rows], self.stations[rows], tips, axes)
+
+    def __len__(self) -> int:
+        return len(self.stations)
+
+    def shifted(self, way: float) -> Rows:
+        """Return the rows with stations `way` metres further on."""
+        return Rows(self.legs, self.stations + way, self.tips, self.axes)
+
+
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """Rows as the controller joins them, of which `count` intervals from row `first` on are looked at.
+
+    piece: the one to which these rows belong; stations are its own.
+    """
+
+    rows: Rows
+    piece: PieceLike
+    period: float
+    interpolation: Literal["linear", "cubic"]
+    first: int
+    count: int
+
+    @property
+    def own_rows(self) -> slice:
+        """The rows that are looked at."""
+        return slice(self.first, self.first + self.count + 1)
+
+    @property
+    def own_intervals(self) -> slice:
+        """The intervals between them."""
+        return slice(self.first, self.first + self.count)
+
+    @cached_property
+    def legs(self) -> Interpolant:
+        """The legs over time."""
+        return self._through(self.rows.legs)
+
+    @cached_property
+    def station(self) -> Interpolant:
+        """The station over time, one column."""
+        return self._through(self.rows.stations[:, None])
+
+    @cached_property
+    def tip(self) -> Interpolant:
+        """The tip over time, where the rows have it."""
+        return self._through(np.asarray(self.rows.tips))
+
+    @cached_property
+    def axis(self) -> Interpolant:
+        """The tool axis over time, likewise."""
+        return self._through(np.asarray(self.rows.axes))
+
+    def _through(self, rows: Floats) -> Interpolant:
+        return Interpolant.through(rows, self.period, self.interpolation)
