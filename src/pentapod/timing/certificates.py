@@ -73,12 +73,12 @@ def certify(
     times = np.minimum(np.arange(count + 1) * period, trajectory.duration)
     stations, segments = trajectory.station(times), trajectory.segment(times)
     limits, given = (*machine_limits(machine), *trajectory.limits), tips
-    tool = tips is not None or any(limit.of_tool for limit in limits)
-    if tool and (tips is None or axes is None):
+    of_tool = any(limit.of_tool for limit in limits)
+    if of_tool and (tips is None or axes is None):
         posed = trajectory.pose(times)
         tips, axes = posed[0] if tips is None else tips, posed[1] if axes is None else axes
     # A motion that starts or ends at a speed is part of a longer one, which the controller's spline goes through.
-    before, after = _paddings(trajectory, period, tool=tool)
+    before, after = _paddings(trajectory, period, tool=tips is not None)
     rows = Rows(trajectory(times) if legs is None else legs, stations, tips, axes)
     rows = Rows.concatenated([part for part in (before, rows, after) if part is not None])
     first = 0 if before is None else len(before)

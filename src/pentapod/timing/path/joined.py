@@ -30,14 +30,17 @@ class Rows:
 
     @classmethod
     def concatenated(cls, parts: Sequence[Rows]) -> Rows:
-        """Return the rows of one part after the other."""
+        """Return the rows of one part after the other; tips and axes where all parts have them."""
         if len(parts) == 1:
             return parts[0]
-        columns = zip(*((part.legs, part.stations, part.tips, part.axes) for part in parts), strict=True)
-        legs, stations, tips, axes = (
-            None if column[0] is None else np.concatenate([y for y in column if y is not None]) for column in columns
+        tips, axes = [part.tips for part in parts], [part.axes for part in parts]
+        tips, axes = ([y for y in column if y is not None] for column in (tips, axes))
+        return cls(
+            np.concatenate([part.legs for part in parts]),
+            np.concatenate([part.stations for part in parts]),
+            np.concatenate(tips) if len(tips) == len(parts) else None,
+            np.concatenate(axes) if len(axes) == len(parts) else None,
         )
-        return cls(np.asarray(legs), np.asarray(stations), tips, axes)
 
     def __getitem__(self, rows: slice) -> Rows:
         """Return some of the rows."""
