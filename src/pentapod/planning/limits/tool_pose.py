@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.kinematics.arithmetic import Arithmetic, Joints, Vector, dot
+from pentapod.kinematics.arithmetic import NUMPY, Arithmetic, Joints, Vector, dot
 from pentapod.kinematics.robot import Branch, Robot
 from pentapod.machine.machine import Machine
 
@@ -69,8 +69,10 @@ class ToolPose:
 
     @cached_property
     def readings(self) -> list[Any]:
-        """The leg lengths (n_legs) as the controller reads them, metres."""
-        return self.machine.robot.lengths_of(self.vectors, self.xp)
+        """The leg lengths (n_legs) as the controller reads them, metres: with the zeros of the scales."""
+        robot = self.machine.robot
+        zeros = robot.lengths_of([(0.0, 0.0, 0.0)] * robot.n_legs, NUMPY)
+        return [length + zero if zero else length for length, zero in zip(self.lengths, zeros, strict=True)]
 
     @cached_property
     def lengths(self) -> list[Any]:
