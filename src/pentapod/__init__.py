@@ -11,7 +11,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pentapod.base import InputError as InputError
+    from pentapod.base import PentapodError as PentapodError
     from pentapod.base import Refusal as Refusal
+    from pentapod.base import RefusalError as RefusalError
     from pentapod.base.version import __version__ as __version__
     from pentapod.cutters import BallCutter as BallCutter
     from pentapod.cutters import BullNose as BullNose
@@ -28,11 +31,14 @@ if TYPE_CHECKING:
     from pentapod.machine import Machine as Machine
     from pentapod.machine import Surroundings as Surroundings
     from pentapod.mesh import Mesh as Mesh
+    from pentapod.mesh import Region as Region
     from pentapod.mesh import load_mesh as load_mesh
+    from pentapod.mesh import write_stl as write_stl
     from pentapod.planning import LegPath as LegPath
     from pentapod.planning import PlacedPath as PlacedPath
     from pentapod.planning import Placement as Placement
     from pentapod.planning import PlacementConstraints as PlacementConstraints
+    from pentapod.planning import Weights as Weights
     from pentapod.planning import leg_path as leg_path
     from pentapod.planning import plan as plan
     from pentapod.program import Program as Program
@@ -40,133 +46,98 @@ if TYPE_CHECKING:
     from pentapod.program import read_csv as read_csv
     from pentapod.program import sample as sample
     from pentapod.program import write_csv as write_csv
+    from pentapod.program.posts import PostInput as PostInput
+    from pentapod.program.posts import post_names as post_names
+    from pentapod.program.posts import read_post as read_post
+    from pentapod.program.posts import write_post as write_post
     from pentapod.report import write_report as write_report
+    from pentapod.simulate import Played as Played
+    from pentapod.simulate import Reference as Reference
+    from pentapod.simulate import simulate_servo as simulate_servo
+    from pentapod.timing import Explanation as Explanation
     from pentapod.timing import Trajectory as Trajectory
+    from pentapod.timing import explain as explain
+    from pentapod.timing import override as override
     from pentapod.timing import retime as retime
+    from pentapod.toolpath import Between as Between
     from pentapod.toolpath import Cone as Cone
+    from pentapod.toolpath import CrossHatchOptions as CrossHatchOptions
+    from pentapod.toolpath import CurveOptions as CurveOptions
+    from pentapod.toolpath import EdgeOptions as EdgeOptions
+    from pentapod.toolpath import Fixed as Fixed
     from pentapod.toolpath import GougeOptions as GougeOptions
+    from pentapod.toolpath import ImageOptions as ImageOptions
+    from pentapod.toolpath import LinkStyle as LinkStyle
+    from pentapod.toolpath import Normal as Normal
+    from pentapod.toolpath import OffsetOptions as OffsetOptions
     from pentapod.toolpath import Orientation as Orientation
+    from pentapod.toolpath import Pointed as Pointed
+    from pentapod.toolpath import PolylineOptions as PolylineOptions
     from pentapod.toolpath import RasterOptions as RasterOptions
     from pentapod.toolpath import Remedy as Remedy
+    from pentapod.toolpath import Segment as Segment
+    from pentapod.toolpath import SegmentKind as SegmentKind
+    from pentapod.toolpath import SpiralOptions as SpiralOptions
     from pentapod.toolpath import Toolpath as Toolpath
+    from pentapod.toolpath import WaterlineOptions as WaterlineOptions
+    from pentapod.toolpath import lettering as lettering
     from pentapod.toolpath import make_toolpath as make_toolpath
     from pentapod.toolpath import oriented as oriented
+    from pentapod.toolpath import read_darkness as read_darkness
+    from pentapod.toolpath import read_lines as read_lines
+    from pentapod.toolpath import read_points as read_points
+    from pentapod.toolpath import stepped as stepped
+    from pentapod.toolpath import toolpath_with_report as toolpath_with_report
     from pentapod.toolpath import without_gouges as without_gouges
+    from pentapod.toolpath.formats import read_toolpath as read_toolpath
+    from pentapod.toolpath.formats import write_toolpath as write_toolpath
     from pentapod.verify import Certificate as Certificate
     from pentapod.verify import Coverage as Coverage
     from pentapod.verify import Cutting as Cutting
     from pentapod.verify import NotJudged as NotJudged
     from pentapod.verify import Verdict as Verdict
+    from pentapod.verify import verify as verify
 
-# `verify` is the one verb that is missing: it has the name of its package. `from pentapod.verify import verify`.
-_HOMES = {
-    "Machine": "machine",
-    "Surroundings": "machine",
-    "LinearPentapod": "kinematics",
-    "Component": "kinematics",
-    "RigidTransform": "geometry",
-    "load_mesh": "mesh",
-    "Mesh": "mesh",
-    "BallCutter": "cutters",
-    "FlatEnd": "cutters",
-    "BullNose": "cutters",
-    "Lollipop": "cutters",
-    "StandOff": "cutters",
-    "Cone": "toolpath",
-    "RasterOptions": "toolpath",
-    "Orientation": "toolpath",
-    "GougeOptions": "toolpath",
-    "Remedy": "toolpath",
-    "make_toolpath": "toolpath",
-    "oriented": "toolpath",
-    "without_gouges": "toolpath",
-    "Toolpath": "toolpath",
-    "plan": "planning",
-    "PlacementConstraints": "planning",
-    "Placement": "planning",
-    "PlacedPath": "planning",
-    "leg_path": "planning",
-    "LegPath": "planning",
-    "retime": "timing",
-    "Trajectory": "timing",
-    "sample": "program",
-    "Provenance": "program",
-    "Program": "program",
-    "write_csv": "program",
-    "read_csv": "program",
-    "Certificate": "verify",
-    "NotJudged": "verify",
-    "Coverage": "verify",
-    "Cutting": "verify",
-    "Verdict": "verify",
-    "Refusal": "base",
-    "Job": "job",
-    "run": "job",
-    "judge": "job",
-    "Outcome": "job",
-    "write_report": "report",
-    "__version__": "base.version",
+_ROOMS = {
+    "base": "InputError PentapodError Refusal RefusalError",
+    "geometry": "RigidTransform",
+    "mesh": "Mesh Region load_mesh write_stl",
+    "cutters": "BallCutter BullNose FlatEnd Lollipop StandOff",
+    "kinematics": "Component LinearPentapod",
+    "machine": "Machine Surroundings",
+    "toolpath": "Cone RasterOptions CrossHatchOptions WaterlineOptions OffsetOptions SpiralOptions EdgeOptions "
+    "CurveOptions PolylineOptions ImageOptions lettering read_lines read_points read_darkness "
+    "make_toolpath toolpath_with_report Orientation Normal Fixed Pointed Between oriented stepped "
+    "GougeOptions Remedy LinkStyle without_gouges Segment SegmentKind Toolpath",
+    "toolpath.formats": "read_toolpath write_toolpath",
+    "planning": "plan PlacementConstraints Weights Placement PlacedPath leg_path LegPath",
+    "timing": "retime Trajectory explain Explanation override",
+    "program": "sample Provenance Program write_csv read_csv",
+    "program.posts": "PostInput post_names write_post read_post",
+    "verify": "verify Coverage Cutting Certificate NotJudged Verdict",
+    "simulate": "Reference simulate_servo Played",
+    "job": "Job run judge Outcome",
+    "report": "write_report",
+    "base.version": "__version__",
 }
+_HOMES = {name: room for room, names in _ROOMS.items() for name in names.split()}
 
-__all__ = [  # noqa: RUF022 - in the order of the flow
-    "Machine",
-    "Surroundings",
-    "LinearPentapod",
-    "Component",
-    "RigidTransform",
-    "load_mesh",
-    "Mesh",
-    "BallCutter",
-    "FlatEnd",
-    "BullNose",
-    "Lollipop",
-    "StandOff",
-    "Cone",
-    "RasterOptions",
-    "Orientation",
-    "GougeOptions",
-    "Remedy",
-    "make_toolpath",
-    "oriented",
-    "without_gouges",
-    "Toolpath",
-    "plan",
-    "PlacementConstraints",
-    "Placement",
-    "PlacedPath",
-    "leg_path",
-    "LegPath",
-    "retime",
-    "Trajectory",
-    "sample",
-    "Provenance",
-    "Program",
-    "write_csv",
-    "read_csv",
-    "Certificate",
-    "NotJudged",
-    "Coverage",
-    "Cutting",
-    "Verdict",
-    "Refusal",
-    "Job",
-    "run",
-    "judge",
-    "Outcome",
-    "write_report",
-    "__version__",
-]
+if not TYPE_CHECKING:  # type checkers read the imports above
+    __all__ = list(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
     """Load a name of `__all__` from where it lives. Raises AttributeError for others."""
     if name not in _HOMES:
         raise AttributeError(f"module 'pentapod' has no attribute {name!r}")
-    value = getattr(import_module(f"pentapod.{_HOMES[name]}"), name)
+    home = import_module(f"pentapod.{_HOMES[name]}")
+    if name == "verify":  # the package of this name, which can be called
+        return home
+    value = getattr(home, name)
     globals()[name] = value  # so that it is looked up once
     return value
 
 
 def __dir__() -> list[str]:
     """Return the public names."""
-    return sorted(__all__)
+    return sorted(_HOMES)

@@ -7,6 +7,7 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cached_property
 from pathlib import PurePath
+from types import FunctionType
 from typing import Any, ClassVar, Self, cast
 
 LONGEST = 300
@@ -46,7 +47,7 @@ class Value:
                 setattr(cls, name, getattr(cls, name))
 
     def __repr__(self) -> str:
-        names = (*self.summary, *(f.name for f in fields(cast(Any, self)) if f.repr))
+        names = dict.fromkeys((*self.summary, *(f.name for f in fields(cast(Any, self)) if f.repr)))
         parts = [f"{name}={_text(getattr(self, name), _UNIT_OF.get(name, ''))}" for name in names]
         shown = [part if len(part) <= _LONGEST_FIELD else part[: _LONGEST_FIELD - 1] + "…" for part in parts]
         while len(text := f"{type(self).__name__}({', '.join(shown)})") > LONGEST:
@@ -89,6 +90,8 @@ def same(a: Any, b: Any) -> bool:
     if isinstance(a, dict) and isinstance(b, dict):
         keys, others = cast("dict[Any, Any]", a), cast("dict[Any, Any]", b)
         return keys.keys() == others.keys() and all(same(value, others[key]) for key, value in keys.items())
+    if type(a) is type(b) and not isinstance(a, type | FunctionType) and type(a).__eq__ is object.__eq__:
+        return same(a.__getstate__(), b.__getstate__())
     return not _is_array(a) and not _is_array(b) and bool(a == b or (a != a and b != b))  # noqa: PLR0124 - NaN
 
 
@@ -97,7 +100,7 @@ def _content(value: Value) -> list[Any]:
 
 
 def _is_array(value: Any) -> bool:
-    return hasattr(value, "dtype") and hasattr(value, "flags")
+    return hasattr(value, "flags") and getattr(value, "ndim", 0) > 0
 
 
 def _text(value: Any, unit: str = "") -> str:  # noqa: PLR0911 - a kind of value each
@@ -106,9 +109,7 @@ def _text(value: Any, unit: str = "") -> str:  # noqa: PLR0911 - a kind of value
         return _array(value, unit)
     if isinstance(value, float):
         return f"{value:.6g}{unit}"
-    if isinstance(value, Enum):
-        return str(value)
-    if isinstance(value, str | PurePath):
+    if isinstance(value, str | PurePath) and not isinstance(value, Enum):
         text = str(value)
         return repr(text if len(text) <= _LONGEST_TEXT else text[: _LONGEST_TEXT - 1] + "…")
     if isinstance(value, Mapping):
@@ -119,7 +120,7 @@ def _text(value: Any, unit: str = "") -> str:  # noqa: PLR0911 - a kind of value
         return f"{type(value).__name__}({', '.join(f'{k}={_text(getattr(value, k))}' for k in value.summary) or '…'})"
     if is_dataclass(value):
         return f"{type(value).__name__}(…)"
-    return str(getattr(value, "__name__", None) or repr(value))
+    return str(getattr(value, "__name__", value))
 
 
 def _items(items: tuple[Any, ...], unit: str) -> str:

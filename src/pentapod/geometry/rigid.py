@@ -19,6 +19,8 @@ class RigidTransform(Value):
     Raises ArrayError where the rotation is not a rotation to 1e-9.
     """
 
+    summary = ("translation",)
+
     rotation: Floats
     translation: Floats
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from pentapod.base.refusal import Refusal
-from pentapod.base.values import Result
+from pentapod.base.values import Result, Value
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.planning.placement.placed_path import PlacedPath
@@ -17,11 +17,11 @@ from pentapod.verify.claims.pieces import WHOLE
 from pentapod.verify.verdict.sources import UNTOLD, Sources
 from pentapod.verify.verdict.verdict import Certificate, Place, Verdict
 
-Value = TypeVar("Value")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Stage:
+class Stage(Value):
     """One stage that ran: its name, its wall time in seconds, the value that it gave, and what it says of it.
 
     A value that is a tuple is several values of one stage.
@@ -40,12 +40,14 @@ class Outcome(Result):
     machine: with the job's own tool length and controller settings.
     """
 
+    summary = ("passed", "refusal")
+
     job: Job
     machine: Machine
     stages: tuple[Stage, ...]
     verdict: Verdict
 
-    def find(self, kind: type[Value]) -> Value | None:
+    def find(self, kind: type[T]) -> T | None:
         """Return the value of this type, or None where no stage gave one."""
         for stage in self.stages:
             for value in stage.value if isinstance(stage.value, tuple) else (stage.value,):
@@ -63,6 +65,12 @@ class Outcome(Result):
         """True when there is a program and every claim about it holds."""
         return self.refusal is None and self.verdict.passed
 
+    def unwrap(self) -> Self:
+        """Return the outcome itself. Raises RefusalError where the job cannot be done."""
+        if self.refusal is not None:
+            self.refusal.unwrap()
+        return self
+
     def to_dict(self) -> dict[str, Any]:
         """Return the content of verdict.json; one of a refused job, or of several set-ups, tells so."""
         content = self.verdict.to_dict()
@@ -74,7 +82,7 @@ class Outcome(Result):
 
 
 @dataclass(frozen=True)
-class SetUp:
+class SetUp(Value):
     """One of several set-ups: its number from 1, the piece of the job's toolpath, and what its own run reached."""
 
     number: int
@@ -126,7 +134,7 @@ class SetUp:
 
 
 @dataclass(frozen=True)
-class SetUps:
+class SetUps(Value):
     """The set-ups into which a job was split, in their order.
 
     cuts: how many intervals of the toolpath are cut; missed: how many of them in no set-up, or in more than one. most:

@@ -41,6 +41,8 @@ class Machine(Value):
     spindle's nose would be above the lowest platform joint.
     """
 
+    summary = ("name",)
+
     name: str
     robot: LinearPentapod
     legs: LegLimits

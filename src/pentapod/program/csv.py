@@ -11,6 +11,7 @@ import numpy as np
 
 from pentapod.base.errors import ProgramError
 from pentapod.base.files import atomic_write
+from pentapod.base.refusal import stage
 from pentapod.program.csv_rows import COLUMNS, TimeCheck, read_rows
 from pentapod.program.header import MAGIC, Header, header_text, parse_header
 from pentapod.program.program import FORMAT_VERSION, Program
@@ -20,6 +21,7 @@ _CHUNK = 20_000
 _LONGEST, _MOST_LINES = 65_536, 1_000  # bytes of a line of the header, and its lines
 
 
+@stage
 def write_csv(program: Program, path: str | Path) -> Path:
     """Write a program and return its path. Same program, same bytes; an interruption leaves no half file.
 

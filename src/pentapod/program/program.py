@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ProgramError
+from pentapod.base.extras import load_extra
+from pentapod.base.html import html_table
 from pentapod.base.values import Result, Value
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import Machine
+from pentapod.program.resolution import to_millimetres
 from pentapod.toolpath.linking.partition import Piece
 
 FORMAT_VERSION = 1
@@ -48,6 +51,8 @@ class Program(Result):
     reconfigurable machine stand, metres; None for other machines.
     """
 
+    summary = ("duration",)
+
     period: float
     legs: Floats
     interpolation: Literal["linear", "cubic"]
@@ -76,3 +81,22 @@ class Program(Result):
     def duration(self) -> float:
         """Time of the last row in seconds."""
         return (len(self.legs) - 1) * self.period
+
+    def to_frame(self) -> Any:
+        """Return leg lengths by `time_s` as a pandas DataFrame, `leg1_mm` and so on. Raises InputError without it."""
+        pandas = load_extra("pandas", "pandas", "frames need pandas", key="to_frame")
+        names = [f"leg{leg}_mm" for leg in range(1, self.legs.shape[1] + 1)]
+        return pandas.DataFrame(to_millimetres(self.legs), pandas.Index(self.times, name="time_s"), names)
+
+    def _repr_html_(self) -> str:
+        """Return what notebooks show: how long it is, how it is played, and what it was made from."""
+        low, high = to_millimetres(self.legs).min(axis=0), to_millimetres(self.legs).max(axis=0)
+        ranges = ", ".join(f"{a:.3f} to {b:.3f}" for a, b in zip(low, high, strict=True))
+        rows = (
+            ("rows", f"{len(self.legs):,}, one each {1e3 * self.period:g} ms, {self.interpolation} between them"),
+            ("legs, mm", ranges),
+            ("component", str(self.component)),
+            ("machine", self.provenance.machine),
+            ("job", self.provenance.job_digest[:12] or "none"),
+        )
+        return html_table(f"Program: {self.duration:.3f} s", rows)

@@ -7,10 +7,13 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.base.errors import InputError
+from pentapod.base.refusal import Refusal, stage
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.machine.machine import Machine
+from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.program.program import Program, Provenance
 from pentapod.program.resolution import quantised
 from pentapod.timing.law.trajectory import Trajectory
@@ -18,19 +21,26 @@ from pentapod.timing.law.trajectory import Trajectory
 _CHUNK = 100_000
 
 
+@stage
 def sample(
     trajectory: Trajectory,
     machine: Machine,
-    placement: RigidTransform,
-    component: Component,
+    placement: RigidTransform | PlacedPath | Refusal,
+    component: Component | None = None,
     provenance: Provenance | None = None,
 ) -> Program:
     """Return the program: the trajectory at the controller's period, at the resolution of program files.
 
     `retime` gives trajectories that last a whole number of the machine's periods; of any other the last
-    row is the end point, reached within the last period. placement: workpiece → machine, metres.
-    provenance: without it the program names the machine and no job.
+    row is the end point, reached within the last period. placement: what `plan` returned; or workpiece → machine, and
+    the component with it. provenance: without it the program names the machine and no job. Raises InputError where the
+    component is missing.
     """
+    if not isinstance(placement, RigidTransform):
+        placed = placement.unwrap()
+        placement, component = placed.placement.transform, component or placed.component
+    if component is None:
+        raise InputError("a placement alone does not say the component", key="component", expected="a Component")
     period = machine.controller.period
     count = max(1, math.ceil(trajectory.duration / period - 1e-6))
     times = np.minimum(np.arange(count + 1) * period, trajectory.duration)

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
-from pentapod.base.errors import ArrayError, InputError
+from pentapod.base.errors import ArrayError
+from pentapod.base.extras import load_extra
 from pentapod.base.progress import Progress, silent
-from pentapod.base.refusal import Refusal
-from pentapod.base.values import Result, Value
+from pentapod.base.refusal import Refusal, stage
+from pentapod.base.values import Result
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.families.as_built_forward import as_built_pose
 from pentapod.simulate.load import leg_loads
@@ -28,7 +29,7 @@ _NEWS = 500  # rows between two reports of progress
 
 
 @dataclass(frozen=True, eq=False)
-class Physics(Value):
+class Physics(Result):
     """A program as MuJoCo played it.
 
     leg_forces (N, 5): with which each leg pushes its platform joint away from its base joint, newtons: what bends and
@@ -67,11 +68,7 @@ class Plant(Result):
 
 def load_mujoco() -> Any:
     """Return the module mujoco. Raises InputError where it is not installed."""
-    try:
-        import mujoco  # noqa: PLC0415 - an extra
-    except ModuleNotFoundError as error:
-        raise InputError("this engine needs MuJoCo", key="mujoco", remedy='pip install "pentapod[sim]"') from error
-    return mujoco
+    return load_extra("mujoco", "sim", "this engine needs MuJoCo", key="mujoco")
 
 
 def plant(reference: Reference, *, base_errors: ArrayLike = 0.0, offset_errors: ArrayLike = 0.0) -> Plant | Refusal:
@@ -93,6 +90,7 @@ def plant(reference: Reference, *, base_errors: ArrayLike = 0.0, offset_errors: 
     return Plant(xml, start.position, start.direction)
 
 
+@stage
 def simulate_mujoco(
     reference: Reference, stands: Plant, *, tip_forces: ArrayLike = 0.0, progress: Progress = silent
 ) -> Physics | Refusal:

@@ -11,7 +11,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError
-from pentapod.base.refusal import Refusal
+from pentapod.base.refusal import Refusal, stage
 from pentapod.kinematics.forward.quadratic import NEAR_W_SQUARED
 from pentapod.simulate.correction import NO_CORRECTION, correction_for
 from pentapod.simulate.played import Played
@@ -21,6 +21,7 @@ _REST_S = 0.25  # before the start the drives stand still and settle, as on a ma
 _LARGEST = 100.0  # legs that are off by a hundred metres are beyond control
 
 
+@stage
 def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False) -> Played | Refusal:
     """Return how five servo drives play a program; the same for the same seed, which gives the ripple's phases.
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
+from pentapod.base.refusal import stage
 from pentapod.base.values import Value
 from pentapod.machine.machine import Machine
 from pentapod.timing.certificates import LimitUse
@@ -109,6 +110,7 @@ class Explanation(Value):
         return content
 
 
+@stage
 def explain(
     trajectory: Trajectory,
     machine: Machine,

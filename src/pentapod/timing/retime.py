@@ -9,7 +9,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress, silent
-from pentapod.base.refusal import Refusal
+from pentapod.base.refusal import Refusal, stage
 from pentapod.machine.machine import Machine
 from pentapod.timing.law.refusals import STILL_M, refusal, unfit
 from pentapod.timing.law.slowed import slowed
@@ -25,6 +25,7 @@ from pentapod.timing.topp.engine import Engine
 from pentapod.timing.topp.stages import Failure
 
 
+@stage
 def retime(
     path: LegPathLike,
     machine: Machine,

@@ -24,6 +24,7 @@ from pentapod.toolpath.inputs.lettering import lettering
 from pentapod.toolpath.inputs.pictures import read_darkness
 from pentapod.toolpath.inputs.points import read_points
 from pentapod.toolpath.lines.scallop import stepover_for
+from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.options import CoverOptions, Entry, PathOptions
 from pentapod.toolpath.path_report import PathReport
 from pentapod.toolpath.strategies.cross_hatch import CrossHatchOptions
@@ -61,6 +62,7 @@ __all__ = [
     "GougeReport",
     "HeightField",
     "ImageOptions",
+    "LinkStyle",
     "Lollipop",
     "Mesh",
     "MeshDiagnosis",

@@ -6,16 +6,21 @@ import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
+from pentapod.base.extras import plot_axes
+from pentapod.base.html import html_table
 from pentapod.base.values import Value
+from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.runs import run_starts
 
 JOIN_TOLERANCE_M = 1e-9
+_MOST_DRAWN = 800
 
 
 class SegmentKind(StrEnum):
@@ -24,6 +29,9 @@ class SegmentKind(StrEnum):
     CUT = "cut"
     LINK = "link"
     RAPID = "rapid"
+
+
+_STYLES = {SegmentKind.CUT: "-", SegmentKind.LINK: "--", SegmentKind.RAPID: ":"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +44,8 @@ class Segment(Value):
     0 for an exact stop without waiting, None where it passes on without a stop. N ≥ 2. Raises ToolpathError for
     an empty segment, a bad feed, power or dwell, or an axis that is not of unit length.
     """
+
+    summary = ("kind",)
 
     kind: SegmentKind
     tips: Floats
@@ -74,6 +84,8 @@ class Toolpath(Value):
     it sets off. Waypoints are the poses of all segments, joints once. Raises ToolpathError where two segments do not
     join, or for a bad wait.
     """
+
+    summary = ("waypoints", "cut_length")
 
     segments: tuple[Segment, ...]
     pivot: float = 0.0
@@ -122,6 +134,42 @@ class Toolpath(Value):
     def __len__(self) -> int:
         return int(self.starts[-1]) + 1
 
+    @property
+    def waypoints(self) -> int:
+        """How many waypoints there are."""
+        return len(self)
+
+    @property
+    def cut_length(self) -> float:
+        """Length of all cuts along the tip, metres."""
+        return sum(float(arc_length(s.tips)[-1]) for s in self.segments if s.kind is SegmentKind.CUT)
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw the tip's path in millimetres into matplotlib axes with three dimensions, and return them.
+
+        Cuts are drawn through, links and rapids broken. Raises InputError where matplotlib is not installed.
+        """
+        (drawn,) = plot_axes(axes, projection="3d")
+        for kind, style in _STYLES.items():
+            gap = np.full((1, 3), np.nan)
+            parts = [part for s in self.segments if s.kind is kind for part in (1e3 * s.tips, gap)]
+            if parts:
+                drawn.plot(*np.concatenate(parts).T, style, label=str(kind), lw=1)
+        drawn.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm", aspect="equal")
+        drawn.legend()
+        return drawn
+
+    def _repr_html_(self) -> str:
+        """Return what notebooks show: what it is made of, its bounds, and the path seen from above."""
+        kinds = [s.kind for s in self.segments]
+        low, high = 1e3 * self.tips.min(axis=0), 1e3 * self.tips.max(axis=0)
+        rows = (
+            ("segments", ", ".join(f"{kinds.count(kind)} {kind}" for kind in SegmentKind if kind in kinds)),
+            ("cut", f"{1e3 * self.cut_length:,.1f} mm"),
+            ("x, y, z, mm", ", ".join(f"{a:.2f} to {b:.2f}" for a, b in zip(low, high, strict=True))),
+        )
+        return html_table(f"Toolpath: {len(self):,} waypoints", rows, more=_seen_from_above(self.tips))
+
     def _joined(self, name: str) -> Floats:
         parts = [getattr(s, name) for s in self.segments]
         return frozen(np.concatenate([parts[0], *(p[1:] for p in parts[1:])]), name)
@@ -147,3 +195,12 @@ class Toolpath(Value):
 def _check_seconds(name: str, seconds: float) -> None:
     if not (math.isfinite(seconds) and seconds >= 0.0):
         raise ToolpathError("must be a time", key=name, value=seconds, expected="seconds, 0 or more")
+
+
+def _seen_from_above(tips: Floats) -> str:
+    """Return a small drawing (SVG) of a path (N, 3) in the colour of the text around it."""
+    points = tips[:: max(1, len(tips) // _MOST_DRAWN), :2] - tips[:, :2].min(axis=0)
+    points *= 180.0 / max(float(np.ptp(tips[:, :2], axis=0).max()), 1e-9)
+    line = " ".join(f"{x:.1f},{180.0 - y:.1f}" for x, y in points)
+    path = f'<polyline points="{line}" fill="none" stroke="currentColor" stroke-width="0.7"/>'
+    return f'<svg width="190" height="190" viewBox="-5 -5 190 190">{path}</svg>'

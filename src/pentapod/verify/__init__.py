@@ -1,4 +1,11 @@
-"""Verify: judges the program that was emitted. Reads it, replays it, certifies it; knows no planner."""
+"""Verify: judges the program that was emitted. Reads it, replays it, certifies it; knows no planner.
+
+The package can be called like its function `verify`, since both have the name `pentapod.verify`.
+"""
+
+import sys
+from types import ModuleType
+from typing import Any
 
 from pentapod.verify.judge import CLAIM_NAMES, CLAIMS, judged, verify, write_verdict
 from pentapod.verify.replay.claim import Claim
@@ -26,3 +33,12 @@ __all__ = [
     "verify",
     "write_verdict",
 ]
+
+
+class _Callable(ModuleType):
+    def __call__(self, *given: Any, **asked: Any) -> Any:
+        """Return the verdict on a program, as `verify.verify`."""
+        return verify(*given, **asked)
+
+
+sys.modules[__name__].__class__ = _Callable

@@ -10,6 +10,7 @@ from typing import Unpack
 from pentapod.base.errors import InputError, MachineError, ProgramError, nearest
 from pentapod.base.files import atomic_write, sha256_of
 from pentapod.base.progress import Progress, silent
+from pentapod.base.refusal import stage
 from pentapod.machine.machine import Machine
 from pentapod.program.csv import read_csv
 from pentapod.program.program import Program
@@ -64,6 +65,7 @@ CLAIM_NAMES = tuple(claim.name for claim in CLAIMS)
 """What may be waived."""
 
 
+@stage
 def verify(
     program: Program | str | Path,
     machine: Machine,

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
 from pentapod.base.errors import InputError
+from pentapod.base.extras import load_extra
 
 if TYPE_CHECKING:
     import viser
@@ -33,10 +34,7 @@ _LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 def load_viser() -> Any:
     """Return the module viser. Raises InputError where it is not installed, or not as tested."""
-    try:
-        import viser  # noqa: PLC0415 - an extra, and heavy
-    except ModuleNotFoundError as error:
-        raise InputError("the viewer needs viser", key="viser", remedy='pip install "pentapod[view]"') from error
+    viser = load_extra("viser", "view", "the viewer needs viser", key="viser")
     if viser.__version__ != TESTED:
         raise InputError(
             "with another version of viser foreign web pages may connect to the viewer", key="viser",

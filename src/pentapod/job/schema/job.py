@@ -47,6 +47,8 @@ class Job(Value):
     their keys in [toolpath]: resolved against its folder. from_file: whether the job is as its file says.
     """
 
+    summary = ("path",)
+
     path: Path
     tables: JobTables
     mesh_path: Path

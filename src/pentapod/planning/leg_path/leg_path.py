@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats, Ints, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
-from pentapod.base.refusal import Blame, Refusal
+from pentapod.base.refusal import Blame, Refusal, stage
 from pentapod.base.values import Result, Value
 from pentapod.geometry.fillet import TooFar, rounded
 from pentapod.kinematics.robot import Robot
@@ -37,6 +37,8 @@ class LegPiece(Value):
     section_feeds (M,): m/s, infinite on rapids; section_kinds, section_segments (M,): kind and index of the segment.
     waypoint_stations (W,): s nearest to each waypoint; waypoints (W,): its index in the toolpath.
     """
+
+    summary = ("length",)
 
     curve: ToolCurve
     robot: Robot
@@ -97,6 +99,8 @@ class LegPath(Result):
     starts (P + 1,): station where each begins, and the end. dwells (P + 1,): seconds for which it stands there.
     """
 
+    summary = ("length",)
+
     pieces: tuple[LegPiece, ...]
     starts: Floats
     dwells: Floats
@@ -138,6 +142,7 @@ class LegPath(Result):
         return out
 
 
+@stage
 def leg_path(
     placed: PlacedPath,
     machine: Machine,

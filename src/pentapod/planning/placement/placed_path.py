@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.extras import plot_axes
 from pentapod.base.refusal import Refusal
 from pentapod.base.values import Result
 from pentapod.kinematics.robot import Branch
@@ -20,6 +24,8 @@ class PlacedPath(Result):
     tips (N, 3) metres; axes (N, 3) unit, tip → spindle; margins (N, M), normalised, 0 at a limit; limits (M,): what
     each stands for.
     """
+
+    summary = ("smallest_margin", "binding")
 
     toolpath: Toolpath
     placement: Placement
@@ -52,6 +58,19 @@ class PlacedPath(Result):
     def pivots(self) -> Floats:
         """The points (N, 3) about which the tool is tilted, machine frame, metres."""
         return self.tips + self.toolpath.pivot * self.axes
+
+    def plot(self, axes: Any = None, most: int = 6) -> Any:
+        """Draw the margins of the `most` tightest limits along the waypoints into matplotlib axes, and return them.
+
+        Raises InputError where matplotlib is not installed.
+        """
+        (drawn,) = plot_axes(axes)
+        for k in np.argsort(self.margins.min(axis=0), kind="stable")[:most]:
+            drawn.plot(self.margins[:, k], label=self.margin_names[k], lw=1)
+        drawn.axhline(0.0, color="tab:red", lw=1, ls="--")
+        drawn.set(xlabel="waypoint", ylabel="margin, 0 at the limit")
+        drawn.legend()
+        return drawn
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,8 @@ class Placement(Value):
     slides (5,): where the guides of a reconfigurable machine are to stand, metres; None for other machines.
     """
 
+    summary = ("chosen_by",)
+
     transform: RigidTransform
     chosen_by: str
     slides: tuple[float, ...] | None = None

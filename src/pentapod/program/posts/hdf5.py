@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from pentapod.base.archives import MOST_UNPACKED, read_arrays
-from pentapod.base.errors import InputError, ProgramError
+from pentapod.base.errors import ProgramError
+from pentapod.base.extras import load_extra
 from pentapod.base.input_files import read_bytes
 from pentapod.program.header import header_text
 from pentapod.program.posts.registry import Post, PostInput, register
@@ -46,12 +47,7 @@ with h5py.File(source, "r") as archive:
 
 
 def _h5py() -> Any:
-    """Return h5py. Raises InputError where it is not installed."""
-    try:
-        import h5py  # noqa: PLC0415 - an extra
-    except ModuleNotFoundError as error:
-        raise InputError("this post needs h5py", key="hdf5", remedy='pip install "pentapod[hdf5]"') from error
-    return h5py
+    return load_extra("h5py", "hdf5", "this post needs h5py", key="hdf5")
 
 
 def _write(given: PostInput) -> dict[str, bytes]:

@@ -20,6 +20,8 @@ class MotionLaw(Value):
     linear in s between knots.
     """
 
+    summary = ("duration",)
+
     times: Floats
     stations: Floats
     speeds: Floats

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats, Ints, as_floats, frozen, set_frozen
+from pentapod.base.extras import plot_axes
 from pentapod.base.values import Result, Value
 from pentapod.timing.law.slowed import Slowed
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.limits.limit import Constraint, Limit
 from pentapod.timing.path.paths import LegPathLike, PieceLike
+
+_PLOTTED = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +66,8 @@ class Trajectory(Result):
     last more than 1.02 times as long as their first law limited in jerk. limits: those that were added to the
     machine's.
     """
+
+    summary = ("duration",)
 
     path: LegPathLike
     indices: tuple[int, ...]
@@ -118,6 +124,20 @@ class Trajectory(Result):
         """Return tips and tool axes (n, 3), machine frame, at times (n,) in seconds."""
         both = self._piecewise(t, lambda piece, law, time: np.hstack(piece.pose(law(time))), (6,))
         return both[:, :3], both[:, 3:]
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw tip speed and leg rates against time into two matplotlib axes, one below the other; return both.
+
+        Raises InputError where matplotlib is not installed.
+        """
+        speed, rates = plot_axes(axes, rows=2)
+        times = np.linspace(0.0, self.duration, _PLOTTED)
+        speed.plot(times, 6e4 * self.station(times, 1), lw=1, label="tip")
+        rates.plot(times, 1e3 * self(times, 1), lw=1)
+        speed.set(ylabel="speed, mm/min")
+        rates.set(xlabel="time, s", ylabel="leg rates, mm/s")
+        rates.legend([f"leg {leg + 1}" for leg in range(len(rates.lines))])
+        return speed, rates
 
     def station(self, t: ArrayLike, order: int = 0) -> Floats:
         """Return the tip's global arc length s (n,) in metres or its derivative in time, order 0, 1, 2."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from pentapod.base.arrays import Ints
 from pentapod.base.errors import InputError
-from pentapod.base.refusal import Refusal
+from pentapod.base.refusal import Refusal, stage
 from pentapod.machine.machine import Machine
 from pentapod.timing.law.refusals import STILL_M
 from pentapod.timing.law.splice import Nodes, joined
@@ -32,6 +32,7 @@ TRANSITION = Constraint("feed override", "feed override")
 """What holds the motion back during a transition, in the profile."""
 
 
+@stage
 def override(
     trajectory: Trajectory, machine: Machine, time: float, share: float, **options: Any
 ) -> Trajectory | Refusal:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.base.errors import InputError, ToolpathError
+from pentapod.base.errors import ToolpathError
+from pentapod.base.extras import load_extra
 from pentapod.base.input_files import read_bytes
 
 MOST_BYTES = 64_000_000
@@ -30,12 +30,7 @@ def small_file(path: Path, most: int = MOST_BYTES) -> bytes:
 
 def extra(module: str, package: str, path: Path) -> Any:
     """Return an optional module. Raises InputError that names the extra to install."""
-    try:
-        return import_module(module)
-    except ImportError as error:
-        raise InputError(
-            f"reading this needs the package {package}", file=path, remedy='pip install "pentapod[drawings]"'
-        ) from error
+    return load_extra(module, "drawings", f"reading this needs the package {package}", file=path)
 
 
 def chords(curve: Callable[[Floats], Floats], tolerance: float) -> int:

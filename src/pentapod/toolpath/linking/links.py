@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.base.values import Value
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length, spaced
 from pentapod.toolpath.options import Entry
@@ -27,7 +28,7 @@ _ARC_STEP = np.radians(6.0)
 
 
 @dataclass(frozen=True)
-class LinkStyle:
+class LinkStyle(Value):
     """How links are made. view (3,): unit, towards the tool. level: metres along it at which rapids cross.
 
     approach, spacing: metres. feed: of links on feed, m/s. entry: their form. axis_step: radians.

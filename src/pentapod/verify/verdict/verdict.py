@@ -5,9 +5,14 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from pentapod.base.extras import load_extra
+from pentapod.base.html import html_table
 from pentapod.base.values import Result, Value
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.verify.verdict.sources import UNTOLD, Sources
+
+_COLUMNS = ["claim", "answer", "value", "bound", "unit", "time_s", "row", "segment", "method"]
+_SHOWN = 12
 
 
 @dataclass(frozen=True)
@@ -27,6 +32,8 @@ class Certificate(Value):
     covers (at the rows, between the rows, proven or sampled). allowed: up to where a value beyond its bound passes all
     the same, for the reason that method gives; None where it does not.
     """
+
+    summary = ("claim", "passed")
 
     claim: str
     passed: bool
@@ -49,6 +56,8 @@ class Certificate(Value):
 class NotJudged(Value):
     """A claim that the job implies and that could not be judged, and why. waived: the job lets it go unjudged."""
 
+    summary = ("claim", "waived")
+
     claim: str
     why: str
     waived: bool = False
@@ -60,6 +69,8 @@ class Verdict(Result):
 
     passed: there is at least one claim, every claim holds, and what was not judged is waived.
     """
+
+    summary = ("answer",)
 
     certificates: tuple[Certificate, ...]
     not_judged: tuple[NotJudged, ...] = ()
@@ -83,6 +94,34 @@ class Verdict(Result):
             return f"FAILED: {', '.join(counts) or 'there is no claim'}"
         return f"passed ({', '.join(counts)})" if counts else "passed"
 
+    def to_frame(self) -> Any:
+        """Return a pandas DataFrame, a row for each claim. Raises InputError where pandas is not installed.
+
+        Columns: claim, answer ("holds", "fails", "not judged" or "waived"), value, bound, unit, time_s, row, segment,
+        method.
+        """
+        pandas = load_extra("pandas", "pandas", "frames need pandas", key="to_frame")
+        entries = [
+            {"claim": c.claim, "answer": "holds" if c.passed else "fails", "value": c.value, "bound": c.bound}
+            | {"unit": c.unit, **asdict(c.where), "method": c.method}
+            for c in self.certificates
+        ]
+        entries += [
+            {"claim": n.claim, "answer": "waived" if n.waived else "not judged", "method": n.why}
+            for n in self.not_judged
+        ]
+        return pandas.DataFrame(entries, columns=_COLUMNS)
+
+    def _repr_html_(self) -> str:
+        """Return what notebooks show: the answer, what failed or was not judged, and how many claims hold."""
+        failed = [(c.claim, "fails", _measured(c), c.method) for c in self.certificates if not c.passed]
+        open_ = [(n.claim, "waived" if n.waived else "not judged", "", n.why) for n in self.not_judged]
+        rows = failed + open_
+        head = ("claim", "answer", "value, bound", "how, why") if rows else ()
+        hold = f"{len(self.certificates) - len(failed)} of {len(self.certificates)} claims hold"
+        more = f"; {len(rows) - _SHOWN} rows are left out" if len(rows) > _SHOWN else ""
+        return html_table(f"Verdict: {self.answer}; {hold}{more}", rows[:_SHOWN], head)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the content of verdict.json."""
         return {
@@ -96,3 +135,8 @@ class Verdict(Result):
                 "processor": processor_kind(),
             },
         }
+
+
+def _measured(claim: Certificate) -> str:
+    told = [f"{number:.4g} {claim.unit}".strip() for number in (claim.value, claim.bound) if number is not None]
+    return ", ".join(told)
