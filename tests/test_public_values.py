@@ -189,10 +189,10 @@ def test_a_chain_of_stages_needs_no_isinstance(reached, tmp_path):
     machine, toolpath = reached.machine, reached.find(Toolpath)
     here = PlacementConstraints.fixture([reached.find(PlacedPath).placement.transform])
 
-    placed = plan(toolpath, machine, freedom=here)
+    placed = plan(toolpath, machine, constraints=here)
     trajectory = retime(leg_path(placed, machine, **LIMITS), machine)
     program = write_csv(sample(trajectory, machine, placed), tmp_path / "program.csv")
-    verdict = verify(program, machine, toolpath, tilt=0.0, freedom=here, **LIMITS).unwrap()
+    verdict = verify(program, machine, toolpath, tilt=0.0, constraints=here, **LIMITS).unwrap()
 
     assert all(claim.passed for claim in verdict.certificates)
     assert retime(leg_path(placed, machine, **LIMITS), machine).unwrap().duration == pytest.approx(
@@ -204,10 +204,10 @@ def test_a_chain_hands_a_refusal_on_to_its_end(reached, tmp_path):
     machine, toolpath = reached.machine, reached.find(Toolpath)
     away = PlacementConstraints.fixture([RigidTransform(np.eye(3), np.array([9.0, 0.0, 0.0]))])
 
-    placed = plan(toolpath, machine, freedom=away)
+    placed = plan(toolpath, machine, constraints=away)
     trajectory = retime(leg_path(placed, machine, **LIMITS), machine)
     program = write_csv(sample(trajectory, machine, placed), tmp_path / "program.csv")
-    answer = verify(program, machine, toolpath, tilt=0.0, freedom=away, **LIMITS)
+    answer = verify(program, machine, toolpath, tilt=0.0, constraints=away, **LIMITS)
 
     assert isinstance(placed, Refusal)
     assert answer is trajectory is explain(trajectory, machine) is placed

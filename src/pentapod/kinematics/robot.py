@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pentapod.base.arrays import Floats
+from pentapod.base.values import Value
 from pentapod.kinematics.arithmetic import Arithmetic, Joints, Vector
 from pentapod.kinematics.component import Component
 from pentapod.kinematics.mode import Mode
@@ -25,7 +26,7 @@ Branch: TypeAlias = Component | Mode
 
 
 @dataclass(frozen=True)
-class SingularSurface:
+class SingularSurface(Value):
     """A surface of poses that a motion must not cross. name: as a user knows it.
 
     unit: of the margin: "mm" for a distance by which the platform can shift unturned (values in metres), "deg" for an
