@@ -310,7 +310,7 @@ def test_plots_show_path_margins_and_rates(reached):
     assert {line.get_label() for line in drawn.lines} == {"cut", "link", "rapid"}
     placed = reached.find(PlacedPath)
     margins = placed.plot(most=3)
-    assert margins.lines[0].get_label() == placed.binding
+    assert margins.lines[0].get_label() == placed.active_limit
     assert min(margins.lines[0].get_ydata()) == placed.smallest_margin
     assert len(margins.lines) == 4
     speed, rates = reached.find(Trajectory).plot()

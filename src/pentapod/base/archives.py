@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pentapod.base.errors import InputError
-from pentapod.base.input_files import read_bytes
+from pentapod.base.files import read_bytes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

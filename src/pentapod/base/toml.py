@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from pentapod.base.errors import InputError
-from pentapod.base.input_files import read_bytes
+from pentapod.base.files import read_bytes
 
 MOST_BYTES = 1_000_000
 """Files that people write are smaller."""

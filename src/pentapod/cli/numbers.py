@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from pentapod.base.input_files import number_in
+from pentapod.base.files import number_in
 
 _WHOLE = re.compile(r"[+-]?[0-9]+", re.ASCII)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ProgramError
-from pentapod.base.input_files import number_in
+from pentapod.base.files import number_in
 from pentapod.program.resolution import LARGEST_M, from_millimetres
 
 COLUMNS = "time_s,leg1_mm,leg2_mm,leg3_mm,leg4_mm,leg5_mm"

@@ -9,9 +9,8 @@ from typing import Any, Literal
 import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.display import html_table, load_extra
 from pentapod.base.errors import ProgramError
-from pentapod.base.extras import load_extra
-from pentapod.base.html import html_table
 from pentapod.base.values import Result, Value
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component

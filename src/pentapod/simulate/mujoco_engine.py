@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.display import load_extra
 from pentapod.base.errors import ArrayError
-from pentapod.base.extras import load_extra
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal, stage
 from pentapod.base.values import Result

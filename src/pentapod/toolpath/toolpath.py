@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints, frozen, set_frozen
+from pentapod.base.display import html_table, plot_axes
 from pentapod.base.errors import ToolpathError
-from pentapod.base.extras import plot_axes
-from pentapod.base.html import html_table
 from pentapod.base.values import Value
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.rigid import RigidTransform

@@ -18,8 +18,8 @@ from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
+from pentapod.base.display import load_extra
 from pentapod.base.errors import InputError
-from pentapod.base.extras import load_extra
 
 if TYPE_CHECKING:
     import viser

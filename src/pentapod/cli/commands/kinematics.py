@@ -135,7 +135,7 @@ def _rows(numbers: tuple[float, ...], names: tuple[str, ...]) -> Floats:
 def _row(line: str, number: int, names: tuple[str, ...]) -> list[float]:
     """Return the numbers of a line of the CSV on stdin. Raises InputError with its number."""
     from pentapod.base.errors import InputError
-    from pentapod.base.input_files import number_in
+    from pentapod.base.files import number_in
 
     fields, what = line.split(","), "not a row of finite numbers"
     if len(fields) != len(names):

@@ -8,7 +8,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import MeshError, nearest
-from pentapod.base.input_files import read_bytes
+from pentapod.base.files import read_bytes
 from pentapod.base.progress import Progress, silent
 from pentapod.mesh.io.obj import read_obj
 from pentapod.mesh.io.ply import read_ply

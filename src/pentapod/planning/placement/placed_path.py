@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
-from pentapod.base.extras import plot_axes
+from pentapod.base.display import plot_axes
 from pentapod.base.refusal import Refusal
 from pentapod.base.values import Result
 from pentapod.kinematics.robot import Branch
@@ -25,7 +25,7 @@ class PlacedPath(Result):
     each stands for.
     """
 
-    summary = ("smallest_margin", "binding")
+    summary = ("smallest_margin", "active_limit")
 
     toolpath: Toolpath
     placement: Placement

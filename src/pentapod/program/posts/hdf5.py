@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from pentapod.base.archives import MOST_UNPACKED, read_arrays
+from pentapod.base.display import load_extra
 from pentapod.base.errors import ProgramError
-from pentapod.base.extras import load_extra
-from pentapod.base.input_files import read_bytes
+from pentapod.base.files import read_bytes
 from pentapod.program.header import header_text
 from pentapod.program.posts.registry import Post, PostInput, register
 from pentapod.program.posts.rows import of_archive

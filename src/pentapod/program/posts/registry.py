@@ -8,8 +8,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from pentapod.base.errors import InputError, ProgramError
-from pentapod.base.files import atomic_write
-from pentapod.base.input_files import read_bytes
+from pentapod.base.files import atomic_write, read_bytes
 from pentapod.base.registry import Registry
 from pentapod.base.values import Value
 from pentapod.machine.machine import Machine

@@ -22,7 +22,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError, ProgramError
-from pentapod.base.input_files import number_in
+from pentapod.base.files import number_in
 from pentapod.base.values import Value
 from pentapod.program.header import Header, header_text
 from pentapod.program.posts.motion import velocities

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats, Ints, as_floats, frozen, set_frozen
-from pentapod.base.extras import plot_axes
+from pentapod.base.display import plot_axes
 from pentapod.base.values import Result, Value
 from pentapod.timing.law.slowed import Slowed
 from pentapod.timing.law.time_law import MotionLaw

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pentapod.base.errors import ToolpathError
-from pentapod.base.input_files import number_in, read_bytes
+from pentapod.base.files import number_in, read_bytes
 
 MOST_BYTES = 500_000_000
 """A toolpath of ten million waypoints is smaller."""

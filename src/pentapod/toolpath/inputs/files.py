@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.base.display import load_extra
 from pentapod.base.errors import ToolpathError
-from pentapod.base.extras import load_extra
-from pentapod.base.input_files import read_bytes
+from pentapod.base.files import read_bytes
 
 MOST_BYTES = 64_000_000
 MOST_POINTS = 1_000_000

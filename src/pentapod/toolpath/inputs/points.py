@@ -11,7 +11,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError, nearest
-from pentapod.base.input_files import number_in
+from pentapod.base.files import number_in
 from pentapod.toolpath.inputs.files import small_file
 
 _TOLD = re.compile(r"#\s*points\s*=\s*([0-9]{1,12})")

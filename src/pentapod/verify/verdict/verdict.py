@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from pentapod.base.extras import load_extra
-from pentapod.base.html import html_table
+from pentapod.base.display import html_table, load_extra
 from pentapod.base.values import Result, Value
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.verify.verdict.sources import UNTOLD, Sources

@@ -1,11 +1,15 @@
-"""Optional packages: loaded when they are used; what is missing is told with the extra that installs it."""
+"""What people look at, in notebooks and plots: optional packages loaded when they are used, and small HTML tables."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from html import escape
 from importlib import import_module
 from typing import Any
 
 from pentapod.base.errors import InputError
+
+_RULE = "border-bottom:1px solid color-mix(in srgb,currentColor 25%,transparent)"
 
 
 def load_extra(module: str, extra: str, what: str, **place: Any) -> Any:
@@ -28,3 +32,19 @@ def plot_axes(axes: Any, rows: int = 1, **subplot: Any) -> list[Any]:
         rows, squeeze=False, sharex=rows > 1, layout="constrained", figsize=(7.0, 2.0 + 2.2 * rows), subplot_kw=subplot
     )
     return list(made[:, 0])
+
+
+def html_table(title: str, rows: Iterable[Sequence[object]], head: Sequence[str] = (), more: str = "") -> str:
+    """Return a table as HTML, its text escaped; it has no colours of its own, for light and dark ground.
+
+    more: HTML that stands below it, as it is.
+    """
+    lines = [f'<tr style="{_RULE}">{_cells("th", head)}</tr>'] if head else []
+    lines += [f'<tr style="{_RULE}">{_cells("td", row)}</tr>' for row in rows]
+    table = f'<table style="border-collapse:collapse;background:none">{"".join(lines)}</table>'
+    return f'<div style="color:inherit;background:none"><strong>{escape(title)}</strong>{table}{more}</div>'
+
+
+def _cells(kind: str, texts: Sequence[object]) -> str:
+    style = "text-align:left;padding:2px 10px 2px 0;background:none;color:inherit"
+    return "".join(f'<{kind} style="{style}">{escape(str(text))}</{kind}>' for text in texts)
