@@ -13,7 +13,7 @@ from pentapod.base.display import html_table, load_extra
 from pentapod.base.errors import ProgramError
 from pentapod.base.values import Result, Value
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.component import Component
+from pentapod.kinematics.robot import Branch
 from pentapod.machine.machine import Machine
 from pentapod.program.resolution import to_millimetres
 from pentapod.toolpath.linking.partition import Piece
@@ -55,7 +55,7 @@ class Program(Result):
     period: float
     legs: Floats
     interpolation: Literal["linear", "cubic"]
-    component: Component
+    component: Branch
     placement: RigidTransform
     provenance: Provenance
     slides: tuple[float, ...] | None = None

@@ -11,7 +11,7 @@ from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal, stage
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.component import Component
+from pentapod.kinematics.robot import Branch
 from pentapod.machine.machine import Machine
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.program.program import Program, Provenance
@@ -26,7 +26,7 @@ def sample(
     trajectory: Trajectory,
     machine: Machine,
     placement: RigidTransform | PlacedPath | Refusal,
-    component: Component | None = None,
+    component: Branch | None = None,
     provenance: Provenance | None = None,
 ) -> Program:
     """Return the program: the trajectory at the controller's period, at the resolution of program files.

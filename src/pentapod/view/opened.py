@@ -26,6 +26,7 @@ from pentapod.job.plan_arrays import BOX, GUIDES, JOB_FILE, WAYPOINTS, guides_in
 from pentapod.job.run_folder import check_run
 from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import COMPONENTS, Component
+from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.collision_world import Surroundings
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
@@ -65,7 +66,7 @@ class Opened(Value):
     toolpath: Toolpath
     surroundings: Surroundings
     placement: RigidTransform
-    component: Component
+    component: Branch
     axes: Floats
     program: Program | None
     same_job: bool

@@ -13,7 +13,7 @@ import numpy as np
 
 from pentapod.base.errors import InputError
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.component import Component
+from pentapod.kinematics.robot import Branch
 from pentapod.machine.machine import Machine
 from pentapod.program.posts.linuxcnc.config import (
     Axis,
@@ -81,7 +81,7 @@ def pentakins_files(given: PostInput) -> dict[str, bytes]:
     return files_of(ini, hal, FILE, _code(_within(path, machine.rapid_velocity)))
 
 
-def controller_frame(machine: Machine, component: Component) -> RigidTransform:
+def controller_frame(machine: Machine, component: Branch) -> RigidTransform:
     """Return the transform machine frame → the controller's: z along the upright tool, zero in the work volume."""
     # Where the direction points to +z the tool comes from −z: half a turn about x puts it upright.
     turned = np.diag([1.0, -1.0, -1.0]) if component[0] > 0 else np.eye(3)
