@@ -3,6 +3,7 @@
 from importlib import import_module
 from typing import Any
 
+from pentapod.kinematics.answers import Chords
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.families.as_built_forward import ProvenPoses, as_built_pose
@@ -37,7 +38,7 @@ from pentapod.kinematics.forward.singularity_polynomial import singularity_cofac
 from pentapod.kinematics.jacobian import pose_jacobian, square_jacobian
 from pentapod.kinematics.mode import MODES, Mode
 from pentapod.kinematics.proofs.certificate import ComponentProof, certify_component
-from pentapod.kinematics.proofs.chords import Chords, prove_chords
+from pentapod.kinematics.proofs.chords import prove_chords
 from pentapod.kinematics.proofs.motion import MotionProof, certify_motion
 from pentapod.kinematics.proofs.pose_enclosure import roaming
 from pentapod.kinematics.proofs.tip_tube import TipTube, prove_tip_tube

@@ -17,12 +17,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
+from pentapod.kinematics.answers import BranchProof, Chords, ProvenMeasure
 from pentapod.kinematics.arithmetic import Arithmetic, Joints, Vector
 from pentapod.kinematics.component import Component
 from pentapod.kinematics.mode import Mode
 
 Branch: TypeAlias = Component | Mode
 """Which of the poses with the same leg lengths is meant: two signs, and `w`, the sign of the direction's z."""
+
+
+Poses: TypeAlias = tuple[Floats, Floats]
+"""Positions and directions (..., 3)."""
 
 
 @dataclass(frozen=True)
@@ -118,4 +123,31 @@ class Robot(Protocol):
 
     def singularity_margins(self, p: Vector, i: Vector, branch: Branch, do: Arithmetic) -> list[Any]:
         """Return how far a pose is on the branch's side of each of `singularities`: positive on its side."""
+        ...
+
+    @property
+    def proven_measures(self) -> tuple[ProvenMeasure, ...]:
+        """What `prove` bounds from below."""
+        ...
+
+    def prove(self, leg_coefficients: Floats, ends: Poses, branch: ArrayLike, *, leg_error: float = 0.0) -> BranchProof:
+        """Prove, interval by interval, that a motion of the legs stays in a branch.
+
+        leg_coefficients (N, n_legs, k + 1): Bernstein coefficients of the readings on each interval. ends: the poses
+        (N + 1, 3) of the branch between the intervals. leg_error: by how much each leg may be off at any time.
+        """
+        ...
+
+    def prove_chords(
+        self, leg_coefficients: Floats, start: Poses, end: Poses, branch: ArrayLike, *, arms: Floats, towards: Floats
+    ) -> Chords:
+        """Return what is proven of how far a motion is from straight lines between poses, and how fast: `Chords`."""
+        ...
+
+    def enclose(self, ends: Poses, readings: Floats, heights: Floats) -> tuple[Floats, Floats]:
+        """Return how far points of the line get from where they are in N poses, at most (N, K), and the direction (N,).
+
+        readings (N, M, n_legs): in whose convex hull the legs are at all times. heights (K,): of the points along the
+        line. Infinite where nothing is proven.
+        """
         ...

@@ -9,7 +9,6 @@ import pytest
 import replay_cases as cases
 
 from pentapod.cli.output import verdict_text
-from pentapod.kinematics.proofs.certificate import certify_component
 from pentapod.program import quantised
 from pentapod.verify import CLAIMS, Certificate, Claim, NotJudged, Place, Verdict, verify, write_verdict
 from pentapod.verify.claims.provenance import guides
@@ -252,9 +251,10 @@ def test_component_findings_keep_the_first(linear):
     legs = linear.program.legs[:40].copy()
     legs[30] = 0.02
     rows = np.stack([legs[:-1], legs[1:]], axis=-1)
-    found = ComponentFindings()
+    found, robot = ComponentFindings(Extreme(2)), linear.machine.robot
     for first in (0, 20):
-        found.see(certify_component(linear.machine.robot, rows[first : first + 20], (1, 1)), first)
+        ends = robot.pose(legs[first : first + 21], (1, 1))
+        found.see(robot.prove(rows[first : first + 20], ends, (1, 1)), first)
     assert found.refuted == 2
     assert found.undecided == 0
     assert found.first_refuted is not None

@@ -5,26 +5,29 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pentapod.kinematics import Component
+from pentapod.kinematics import Component, LinearPentapod
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.verify.claims.component import axis_upright, off_singular_plane
+from pentapod.verify.claims.component import kept
 from pentapod.verify.claims.speed import feed, rest
 from pentapod.verify.claims.stops_and_dwells import dwells
-from pentapod.verify.replay.interval_bounds import ComponentFindings
+from pentapod.verify.replay.interval_bounds import ComponentFindings, Extreme
 
 PERIOD = 0.002
 UP = [0.0, 0.0, 1.0]
 
 
-def replay_of(upright=-0.5, away=-0.3, delta=0.0, **found):
-    component = ComponentFindings()
-    component.upright.see(np.array([[upright]]), 7)
-    component.away.see(np.array([[away]]), 9)
+BASE = [[-0.552, -0.229], [-0.312, 0.510], [0.155, 0.577], [0.429, -0.417], [-0.078, -0.563]]
+
+
+def replay_of(upright=-0.5, away=-0.3, delta=1.0, **found):
+    component = ComponentFindings(Extreme(2))
+    component.lower.see(np.array([[upright, -np.inf]]), 7)
+    component.lower.see(np.array([[-np.inf, away]]), 9)
     for name, value in found.items():
         setattr(component, name, value)
     return SimpleNamespace(
         survey=SimpleNamespace(component=component),
-        machine=SimpleNamespace(robot=SimpleNamespace(delta=delta)),
+        machine=SimpleNamespace(robot=LinearPentapod.quadratic(BASE, delta)),
         program=SimpleNamespace(component=Component.parse("+-"), period=PERIOD),
         path_tolerance=2e-5,
         place=lambda sample: sample,
@@ -33,16 +36,16 @@ def replay_of(upright=-0.5, away=-0.3, delta=0.0, **found):
 
 @pytest.mark.parametrize(("upright", "angle"), [(-0.5, 30.0), (-1.0, 90.0), (-1.5, 90.0), (0.0, 0.0), (0.5, -30.0)])
 def test_the_angle_is_that_of_the_least_w(upright, angle):
-    finding = axis_upright(replay_of(upright=upright))
+    finding = kept(measure="w", replay=replay_of(upright=upright))
     assert finding.value == pytest.approx(angle, abs=1e-12)
     assert finding.passed == (angle > 0.0)
     assert (finding.bound, finding.unit, finding.where) == (0.0, "deg", 14)
     assert "least angle between platform line and base plane," in finding.method
 
 
-@pytest.mark.parametrize(("delta", "millimetres"), [(0.0, 300.0), (2.0, 100.0), (-2.0, 100.0), (0.5, 200.0)])
+@pytest.mark.parametrize(("delta", "millimetres"), [(1.0, 150.0), (2.0, 100.0), (-2.0, 100.0), (0.5, 200.0)])
 def test_the_distance_is_bounded_by_the_largest_root(delta, millimetres):
-    finding = off_singular_plane(replay_of(delta=delta))
+    finding = kept(measure="S", replay=replay_of(delta=delta))
     assert finding.passed
     assert finding.value == pytest.approx(millimetres)
     assert (finding.unit, finding.where) == ("mm", 18)
@@ -52,7 +55,7 @@ def test_the_distance_is_bounded_by_the_largest_root(delta, millimetres):
 
 def test_a_refuted_interval_is_named_before_an_undecided_one():
     doubts = {"first_refuted": (4, 0.25, 0.5), "first_undecided": (2, 0.0, 1.0), "refuted": 3, "undecided": 6}
-    finding = off_singular_plane(replay_of(away=np.inf, **doubts))
+    finding = kept(measure="S", replay=replay_of(away=np.inf, **doubts))
     assert not finding.passed
     assert finding.where == 8
     assert finding.method.startswith(
@@ -61,7 +64,7 @@ def test_a_refuted_interval_is_named_before_an_undecided_one():
 
 
 def test_an_undecided_interval_is_named():
-    finding = axis_upright(replay_of(upright=0.0, first_undecided=(5, 0.5, 1.0), undecided=2))
+    finding = kept(measure="w", replay=replay_of(upright=0.0, first_undecided=(5, 0.5, 1.0), undecided=2))
     assert not finding.passed
     assert finding.where == 10
     assert finding.method.startswith(
@@ -70,7 +73,7 @@ def test_an_undecided_interval_is_named():
 
 
 def test_without_a_doubtful_interval_the_least_place_is_named():
-    finding = axis_upright(replay_of(upright=0.1))
+    finding = kept(measure="w", replay=replay_of(upright=0.1))
     assert finding.where == 14
     assert finding.method.startswith("undecided: too near a singularity; component +-")
 

@@ -116,7 +116,7 @@ def test_a_program_that_ends_at_speed_has_its_largest_acceleration_there(linear)
 
 
 def test_what_is_undecided_is_counted_and_the_first_is_kept():
-    findings, none = ComponentFindings(), np.zeros(3, dtype=bool)
+    findings, none = ComponentFindings(Extreme(2)), np.zeros(3, dtype=bool)
     doubt = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])
     for first, undecided, refuted in (
         (0, none, none),
@@ -124,10 +124,12 @@ def test_what_is_undecided_is_counted_and_the_first_is_kept():
         (6, none | [1, 0, 0], none | [0, 0, 1]),
     ):
         lower = np.array([5.0, 4.0, 6.0]) - 0.1 * first
-        found = SimpleNamespace(w_lower=lower, s_lower=2.0 * lower, refuted=refuted, undecided=undecided, doubt=doubt)
+        found = SimpleNamespace(
+            lower=np.stack([lower, 2.0 * lower], axis=1), refuted=refuted, undecided=undecided, doubt=doubt
+        )
         findings.see(found, first)
     assert (findings.undecided, findings.refuted) == (3, 1)
     assert findings.first_undecided == (4, 0.3, 0.4)
     assert findings.first_refuted == (8, 0.5, 0.6)
-    assert (-findings.upright.values[0], findings.upright.at[0]) == (pytest.approx(3.4), 7)
-    assert (-findings.away.values[0], findings.away.at[0]) == (pytest.approx(6.8), 7)
+    np.testing.assert_allclose(-findings.lower.values, [3.4, 6.8])
+    assert findings.lower.at.tolist() == [7, 7]

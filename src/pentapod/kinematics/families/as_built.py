@@ -19,11 +19,12 @@ from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.five_legs import FiveLegs, length_scale
 from pentapod.kinematics.leibniz import cross_products, root, scalar_products
+from pentapod.kinematics.proofs.by_leg_equations import ProvenByLegEquations
 from pentapod.kinematics.robot import Branch, SingularSurface
 
 
 @dataclass(frozen=True, eq=False)
-class AsBuiltPentapod(Value):
+class AsBuiltPentapod(Value, ProvenByLegEquations):
     """Five legs from a_k in space to rings around the platform line; all in metres, machine frame.
 
     base (5, 3): where the base joints are, off the plane z = 0 too. offsets (5,): z_k, the heights of the platform

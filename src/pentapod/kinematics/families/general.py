@@ -21,6 +21,7 @@ from pentapod.kinematics.forward.newton_refinement import polish
 from pentapod.kinematics.forward.singularity_polynomial import polynomial_terms
 from pentapod.kinematics.forward.solution_line import SolutionLine
 from pentapod.kinematics.mode import MODES, Mode, as_labels
+from pentapod.kinematics.proofs.by_leg_equations import ProvenByLegEquations
 from pentapod.kinematics.robot import Branch, SingularSurface
 from pentapod.numerics.blocks import blocks
 
@@ -30,7 +31,7 @@ _SINGULAR = 1e-12  # below this reciprocal condition no digits are left
 
 
 @dataclass(frozen=True, eq=False)
-class GeneralPentapod(Value, FiveLegs):
+class GeneralPentapod(Value, FiveLegs, ProvenByLegEquations):
     """Five base attachments a_i = (x_i, y_i, 0) and any offsets z_i along the platform line, b_i = p + z_i i.
 
     base (5, 2) and offsets (5,) in metres, machine frame: the base plane is z = 0. Leg lengths have at most four

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pentapod.base.arrays import Floats, Ints, as_batch, frozen, set_frozen
 from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
+from pentapod.kinematics.answers import BranchProof, ProvenMeasure
 from pentapod.kinematics.arithmetic import Arithmetic, Vector
 from pentapod.kinematics.batches import as_poses, broadcast
 from pentapod.kinematics.component import COMPONENTS, Component
@@ -27,7 +28,9 @@ from pentapod.kinematics.forward.quadratic import (
 )
 from pentapod.kinematics.forward.quadratic_near import solve_near
 from pentapod.kinematics.mode import as_labels
-from pentapod.kinematics.robot import Branch, SingularSurface
+from pentapod.kinematics.proofs.by_leg_equations import ProvenByLegEquations
+from pentapod.kinematics.proofs.certificate import METHOD, certify_component
+from pentapod.kinematics.robot import Branch, Poses, SingularSurface
 from pentapod.numerics.blocks import blocks
 from pentapod.numerics.kernels import kernels_pay
 
@@ -35,7 +38,7 @@ _SINGULAR = 1e-12  # below this reciprocal condition the closed form has no digi
 
 
 @dataclass(frozen=True, eq=False)
-class LinearPentapod(Value, FiveLegs):
+class LinearPentapod(Value, FiveLegs, ProvenByLegEquations):
     """Five base attachments a_i = (x_i, y_i, 0) and offsets z_i along the platform line, b_i = p + z_i i.
 
     base (5, 2) and offsets (5,) in metres; delta: the constant z_i − z_3 = δ (x_i − x_3) of the quadratic
@@ -130,6 +133,23 @@ class LinearPentapod(Value, FiveLegs):
         position, direction = outputs(out, batch, (3,), (3,))
         self._solve(lengths.reshape(-1, 5), signs.reshape(-1, 2), position, direction)
         return position.reshape(*batch, 3), direction.reshape(*batch, 3)
+
+    @property
+    def proven_measures(self) -> tuple[ProvenMeasure, ...]:
+        """Angle between the line and the base plane, and distance to S = 0.
+
+        |S| / √(δ²w² + (1 − δu)²) is the distance at fixed orientation; the root is ≤ 1 + |δ|.
+        """
+        distance = "lower bound of the position's distance to S = 0,"
+        return (
+            ProvenMeasure("w", "deg", 1.0, "least angle between platform line and base plane,", METHOD),
+            ProvenMeasure("S", "mm", 1e3 / (1.0 + abs(self.delta)), distance, METHOD),
+        )
+
+    def prove(self, leg_coefficients: Floats, ends: Poses, branch: ArrayLike, *, leg_error: float = 0.0) -> BranchProof:
+        """Return `certify_component`: by the discriminants, quickly; the poses are not needed."""
+        proof = certify_component(self, leg_coefficients, branch, leg_error=leg_error)
+        return BranchProof(proof.proven, proof.refuted, proof.doubt, np.stack([proof.w_lower, proof.s_lower], axis=1))
 
     @property
     def conditioning(self) -> float:

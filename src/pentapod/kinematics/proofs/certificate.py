@@ -17,13 +17,16 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Bools, Floats, as_batch, set_frozen
 from pentapod.base.errors import ArrayError
 from pentapod.base.values import Value
+from pentapod.kinematics.answers import Answers
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.component import Component, as_component
-from pentapod.kinematics.families.quadratic import LinearPentapod
-from pentapod.kinematics.proofs.answers import Answers
 from pentapod.kinematics.proofs.discriminants import Discriminants
+from pentapod.kinematics.tubes.leg_equations import QuadraticLegs
 from pentapod.numerics.blocks import blocks
 from pentapod.numerics.positivity import Positivity, positivity
+
+METHOD = "by Bernstein coefficients of the discriminants of the forward kinematics, rounded outwards"
+"""As a user reads it."""
 
 _UNIT_ROUNDOFF = 2.0**-53
 _SANE = (1e-40, 1e40)  # metres; within these nothing below can underflow or overflow to harm
@@ -61,7 +64,7 @@ class ComponentProof(Value, Answers):
 
 
 def certify_component(
-    pentapod: LinearPentapod,
+    pentapod: QuadraticLegs,
     leg_coefficients: ArrayLike,
     component: ArrayLike,
     *,

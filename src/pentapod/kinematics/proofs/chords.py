@@ -13,45 +13,22 @@ chord is halved.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.base.arrays import Bools, Floats, as_batch, as_floats
+from pentapod.base.arrays import Floats, as_batch, as_floats
 from pentapod.base.errors import ArrayError
-from pentapod.base.values import Value
+from pentapod.kinematics.answers import Chords
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.component import as_component
-from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.kinematics.tubes.leg_equations import PosedLegs, QuadraticLegs
 from pentapod.numerics.bernstein import elevate, multiply, split
 
 Pose = tuple[Floats, Floats]
 
 
-@dataclass(frozen=True, eq=False)
-class Chords(Value):
-    """What is proven of H chords, for all times t in [0, 1] of each, and for A points p + arm · i of the line.
-
-    proven (H,): on the whole chord the legs give one continuous motion in the component.
-    away (H, A): the point is nowhere farther than this from its own straight line at the same time, metres.
-    turned (H,): the angle in radians between the line's direction and x̃'s is nowhere larger.
-    speeds (H, A): the point is nowhere faster, metres per duration of the chord.
-    base_cosines (H, 5): the cosine of the angle between each leg (base → platform) and a given direction is nowhere
-    less. platform_cosines (H, 5, 2): that of each leg and the line's direction i is nowhere less, nor more.
-    Infinite, or −1 and 1, where nothing is proven.
-    """
-
-    proven: Bools
-    away: Floats
-    turned: Floats
-    speeds: Floats
-    base_cosines: Floats
-    platform_cosines: Floats
-
-
 def prove_chords(
-    pentapod: LinearPentapod,
+    robot: PosedLegs,
     leg_coefficients: ArrayLike,
     start: Pose,
     end: Pose,
@@ -63,10 +40,10 @@ def prove_chords(
 ) -> Chords:
     """Return what can be proven of the motion beside each chord.
 
-    leg_coefficients (H, 5, k + 1): Bernstein coefficients in metres of the legs on the chord, k ≥ 1. start, end:
-    positions and directions (H, 3) each, the poses of the component at both ends, to rounding; whatever they are, the
-    bounds hold. arms (A,): metres along the line from p. towards (5, 3): unit vectors, machine frame, from which the
-    angles of the legs are asked. depth: how often a chord may be halved.
+    leg_coefficients (H, 5, k + 1): Bernstein coefficients in metres of the legs' readings on the chord, k ≥ 1. start,
+    end: positions and directions (H, 3) each, the poses of the component at both ends, to rounding; whatever they are,
+    the bounds hold. arms (A,): metres along the line from p. towards (5, 3): unit vectors, machine frame, from which
+    the angles of the legs are asked. depth: how often a chord may be halved.
     Raises ArrayError for a wrong shape, numbers that are not finite, signs other than ±1, a negative depth.
     """
     legs = as_motion(as_floats(leg_coefficients, "leg_coefficients"), least=1)
@@ -80,8 +57,8 @@ def prove_chords(
     for name, x in (("start", ends[0]), ("end", ends[1])):
         if x.shape != (len(legs), 6):
             raise ArrayError(f"{name} has shape {x.shape}", expected=f"positions and directions ({len(legs)}, 3)")
-    prover = _Prover(pentapod, signs, points, as_floats(towards, "towards", (5, 3)), legs.shape[-1] - 1)
-    return prover.prove(legs, ends[0], ends[1], depth)
+    prover = _Prover(robot, signs, points, as_floats(towards, "towards", (5, 3)), legs.shape[-1] - 1)
+    return prover.prove(legs - robot.zeros[:, None], ends[0], ends[1], depth)
 
 
 def _named(start: Pose, end: Pose) -> tuple[tuple[str, Pose], tuple[str, Pose]]:
@@ -91,8 +68,8 @@ def _named(start: Pose, end: Pose) -> tuple[tuple[str, Pose], tuple[str, Pose]]:
 class _Prover:
     """The machine and the questions, as the kernel takes them."""
 
-    def __init__(self, pentapod: LinearPentapod, signs: Floats, arms: Floats, towards: Floats, degree: int) -> None:
-        self.pentapod, self.signs, self.arms, self.towards = pentapod, signs, arms, np.ascontiguousarray(towards)
+    def __init__(self, robot: PosedLegs, signs: Floats, arms: Floats, towards: Floats, degree: int) -> None:
+        self.robot, self.signs, self.arms, self.towards = robot, signs, arms, np.ascontiguousarray(towards)
         one = np.eye(degree + 1)
         self.products = np.array([[multiply(a, b)[m + n] for n, b in enumerate(one)] for m, a in enumerate(one)])
         top = max(degree, 2)
@@ -137,12 +114,14 @@ class _Prover:
         return found
 
     def _geometry(self, legs: Floats) -> Floats:
-        """Return attachments and offsets, then δ, the lever and a length that no sum of lengths here exceeds."""
-        robot = self.pentapod
-        reach = float(np.abs(legs).max(initial=0.0)) + 2.0 * float(np.abs(robot.base).sum(axis=1).max())
-        size = 2.0 * (reach + 2.0 * float(np.abs(robot.offsets).max()))
-        rows = np.column_stack([robot.base, robot.offsets])
-        return np.vstack([rows, [robot.delta, robot.lever, size]])
+        """Return what the kernels take of the machine; its size is a length that no sum of lengths here exceeds."""
+        robot, last = self.robot, [0.0, 0.0, 0.0]
+        if isinstance(robot, QuadraticLegs):
+            last = [robot.delta, robot.lever, 1.0]
+        reach = float(np.abs(legs).max(initial=0.0)) + 2.0 * float(np.abs(robot.base_joints).sum(axis=1).max())
+        size = 2.0 * (reach + 2.0 * float(np.abs(robot.line_heights).max()) + 4.0 * float(robot.radii.max()))
+        rows = np.column_stack([robot.base_joints, robot.line_heights, robot.radii])
+        return np.vstack([rows, [*last[:2], size, last[2], 0.0]])
 
     def _halve(self, found: Chords, legs: Floats, start: Floats, end: Floats, depth: int) -> None:
         """Fill in what two halves prove where the whole chord was not, or its speed was not."""
@@ -152,7 +131,7 @@ class _Prover:
         if not len(which):
             return
         halves = split(legs[which])
-        middle = np.concatenate(self.pentapod.pose(halves[0][..., -1], self.signs), axis=-1)
+        middle = np.concatenate(self.robot.pose(halves[0][..., -1] + self.robot.zeros, self.signs), axis=-1)
         first, last, half = start[which], end[which], len(which)
         parts = self.prove(
             np.concatenate(halves), np.concatenate([first, middle]), np.concatenate([middle, last]), depth - 1

@@ -10,6 +10,7 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats
 from pentapod.kinematics.proofs.krawczyk_kernels import (
     ROUND,
+    about,
     angle_within,
     defect,
     enclosed,
@@ -17,9 +18,11 @@ from pentapod.kinematics.proofs.krawczyk_kernels import (
     invert,
     line,
     mapped,
+    norm,
     sided,
     spreads,
 )
+from pentapod.kinematics.proofs.ring_kernels import ring_bend, ring_swing
 from pentapod.numerics.kernels import kernel
 
 
@@ -43,7 +46,7 @@ def chords(
 ) -> None:
     """Fill what `Chords` holds for legs (H, 5, k + 1) and poses `start`, `end` (H, 6).
 
-    geometry (6, 3): attachments x_j, y_j and offsets z_j; then δ, the lever and the machine's size. products (k + 1,
+    geometry (6, 5): as in `krawczyk_kernels`. products (k + 1,
     k + 1): what l_a l_b counts in coefficient a + b of l². elevations: matrices from degree 2 to 2k, from 1 to
     max(k, 1) and from 2 to max(k, 2), and in its last rows from k to max(k, 2).
     """
@@ -55,26 +58,27 @@ def chords(
     residual, e, de = np.empty((6, 2 * k + 1)), np.empty((6, 2 * k + 1)), np.empty((6, 2 * k))
     slack, y, z, bound = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
     spread, spread_i, off = np.empty((5, 3)), np.empty(3), np.empty(6)
+    rings = np.zeros((5, 8))
     for h in range(len(legs)):
         proven[h], turned[h], away[h], speeds[h] = False, np.inf, np.inf, np.inf
         base_cosines[h], platform_cosines[h, :, 0], platform_cosines[h, :, 1] = -1.0, -1.0, 1.0
         if not _sane(legs[h], start[h], end[h]):
             continue
-        line(start[h], end[h], geometry, first, second, change, step, jacobian)
+        line(start[h], end[h], geometry, first, second, change, step, jacobian, rings)
         if not invert(jacobian, work, inverse):
             continue
         defect(inverse, jacobian, rest)
-        _residuals(legs[h], start[h], end[h], first, second, squares_up, products, residual)
-        _corrections(inverse, residual, ROUND * size * size, e, slack, y)
-        if not enclosed(y, rest, inverse, geometry, change, step, spread, spread_i, z, bound):
+        _residuals(legs[h], start[h], end[h], first, second, geometry, rings, squares_up, products, residual)
+        _corrections(inverse, residual, ROUND * size * size, geometry, rings, e, slack, y)
+        if not enclosed(y, rest, inverse, geometry, rings, change, step, spread, spread_i, z, bound):
             continue
-        if not sided(start[h], end[h], bound, geometry[5, 0], geometry[5, 1], signs, size):
+        if not sided(start[h], end[h], bound, geometry[5], signs):
             continue
         proven[h] = True
         # Now that the solution is known to be this near, once more: closer.
         spreads(geometry, change, step, bound, ROUND * size, spread, spread_i)
-        mapped(rest, inverse, geometry, spread, spread_i, bound, z)
-        bounded = _derived(e, slack, bound, rest, inverse, geometry, change, step, spread, spread_i, de, off)
+        mapped(rest, inverse, geometry, rings, spread, spread_i, bound, z)
+        bounded = _derived(e, slack, bound, rest, inverse, geometry, rings, change, step, spread, spread_i, de, off)
         z += slack
         for a in range(len(arms)):
             away[h, a] = _farthest(e, step, 0.0, arms[a]) + _joined(z, abs(arms[a]))
@@ -90,12 +94,16 @@ def chords(
         for j in range(5):
             own, one, two = legs[h, j], first[j], second[j]
             shortest = own.min()
-            shift, rounding = _joined(bound, abs(geometry[j, 2])), 4.0 * ROUND * size / shortest
-            base = _base_cosine(one, two, towards[j], own, lines_up)
-            base_cosines[h, j] = base - shift / shortest - rounding
+            shift, rounding = _joined(bound, abs(geometry[j, 3])), 4.0 * ROUND * size / shortest
+            aside, radius = 0.0, geometry[j, 4]
+            if radius > 0.0:
+                aside = radius * ring_swing(rings[j], about(spread[j], spread_i, abs(geometry[j, 3])))
+            base = _base_cosine(one, two, radius * rings[j, 5:], towards[j], own, lines_up)
+            base_cosines[h, j] = base - (shift + aside) / shortest - rounding
+            # A ring's vector has the same part along the line as that to its centre, and is no longer than the leg, its
+            # shift and the ring's radius.
             least, most = _platform_cosine(one, two, start_i, end_i, own, cosines_up)
-            # On the line the vector is no longer than the leg and its shift.
-            loose = ((own.max() + shift) * swing + shift) / shortest + rounding
+            loose = ((own.max() + shift + radius) * swing + shift) / shortest + rounding
             platform_cosines[h, j, 0], platform_cosines[h, j, 1] = least - loose, most + loose
 
 
@@ -119,13 +127,23 @@ def _residuals(
     end: Floats,
     first: Floats,
     second: Floats,
+    geometry: Floats,
+    rings: Floats,
     squares_up: Floats,
     products: Floats,
     residual: Floats,
 ) -> None:
-    """Fill G along the line (6, 2k + 1): ½ (|D|² − l²) of each leg and ½ (|i|² − 1), as Bernstein coefficients."""
+    """Fill G along the line (6, 2k + 1): ½ (|D|² − l²) of each leg and ½ (|i|² − 1), as Bernstein coefficients.
+
+    With a ring ½ r² − r ρ besides, ρ taken straight from start to end.
+    """
     for j in range(5):
         _square(first[j], second[j], squares_up, residual[j])
+        radius, last = geometry[j, 4], residual.shape[1] - 1
+        if radius > 0.0:
+            for m in range(last + 1):
+                far = rings[j, 0] + m / last * (rings[j, 1] - rings[j, 0])
+                residual[j, m] += radius * (0.5 * radius - far)
         for a in range(len(products)):
             for b in range(len(products)):
                 residual[j, a + b] -= 0.5 * products[a, b] * legs[j, a] * legs[j, b]
@@ -142,12 +160,21 @@ def _square(first: Floats, second: Floats, squares_up: Floats, out: Floats) -> N
 
 
 @kernel
-def _corrections(inverse: Floats, residual: Floats, rounding: float, e: Floats, slack: Floats, y: Floats) -> None:
-    """Fill C G (6, 2k + 1), what rounding takes from it (6,), and bounds (6,) of both together at all times."""
+def _corrections(
+    inverse: Floats,
+    residual: Floats,
+    rounding: float,
+    geometry: Floats,
+    rings: Floats,
+    e: Floats,
+    slack: Floats,
+    y: Floats,
+) -> None:
+    """Fill C G (6, 2k + 1), what rounding and bent ρ take from it (6,), and bounds (6,) of both at all times."""
     for r in range(6):
         slack[r] = 4.0 * ROUND * abs(inverse[r, 5])
         for n in range(5):
-            slack[r] += rounding * abs(inverse[r, n])
+            slack[r] += (rounding + 0.125 * geometry[n, 4] * rings[n, 4]) * abs(inverse[r, n])
         y[r] = 0.0
         for m in range(e.shape[1]):
             e[r, m] = 0.0
@@ -165,6 +192,7 @@ def _derived(
     rest: Floats,
     inverse: Floats,
     geometry: Floats,
+    rings: Floats,
     change: Floats,
     step: Floats,
     spread: Floats,
@@ -183,10 +211,14 @@ def _derived(
     for n in range(3):
         moved[5] += bound[3 + n] * (abs(step[3 + n]) + ROUND)
         for j in range(5):
-            reach = bound[n] + abs(geometry[j, 2]) * bound[3 + n]
+            reach = bound[n] + abs(geometry[j, 3]) * bound[3 + n]
             moved[j] += reach * (abs(change[j, n]) + ROUND * size)
+    for j in range(5):
+        if geometry[j, 4] > 0.0:
+            region, way = about(spread[j], spread_i, abs(geometry[j, 3])), (norm(step[:3]), norm(step[3:]))
+            moved[j] += geometry[j, 4] * ring_bend(rings[j], region, (norm(bound[:3]), norm(bound[3:])), way)
     for r in range(6):
-        q[r] = 4.0 * degree * slack[r]
+        q[r] = 4.0 * degree * slack[r]  # ρ' is within |ρ''| / 2 of its mean: four times what slack counts of it
         for j in range(6):
             q[r] += abs(inverse[r, j]) * moved[j]
         largest = 0.0
@@ -195,7 +227,7 @@ def _derived(
             largest = max(largest, abs(de[r, m]))
         least[r] = largest + q[r]
     growth = inflated(least, size)
-    mapped(rest, inverse, geometry, spread, spread_i, growth, off)
+    mapped(rest, inverse, geometry, rings, spread, spread_i, growth, off)
     bounded = True
     for r in range(6):
         bounded = bounded and least[r] + off[r] < growth[r]
@@ -204,12 +236,13 @@ def _derived(
 
 
 @kernel
-def _base_cosine(first: Floats, second: Floats, towards: Floats, legs: Floats, lines_up: Floats) -> float:
-    """Return the least v · towards / l, v on the line from first to second (3,), l of coefficients legs (k + 1,).
+def _base_cosine(first: Floats, second: Floats, ring: Floats, towards: Floats, legs: Floats, lines_up: Floats) -> float:
+    """Return the least v · towards / l: v + ring on the line from first to second (3,), l of coefficients (k + 1,).
 
     A quotient of polynomials lies between the quotients of their coefficients.
     """
-    b0, b1 = _dot(first, towards), _dot(second, towards)
+    off = _dot(ring, towards)
+    b0, b1 = _dot(first, towards) - off, _dot(second, towards) - off
     least = np.inf
     for m in range(len(legs)):
         least = min(least, (lines_up[0, m] * b0 + lines_up[1, m] * b1) / legs[m])

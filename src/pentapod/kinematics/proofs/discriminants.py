@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.forward.quadratic import LinearPart
+from pentapod.kinematics.tubes.leg_equations import QuadraticLegs
 from pentapod.numerics.bernstein import binomials
 
 
@@ -34,7 +34,7 @@ class Discriminants:
     tops: Floats
 
     @classmethod
-    def of(cls, pentapod: LinearPentapod, legs: Floats, *, tops: bool) -> Discriminants:
+    def of(cls, pentapod: QuadraticLegs, legs: Floats, *, tops: bool) -> Discriminants:
         """Return them for Bernstein coefficients of the legs (N, 5, k + 1), metres."""
         from pentapod.kinematics.proofs.discriminants_kernels import discriminants  # noqa: PLC0415
 

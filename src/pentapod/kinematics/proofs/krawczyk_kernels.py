@@ -1,8 +1,9 @@
 """Krawczyk's operator on the leg equations, beside a straight line of poses: pieces of `chords_kernels`, compiled.
 
 G(x) = (½ (|p + z_j i − a_j|² − l_j²), ½ (|i|² − 1)) of x = (p, i), J its Jacobian, C ≈ J⁻¹ in the middle of the line.
-Poses and boxes are (6,), p in metres first. geometry (6, 3): attachments x_j, y_j and offsets z_j of the legs; then
-δ, the lever and a length that no sum of lengths exceeds.
+Legs may end on rings (`ring_kernels`). Poses and boxes are (6,), p in metres first. geometry (6, 5): base joints (3),
+offset and radius of the ring of each leg; then δ, the lever, a length that no sum of lengths exceeds, and 1 where the
+machine is of the quadratic family, 0 where it is not.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.kinematics.proofs.ring_kernels import ring_bend, ring_line
 from pentapod.numerics.kernels import kernel
 
 ROUND = 2.0**-46
@@ -27,19 +29,25 @@ def line(
     change: Floats,
     step: Floats,
     jacobian: Floats,
+    rings: Floats,
 ) -> None:
-    """Fill the vectors of the legs at both ends and their change (5, 3), the poses' (6,), the middle's Jacobian."""
+    """Fill the vectors of the legs at both ends and their change (5, 3), the poses' (6,), the middle's Jacobian.
+
+    rings (5, 8): filled for legs that end on rings, by `ring_line`; their vectors lead to the rings' centres.
+    """
     for r in range(6):
         step[r] = end[r] - start[r]
     for j in range(5):
-        offset = geometry[j, 2]
+        offset = geometry[j, 3]
         for n in range(3):
-            attached = geometry[j, n] if n < 2 else 0.0
+            attached = geometry[j, n]
             first[j, n] = start[n] + offset * start[3 + n] - attached
             second[j, n] = end[n] + offset * end[3 + n] - attached
             change[j, n] = second[j, n] - first[j, n]
             jacobian[j, n] = 0.5 * (first[j, n] + second[j, n])
             jacobian[j, 3 + n] = offset * jacobian[j, n]
+        if geometry[j, 4] > 0.0:
+            ring_line(first[j], second[j], start, end, offset, geometry[j, 4], jacobian[j], rings[j])
     for n in range(3):
         jacobian[5, 3 + n] = 0.5 * (start[3 + n] + end[3 + n])
 
@@ -89,6 +97,7 @@ def enclosed(
     rest: Floats,
     inverse: Floats,
     geometry: Floats,
+    rings: Floats,
     change: Floats,
     step: Floats,
     spread: Floats,
@@ -99,7 +108,7 @@ def enclosed(
     """Return whether Krawczyk's operator maps a box around the line into itself; bound (6,): its distance."""
     radius = inflated(y, geometry[5, 2])
     spreads(geometry, change, step, radius, ROUND * geometry[5, 2], spread, spread_i)
-    mapped(rest, inverse, geometry, spread, spread_i, radius, z)
+    mapped(rest, inverse, geometry, rings, spread, spread_i, radius, z)
     for r in range(6):
         bound[r] = y[r] + z[r]
         if not bound[r] < radius[r]:
@@ -127,13 +136,20 @@ def spreads(
     for n in range(3):
         spread_i[n] = 0.5 * abs(step[3 + n]) + radius[3 + n] + ROUND
         for j in range(5):
-            reach = radius[n] + abs(geometry[j, 2]) * radius[3 + n]
+            reach = radius[n] + abs(geometry[j, 3]) * radius[3 + n]
             spread[j, n] = 0.5 * abs(change[j, n]) + reach + rounding
 
 
 @kernel
 def mapped(
-    rest: Floats, inverse: Floats, geometry: Floats, spread: Floats, spread_i: Floats, v: Floats, out: Floats
+    rest: Floats,
+    inverse: Floats,
+    geometry: Floats,
+    rings: Floats,
+    spread: Floats,
+    spread_i: Floats,
+    v: Floats,
+    out: Floats,
 ) -> None:
     """Fill an upper bound (6,) of |1 − C J| v for all Jacobians within the spread, v (6,) ≥ 0."""
     across_i = spread_i[0] * v[3] + spread_i[1] * v[4] + spread_i[2] * v[5]
@@ -142,13 +158,29 @@ def mapped(
         for c in range(6):
             out[r] += rest[r, c] * v[c]
     for j in range(5):
-        across, offset = 0.0, abs(geometry[j, 2])
+        across, offset = 0.0, abs(geometry[j, 3])
         for n in range(3):
             across += spread[j, n] * (v[n] + offset * v[3 + n])
+        if geometry[j, 4] > 0.0:
+            region = about(spread[j], spread_i, offset)
+            across += geometry[j, 4] * ring_bend(rings[j], region, region, (norm(v[:3]), norm(v[3:])))
         for r in range(6):
             out[r] += abs(inverse[r, j]) * across
     for r in range(6):
         out[r] *= 1.0 + ROUND
+
+
+@kernel
+def about(spread: Floats, spread_i: Floats, offset: float) -> tuple[float, float]:
+    """Return by how much d = p − a and i differ from those in the middle, at most, where leg's vector and i do so."""
+    turn = norm(spread_i)
+    return norm(spread) + offset * turn, turn
+
+
+@kernel
+def norm(a: Floats) -> float:
+    """Return the length of a vector (3,)."""
+    return np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
 @kernel
@@ -162,8 +194,15 @@ def angle_within(distance: float) -> float:
 
 
 @kernel
-def sided(start: Floats, end: Floats, bound: Floats, delta: float, lever: float, signs: Floats, size: float) -> bool:
-    """Return whether w and S have these signs all over the tube of this radius around the line."""
+def sided(start: Floats, end: Floats, bound: Floats, machine: Floats, signs: Floats) -> bool:
+    """Return whether w and S have these signs all over the tube around the line; machine: geometry's last row.
+
+    Outside the quadratic family there is no S, and w has the sign that it has at the start.
+    """
+    delta, lever, size = machine[:3]
+    if machine[3] == 0.0:
+        side = 1.0 if start[5] > 0.0 else -1.0
+        return min(side * start[5], side * end[5]) - bound[5] > 4.0 * ROUND
     w = min(signs[0] * start[5], signs[0] * end[5]) - bound[5]
     # S = δ w p_x + (1 − δ u) p_z + lever · w is a quadratic along the line; its coefficients, and what the radius adds.
     s0 = delta * start[5] * start[0] + (1.0 - delta * start[3]) * start[2] + lever * start[5]

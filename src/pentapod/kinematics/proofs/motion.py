@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Bools, Floats, Ints, as_batch, as_floats
 from pentapod.base.errors import ArrayError
 from pentapod.base.values import Value
+from pentapod.kinematics.answers import Answers, BranchProof, ProvenMeasure
 from pentapod.kinematics.batches import as_motion
-from pentapod.kinematics.proofs.answers import Answers
 from pentapod.kinematics.tubes.continuation import carry
 from pentapod.kinematics.tubes.jacobian_sign import proven_sides
 from pentapod.kinematics.tubes.leg_equations import BuiltLegs, Legs, mids
@@ -120,6 +120,36 @@ def certify_motion(
             )
             refuted[some] = before * after < 0
     return MotionProof(out[0] == 1.0, refuted, nodes_p.T.copy(), nodes_i.T.copy(), *out)
+
+
+MOTION_MEASURES = (
+    ProvenMeasure(
+        "",
+        "mm/mm",
+        1.0,
+        "least change of some leg for each mm that the platform shifts along an axis,",
+        "by Krawczyk's operator on the leg equations, in ball arithmetic",
+    ),
+)
+"""What `motion_in_branch` bounds: the reciprocal of the sensitivity."""
+
+
+def motion_in_branch(
+    machine: BuiltLegs, leg_coefficients: Floats, position: Floats, direction: Floats, leg_error: float
+) -> BranchProof:
+    """Return `certify_motion` between poses (N + 1, 3) of one branch as proof that a motion stays in this branch.
+
+    Intervals on which a leg's length is not positive are undecided, and so are all where a pose is missing.
+    """
+    n = len(leg_coefficients)
+    if not (leg_coefficients - machine.zeros[:, None] > 0.0).all():
+        nothing = np.zeros(n, dtype=np.bool_)
+        return BranchProof(nothing, nothing, np.tile([0.0, 1.0], (n, 1)), np.zeros((n, 1)))
+    proof = certify_motion(machine, leg_coefficients, position, direction, leg_error=leg_error)
+    doubt = np.where(proof.proven[:, None], np.nan, np.stack([proof.reached, proof.stop], axis=1))
+    with np.errstate(divide="ignore"):
+        least = np.where(proof.proven, 1.0 / proof.position_sensitivity, 0.0)
+    return BranchProof(proof.proven, proof.refuted, doubt, least[:, None])
 
 
 class _Motion:

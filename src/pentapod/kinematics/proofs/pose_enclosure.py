@@ -4,6 +4,9 @@ With x = (p, i), x̃ a pose, d_j = p̃ + z_j ĩ − a_j and δ = x − x̃, the 
 
     ½(|d_j|² − l_j²) + d_j·(δp + z_j δi) + ½|δp + z_j δi|² = 0,   ½(|ĩ|² − 1) + ĩ·δi + ½|δi|² = 0.
 
+A leg that ends on a ring of radius r around the line adds −r ρ, ρ = |(p − a_j) × i|: its gradient is part of J, and
+what its second derivative can make of δ is bounded with q.
+
 So δ = (1 − C J) δ − C (g + ½q(δ)) with J the matrix of the linear part and C nearly its inverse. Where that maps the
 ball |δp| ≤ P, |δi| ≤ Q into itself and contracts it, for every choice of lengths there is exactly one pose in the ball,
 and it depends continuously on them (Banach): legs that move within these lengths, and pass x̃, keep the platform in the
@@ -13,12 +16,14 @@ ball. Lemma 9 of docs/proofs.md. The bounds are computed in floating point; what
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, as_batch
-from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.jacobian import invert
+from pentapod.kinematics.tubes.leg_equations import BuiltLegs
 
 _ROUNDS = 6
 _U = 2.0**-53
@@ -26,11 +31,11 @@ _UP = 1.0 + 1e-9  # for what rounding takes from sums of positive terms
 
 
 def roaming(
-    pentapod: FiveLegs, position: ArrayLike, direction: ArrayLike, lengths: ArrayLike, offsets: ArrayLike
+    robot: BuiltLegs, position: ArrayLike, direction: ArrayLike, lengths: ArrayLike, offsets: ArrayLike
 ) -> tuple[Floats, Floats]:
     """Return how far (N, K) points of the platform line get from where they are, at most, and how far (N,) i does.
 
-    position, direction (N, 3): poses. lengths (N, M, 5): metres; at all times the five leg lengths together are in
+    position, direction (N, 3): poses. lengths (N, M, 5): metres; at all times the five readings together are in
     the convex hull of these M (Bernstein coefficients, say), and so are those of the pose. offsets (K,): of the points
     along the line, metres. Infinite where nothing is proven: the lengths change too much for this, or the pose is
     close to a singularity.
@@ -38,14 +43,19 @@ def roaming(
     p, i = as_batch(position, "position", (None, 3)), as_batch(direction, "direction", (None, 3))
     legs, along = as_batch(lengths, "lengths", (None, None, 5)), as_batch(offsets, "offsets", (None,))
     with np.errstate(all="ignore"):
-        z = pentapod.offsets
-        d = pentapod.leg_vectors(p, i)
+        z, legs = robot.line_heights, legs - robot.zeros
+        d = p[..., None, :] + z[:, None] * i[..., None, :] - robot.base_joints
         # Where the base is far off, d has lost digits: by so many metres each vector may be wrong (N, 5).
-        far = np.linalg.norm(p, axis=1)[:, None] + np.linalg.norm(pentapod.base, axis=1) + 2.0 * np.abs(z)
+        far = np.linalg.norm(p, axis=1)[:, None] + np.linalg.norm(robot.base_joints, axis=1) + 2.0 * np.abs(z)
         wrong = 4.0 * _U * far * _UP
         here = np.linalg.norm(d, axis=2)
         last = np.concatenate([np.zeros_like(i), i], axis=-1)[:, None]
-        jacobian = np.concatenate([np.concatenate([d, z[:, None] * d], axis=-1), last], axis=1)
+        by_pose, rings = np.concatenate([d, z[:, None] * d], axis=-1), _Rings.of(robot, p, i)
+        if rings is not None:
+            by_pose -= rings.gradient
+            here = np.sqrt(here * here + rings.radii * (rings.radii - 2.0 * rings.distance))
+            wrong = wrong + 64.0 * _U * rings.radii * (1.0 + far)
+        jacobian = np.concatenate([by_pose, last], axis=1)
         c = invert(jacobian, np.nan)
         # ½(l² − |d|²) = |d| e + ½ e², e = l − |d|: the first part of all legs together, the second of each.
         change = legs - here[:, None]
@@ -80,6 +90,8 @@ def roaming(
             """Return |δp + z_j δi|² (N, 6), of the last equation |δi|², and what the ball adds to p and i (N,)."""
             reach = large[:, None] * np.append(np.ones(5), 0.0) + turn[:, None] * lever
             bend, ball = reach * reach, np.stack([large, turn])
+            if rings is not None:
+                bend[:, :5] += rings.bend(large[:, None], turn[:, None])
             return (
                 bend,
                 (by_p * bend).sum(axis=1) + strayed(off[:, :3], ball),
@@ -100,6 +112,39 @@ def roaming(
         ]
         turned = moved(c[:, 3:], np.abs(c[:, 3:]), rest) + strayed(off[:, 3:], ball)
         return np.where(proven[:, None], np.stack(points, axis=1) * _UP, np.inf), np.where(proven, turned * _UP, np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rings:
+    """r ρ of the legs: radii (5,), ρ and |p − a| (N, 5), and the gradient of r ρ (N, 5, 6)."""
+
+    radii: Floats
+    distance: Floats
+    depth: Floats
+    gradient: Floats
+
+    @classmethod
+    def of(cls, robot: BuiltLegs, p: Floats, i: Floats) -> _Rings | None:
+        """Return them for poses (N, 3), or None for a robot without rings."""
+        radii = robot.radii
+        if not radii.any():
+            return None
+        d = p[:, None] - robot.base_joints
+        normal = np.asarray(np.cross(d, i[:, None]), dtype=np.float64)
+        distance = np.linalg.norm(normal, axis=2)
+        normal /= distance[..., None]
+        gradient = np.concatenate([np.cross(i[:, None], normal), np.cross(normal, d)], axis=2)
+        gradient = np.where(radii[:, None] > 0.0, radii[:, None] * gradient, 0.0)
+        return cls(radii, np.where(radii > 0.0, distance, 0.0), np.linalg.norm(d, axis=2), gradient)
+
+    def bend(self, large: Floats, turn: Floats) -> Floats:
+        """Return r times the largest second derivative of ρ (N, 5) for changes of p and i in the ball, and in it."""
+        far, unit = self.depth + large, 1.0001 + turn
+        change = large * unit + far * turn
+        nearest = self.distance - change
+        most = change * change / nearest + 2.0 * large * turn
+        most = np.where(nearest > far / 16.0, most, np.inf)
+        return np.where(self.radii > 0.0, self.radii * most, 0.0)
 
 
 def _defect(c: Floats, jacobian: Floats, wrong: Floats, z: Floats) -> Floats:

@@ -26,9 +26,9 @@ from pentapod.base.errors import ArrayError
 from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.component import as_component
-from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.jacobian import invert
 from pentapod.kinematics.proofs.tip_deviation import angle_bound, distance_bound
+from pentapod.kinematics.tubes.leg_equations import PosedQuadraticLegs
 from pentapod.numerics.ball_bernstein import blossom, elevate, hull, multiply, restricted
 from pentapod.numerics.balls import Ball
 from pentapod.numerics.blocks import blocks
@@ -91,7 +91,7 @@ class TipTube(Value):
 
 
 def prove_tip_tube(
-    pentapod: LinearPentapod,
+    pentapod: PosedQuadraticLegs,
     leg_coefficients: ArrayLike,
     component: ArrayLike,
     *,
@@ -138,7 +138,7 @@ def prove_tip_tube(
 
 
 def _prove(
-    pentapod: LinearPentapod, legs: Ball, signs: Floats, leg_error: float
+    pentapod: PosedQuadraticLegs, legs: Ball, signs: Floats, leg_error: float
 ) -> tuple[tuple[Floats, Floats, Floats, Floats], Bools]:
     """Return x̃ as p and i (m + 1, 3, N), the errors of both (3, N), and where they are proven (N,).
 
@@ -146,8 +146,8 @@ def _prove(
     """
     k, count = len(legs.mid) - 1, legs.mid.shape[-1]
     p, i = _fitted(pentapod, legs, signs, k + 3)
-    offsets = pentapod.offsets[:, None, None]
-    attachments = np.concatenate([pentapod.base, np.zeros((5, 1))], axis=1)[..., None]
+    offsets = pentapod.line_heights[:, None, None]
+    attachments = pentapod.base_joints[..., None]
     joints = Ball.exact(p)[:, None] + Ball.exact(i)[:, None] * offsets - attachments  # (m + 1, 5, 3, N)
     squares = multiply(joints, joints)
     lengths = multiply(legs, legs)
@@ -155,7 +155,7 @@ def _prove(
     unit = (_sum(multiply(Ball.exact(i), Ball.exact(i)), 1) - 1.0) * 0.5
 
     middle = [blossom(x, [np.full(count, 0.5)] * (len(p) - 1)).mid for x in (joints, Ball.exact(i))]
-    inverse = invert(_jacobian(middle[0], middle[1], pentapod.offsets), np.nan)  # (N, 6, 6)
+    inverse = invert(_jacobian(middle[0], middle[1], pentapod.line_heights), np.nan)  # (N, 6, 6)
     columns = Ball(
         np.concatenate([g.mid, unit.mid[:, None]], axis=1).transpose(2, 1, 0),
         np.concatenate([g.rad, unit.rad[:, None]], axis=1).transpose(2, 1, 0),
@@ -166,7 +166,7 @@ def _prove(
         loose = (longest + leg_error) * leg_error * _UP  # ½ (l + e)² − ½ l², and more
         y = (y + np.einsum("nrl,ln->nr", np.abs(inverse[:, :, :5]), loose) * _UP) * _UP
 
-    scale = np.repeat([float(np.abs(pentapod.base - pentapod.base[2]).max()), 1.0], 3)
+    scale = np.repeat([float(np.abs(pentapod.base_joints - pentapod.base_joints[2]).max()), 1.0], 3)
     largest = (y / scale).max(axis=1, keepdims=True) + 2.0**-50
     radius = (y + 0.5 * largest * scale) * _UP
     p_hull, i_hull = hull(Ball.exact(p)).widened(radius[:, :3].T), hull(Ball.exact(i)).widened(radius[:, 3:].T)
@@ -174,14 +174,14 @@ def _prove(
     rough = hull(joints).widened((radius[:, :3].T + np.abs(offsets) * radius[:, 3:].T) * _UP)
     narrow = rough.rad < rows.rad  # both enclose the same; their own curves are narrower where p and i move together
     rows = Ball(np.where(narrow, rough.mid, rows.mid), np.where(narrow, rough.rad, rows.rad))
-    z = (np.eye(6) - inverse @ _ball_jacobian(rows, i_hull, pentapod.offsets)).magnitude
+    z = (np.eye(6) - inverse @ _ball_jacobian(rows, i_hull, pentapod.line_heights)).magnitude
     error = (y + np.einsum("nij,nj->ni", z, radius) * _UP) * _UP
     w, s = i_hull[2], _s(pentapod, p_hull, i_hull)
     sided = ((w * signs[0]).lower > 0.0) & ((s * signs[1]).lower > 0.0)
     return (p, i, error[:, :3].T, error[:, 3:].T), (error < radius).all(axis=1) & sided
 
 
-def _fitted(pentapod: LinearPentapod, legs: Ball, signs: Floats, m: int) -> tuple[Floats, Floats]:
+def _fitted(pentapod: PosedQuadraticLegs, legs: Ball, signs: Floats, m: int) -> tuple[Floats, Floats]:
     """Return Bernstein coefficients (m + 1, 3, N) of polynomials through the poses at m + 1 Chebyshev nodes."""
     nodes = 0.5 - 0.5 * np.cos(np.pi * np.arange(m + 1) / m)
     at = np.stack([blossom(legs, [np.full(1, t)] * (len(legs.mid) - 1)).mid for t in nodes])  # (m + 1, 5, N)
@@ -212,10 +212,10 @@ def _ball_jacobian(rows: Ball, i: Ball, offsets: Floats) -> Ball:
     )
 
 
-def _s(pentapod: LinearPentapod, p: Ball, i: Ball) -> Ball:
+def _s(pentapod: PosedQuadraticLegs, p: Ball, i: Ball) -> Ball:
     """Return S (N,) of p and i (3, N): see `quadratic.w_and_s`, with z_3 − δ x_3 rounded outwards."""
     delta = pentapod.delta
-    lever = Ball.exact(pentapod.offsets[2]) - Ball.exact(pentapod.base[2, 0]) * delta
+    lever = Ball.exact(pentapod.line_heights[2]) - Ball.exact(pentapod.base_joints[2, 0]) * delta
     return i[2] * p[0] * delta + (1.0 - i[0] * delta) * p[2] + lever * i[2]
 
 

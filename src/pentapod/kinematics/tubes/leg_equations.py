@@ -14,11 +14,13 @@ components on the first axis, legs are on the second, the batch is last: (3, 5, 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar, cast
+from typing import Generic, Protocol, TypeVar, cast, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats
+from pentapod.kinematics.forward.quadratic import LinearPart
 from pentapod.numerics.balls import Ball
 
 Q = TypeVar("Q", Floats, Ball)
@@ -53,6 +55,38 @@ class BuiltLegs(Protocol):
     def scale(self) -> float:
         """Metres that count as much as a radian."""
         ...
+
+
+@runtime_checkable
+class QuadraticLegs(BuiltLegs, Protocol):
+    """Legs of the quadratic family, z_i = z_3 + δ (x_i − x_3)."""
+
+    @property
+    def delta(self) -> float:
+        """δ, no unit."""
+        ...
+
+    @property
+    def lever(self) -> float:
+        """z_3 − δ x_3, metres."""
+        ...
+
+    @property
+    def linear_part(self) -> LinearPart:
+        """The linear half of the forward kinematics."""
+        ...
+
+
+class PosedLegs(BuiltLegs, Protocol):
+    """Legs with forward kinematics."""
+
+    def pose(self, legs: ArrayLike, branch: ArrayLike, /) -> tuple[Floats, Floats]:
+        """Return positions and directions (..., 3) of leg readings (..., 5) in a branch."""
+        ...
+
+
+class PosedQuadraticLegs(QuadraticLegs, PosedLegs, Protocol):
+    """Legs of the quadratic family with forward kinematics."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """How near bodies come to each other at any time: proven from some moments, and how far bodies stray from there.
 
 Time is cut into stretches of rows. In the middle of each the gaps are computed; from there on no body moves further
-than `roaming` proves of the platform (lemmas 9 and 13 of docs/proofs.md). Stretches that may hold a gap smaller than
+than `enclose` proves of the platform (lemmas 9 and 13 of docs/proofs.md). Stretches that may hold a gap smaller than
 what is known are cut into eight.
 """
 
@@ -14,7 +14,6 @@ from typing import cast
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.kinematics.proofs.pose_enclosure import roaming
 from pentapod.numerics.blocks import blocks
 from pentapod.verify.replay.replay import Replay
 
@@ -104,12 +103,13 @@ def _stray(replay: Replay, starts: Ints, size: int, offsets: Floats) -> Stray:
         intervals = np.minimum(starts[rows, None] + np.arange(size), last)
         lengths = _controls(replay, intervals)
         middle = starts[rows] + np.minimum(starts[rows] + size, last + 1)
-        line[rows], turn[rows] = roaming(replay.machine.robot, position[middle], direction[middle], lengths, offsets)
+        ends = position[middle], direction[middle]
+        line[rows], turn[rows] = replay.machine.robot.enclose(ends, lengths, offsets)
     return Stray(line, turn)
 
 
 def _controls(replay: Replay, intervals: Ints) -> Floats:
-    """Return leg lengths (n, M, 5) whose hull holds the legs on intervals (n, m): the Bernstein coefficients."""
+    """Return leg lengths (n, M, n_legs) whose hull holds the legs on intervals (n, m): the Bernstein coefficients."""
     legs, slopes = replay.program.legs, replay.slopes
     if slopes is None:
         return np.concatenate([legs[intervals], legs[intervals[:, -1:] + 1]], axis=1)

@@ -7,14 +7,13 @@ worst value of each leg and its place, and for each sample and each chord betwee
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.interpolant import Interpolant, clamped_slopes
-from pentapod.kinematics.proofs.certificate import ComponentProof, certify_component
-from pentapod.kinematics.proofs.chords import Chords, prove_chords
+from pentapod.kinematics.answers import BranchProof, Chords
 from pentapod.machine.machine import Machine
 from pentapod.numerics.bernstein import split
 from pentapod.program.program import Program
@@ -41,28 +40,26 @@ class Extreme:
 class ComponentFindings:
     """What is proven of the component, over all intervals.
 
-    upright, away: least |w| and |S| that are proven, as −`Extreme` of one column. refuted, undecided: how many
-    intervals; their first ones, and the doubtful part of those in [0, 1].
+    lower: the least values that are proven of the robot's `proven_measures`, as −`Extreme`. refuted, undecided: how
+    many intervals; their first ones, and the doubtful part of those in [0, 1].
     """
 
-    upright: Extreme = field(default_factory=lambda: Extreme(1))
-    away: Extreme = field(default_factory=lambda: Extreme(1))
+    lower: Extreme
     refuted: int = 0
     undecided: int = 0
     first_refuted: tuple[int, float, float] | None = None
     first_undecided: tuple[int, float, float] | None = None
 
-    def see(self, proof: ComponentProof, first: int) -> None:
+    def see(self, proof: BranchProof, first: int) -> None:
         """Take in the proof of the intervals from `first` on."""
-        self.upright.see(-proof.w_lower[:, None], first)
-        self.away.see(-proof.s_lower[:, None], first)
+        self.lower.see(-proof.lower, first)
         self.refuted += int(proof.refuted.sum())
         self.undecided += int(proof.undecided.sum())
         self.first_refuted = self.first_refuted or _first(proof, proof.refuted, first)
         self.first_undecided = self.first_undecided or _first(proof, proof.undecided, first)
 
 
-def _first(proof: ComponentProof, which: Bools, first: int) -> tuple[int, float, float] | None:
+def _first(proof: BranchProof, which: Bools, first: int) -> tuple[int, float, float] | None:
     if not which.any():
         return None
     k = int(np.argmax(which))
@@ -115,7 +112,7 @@ def survey(
     """
     count = len(program.legs) - 1
     slopes = clamped_slopes(program.legs) if program.interpolation == "cubic" else None
-    found = _empty(count)
+    found = _empty(count, machine.robot.n_legs, len(machine.robot.proven_measures))
     for first in range(0, count, _BLOCK):
         last = min(first + _BLOCK, count)
         progress(first / count)
@@ -125,10 +122,10 @@ def survey(
         wide = Interpolant.along(program.legs[rows], None if slopes is None else slopes[rows], program.period)
         _legs(found, wide, first, slice(first - low, last - low))
         part = Interpolant(wide.bernstein[first - low : last - low], program.period)
-        proof = certify_component(machine.robot, part.bernstein, program.component, leg_error=leg_error)
-        found.component.see(proof, first)
         samples = slice(2 * first, 2 * last + 1)
         found.position[samples], found.direction[samples] = machine.robot.pose(part.halves, program.component)
+        ends = found.position[samples][::2], found.direction[samples][::2]
+        found.component.see(machine.robot.prove(part.bernstein, ends, program.component, leg_error=leg_error), first)
         between = slice(2 * first, 2 * last)
         chords = _chords(found, machine, program, part, between, pivot)
         found.away[between], found.turned[between] = chords.away[:, 1], chords.turned
@@ -141,23 +138,23 @@ def survey(
     return found
 
 
-def _empty(count: int) -> Survey:
+def _empty(count: int, legs: int, measures: int) -> Survey:
     """Return a survey of `count` intervals of which nothing is known yet."""
     return Survey(
-        shortest=Extreme(5),
-        longest=Extreme(5),
-        rates=Extreme(5),
-        accelerations=Extreme(5),
-        jerks=Extreme(5),
-        component=ComponentFindings(),
+        shortest=Extreme(legs),
+        longest=Extreme(legs),
+        rates=Extreme(legs),
+        accelerations=Extreme(legs),
+        jerks=Extreme(legs),
+        component=ComponentFindings(Extreme(measures)),
         position=np.empty((2 * count + 1, 3)),
         direction=np.empty((2 * count + 1, 3)),
         away=np.empty(2 * count),
         turned=np.empty(2 * count),
         speeds=np.empty((2 * count, 3)),
-        base_widest=Extreme(5),
-        platform_closed=Extreme(5),
-        platform_open=Extreme(5),
+        base_widest=Extreme(legs),
+        platform_closed=Extreme(legs),
+        platform_open=Extreme(legs),
     )
 
 
@@ -178,16 +175,15 @@ def _chords(
 
     Of the tip, the pivot, and both ends of what the platform's line carries.
     """
-    tip, offsets = machine.tool_length, machine.robot.offsets
+    tip, heights = machine.tool_length, machine.robot.line_heights
     halves = split(part.bernstein)
-    legs = np.stack(halves, axis=1).reshape(-1, 5, part.degree + 1)
+    legs = np.stack(halves, axis=1).reshape(-1, *part.bernstein.shape[1:])
     start, end = between, slice(between.start + 1, between.stop + 1)
-    return prove_chords(
-        machine.robot,
+    return machine.robot.prove_chords(
         legs,
         (found.position[start], found.direction[start]),
         (found.position[end], found.direction[end]),
         program.component,
-        arms=np.array([tip, tip - pivot, offsets.min(), max(offsets.max(), tip)]),
+        arms=np.array([tip, tip - pivot, heights.min(), max(heights.max(), tip)]),
         towards=machine.joints.base_axes,
     )
