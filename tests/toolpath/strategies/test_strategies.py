@@ -164,6 +164,14 @@ def test_every_strategy_on_every_generated_part(generated, name, part):
         assert coverage(mesh, options, cuts, count=30_000) >= 0.999
 
 
+@pytest.mark.parametrize("name", STRATEGIES)
+def test_every_strategy_refuses_lengths_in_millimetres(generated, name):
+    options = told(0.1)[name]
+    wrong = {"stepover": 3.0} if isinstance(options, CoverOptions) and options.stepover else {"clearance": 10.0}
+    with pytest.raises(ToolpathError, match=r" m is .* the part \(0\.1 m\); lengths are in metres"):
+        toolpath_with_report(generated["waves"], BallCutter(1e-3), replace(options, **wrong))
+
+
 REAL = [
     "wavy_mesh_with_hole.ply", "facade_infill_open_mid_res.stl", "wavy_vase_open_low_res.stl", "1002_tray_bottom.STL",
     "octagonal_pocket.stl", "fandisk.obj", "torus.STL", "unit_sphere.STL", "busted.STL", "soup.stl", "teapot.stl",
