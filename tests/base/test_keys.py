@@ -17,6 +17,7 @@ from pentapod.base.keys import Key, check_fields, check_size, declared, fields_f
 from pentapod.base.tables import Table, table_of
 from pentapod.base.units import from_si, split_key, to_si
 from pentapod.cutters import CUTTERS
+from pentapod.machine.tables import PARTS
 from pentapod.toolpath import STRATEGIES
 
 
@@ -86,11 +87,12 @@ def test_lengths_are_checked_against_the_part():
 
 
 def test_every_default_is_the_same_in_si_and_in_the_unit_of_files():
-    for cls in (*(strategy.options for strategy in STRATEGIES.values()), *CUTTERS.values()):
+    parts = {**PARTS, **CUTTERS, **{name: strategy.options for name, strategy in STRATEGIES.items()}}
+    for cls in parts.values():
         for item in declared(cls):
             assert item.key.meaning
-            if not item.is_needed and isinstance(item.default, float):
-                assert item.key.si(item.file_default) == item.default, item.file_key
+            if not item.is_needed and item.file_default is not None and isinstance(item.default, float | np.ndarray):
+                np.testing.assert_array_equal(item.key.si(item.file_default), item.default, item.file_key)
 
 
 @given(st.floats(-1e6, 1e6), st.sampled_from(["mm", "mm_min", "deg", "deg_mm", "ms", "per_mm", "s", ""]))

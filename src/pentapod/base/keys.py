@@ -11,16 +11,16 @@ from __future__ import annotations
 import dataclasses
 import math
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from pentapod.base.arrays import set_frozen
+from pentapod.base.arrays import Floats, set_frozen
 from pentapod.base.errors import InputError, nearest
 from pentapod.base.units import from_si, to_si
 
@@ -155,37 +155,37 @@ def check_fields(instance: object, wrong: type[InputError]) -> None:
     for item in declared(type(instance)):
         value = getattr(instance, item.field)
         if (names := item.enumeration()) is not None:
-            set_frozen(instance, **{item.field: chosen(item.field, value, names, wrong)})
-        elif isinstance(value, int | float) and not isinstance(value, bool):
+            set_frozen(instance, **{item.field: names(chosen(item.field, value, tuple(names), wrong))})
+        elif get_origin(item.hint) is Literal:
+            chosen(item.field, value, get_args(item.hint), wrong)
+        elif isinstance(value, int | float | np.ndarray) and not isinstance(value, bool):
             _check_number(item, value, wrong)
 
 
-def _check_number(item: Declared, value: float, wrong: type[InputError]) -> None:
-    if not math.isfinite(value):
+def _check_number(item: Declared, numbers: float | Floats, wrong: type[InputError]) -> None:
+    bounds = {name: item.key.si(bound) for name, bound in item.key.bounds.items()}
+    value = numbers.tolist() if isinstance(numbers, np.ndarray) else numbers
+    if not np.isfinite(numbers).all():
         raise wrong("must be finite", key=item.field, value=value)
-    si = {name: item.key.si(bound) for name, bound in item.key.bounds.items()}
-    low, high = (
-        max(si.get("gt", -math.inf), si.get("ge", -math.inf)),
-        min(si.get("lt", math.inf), si.get("le", math.inf)),
-    )
-    below = value < low or ("gt" in si and value <= si["gt"])
-    if not below and not value > high and not ("lt" in si and value >= si["lt"]):
+    kept = {name: bool(np.all(_BOUNDS[name][1](numbers, bound))) for name, bound in bounds.items()}
+    if all(kept.values()):
         return
-    if below and low == 0.0:
-        raise wrong("must be positive" if "gt" in si else "must not be negative", key=item.field, value=value)
-    words = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
-    expected = " and ".join(f"{words[name]} {bound:.6g}" for name, bound in si.items())
+    if not kept.get("gt", True) and bounds["gt"] == 0.0:
+        raise wrong("must be positive", key=item.field, value=value)
+    if not kept.get("ge", True) and bounds["ge"] == 0.0:
+        raise wrong("must not be negative", key=item.field, value=value)
+    expected = " and ".join(f"{_BOUNDS[name][0]} {bound:.6g}" for name, bound in bounds.items())
     raise wrong("out of range", key=item.field, value=value, expected=expected)
 
 
-def chosen(name: str, value: str, choices: type[StrEnum], wrong: type[InputError]) -> StrEnum:
-    """Return the choice of that name. Raises `wrong` with the known ones."""
+def chosen(name: str, value: str, choices: Sequence[str], wrong: type[InputError]) -> str:
+    """Return a name that is one of the choices. Raises `wrong` with the known ones."""
     known = [str(choice) for choice in choices]
     if value not in known:
         raise wrong(
             f"unknown {name}", key=name, value=value, expected=" or ".join(known), remedy=nearest(str(value), known)
         )
-    return choices(value)
+    return value
 
 
 def oversized(cls: type, values: Mapping[str, Any], extent: float) -> Declared | None:

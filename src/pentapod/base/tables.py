@@ -62,6 +62,12 @@ def table_of(cls: type, base: type[TableType]) -> type[TableType]:
     return made
 
 
+def extended(name: str, base: type[TableType], cls: type) -> type[TableType]:
+    """Return a table with the keys of another one, and those that a dataclass declares."""
+    made: Any = create_model(name, __base__=base, __doc__=base.__doc__, **table_fields(cls))
+    return made
+
+
 def _one_of(table: Any) -> Any:
     """Raise where not exactly one of the keys is given of which the dataclass takes one."""
     cls = table.declared_by
@@ -76,9 +82,10 @@ def _one_of(table: Any) -> Any:
 
 def _field(item: Declared, *, optional: bool) -> Any:
     default = None if optional else item.file_default
-    default = ... if default is MISSING else tuple(default) if isinstance(default, list) else default
+    default = ... if default is MISSING else default
+    bounds = item.key.bounds if item.key.kind is None else {}  # others are checked by the dataclass
     least: dict[str, Any] = {"min_length": 1} if item.key.kind is Path or (item.hint is str and not default) else {}
-    return Field(default=default, description=item.key.meaning, **item.key.bounds, **least)
+    return Field(default=default, description=item.key.meaning, **bounds, **least)
 
 
 def _kind(item: Declared, *, optional: bool) -> Any:

@@ -3,30 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Annotated, Literal
 
 import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import MachineError
+from pentapod.base.keys import Key, check_fields
 from pentapod.base.values import Value
-from pentapod.machine.fields import per_leg, positive
+from pentapod.machine.fields import FIVE_AXES, LIST_OF_3, PER_LEG, per_leg, positive
 
 Interpolation = Literal["linear", "cubic"]
 
 
 @dataclass(frozen=True, eq=False)
 class LegLimits(Value):
-    """Limits of each leg, arrays (5,): lengths in m, rates in m/s, accelerations in m/s², jerks in m/s³.
+    """Limits of each leg.
 
-    Scalars hold for all legs. Raises MachineError: not positive and finite, min_length ≥ max_length.
+    Arrays (5,), SI; scalars hold for all legs. Raises MachineError: not positive and finite, min_length ≥ max_length.
     """
 
-    min_length: Floats
-    max_length: Floats
-    max_velocity: Floats
-    max_acceleration: Floats
-    max_jerk: Floats
+    min_length: Annotated[Floats, Key("mm", "shortest leg, base joint to platform joint", kind=PER_LEG)]
+    max_length: Annotated[Floats, Key("mm", "longest leg", kind=PER_LEG)]
+    max_velocity: Annotated[Floats, Key("mm_s", "largest rate of a leg", kind=PER_LEG)]
+    max_acceleration: Annotated[Floats, Key("mm_s2", "largest acceleration of a leg", kind=PER_LEG)]
+    max_jerk: Annotated[Floats, Key("mm_s3", "largest jerk of a leg", kind=PER_LEG)]
 
     def __post_init__(self) -> None:
         per_leg(self, *self.__dataclass_fields__)
@@ -58,8 +59,11 @@ class JointLimits(Value):
     that is empty or beyond 0..180°.
     """
 
-    base_axes: Floats
-    base_cone: Floats
+    base_axes: Annotated[
+        Floats,
+        Key("", "unit axis of each base joint's cone, from the base into the work", "base_axis", kind=FIVE_AXES),
+    ]
+    base_cone: Annotated[Floats, Key("deg", "largest angle between leg and that axis", kind=PER_LEG)]
     platform_range: Floats
 
     def __post_init__(self) -> None:
@@ -81,7 +85,7 @@ class JointLimits(Value):
 
 @dataclass(frozen=True)
 class Bodies(Value):
-    """Simple bodies around the legs and the platform line, metres.
+    """Simple bodies around the legs and the platform line.
 
     leg_radius: each leg is a capsule from base joint to platform joint. shaft_radius: the platform (spindle)
     is a capsule along the line, from the platform joint farthest from the tip to the tip's holder end,
@@ -89,31 +93,28 @@ class Bodies(Value):
     are joined, not colliding.
     """
 
-    leg_radius: float
-    shaft_radius: float
-    shaft_end: float
-    joint_radius: float
+    leg_radius: Annotated[float, Key("mm", "each leg is a cylinder with round ends", "leg_diameter", 0.5, gt=0.0)]
+    shaft_radius: Annotated[
+        float, Key("mm", "the spindle is one too, along the platform line", "shaft_diameter", 0.5, gt=0.0)
+    ]
+    shaft_end: Annotated[float, Key("mm", "the spindle ends this far short of the tip", gt=0.0)]
+    joint_radius: Annotated[
+        float, Key("mm", "so close to its own platform joint a leg may be inside the spindle", gt=0.0)
+    ]
 
     def __post_init__(self) -> None:
-        positive(self, *self.__dataclass_fields__)
+        check_fields(self, MachineError)
 
 
 @dataclass(frozen=True)
 class ControllerSettings(Value):
-    """period: seconds between setpoints. interpolation: how the controller moves between them."""
+    """How the controller takes its setpoints. period: seconds between them."""
 
-    period: float
-    interpolation: Interpolation
+    period: Annotated[float, Key("ms", "time between setpoints", gt=0.0)]
+    interpolation: Annotated[Interpolation, Key("", "how it moves between them")]
 
     def __post_init__(self) -> None:
-        positive(self, "period")
-        if self.interpolation not in get_args(Interpolation):
-            raise MachineError(
-                "unknown interpolation",
-                key="interpolation",
-                value=self.interpolation,
-                expected='"linear" or "cubic"',
-            )
+        check_fields(self, MachineError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,15 +125,11 @@ class WorkVolume(Value):
     tool axis and −z (the base normal away from the work).
     """
 
-    centre: Floats
-    diameter: float
-    height: float
-    tilt: float
+    centre: Annotated[Floats, Key("mm", "centre of the cylinder", kind=LIST_OF_3)]
+    diameter: Annotated[float, Key("mm", "of the cylinder of tip positions", gt=0.0)]
+    height: Annotated[float, Key("mm", "of the cylinder, along z", gt=0.0)]
+    tilt: Annotated[float, Key("deg", "largest angle between tool axis and −z", ge=0.0, lt=90.0)]
 
     def __post_init__(self) -> None:
         set_frozen(self, centre=frozen(self.centre, "centre", (3,)))
-        positive(self, "diameter", "height")
-        if not 0.0 <= self.tilt < 0.5 * np.pi:
-            raise MachineError(
-                "out of range", key="tilt", value=float(np.degrees(self.tilt)), expected="0 to 90 degrees"
-            )
+        check_fields(self, MachineError)

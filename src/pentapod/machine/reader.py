@@ -8,49 +8,23 @@ from __future__ import annotations
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError, MachineError, nearest
+from pentapod.base.keys import fields_from
 from pentapod.base.tables import problem_of
 from pentapod.base.toml import line_of, parsed, read_toml
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, WorkVolume
-from pentapod.machine.tables import DrivesTable, GeometryTable, GuidesTable, MachineTables, MassesTable
+from pentapod.machine.tables import FILE_KEYS, PARTS, GeometryTable, GuidesTable, MachineTables
 from pentapod.machine.tool_limits import ToolLimits
 
 OFFSET_TOLERANCE_M = 1e-6  # offsets in a file are rounded; beyond a micrometre they mean another machine
-
-# The key of the file that a field of the SI types comes from, where the names differ.
-_FILE_KEYS = {
-    "min_length": "legs.min_length_mm",
-    "max_length": "legs.max_length_mm",
-    "max_velocity": "legs.max_velocity_mm_s",
-    "max_acceleration": "legs.max_acceleration_mm_s2",
-    "max_jerk": "legs.max_jerk_mm_s3",
-    "base_axes": "joints.base_axis",
-    "base_cone": "joints.base_cone_deg",
-    "platform_range": "joints.platform_min_deg",
-    "base": "geometry.base_mm",
-    "delta": "geometry.delta",
-    "offsets": "geometry.platform_mm",
-    "guides": "guides.direction",
-    "travel": "guides.least_mm",
-    "tool_length": "tool.length_mm",
-    "tilt": "work.tilt_deg",
-    "position_gain": "drives.position_gain_per_s",
-    "velocity_gain": "drives.velocity_gain_per_s",
-    "velocity_integral": "drives.velocity_integral_per_s",
-    "moving_mass": "drives.moving_mass_kg",
-    "ripple_force": "drives.ripple_n",
-    "ripple_pitch": "drives.ripple_pitch_mm",
-}
-
 
 _Made_co = TypeVar("_Made_co", covariant=True)
 
@@ -129,7 +103,7 @@ def read(text: str, file: str | Path, make: Maker[_Made_co]) -> _Made_co:
         where, details = problem_of(error, MachineTables, _table)
         raise MachineError(file=file, line=line_of(text, where), **details) from error
     except InputError as error:
-        key = _FILE_KEYS.get(error.key or "", error.key)
+        key = FILE_KEYS.get(error.key or "", error.key)
         raise MachineError(
             error.what,
             file=file,
@@ -145,53 +119,31 @@ def _library() -> Traversable:
     return resources.files("pentapod.machine") / "library"
 
 
-def _si(values: object) -> Floats:
-    """Return millimetres as metres: divided by 1000, which rounds once."""
-    return np.asarray(values, dtype=np.float64) / 1000.0
-
-
-def _made(tables: MachineTables, make: Maker[_Made_co]) -> _Made_co:
-    legs, joints, bodies, work = tables.legs, tables.joints, tables.bodies, tables.work
-    pentapod = _geometry(tables.geometry)
+def _made(tables: Any, make: Maker[_Made_co]) -> _Made_co:
+    """Return what is made of the parts; tables: a `MachineTables`."""
+    robot, joints = _geometry(tables.geometry), tables.joints
+    parts = {name: fields_from(part, getattr(tables, name)) for name, part in PARTS.items()}
     return make(
         name=tables.name,
-        robot=pentapod,
-        legs=LegLimits(
-            min_length=_si(legs.min_length_mm),
-            max_length=_si(legs.max_length_mm),
-            max_velocity=_si(legs.max_velocity_mm_s),
-            max_acceleration=_si(legs.max_acceleration_mm_s2),
-            max_jerk=_si(legs.max_jerk_mm_s3),
-        ),
+        robot=robot,
+        legs=LegLimits(**parts["legs"]),
         joints=JointLimits(
-            base_axes=np.asarray(joints.base_axis),
-            base_cone=np.radians(joints.base_cone_deg),
-            platform_range=np.radians(np.stack([joints.platform_min_deg, joints.platform_max_deg], axis=1)),
+            platform_range=np.stack([joints.si.platform_min, joints.si.platform_max], axis=1), **parts["joints"]
         ),
-        bodies=Bodies(
-            leg_radius=bodies.leg_diameter_mm / 2000.0,
-            shaft_radius=bodies.shaft_diameter_mm / 2000.0,
-            shaft_end=bodies.shaft_end_mm / 1000.0,
-            joint_radius=bodies.joint_radius_mm / 1000.0,
-        ),
-        tool_length=tables.tool.length_mm / 1000.0,
-        rapid_velocity=tables.tool.rapid_mm_min / 60000.0,
-        controller=ControllerSettings(tables.controller.period_ms / 1000.0, tables.controller.interpolation),
-        work=WorkVolume(
-            centre=_si(work.centre_mm),
-            diameter=work.diameter_mm / 1000.0,
-            height=work.height_mm / 1000.0,
-            tilt=float(np.radians(work.tilt_deg)),
-        ),
-        drives=_drives(tables.drives),
-        masses=_masses(tables.masses),
-        tool_limits=ToolLimits.of(tables.tool),
-        guides=_guides(tables.guides, pentapod),
+        bodies=Bodies(**parts["bodies"]),
+        tool_length=tables.tool.si.length,
+        rapid_velocity=tables.tool.si.rapid,
+        controller=ControllerSettings(**parts["controller"]),
+        work=WorkVolume(**parts["work"]),
+        drives=Drives(**parts["drives"]),
+        masses=Masses(**parts["masses"]),
+        tool_limits=ToolLimits(**parts["tool"]),
+        guides=_guides(tables.guides, robot),
     )
 
 
 def _guides(table: GuidesTable, pentapod: LinearPentapod) -> ReconfigurablePentapod | None:
-    travel = _si(np.stack([table.least_mm, table.greatest_mm], axis=1))
+    travel = np.stack([table.si.least, table.si.greatest], axis=1)
     if not travel.any():
         return None
     if ((travel[:, 0] > 0.0) | (travel[:, 1] < 0.0)).any():
@@ -204,35 +156,8 @@ def _guides(table: GuidesTable, pentapod: LinearPentapod) -> ReconfigurablePenta
     return ReconfigurablePentapod(pentapod, np.asarray(table.direction), travel)
 
 
-def _drives(table: DrivesTable) -> Drives:
-    return Drives(
-        position_gain=np.asarray(table.position_gain_per_s),
-        velocity_gain=np.asarray(table.velocity_gain_per_s),
-        velocity_integral=np.asarray(table.velocity_integral_per_s),
-        moving_mass=np.asarray(table.moving_mass_kg),
-        ripple_force=np.asarray(table.ripple_n),
-        ripple_pitch=_si(table.ripple_pitch_mm),
-        velocity_feedforward=table.velocity_feedforward,
-        acceleration_feedforward=table.acceleration_feedforward,
-        load_feedforward=table.load_feedforward,
-        encoder_step=table.encoder_step_mm / 1000.0,
-        dead_time=table.dead_time_ms / 1000.0,
-        period=table.period_ms / 1000.0,
-        contour_margin=table.contour_margin,
-    )
-
-
-def _masses(table: MassesTable) -> Masses:
-    return Masses(
-        cylinder=table.cylinder_kg,
-        rod=table.rod_kg,
-        platform=table.platform_kg,
-        gravity=np.asarray(table.gravity_m_s2),
-    )
-
-
 def _geometry(table: GeometryTable) -> LinearPentapod:
-    base = _si(table.base_mm)
+    base = table.si.base
     if table.platform_mm is None:
         if table.delta is None:
             raise MachineError(
@@ -240,7 +165,7 @@ def _geometry(table: GeometryTable) -> LinearPentapod:
             )
         return LinearPentapod.quadratic(base, table.delta)
     try:
-        return LinearPentapod.from_offsets(base, _si(table.platform_mm), table.delta, tolerance=OFFSET_TOLERANCE_M)
+        return LinearPentapod.from_offsets(base, table.si.platform, table.delta, tolerance=OFFSET_TOLERANCE_M)
     except MachineError as error:
         if table.delta is not None or error.key != "offsets":
             raise

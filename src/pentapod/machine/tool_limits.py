@@ -4,24 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from math import radians
-from typing import Protocol
+from typing import Annotated
 
 from pentapod.base.errors import MachineError
+from pentapod.base.keys import Key
 from pentapod.base.values import Value
 
-
-class ToolLimitKeys(Protocol):
-    """The keys of a file's table that limit the tool's motion, in millimetres and degrees; None: no limit."""
-
-    @property
-    def max_tip_acceleration_mm_s2(self) -> float | None: ...  # noqa: D102 (described above)
-    @property
-    def max_tip_jerk_mm_s3(self) -> float | None: ...  # noqa: D102
-    @property
-    def max_axis_velocity_deg_s(self) -> float | None: ...  # noqa: D102
-    @property
-    def max_axis_acceleration_deg_s2(self) -> float | None: ...  # noqa: D102
+_NONE = float("inf")
 
 
 @dataclass(frozen=True)
@@ -32,32 +21,23 @@ class ToolLimits(Value):
     of the direction of the tool axis. Raises MachineError: not positive.
     """
 
-    max_tip_acceleration: float = float("inf")
-    max_tip_jerk: float = float("inf")
-    max_axis_velocity: float = float("inf")
-    max_axis_acceleration: float = float("inf")
+    max_tip_acceleration: Annotated[
+        float, Key("mm_s2", "largest acceleration of the tip; of machine and job the smaller", gt=0.0)
+    ] = _NONE
+    max_tip_jerk: Annotated[float, Key("mm_s3", "largest jerk of the tip; of machine and job the smaller", gt=0.0)] = (
+        _NONE
+    )
+    max_axis_velocity: Annotated[
+        float, Key("deg_s", "largest angular velocity of the tool axis; of machine and job the smaller", gt=0.0)
+    ] = _NONE
+    max_axis_acceleration: Annotated[
+        float, Key("deg_s2", "largest angular acceleration of the tool axis; of machine and job the smaller", gt=0.0)
+    ] = _NONE
 
     def __post_init__(self) -> None:
         for name, value in self.given(all_fields=True).items():
             if not value > 0.0:
                 raise MachineError("must be positive", key=name, value=value)
-
-    @classmethod
-    def of(cls, table: ToolLimitKeys) -> ToolLimits:
-        """Return the limits that a table of a machine or job file sets."""
-
-        def metres(value: float | None) -> float:
-            return float("inf") if value is None else value / 1000.0
-
-        def angle(value: float | None) -> float:
-            return float("inf") if value is None else radians(value)
-
-        return cls(
-            metres(table.max_tip_acceleration_mm_s2),
-            metres(table.max_tip_jerk_mm_s3),
-            angle(table.max_axis_velocity_deg_s),
-            angle(table.max_axis_acceleration_deg_s2),
-        )
 
     def given(self, *, all_fields: bool = False) -> dict[str, float]:
         """Return the limits that are set, by name; or all of them."""
@@ -72,19 +52,19 @@ class ToolLimits(Value):
     @property
     def limits_tip_acceleration(self) -> bool:
         """Whether the tip's acceleration is limited."""
-        return self.max_tip_acceleration < float("inf")
+        return self.max_tip_acceleration < _NONE
 
     @property
     def limits_tip_jerk(self) -> bool:
         """Whether the tip's jerk is limited."""
-        return self.max_tip_jerk < float("inf")
+        return self.max_tip_jerk < _NONE
 
     @property
     def limits_axis_acceleration(self) -> bool:
         """Whether the axis's angular acceleration is limited."""
-        return self.max_axis_acceleration < float("inf")
+        return self.max_axis_acceleration < _NONE
 
     @property
     def limits_axis(self) -> bool:
         """Whether the axis's angular velocity or acceleration is limited."""
-        return self.limits_axis_acceleration or self.max_axis_velocity < float("inf")
+        return self.limits_axis_acceleration or self.max_axis_velocity < _NONE

@@ -6,6 +6,7 @@ import dataclasses
 from pathlib import Path
 
 from pentapod.base.errors import InputError, MachineError, MeshError
+from pentapod.base.keys import fields_from
 from pentapod.base.progress import Progress, silent
 from pentapod.job.build.strategy import check_sizes, job_options
 from pentapod.job.build.tool import FileReport, Reports, finished_as_asked, job_link_style, job_tool
@@ -28,7 +29,7 @@ def job_machine(job: Job) -> Machine:
         interpolation=job.output.interpolation or machine.controller.interpolation,
     )
     length = machine.tool_length if job.tool.length_mm is None else job.tool.si.length
-    limits = machine.tool_limits.and_(ToolLimits.of(job.feed))
+    limits = machine.tool_limits.and_(ToolLimits(**fields_from(ToolLimits, job.feed)))
     try:
         return dataclasses.replace(machine, controller=controller, tool_length=length, tool_limits=limits)
     except MachineError as error:

@@ -7,14 +7,15 @@ degrees, mm/min), and in SI at `table.si`.
 
 from __future__ import annotations
 
-from typing import Literal, cast
+from typing import TYPE_CHECKING, Literal, cast
 
 from pydantic import Field, model_validator
 
-from pentapod.base.tables import Positive, Table, Vector, wrong
+from pentapod.base.tables import Positive, Table, Vector, extended, wrong
 from pentapod.job.schema.placement import FixtureTable, PlacementTable
 from pentapod.job.schema.strategies import ToolpathTable, strategy_table
 from pentapod.job.schema.tool import AnyTool, tool_table
+from pentapod.machine.tool_limits import ToolLimits
 
 
 class PartTable(Table):
@@ -132,7 +133,7 @@ class GougeTable(Table):
     highest_mm: Positive = Field(default=20.0, description="lift: most that a waypoint may rise")
 
 
-class FeedTable(Table):
+class SpeedTable(Table):
     """Speeds of the tool tip, and what this job asks of tip and axis beyond the machine's own limits."""
 
     cut_mm_min: Positive = Field(le=100_000.0, description="feed while cutting")
@@ -158,12 +159,12 @@ class FeedTable(Table):
         le=180.0,
         description="an exact stop at every corner where the toolpath turns by more; others are rounded in passing",
     )
-    max_tip_acceleration_mm_s2: Positive | None = Field(default=None, description="of the tip; the machine's if less")
-    max_tip_jerk_mm_s3: Positive | None = Field(default=None, description="of the tip; the machine's if less")
-    max_axis_velocity_deg_s: Positive | None = Field(
-        default=None, description="of the tool axis; the machine's if less"
-    )
-    max_axis_acceleration_deg_s2: Positive | None = Field(default=None, description="of the tool axis, likewise")
+
+
+if TYPE_CHECKING:
+    FeedTable = SpeedTable
+else:
+    FeedTable = extended("FeedTable", SpeedTable, ToolLimits)
 
 
 class ToleranceTable(Table):
