@@ -1,6 +1,6 @@
 """Polynomials in Bernstein form on [0, 1] whose coefficients are balls: coefficients first, (n + 1, ...).
 
-The laws are those of `geometry.bernstein`; what is read off the results holds in spite of rounding (lemmas 5 and 6 of
+The laws are those of `numerics.bernstein`; what is read off the results holds in spite of rounding (lemmas 5 and 6 of
 docs/proofs.md).
 """
 
