@@ -6,7 +6,7 @@ import pytest
 from scipy.optimize import linprog
 
 from pentapod.kinematics.component import Component
-from pentapod.numerics.convex.dense_program import dense_program
+from pentapod.numerics.convex.dense_qp import dense_qp
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.curvature import Curvature
 from pentapod.planning.placement.sampling import first_candidate, first_guesses
@@ -27,7 +27,7 @@ def program(seed, bent):
 @pytest.mark.parametrize("seed", range(4))
 def test_linear_programs_against_the_simplex_method(seed):
     hessian, gradient, matrix, upper = program(seed, 0)
-    x, z = dense_program(hessian, gradient, matrix, upper)
+    x, z = dense_qp(hessian, gradient, matrix, upper)
     theirs = linprog(gradient, A_ub=matrix, b_ub=upper, bounds=(None, None), method="highs-ds")
     assert gradient @ x == pytest.approx(theirs.fun, abs=1e-6)
     np.testing.assert_allclose(z, -theirs.ineqlin.marginals, atol=1e-5)
@@ -37,7 +37,7 @@ def test_linear_programs_against_the_simplex_method(seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_quadratic_programs_against_an_active_set_method(seed, bent):
     hessian, gradient, matrix, upper = program(seed, bent)
-    x, z = dense_program(hessian, gradient, matrix, upper)
+    x, z = dense_qp(hessian, gradient, matrix, upper)
     shapes = {"h": ca.DM(hessian).sparsity(), "a": ca.DM(matrix).sparsity()}
     solver = ca.conic("theirs", "qpoases", shapes, {"printLevel": "none"})
     theirs = solver(h=hessian, g=gradient, a=matrix, uba=upper, lba=-np.inf)
@@ -48,7 +48,7 @@ def test_quadratic_programs_against_an_active_set_method(seed, bent):
 
 def test_without_an_interior_there_is_no_answer():
     matrix = np.array([[1.0], [-1.0]])
-    assert dense_program(np.zeros((1, 1)), np.ones(1), matrix, np.array([-1.0, -1.0])) is None
+    assert dense_qp(np.zeros((1, 1)), np.ones(1), matrix, np.array([-1.0, -1.0])) is None
 
 
 def test_curvature_against_differences(desk, cap):

@@ -9,7 +9,7 @@ from planning_instances import instances
 from scipy import sparse
 
 from pentapod.kinematics.component import COMPONENTS
-from pentapod.numerics.convex.interior_point import AxisProgram, SoftRows
+from pentapod.numerics.convex.banded_qp import BandedQP, SoftRows
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.sampling import first_candidate, first_guesses
 from pentapod.planning.problem.problem import PlacementProblem
@@ -82,7 +82,7 @@ def test_the_banded_program_is_solved_as_ipopt_solves_it(seed):
     slopes, upper = rng.normal(size=(len(point), 2)), rng.uniform(0.05, 0.5, len(point))
     centre = np.zeros((spline.hessian.shape[1] // 2, 2))
     scale = spline.cost_of(centre)
-    program = AxisProgram(spline.hessian, spline.gradient, scale, spline.basis, point, slopes, upper, centre, 0.8)
+    program = BandedQP(spline.hessian, spline.gradient, scale, spline.basis, point, slopes, upper, centre, 0.8)
     found = program.solved()
     assert ((slopes * (spline.basis @ found)[point]).sum(axis=1) <= upper + 1e-5).all()
     assert np.linalg.norm(found, axis=1).max() <= 0.8 + 1e-3
@@ -110,7 +110,7 @@ def test_soft_rows_are_exceeded_where_it_pays(seed):
     windows[-1, 8:] = 0.0
     soft = SoftRows(windows, starts, rng.uniform(-0.3, 0.1, 61), 10.0 ** rng.uniform(-4.0, 2.0, 61))
     none = np.zeros(0, dtype=np.intp)
-    program = AxisProgram(
+    program = BandedQP(
         spline.hessian,
         spline.gradient,
         0.01,
@@ -146,7 +146,7 @@ def test_a_program_without_interior_has_no_answer():
     _, spline = course_of(0)
     centre = np.zeros((spline.hessian.shape[1] // 2, 2))
     point, slopes = np.array([3, 3]), np.array([[1.0, 0.0], [-1.0, 0.0]])
-    program = AxisProgram(
+    program = BandedQP(
         spline.hessian, spline.gradient, 1.0, spline.basis, point, slopes, np.array([-0.2, -0.2]), centre, 2.0
     )
     assert program.solved() is None

@@ -1,1 +1,1 @@
-"""Convex programs by interior-point methods."""
+"""Convex quadratic programs, dense and banded, by one interior-point method."""

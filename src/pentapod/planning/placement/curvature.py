@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.numerics.convex.dense_program import dense_program
+from pentapod.numerics.convex.dense_qp import dense_qp
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.problem.formulation import curvature_function
 from pentapod.planning.problem.linear_model import LinearModel, by_field
@@ -43,12 +43,12 @@ class Curvature:
             np.concatenate([upper[near], box, box]),
         )
         gradient, hessian = np.append(np.zeros(count - 1), -1.0), np.zeros((count, count))
-        answer = dense_program(hessian, gradient, matrix, upper)
+        answer = dense_qp(hessian, gradient, matrix, upper)
         if answer is not None:
             multipliers = np.zeros(len(near))
             multipliers[near] = answer[1][: int(near.sum())]
             hessian[:-1, :-1] = self.hessian(model, at, multipliers)
-            answer = dense_program(hessian, gradient, matrix, upper)
+            answer = dense_qp(hessian, gradient, matrix, upper)
         if answer is None:
             return np.zeros(len(model.moves)), np.zeros_like(at.coefficients), 0.0
         x = answer[0]

@@ -15,7 +15,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.numerics.casadi_vectorised import Vectorised
-from pentapod.numerics.convex.interior_point import SoftRows
+from pentapod.numerics.convex.banded_qp import SoftRows
 from pentapod.numerics.divided_differences import as_matrix, differences, divided_differences
 from pentapod.planning.problem.formulation import leg_function
 from pentapod.planning.problem.problem import Candidate, PlacementProblem

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
-from pentapod.numerics.convex.interior_point import NO_ROWS, AxisProgram
+from pentapod.numerics.convex.banded_qp import NO_ROWS, BandedQP
 from pentapod.planning.problem.formulation import Slopes, lean_slopes
 from pentapod.planning.problem.linear_model import valleys
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
@@ -183,7 +183,7 @@ class _Smoothing:
         point, kind = np.nonzero(near[:, kinds] & reached)
         return _Model(c, looked[point], rows[point], kinds[kind], values[point, kind], slopes[point, kind])
 
-    def program(self, model: _Model, missed: Floats | None, tried: list[Floats] | None) -> AxisProgram:
+    def program(self, model: _Model, missed: Floats | None, tried: list[Floats] | None) -> BandedQP:
         """Return the convex program around a model.
 
         missed: see `_Model.missed`; tried: coefficients at which charges are looked for, besides the model's; None
@@ -197,7 +197,7 @@ class _Smoothing:
         soft = NO_ROWS if tried is None else self.cost.excess(model.c, *tried)
         # Where charges still dwarf the spline's own cost, an answer good for the one need not be so for the other.
         scale = max(float(np.sqrt(spline.cost_of(model.c) * self.spent)), 1e-9)
-        return AxisProgram(
+        return BandedQP(
             spline.hessian, spline.gradient, scale, basis, point, -model.slopes, upper, model.c, self.reach, soft,
             self.accuracy,
         )  # fmt: skip
