@@ -11,9 +11,12 @@ from pentapod.base.arrays import Bools, Floats, Ints, as_floats
 
 # Kuhn's six tetrahedra: from corner 0 to corner 7 (bits x, y, z), one axis at a time, in every order of the axes. They
 # fit across the faces of neighbouring cells, so the surface is closed.
-_PATHS = [(0, 1 << a, (1 << a) | (1 << b), 7) for a, b, _ in itertools.permutations(range(3))]
-_LEFT_HANDED = (1, 2, 5)  # odd orders of the axes
-_TETRAHEDRA = np.array([(a, c, b, d) if k in _LEFT_HANDED else (a, b, c, d) for k, (a, b, c, d) in enumerate(_PATHS)])
+_ORDERS = list(itertools.permutations(range(3)))
+_LEFT_HANDED = [(b - a) % 3 != 1 for a, b, _ in _ORDERS]  # odd orders of the axes
+_PATHS = [(0, 1 << a, (1 << a) | (1 << b), 7) for a, b, _ in _ORDERS]
+_TETRAHEDRA = np.array(
+    [(a, c, b, d) if odd else (a, b, c, d) for odd, (a, b, c, d) in zip(_LEFT_HANDED, _PATHS, strict=True)]
+)
 _REFERENCE = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
 
 

@@ -217,10 +217,12 @@ class Patch:
         return Patch(vertices, faces, normals)
 
 
+_A, _B, _C, _AB, _BC, _CA = range(6)
+"""Corners of a facet, and the middles of its sides."""
 _CUTS: dict[tuple[bool, bool, bool], tuple[tuple[int, int, int], ...]] = {
-    (False, False, False): ((0, 1, 2),),
-    (True, False, False): ((0, 3, 2), (3, 1, 2)),
-    (True, True, False): ((3, 1, 4), (0, 3, 4), (0, 4, 2)),
-    (True, True, True): ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+    (False, False, False): ((_A, _B, _C),),
+    (True, False, False): ((_A, _AB, _C), (_AB, _B, _C)),
+    (True, True, False): ((_AB, _B, _BC), (_A, _AB, _BC), (_A, _BC, _C)),
+    (True, True, True): ((_A, _AB, _CA), (_AB, _B, _BC), (_CA, _BC, _C), (_AB, _BC, _CA)),
 }
-"""By which of its sides are halved: the triangles that a facet becomes, of corners 0 to 2 and middles 3 to 5."""
+"""By which of its sides are halved: the triangles that a facet becomes."""

@@ -103,7 +103,7 @@ def _header(path: Path, header: bytes) -> tuple[str | None, list[_Element]]:
                 raise wrong("the element is there twice")
             elements.append(_Element(words[1], int(words[2]), number))
         elif words[:1] == ["property"]:
-            types = words[2:4] if words[1] == "list" and len(words) == 5 else words[1:2]
+            types = words[2:4] if len(words) > 3 else words[1:2]
             if not elements or any(word not in _TYPES for word in types):
                 raise wrong("not a type of numbers" if elements else "a property of no element")
             if words[-1] in {known.name for known in elements[-1].properties}:

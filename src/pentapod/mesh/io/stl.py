@@ -18,6 +18,7 @@ from pentapod.mesh.io.text import AGAIN, NUMBER, line_of
 
 _HEADER = 84
 _FACET = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_SOLID = b"solid"
 _FLOAT = re.compile(NUMBER)
 _WORDS = (b"facet", b"endfacet", b"endsolid")
 _VERTEX = re.compile(rb"vertex[ \t]++(\S++)[ \t]++(\S++)[ \t]++(\S++)", re.IGNORECASE)
@@ -31,7 +32,7 @@ def read_stl(path: Path, data: bytes) -> Floats:
     announced = int.from_bytes(data[80:84], "little") if len(data) >= _HEADER else None
     if announced is not None and len(data) == _HEADER + _FACET.itemsize * announced:
         return _binary(data, announced)
-    if data.lstrip()[:5].lower() == b"solid" and (_is_text(data[:4096]) or announced is None):
+    if data.lstrip()[: len(_SOLID)].lower() == _SOLID and (_is_text(data[:4096]) or announced is None):
         return _ascii(path, data)
     if _is_text(data[:4096]):
         raise MeshError("a text file, not STL", file=path, expected='binary STL, or text that begins with "solid"')

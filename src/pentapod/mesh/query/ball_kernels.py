@@ -1,21 +1,16 @@
-"""Kernels for a ball on a straight way: the deepest point of a mesh, faster than for any other body.
+"""Least distance of a point that moves straight on from a box and from a facet, by tangents of convex functions.
 
-The distance of a moving point from a box or a facet, both convex, is a convex function of time: two tangents bound it
-from below, and a few more find its minimum. Nothing has to be halved in space, so a ball that touches a smooth
-surface looks at a dozen facets.
+Both distances are convex functions of time: two tangents bound them from below, and a few more find the minimum.
+Nothing has to be halved in space, so a ball that touches a smooth surface needs a dozen facets.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from pentapod.base.arrays import Floats, Ints
-from pentapod.mesh.query.box_kernels import open_node
+from pentapod.base.arrays import Floats
 from pentapod.numerics.kernels import kernel
 
-_STACK = 128
 _ROUNDS = 40
 
 
@@ -100,7 +95,7 @@ def lower_bound(box: Floats, start: Floats, way: Floats, enough: float, g: Float
 
 
 @kernel
-def _nearest_time(p: Floats, start: Floats, way: Floats, g: Floats) -> tuple[float, float]:
+def nearest_time(p: Floats, start: Floats, way: Floats, g: Floats) -> tuple[float, float]:
     """Return the smallest distance of a moving point from a facet, and when. Leaves g (3,) as it is then."""
     t0, t1 = 0.0, 1.0
     d0 = to_facet(p, start[0], start[1], start[2], g)
@@ -130,62 +125,3 @@ def _nearest_time(p: Floats, start: Floats, way: Floats, g: Floats) -> tuple[flo
             break
     to_facet(p, start[0] + when * way[0], start[1] + when * way[1], start[2] + when * way[2], g)
     return best, when
-
-
-@kernel
-def nearest_to_point(
-    start: Floats, way: Floats, corners: Floats, boxes: Floats, starts: Ints, best: Floats, nodes: Ints, bounds: Floats
-) -> int:
-    """Lower best (5,): distance, time and mesh point, for a point that goes straight; return the facet, or −1.
-
-    best[0] on entry is the distance of interest: only what is nearer is looked for. nodes, bounds: room.
-    """
-    g = np.empty(3)
-    leaves = len(starts) - 1
-    facet = -1
-    nodes[0], bounds[0] = 0, lower_bound(boxes[0], start, way, best[0], g)
-    count = 1
-    while count > 0:
-        count -= 1
-        node = nodes[count]
-        if bounds[count] >= best[0]:
-            continue
-        leaf = node - (leaves - 1)
-        if leaf < 0:
-            near = lower_bound(boxes[2 * node + 1], start, way, best[0], g)
-            far = lower_bound(boxes[2 * node + 2], start, way, best[0], g)
-            count = open_node(node, near, far, best[0], count, nodes, bounds)
-        else:
-            for k in range(starts[leaf], starts[leaf + 1]):
-                distance, t = _nearest_time(corners[k], start, way, g)
-                if distance < best[0]:
-                    best[0], best[1], facet = distance, t, k
-                    for j in range(3):
-                        best[2 + j] = start[j] + t * way[j] - g[j]
-    return facet
-
-
-@kernel
-def nearest_all(
-    points: Floats,
-    ways: Floats,
-    corners: Floats,
-    boxes: Floats,
-    starts: Ints,
-    within: float,
-    distances: Floats,
-    where: Floats,
-    facets: Ints,
-) -> None:
-    """Fill distances (M,), where (M, 4): time and mesh point, and facets (M,), −1 where none is nearer than `within`.
-
-    points, ways (M, 3): each point goes straight from points to points + ways.
-    """
-    nodes, bounds, best = np.empty(_STACK, dtype=np.intp), np.empty(_STACK), np.empty(5)
-    for m in range(len(points)):
-        best[0] = within
-        facets[m] = nearest_to_point(points[m], ways[m], corners, boxes, starts, best, nodes, bounds)
-        if facets[m] >= 0:
-            distances[m] = best[0]
-            for j in range(4):
-                where[m, j] = best[1 + j]

@@ -1,4 +1,4 @@
-"""Kernels of trees of boxes: those of `FacetTree`, along the mean normals of runs of facets; how a tree is searched."""
+"""Trees of oriented bounding boxes, compiled: along the mean normals of runs of facets, and how they are searched."""
 
 from __future__ import annotations
 
@@ -66,6 +66,15 @@ def _fit(corners: Floats, box: Floats) -> None:
         box[3 + k] = 0.5 * (high - low) + slack
         for j in range(3):
             box[j] += 0.5 * (low + high) * box[6 + 3 * k + j]
+
+
+@kernel
+def box_radius(box: Floats) -> float:
+    """Return the radius of the ball around a box (15,)."""
+    square = 0.0
+    for k in range(3):
+        square += box[3 + k] * box[3 + k]
+    return math.sqrt(square)
 
 
 @kernel

@@ -137,14 +137,14 @@ class MeshDistance:
 
     def _nearest(self, starts: Floats, ways: Floats, within: float) -> tuple[Floats, Floats, Floats, Ints]:
         """Return distances, places on the ways, vectors from the mesh, and facets in tree order (−1: too far)."""
-        from pentapod.mesh.query.segment_kernels import nearest_to_segments  # noqa: PLC0415  loads numba
+        from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415  loads numba
 
         count = len(starts)
         distance, where = np.full(count, within), np.zeros((count, 4))
         facet = np.full(count, -1, dtype=np.intp)
         tree = self.tree
         points, ways = np.ascontiguousarray(starts), np.ascontiguousarray(ways)
-        nearest_to_segments(points, ways, tree.corners, tree.boxes, tree.starts, within, distance, where, facet)
+        nearest_all(points, ways, tree.corners, tree.boxes, tree.starts, within, True, distance, where, facet)
         away = np.where(facet[:, None] >= 0, starts + where[:, :1] * ways - where[:, 1:], 0.0)
         return distance, where[:, 0], away, facet
 

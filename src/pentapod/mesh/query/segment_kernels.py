@@ -1,8 +1,8 @@
-"""Kernel for the distance of straight segments, which may be long and far away, from a mesh.
+"""Nearest facets of a mesh to points that move straight on, short ways that touch it or long ones far away.
 
-The question is that of `ball_kernels`, a point on a straight way; but there the ways are short and the mesh is touched,
-so that the tangents at a way's ends bound the distance well. Here the distance of the segment from the ball around
-each box does, until the boxes are as small as they are far.
+A branch-and-bound search through the tree of boxes. Of short ways near the mesh the tangents at their ends bound the
+distance well (`ball_kernels`). Of others the distance of the segment from the ball around each box does, until the
+boxes are as small as they are far.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.mesh.query.ball_kernels import lower_bound, to_facet
-from pentapod.mesh.query.box_kernels import open_node
+from pentapod.mesh.query.ball_kernels import lower_bound, nearest_time, to_facet
+from pentapod.mesh.query.box_kernels import box_radius, open_node
 from pentapod.numerics.kernels import kernel
 
 _STACK = 128
@@ -23,14 +23,18 @@ _EXACT = 1e-9  # metres
 
 @kernel
 def _bound(box: Floats, start: Floats, way: Floats, square: float, enough: float, g: Floats) -> float:
-    """Return a lower bound on the distance of a segment, of squared length `square`, from a box (15,)."""
+    """Return a lower bound on the distance of a segment, of squared length `square`, from a box (15,).
+
+    A negative square: tangents alone bound it, which is best for what is short and near.
+    """
+    if square < 0.0:
+        return lower_bound(box, start, way, enough, g)
     x, y, z = box[0] - start[0], box[1] - start[1], box[2] - start[2]
     t = 0.0
     if square > 0.0:
         t = min(max((x * way[0] + y * way[1] + z * way[2]) / square, 0.0), 1.0)
     x, y, z = x - t * way[0], y - t * way[1], z - t * way[2]
-    reach = math.sqrt(box[3] * box[3] + box[4] * box[4] + box[5] * box[5])
-    ball = math.sqrt(x * x + y * y + z * z) - reach
+    ball = math.sqrt(x * x + y * y + z * z) - box_radius(box)
     if ball >= enough:
         return ball
     return max(ball, lower_bound(box, start, way, enough, g))
@@ -83,26 +87,28 @@ def _to_facet(p: Floats, start: Floats, way: Floats, square: float, enough: floa
 
 
 @kernel
-def nearest_to_segments(
+def nearest_all(
     starts: Floats,
     ways: Floats,
     corners: Floats,
     boxes: Floats,
     leaf_starts: Ints,
     within: float,
+    far: bool,
     distances: Floats,
     where: Floats,
     facets: Ints,
 ) -> None:
     """Fill distances (M,), where (M, 4): place on the way and mesh point, and facets (M,), −1 where none is nearer.
 
-    starts, ways (M, 3): the segments. within: only what is nearer is looked for.
+    starts, ways (M, 3): each point goes straight from starts to starts + ways. within: only what is nearer is looked
+    for. far: ways may be long and far from the mesh; otherwise they are short and touch it.
     """
     nodes, bounds, g = np.empty(_STACK, dtype=np.intp), np.empty(_STACK), np.empty(3)
     leaves = len(leaf_starts) - 1
     for m in range(len(starts)):
         start, way, best = starts[m], ways[m], within
-        square = way[0] * way[0] + way[1] * way[1] + way[2] * way[2]
+        square = way[0] * way[0] + way[1] * way[1] + way[2] * way[2] if far else -1.0
         facets[m] = -1
         nodes[0], bounds[0] = 0, _bound(boxes[0], start, way, square, best, g)
         count = 1
@@ -114,11 +120,14 @@ def nearest_to_segments(
             leaf = node - (leaves - 1)
             if leaf < 0:
                 near = _bound(boxes[2 * node + 1], start, way, square, best, g)
-                far = _bound(boxes[2 * node + 2], start, way, square, best, g)
-                count = open_node(node, near, far, best, count, nodes, bounds)
+                last = _bound(boxes[2 * node + 2], start, way, square, best, g)
+                count = open_node(node, near, last, best, count, nodes, bounds)
             else:
                 for k in range(leaf_starts[leaf], leaf_starts[leaf + 1]):
-                    distance, t = _to_facet(corners[k], start, way, square, best, g)
+                    if far:
+                        distance, t = _to_facet(corners[k], start, way, square, best, g)
+                    else:
+                        distance, t = nearest_time(corners[k], start, way, g)
                     if distance < best:
                         best, facets[m] = distance, k
                         distances[m], where[m, 0] = distance, t

@@ -1,4 +1,4 @@
-"""Kernels of `sweep`: the deepest point of a mesh in a moving convex body, by branch and bound.
+"""Deepest point of a mesh in a moving convex body, by branch and bound, compiled.
 
 Let f(q, t) be the signed distance of a mesh point q to the body at time t in [0, 1]: negative inside. In the body's
 own frame f is convex and its gradient g has length 1, so a tangent plane bounds it from below. Over a box or a triangle
@@ -18,12 +18,17 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
+from pentapod.mesh.query.box_kernels import box_radius
 from pentapod.numerics.kernels import kernel
 
 _STACK = 512
 """Far more than the halvings between a kilometre and a tenth of a micrometre need."""
 
 
+_AXIS = 3
+"""Where the axis begins in a pose."""
+_VALUE, _RATE, _FAR = range(3, 6)
+"""Places of f, ∂f/∂t and W in what `_slope` writes."""
 _SHARE = 1e-2
 """Of a depth that may be missed, besides `eps`."""
 
@@ -84,29 +89,30 @@ def _place(motion: Floats, t: float, pose: Floats) -> None:
 def _slope(solid: Floats, motion: Floats, pose: Floats, x: float, y: float, z: float, g: Floats) -> None:
     """Write into g (6,): the gradient in the mesh's frame, f, ∂f/∂t and W, at a mesh point and a pose."""
     wx, wy, wz = x - pose[0], y - pose[1], z - pose[2]
-    height = wx * pose[3] + wy * pose[4] + wz * pose[5]
-    rx, ry, rz = wx - height * pose[3], wy - height * pose[4], wz - height * pose[5]
+    i, j, k = pose[_AXIS], pose[_AXIS + 1], pose[_AXIS + 2]
+    height = wx * i + wy * j + wz * k
+    rx, ry, rz = wx - height * i, wy - height * j, wz - height * k
     r = math.sqrt(rx * rx + ry * ry + rz * rz)
     f, by_r, by_z = meridian_distance(solid, r, height + motion[17])
     scale = by_r / r if r > 1e-15 else 0.0
-    g[0] = scale * rx + by_z * pose[3]
-    g[1] = scale * ry + by_z * pose[4]
-    g[2] = scale * rz + by_z * pose[5]
-    g[3] = f
+    g[0] = scale * rx + by_z * i
+    g[1] = scale * ry + by_z * j
+    g[2] = scale * rz + by_z * k
+    g[_VALUE] = f
     # The body moves with velocity V + ω × w at the point; seen from it the point moves the other way.
     vx = motion[6] + motion[13] * wz - motion[14] * wy
     vy = motion[7] + motion[14] * wx - motion[12] * wz
     vz = motion[8] + motion[12] * wy - motion[13] * wx
-    g[4] = -(g[0] * vx + g[1] * vy + g[2] * vz)
-    g[5] = math.sqrt(wx * wx + wy * wy + wz * wz)
+    g[_RATE] = -(g[0] * vx + g[1] * vy + g[2] * vz)
+    g[_FAR] = math.sqrt(wx * wx + wy * wy + wz * wz)
 
 
 @kernel
 def _loss_in_time(motion: Floats, g: Floats, tau: float, size: float) -> float:
     """Return how far f may fall below its tangent plane within ± tau, for offsets up to `size`."""
     angle, way = motion[16], motion[15]
-    bend = angle * angle * (g[5] + way * tau + size) + 2.0 * angle * way
-    return abs(g[4]) * tau + 0.5 * tau * tau * bend + angle * tau * size
+    bend = angle * angle * (g[_FAR] + way * tau + size) + 2.0 * angle * way
+    return abs(g[_RATE]) * tau + 0.5 * tau * tau * bend + angle * tau * size
 
 
 @kernel
@@ -135,8 +141,8 @@ def _deepest_in_facet(
         x, y, z = (a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0, (a[2] + b[2] + c[2]) / 3.0
         _place(motion, s, pose)
         _slope(solid, motion, pose, x, y, z, g)
-        if g[3] < best[0]:
-            best[0], best[1], best[2], best[3], best[4] = g[3], s, x, y, z
+        if g[_VALUE] < best[0]:
+            best[0], best[1], best[2], best[3], best[4] = g[_VALUE], s, x, y, z
             found = True
         lowest, size = 0.0, 0.0
         for p in (a, b, c):
@@ -144,7 +150,7 @@ def _deepest_in_facet(
             lowest = min(lowest, g[0] * dx + g[1] * dy + g[2] * dz)
             size = max(size, dx * dx + dy * dy + dz * dz)
         loss = _loss_in_time(motion, g, tau, math.sqrt(size))
-        if g[3] + lowest - loss >= best[0] - eps + _SHARE * min(best[0], 0.0) or count + 2 > _STACK:
+        if g[_VALUE] + lowest - loss >= best[0] - eps + _SHARE * min(best[0], 0.0) or count + 2 > _STACK:
             continue
         if loss > -lowest:
             for half in range(2):
@@ -201,8 +207,8 @@ def deepest(
         fall = 0.0
         for k in range(3):
             fall += box[3 + k] * abs(g[0] * box[6 + 3 * k] + g[1] * box[7 + 3 * k] + g[2] * box[8 + 3 * k])
-        loss = _loss_in_time(motion, g, tau, math.sqrt(box[3] * box[3] + box[4] * box[4] + box[5] * box[5]))
-        if g[3] - fall - loss >= best[0] - eps + _SHARE * min(best[0], 0.0) or count + 2 > _STACK:
+        loss = _loss_in_time(motion, g, tau, box_radius(box))
+        if g[_VALUE] - fall - loss >= best[0] - eps + _SHARE * min(best[0], 0.0) or count + 2 > _STACK:
             continue
         leaf = node - (leaves - 1)
         if leaf < 0 and loss <= fall:
@@ -241,7 +247,7 @@ def sweep_all(
     facets: Ints,
 ) -> None:
     """Fill depths (M,), where (M, 4): time and point, and facets (M,), −1 where none is beyond the threshold."""
-    nodes, work, best = np.empty((_STACK, 3)), np.empty((_STACK, 11)), np.empty(5)
+    nodes, work, best = np.empty((_STACK, 3)), np.empty((_STACK, 11)), np.empty(2 + 3)
     for m in range(len(motions)):
         best[0] = -threshold
         facets[m] = deepest(solid, motions[m], corners, boxes, starts, best, nodes, work, eps)

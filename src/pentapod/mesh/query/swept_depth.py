@@ -125,7 +125,7 @@ def _swept(
     progress: Progress,
     resolution: float = RESOLUTION_M,
 ) -> Sweep:
-    from pentapod.mesh.query.ball_kernels import nearest_all  # noqa: PLC0415 - loads numba
+    from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415 - loads numba
     from pentapod.mesh.query.sweep_kernels import sweep_all  # noqa: PLC0415
 
     solids = tool.solids
@@ -143,7 +143,9 @@ def _swept(
             place = (tree.corners, tree.boxes, tree.starts)
             if ball:
                 way = np.ascontiguousarray(motions[rows, 6:9])
-                nearest_all(np.ascontiguousarray(motions[rows, :3]), way, *place, solid.rounding - threshold, *found)
+                nearest_all(
+                    np.ascontiguousarray(motions[rows, :3]), way, *place, solid.rounding - threshold, False, *found
+                )
                 depths[k, rows] = np.where(facets[k, rows] < 0, -np.inf, solid.rounding - depths[k, rows])
             else:
                 sweep_all(numbers, motions[rows], *place, threshold, resolution, *found)

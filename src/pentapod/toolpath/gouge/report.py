@@ -12,6 +12,9 @@ from pentapod.base.values import Value
 from pentapod.geometry.solids import KINDS
 from pentapod.toolpath.linking.links import LinkStyle
 
+_NAMED = 6
+"""Most waypoints that a message names."""
+
 
 class Remedy(StrEnum):
     """What is done about a gouge: tilt the tool clear within a cone, lift it along its axis, drop the cut, nothing."""
@@ -96,4 +99,4 @@ class GougeReport(Value):
 
 
 def _some(places: tuple[int, ...]) -> str:
-    return ", ".join(str(place) for place in places[:5]) + (", ..." if len(places) > 5 else "")
+    return ", ".join(str(place) for place in places[:_NAMED]) + (", ..." if len(places) > _NAMED else "")

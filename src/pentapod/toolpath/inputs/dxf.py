@@ -12,7 +12,8 @@ from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
 from pentapod.toolpath.inputs.files import check_points, distinct, extra
 
-_DXF_UNITS = {1: 25.4e-3, 2: 304.8e-3, 4: 1e-3, 5: 1e-2, 6: 1.0, 14: 0.1}
+_METRES = {"IN": 25.4e-3, "FT": 304.8e-3, "MM": 1e-3, "CM": 1e-2, "M": 1.0, "DM": 0.1}
+"""Units by their names in ezdxf."""
 _LINE = re.compile(r"line (\d+)")
 _WITH_LINES = {
     "INSERT": "explode blocks into lines",
@@ -41,11 +42,13 @@ def dxf_lines(path: Path, data: bytes, tolerance: float) -> list[Floats]:
         )
     paths = extra("ezdxf.path", "ezdxf", path)
     recover = extra("ezdxf.recover", "ezdxf", path)
+    units = extra("ezdxf.units", "ezdxf", path)
     try:
         document, audit = recover.read(io.BytesIO(data))
         if audit.has_errors:
             raise ToolpathError(f"broken DXF: {audit.errors[0].message}".splitlines()[0][:120], file=path)
-        unit = _DXF_UNITS.get(int(document.header.get("$INSUNITS", 0)))
+        told = int(document.header.get("$INSUNITS", 0))
+        unit = next((metres for name, metres in _METRES.items() if getattr(units, name) == told), None)
         if unit is None:
             raise ToolpathError(
                 "the drawing does not say its unit", file=path, key="$INSUNITS", expected="mm, cm, m, inch or foot"
