@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from pentapod.base.progress import Progress, silent
@@ -26,11 +26,11 @@ from pentapod.planning.plan import PlacementOptions, fits
 from pentapod.planning.problem.constraints import FREE
 from pentapod.planning.setups import setups
 from pentapod.program import Program, Provenance, sample, write_csv
-from pentapod.timing import Explanation, Trajectory, certify, explain, retime, unheld
+from pentapod.timing import Explanation, Limit, Trajectory, certify, explain, retime, unheld
 from pentapod.toolpath import Mesh, Toolpath
 from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.linking.partition import Piece, missed_cuts, part_of
-from pentapod.verify import Specification, judged
+from pentapod.verify import Claim, Specification, judged
 
 Writer = Callable[[Outcome, Path], object]
 
@@ -42,11 +42,14 @@ def run(
     *,
     piece: Piece | None = None,
     writers: Mapping[str, Writer] | None = None,
+    limits: Sequence[Limit] = (),
+    claims: Sequence[Claim] = (),
 ) -> Outcome:
     """Plan a job, write program.csv, plan.npz and verdict.json into `out`, and return what was reached.
 
     piece: of the job's toolpath, where only that is to be planned, in one set-up. writers: further files, by name,
-    each made from the outcome (the report, which stands above this floor).
+    each made from the outcome (the report, which stands above this floor). limits: further ones for the time law;
+    claims: further ones for the verdict.
     The program is judged from the file, as it was written. What cannot be done ends in an outcome with a
     refusal: verdict.json says so, and there is no program. The folder changes when the run ends: an
     error or an interruption leaves it as it was. Raises InputError for a bad job, mesh, machine or folder, and where
@@ -61,7 +64,7 @@ def run(
         asked = job_specification(job, machine, mesh, lambda: _toolpath(job, mesh, piece, clock))
         if piece is not None:  # whoever asks for a piece has the others made elsewhere
             asked = dataclasses.replace(asked, setups=max(asked.setups, 2))
-        task = _Task(job, asked, clock, piece)
+        task = _Task(job, asked, clock, piece, tuple(limits), tuple(claims))
         outcome = _reached(task, staging, writers or {})
         refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
         if refusal is not None and refusal.stage == "placement" and splits:
@@ -87,7 +90,7 @@ def _reached(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outco
         verdict = refusal_verdict(program, task.asked.sources)
     else:
         file = staging / PROGRAM
-        verdict = clock.time("verify", lambda: judged(file, task.asked, progress=clock.progress))
+        verdict = clock.time("verify", lambda: judged(file, task.asked, claims=task.claims, progress=clock.progress))
     outcome = Outcome(task.job, task.machine, tuple(clock.stages), verdict)
     if (placed := outcome.find(PlacedPath)) is not None:
         outcome = dataclasses.replace(outcome, machine=task.on(placed.placement).machine)
@@ -139,6 +142,8 @@ class _Task:
     asked: Specification
     clock: Clock
     piece: Piece | None = None
+    limits: tuple[Limit, ...] = ()
+    claims: tuple[Claim, ...] = ()
 
     @property
     def machine(self) -> Machine:
@@ -167,7 +172,8 @@ class _Task:
         path = self.clock.time("leg path", lambda: self._path(placed))
         if isinstance(path, Refusal):
             return path
-        trajectory = self.clock.time("timing", lambda: retime(path, self.machine, progress=self.clock.progress))
+        machine, progress = self.machine, self.clock.progress
+        trajectory = self.clock.time("timing", lambda: retime(path, machine, limits=self.limits, progress=progress))
         if isinstance(trajectory, Refusal):
             return trajectory
         program = self.clock.time("program", lambda: self._program(placed, trajectory, file))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Unpack
@@ -72,6 +73,7 @@ def verify(
     toolpath: Toolpath,
     *,
     strict: bool = False,
+    claims: Sequence[Claim] = (),
     progress: Progress = silent,
     **asked: Unpack[Asked],
 ) -> Verdict:
@@ -80,20 +82,27 @@ def verify(
     asked: the other fields of `Specification`, which says what they mean: tilt, path_tolerance and axis_tolerance, and
     what else the program is judged against: freedom, component, surroundings, cutting, job_digest. A claim that needs
     what was not told is listed as "not judged"; the verdict fails then, unless the claim's name is among `waived`.
-    strict: claims that do not apply are listed too, with the reason. A malformed file gives a failed verdict with the
+    strict: claims that do not apply are listed too, with the reason. claims: further ones, which stand after all others
+    and may be waived as they may. A malformed file gives a failed verdict with the
     one claim "readable". Raises ProgramError where there is no such file, ArrayError where a tolerance is not a
     sensible number, InputError where a waived claim is not known.
     """
-    return judged(program, Specification(machine, toolpath, **asked), strict=strict, progress=progress)
+    return judged(program, Specification(machine, toolpath, **asked), strict=strict, claims=claims, progress=progress)
 
 
 def judged(
-    program: Program | str | Path, specification: Specification, *, strict: bool = False, progress: Progress = silent
+    program: Program | str | Path,
+    specification: Specification,
+    *,
+    strict: bool = False,
+    claims: Sequence[Claim] = (),
+    progress: Progress = silent,
 ) -> Verdict:
     """Return the verdict on a program, or on a program file, against a specification, as `verify`."""
+    known = (*CLAIM_NAMES, *(claim.name for claim in claims))
     for name in specification.waived:
-        if name not in CLAIM_NAMES:
-            raise InputError("no such claim", key="waived", value=name, remedy=nearest(name, CLAIM_NAMES))
+        if name not in known:
+            raise InputError("no such claim", key="waived", value=name, remedy=nearest(name, known))
     read, sources = list[Certificate](), specification.sources
     if not isinstance(program, Program):
         path = Path(program)
@@ -115,7 +124,7 @@ def judged(
         )
     replay, unjudged = Replay(program, specification, progress), list[NotJudged]()
     _ = replay.survey
-    claims = (*CLAIMS, *collisions.claims(specification.surroundings))
+    claims = (*CLAIMS, *collisions.claims(specification.surroundings), *claims)
     for k, claim in enumerate(claims):
         progress("verify", SURVEY_SHARE + (1.0 - SURVEY_SHARE) * k / len(claims), claim.name)
         answer = claim(replay)

@@ -204,7 +204,10 @@ class Limit(Protocol):
         By default the share, at their stations.
         """
         rows, station = joined.own_rows, joined.station
-        v, u = station.first[rows, 0], station.second[rows, 0]
+        v, u = station.first[:, 0], station.second[rows, 0]
+        if joined.interpolation == "linear":  # the rate jumps at the row: the mean of both sides
+            v = 0.5 * (v + np.append(v[1:], 0.0))
+        v = v[rows]
         jerk = np.gradient(station.second[:, 0], joined.period)[rows] if self.group == "jerk" else None
         path = PathDerivatives(joined.piece, joined.rows.stations[rows], 2 if jerk is None else 3)
         return self.share(path, Motion(v * v, v, u, jerk))

@@ -51,7 +51,8 @@ def common_push(first: Floats, second: Floats, offset: Floats | None = None, siz
     above = size[i] * one[:, j] + size[j] * one[:, i]
     across = second[:, i] * first[:, j] - second[:, j] * first[:, i]
     if offset is not None and offset.any():
-        above = above - np.sign(across) * (first[:, j] * offset[:, i] - first[:, i] * offset[:, j])
+        shift = first[:, j] * offset[:, i] - first[:, i] * offset[:, j]
+        above = np.maximum(above - np.sign(across) * shift, 0.0)
     below = np.abs(across)
     # Where rows hardly bend at all a quotient beyond all numbers is no bound, as it should be.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
