@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from pentapod.base.errors import ArrayError
-from pentapod.geometry.fillet import rounded
+from pentapod.geometry.fillet import blended
 
 
 def within(tolerance):
@@ -25,7 +25,7 @@ def chord_parameter(points):
 def test_curve_stays_within_the_tolerance(seed, count, tolerance):
     points = np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 3))
     u = chord_parameter(points)
-    curve = rounded(u, points, within(tolerance))
+    curve = blended(u, points, within(tolerance))
     # An oracle that knows nothing of parameters: dense points of the curve against dense points of the polyline.
     dense = np.unique(np.concatenate([curve.t + k * np.append(np.diff(curve.t), 0.0) for k in np.linspace(0, 1, 9)]))
     fine = np.concatenate([np.linspace(a, b, 3000) for a, b in pairwise(points)])
@@ -38,14 +38,14 @@ def test_curve_stays_within_the_tolerance(seed, count, tolerance):
 def test_straight_stretches_are_reproduced_exactly():
     points = np.array([[0.0, 0.0], [0.3, 0.0], [1.0, 0.0], [1.0, 2.0]])
     u = chord_parameter(points)
-    curve = rounded(u, points, within(1e-3))
+    curve = blended(u, points, within(1e-3))
     at = np.linspace(0.0, 0.9, 50)
     np.testing.assert_allclose(curve(at), np.c_[at, 0.0 * at], atol=1e-13)
 
 
 def test_third_derivative_is_continuous_and_the_fourth_is_not():
     points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.2, 1.3]])
-    curve = rounded(chord_parameter(points), points, within(1e-2))
+    curve = blended(chord_parameter(points), points, within(1e-2))
     inner = np.unique(curve.t)[1:-1]
     assert np.unique(curve.t[5:-5]).size == curve.t[5:-5].size  # simple knots
     h = 1e-11
@@ -68,7 +68,7 @@ def test_the_stretches_that_are_judged_enclose_the_curve_and_cover_it(seed, tole
         largest.append(size)
         return size > tolerance
 
-    curve = rounded(u, points, too_far)
+    curve = blended(u, points, too_far)
     knots = np.unique(curve.t)
     at = (knots[:-1, None] + np.diff(knots)[:, None] * np.linspace(0.0, 1.0, 41)).ravel()
     on_line = np.column_stack([np.interp(at, u, column) for column in points.T])
@@ -82,7 +82,7 @@ def test_a_micrometre_step_beside_metres():
     """Knots of very different spacing."""
     points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1e-6], [0.0, 1e-6]])
     u = chord_parameter(points)
-    curve = rounded(u, points, within(1e-5))
+    curve = blended(u, points, within(1e-5))
     at = np.linspace(0.0, u[-1], 20_001)
     on_line = np.column_stack([np.interp(at, u, column) for column in points.T])
     assert np.linalg.norm(curve(at) - on_line, axis=1).max() <= 1e-5
@@ -90,4 +90,4 @@ def test_a_micrometre_step_beside_metres():
 
 def test_parameters_must_increase():
     with pytest.raises(ArrayError, match="increase strictly"):
-        rounded(np.array([0.0, 1.0, 1.0]), np.zeros((3, 2)), within(1.0))
+        blended(np.array([0.0, 1.0, 1.0]), np.zeros((3, 2)), within(1.0))

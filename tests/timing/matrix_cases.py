@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.geometry.fillet import rounded
+from pentapod.geometry.fillet import blended
 
 MATRIX = tomllib.loads((Path(__file__).parent / "matrix.toml").read_text(encoding="utf-8"))
 
@@ -63,7 +63,7 @@ def legs_of(kind, rng, finer=1):
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     u = np.concatenate([[0.0], np.cumsum(steps)])
     keep = np.concatenate([[True], steps > 0.0])
-    curve = rounded(u[keep], points[keep], lambda off, _: np.linalg.norm(off, axis=1).max(axis=1) > 1e-2)
+    curve = blended(u[keep], points[keep], lambda off, _: np.linalg.norm(off, axis=1).max(axis=1) > 1e-2)
     knots = np.unique(curve.t)
     fractions = np.arange(4 * finer) / (4 * finer)
     s = np.unique(np.append(knots[:-1, None] + fractions * np.diff(knots)[:, None], knots[-1]))

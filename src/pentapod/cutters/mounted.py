@@ -1,4 +1,4 @@
-"""Mounted: what all tools share: shank and holder on the part that cuts. Balled: those with a ball at the lower end."""
+"""Shank and holder, which all tools share, and the tools with a ball at the lower end."""
 
 from __future__ import annotations
 

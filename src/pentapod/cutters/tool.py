@@ -1,4 +1,4 @@
-"""Tools as the workpiece sees them: where the tip is when the tool meets the surface, and what body it has.
+"""Tool: where the tip is when the tool touches the surface, and the solids of its body.
 
 Every tool is a body of revolution about its axis. The tip is where the axis leaves the tool; heights are
 measured from there along the axis, towards the spindle. Shank and holder are cones and cylinders, stacked

@@ -36,7 +36,7 @@ _PARTS = 8
 """A stretch whose coefficients are too far out is cut into so many before it is called too far."""
 
 
-def rounded(parameter: Floats, points: Floats, too_far: TooFar) -> BSpline:
+def blended(parameter: Floats, points: Floats, too_far: TooFar) -> BSpline:
     """Return a clamped C3 spline of degree 4 near the polyline of points (N, D) at parameters (N,), ends exact.
 
     The polyline is linear between parameters, which must increase strictly. Raises ArrayError where they do

@@ -1,4 +1,4 @@
-"""Interpolant: what a controller makes of rows at equal periods, as polynomials, with their exact extrema."""
+"""Interpolant: what a controller makes of setpoints at equal periods, as polynomials with their exact extrema."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The surface where a function on a regular grid is zero, by marching tetrahedra."""
+"""Marching tetrahedra: the surface where a function on a regular grid is zero."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs of neighbours in an array: where they begin and end. A run is told as Python's ranges are, its end excluded."""
+"""Runs of equal or marked neighbours in an array, as half-open ranges."""
 
 from __future__ import annotations
 

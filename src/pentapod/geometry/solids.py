@@ -1,4 +1,4 @@
-"""Solids of revolution that tools are made of: convex, exact distance, one formula for all.
+"""Convex solids of revolution that tools are made of, with one exact distance formula for all.
 
 A `Solid` is a frustum thickened by a ball: cylinders and cones have no thickening, a ball is a thickened point,
 the end of a bull-nose cutter a thickened disc, a ball's path a thickened line.

@@ -1,4 +1,4 @@
-"""Frames carried along a sequence of directions without turning about them."""
+"""Rotation-minimising frames along a sequence of directions (parallel transport)."""
 
 from __future__ import annotations
 

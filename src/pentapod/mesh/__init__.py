@@ -1,4 +1,4 @@
-"""Triangle meshes: read, repaired, diagnosed, and asked."""
+"""Triangle meshes: reading, repair, diagnosis, and geometric queries."""
 
 from pentapod.mesh.diagnosis import MeshDiagnosis
 from pentapod.mesh.io.load import UNITS, load_mesh

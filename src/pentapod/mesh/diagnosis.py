@@ -1,4 +1,4 @@
-"""MeshDiagnosis: what a mesh is worth as a surface to machine, said plainly."""
+"""MeshDiagnosis: counts of what makes a mesh unsound for machining, and its one-paragraph text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Faults: where on a mesh its diagnosis found what it counts, as line segments to draw."""
+"""Places of mesh faults, as line segments to draw."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Region: which part of a surface is machined, by a box and by the way the surface faces."""
+"""Region: the part of a surface to machine, by a box and by the direction of its normals."""
 
 from __future__ import annotations
 

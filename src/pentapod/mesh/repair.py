@@ -1,4 +1,4 @@
-"""Mending: from triangles as a file gives them to welded, indexed facets; every change is counted."""
+"""Mesh repair: triangle soup to welded, indexed facets; every change is counted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Topology: which facets of a triangle mesh share which edges, and what follows from it."""
+"""Topology: edges of a triangle mesh, with neighbours, borders and connected components."""
 
 from __future__ import annotations
 

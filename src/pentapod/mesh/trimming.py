@@ -1,4 +1,4 @@
-"""Trimming: facets cut where a quantity on their corners changes sign, neighbours alike to the last bit."""
+"""Trimming: facets cut where a quantity on their corners changes sign, with equal bits on both sides of an edge."""
 
 from __future__ import annotations
 

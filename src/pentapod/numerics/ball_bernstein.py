@@ -1,4 +1,4 @@
-"""Polynomials in Bernstein form on [0, 1] whose coefficients are balls: coefficients first, (n + 1, ...).
+"""Bernstein polynomials on [0, 1] with balls as coefficients: coefficients first, (n + 1, ...).
 
 The laws are those of `numerics.bernstein`; what is read off the results holds in spite of rounding (lemmas 5 and 6 of
 docs/proofs.md).

@@ -1,4 +1,4 @@
-"""Ball arithmetic on arrays: numbers as midpoint ± radius, whose radius accounts for every rounding.
+"""Ball arithmetic on arrays: midpoint ± radius, whose radius bounds every rounding.
 
 A `Ball` encloses an unknown exact number, or every number of a range: whatever the operands' exact values are, the
 exact result lies in the result's ball. So a bound read off a computed ball is a proof. The midpoints are computed as

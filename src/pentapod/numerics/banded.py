@@ -1,4 +1,4 @@
-"""Symmetric matrices with few diagonals, in SciPy's lower banded form (B, n): row k holds the k-th diagonal below."""
+"""Symmetric banded matrices in SciPy's lower form (B, n): row k holds the k-th diagonal below the main one."""
 
 from __future__ import annotations
 

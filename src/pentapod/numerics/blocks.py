@@ -1,4 +1,4 @@
-"""Large batches in blocks: the temporaries of a block stay in the processor's cache."""
+"""Blocks of large batches, so that temporaries stay in the processor's cache."""
 
 from __future__ import annotations
 

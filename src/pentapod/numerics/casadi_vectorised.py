@@ -1,4 +1,4 @@
-"""A casadi function on many points at once: its instructions carried out on NumPy arrays.
+"""Batch evaluation of a casadi function: its instructions carried out on NumPy arrays.
 
 casadi's own `map` calls its virtual machine once for each point; here each instruction runs over a block of points. The
 instructions are the same, in the same order, so the numbers are casadi's, to the last bit where NumPy's elementary

@@ -1,4 +1,4 @@
-"""Derivatives of what is known at places along a way, as divided differences."""
+"""Divided differences: derivatives of values that are known at places along a way."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers with about 32 digits, in batches: unevaluated sums of two doubles.
+"""Double-double arithmetic: numbers with about 32 digits, in batches, as unevaluated sums of two doubles.
 
 For the few places where an ordinary double has lost its digits by cancellation. Sources: D. E. Knuth, The Art of
 Computer Programming, vol. 2, section 4.2.2 (two_sum); T. J. Dekker, "A floating-point technique for extending

@@ -1,4 +1,4 @@
-"""Where the machine code of kernels is kept between runs: one folder for each state of their sources.
+"""Disk cache of compiled kernels: one folder for each state of their sources.
 
 A kernel holds the machine code of those it calls, but numba looks for changes in the kernel's own file only. So the
 folder's name is a digest of all files with kernels: what was compiled for an older version is never looked at.

@@ -1,4 +1,4 @@
-"""Kernels compiled by numba: where plain loops over a million poses or gridpoints are the clearest and fastest form.
+"""Kernels compiled by numba: plain loops over up to a million poses or gridpoints.
 
 Files named `*_kernels.py` hold them, each function marked with `kernel`; they are imported where they are first used,
 so that `import pentapod` stays light. The machine code is cached on disk (`kernel_cache`): only the first run of a

@@ -1,4 +1,4 @@
-"""on_one_thread: linear algebra that gives the same bits however many threads there are.
+"""on_one_thread: linear algebra on one thread, so that its last bits do not depend on the number of threads.
 
 On one kind of processor and with one set of libraries, that is: they choose the order of sums too.
 """

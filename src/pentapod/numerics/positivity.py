@@ -1,4 +1,4 @@
-"""Whether polynomials in Bernstein form are positive on [0, 1]: yes with a bound, no, or undecided and where.
+"""Positivity of Bernstein polynomials on [0, 1] by subdivision: proven with a bound, refuted, or undecided and where.
 
 Lemma 6 of docs/proofs.md.
 """

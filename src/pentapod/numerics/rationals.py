@@ -1,4 +1,4 @@
-"""Linear algebra of a handful of rational numbers: a geometry's constants, exact before they are rounded once."""
+"""Exact Gaussian elimination of a few rational equations, for constants that are rounded once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drawing: what a strategy draws on the surface, before a tool follows it."""
+"""Drawing: the contact lines that a strategy makes on the surface, before waypoints and links."""
 
 from __future__ import annotations
 

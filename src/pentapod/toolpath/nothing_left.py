@@ -1,4 +1,4 @@
-"""The error of a region that holds nothing to machine: why, as far as it can be told."""
+"""The error of a region without surface to machine, with its cause as far as it can be found."""
 
 from __future__ import annotations
 

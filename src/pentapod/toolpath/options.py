@@ -1,4 +1,4 @@
-"""PathOptions: the options of every strategy, SI; CoverOptions: those of strategies that cover a surface.
+"""Options of all strategies (PathOptions) and of those that cover a surface (CoverOptions), in SI units.
 
 The keys of [toolpath] in a job file are declared here and beside each strategy, with the fields.
 """

@@ -1,4 +1,4 @@
-"""PathReport: what a toolpath came to."""
+"""PathReport: lengths, counts and problems of a toolpath."""
 
 from __future__ import annotations
 

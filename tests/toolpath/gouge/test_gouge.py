@@ -148,7 +148,7 @@ def test_links_and_rapids_that_meet_the_part_are_told():
     style = LinkStyle(np.array([0.0, 0.0, 1.0]), level=0.05, approach=3e-3, spacing=2e-3, feed=0.05)
     through = Toolpath((dive, *path.segments), path.pivot)
     found, report = checked(through, BALL, tree, GougeOptions(links=style))
-    assert (report.rejoined, report.unclear) == (1, 0)
+    assert (report.relinked, report.unclear) == (1, 0)
     assert [s.kind for s in found.segments] == ["rapid", "link", "cut", "link"]
     assert found.tips[0, 2] == pytest.approx(0.05)
     np.testing.assert_array_equal(found.segments[2].tips, path.segments[1].tips)

@@ -1,4 +1,4 @@
-"""load_mesh: a mesh file with its unit → Mesh. Nothing is guessed; what is missing is asked for."""
+"""load_mesh: a mesh file and its unit to a Mesh; a missing unit is an error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What readers of mesh files share: numbers, lines, polygons, and the marks of a file that was cut off."""
+"""Shared parts of the readers of mesh files: numbers, lines, polygons, and marks of a truncated file."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Questions to a mesh: what is near, how deep a body reaches, geodesics, slices."""
+"""Geometric queries on meshes: distances, swept penetration, geodesics, slices."""

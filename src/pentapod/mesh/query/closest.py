@@ -1,4 +1,4 @@
-"""Closest: the point of a patch that is nearest to a given one, and where along a line a curve lies on it."""
+"""Closest point of a patch, by centroids in a k-d tree and exact distances to facets."""
 
 from __future__ import annotations
 

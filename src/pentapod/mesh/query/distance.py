@@ -1,4 +1,4 @@
-"""MeshDistance: how far points, segments and tools are from a mesh, exactly; negative inside a closed one.
+"""MeshDistance: signed distance of points, segments and tools from a mesh, exact; negative inside a closed one.
 
 A closed, consistently wound mesh has an inside. Which side a point is on shows at the mesh point nearest to it: the
 angle-weighted normal there points to it from the inside out (Bærentzen and Aanæs 2005). An open sheet has no

@@ -1,4 +1,4 @@
-"""Geodesic distance on a patch: from vertices with given distances, over the surface, by fast marching.
+"""Geodesic distance on a patch by fast marching, from vertices with given distances.
 
 Kimmel and Sethian (1998): a front crosses facets as a straight wave, each vertex settled in the order in which it
 is reached. Exact for straight fronts on flat ground; on curved ground the error is proportional to the edges'

@@ -1,4 +1,4 @@
-"""The marching front, as plain loops."""
+"""Fast marching of a front over triangles, compiled."""
 
 # Every name is a plain array or number here; numba compiles what it sees.
 from __future__ import annotations

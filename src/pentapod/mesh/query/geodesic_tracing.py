@@ -1,4 +1,4 @@
-"""Shooting: straight on over a surface, facet after facet, as if it were unfolded; many shots at once.
+"""Geodesic tracing: straight lines over a surface, facet after facet as if it were unfolded; many rays at once.
 
 A straightest line enters each next facet at the angle at which it left the last (Polthier and Schmies 1998): the
 direction's part across the common edge is carried from one facet's plane into the other's.
@@ -17,7 +17,7 @@ _INSIDE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Shots:
+class SurfaceRays:
     """N places on a patch, each with a direction in its facet. weights (N, 3): barycentric in facets (N,).
 
     directions (N, 3): unit. landed (N,): false where the border came first.
@@ -43,10 +43,10 @@ def neighbours(patch: Patch) -> Ints:
     return other.reshape(-1, 3)
 
 
-def shoot(patch: Patch, beside: Ints, start: Shots, lengths: Floats) -> Shots:
-    """Return where shots end that go `lengths` (N,) metres straight on over a patch. beside: its `neighbours`.
+def traced(patch: Patch, beside: Ints, start: SurfaceRays, lengths: Floats) -> SurfaceRays:
+    """Return where rays end that go `lengths` (N,) metres straight on over a patch. beside: its `neighbours`.
 
-    The loop is over the facets that the longest shot crosses, all shots at once.
+    The loop is over the facets that the longest ray crosses, all rays at once.
     """
     facets, weights = start.facets.copy(), start.weights.copy()
     directions, landed = start.directions.copy(), start.landed.copy()
@@ -80,7 +80,7 @@ def shoot(patch: Patch, beside: Ints, start: Shots, lengths: Floats) -> Shots:
         landed[going[lost]] = False
         going, side, f, following = going[~lost], side[~lost], f[~lost], following[~lost]
         _cross(patch, (facets, weights, directions, from_side), going, f, side, following)
-    return Shots(facets, weights, directions, landed)
+    return SurfaceRays(facets, weights, directions, landed)
 
 
 def _rates(corners: Floats, directions: Floats) -> Floats:
@@ -101,7 +101,7 @@ def _cross(
     side: Ints,
     following: Ints,
 ) -> None:
-    """Carry shots `going` from facets f over their sides into the following facets, in place."""
+    """Carry rays `going` from facets f over their sides into the following facets, in place."""
     facets, weights, directions, from_side = state
     rows = np.arange(len(going))
     first = patch.faces[f, side]

@@ -1,4 +1,4 @@
-"""HeightField: what lies on top, seen along a view direction; exact on the facets, found through a grid."""
+"""HeightField: ray casting along one view direction through a uniform grid; exact on the facets."""
 
 from __future__ import annotations
 

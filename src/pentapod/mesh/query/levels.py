@@ -1,4 +1,4 @@
-"""Levels: values of a quantity at which lines on a surface are no further apart than asked for, anywhere.
+"""Level values of a quantity such that its level lines on a surface are nowhere further apart than asked for.
 
 On a facet where the quantity changes by s per metre, lines at levels d apart are d / s apart on the surface. So each
 facet asks for at least 1 / (s · stepover) levels per unit between its lowest corner and its highest; the most

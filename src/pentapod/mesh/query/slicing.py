@@ -1,4 +1,4 @@
-"""Slicing: the lines on a surface where a quantity takes given values, all of them at once.
+"""Level lines (isolines) of a quantity on a surface, for many values at once.
 
 The quantity (height along a direction, geodesic distance, a winding phase) is known at the vertices and linear on
 facets. Each vertex gets the number of levels at or below it, an integer; from these follow without any tolerance

@@ -1,4 +1,4 @@
-"""Sweep: how deep the mesh reaches into a tool on its way, and how near the tool comes to the mesh."""
+"""Penetration depth of a mesh into a tool over a whole motion, and the gap between them."""
 
 from __future__ import annotations
 

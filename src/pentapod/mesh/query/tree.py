@@ -1,4 +1,4 @@
-"""FacetTree: the facets of a mesh in a binary tree of boxes, for questions about what is near.
+"""FacetTree: bounding-volume hierarchy over the facets of a mesh.
 
 Facets are sorted along a Morton curve through their centres; the tree above them is complete, so that node k has
 the children 2k + 1 and 2k + 2 and needs no pointers. Each box stands along the mean normal of its facets: over a

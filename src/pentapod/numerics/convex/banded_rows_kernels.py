@@ -1,4 +1,4 @@
-"""What an interior-point iteration along a path needs of its linear rows, compiled.
+"""Sparse rows of a banded program times vectors and times themselves, compiled.
 
 Hard rows: slopes (R, 2) times the lean at waypoint point[r], which is weights[w] (4,) of the coefficients from first[w]
 on. Soft rows: windows (S, B) times B of the unknowns, from starts[s] on; an unknown is one number of a coefficient.

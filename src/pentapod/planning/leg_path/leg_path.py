@@ -13,7 +13,7 @@ from pentapod.base.arrays import Bools, Floats, Ints, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.refusal import Blame, Refusal, stage
 from pentapod.base.values import Result, Value
-from pentapod.geometry.fillet import TooFar, rounded
+from pentapod.geometry.fillet import TooFar, blended
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.machine import Machine
 from pentapod.planning.leg_path.tool_curve import ToolCurve
@@ -188,7 +188,7 @@ def leg_path(
     bounds = np.flatnonzero(stops)
     pieces = []
     for a, b in pairwise(bounds.tolist()):
-        spline = rounded(
+        spline = blended(
             u[a : b + 1] - u[a],
             points[a : b + 1],
             _tolerance(TOLERANCE_SHARE * path_tolerance, TOLERANCE_SHARE * axis_tolerance),

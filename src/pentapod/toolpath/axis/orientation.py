@@ -1,4 +1,4 @@
-"""Orientation: everything that sets the nominal tool axis along the passes of a toolpath."""
+"""Orientation: axis mode, lead, tilt and smoothing of the nominal tool axis along passes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Orienting: a finished toolpath with other tool axes than the surface's normals."""
+"""New tool axes for an existing toolpath."""
 
 from __future__ import annotations
 

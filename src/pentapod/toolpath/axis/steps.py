@@ -1,4 +1,4 @@
-"""Axis steps: further waypoints where the tool axis turns by more than it may from one to the next."""
+"""Subdivision of a toolpath where its tool axis turns by more than a limit between two waypoints."""
 
 from __future__ import annotations
 

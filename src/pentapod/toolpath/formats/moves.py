@@ -1,4 +1,4 @@
-"""Moves: a toolpath as files tell it, one pose after the other, each with how it is reached."""
+"""Moves: the poses of a toolpath file in their order, with feed and kind of motion."""
 
 from __future__ import annotations
 

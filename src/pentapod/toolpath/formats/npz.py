@@ -1,4 +1,4 @@
-"""NumPy archives: the arrays that `plan.npz` also holds for the toolpath; nothing is lost."""
+"""NumPy archives of toolpaths, with the arrays of `plan.npz`; lossless."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the readers of text share: lines with their numbers, numbers with their words, and guards against non-text."""
+"""Shared parts of the readers of toolpath text: numbered lines, numbers with their words, guards against non-text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The formats by name, and reading and writing by a file's suffix."""
+"""Registry of toolpath formats; reading and writing by a file's suffix."""
 
 from __future__ import annotations
 

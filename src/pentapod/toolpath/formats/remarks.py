@@ -1,4 +1,4 @@
-"""Remarks: what pentapod says in a file's comments, for its own readers: what the language has no word for."""
+"""Remarks: comments by which pentapod's files keep what their language has no word for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two rotary words and a tool axis: the conventions of five-axis G-code, degrees.
+"""Rotary angles of five-axis G-code (A and B, B and C) and tool axes, degrees.
 
 XYZAB, as LinuxCNC's pentakins and other machines with A and B heads have it: R = Ry(B) Rx(A), so that the axis from the
 tip to the spindle is (cos A sin B, −sin A, cos A cos B). XYZBC: R = Rz(C) Ry(B), (sin B cos C, sin B sin C, cos B).

@@ -1,4 +1,4 @@
-"""Gouges: every motion checked against the part; cuts that gouge tilted clear, lifted, dropped, or only reported."""
+"""Gouge check of every motion against the part; gouging cuts are tilted clear, lifted, dropped, or only reported."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pentapod.mesh.query.swept_depth import RESOLUTION_M, Sweep, sweep, touch
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath.gouge.report import GougeOptions, GougeReport, Remedy
 from pentapod.toolpath.linking.links import RAPID_SPACING_M
-from pentapod.toolpath.linking.relinking import rejoined
+from pentapod.toolpath.linking.relinking import relinked
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 _RINGS, _SPOKES = 4, 16
@@ -66,8 +66,8 @@ def checked(
     result = work.toolpath() if report.gouging else toolpath
     depths, cutting = _standing(result, work)
     if options.links is not None and (depths[~cutting] > -np.inf).any():
-        result, changed = rejoined(result, (depths > -np.inf) & ~cutting, options.links, work.clear)
-        report = replace(report, rejoined=changed)
+        result, changed = relinked(result, (depths > -np.inf) & ~cutting, options.links, work.clear)
+        report = replace(report, relinked=changed)
         depths, cutting = _standing(result, work) if changed else (depths, cutting)
     left, unclear = (depths > -np.inf) & cutting, (depths > -np.inf) & ~cutting
     return result, replace(

@@ -1,4 +1,4 @@
-"""GougeOptions and GougeReport: what is to be done about gouges, and what was found and done."""
+"""GougeOptions: remedies and tolerances of the gouge check. GougeReport: its results."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class GougeReport(Value):
     gouging: of them too deep at first; depths: the deepest of cutter, shank and holder at first, metres, −inf for none.
     tilted, lifted: waypoints changed; dropped: motions taken out of the cut; most_lifted: metres.
     left: motions still too deep, left_depth how deep, metres; places: the first waypoint of each run of those.
-    rejoined: ways between cuts led anew. unclear: links deeper than the tolerance and rapids that touch,
+    relinked: ways between cuts led anew. unclear: links deeper than the tolerance and rapids that touch,
     unclear_places likewise.
     """
 
@@ -68,7 +68,7 @@ class GougeReport(Value):
     left: int = 0
     left_depth: float = 0.0
     places: tuple[int, ...] = ()
-    rejoined: int = 0
+    relinked: int = 0
     unclear: int = 0
     unclear_places: tuple[int, ...] = ()
 
@@ -91,7 +91,7 @@ class GougeReport(Value):
         return text + self._unclear()
 
     def _unclear(self) -> str:
-        text = f"\n  note: {self.rejoined:,} ways between cuts led over the clearance level" if self.rejoined else ""
+        text = f"\n  note: {self.relinked:,} ways between cuts led over the clearance level" if self.relinked else ""
         if not self.unclear:
             return text
         where = _some(self.unclear_places)

@@ -1,1 +1,1 @@
-"""Drawings, points, pictures and text to be engraved."""
+"""Readers of drawings, points and pictures, and lettering."""

@@ -1,4 +1,4 @@
-"""Drawings in: flat lines from SVG and DXF files, curves as chords within a tolerance."""
+"""Readers of flat drawings by a file's suffix: SVG and DXF."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""DXF in: the lines of a drawing's model space, curves as chords within a tolerance."""
+"""Reader of DXF drawings: lines of the model space, with curves as chords within a tolerance."""
 
 from __future__ import annotations
 

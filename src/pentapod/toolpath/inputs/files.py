@@ -1,4 +1,4 @@
-"""What the readers of drawings, points and pictures share: small files, optional packages, chords of curves."""
+"""Shared parts of the readers of drawings, points and pictures: size limits, optional packages, chords of curves."""
 
 from __future__ import annotations
 

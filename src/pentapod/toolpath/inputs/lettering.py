@@ -1,4 +1,4 @@
-"""Lettering: text as single strokes, with the font that ships with the package."""
+"""Single-stroke lettering, with the font that ships with the package."""
 
 from __future__ import annotations
 

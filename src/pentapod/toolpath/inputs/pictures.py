@@ -1,4 +1,4 @@
-"""Pictures in: grey levels from PNG, JPEG and other picture files."""
+"""Reader of pictures (PNG, JPEG and others) as grey levels."""
 
 from __future__ import annotations
 

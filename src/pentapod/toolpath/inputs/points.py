@@ -1,4 +1,4 @@
-"""Points in: polylines from a CSV file, straight down on a surface or onto the nearest point of it."""
+"""Reader of polylines as points of a CSV file."""
 
 from __future__ import annotations
 

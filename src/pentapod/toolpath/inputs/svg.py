@@ -1,4 +1,4 @@
-"""SVG in: the lines of a drawing, curves as chords within a tolerance; what it would unfold to is counted first."""
+"""Reader of SVG drawings: lines, with curves as chords within a tolerance; their number is bounded first."""
 
 from __future__ import annotations
 

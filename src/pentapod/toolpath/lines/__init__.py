@@ -1,1 +1,1 @@
-"""Lines on a surface: how far apart, over gaps, projected."""
+"""Lines on a surface: stepover, gap filling, projection."""

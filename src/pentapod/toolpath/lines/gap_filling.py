@@ -1,4 +1,4 @@
-"""Covering: lines a step apart over the surface itself, and lines where others leave gaps.
+"""Offset lines over a surface at a constant stepover, and lines that fill the gaps that others leave.
 
 With the distance counted in steps (a step being how far apart passes may be there), lines half a step from the source
 and then a step apart cover all but the ridges where fronts meet: there the last line may be up to a step away. What is
@@ -31,7 +31,7 @@ def edge_for(steps: Floats, facets_per_step: float = FACETS_PER_STEP) -> float:
     return float(steps.min()) / facets_per_step
 
 
-def rest_covered(patch: Patch, steps: Floats, seeds: Floats, parts: list[Passes]) -> Passes:
+def gaps_filled(patch: Patch, steps: Floats, seeds: Floats, parts: list[Passes]) -> Passes:
     """Return lines on a patch, and further ones wherever these leave more than half a step.
 
     steps (F,): how far apart lines may be on each facet, metres; the facets must be small against them. seeds (V,):

@@ -1,4 +1,4 @@
-"""Draping: flat lines laid on a surface, projected along a direction or wrapped along geodesics."""
+"""Projection of flat lines onto a surface, along a direction or wrapped along geodesics."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PLACES = (0.47, 0.21, 0.78)
 """Where a chord is tested, one after the other: a symmetric bend would hide in the middle, two bends from one place."""
 
 
-def draped(
+def projected(
     lines: list[Floats],
     landing: Landing,
     options: PathOptions,

@@ -1,4 +1,4 @@
-"""Scallop: how far apart passes may be so that the ridge between them is no higher than asked for.
+"""Stepover for a given scallop height.
 
 Across the passes, a surface of normal curvature κ is a circle of radius 1 / κ (positive: convex), and a ball of radius
 r follows one of radius 1 / κ + r. Two balls whose contacts are s apart along the surface leave a ridge h where the

@@ -1,4 +1,4 @@
-"""Slopes: passes split where they turn from rising to falling, and turned to run one way."""
+"""Uphill and downhill passes: split where they turn from rising to falling, and turned to run one way."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""From lines to a toolpath: waypoints, order, links, pieces."""
+"""From contact lines to a toolpath: waypoints, order, links, partition."""

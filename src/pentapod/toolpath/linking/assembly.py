@@ -1,4 +1,4 @@
-"""Finishing: from lines on a surface to a toolpath: waypoints, order, links, tips. Every strategy ends here."""
+"""Assembly of a toolpath from contact lines: waypoints, order, links, tips; the last step of every strategy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pentapod.mesh.passes import Passes
 from pentapod.mesh.query.heightfield import HeightField
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.linking import ordering
-from pentapod.toolpath.linking.link_passes import Run, joined
+from pentapod.toolpath.linking.link_passes import Run, linked
 from pentapod.toolpath.linking.resampling import resample
 from pentapod.toolpath.linking.tour import travel, travel_bound
 from pentapod.toolpath.nothing_left import nothing_left
@@ -27,7 +27,7 @@ _HIDDEN_SLACK_M = 1e-6
 _STEEPEST = 0.05
 
 
-def finished(
+def assembled(
     strategy: str, mesh: Mesh, tool: Tool, options: PathOptions, drawing: Drawing
 ) -> tuple[Toolpath, PathReport]:
     """Return the toolpath along a drawing, and what it came to.
@@ -55,7 +55,7 @@ def finished(
         rows = rows[::-1] if turn.backwards else rows
         stay = 0.0 if drawing.sink > 0.0 or not turn.near else reach
         runs.append(Run(passes.points[rows], passes.normals[rows], float(power[turn.index]), stay))
-    toolpath, counts = joined(mesh, tool, options, runs=runs, field=field, stepover=drawing.stepover or options.spacing)
+    toolpath, counts = linked(mesh, tool, options, runs=runs, field=field, stepover=drawing.stepover or options.spacing)
     firsts, lasts = np.stack([r.contacts[0] for r in runs]), np.stack([r.contacts[-1] for r in runs])
     report = PathReport(
         strategy=strategy,

@@ -1,4 +1,4 @@
-"""Clearing: whether the tool, shank and holder stay clear of the part on a whole motion, between its poses too."""
+"""Collision check of tool, shank and holder against the part over a whole motion."""
 
 from __future__ import annotations
 

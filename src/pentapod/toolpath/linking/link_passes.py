@@ -1,4 +1,4 @@
-"""Joining: passes in their order with the links between them, each link the shortest that is proven clear."""
+"""Linking of ordered passes, each link the shortest that is proven free of collision."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Counts:
     unproven: int = 0
 
 
-def joined(
+def linked(
     mesh: Mesh, tool: Tool, options: PathOptions, *, runs: list[Run], field: HeightField, stepover: float
 ) -> tuple[Toolpath, Counts]:
     """Return runs in their order with the links between them, and how many of which kind.
@@ -56,10 +56,10 @@ def joined(
     where the surface allows; one closer than `hop` by a rapid close above the part; else over the
     clearance level. Rapids are proven clear of the part, as far as a way is found.
     """
-    return _Joiner(mesh, tool, options, runs, field, stepover).toolpath()
+    return _Linker(mesh, tool, options, runs, field, stepover).toolpath()
 
 
-class _Joiner:
+class _Linker:
     def __init__(
         self, mesh: Mesh, tool: Tool, options: PathOptions, runs: list[Run], field: HeightField, stepover: float
     ) -> None:

@@ -1,7 +1,7 @@
-"""Links: how the tool comes to a pass, leaves it, and travels between passes.
+"""Approaches, retracts, ramps and rapids: how the tool comes to a pass, leaves it, and travels between passes.
 
 A *rapid* leaves along the tool axis, rises along the view to the clearance level, crosses, and comes down the
-same way; its corners are rounded, and the axis turns along the great circle, gently at both ends. The last
+same way; its corners are blended, and the axis turns along the great circle, gently at both ends. The last
 stretch to the surface and the first away from it, `approach` high, is a link on feed. A *hop* is a rapid that crosses
 close above the part instead of at the clearance level. A link to a pass close by stays on the
 surface (see `stay_down`).
@@ -73,7 +73,7 @@ def rapid(start: Floats, start_axis: Floats, end: Floats, end_axis: Floats, styl
     """Return the rapid between two poses, off the surface by `approach`, over the clearance level."""
     up = _rise(start, start_axis, style)
     down = _rise(end, end_axis, style)[::-1]
-    way = rounded(np.vstack([up, down]))
+    way = blended(np.vstack([up, down]))
     # Midway the axis turns 15/8 times as fast as on average.
     turn = 1.875 * float(angle_between(start_axis, end_axis))
     length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
@@ -83,13 +83,13 @@ def rapid(start: Floats, start_axis: Floats, end: Floats, end_axis: Floats, styl
 
 def entry(tip: Floats, axis: Floats, style: LinkStyle) -> Segment:
     """Return the rapid from the clearance level down to the start of an approach at `tip` (3,)."""
-    tips = spaced(rounded(_rise(tip, axis, style)[::-1]), RAPID_SPACING_M)
+    tips = spaced(blended(_rise(tip, axis, style)[::-1]), RAPID_SPACING_M)
     return Segment(SegmentKind.RAPID, tips, np.tile(axis, (len(tips), 1)), np.inf)
 
 
 def leave(tip: Floats, axis: Floats, style: LinkStyle) -> Segment:
     """Return the rapid from the end of a retract at `tip` (3,) up to the clearance level."""
-    tips = spaced(rounded(_rise(tip, axis, style)), RAPID_SPACING_M)
+    tips = spaced(blended(_rise(tip, axis, style)), RAPID_SPACING_M)
     return Segment(SegmentKind.RAPID, tips, np.tile(axis, (len(tips), 1)), np.inf)
 
 
@@ -114,7 +114,7 @@ def _turning(start: Floats, end: Floats, tips: Floats) -> Floats:
     return axes
 
 
-def rounded(corners: Floats) -> Floats:
+def blended(corners: Floats) -> Floats:
     """Return a polyline (M, 3) with its inner corners replaced by parabolic arcs; ends and legs stay.
 
     An arc takes up to 5 mm of each leg, less than half of it, so that arcs never meet.

@@ -1,4 +1,4 @@
-"""Ordering: which pass follows which, and which way it is cut."""
+"""Order and direction of passes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parting: pieces of a toolpath, each a toolpath that comes to the work and leaves it."""
+"""Partition of a toolpath into pieces, each with its own approach and retract."""
 
 from __future__ import annotations
 
@@ -90,14 +90,14 @@ def part_of(toolpath: Toolpath, piece: Piece, style: LinkStyle) -> Toolpath:
     chosen = piece.cuts(toolpath)
     if not chosen.any():
         raise ToolpathError("there is no cut in this piece", value=str(piece))
-    return _Parted(toolpath, style).joined(marked_runs(chosen).tolist())
+    return _Partition(toolpath, style).toolpath(marked_runs(chosen).tolist())
 
 
-class _Parted:
+class _Partition:
     def __init__(self, toolpath: Toolpath, style: LinkStyle) -> None:
         self.whole, self.style, self.cutting = toolpath, style, cutting_intervals(toolpath)
 
-    def joined(self, runs: list[list[int]]) -> Toolpath:
+    def toolpath(self, runs: list[list[int]]) -> Toolpath:
         """Return what is made of runs of intervals, of which a run's end is its last waypoint."""
         last = len(self.whole) - 1
         segments = self._lead(runs[0][0])

@@ -1,4 +1,4 @@
-"""Rejoining: links and rapids led anew, over the clearance level, where the old ones meet the part.
+"""Relinking: links and rapids that meet the part, replaced by ways over the clearance level.
 
 A cut that was leaned, lifted or dropped leaves links behind that were laid for the cut as it was.
 """
@@ -14,7 +14,7 @@ from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 
-def rejoined(
+def relinked(
     path: Toolpath, meeting: Bools, style: LinkStyle, clear: Callable[[Segment], bool]
 ) -> tuple[Toolpath, int]:
     """Return a path with other ways between its cuts wherever one of the motions (N − 1,) in `meeting` is.

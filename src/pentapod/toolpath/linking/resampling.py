@@ -1,4 +1,4 @@
-"""Resampling: waypoints along passes, as few as the tolerances allow, evenly spread.
+"""Adaptive resampling of passes: as few waypoints as the chord tolerances allow, evenly spread.
 
 Density first: between waypoints at most `spacing`, at most `axis_step` of turning, and √(8 · chordal · R)
 where the surface curves with radius R; waypoints are spread evenly over the integral of that density. Then

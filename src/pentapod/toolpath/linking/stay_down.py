@@ -1,4 +1,4 @@
-"""Links that stay down: across the surface from the end of one pass to the start of the next."""
+"""Stay-down links: across the surface from the end of one pass to the start of the next."""
 
 from __future__ import annotations
 

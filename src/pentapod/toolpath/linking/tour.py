@@ -1,4 +1,4 @@
-"""Tour: an order of lines with little travel between them, and a length that no order can beat.
+"""Travelling-salesman tour over lines with two ends: nearest neighbours, 2-opt, and a lower bound on its travel.
 
 Nearest neighbour first; then 2-opt (a run of lines turned round) and or-opt (a run of up to three lines put elsewhere)
 until neither helps. The bound: travel joins all lines into one, so it is no shorter than the minimum spanning tree of

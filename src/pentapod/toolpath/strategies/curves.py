@@ -17,10 +17,10 @@ from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.closest import closest, normals_at
-from pentapod.mesh.query.geodesic_tracing import Shots, neighbours, shoot
+from pentapod.mesh.query.geodesic_tracing import SurfaceRays, neighbours, traced
 from pentapod.mesh.query.heightfield import HeightField
 from pentapod.toolpath.drawing import Drawing, Order
-from pentapod.toolpath.lines.projection import Landing, draped, sunk
+from pentapod.toolpath.lines.projection import Landing, projected, sunk
 from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import PathOptions, positive
 from pentapod.toolpath.strategies.strategy import Strategy
@@ -80,7 +80,7 @@ def draw_curves(mesh: Mesh, tool: Tool, options: CurveOptions) -> Drawing:
     landing = projection(mesh, options) if options.laying is Laying.PROJECT else wrapping(mesh, options)
     landing = sunk(landing, lambda plane: np.full(len(plane), options.depth))
     wrapped = options.laying is Laying.WRAP
-    passes, notes = draped(lines, landing, options, spacing=options.spacing, wrapped=wrapped, sink=options.depth)
+    passes, notes = projected(lines, landing, options, spacing=options.spacing, wrapped=wrapped, sink=options.depth)
     if not len(passes):
         raise ToolpathError(
             "no line meets the surface",
@@ -152,13 +152,15 @@ def wrapping(mesh: Mesh, options: CurveOptions) -> Landing:
     def land(plane: Floats) -> tuple[Floats, Floats, Bools]:
         count = len(plane)
         ahead = np.where(plane[:, :1] < 0.0, -1.0, 1.0)
-        shots = Shots(np.repeat(facet, count), np.repeat(weights, count, axis=0), ahead * x, np.ones(count, np.bool_))
-        shots = shoot(patch, beside, shots, np.abs(plane[:, 0]))
-        forward = shots.directions * ahead
-        left = np.cross(patch.facet_normals[shots.facets], forward)
+        rays = SurfaceRays(
+            np.repeat(facet, count), np.repeat(weights, count, axis=0), ahead * x, np.ones(count, np.bool_)
+        )
+        rays = traced(patch, beside, rays, np.abs(plane[:, 0]))
+        forward = rays.directions * ahead
+        left = np.cross(patch.facet_normals[rays.facets], forward)
         up = np.where(plane[:, 1:] < 0.0, -left, left)
-        shots = shoot(patch, beside, Shots(shots.facets, shots.weights, up, shots.landed), np.abs(plane[:, 1]))
-        return shots.points(patch), normals_at(patch, shots.facets, shots.weights), shots.landed
+        rays = traced(patch, beside, SurfaceRays(rays.facets, rays.weights, up, rays.landed), np.abs(plane[:, 1]))
+        return rays.points(patch), normals_at(patch, rays.facets, rays.weights), rays.landed
 
     return land
 

@@ -19,7 +19,7 @@ from pentapod.geometry.runs import equal_runs, marked_runs
 from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.inputs.pictures import read_darkness
-from pentapod.toolpath.lines.projection import draped, sunk
+from pentapod.toolpath.lines.projection import projected, sunk
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.strategies.curves import CurveOptions, Laying, flat_turn, projection, wrapping
 from pentapod.toolpath.strategies.strategy import Strategy
@@ -110,7 +110,7 @@ def draw_image(mesh: Mesh, tool: Tool, options: ImageOptions) -> Drawing:
     if options.effect is Effect.DEPTH:
         landing = sunk(landing, lambda plane: options.depth * _shade(darkness, pixel, plane @ turn.T))
     sink = options.sink_of(options)
-    passes, notes = draped(
+    passes, notes = projected(
         lines,
         landing,
         options,

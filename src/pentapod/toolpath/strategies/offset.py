@@ -21,7 +21,7 @@ from pentapod.mesh.query.levels import gradients
 from pentapod.mesh.query.slicing import LevelSet
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.inputs.points import read_points
-from pentapod.toolpath.lines.gap_filling import FACETS_PER_FRONT, edge_for, rest_covered
+from pentapod.toolpath.lines.gap_filling import FACETS_PER_FRONT, edge_for, gaps_filled
 from pentapod.toolpath.lines.scallop import surface_steps
 from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import CoverOptions
@@ -82,7 +82,7 @@ def draw_offset(mesh: Mesh, tool: Tool, options: OffsetOptions) -> Drawing:
     beyond = float(levels[-1]) + 1.0
     level_set = LevelSet(patch, np.where(reached, away, beyond), levels)
     seeds = seeds_along(level_set, 1.0 / contours.steps)
-    passes = rest_covered(patch, contours.steps, seeds, [level_set.lines()])
+    passes = gaps_filled(patch, contours.steps, seeds, [level_set.lines()])
     left = 1.0 - float(patch.areas[reached[patch.faces].all(axis=1)].sum() / patch.areas.sum())
     notes = (f"{100.0 * left:.2g} % of the region is not connected to the source and left out",) if left > 1e-9 else ()
     return Drawing(passes, float(contours.steps.max()), Order.ZIGZAG, notes=notes)

@@ -20,7 +20,7 @@ from pentapod.mesh.query.closest import closest, normals_at
 from pentapod.mesh.query.heightfield import HeightField
 from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.inputs.points import read_points
-from pentapod.toolpath.lines.projection import draped, sunk
+from pentapod.toolpath.lines.projection import projected, sunk
 from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.strategies.strategy import Strategy
@@ -78,7 +78,7 @@ def draw_polyline(mesh: Mesh, tool: Tool, options: PolylineOptions) -> Drawing:
 
     lines = [np.asarray(line) for line in options.lines if len(line) > 1]
     landing = sunk(land, lambda points: np.full(len(points), options.depth))
-    passes, notes = draped(lines, landing, options, spacing=options.spacing, wrapped=False, sink=options.depth)
+    passes, notes = projected(lines, landing, options, spacing=options.spacing, wrapped=False, sink=options.depth)
     if not len(passes):
         raise ToolpathError("no line meets the surface", key="lines", remedy="check the unit and the view")
     visible = options.towards is Towards.VIEW

@@ -9,7 +9,7 @@ from pentapod.base.keys import check_size
 from pentapod.base.registry import Registry
 from pentapod.cutters.tool import Tool
 from pentapod.mesh.mesh import Mesh
-from pentapod.toolpath.linking.assembly import finished
+from pentapod.toolpath.linking.assembly import assembled
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.path_report import PathReport
 from pentapod.toolpath.strategies.strategy import Strategy
@@ -58,7 +58,7 @@ def toolpath_with_report(mesh: Mesh, tool: Tool, options: PathOptions) -> tuple[
     """
     strategy = strategy_of(options)
     check_size(options, float(np.ptp(mesh.bounds, axis=0).max()), ToolpathError)
-    return finished(strategy.name, mesh, tool, options, strategy.draw(mesh, tool, options))
+    return assembled(strategy.name, mesh, tool, options, strategy.draw(mesh, tool, options))
 
 
 def make_toolpath(mesh: Mesh, tool: Tool, options: PathOptions) -> Toolpath:

@@ -19,7 +19,7 @@ from pentapod.mesh.query.geodesic import seeds_along
 from pentapod.mesh.query.levels import gradients, spread
 from pentapod.mesh.query.slicing import LevelSet
 from pentapod.toolpath.drawing import Drawing, Order
-from pentapod.toolpath.lines.gap_filling import FACETS_PER_FRONT, edge_for, rest_covered
+from pentapod.toolpath.lines.gap_filling import FACETS_PER_FRONT, edge_for, gaps_filled
 from pentapod.toolpath.lines.scallop import surface_steps
 from pentapod.toolpath.nothing_left import nothing_left
 from pentapod.toolpath.options import CoverOptions
@@ -82,7 +82,7 @@ def _offset(mesh: Mesh, tool: Tool, options: SpiralOptions) -> Drawing:
     spiral = LevelSet(inner, inner_away - 0.5 - phase, np.zeros(0), turns)
     steps = contours.steps[kept]
     seeds = np.minimum(seeds_along(ring, 1.0 / steps), seeds_along(inside, 1.0 / steps[deep]))
-    passes = rest_covered(patch, steps, seeds, [ring.lines(), spiral.lines()])
+    passes = gaps_filled(patch, steps, seeds, [ring.lines(), spiral.lines()])
     return Drawing(passes, float(contours.steps.max()), Order.ZIGZAG)
 
 
@@ -114,7 +114,7 @@ def _planar(mesh: Mesh, tool: Tool, options: SpiralOptions) -> Drawing:
     patch, phase, turns, kept = _winding(patch, centre, options.up)
     spiral = LevelSet(patch, turn - phase, np.zeros(0), turns)
     seeds = seeds_along(spiral, 1.0 / steps[kept])
-    passes = rest_covered(patch, steps[kept], seeds, [spiral.lines()])
+    passes = gaps_filled(patch, steps[kept], seeds, [spiral.lines()])
     return Drawing(passes, float(steps.max()), Order.ZIGZAG)
 
 
