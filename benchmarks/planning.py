@@ -25,10 +25,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "planning
 from planning_instances import Instance, instances
 
 from pentapod.base.refusal import Refusal
-from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine.machine import Machine
 from pentapod.planning.leg_path.leg_path import leg_path
-from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.ipopt import IpoptSolver
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.planning.placement.placement import Placement
@@ -56,8 +54,8 @@ def timed(action: Callable[[], Value]) -> tuple[Value, float]:
 
 def start_of(problem: PlacementProblem) -> Candidate:
     """Return the first candidate of the best first guess."""
-    guess = first_guesses(problem.samples, problem.machine, COMPONENTS, 0)[0]
-    return first_candidate(problem, Margins.of(problem.machine, guess.component), guess.transform)
+    guess = first_guesses(problem)[0]
+    return first_candidate(problem, guess.margins, guess.transform)
 
 
 def against_ipopt(tasks: list[Instance], machine: Machine) -> None:

@@ -47,7 +47,7 @@ def main() -> None:
     out = parser.parse_args().out
     machine, toolpath, component = Machine.load("desk"), dome(WIDTH, SLOPE), Component(1, 1)
 
-    strict = search(PlacementProblem.of(ToolpathSamples.of(toolpath, 0.0), machine), component).best
+    strict = search(PlacementProblem.of(ToolpathSamples.of(toolpath, 0.0), machine, component=component)).best
     answer = plan(toolpath, machine, component=component, constraints=PlacementConstraints.fixture([strict.transform]))
     print(f"strict normals, at the best placement found:\n  {answer}")
     placed = plan(toolpath, machine, tilt=TILT, component=component)

@@ -7,14 +7,13 @@ import pytest
 from planning_instances import Instance, instances, machine
 
 from pentapod.base.refusal import Refusal
-from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
 from pentapod.planning import LegPath, PlacedPath, leg_path, plan
-from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.sampling import best_tilted_margins, first_guesses
 from pentapod.planning.plan import NEEDED_MARGIN
 from pentapod.planning.problem.constraints import FREE
+from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.program import Provenance, sample, write_csv
 from pentapod.timing import Trajectory, retime
@@ -28,8 +27,8 @@ AXIS_TOLERANCE = np.radians(0.5)
 def brute_force(instance: Instance, machine: Machine, samples: int) -> float:
     """Return the best smallest margin of random placements with each waypoint's tilt chosen by itself."""
     task = ToolpathSamples.of(instance.toolpath, instance.tilt)
-    guesses = first_guesses(task, machine, COMPONENTS, seed=99, tries=samples)
-    return max(best_tilted_margins(task, Margins.of(machine, g.component), g.transform)[0].min() for g in guesses)
+    guesses = first_guesses(PlacementProblem.of(task, machine), seed=99, tries=samples)
+    return max(best_tilted_margins(task, g.margins, g.transform)[0].min() for g in guesses)
 
 
 def check(instance: Instance, samples: int, folder: Path) -> bool:

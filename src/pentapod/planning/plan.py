@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypedDict
+from collections.abc import Callable, Sequence
+from typing import TypedDict, Unpack
 
 from pentapod.base.arrays import Floats
 from pentapod.base.progress import Progress, silent
@@ -13,6 +13,7 @@ from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
 from pentapod.machine.machine import Machine
 from pentapod.numerics.one_thread import on_one_thread
 from pentapod.planning.diagnosis import refusal
+from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.placement.base_reconfiguration import reconfigured
 from pentapod.planning.placement.placed_path import PlacedPath, UnplacedPath
 from pentapod.planning.placement.placement import Placement
@@ -55,6 +56,7 @@ def plan(
     surroundings: Surroundings = NOTHING,
     weights: Weights = EVEN,
     secondary_objective: SecondaryObjective | None = None,
+    limits: Sequence[LimitKind] | None = None,
     seed: int = 0,
     solver: SolverName = "sequential",
     progress: Progress = silent,
@@ -65,12 +67,16 @@ def plan(
     constraints: the allowed placements; of them, and of all components where none is given, the one with the largest
     smallest margin is kept, the margins weighed by `weights`; a machine's guides are chosen with it. surroundings: what
     legs, spindle and tool must not touch.
-    secondary_objective: a tenth of that margin may be given up for it. Deterministic for a seed. Returns a Refusal
-    that names limits, waypoints and shortfalls where the part does not fit. An interruption (Ctrl-C) of the search ends
-    it with the best placement found so far, if that fits; else KeyboardInterrupt is raised.
+    secondary_objective: a tenth of that margin may be given up for it. limits: the kinds of limits, all of `LIMITS` by
+    default. Deterministic for a seed. Returns a Refusal that names limits, waypoints and shortfalls where the part does
+    not fit. An interruption (Ctrl-C) of the search ends it with the best placement found so far, if that fits; else
+    KeyboardInterrupt is raised.
     """
-    problem = PlacementProblem.of(ToolpathSamples.of(toolpath, tilt), machine, constraints, weights)
-    problem, found = _searched(problem, component, surroundings, seed, solver, progress)
+    problem = PlacementProblem.of(
+        ToolpathSamples.of(toolpath, tilt), machine, constraints, weights,
+        component=component, surroundings=surroundings, limits=limits,
+    )  # fmt: skip
+    problem, found = _searched(problem, seed, solver, progress)
     best = found.best
     if best.smallest < NEEDED_MARGIN:
         progress("placement", 1.0, "it does not fit; looking for what would")
@@ -89,40 +95,28 @@ def plan(
 
 
 @on_one_thread
-def fits(
-    toolpath: Toolpath,
-    machine: Machine,
-    *,
-    tilt: float,
-    constraints: PlacementConstraints,
-    component: Branch | None,
-    surroundings: Surroundings,
-    weights: Weights,
-    solver: SolverName,
-) -> bool:
+def fits(toolpath: Toolpath, machine: Machine, **options: Unpack[PlacementOptions]) -> bool:
     """Return whether `plan` finds a placement: the quick answer, without axes along the path and without suggestions.
 
     Raises KeyboardInterrupt where the search is interrupted.
     """
-    problem = PlacementProblem.of(ToolpathSamples.of(toolpath, tilt), machine, constraints, weights)
-    _, found = _searched(problem, component, surroundings, 0, solver, silent)
+    problem = PlacementProblem.of(
+        ToolpathSamples.of(toolpath, options["tilt"]), machine, options["constraints"], options["weights"],
+        component=options["component"], surroundings=options["surroundings"],
+    )  # fmt: skip
+    _, found = _searched(problem, 0, options["solver"], silent)
     if found.interrupted:
         raise KeyboardInterrupt
     return found.best.smallest >= NEEDED_MARGIN
 
 
 def _searched(
-    problem: PlacementProblem,
-    component: Branch | None,
-    surroundings: Surroundings,
-    seed: int,
-    solver: SolverName,
-    progress: Progress,
+    problem: PlacementProblem, seed: int, solver: SolverName, progress: Progress
 ) -> tuple[PlacementProblem, Search]:
     """Return what the search found, and the problem: with its machine's guides as chosen, where it has some."""
     if problem.machine.guides is not None:
-        return reconfigured(problem, component, surroundings, seed=seed, solver=solver, progress=progress)
-    return problem, search(problem, component, surroundings, seed=seed, solver=solver, progress=progress)
+        return reconfigured(problem, seed=seed, solver=solver, progress=progress)
+    return problem, search(problem, seed=seed, solver=solver, progress=progress)
 
 
 def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: Floats, chosen_by: str) -> PlacedPath:

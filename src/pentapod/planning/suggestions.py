@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from pentapod.planning.placement.sampling import first_candidate
 from pentapod.planning.problem.constraints import FREE
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
-from pentapod.planning.problem.samples import ToolpathSamples
 
 Raise = Callable[[PlacementProblem, Candidate], Candidate]
 """Improves a candidate of a problem, its placement free, until it fits."""
@@ -28,7 +28,7 @@ def suggestions(problem: PlacementProblem, best: Candidate, improve: Raise, need
 
 
 def _move(problem: PlacementProblem, best: Candidate, improve: Raise, needed: float) -> str:
-    moved = improve(PlacementProblem.of(problem.samples, problem.machine, weights=problem.weights), best)
+    moved = improve(replace(problem, constraints=FREE), best)
     if moved.smallest < needed:
         return ""
     shift = (moved.transform.translation - best.transform.translation) * 1e3
@@ -44,12 +44,7 @@ def _cone(problem: PlacementProblem, best: Candidate, improve: Raise, needed: fl
     wider = [float(tilt) for tilt in samples.tilt + _WIDER if tilt <= _WIDEST]
 
     def fits(tilt: float) -> bool:
-        there = PlacementProblem.of(
-            ToolpathSamples(samples.pivots, samples.nominal, samples.pivot, tilt),
-            problem.machine,
-            problem.constraints,
-            problem.weights,
-        )
+        there = problem.along(replace(samples, tilt=tilt))
         return improve(there, first_candidate(there, best.margins, best.transform)).smallest >= needed
 
     enough = 0.0
@@ -72,9 +67,7 @@ def _region(problem: PlacementProblem, best: Candidate, improve: Raise, needed: 
         inside = np.flatnonzero((np.abs(problem.samples.pivots - middle) <= share * half + 1e-9).all(axis=1))
         found = None
         if len(inside) > 0:
-            part = PlacementProblem.of(
-                problem.samples.at(inside), problem.machine, problem.constraints, problem.weights
-            )
+            part = problem.along(problem.samples.at(inside))
             found = improve(part, first_candidate(part, start.margins, start.transform))
         if found is not None and found.smallest >= needed:
             fits, start = share, found

@@ -143,14 +143,14 @@ def test_without_obstacles_nothing_changes(desk, cap):
 
 @pytest.fixture(scope="module")
 def problem(desk, cap):
-    return PlacementProblem.of(ToolpathSamples.of(cap, TILT), desk)
+    return PlacementProblem.of(ToolpathSamples.of(cap, TILT), desk, component=PLUS)
 
 
 @pytest.fixture(scope="module")
 def free(desk, problem):
     """A first guess where nothing is in the way."""
-    guess = first_guesses(problem.samples, desk, (PLUS,), 0, tries=2000)[0]
-    return first_candidate(problem, Margins.of(desk, PLUS), guess.transform)
+    guess = first_guesses(problem, tries=2000)[0]
+    return first_candidate(problem, guess.margins, guess.transform)
 
 
 def beside(desk, problem, free, leg, away):
@@ -236,6 +236,7 @@ def test_a_refusal_names_the_fixture(desk, problem, free):
 
 def test_first_guesses_see_the_fixture(desk, problem, free):
     crowded = Surroundings((beside(desk, problem, free, 1, 0.0),))
-    plain = first_guesses(problem.samples, desk, (PLUS,), 0, tries=1500)
-    seen = first_guesses(problem.samples, desk, (PLUS,), 0, tries=1500, surroundings=crowded)
+    plain = first_guesses(problem, tries=1500)
+    there = PlacementProblem.of(problem.samples, desk, component=PLUS, surroundings=crowded)
+    seen = first_guesses(there, tries=1500)
     assert seen[0].margin <= plain[0].margin

@@ -7,15 +7,18 @@ import pytest
 from domes import dome
 from scipy.optimize import differential_evolution
 
+from pentapod.base.errors import MachineError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
+from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.planning import plan
 from pentapod.planning.limits.margins import Margins
-from pentapod.planning.placement.base_reconfiguration import at_slides, reconfigured
+from pentapod.planning.placement.base_reconfiguration import reconfigured
 from pentapod.planning.placement.curvature import Curvature
+from pentapod.planning.placement.rail_positions import at_rail_positions
 from pentapod.planning.placement.search import search
-from pentapod.planning.problem.constraints import FREE, PlacementConstraints
+from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.planning.problem.formulation import guide_function, step_slopes, stepped
 from pentapod.planning.problem.linear_model import LinearModel
 from pentapod.planning.problem.problem import PlacementProblem
@@ -40,8 +43,9 @@ def here(desk):
 
 def setting_of(machine, here, tilt=0.0, size=0.08, waypoints=80):
     return PlacementProblem.of(
-        ToolpathSamples.of(dome(size, 25.0, waypoints), tilt), machine, PlacementConstraints.fixture([here])
-    )
+        ToolpathSamples.of(dome(size, 25.0, waypoints), tilt), machine, PlacementConstraints.fixture([here]),
+        component=COMPONENT,
+    )  # fmt: skip
 
 
 def test_derivatives_are_those_of_the_machine_with_its_guides_moved(sliding, here):
@@ -75,7 +79,7 @@ def test_curvature_is_that_of_the_machine_with_its_guides_moved(sliding, here):
     """Second differences, along a line of placement, slides and tilt field, of machines built anew at each slide."""
     start = setting_of(sliding, here, tilt=0.2)
     machine = sliding.at([0.01, -0.02, 0.0, 0.015, -0.005])
-    problem = dataclasses.replace(start, machine=machine)
+    problem = start.on(machine)
     at = problem.candidate(Margins.of(machine, COMPONENT), here, problem.upright + 0.05)
     rows, moves, none = np.arange(len(problem.samples.pivots)), 0.1 * np.eye(11), np.zeros(0, dtype=np.intp)
     slopes = step_slopes(start, Margins.of(sliding, COMPONENT), guides=True)
@@ -108,14 +112,14 @@ def test_slides_as_good_as_those_of_another_method(sliding, here):
     poses = few.machine_poses(here, few.nominal)
 
     def cost(slides):
-        there = at_slides(problem, slides)
-        return 1.0 if there is None else -float(Margins.of(there.machine, COMPONENT)(*poses).min())
+        there = at_rail_positions(problem.margins[0], slides)
+        return 1.0 if there is None else -float(there(*poses).min())
 
     other = differential_evolution(
         cost, list(zip(least, greatest, strict=True)), maxiter=12, popsize=6, rng=3, tol=0.0, polish=False
     )
-    there, found = reconfigured(problem, COMPONENT)
-    home = search(problem, COMPONENT).best.smallest
+    there, found = reconfigured(problem)
+    home = search(problem).best.smallest
     assert found.best.smallest >= -other.fun - 2e-3
     assert found.best.smallest > home + 0.01
     slides = there.machine.slides
@@ -150,13 +154,21 @@ def test_slides_that_cannot_be_reached_are_not_taken(sliding, here):
     assert len(forbidden) > 0
     beyond = np.zeros(5)
     beyond[0] = forbidden[np.abs(forbidden).argmin()] * 1.5
-    assert at_slides(problem, beyond) is None
-    assert at_slides(problem, 0.2 * beyond) is not None
+    assert at_rail_positions(problem.margins[0], beyond) is None
+    assert at_rail_positions(problem.margins[0], 0.2 * beyond) is not None
 
 
 @pytest.mark.slow
 def test_free_placement_and_guides(sliding):
     """Everything free: more margin than with the guides as they stand."""
-    problem = PlacementProblem.of(ToolpathSamples.of(dome(0.12, 35.0), np.radians(10.0)), sliding, FREE)
-    _, found = reconfigured(problem, COMPONENT)
-    assert found.best.smallest > search(problem, COMPONENT).best.smallest + 0.02
+    problem = PlacementProblem.of(ToolpathSamples.of(dome(0.12, 35.0), np.radians(10.0)), sliding, component=COMPONENT)
+    _, found = reconfigured(problem)
+    assert found.best.smallest > search(problem).best.smallest + 0.02
+
+
+def test_guides_of_other_families_are_refused(sliding, here):
+    general = dataclasses.replace(
+        sliding, robot=GeneralPentapod(sliding.robot.base, sliding.robot.offsets + 0.01 * np.eye(5)[1])
+    )
+    with pytest.raises(MachineError, match="quadratic family"):
+        reconfigured(setting_of(general, here))

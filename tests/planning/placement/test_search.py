@@ -11,7 +11,7 @@ from pentapod.machine.clearance.collision_world import Obstacle, Surroundings
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning.limits.margins import Margins
-from pentapod.planning.placement.search import search
+from pentapod.planning.placement.search import SearchOptions, search
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.weights import NEEDED_MARGIN
@@ -32,29 +32,24 @@ def names(margins):
     return [limit.name for limit in margins.limits]
 
 
-def test_what_does_not_fit_alone_is_answered_without_surroundings(desk, wide, surroundings, monkeypatch):
-    monkeypatch.setattr("pentapod.planning.placement.search.TRIED", 2)
-    problem = PlacementProblem.of(ToolpathSamples.of(wide, 0.2), desk)
-    alone = search(problem, PLUS)
-    monkeypatch.setattr("pentapod.planning.placement.search.HOPELESS", np.inf)
-    found = search(problem, PLUS, surroundings)
+def test_what_does_not_fit_alone_is_answered_without_surroundings(desk, wide, surroundings):
+    problem = PlacementProblem.of(ToolpathSamples.of(wide, 0.2), desk, component=PLUS, surroundings=surroundings)
+    alone = search(problem.alone(), options=SearchOptions(tried=2))
+    found = search(problem, options=SearchOptions(tried=2, hopeless=np.inf))
     assert found.best.smallest == alone.best.smallest < NEEDED_MARGIN
     assert names(found.best.margins) == names(Margins.of(desk, PLUS))
 
 
-def test_what_fits_alone_is_placed_among_its_surroundings(desk, cap, surroundings, monkeypatch):
-    monkeypatch.setattr("pentapod.planning.placement.search.REFINED", 1)
-    problem = PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk)
-    promising = search(problem, PLUS, surroundings)
-    monkeypatch.setattr("pentapod.planning.placement.search.HOPELESS", np.inf)
-    found = search(problem, PLUS, surroundings)
+def test_what_fits_alone_is_placed_among_its_surroundings(desk, cap, surroundings):
+    problem = PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk, component=PLUS, surroundings=surroundings)
+    promising = search(problem, options=SearchOptions(refined=1))
+    found = search(problem, options=SearchOptions(refined=1, hopeless=np.inf))
     assert names(found.best.margins) == names(Margins.of(desk, PLUS, surroundings))
     assert found.best.smallest == promising.best.smallest >= NEEDED_MARGIN
     assert np.array_equal(found.best.transform.matrix, promising.best.transform.matrix)
 
 
-def test_an_interruption_of_the_look_without_surroundings_ends_the_search(desk, cap, surroundings, monkeypatch):
-    monkeypatch.setattr("pentapod.planning.placement.search.HOPELESS", np.inf)
+def test_an_interruption_of_the_look_without_surroundings_ends_the_search(desk, cap, surroundings):
     improved = []
 
     def progress(stage: str, fraction: float, note: str = "") -> None:
@@ -63,5 +58,9 @@ def test_an_interruption_of_the_look_without_surroundings_ends_the_search(desk, 
             signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
-        search(PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk), PLUS, surroundings, progress=progress)
+        search(
+            PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk, component=PLUS, surroundings=surroundings),
+            progress=progress,
+            options=SearchOptions(hopeless=np.inf),
+        )
     assert len(improved) == 1

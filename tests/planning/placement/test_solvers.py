@@ -6,8 +6,6 @@ from domes import dome
 from planning_instances import instances
 
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.component import COMPONENTS
-from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.ipopt import IpoptSolver
 from pentapod.planning.placement.sampling import first_candidate, first_guesses
 from pentapod.planning.placement.search import search
@@ -30,8 +28,8 @@ def problem(desk):
 
 @pytest.fixture(scope="module")
 def start(problem, desk):
-    guess = first_guesses(problem.samples, desk, COMPONENTS, 0, tries=2000)[0]
-    return first_candidate(problem, Margins.of(desk, guess.component), guess.transform)
+    guess = first_guesses(problem, tries=2000)[0]
+    return first_candidate(problem, guess.margins, guess.transform)
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,7 @@ import numpy as np
 import pytest
 from planning_instances import instances
 
-from pentapod.kinematics.component import COMPONENTS
 from pentapod.planning.leg_path.leg_path import leg_path
-from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.planning.placement.placement import Placement
 from pentapod.planning.placement.sampling import first_candidate, first_guesses
@@ -24,8 +22,8 @@ KEPT = 0.9
 
 def candidate_of(instance, desk):
     problem = PlacementProblem.of(ToolpathSamples.of(instance.toolpath, max(instance.tilt, 0.1)), desk)
-    guess = first_guesses(problem.samples, desk, COMPONENTS, 0, tries=2000)[0]
-    return problem, first_candidate(problem, Margins.of(desk, guess.component), guess.transform)
+    guess = first_guesses(problem, tries=2000)[0]
+    return problem, first_candidate(problem, guess.margins, guess.transform)
 
 
 @pytest.fixture(scope="module", params=[0, 6, 11])

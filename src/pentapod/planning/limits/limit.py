@@ -73,8 +73,11 @@ class Scene:
     comforts: Comforts = Comforts()
 
 
-LimitMaker = Callable[[Scene], Iterable[Limit]]
-"""Returns the limits of one kind in a scene: the class method `of` of each file here."""
+@dataclass(frozen=True)
+class LimitKind:
+    """One kind of limit. of: returns its limits in a scene, one for each margin."""
+
+    of: Callable[[Scene], Iterable[Limit]]
 
 
 @dataclass(frozen=True, kw_only=True)

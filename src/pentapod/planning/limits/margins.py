@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ArrayError
+from pentapod.base.registry import Registry
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.arithmetic import NUMPY, Arithmetic, Joints
 from pentapod.kinematics.robot import Branch
@@ -24,23 +26,23 @@ from pentapod.planning.limits.contacts import NUMBERS, contacts
 from pentapod.planning.limits.leg_pairs import LegPairClearance
 from pentapod.planning.limits.leg_spindle import LegSpindleClearance
 from pentapod.planning.limits.leg_tool import LegToolClearance
-from pentapod.planning.limits.limit import Limit, LimitMaker, Scene
+from pentapod.planning.limits.limit import Limit, LimitKind, Scene
 from pentapod.planning.limits.obstacles import ObstacleClearance
 from pentapod.planning.limits.platform_joints import PlatformJointAngle
 from pentapod.planning.limits.singular_surfaces import SurfaceDistance
 from pentapod.planning.limits.strokes import LegStroke
 from pentapod.planning.limits.tool_pose import ToolPose, WorkpieceContacts
 
-LIMITS: tuple[LimitMaker, ...] = (
-    LegStroke.of,
-    SurfaceDistance.of,
-    BaseJointCone.of,
-    PlatformJointAngle.of,
-    LegPairClearance.of,
-    LegSpindleClearance.of,
-    LegToolClearance.of,
-)
-"""The kinds of limits of the machine itself, in the order of the margins; those to obstacles come after them."""
+LIMITS = Registry("limit", "pentapod.limits", LimitKind)
+"""The kinds of limits by name, in the order of the margins; those to obstacles come after them."""
+
+LIMITS.register("strokes", LimitKind(LegStroke.of))
+LIMITS.register("singular surfaces", LimitKind(SurfaceDistance.of))
+LIMITS.register("base joints", LimitKind(BaseJointCone.of))
+LIMITS.register("platform joints", LimitKind(PlatformJointAngle.of))
+LIMITS.register("leg pairs", LimitKind(LegPairClearance.of))
+LIMITS.register("leg and spindle", LimitKind(LegSpindleClearance.of))
+LIMITS.register("leg and tool", LimitKind(LegToolClearance.of))
 
 _BLOCK = 16_384
 """Poses at a time: a hundred intermediate values of each need not be held for a million."""
@@ -55,6 +57,7 @@ class Margins:
     """
 
     scene: Scene
+    kinds: tuple[LimitKind, ...]
     own_limits: tuple[Limit, ...]
     limits: tuple[Limit, ...]
 
@@ -64,12 +67,24 @@ class Margins:
         machine: Machine,
         branch: Branch,
         surroundings: Surroundings = NOTHING,
-        kinds: Sequence[LimitMaker] = LIMITS,
+        kinds: Sequence[LimitKind] | None = None,
     ) -> Margins:
-        """Build the margins of `machine` in a branch. surroundings: what must not be touched."""
+        """Build the margins of `machine` in a branch.
+
+        surroundings: what must not be touched. kinds: of limits; all of `LIMITS` where none are given.
+        """
+        kinds = (*LIMITS.own.values(), *_of_other_packages()) if kinds is None else tuple(kinds)
         scene = Scene(machine, branch, surroundings)
-        own = tuple(limit for kind in kinds for limit in kind(scene))
-        return cls(scene, own, (*own, *ObstacleClearance.of(scene)))
+        own = tuple(limit for kind in kinds for limit in kind.of(scene))
+        return cls(scene, kinds, own, (*own, *ObstacleClearance.of(scene)))
+
+    def on(self, machine: Machine) -> Margins:
+        """Return the same margins of another machine."""
+        return Margins.of(machine, self.component, self.surroundings, self.kinds)
+
+    def alone(self) -> Margins:
+        """Return the same margins without surroundings."""
+        return Margins.of(self.machine, self.component, NOTHING, self.kinds)
 
     @property
     def machine(self) -> Machine:
@@ -143,3 +158,8 @@ class Margins:
         tip, axis = ca.vertsplit(tip), ca.vertsplit(axis)
         pose = ToolPose(self.machine, self.component, tip, axis, Arithmetic.casadi(), joints, touching)
         return ca.vertcat(*(limit.margin(pose) for limit in self.limits))
+
+
+@cache
+def _of_other_packages() -> tuple[LimitKind, ...]:
+    return tuple(LIMITS[name] for name in LIMITS if name not in LIMITS.own)

@@ -9,11 +9,8 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.robot import Branch
-from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.margins import Margins
-from pentapod.planning.problem.constraints import FREE, PlacementConstraints
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
@@ -29,39 +26,31 @@ LARGEST_SLOPE = np.radians(40.0)
 """How far the part's mean axis may lean from the base normal in a first guess."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Guess:
-    """A placement, the component, and the smallest margin over the representatives."""
+    """A placement in the branch of its margins, and the smallest margin over the representatives."""
 
+    margins: Margins
     transform: RigidTransform
-    component: Branch
     margin: float
 
 
-def first_guesses(
-    samples: ToolpathSamples,
-    machine: Machine,
-    components: tuple[Branch, ...],
-    seed: int,
-    tries: int = SAMPLES,
-    constraints: PlacementConstraints = FREE,
-    surroundings: Surroundings = NOTHING,
-) -> list[Guess]:
-    """Return the best few of the allowed placements for each component, best first.
+def first_guesses(problem: PlacementProblem, seed: int = 0, tries: int = SAMPLES) -> list[Guess]:
+    """Return the best few of the allowed placements for each branch, best first.
 
     The same for a seed, on one kind of processor and with one set of libraries.
     Each placement is judged on a dozen representatives with their nominal axes, the best again with a cone of tilts and
     with the surroundings.
     """
+    samples, machine, constraints = problem.samples, problem.machine, problem.constraints
     rng = np.random.default_rng(seed)
     rows = samples.representatives(12)
     centre, mean_axis = samples.pivots.mean(axis=0), samples.nominal.mean(axis=0)
     mean_axis = mean_axis / max(float(np.linalg.norm(mean_axis)), 1e-9)
     guesses: list[Guess] = []
-    for component in components:
-        margins = Margins.of(machine, component, surroundings)
-        simple = samples.tilt == 0.0 and not surroundings.obstacles
-        rotations, places = _rotations(mean_axis, -float(component.w), tries, rng), _places(machine, tries, rng)
+    for margins in problem.margins:
+        simple = samples.tilt == 0.0 and not margins.surroundings.obstacles
+        rotations, places = _rotations(mean_axis, -float(margins.component.w), tries, rng), _places(machine, tries, rng)
         if constraints.is_bounded:
             rotations, origins = constraints.within(rotations, places - rotations @ centre, rng)
             places = origins + rotations @ centre
@@ -78,7 +67,7 @@ def first_guesses(
         score = _score(samples, margins, rotations, translations, rows)
         best = _best(score)
         found = [
-            Guess(t, component, float(score[k] if simple else _smallest(samples, margins, t, rows)))
+            Guess(margins, t, float(score[k] if simple else _smallest(samples, margins, t, rows)))
             for k in best
             for t in (constraints.nearest_to(RigidTransform(_orthonormal(rotations[k]), translations[k])),)
         ]

@@ -11,8 +11,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.progress import Progress, silent
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.robot import Branch
-from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
+from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.ipopt import IpoptSolver
 from pentapod.planning.placement.sampling import first_candidate, first_guesses
@@ -23,17 +22,21 @@ from pentapod.planning.problem.weights import NEEDED_MARGIN
 
 SolverName = Literal["sequential", "ipopt"]
 
-HOPELESS = -0.5
-"""First guesses all below this smallest margin: whether the part fits with nothing around it is looked at first."""
 
-REFINED = 4
-"""How many first guesses are improved in any case."""
+@dataclass(frozen=True)
+class SearchOptions:
+    """How many first guesses are improved.
 
-TRIED = 10
-"""How many are improved at most, while none is good enough."""
+    refined: so many in any case. tried: so many at most, while none is good enough. hopeless: where all guesses are
+    below this margin, whether the part fits without surroundings is found out first. beyond_reach: a best margin, after
+    the first few, below which no other start is expected to lead to a placement that fits.
+    """
 
-BEYOND_REACH = -0.1
-"""A best smallest margin, after the first few, from which no other start is expected to lead to one that fits."""
+    refined: int = 4
+    tried: int = 10
+    hopeless: float = -0.5
+    beyond_reach: float = -0.1
+
 
 Start = tuple[Margins, RigidTransform]
 
@@ -83,31 +86,30 @@ class Search:
 
 def search(
     problem: PlacementProblem,
-    component: Branch | None = None,
-    surroundings: Surroundings = NOTHING,
     *,
     seed: int = 0,
     solver: SolverName = "sequential",
     progress: Progress = silent,
+    options: SearchOptions = SearchOptions(),
 ) -> Search:
-    """Return the best allowed placement that was found, in the component given or in any.
+    """Return the best allowed placement that was found.
 
     KeyboardInterrupt ends the search early; it is raised where nothing that fits was found until then.
     """
     constraints, best, tried, count, interrupted = problem.constraints, None, 0, 1, False
     try:
-        starts, promise = _starts(problem, component, surroundings, seed, progress)
-        if promise < HOPELESS and surroundings is not NOTHING:
+        starts, promise = _starts(problem, seed, progress)
+        if promise < options.hopeless and problem.surroundings is not NOTHING:
             # What does not fit with nothing around does not fit; that is found much sooner.
-            alone = search(problem, component, seed=seed, solver=solver, progress=progress)
+            alone = search(problem.alone(), seed=seed, solver=solver, progress=progress, options=options)
             if alone.best.smallest < NEEDED_MARGIN:
                 return alone
             if alone.interrupted:
                 raise KeyboardInterrupt
-        count = min(len(starts), TRIED) if constraints.moves else len(starts)
+        count = min(len(starts), options.tried) if constraints.moves else len(starts)
         improver = SOLVERS[solver](problem, constraints.moves)
         for margins, transform in starts[:count]:
-            if constraints.moves and tried >= REFINED and best is not None and _is_decided(best):
+            if constraints.moves and tried >= options.refined and best is not None and _is_decided(best, options):
                 break
             found = improver.raise_margin(first_candidate(problem, margins, transform))
             best = found if best is None or found.smallest > best.smallest else best
@@ -124,25 +126,14 @@ def search(
     return Search(best, tried, count, interrupted, constraints)
 
 
-def _is_decided(best: Candidate) -> bool:
-    return best.smallest >= NEEDED_MARGIN or best.smallest < BEYOND_REACH
+def _is_decided(best: Candidate, options: SearchOptions) -> bool:
+    return best.smallest >= NEEDED_MARGIN or best.smallest < options.beyond_reach
 
 
-def _starts(
-    problem: PlacementProblem, component: Branch | None, surroundings: Surroundings, seed: int, progress: Progress
-) -> tuple[list[Start], float]:
+def _starts(problem: PlacementProblem, seed: int, progress: Progress) -> tuple[list[Start], float]:
     """Return where to start, and the smallest margin of the most promising guess (∞ where nothing is guessed)."""
-    components, machine, constraints = (
-        problem.machine.robot.branches if component is None else (component,),
-        problem.machine,
-        problem.constraints,
-    )
-    if not constraints.moves:
-        return [(Margins.of(machine, c, surroundings), pose) for pose in constraints.poses for c in components], np.inf
+    if not problem.constraints.moves:
+        return [(margins, pose) for pose in problem.constraints.poses for margins in problem.margins], np.inf
     progress("placement", 0.0, "sampling")
-    guesses = first_guesses(
-        problem.samples, machine, components, seed, constraints=constraints, surroundings=surroundings
-    )
-    margins = {c: Margins.of(machine, c, surroundings) for c in components}
-    starts = [(margins[guess.component], guess.transform) for guess in guesses]
-    return starts, max(g.margin for g in guesses)
+    guesses = first_guesses(problem, seed)
+    return [(guess.margins, guess.transform) for guess in guesses], max(guess.margin for guess in guesses)

@@ -13,8 +13,11 @@ from functools import cached_property
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.curvature import Curvature
-from pentapod.planning.problem.formulation import Room, placement_room, step_slopes, stepped
+from pentapod.planning.placement.rail_positions import STEP_M, at_rail_positions, with_guides, with_travel
+from pentapod.planning.problem.formulation import Room, StepSlopes, placement_room, step_slopes, stepped
 from pentapod.planning.problem.linear_model import REACH, LinearModel, valleys
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.tool_axis.smoothing import smoothed
@@ -31,10 +34,11 @@ _NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
 
 @dataclass(eq=False)
 class SequentialSolver:
-    """Improves candidates of one problem; free: whether the placement may move."""
+    """Improves candidates of one problem. free, guides: whether the placement and the machine's guides may move."""
 
     problem: PlacementProblem
     free: bool
+    guides: bool = False
 
     def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
         """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one."""
@@ -63,40 +67,59 @@ class SequentialSolver:
         problem, reach, extra = self.problem, 0.5, _NO_ROWS
         smallest = float(problem.values(start.margins, start.transform, start.coefficients, rows).min())
         best = Candidate(start.margins, start.transform, start.coefficients, smallest)
-        model, curvature = self.model(best, rows, best.smallest), Curvature(problem, start.margins)
+        slopes = step_slopes(problem, start.margins, guides=self.guides)
+        curvature = Curvature(problem, start.margins, self.guides)
+        model = self.model(best, rows, best.smallest, slopes=slopes)
         for _ in range(_STEPS):
             if best.smallest >= enough:
                 break
             step, change, promise = curvature.best_step(model, best, reach)
             if promise < _LEAST:
                 break
-            transform = problem.constraints.nearest_to(stepped(best.transform, step)) if self.free else best.transform
-            coefficients = problem.within_cone(best.coefficients + change)
-            values = problem.values(best.margins, transform, coefficients, rows)
-            gain = float(values.min()) - best.smallest
+            coefficients, values, gain = problem.within_cone(best.coefficients + change), np.zeros((0, 1)), -np.inf
+            moved = self._moved(best, step)
+            if moved is not None:
+                values = problem.values(*moved, coefficients, rows)
+                gain = float(values.min()) - best.smallest
             reach *= 2.0 if gain > 0.6 * promise else 1.0 if gain > 0.25 * promise else 0.4
-            if gain > 0.05 * promise:
-                best = Candidate(best.margins, transform, coefficients, float(values.min()))
+            if moved is not None and gain > 0.05 * promise:
+                best = Candidate(*moved, coefficients, float(values.min()))
             elif reach < _LEAST:
                 break
-            else:  # what came out worst may not have been in the model
+            elif moved is not None:  # what came out worst may not have been in the model
                 steepness = problem.steepness(best.coefficients + change, rows)
                 extra = np.union1d(extra, np.union1d(valleys(values), valleys(-steepness[:, None])))
-            model = self.model(best, rows, best.smallest, extra)
+            model = self.model(best, rows, best.smallest, extra, slopes)
         return best
 
-    def model(self, at: Candidate, rows: Ints, level: float, extra: Ints = _NO_ROWS) -> LinearModel:
+    def _moved(self, at: Candidate, step: Floats) -> tuple[Margins, RigidTransform] | None:
+        """Return margins and placement after a step; None where the guides cannot stand there, or get there."""
+        transform, margins = at.transform, at.margins
+        if self.free:
+            transform = self.problem.constraints.nearest_to(stepped(transform, step[:6]))
+        if self.guides:
+            there = at_rail_positions(margins, margins.machine.slides + step[6:])
+            return None if there is None else (there, transform)
+        return margins, transform
+
+    def model(
+        self, at: Candidate, rows: Ints, level: float, extra: Ints = _NO_ROWS, slopes: StepSlopes | None = None
+    ) -> LinearModel:
         """Return the linear model around a candidate of what comes near a margin of `level` among `rows`.
 
-        extra: indices into rows that enter in any case.
+        extra: indices into rows that enter in any case. slopes: of the margins; those of the candidate by default.
         """
-        slopes = step_slopes(self.problem, at.margins)
-        return LinearModel.of(self.problem, at, rows, level, extra, slopes, self._room(at.transform), self._moves)
+        slopes = step_slopes(self.problem, at.margins) if slopes is None else slopes
+        room = self._room(at.transform)
+        if self.guides:
+            room = with_travel(at.margins.machine, room)
+        return LinearModel.of(self.problem, at, rows, level, extra, slopes, room, self._moves)
 
     @property
     def _moves(self) -> Floats:
         moves = REACH[:, None] * self.problem.constraints.motion
-        return moves if self.free else moves[:, :0]
+        moves = moves if self.free else moves[:, :0]
+        return with_guides(moves, STEP_M * np.eye(len(self.problem.machine.slides))) if self.guides else moves
 
     @cached_property
     def _room(self) -> Room:

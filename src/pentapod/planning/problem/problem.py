@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.robot import Branch
+from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
 from pentapod.machine.machine import Machine
+from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.problem.constraints import FREE, PlacementConstraints
 from pentapod.planning.problem.samples import ToolpathSamples
@@ -23,7 +27,7 @@ _CELLS = 2
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A placement in a component (the margins') with a tilt field's coefficients, and its smallest margin, weighed."""
+    """A placement in the branch of its margins, with a tilt field's coefficients, and its smallest margin, weighed."""
 
     margins: Margins
     transform: RigidTransform
@@ -33,13 +37,15 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class PlacementProblem:
-    """Everything about one planning samples that does not change while solvers work on it.
+    """Where to clamp a part and how to tilt the tool: the smallest weighed margin is to become largest.
 
-    basis (N, size): the tilt field's spline basis at the waypoints; without a tilt cone it has size 0.
+    margins: one for each branch to choose from. basis (N, size): the tilt field's spline basis at the waypoints;
+    without a tilt cone it has size 0.
     """
 
     samples: ToolpathSamples
     machine: Machine
+    margins: tuple[Margins, ...]
     domain: FieldDomain
     basis: Floats
     constraints: PlacementConstraints
@@ -52,11 +58,37 @@ class PlacementProblem:
         machine: Machine,
         constraints: PlacementConstraints = FREE,
         weights: Weights = EVEN,
+        *,
+        component: Branch | None = None,
+        surroundings: Surroundings = NOTHING,
+        limits: Sequence[LimitKind] | None = None,
     ) -> PlacementProblem:
-        """Return the problem of a samples on a machine, with the allowed placements and the weights of the margins."""
-        domain = FieldDomain.around(samples.pivots, samples.nominal, _CELLS)
-        basis = domain.basis(samples.pivots) if samples.tilt > 0.0 else np.zeros((len(samples.pivots), 0))
-        return cls(samples, machine, domain, basis, constraints, weights)
+        """Return the problem of samples on a machine, with the allowed placements and the weights of the margins.
+
+        component: the branch to work in, any where none is given. surroundings: what must not be touched. limits: the
+        kinds of limits, all where none are given.
+        """
+        branches = machine.robot.branches if component is None else (component,)
+        margins = tuple(Margins.of(machine, branch, surroundings, limits) for branch in branches)
+        return cls(samples, machine, margins, *_field(samples), constraints, weights)
+
+    def along(self, samples: ToolpathSamples) -> PlacementProblem:
+        """Return the same problem for another path or tilt cone."""
+        domain, basis = _field(samples)
+        return replace(self, samples=samples, domain=domain, basis=basis)
+
+    def on(self, machine: Machine) -> PlacementProblem:
+        """Return the same problem on another machine."""
+        return replace(self, machine=machine, margins=tuple(margins.on(machine) for margins in self.margins))
+
+    def alone(self) -> PlacementProblem:
+        """Return the same problem without surroundings."""
+        return replace(self, margins=tuple(margins.alone() for margins in self.margins))
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """What must not be touched."""
+        return self.margins[0].surroundings
 
     @property
     def cone(self) -> float:
@@ -95,7 +127,7 @@ class PlacementProblem:
     def contacts(self, margins: Margins, transform: RigidTransform, leans: Floats, rows: Ints) -> Floats:
         """Return the contacts (n, margins.contact_numbers) for leans (n, 3), workpiece frame, at waypoints `rows`.
 
-        What of a lean lies along the nominal axis does not count.
+        Only the components of the leans across the nominal axes are used.
         """
         nominal = self.samples.nominal[rows]
         across = leans - (leans * nominal).sum(axis=1, keepdims=True) * nominal
@@ -113,3 +145,9 @@ class PlacementProblem:
         """Return the candidate with its smallest margin over all waypoints."""
         smallest = float(self.values(margins, transform, coefficients).min())
         return Candidate(margins, transform, coefficients, smallest)
+
+
+def _field(samples: ToolpathSamples) -> tuple[FieldDomain, Floats]:
+    """Return the domain of the tilt field of a path, and its basis (N, size) at the waypoints."""
+    domain = FieldDomain.around(samples.pivots, samples.nominal, _CELLS)
+    return domain, domain.basis(samples.pivots) if samples.tilt > 0.0 else np.zeros((len(samples.pivots), 0))

@@ -1,0 +1,64 @@
+"""Rail positions: where the guides of a reconfigurable machine may stand, as unknowns of a placement problem."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import MachineError
+from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
+from pentapod.kinematics.robot import Robot
+from pentapod.machine.machine import Machine
+from pentapod.planning.limits.margins import Margins
+
+DIGITS = 6
+"""Rail positions are rounded to micrometres, so that people can read them and files hold them."""
+STEP_M = 0.1
+"""The unit of a step of a guide, metres."""
+
+
+def guides_of(machine: Machine) -> ReconfigurablePentapod:
+    """Return the guides of a machine. Raises MachineError: it has none, or its geometry is not of their family."""
+    if machine.guides is None or not _is_quadratic(machine.robot):
+        raise MachineError(
+            "only the base joints of a pentapod of the quadratic family are set on guides",
+            key="guides",
+            value=type(machine.robot).__name__,
+            expected="offsets proportional to the base coordinates x",
+            remedy="leave out [guides], and plan for the base as it stands",
+        )
+    return machine.guides
+
+
+def at_rail_positions(margins: Margins, positions: Floats) -> Margins | None:
+    """Return the margins of the same machine with its guides at positions (n,), rounded and within their travel.
+
+    None where it is architecturally singular there or on the way there.
+    """
+    guides = guides_of(margins.machine)
+    positions = np.clip(np.round(positions, DIGITS), *guides.travel.T)
+    if not guides.stays_regular(np.zeros(len(positions)), positions):
+        return None
+    try:
+        return margins.on(margins.machine.at(positions))
+    except MachineError:
+        return None
+
+
+def with_travel(machine: Machine, room: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Return the room (L,) of a placement and its derivatives (L, 6), with the room of the guides' travel added."""
+    positions, (least, greatest) = machine.slides, guides_of(machine).travel.T
+    each = np.eye(len(positions))
+    left = np.concatenate([room[0], positions - least, greatest - positions])
+    return left, with_guides(room[1], np.vstack([each, -each]))
+
+
+def with_guides(by_step: Floats, by_guides: Floats) -> Floats:
+    """Return the block diagonal matrix of what depends on the placement and what depends on the guides."""
+    return np.asarray(block_diag(by_step, by_guides), dtype=np.float64)
+
+
+def _is_quadratic(robot: Robot) -> bool:
+    return isinstance(robot, LinearPentapod)
