@@ -8,16 +8,16 @@ apart, for APT has no word for it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from pentapod.base.errors import ToolpathError, nearest
-from pentapod.toolpath.formats.moves import Moves, plain, poses, stands
+from pentapod.base.errors import nearest
+from pentapod.toolpath.formats.moves import plain, poses, stands
 from pentapod.toolpath.formats.reading import number, read_lines, seconds
 from pentapod.toolpath.formats.registry import Defaults, Format, register
-from pentapod.toolpath.formats.remarks import Remarks, kind_remark, pivot_remark
+from pentapod.toolpath.formats.remarks import StatementReader, kind_remark, pivot_remark
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 _MM = {"MM": 1.0, "INCHES": 25.4, "INCH": 25.4}
@@ -41,22 +41,12 @@ _WORDS = ("UNITS", "MULTAX", "FEDRAT", "RAPID", "GOTO", "FROM", "CUTTER", "DELAY
 
 
 @dataclass
-class _Reader:
-    file: Path
-    defaults: Defaults
-    moves: Moves = field(init=False)
-    remarks: Remarks = field(init=False)
+class _Reader(StatementReader):
     unit: float | None = None
     five_axis: bool = False
     feed: float | None = None
     rapid: bool = False
-    finished: int | None = None
-
-    def __post_init__(self) -> None:
-        self.moves, self.remarks = Moves(self.file), Remarks(self.file)
-
-    def wrong(self, what: str, line: int, word: str, **details: object) -> ToolpathError:
-        return ToolpathError(what, file=self.file, line=line, key=word, **details)  # type: ignore[arg-type]
+    ended: int | None = None
 
     def toolpath(self) -> Toolpath:
         line, pending, lines = 0, "", read_lines(self.file)
@@ -72,14 +62,14 @@ class _Reader:
                 self._statement(statement, line)
         if pending:
             raise self.wrong("the file ends within a statement", line, pending.split("/")[0].strip())
-        if self.finished is None:
+        if self.ended is None:
             raise self.wrong("FINI is missing: the file was cut off", line, "FINI", expected="FINI as the last word")
-        return self.moves.toolpath(self.defaults.pivot if self.remarks.pivot is None else self.remarks.pivot)
+        return self.gathered()
 
     def _statement(self, text: str, line: int) -> None:
         head, _, tail = text.partition("/")
         word = head.strip().upper()
-        if self.finished is not None:
+        if self.ended is not None:
             raise self.wrong("a word after FINI", line, word)
         if word in _SILENT or word.startswith(_NAMED):
             return
@@ -161,7 +151,7 @@ class _Reader:
     def _fini(self, words: list[str], line: int) -> None:
         if words:
             raise self.wrong("FINI takes no value", line, "FINI", value=",".join(words)[:40])
-        self.finished = line
+        self.ended = line
 
 
 def _read(file: Path, defaults: Defaults) -> Toolpath:

@@ -19,11 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.base.errors import ToolpathError
-from pentapod.toolpath.formats.moves import Moves, plain, poses, stands
+from pentapod.toolpath.formats.moves import plain, poses, stands
 from pentapod.toolpath.formats.reading import read_lines
 from pentapod.toolpath.formats.registry import Defaults, Format, register
-from pentapod.toolpath.formats.remarks import Remarks, kind_remark, pivot_remark
+from pentapod.toolpath.formats.remarks import StatementReader, kind_remark, pivot_remark
 from pentapod.toolpath.formats.rotary import AB, BC, Rotary
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
@@ -38,15 +37,11 @@ _LINEAR = ("X", "Y", "Z")
 
 
 @dataclass
-class _Reader:
+class _Reader(StatementReader):
     """Modal state, and the moves so far. Positions are in millimetres and degrees."""
 
-    file: Path
-    defaults: Defaults
     rotary: Rotary
     needs_tcp: bool
-    moves: Moves = field(init=False)
-    remarks: Remarks = field(init=False)
     scale: float | None = None
     absolute: bool = True
     inverse: bool = False
@@ -56,12 +51,6 @@ class _Reader:
     stopping: bool = False
     place: dict[str, float] = field(default_factory=dict[str, float])
     ended: int | None = None
-
-    def __post_init__(self) -> None:
-        self.moves, self.remarks = Moves(self.file), Remarks(self.file)
-
-    def wrong(self, what: str, line: int, word: str, **details: object) -> ToolpathError:
-        return ToolpathError(what, file=self.file, line=line, key=word, **details)  # type: ignore[arg-type]
 
     def toolpath(self) -> Toolpath:
         lines = read_lines(self.file)
@@ -81,7 +70,7 @@ class _Reader:
             self._block(block, line)
         if self.ended is None:
             raise self.wrong("M2 or M30 is missing: the file was cut off", len(lines), "M", expected="M2 or M30")
-        return self.moves.toolpath(self.defaults.pivot if self.remarks.pivot is None else self.remarks.pivot)
+        return self.gathered()
 
     def _words(self, block: str, line: int) -> list[tuple[str, float]]:
         words, position = [], 0

@@ -11,7 +11,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError, nearest
-from pentapod.base.files import number_in
+from pentapod.toolpath.formats.reading import number
 from pentapod.toolpath.inputs.files import small_file
 
 _TOLD = re.compile(r"#\s*points\s*=\s*([0-9]{1,12})")
@@ -41,7 +41,7 @@ def read_points(path: str | Path) -> list[Floats]:
     columns: dict[str, tuple[int, float]] | None = None
     lines: list[list[list[float]]] = [[]]
     name, told = "", None
-    for number, row in _rows(path, text):
+    for line, row in _rows(path, text):
         if row and row[0].lstrip().startswith("#"):
             told = _TOLD.fullmatch(row[0].strip()) or told
             continue
@@ -49,15 +49,15 @@ def read_points(path: str | Path) -> list[Floats]:
             lines.append([])
             continue
         if columns is None:
-            columns = _columns(path, number, row)
+            columns = _columns(path, line, row)
             continue
         if len(row) != len(columns):
             what = "the row has another number of columns than the first"
-            raise ToolpathError(what, file=path, line=number, value=len(row), expected=str(len(columns)))
+            raise ToolpathError(what, file=path, line=line, value=len(row), expected=str(len(columns)))
         if "line" in columns and row[columns["line"][0]].strip() != name:
             name = row[columns["line"][0]].strip()
             lines.append([])
-        lines[-1].append([_number(path, number, axis, row[columns[axis][0]]) * columns[axis][1] for axis in "xyz"])
+        lines[-1].append([number(row[columns[axis][0]], path, line, axis) * columns[axis][1] for axis in "xyz"])
     count = sum(map(len, lines))
     if told is not None and int(told[1]) != count:
         what = "the number of rows is not that of the remark: the file was cut off or rows were added"
@@ -85,13 +85,6 @@ def _columns(path: Path, number: int, row: list[str]) -> dict[str, tuple[int, fl
         names = ", ".join(f"{axis}_mm" for axis in missing)
         raise ToolpathError("a column is missing", file=path, line=number, expected=names)
     return columns
-
-
-def _number(path: Path, line: int, key: str, cell: str) -> float:
-    value = number_in(cell)
-    if value is None:
-        raise ToolpathError("not a finite number", file=path, line=line, key=key, value=cell.strip()[:40])
-    return value
 
 
 def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
