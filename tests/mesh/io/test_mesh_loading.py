@@ -9,6 +9,7 @@ import toolpath_surfaces as surfaces
 from pentapod.base.errors import InputError, MeshError
 from pentapod.mesh.io.obj import read_obj
 from pentapod.toolpath import UNITS, Mesh, load_mesh, write_stl
+from plugins import install
 
 
 @pytest.fixture
@@ -333,3 +334,24 @@ def test_meshes_go_to_trimesh_and_back():
     np.testing.assert_array_equal(back.faces, mesh.faces)
     with pytest.raises(MeshError, match="metres"):
         Mesh.from_trimesh(shape, 0.0)
+
+
+RAW = """
+import numpy as np
+from pentapod.mesh import MeshFormat
+
+def read(path, data, loose):
+    corners = np.frombuffer(data).reshape(-1, 3)
+    return corners, np.arange(len(corners)).reshape(-1, 3), ()
+
+FORMAT = MeshFormat(read)
+"""
+
+
+def test_a_format_of_another_package_is_read_by_its_suffix(tmp_path, monkeypatch):
+    file = tmp_path / "part.raw"
+    file.write_bytes(np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]]).tobytes())
+    with pytest.raises(MeshError, match=r"not a mesh format that is read.*\.obj, \.ply, \.stl"):
+        load_mesh(file, "mm")
+    install(tmp_path / "site", monkeypatch, {"pentapod.mesh_formats": {"raw": "raw_meshes:FORMAT"}}, raw_meshes=RAW)
+    assert load_mesh(file, "mm").facet_areas.sum() == pytest.approx(40.5e-6)

@@ -10,15 +10,11 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import MeshError, nearest
 from pentapod.base.files import read_bytes
 from pentapod.base.progress import Progress, silent
-from pentapod.mesh.io.obj import read_obj
-from pentapod.mesh.io.ply import read_ply
-from pentapod.mesh.io.stl import check_stl_size, read_stl
+from pentapod.mesh.io.registry import KNOWN, MESH_FORMATS
 from pentapod.mesh.mesh import CREASE_ANGLE, Mesh
 
 UNITS: dict[str, float] = {"mm": 1e-3, "cm": 1e-2, "inch": 25.4e-3, "m": 1.0}
 """Metres in each unit that a mesh file's numbers may have."""
-
-FORMATS = (".obj", ".ply", ".stl")
 
 _HEAD = 4096
 _DOUBTFUL_M = (2e-3, 2.0)
@@ -40,7 +36,7 @@ def load_mesh(
     crease_angle: float = CREASE_ANGLE,
     progress: Progress = silent,
 ) -> Mesh:
-    """Return the mesh of an STL, PLY or OBJ file, in metres; the suffix names the format.
+    """Return the mesh of an STL, PLY or OBJ file, or of a further format, in metres; the suffix names the format.
 
     unit: of the file's numbers, one of `UNITS`; compulsory, as no format says it. scale: factor after the
     unit. repair: also wind facets alike (see `Mesh.of`), and leave useless facets out however many they are: without
@@ -86,22 +82,17 @@ def _check_dropped(path: Path, mesh: Mesh, held: int) -> None:
 
 def _read(path: Path, *, repair: bool) -> tuple[Floats, Ints, tuple[str, ...]]:
     """Return vertices (V, 3) in the file's numbers, facets (F, 3) and notes."""
-    suffix = path.suffix.lower()
+    suffix = path.suffix.lower().removeprefix(".")
     head, size = _head(path)
-    if suffix not in FORMATS:
-        raise MeshError("not a mesh format that is read", file=path, value=suffix, expected=", ".join(FORMATS))
-    _check_head(path, suffix, head, size)
-    data = read_bytes(path, MeshError, "a mesh: " + ", ".join(FORMATS))
+    if suffix not in MESH_FORMATS:
+        known = ", ".join(f".{name}" for name in MESH_FORMATS)
+        raise MeshError("not a mesh format that is read", file=path, value=path.suffix.lower(), expected=known)
+    form = MESH_FORMATS.find(suffix)
+    form.check(path, head, size)
+    data = read_bytes(path, MeshError, f"a mesh: {KNOWN}")
     if not data.strip():
         raise MeshError("the file is empty", file=path)
-    notes: tuple[str, ...] = ()
-    if suffix == ".stl":
-        triangles = read_stl(path, data)
-        vertices, faces = triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
-    elif suffix == ".obj":
-        vertices, faces, notes = read_obj(path, data, loose=repair)
-    else:
-        vertices, faces = read_ply(path, data)
+    vertices, faces, notes = form.read(path, data, repair)
     if not len(faces):
         raise MeshError("the mesh has no facets", file=path, expected="a surface made of triangles")
     return vertices, faces, notes
@@ -114,7 +105,7 @@ def _head(path: Path) -> tuple[bytes, int]:
             head = stream.read(_HEAD)
         size = path.stat().st_size
     except FileNotFoundError as error:
-        raise MeshError("no such file", file=path, expected="a mesh: " + ", ".join(FORMATS)) from error
+        raise MeshError("no such file", file=path, expected=f"a mesh: {KNOWN}") from error
     except IsADirectoryError as error:
         raise MeshError("a directory, not a mesh file", file=path) from error
     except OSError as error:
@@ -122,18 +113,6 @@ def _head(path: Path) -> tuple[bytes, int]:
     if not head:
         raise MeshError("the file is empty", file=path)
     return head, size
-
-
-def _check_head(path: Path, suffix: str, head: bytes, size: int) -> None:
-    """Raise MeshError where the first bytes and the size say that this is no such file, before all of it is read."""
-    if suffix == ".stl":
-        check_stl_size(path, head, size)
-    elif suffix == ".ply" and not head.startswith(b"ply"):
-        raise MeshError('cannot be read as PLY: it does not begin with "ply"', file=path, line=1)
-    elif suffix == ".obj" and b"\0" in head:
-        wide = head.startswith((b"\xff\xfe", b"\xfe\xff"))
-        what = "not UTF-8 text but UTF-16" if wide else "it holds zero bytes"
-        raise MeshError(f"cannot be read as OBJ: {what}", file=path, line=1, remedy="save it as UTF-8")
 
 
 def _unit_missing(path: Path, vertices: Floats) -> MeshError:

@@ -16,6 +16,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import MeshError
+from pentapod.mesh.io.registry import MeshFormat
 from pentapod.mesh.io.text import AGAIN, NUMBER, check_last_line, fans, line_of
 
 _CORNER = rb"[-+]?\d++(?:/[-+]?\d*+){0,2}"
@@ -40,7 +41,7 @@ _REST_OF_CORNER = re.compile(rb"/\S*")
 _COMMENT_OR_GOES_ON = re.compile(rb"(#[^\n]*)|\\\r?\n")
 
 
-def read_obj(path: Path, data: bytes, *, loose: bool = False) -> tuple[Floats, Ints, tuple[str, ...]]:
+def read_obj(path: Path, data: bytes, loose: bool = False) -> tuple[Floats, Ints, tuple[str, ...]]:
     """Return vertices (V, 3) in the file's own numbers, facets (F, 3), and notes. Raises MeshError naming the line.
 
     loose: whether more than 1 % of the vertices may belong to no facet. A file that was cut off looks like that.
@@ -143,3 +144,13 @@ def _unused(path: Path, text: bytes, vertices: Floats, faces: Ints, *, loose: bo
         remedy = "export the mesh again; where it is whole, repair = true takes it as it is"
         raise MeshError(what, file=path, remedy=remedy)
     return (what,) if left else ()
+
+
+def _check(path: Path, head: bytes, _size: int) -> None:
+    if b"\0" in head:
+        wide = head.startswith((b"\xff\xfe", b"\xfe\xff"))
+        what = "not UTF-8 text but UTF-16" if wide else "it holds zero bytes"
+        raise MeshError(f"cannot be read as OBJ: {what}", file=path, line=1, remedy="save it as UTF-8")
+
+
+FORMAT = MeshFormat(read_obj, _check)

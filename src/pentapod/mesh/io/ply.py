@@ -8,7 +8,7 @@ count; polygons are cut into fans. Other elements and numbers are passed over.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -18,42 +18,16 @@ from numpy.typing import NDArray
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import MeshError
+from pentapod.mesh.io.ply_header import Element, split_header, truncated
+from pentapod.mesh.io.registry import MeshFormat
 from pentapod.mesh.io.text import AGAIN, NUMBER, check_last_line, fans, line_of
 
-_HEADER_END = re.compile(rb"^[ \t]*+end_header[ \t]*+\r?\n", re.MULTILINE)
-_HEADER_LINE = re.compile(
-    rb"ply|format (?:ascii|binary_little_endian|binary_big_endian) 1\.0|(?:comment|obj_info)\b.*|element \w+ \d{1,18}"
-    rb"|property (?:list \w+ )?\w+ \w+|end_header"
-)
 _STRANGE = re.compile(
     rb"^(?![ \t]*+(?:" + NUMBER + rb"(?:[ \t]++" + NUMBER + rb")*+)?[ \t\r]*+$)(.*)$", re.MULTILINE
 )  # fmt: skip
-_TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
-    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
-    "double": "f8", "float64": "f8",
-}  # fmt: skip
 _CORNERS = ("vertex_indices", "vertex_index")
-_LONGEST_HEADER = 1_000_000
 _MOST_DIFFERING = 5_000_000
 """Polygons of different sizes in a binary file are read one by one."""
-
-
-@dataclass(frozen=True)
-class _Property:
-    """A number of an element, or where `count` is given a list of them; types as NumPy names them."""
-
-    name: str
-    type: str
-    count: str | None
-
-
-@dataclass(frozen=True)
-class _Element:
-    name: str
-    rows: int
-    line: int
-    properties: list[_Property] = field(default_factory=list[_Property])
 
 
 @dataclass(frozen=True)
@@ -64,71 +38,20 @@ class _Columns:
     lists: dict[str, tuple[NDArray[Any], Ints]]
 
 
-def read_ply(path: Path, data: bytes) -> tuple[Floats, Ints]:
-    """Return vertices (V, 3) in the file's own numbers and facets (F, 3). Raises MeshError, with the line in text."""
-    end = _HEADER_END.search(data, 0, _LONGEST_HEADER)
-    header = data[: end.end()] if end else data[:_LONGEST_HEADER]
-    order, elements = _header(path, header)
-    if end is None:
-        raise MeshError(
-            'cannot be read as PLY: "end_header" is missing', file=path, line=line_of(header, len(header)), remedy=AGAIN
-        )
-    found = _text(path, data, end.end(), elements) if order is None else _binary(path, data, end.end(), elements, order)
+def read_ply(path: Path, data: bytes, _loose: bool = False) -> tuple[Floats, Ints, tuple[str, ...]]:
+    """Return vertices (V, 3) in the file's own numbers, facets (F, 3), and no notes. Raises MeshError."""
+    order, elements, start = split_header(path, data)
+    found = _text(path, data, start, elements) if order is None else _binary(path, data, start, elements, order)
     corners, counts = _corners(path, found["face"])
     vertices = _vertices(path, found["vertex"])
     few = np.flatnonzero(counts < 3)
     if len(few):
         what = f"facet {int(few[0])} has fewer than three corners"
         raise MeshError(what, file=path, key="face", value=int(counts[few[0]]), remedy=AGAIN)
-    return vertices, fans(corners, counts)
+    return vertices, fans(corners, counts), ()
 
 
-def _header(path: Path, header: bytes) -> tuple[str | None, list[_Element]]:
-    """Return the order of bytes, None for text, and the elements. Raises MeshError for the first line that is none."""
-    order: str | None = "?"
-    elements: list[_Element] = []
-    for number, raw in enumerate(header.splitlines(), start=1):
-        line = b" ".join(raw.split())
-        words = line.decode("ascii", "replace").split()
-
-        def wrong(what: str, line: int = number, value: str = raw.decode("utf-8", "replace").strip()[:40]) -> MeshError:
-            return MeshError(f"cannot be read as PLY: {what}", file=path, line=line, value=value, remedy=AGAIN)
-
-        if line and not _HEADER_LINE.fullmatch(line):
-            raise wrong("not a line of a header")
-        if words[:1] == ["format"]:
-            order = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}[words[1]]
-        elif words[:1] == ["element"]:
-            if words[1] in {element.name for element in elements}:
-                raise wrong("the element is there twice")
-            elements.append(_Element(words[1], int(words[2]), number))
-        elif words[:1] == ["property"]:
-            types = words[2:4] if len(words) > 3 else words[1:2]
-            if not elements or any(word not in _TYPES for word in types):
-                raise wrong("not a type of numbers" if elements else "a property of no element")
-            if words[-1] in {known.name for known in elements[-1].properties}:
-                raise wrong("the property is there twice")
-            count = _TYPES[types[0]] if len(types) == 2 else None
-            if count is not None and count.startswith("f"):
-                raise wrong("a list's count is a whole number")
-            elements[-1].properties.append(_Property(words[-1], _TYPES[types[-1]], count))
-    if order == "?" and b"end_header" in header:
-        raise MeshError("cannot be read as PLY: the header has no format", file=path, line=1, remedy=AGAIN)
-    names = [element.name for element in elements]
-    for name in ("vertex", "face"):
-        if b"end_header" in header and name not in names:
-            what = f"the file announces no {'facets' if name == 'face' else 'vertices'}"
-            raise MeshError(what, file=path, expected=f'"element {name}" in its header')
-    return order, elements
-
-
-def _truncated(path: Path, element: _Element, held: int) -> MeshError:
-    name = {"face": "facets", "vertex": "vertices"}.get(element.name, f'elements "{element.name[:40]}"')
-    what = f"truncated: the header announces {element.rows:,} {name}, the file holds {held:,}"
-    return MeshError(what, file=path, remedy="export the mesh again")
-
-
-def _text(path: Path, data: bytes, start: int, elements: list[_Element]) -> dict[str, _Columns]:
+def _text(path: Path, data: bytes, start: int, elements: list[Element]) -> dict[str, _Columns]:
     """Return the elements of a file in text."""
     if strange := _STRANGE.search(data, start):
         value = strange[1].decode("utf-8", "replace").strip()[:40]
@@ -143,7 +66,7 @@ def _text(path: Path, data: bytes, start: int, elements: list[_Element]) -> dict
         rows = kept[at : at + element.rows]
         at += len(rows)
         if len(rows) < element.rows:
-            raise _truncated(path, element, len(rows))
+            raise truncated(path, element, len(rows))
         words = [lines[k].split() for k in rows]
         width = np.fromiter(map(len, words), np.intp, len(words))
         values = np.fromiter(map(float, chain.from_iterable(words)), np.float64, int(width.sum()))
@@ -161,7 +84,7 @@ def _text(path: Path, data: bytes, start: int, elements: list[_Element]) -> dict
     return found
 
 
-def _split(values: Floats, width: Ints, element: _Element) -> tuple[_Columns, Ints]:
+def _split(values: Floats, width: Ints, element: Element) -> tuple[_Columns, Ints]:
     """Return the columns of rows that follow each other, and how many numbers of each they use; −1: wrong."""
     start = np.cumsum(width) - width
     used = np.zeros_like(width)
@@ -188,14 +111,14 @@ def _spread(starts: Ints, counts: Ints, step: int = 1) -> Ints:
     return np.repeat(starts, counts) + step * inner
 
 
-def _binary(path: Path, data: bytes, start: int, elements: list[_Element], order: str) -> dict[str, _Columns]:
+def _binary(path: Path, data: bytes, start: int, elements: list[Element], order: str) -> dict[str, _Columns]:
     """Return the elements of a binary file."""
     found: dict[str, _Columns] = {}
     at = start
     for element in elements:
         columns, end = _alike(data, at, element, order) or _differing(path, data, at, element, order)
         if end > len(data):
-            raise _truncated(path, element, min(element.rows - 1, (len(data) - at) * element.rows // (end - at)))
+            raise truncated(path, element, min(element.rows - 1, (len(data) - at) * element.rows // (end - at)))
         found[element.name], at = columns, end
     if data[at:] not in (b"", b"\n", b"\r\n"):
         what = f"{len(data) - at:,} bytes stand after the last element that the header announces"
@@ -203,7 +126,7 @@ def _binary(path: Path, data: bytes, start: int, elements: list[_Element], order
     return found
 
 
-def _alike(data: bytes, at: int, element: _Element, order: str) -> tuple[_Columns, int] | None:
+def _alike(data: bytes, at: int, element: Element, order: str) -> tuple[_Columns, int] | None:
     """Return the columns of rows whose lists are all as long as those of the first, and where they end; else None.
 
     The columns are empty where the end lies beyond that of the file.
@@ -242,7 +165,7 @@ def _alike(data: bytes, at: int, element: _Element, order: str) -> tuple[_Column
     return columns, end
 
 
-def _differing(path: Path, data: bytes, at: int, element: _Element, order: str) -> tuple[_Columns, int]:
+def _differing(path: Path, data: bytes, at: int, element: Element, order: str) -> tuple[_Columns, int]:
     """Return the columns of rows whose lists have different lengths, and where they end."""
     if element.rows > _MOST_DIFFERING:
         what = f'elements "{element.name[:40]}" of different sizes are too many, or the file was cut off'
@@ -262,7 +185,7 @@ def _differing(path: Path, data: bytes, at: int, element: _Element, order: str) 
                 length = int.from_bytes(data[at : at + size_of_count], names[order], signed=signed)  # type: ignore[arg-type]
                 at += size_of_count
             if length < 0 or at + length * size > len(data):
-                raise _truncated(path, element, row)
+                raise truncated(path, element, row)
             places[k].append(at)
             counts[k].append(length)
             at += length * size
@@ -302,3 +225,11 @@ def _corners(path: Path, found: _Columns) -> tuple[Ints, Ints]:
                 value=float(corners[np.argmin(whole)]), remedy=AGAIN,
             )  # fmt: skip
     return corners.astype(np.intp), counts
+
+
+def _check(path: Path, head: bytes, _size: int) -> None:
+    if not head.startswith(b"ply"):
+        raise MeshError('cannot be read as PLY: it does not begin with "ply"', file=path, line=1)
+
+
+FORMAT = MeshFormat(read_ply, _check)

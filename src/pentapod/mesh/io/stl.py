@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import MeshError
+from pentapod.mesh.io.registry import MeshFormat
 from pentapod.mesh.io.text import AGAIN, NUMBER, line_of
 
 _HEADER = 84
@@ -51,7 +52,7 @@ def read_stl(path: Path, data: bytes) -> Floats:
     raise MeshError(f"{extra:,} bytes stand after the last of {announced:,} facets", file=path, remedy=AGAIN)
 
 
-def check_stl_size(path: Path, head: bytes, size: int) -> None:
+def _check_size(path: Path, head: bytes, size: int) -> None:
     """Raise MeshError where the head announces another size than the file has, and it is not text either."""
     if len(head) < _HEADER or _is_text(head) or not head.strip():
         return
@@ -65,6 +66,11 @@ def check_stl_size(path: Path, head: bytes, size: int) -> None:
         raise MeshError(
             f"the header announces {announced:,} facets, the file has room for {held:,}", file=path, remedy=AGAIN
         )
+
+
+def _indexed(path: Path, data: bytes, _loose: bool) -> tuple[Floats, Ints, tuple[str, ...]]:
+    triangles = read_stl(path, data)
+    return triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), ()
 
 
 def write_stl(triangles: Floats, name: str) -> bytes:
@@ -124,3 +130,6 @@ def _not_a_number(path: Path, data: bytes) -> MeshError:
                 value = word.decode("ascii", "replace")[:40]
                 return MeshError("a vertex is not three numbers", file=path, line=line, value=value)
     return MeshError("a vertex is not three numbers", file=path)
+
+
+FORMAT = MeshFormat(_indexed, _check_size)

@@ -1,0 +1,34 @@
+"""Registry of mesh formats by suffix: pentapod's own, and those of other packages by entry points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.base.errors import MeshError
+from pentapod.base.registry import Registry
+
+
+def _anything(_path: Path, _head: bytes, _size: int) -> None:
+    """Accept any first bytes."""
+
+
+@dataclass(frozen=True)
+class MeshFormat:
+    """A format of mesh files.
+
+    read: path, data and `loose` → vertices (V, 3) in the file's own numbers, facets (F, 3), and notes; loose: whether
+    facets and vertices of no use are left out however many they are. check: path, first bytes and size of the file,
+    before all of it is read. Both raise MeshError, with file and line.
+    """
+
+    read: Callable[[Path, bytes, bool], tuple[Floats, Ints, tuple[str, ...]]]
+    check: Callable[[Path, bytes, int], None] = _anything
+
+
+_HOMES = {suffix: f"pentapod.mesh.io.{suffix}" for suffix in ("obj", "ply", "stl")}
+KNOWN = ", ".join(f".{suffix}" for suffix in _HOMES)
+MESH_FORMATS = Registry("mesh format", "pentapod.mesh_formats", MeshFormat, MeshError, homes=_HOMES, constant="FORMAT")
+"""Formats by suffix, in lower case and without its dot."""
