@@ -14,8 +14,7 @@ from pentapod.timing.law.trajectory import Trajectory
 from pentapod.timing.limits.feed import Feed
 from pentapod.timing.limits.limit import Limit, Reading
 from pentapod.timing.limits.limits import machine_limits
-from pentapod.timing.path.joined import Joined, Rows
-from pentapod.timing.pieces.spline_padding import spline_padding
+from pentapod.timing.path.joined import Joined, Rows, spline_padding
 
 
 @dataclass(frozen=True)

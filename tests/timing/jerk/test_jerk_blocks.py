@@ -10,8 +10,8 @@ from pentapod.base.errors import InputError
 from pentapod.timing.jerk import limited as jerk
 from pentapod.timing.jerk.limited import jerk_limited
 from pentapod.timing.jerk.rows import JerkRows
-from pentapod.timing.jerk.stored import StoredProfile, limit_stored
 from pentapod.timing.law.time_law import MotionLaw
+from pentapod.timing.stored import StoredProfile, limit_stored
 from pentapod.timing.topp.engine import fastest
 from pentapod.timing.topp.stages import Failure
 

@@ -5,9 +5,9 @@ import pytest
 from test_core import problem
 
 from pentapod.base.errors import InputError
+from pentapod.timing.stored import StoredStages, fastest_stored
 from pentapod.timing.topp.engine import fastest
 from pentapod.timing.topp.stages import Failure, Stages
-from pentapod.timing.topp.stored import StoredStages, fastest_stored
 
 
 def stored(p, folder):

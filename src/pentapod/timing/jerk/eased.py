@@ -12,8 +12,8 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.timing.jerk.about import about, tangents
-from pentapod.timing.jerk.over import Measure
 from pentapod.timing.jerk.problem import Answer, Problem
+from pentapod.timing.jerk.rows import Measure
 
 _ROUNDS = 10
 _EXTRA = 0.003

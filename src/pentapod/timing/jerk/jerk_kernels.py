@@ -116,7 +116,7 @@ def _assemble(
                 h[2] += w0 * p2
                 h[3] += w1 * p1
                 h[4] += w1 * p2
-                h[5] += w * p2 * p2
+                h[-1] += w * p2 * p2
                 sign = -1.0
         spread(basis, i, g, first[i], right)
         spread(basis, i, g2, first[i], down)

@@ -17,6 +17,9 @@ _GROWTH = 1.5
 _BENT = 0.05
 """Share of a limit that the path's own bend takes by itself, above which its kinks become knots."""
 
+_BESIDE = 2
+"""Gridpoints on either side of a kink that count with it."""
+
 _CALM_MARGIN, _CALM_GROWTH, _CALM_MOST = 3.0, 0.3, 12.0
 """Knots become fewer from so many ramps on inside a stretch of constant speed, how fast with the time, and how few."""
 
@@ -61,7 +64,7 @@ def _ramp(rows: JerkRows) -> float:
 def _kinks(part: Part, x: Floats, times: Floats) -> Floats:
     """Return the marks where the path's bend takes part of a limit by the law x, no closer than the least step."""
     use = np.maximum(np.abs(part.rows.jerks[:, :, 0]).max(axis=1) * x**1.5, np.abs(part.rows.second).max(axis=1) * x)
-    marks = part.marks[np.interp(part.marks, part.s, maximum_filter1d(use, 5)) > _BENT]
+    marks = part.marks[np.interp(part.marks, part.s, maximum_filter1d(use, 2 * _BESIDE + 1)) > _BENT]
     if part.least_step <= 0.0 or not len(marks):
         return marks
     at = np.interp(marks, part.s, times)

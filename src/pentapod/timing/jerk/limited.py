@@ -25,11 +25,10 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.timing.jerk.eased import Eased, eased
-from pentapod.timing.jerk.over import Measure, Over, Run
 from pentapod.timing.jerk.part import Part
 from pentapod.timing.jerk.passes import PASSES, answer_of
 from pentapod.timing.jerk.problem import Problem
-from pentapod.timing.jerk.rows import NO_ROWS, JerkRows, RowsAt
+from pentapod.timing.jerk.rows import NO_ROWS, JerkRows, Measure, Over, RowsAt, Run
 from pentapod.timing.topp.stages import Failure
 
 BLOCK = 65_536

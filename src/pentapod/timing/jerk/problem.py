@@ -8,11 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.timing.jerk.ends import End
 from pentapod.timing.jerk.jerk_kernels import convex_pass
-from pentapod.timing.jerk.over import Run
-from pentapod.timing.jerk.part import Part
-from pentapod.timing.jerk.rows import ROW_NAMES, JerkRows
+from pentapod.timing.jerk.part import End, Part
+from pentapod.timing.jerk.rows import ROW_NAMES, JerkRows, Run
 from pentapod.timing.jerk.spline_kernels import cubic_basis, spline_values
 
 GRIDPOINTS_PER_KNOT = 4
@@ -88,9 +86,9 @@ class Problem:
         """Return coefficients to start from; those that are given at the ends stay."""
         places = (self.knots[1:-3] + self.knots[2:-2] + self.knots[3:-1]) / 3.0
         y = 0.5 * np.interp(places, self.s, np.minimum(self.top, self.ramps))
-        for k, value in enumerate(self.begin.coefficients(float(self.knots[4] - self.knots[3]))):
+        for k, value in enumerate(self.begin.coefficients(float(self.inner[1] - self.inner[0]))):
             y[k] = value
-        for k, value in enumerate(self.end.coefficients(float(self.knots[-4] - self.knots[-5]))):
+        for k, value in enumerate(self.end.coefficients(float(self.inner[-1] - self.inner[-2]))):
             y[-1 - k] = value
         return y
 

@@ -1,7 +1,8 @@
-"""What limits a law with bounded jerk, at any stations."""
+"""What limits a law with bounded jerk, at any stations; and where its setpoints exceed the limits."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Protocol
 
@@ -42,3 +43,25 @@ class RowsAt(Protocol):
     """Gives the rows at sorted stations (N,)."""
 
     def __call__(self, s: Floats) -> JerkRows: ...  # noqa: D102
+
+
+Run = tuple[Floats, Floats, Floats]
+"""Stations, x and x′ (n,) of a part of a law."""
+
+
+@dataclass(frozen=True, eq=False)
+class Over:
+    """Sorted stations (n,) where setpoints of a law exceed, and by which factors (n,), of speed, acceleration and jerk.
+
+    reach (n,): metres on either side of which the rows say what the controller makes of it.
+    """
+
+    s: Floats
+    reach: Floats
+    speed: Floats
+    acceleration: Floats
+    jerk: Floats
+
+
+Measure = Callable[[Run, Floats], Over]
+"""Says where a law exceeds, looked for between stations (2, m)."""

@@ -14,7 +14,7 @@ def cubic_basis(knots: Floats, s: Floats, basis: Floats, first: Ints) -> None:
 
     knots (K + 6,): ends given four times. first (N,): index of the first of the four coefficients.
     """
-    m, last = 3, len(knots) - 5
+    m, last = 3, len(knots) - 4 - 1
     one, two, slope = np.zeros(2), np.zeros(3), np.zeros(3)
     for i in range(len(s)):
         x = s[i]
@@ -74,7 +74,7 @@ def spread_matrix(basis: Floats, i: int, h: Floats, b: int, band: Floats) -> Non
         u0, u1, u2 = basis[i, 0, k], basis[i, 1, k], basis[i, 2, k]
         h0 = h[0] * u0 + h[1] * u1 + h[2] * u2
         h1 = h[1] * u0 + h[3] * u1 + h[4] * u2
-        h2 = h[2] * u0 + h[4] * u1 + h[5] * u2
+        h2 = h[2] * u0 + h[4] * u1 + h[-1] * u2
         for m in range(k + 1):
             band[b + k, k - m] += basis[i, 0, m] * h0 + basis[i, 1, m] * h1 + basis[i, 2, m] * h2
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
-from pentapod.timing.limits.limit import MachineLimit, Motion, Reserve
+from pentapod.timing.limits.limit import MachineLimit, Reserve
 from pentapod.timing.path.joined import Joined
 from pentapod.timing.path.path_derivatives import PathDerivatives
 from pentapod.timing.path.paths import PieceLike
@@ -62,10 +62,6 @@ class Feed(MachineLimit):
     def speed_rows(self, path: PathDerivatives) -> Floats:
         """Return the largest ṡ (n, 1)."""
         return self.speeds(path.piece, path.s)[:, None]
-
-    def share(self, path: PathDerivatives, motion: Motion) -> Floats:
-        """Return the shares (n, 1)."""
-        return motion.v[:, None] / self.speed_rows(path)
 
     def measured(self, joined: Joined) -> Floats:
         """Return the shares (intervals, 1) of the feeds themselves: a plan's reserve is there to be used up."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
-from pentapod.timing.limits.limit import MachineLimit, Motion, Reserve
+from pentapod.timing.limits.limit import MachineLimit, Reserve
 from pentapod.timing.path.joined import Joined
 from pentapod.timing.path.path_derivatives import PathDerivatives
 
@@ -31,10 +31,6 @@ class RapidRate(MachineLimit):
     def speed_rows(self, path: PathDerivatives) -> Floats:
         """Return the largest ṡ (n, 1): the tip is never faster than s."""
         return np.broadcast_to(self.limit, (len(path.s), 1))
-
-    def share(self, path: PathDerivatives, motion: Motion) -> Floats:
-        """Return the shares (n, 1)."""
-        return motion.v[:, None] / self.limit
 
     def measured(self, joined: Joined) -> Floats:
         """Return the largest rates (intervals, 1) of the station."""

@@ -88,11 +88,11 @@ class PiecePart:
         return self.piece.pose(self._along(s), order)
 
     def __call__(self, s: Floats, order: int = 0) -> Floats:
-        """Return legs (n, 5) or their derivatives at stations s (n,) from the part's own start."""
+        """Return legs (n, legs) or their derivatives at stations s (n,) from the part's own start."""
         return self.piece(self._along(s), order)
 
     def derivatives(self, s: Floats, order: int) -> list[Floats]:
-        """Return legs and their derivatives (n, 5) up to `order` at stations s (n,) from the part's own start."""
+        """Return legs and their derivatives (n, legs) up to `order` at stations s (n,) from the part's own start."""
         return self.piece.derivatives(self._along(s), order)
 
     def _along(self, s: Floats) -> Floats:

@@ -24,6 +24,7 @@ _DELAYS = (0, 4, 8, 16, 32, 64, 128)
 """Periods: how long a transition may take, and how much later it may begin where the old plan is at its limits."""
 
 _NODES_PER_PERIOD = 4
+_EXACT_DEGREE = 9  # of polynomials that the quadrature of the time takes exactly
 _EDGE = 24  # rows beside a transition that the spline through its rows needs to forget where the rows were cut
 
 
@@ -122,7 +123,7 @@ def _between(old: MotionLaw, new: MotionLaw, leave: float, seconds: float, perio
     marks = np.concatenate([even, old.times, times_at(old, inner)])
     clock = np.unique(marks[(marks >= leave) & (marks <= leave + seconds)])
     clock = clock[np.concatenate([[True], np.diff(clock) > 1e-9 * seconds])]
-    x, w = np.polynomial.legendre.leggauss(5)
+    x, w = np.polynomial.legendre.leggauss((_EXACT_DEGREE + 1) // 2)
     half = 0.5 * np.diff(clock)
     at = clock[:-1, None] + half[:, None] * (1.0 + x)
 

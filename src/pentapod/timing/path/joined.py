@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import factorial
 from typing import Literal
 
 import numpy as np
@@ -12,6 +13,9 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.timing.path.paths import PieceLike
+
+ROWS = 16
+"""Rows that the spline through all rows needs to forget where they begin: 0.27 of a row's say is left in the next."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,3 +105,22 @@ class Joined:
 
     def _through(self, rows: Floats) -> Interpolant:
         return Interpolant.through(rows, self.period, self.interpolation)
+
+
+def spline_padding(piece: PieceLike, speed: float, period: float, *, start: bool, tool: bool = False) -> Rows:
+    """Return ROWS + 1 rows that come to a piece's start, or leave its end, at constant speed.
+
+    Legs, station and, where `tool` asks for them, tip and axis: by the Taylor polynomials of degree 3 there, through
+    which the spline of a controller goes on without a step of acceleration or jerk. The piece's own row is among them.
+    """
+    station = 0.0 if start else piece.length
+    way = speed * period * np.arange(ROWS + 1)
+    way = np.asarray(-way[::-1] if start else way, dtype=np.float64)
+    at = np.array([station])
+
+    def beyond(of: Callable[[int], Floats]) -> Floats:
+        rows = [of(order) * way[:, None] ** order / factorial(order) for order in range(4)]
+        return np.asarray(np.sum(rows, axis=0), dtype=np.float64)
+
+    poses = (beyond(lambda order, k=k: piece.pose(at, order)[k]) for k in (0, 1)) if tool else ()
+    return Rows(beyond(lambda order: piece(at, order)), station + way, *poses)

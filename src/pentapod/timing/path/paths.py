@@ -15,7 +15,7 @@ class PieceLike(Protocol):
     knots (K,): where the third derivative may jump. section_ends (M,): s where each section ends, the last
     is `length`; section_feeds (M,): m/s, infinite on rapids; section_kinds and section_segments (M,): kind
     and index of the toolpath's segment. waypoint_stations, waypoints (W,): s of the toolpath's waypoints, not
-    falling, and their indices. `piece(s, order)` gives legs (n, 5) in metres or their derivatives d^order/ds^order,
+    falling, and their indices. `piece(s, order)` gives legs (n, legs) in metres or their derivatives d^order/ds^order,
     `derivatives(s, order)` all of them up to an order: 0 to 3, the second continuous, the third asked for where jerk is
     limited.
     `feed_rate(s)` tells how far (n,) the point whose speed the feed is moves for each metre of s: 1 for cutters, whose

@@ -8,12 +8,11 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
-from pentapod.timing.jerk.over import Over, Run
+from pentapod.timing.jerk.rows import Over, Run
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.pieces.boundary_speeds import whole_periods
 from pentapod.timing.pieces.piece import PieceProfile
-from pentapod.timing.pieces.setpoints import EDGE, Setpoints
-from pentapod.timing.pieces.use import GOAL, Use
+from pentapod.timing.pieces.setpoints import EDGE, GOAL, Setpoints, Use
 
 _PHASES = (0.0, 0.25, 0.5, 0.75)
 """Of the setpoints, in periods: what is slower at one place shifts all later ones against the path."""

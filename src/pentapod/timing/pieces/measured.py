@@ -9,8 +9,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.path.joined import Rows
-from pentapod.timing.pieces.setpoints import EDGE, Setpoints
-from pentapod.timing.pieces.use import Use
+from pentapod.timing.pieces.setpoints import EDGE, Setpoints, Use
 
 _AT_ONCE = 1 << 16
 """Rows measured at once: memory does not grow with the piece by more than four numbers a row."""

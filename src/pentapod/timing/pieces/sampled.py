@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
@@ -22,13 +23,11 @@ from pentapod.timing.law.local_stretch import Stretchable
 from pentapod.timing.law.slowed import most_lost
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.pieces.boundary_speeds import law_between, whole_periods
-from pentapod.timing.pieces.eased import eased
 from pentapod.timing.pieces.exceeding import over_limits
 from pentapod.timing.pieces.measured import measured, untouched
 from pentapod.timing.pieces.mended import about, mended, worst_places
 from pentapod.timing.pieces.piece import PieceProfile
-from pentapod.timing.pieces.setpoints import Setpoints
-from pentapod.timing.pieces.use import Use
+from pentapod.timing.pieces.setpoints import EDGE, GOAL, Setpoints, Use
 from pentapod.timing.topp.stages import Failure
 
 WINDOW_PERIODS = 4
@@ -40,6 +39,12 @@ MOST_SLOWER = 20.0
 _LOCAL = 8
 _SLOWINGS = 12
 _EXTRA = 1.003
+_ROOM, _ROOM_PER_ROUND = 0.99, 0.01
+"""Each easing moves the setpoints against the corners of the path: a place that comes back gets more room."""
+
+_SPREAD = 3
+"""Rows on either side of one that exceeds to which it spreads: the averaging's own, and one more."""
+
 _EVERYWHERE = "the sampled program exceeds a limit however slowly it is run"
 _SLOW = "the sampled program keeps the limits only {:.3g} times slower than the law it is made of"
 
@@ -162,7 +167,7 @@ def sampled_laws(
             if attempt < _LOCAL and plans[k].nodes is not None:
                 plans[k] = plans[k].stretched(pieces[k].law, found[k], pieces[k].before, period)
             elif attempt < _LOCAL and not smooth:
-                again = eased(pieces[k], found[k], machine, attempt)
+                again = _eased(pieces[k], found[k], machine, attempt)
                 if isinstance(again, Failure):
                     return Unmended(k, again)
                 plans[k] = replace(plans[k], profile=again)
@@ -179,3 +184,29 @@ def sampled_laws(
 def _worst(piece: Setpoints, use: Use) -> float:
     """Return the station of the row that exceeds most, as far as the piece's law is still the one that was measured."""
     return float(piece.law([(int(use.slowing.argmax()) - piece.before) * piece.period])[0])
+
+
+def _eased(piece: Setpoints, use: Use, machine: Machine, attempt: int) -> PieceProfile | Failure:
+    """Return the profile of a piece with limits lowered around the rows where a share exceeds the goal, solved anew."""
+    # Easing shifts all later setpoints against the path: ease for the rows between as well.
+    profile, count = piece.profile, piece.count
+    between = piece.use(piece.rows(0, count, 0.5), machine, 0, count)
+    between = between.without_edges(EDGE * (profile.x_start > 0.0), EDGE * (profile.x_end > 0.0))
+    rows, room = piece.rows(0, count).stations, _ROOM - attempt * _ROOM_PER_ROUND
+    speed, acceleration = (
+        _factors(profile.s, rows, np.maximum(here, there), room)
+        for here, there in ((use.speed, between.speed), (use.acceleration, between.acceleration))
+    )
+    return profile.eased(acceleration, speed)
+
+
+def _factors(s: Floats, rows: Floats, shares: Floats, room: float) -> Floats:
+    """Return factors (N + 1,) at gridpoints s from shares at rows (n,), spread over the smoothing window."""
+    near = maximum_filter1d(shares, 2 * _SPREAD + 1)
+    # From the rows on both sides of a gridpoint, and from the rows inside the stages that it ends.
+    after = np.clip(np.searchsorted(rows, s), 1, len(rows) - 1)
+    worst = np.maximum(near[after - 1], near[after])
+    stage = np.clip(np.searchsorted(s, rows, side="right") - 1, 0, len(s) - 2)
+    np.maximum.at(worst, stage, near)
+    np.maximum.at(worst, stage + 1, near)
+    return np.where(worst > GOAL, room / np.maximum(worst, GOAL), 1.0)

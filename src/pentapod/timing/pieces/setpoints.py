@@ -2,23 +2,68 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import cast
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Floats, Ints
 from pentapod.machine.machine import Machine
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.limits.limit import Group
-from pentapod.timing.path.joined import Joined, Rows
+from pentapod.timing.path.joined import Joined, Rows, spline_padding
 from pentapod.timing.pieces.piece import PieceProfile
-from pentapod.timing.pieces.spline_padding import spline_padding
-from pentapod.timing.pieces.use import Use
 from pentapod.timing.topp.stages import Failure
+
+GOAL = 0.999
+"""Share of each limit that a sampled program may use."""
 
 EDGE = 32
 """Rows beyond which the spline through all rows has forgotten a row: 0.27 of its say is left from each to the next."""
+
+
+@dataclass(frozen=True, eq=False)
+class Use:
+    """Shares (rows,) of the limits around the setpoints of a piece: of rates or feed, of accelerations, of jerks.
+
+    reach (rows,): seconds over which a jerk at its limit changes the legs' velocities by what they are.
+    """
+
+    speed: Floats
+    acceleration: Floats
+    jerk: Floats
+    reach: Floats
+
+    @property
+    def exceeds(self) -> bool:
+        """Whether a share is above what is aimed at."""
+        return bool((self.slowing > 1.0).any())
+
+    @cached_property
+    def slowing(self) -> Floats:
+        """By which factor (rows,) the motion must be slower at each row to keep the goal."""
+        return np.maximum(np.maximum(self.speed / GOAL, np.sqrt(self.acceleration / GOAL)), np.cbrt(self.jerk / GOAL))
+
+    def without_edges(self, start: int, end: int) -> Use:
+        """Return it with no shares in so many rows at the start and at the end."""
+        rows = np.arange(len(self.speed))
+        known = (rows >= start) & (rows < len(rows) - end)
+        speed, acceleration, jerk = (np.where(known, y, 0.0) for y in (self.speed, self.acceleration, self.jerk))
+        return Use(speed, acceleration, jerk, self.reach)
+
+    def at(self, rows: Ints) -> Use:
+        """Return the shares of some of its rows (n,)."""
+        return Use(*(getattr(self, name)[rows] for name in _COLUMNS))
+
+    @classmethod
+    def joined(cls, uses: Sequence[Use]) -> Use:
+        """Return the shares of one after the other."""
+        return cls(*(np.concatenate([getattr(use, name) for use in uses]) for name in _COLUMNS))
+
+
+_COLUMNS = tuple(field.name for field in fields(Use))
 
 
 @dataclass(frozen=True, eq=False)

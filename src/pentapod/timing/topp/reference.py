@@ -123,7 +123,7 @@ def _constraint(problem: _Problem) -> Any:
                 gridpoints,
                 identical=True,
             )
-            return (*found[:5], None, x_bounds)
+            return (*found[:-2], None, x_bounds)
 
     return RowsAndCeiling()
 
