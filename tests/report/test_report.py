@@ -105,11 +105,8 @@ def test_report_of_a_passed_job(make_job, tmp_path):
     poses = data(text, "poses")
     assert poses["moving"] == 8
     # Legs drawn have the lengths of the rows they are drawn for.
-    pose = poses["poses"][0]
-    tip, axis = np.array(pose["tip"]), np.array(pose["axis"])
-    joints = tip + (poses["tool_length"] - np.array(poses["offsets"]))[:, None] * axis
-    base = np.column_stack([poses["base"], np.zeros(5)])
-    assert np.linalg.norm(joints - base, axis=1) == pytest.approx(1e3 * program.legs[0], abs=2e-3)
+    legs = np.array(poses["poses"][0]["joints"]) - poses["base"]
+    assert np.linalg.norm(legs, axis=1) == pytest.approx(1e3 * program.legs[0], abs=2e-3)
 
 
 def test_signals_are_those_of_the_program(make_job, tmp_path):

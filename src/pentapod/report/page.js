@@ -65,13 +65,11 @@
 
   const along = (p, a, s) => p.map((value, k) => value + s * a[k]);
 
-  // The ends of what moves: five legs, the platform line, the tool, the tip (as the report's scene has them).
-  function lines({ tip, axis }) {
-    const joints = machine.offsets.map((offset) => along(tip, axis, machine.tool_length - offset));
-    const nose = along(tip, axis, machine.shaft_end);
-    const first = machine.offsets.indexOf(Math.min(...machine.offsets));
-    const legs = machine.base.map(([x, y], k) => [[x, y, 0], joints[k]]);
-    return [...legs, [joints[first], nose], [nose, tip], [tip, tip]];
+  // The ends of what moves: the legs, the platform line, the tool, the tip (in the order of the report's scene).
+  function lines({ tip, axis, joints }) {
+    const top = along(tip, axis, machine.line_top), nose = along(tip, axis, machine.shaft_end);
+    const legs = machine.base.map((base, k) => [base, joints[k]]);
+    return [...legs, [top, nose], [nose, tip], [tip, tip]];
   }
 
   const nearest = (t) => poses.reduce((best, pose, k) => Math.abs(pose.t - t) < Math.abs(poses[best].t - t) ? k : best, 0);

@@ -18,6 +18,7 @@ from pentapod.job.outcome import Outcome, SetUps
 from pentapod.job.plan_arrays import matrix_mm
 from pentapod.job.schema.job import Job
 from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
+from pentapod.machine.leg_ends import leg_ends
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.placed_path import PlacedPath, UnplacedPath
 from pentapod.program.program import Program
@@ -169,21 +170,26 @@ def _poses(outcome: Outcome, signals: Signals | None) -> dict[str, Any]:
     linked += [place.row for place in worst_places(signals, machine) if place.row is not None]
     rows = np.unique(np.concatenate([rows, [_start_row(signals)], np.clip(linked, 0, len(signals.times) - 1)]))
     rows = rows.astype(np.intp)
+    base, joints = leg_ends(machine, signals.tips[rows], signals.axes[rows])
     tips, axes = np.round(1e3 * signals.tips[rows], 3), np.round(signals.axes[rows], 6)
     return {
         "poses": [
-            {"t": round(float(t), 3), "tip": tip, "axis": axis, "segment": int(segment)}
-            for t, tip, axis, segment in zip(
-                signals.times[rows], tips.tolist(), axes.tolist(), signals.segments[rows], strict=True
+            {"t": round(float(t), 3), "tip": tip, "axis": axis, "joints": ends, "segment": int(segment)}
+            for t, tip, axis, ends, segment in zip(
+                signals.times[rows],
+                tips.tolist(),
+                axes.tolist(),
+                np.round(1e3 * joints, 3).tolist(),
+                signals.segments[rows],
+                strict=True,
             )
         ],
         "start": int(np.searchsorted(rows, _start_row(signals))),
         "around": _around(signals),
-        "moving": scene.MACHINE_TRACES,
+        "moving": scene.moving_traces(machine),
         "colours": scene.CUTS_BY,
-        "base": (1e3 * machine.robot.base).tolist(),
-        "offsets": (1e3 * machine.robot.offsets).tolist(),
-        "tool_length": 1e3 * machine.tool_length,
+        "base": np.round(1e3 * base, 3).tolist(),
+        "line_top": 1e3 * (machine.tool_length - float(machine.robot.line_heights.min())),
         "shaft_end": 1e3 * machine.bodies.shaft_end,
     }
 
@@ -215,7 +221,9 @@ def _to_prepare(outcome: Outcome, signals: Signals | None) -> list[tuple[str, st
     placed = outcome.find(PlacedPath)
     if placed is not None and placed.placement.guides:
         stand = placed.placement.guides.replace("-", "−")
-        sheet.append(("guides 1 to 5", f"set to {stand} from where the machine file has the base joints"))
+        sheet.append(
+            (f"guides 1 to {machine.robot.n_legs}", f"set to {stand} from where the machine file has the base joints")
+        )
     mesh = outcome.find(Mesh)
     if mesh is not None:
         size = " × ".join(f"{value:.1f}" for value in 1e3 * np.ptp(mesh.bounds, axis=0))

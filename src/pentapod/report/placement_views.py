@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.machine.leg_ends import leg_ends, line_top
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.report.decimate import thinned_mesh
-from pentapod.report.figure import HELD_COLOUR, LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR
+from pentapod.report.figure import HELD_COLOUR, LIMIT_COLOUR, QUIET_COLOUR, leg_colour
 from pentapod.report.held import Held
 
 _FACETS, _POINTS = 1200, 1500
@@ -20,8 +21,9 @@ _LETTER = 15.0  # of a drawing 500 wide
 
 @dataclass(frozen=True, eq=False)
 class _Subject:
-    """What is drawn, machine frame, metres. facets (F, 3, 3); tips (K, 3); base, joints (5, 3); far, tip, origin (3,).
+    """What is drawn, machine frame, metres.
 
+    facets (F, 3, 3); tips (K, 3); base, joints (n_legs, 3); far, tip, origin (3,).
     hangs: whether the base is above the work, so that the machine's z points down. table: z of its surface, if any.
     around (G, 3, 3): facets of what holds the part; holder: its name.
     """
@@ -62,7 +64,7 @@ def _subject(
 ) -> _Subject:
     transform, worst = placed.placement.transform, int(placed.margins.min(axis=1).argmin())
     axis, tip = placed.axes[worst], placed.tips[worst]
-    joints = tip + (machine.tool_length - machine.robot.offsets)[:, None] * axis
+    base, joints = leg_ends(machine, tip, axis)
     starts = placed.toolpath.starts
     even = np.linspace(0, len(placed.tips) - 1, min(len(placed.tips), _POINTS)).astype(np.intp)
     tips = placed.tips[np.unique(np.concatenate([even, starts[:: -(-len(starts) // _POINTS)]]))]
@@ -70,8 +72,7 @@ def _subject(
     if mesh is not None:
         vertices, faces = thinned_mesh(mesh.vertices, mesh.faces, _FACETS)
         facets = transform.apply(vertices)[faces]
-    base = np.column_stack([machine.robot.base, np.zeros(5)])
-    far, hangs = joints[int(np.argmin(machine.robot.offsets))], bool(machine.work.centre[2] > 0.0)
+    far, hangs = line_top(machine, tip, axis), bool(machine.work.centre[2] > 0.0)
     around = np.zeros((0, 3, 3))
     if held is not None:
         vertices, faces = thinned_mesh(held.vertices, held.faces, _FACETS)
@@ -124,7 +125,7 @@ class _Paper:
         """Return a dot with its number."""
         (x, y), u = self.at(point), self.unit
         return (
-            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{5 * u:.2f}" fill="{colour}"/><text x="{x + 8.0 * u:.1f}" '
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{5.0 * u:.2f}" fill="{colour}"/><text x="{x + 8.0 * u:.1f}" '
             f'y="{y - 6.0 * u:.1f}" font-size="{_LETTER * u:.1f}" fill="currentColor">{number}</text>'
         )
 
@@ -155,8 +156,8 @@ def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool =
     parts.append(paper.line(flat(subject.tips), LIMIT_COLOUR, 0.6))
     if not close:
         base, legs = flat(subject.base), flat(np.stack([subject.base, subject.joints], axis=1))
-        parts += [paper.line(legs[k], LEG_COLOURS[k], 2.4) for k in range(5)]
-        parts += [paper.numbered(base[k], k + 1, LEG_COLOURS[k]) for k in range(5)]
+        parts += [paper.line(leg, leg_colour(k), 2.4) for k, leg in enumerate(legs)]
+        parts += [paper.numbered(joint, k + 1, leg_colour(k)) for k, joint in enumerate(base)]
         parts.append(paper.line(flat(np.stack([subject.far, subject.tip])), "currentColor", 3.0))
     parts.append(paper.cross(flat(subject.origin), "origin of the mesh"))
     (width, height), extent = paper.size, paper.high - paper.low

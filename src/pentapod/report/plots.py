@@ -9,7 +9,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.report.decimate import keep_extremes
-from pentapod.report.figure import LEG_COLOURS, LEG_DASHES, LIMIT_COLOUR, QUIET_COLOUR, Figure, packed
+from pentapod.report.figure import LIMIT_COLOUR, QUIET_COLOUR, Figure, leg_colour, leg_dash, packed
 from pentapod.report.signals import Signals
 
 _BUCKETS = 600
@@ -21,6 +21,7 @@ _TITLES = (
     "speed, mm/min",
     "margins, 0 at a limit",
 )
+_MARGIN_ROW = len(_TITLES)
 _MARGIN_COLOURS = ("#c2417c", "#2a78d6", "#e08a00", "#1baa7a", "#7a5cd6", "#5f7d8c")
 
 
@@ -33,7 +34,7 @@ def time_figure(signals: Signals, machine: Machine) -> Figure:
         (signals.accelerations, -limits.max_acceleration, limits.max_acceleration, "mm/s²"),
     )
     for row, (values, low, high, unit) in enumerate(quantities, start=1):
-        for leg in range(5):
+        for leg in range(values.shape[1]):
             traces.append(_leg_line(signals.times, 1e3 * values[:, leg], leg, row, unit))
         traces += _limits(signals.times, 1e3 * low, row, unit) + _limits(signals.times, 1e3 * high, row, unit)
     traces += _speed_lines(signals)
@@ -58,10 +59,10 @@ def _line(times: Floats, values: Floats, row: int, name: str, colour: str, **mor
 def _leg_line(times: Floats, values: Floats, leg: int, row: int, unit: str) -> dict[str, Any]:
     hover = f"leg {leg + 1}: %{{y:.5g}} {unit}<extra></extra>"
     line = _line(
-        times, values, row, f"leg {leg + 1}", LEG_COLOURS[leg], legendgroup=f"leg{leg}", showlegend=row == 1,
+        times, values, row, f"leg {leg + 1}", leg_colour(leg), legendgroup=f"leg{leg}", showlegend=row == 1,
         hovertemplate=hover,
     )  # fmt: skip
-    line["line"] = line["line"] | {"dash": LEG_DASHES[leg]}
+    line["line"] = line["line"] | {"dash": leg_dash(leg)}
     return line
 
 
@@ -69,9 +70,9 @@ def _limits(times: Floats, values: Floats, row: int, unit: str) -> list[dict[str
     """Return dashed lines at a limit: one where all legs share it."""
     ends, shared = times[[0, -1]], bool(np.ptp(values) == 0.0)
     lines: list[dict[str, Any]] = []
-    for leg in range(1 if shared else 5):
+    for leg in range(1 if shared else len(values)):
         whose = "limit" if shared else f"limit of leg {leg + 1}"
-        line = _line(ends, np.full(2, values[leg]), row, whose, LIMIT_COLOUR if shared else LEG_COLOURS[leg])
+        line = _line(ends, np.full(2, values[leg]), row, whose, LIMIT_COLOUR if shared else leg_colour(leg))
         line |= {"showlegend": False, "hovertemplate": f"{whose}: %{{y:.5g}} {unit}<extra></extra>"}
         line["line"] = line["line"] | {"dash": "dash", "width": 1.1}
         lines.append(line)
@@ -96,7 +97,7 @@ def _margin_lines(signals: Signals) -> list[dict[str, Any]]:
     times = signals.times[signals.margin_rows]
     order = np.argsort(signals.margins.min(axis=0), kind="stable")[:_SHOWN_MARGINS]
     smallest = _line(
-        times, signals.smallest_margins, 5, "smallest margin", QUIET_COLOUR, legend="legend2",
+        times, signals.smallest_margins, _MARGIN_ROW, "smallest margin", QUIET_COLOUR, legend="legend2",
         hovertemplate="smallest: %{y:.3f}<extra></extra>",
     )  # fmt: skip
     smallest["line"] = {"color": QUIET_COLOUR, "width": 4}
@@ -104,10 +105,10 @@ def _margin_lines(signals: Signals) -> list[dict[str, Any]]:
     for colour, k in zip(_MARGIN_COLOURS, order, strict=False):
         name = signals.margin_names[k]
         hover = f"{name}: %{{y:.3f}}<extra></extra>"
-        line = _line(times, signals.margins[:, k], 5, name, colour, legend="legend2", hovertemplate=hover)
-        line["line"] = line["line"] | {"dash": LEG_DASHES[len(lines) % len(LEG_DASHES)]}
+        line = _line(times, signals.margins[:, k], _MARGIN_ROW, name, colour, legend="legend2", hovertemplate=hover)
+        line["line"] = line["line"] | {"dash": leg_dash(len(lines))}
         lines.append(line)
-    zero = _line(times[[0, -1]], np.zeros(2), 5, "limit", LIMIT_COLOUR, showlegend=False, hoverinfo="skip")
+    zero = _line(times[[0, -1]], np.zeros(2), _MARGIN_ROW, "limit", LIMIT_COLOUR, showlegend=False, hoverinfo="skip")
     zero["line"] = zero["line"] | {"dash": "dash", "width": 1.1}
     return [*lines, zero]
 

@@ -10,18 +10,16 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.base.refusal import Refusal
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.machine.leg_ends import leg_ends, line_top
 from pentapod.machine.machine import Machine
 from pentapod.mesh.faults import faults
 from pentapod.mesh.mesh import Mesh
 from pentapod.report.decimate import keep_extremes, thinned_mesh
-from pentapod.report.figure import HELD_COLOUR, LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR, Figure, packed
+from pentapod.report.figure import HELD_COLOUR, LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR, Figure, leg_colour, packed
 from pentapod.report.held import Held
 from pentapod.report.signals import Signals
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.toolpath.toolpath import Toolpath
-
-MACHINE_TRACES = 8
-"""Traces that move with the pose: five legs, the platform line, the tool, the tip. They come last."""
 
 CUTS_BY = {
     "margin": "cuts, by smallest margin",
@@ -33,6 +31,7 @@ CUTS_BY = {
 _MOST_FACETS = 60_000
 _MOST_EDGES = 5_000
 _BUCKETS = 2_500
+_CUT_WIDTH = 5.0
 _LIFT_M = 0.5e-3  # along the tool axis: a ball's tip runs on and below the surface, which would hide its path
 # Worst is darkest, on a light part: the order can be read without colour, too.
 _MARGIN_COLOURS = [[0.0, "#5c0019"], [0.2, "#b5371c"], [0.5, "#e39a2d"], [1.0, "#9fe0bd"]]
@@ -69,7 +68,7 @@ def fault_traces(mesh: Mesh, placement: RigidTransform) -> list[dict[str, Any]]:
     for k, (name, edges) in enumerate(faults(mesh).items()):
         shown = placement.apply(edges[:: max(1, len(edges) // _MOST_EDGES)])
         lines = np.concatenate([shown, np.full((len(shown), 1, 3), np.nan)], axis=1).reshape(-1, 3)
-        trace = _line3d(1e3 * lines, f"mesh: {name} ({len(edges):,})", LEG_COLOURS[k % len(LEG_COLOURS)], 4.0)
+        trace = _line3d(1e3 * lines, f"mesh: {name} ({len(edges):,})", leg_colour(k), 4.0)
         # An open sheet's border is as it should be: there to look at, not to alarm.
         traces.append(trace | ({"visible": "legendonly"} if name == "border" else {}))
     return traces
@@ -116,8 +115,8 @@ def _cuts(
     """Return the cuts coloured by values (N,), thinned: whatever `also` names is kept. words: of whole values."""
     even = np.linspace(0, len(tips) - 1, min(len(tips), 2 * _BUCKETS)).astype(np.intp)
     keep = np.unique(np.concatenate([even, also]))
-    trace = _line3d(np.where(signals.cutting[keep, None], tips[keep], np.nan), name, "", 5)
-    trace["line"] = {"width": 5, "color": packed(values[keep]), "showscale": True, **look}
+    trace = _line3d(np.where(signals.cutting[keep, None], tips[keep], np.nan), name, "", _CUT_WIDTH)
+    trace["line"] = {"width": _CUT_WIDTH, "color": packed(values[keep]), "showscale": True, **look}
     trace["showlegend"] = False
     trace["text"] = [words[int(v)] for v in values[keep]] if words else [f"{float(v):.3g}" for v in values[keep]]
     trace["hovertemplate"] = "%{text}<br>%{x:.1f}, %{y:.1f}, %{z:.1f} mm<extra></extra>"
@@ -156,45 +155,45 @@ def piece_traces(toolpath: Toolpath, pieces: Sequence[Piece]) -> list[dict[str, 
     for k, piece in enumerate(pieces):
         cuts = np.append(piece.cuts(toolpath), False)
         ends = cuts | np.concatenate([[False], cuts[:-1]])
-        traces.append(_line3d(_with_gaps(tips, ends), f"set-up {k + 1}", LEG_COLOURS[k % len(LEG_COLOURS)], 4.0))
+        traces.append(_line3d(_with_gaps(tips, ends), f"set-up {k + 1}", leg_colour(k), 4.0))
     return traces
 
 
 def machine_traces(machine: Machine, tip: Floats, axis: Floats) -> list[dict[str, Any]]:
     """Return the base, and then the traces that move: legs, platform line, tool and tip, at one pose."""
-    base = np.column_stack([machine.robot.base, np.zeros(5)]) * 1e3
+    base = 1e3 * machine.robot.base_joints
     radius = 1.12 * float(np.linalg.norm(base - base.mean(axis=0), axis=1).max())
     angle = np.linspace(0.0, 2.0 * np.pi, 73)
     rim = base.mean(axis=0) + radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(73)])
     joints = _line3d(base, "base joints", QUIET_COLOUR, 1.0)
     joints |= {
-        "mode": "markers+text", "marker": {"size": 5, "color": list(LEG_COLOURS)}, "showlegend": False,
-        "text": [f"{k}" for k in range(1, 6)], "textposition": "top center",
+        "mode": "markers+text", "showlegend": False,
+        "marker": {"size": 5.0, "color": [leg_colour(k) for k in range(len(base))]},
+        "text": [f"{k + 1}" for k in range(len(base))], "textposition": "top center",
     }  # fmt: skip
     return [
         _line3d(rim, "base plane", QUIET_COLOUR, 2.0),
         joints,
-        *(_line3d(line, *look) for line, look in zip(_pose_lines(machine, tip, axis), _LOOKS, strict=True)),
+        *(_line3d(line, *look) for line, look in zip(_pose_lines(machine, tip, axis), _looks(len(base)), strict=True)),
     ]
 
 
-_LOOKS: tuple[tuple[str, str, float], ...] = (
-    *((f"leg {k + 1}", LEG_COLOURS[k], 8.0) for k in range(5)),
-    ("platform", "#6d7480", 14.0),
-    ("tool", "#b9a36b", 8.0),
-    ("tip", LIMIT_COLOUR, 3.0),
-)
+def moving_traces(machine: Machine) -> int:
+    """Return how many traces move with the pose (legs, platform line, tool and tip); they are the last ones."""
+    return len(_looks(machine.robot.n_legs))
+
+
+def _looks(n_legs: int) -> list[tuple[str, str, float]]:
+    """Return name, colour and width of each moving line."""
+    legs = [(f"leg {k + 1}", leg_colour(k), 8.0) for k in range(n_legs)]
+    return [*legs, ("platform", "#6d7480", 14.0), ("tool", "#b9a36b", 8.0), ("tip", LIMIT_COLOUR, 3.0)]
 
 
 def _pose_lines(machine: Machine, tip: Floats, axis: Floats) -> list[Floats]:
     """Return the two ends of each moving line, mm; the page's script does the same for other poses."""
-    robot = machine.robot
-    joints = tip + (machine.tool_length - robot.offsets)[:, None] * axis
-    base = np.column_stack([robot.base, np.zeros(5)])
     nose = tip + machine.bodies.shaft_end * axis
-    far = joints[int(np.argmin(robot.offsets))]
-    lines = [np.array([base[k], joints[k]]) for k in range(5)]
-    return [1e3 * line for line in (*lines, np.array([far, nose]), np.array([nose, tip]), np.array([tip, tip]))]
+    legs, far = np.stack(leg_ends(machine, tip, axis), axis=1), line_top(machine, tip, axis)
+    return [1e3 * line for line in (*legs, np.array([far, nose]), np.array([nose, tip]), np.array([tip, tip]))]
 
 
 def scene_figure(traces: list[dict[str, Any]], *, down: bool) -> Figure:

@@ -12,7 +12,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.files import atomic_write
 from pentapod.report.decimate import keep_extremes
-from pentapod.report.figure import LEG_COLOURS, LEG_DASHES, PLOT_CONFIG, Figure, as_script, packed
+from pentapod.report.figure import PLOT_CONFIG, Figure, as_script, leg_colour, leg_dash, packed
 from pentapod.simulate import Tracking
 
 _BUCKETS = 1000
@@ -63,8 +63,8 @@ def simulation_figure(runs: Sequence[tuple[str, Tracking]]) -> Figure:
         ("force of each drive, N", last.played.forces),
     ):
         titles.append(title)
-        for leg in range(5):
-            line = {"color": LEG_COLOURS[leg], "dash": LEG_DASHES[leg], "width": 1.2}
+        for leg in range(values.shape[1]):
+            line = {"color": leg_colour(leg), "dash": leg_dash(leg), "width": 1.2}
             name = f"leg {leg + 1}"
             shown = {"name": name, "legendgroup": name, "showlegend": values is last.played.forces}
             traces.append(_line(times, values[:, leg], len(titles), line) | shown)

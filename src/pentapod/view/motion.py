@@ -10,6 +10,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.machine.leg_ends import leg_ends
 from pentapod.machine.machine import Machine
 from pentapod.program import Program
 from pentapod.toolpath.toolpath import Toolpath
@@ -22,8 +23,8 @@ _ROWS = 200_000
 class Stance:
     """The machine at one pose of the tool, machine frame, metres.
 
-    tip, axis (3,): axis unit, tip → spindle. legs (5,): lengths. within (5,): whether each keeps its stroke. bases,
-    joints (5, 3): where the legs begin and end.
+    tip, axis (3,): axis unit, tip → spindle. legs (n_legs,): lengths. within: whether each leg keeps its stroke.
+    bases, joints (n_legs, 3): where the legs begin and end.
     """
 
     tip: Floats
@@ -80,9 +81,7 @@ class Motion(Value):
         """Return how the machine stands at a time where the part is at a placement."""
         tip, axis = self.pose(time)
         tip, axis = placement.apply(tip), placement.rotate(axis)
-        position = tip + machine.tool_length * axis
-        bases = np.column_stack([machine.robot.base, np.zeros(5)])
-        joints = position - machine.robot.offsets[:, None] * axis
-        legs = np.linalg.norm(joints - bases, axis=1)
+        bases, joints = leg_ends(machine, tip, axis)
+        legs = machine.robot.leg_lengths(tip + machine.tool_length * axis, -axis)
         within = (legs >= machine.legs.min_length) & (legs <= machine.legs.max_length)
         return Stance(tip, axis, legs, tuple(bool(k) for k in within), bases, joints)

@@ -40,7 +40,7 @@ _FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
     JOB_FILE: ("U", ()),
     WAYPOINTS: ("i", (2,)),
     BOX: ("f", (2, 3)),
-    GUIDES: ("f", (5,)),
+    GUIDES: ("f", (None,)),
     "placed.placement_mm": ("f", (4, 4)),
     "placed.component": ("i", (2,)),
     "placed.axes": ("f", (None, 3)),

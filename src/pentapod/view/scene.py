@@ -10,7 +10,7 @@ from pentapod.base.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.clearance.collision_world import mounted
 from pentapod.report.decimate import thinned_mesh
-from pentapod.report.figure import LEG_COLOURS, LIMIT_COLOUR
+from pentapod.report.figure import LIMIT_COLOUR, leg_colour
 from pentapod.view.motion import Stance
 from pentapod.view.opened import Opened
 from pentapod.view.shapes import along, quaternion, revolved, rotation_of, tool_mesh
@@ -52,7 +52,9 @@ class Scene:
         self._tool = api.add_frame("/tool", show_axes=False)
         self._add_tool()
         radius = run.machine.bodies.leg_radius
-        self._legs = [self._cylinder(f"/legs/{k + 1}", radius, _rgb(LEG_COLOURS[k])) for k in range(5)]
+        self._legs = [
+            self._cylinder(f"/legs/{k + 1}", radius, _rgb(leg_colour(k))) for k in range(run.machine.robot.n_legs)
+        ]
 
     @property
     def placement(self) -> RigidTransform:
@@ -76,10 +78,10 @@ class Scene:
         with self._server.atomic():
             self._tool.position, self._tool.wxyz = stance.tip, quaternion(along(stance.axis))
             for k, leg in enumerate(self._legs):
-                leg.position = stance.bases[k]
-                leg.wxyz = quaternion(along((stance.joints[k] - stance.bases[k]) / stance.legs[k]))
-                leg.scale = (1.0, 1.0, float(stance.legs[k]))
-                leg.color = _rgb(LEG_COLOURS[k] if stance.within[k] else LIMIT_COLOUR)
+                leg.position, way = stance.bases[k], stance.joints[k] - stance.bases[k]
+                length = float(np.linalg.norm(way))
+                leg.wxyz, leg.scale = quaternion(along(way / length)), (1.0, 1.0, length)
+                leg.color = _rgb(leg_colour(k) if stance.within[k] else LIMIT_COLOUR)
 
     def _set_up(self, server: viser.ViserServer) -> None:
         """Look at the work from the side, the base above it."""
@@ -94,7 +96,7 @@ class Scene:
         camera.up = (0.0, 0.0, upward)
 
     def _add_base(self) -> None:
-        base = np.column_stack([self._run.machine.robot.base, np.zeros(5)])
+        base = self._run.machine.robot.base_joints
         centre = base.mean(axis=0)
         radius = 1.12 * float(np.linalg.norm(base - centre, axis=1).max())
         turn = np.linspace(0.0, 2.0 * np.pi, 97)
@@ -103,20 +105,20 @@ class Scene:
         self._server.scene.add_line_segments("/base/rim", rims, _DARK, thickness=3.0, thickness_units="screen")
         ball = 1.8 * self._run.machine.bodies.leg_radius
         for k, joint in enumerate(base):
-            self._server.scene.add_icosphere(f"/base/{k + 1}", ball, color=_rgb(LEG_COLOURS[k]), position=joint)
+            self._server.scene.add_icosphere(f"/base/{k + 1}", ball, color=_rgb(leg_colour(k)), position=joint)
             self._server.scene.add_label(f"/base/{k + 1}/name", f"{k + 1}")
 
     def _add_tool(self) -> None:
         """Everything that is fixed to the tool: spindle, platform joints, shank and cutter, beam."""
         run, api = self._run, self._server.scene
-        machine, offsets = run.machine, run.machine.robot.offsets
-        heights = machine.tool_length - offsets
+        machine = run.machine
+        heights = machine.tool_length - machine.robot.line_heights
         top, nose = float(heights.max()), machine.bodies.shaft_end
         self._cylinder("/tool/spindle", machine.bodies.shaft_radius, _STEEL, nose, top)
         self._cylinder("/tool/shaft", _SHAFT_SHARE * machine.bodies.shaft_radius, _DARK, 0.0, nose)
         for k, height in enumerate(heights.tolist()):
             ball = 1.6 * machine.bodies.leg_radius
-            api.add_icosphere(f"/tool/joint{k + 1}", ball, color=_rgb(LEG_COLOURS[k]), position=(0.0, 0.0, height))
+            api.add_icosphere(f"/tool/joint{k + 1}", ball, color=_rgb(leg_colour(k)), position=(0.0, 0.0, height))
         cutter = [solid for solid in run.tool.solids if solid.kind == "cutter"]
         for name, solids, colour in (("cutter", cutter, _DARK), ("body", mounted(run.tool.solids, machine), _STEEL)):
             if solids:
@@ -132,5 +134,5 @@ class Scene:
 
 def _rgb(colour: str) -> Rgb:
     """Return the numbers of "#rrggbb"."""
-    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
     return red, green, blue
