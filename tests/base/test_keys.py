@@ -18,7 +18,7 @@ from pentapod.base.tables import Table, table_of
 from pentapod.base.units import from_si, split_key, to_si
 from pentapod.cutters import CUTTERS
 from pentapod.machine.tables import PARTS
-from pentapod.toolpath import STRATEGIES
+from pentapod.toolpath import STRATEGIES, GougeOptions, Orientation, Region
 
 
 class Colour(StrEnum):
@@ -87,7 +87,14 @@ def test_lengths_are_checked_against_the_part():
 
 
 def test_every_default_is_the_same_in_si_and_in_the_unit_of_files():
-    parts = {**PARTS, **CUTTERS, **{name: strategy.options for name, strategy in STRATEGIES.items()}}
+    parts = {
+        "region": Region,
+        "axis": Orientation,
+        "gouge": GougeOptions,
+        **PARTS,
+        **CUTTERS,
+        **{name: strategy.options for name, strategy in STRATEGIES.items()},
+    }
     for cls in parts.values():
         for item in declared(cls):
             assert item.key.meaning

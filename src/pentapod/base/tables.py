@@ -63,8 +63,8 @@ def table_of(cls: type, base: type[TableType]) -> type[TableType]:
 
 
 def extended(name: str, base: type[TableType], cls: type) -> type[TableType]:
-    """Return a table with the keys of another one, and those that a dataclass declares."""
-    made: Any = create_model(name, __base__=base, __doc__=base.__doc__, **table_fields(cls))
+    """Return a table with the keys of another one, and those that a dataclass declares; it pickles as `name`."""
+    made: Any = create_model(name, __base__=base, __module__=base.__module__, __doc__=base.__doc__, **table_fields(cls))
     return made
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import VECTOR, Key
 from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
 
@@ -21,9 +23,21 @@ class Region(Value):
     Raises ToolpathError for a direction of no length, an angle out of range, or a flat box.
     """
 
-    direction: Floats | tuple[float, float, float] = (0.0, 0.0, 1.0)
-    angle: float = float(np.radians(80.0))
-    box: Floats | tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
+    box: Annotated[
+        Floats | tuple[tuple[float, float, float], tuple[float, float, float]] | None,
+        Key(
+            "mm", "machine only inside this box: two opposite corners, mesh frame, scaled",
+            name="region_box", kind=tuple[VECTOR, VECTOR],
+        ),
+    ] = None  # fmt: skip
+    direction: Annotated[
+        Floats | tuple[float, float, float],
+        Key("", "direction that the machined side faces, mesh frame", name="region_direction", kind=VECTOR),
+    ] = (0.0, 0.0, 1.0)
+    angle: Annotated[
+        float,
+        Key("deg", "machine only where the normal is within this angle of it", name="region_angle", gt=0.0, lt=90.0),
+    ] = float(np.radians(80.0))
 
     def __post_init__(self) -> None:
         direction = frozen(self.direction, "region.direction", (3,))

@@ -72,10 +72,15 @@ def test_a_job_pickles(make_job):
 
 
 @pytest.mark.parametrize(
-    ("key", "more"),
-    [("stepover_mm", "stepover_mm = 90000"), ("clearance_mm", "stepover_mm = 15\nclearance_mm = 90000")],
+    ("key", "old", "new"),
+    [
+        ("toolpath.stepover_mm", "stepover_mm = 15", "stepover_mm = 90000"),
+        ("toolpath.clearance_mm", "stepover_mm = 15", "stepover_mm = 15\nclearance_mm = 90000"),
+        ("axis.smoothing_reach_mm", "tilt_deg = 0", "tilt_deg = 0\nsmoothing_reach_mm = 90000"),
+        ("gouge.highest_mm", "[feed]", "[gouge]\nhighest_mm = 90000\n[feed]"),
+    ],
 )
-def test_a_length_larger_than_the_part_is_told_with_its_line(make_job, key, more):
-    job = Job.load(make_job(("stepover_mm = 15", more)))
-    with pytest.raises(JobError, match=rf"job\.toml:1\d: toolpath\.{key}: too large for the part, .*expected at most"):
+def test_a_length_larger_than_the_part_is_told_with_its_line(make_job, key, old, new):
+    job = Job.load(make_job((old, new)))
+    with pytest.raises(JobError, match=rf"job\.toml:\d+: {key}: too large for the part, .*expected at most"):
         job_mesh(job)

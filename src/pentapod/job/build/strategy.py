@@ -9,6 +9,8 @@ from pentapod.base.units import from_si
 from pentapod.job.schema.job import Job
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.region import Region
+from pentapod.toolpath.axis.orientation import Orientation
+from pentapod.toolpath.gouge.report import GougeOptions
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.strategies.registry import STRATEGIES
 
@@ -32,8 +34,7 @@ def job_options(job: Job) -> PathOptions:
 
 def job_region(job: Job) -> Region:
     """Return which part of the surface a job machines."""
-    part = job.part.si
-    return Region(direction=part.region_direction, angle=part.region_angle, box=part.region_box)
+    return Region(**fields_from(Region, job.part))
 
 
 def job_sink(job: Job) -> float:
@@ -43,7 +44,7 @@ def job_sink(job: Job) -> float:
 
 
 def check_sizes(job: Job, mesh: Mesh) -> None:
-    """Raise JobError for a tolerance or a length of the strategy that makes no sense for the part."""
+    """Raise JobError for a tolerance or another length that makes no sense for the part."""
     extent = float(np.ptp(mesh.bounds, axis=0).max())
     largest = f"the part, whose largest extent is {from_si(extent, 'mm'):.4g} mm"
     remedy = "check part.unit and part.scale"
@@ -52,8 +53,11 @@ def check_sizes(job: Job, mesh: Mesh) -> None:
             expected = f"at most {from_si(_LARGEST_TOLERANCE * extent, 'mm'):.3g}"
             what = f"the tolerance is too large for {largest}"
             raise job.error("tolerance", key, what, expected=expected, remedy=remedy)
+    options: dict[str, type] = {"axis": Orientation, "gouge": GougeOptions}
     if job.toolpath.strategy in STRATEGIES:
-        options = STRATEGIES[job.toolpath.strategy].options
-        if (item := oversized(options, fields_from(options, job.toolpath), extent)) is not None:
+        options["toolpath"] = STRATEGIES[job.toolpath.strategy].options
+    for table, cls in options.items():
+        values = fields_from(cls, getattr(job, table))
+        if (item := oversized(cls, values, extent)) is not None:
             expected = f"at most {from_si(item.key.of_part * extent, 'mm'):.4g}"
-            raise job.error("toolpath", item.file_key, f"too large for {largest}", expected=expected, remedy=remedy)
+            raise job.error(table, item.file_key, f"too large for {largest}", expected=expected, remedy=remedy)

@@ -19,12 +19,11 @@ from pentapod.job.build.strategy import job_sink
 from pentapod.job.schema.job import Job
 from pentapod.job.schema.strategies import FileTable
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath.axis.modes import AxisMode, Between, Fixed, Normal, Pointed
 from pentapod.toolpath.axis.orientation import Orientation
 from pentapod.toolpath.axis.orienting import oriented
 from pentapod.toolpath.axis.steps import fastest_turn, stepped
-from pentapod.toolpath.gouge.gouge import checked
+from pentapod.toolpath.gouge.gouge import without_gouges
 from pentapod.toolpath.gouge.report import GougeOptions, Remedy
 from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.options import PathOptions
@@ -82,15 +81,7 @@ def job_tool(job: Job) -> Tool:
 
 def job_orientation(job: Job) -> Orientation:
     """Return how the job wants the tool to stand."""
-    axis = job.axis.si
-    return Orientation(
-        mode=_mode(job),
-        lead=axis.lead,
-        tilt=axis.side,
-        smoothing=axis.smoothing,
-        reach=axis.smoothing_reach,
-        rate=axis.rate,
-    )
+    return Orientation(mode=_mode(job), **fields_from(Orientation, job.axis))
 
 
 def finished_as_asked(
@@ -101,28 +92,26 @@ def finished_as_asked(
     axis_step = np.inf if from_file else job.toolpath.si.axis_step
     if not from_file:
         toolpath = stepped(oriented(toolpath, tool, job_orientation(job)), axis_step)
-    gouge = job.gouge.si
+    gouge = fields_from(GougeOptions, job.gouge)
     options = GougeOptions(
         # A toolpath from a file is somebody's: nothing is taken out of it unasked.
-        tuple(Remedy(name) for name in gouge.remedy or ("report" if from_file else "drop",)),
+        tuple(Remedy(name) for name in job.gouge.remedy or ("report" if from_file else "drop",)),
         # What is engraved is meant to be below the surface.
-        tolerance=gouge.tolerance + job_sink(job),
-        cone=gouge.cone,
-        highest=gouge.highest,
+        **{**gouge, "tolerance": gouge["tolerance"] + job_sink(job)},
         links=None if from_file else job_link_style(job, mesh, toolpath),
     )
-    toolpath, report = checked(toolpath, tool, FacetTree.of(mesh), options, progress)
+    toolpath, report = without_gouges(toolpath, tool, mesh, options, progress)
     if not report.tilted:
         return toolpath, report
     # What was tilted clear may turn faster than before.
     toolpath = stepped(toolpath, axis_step)
-    fastest, most = float(from_si(fastest_turn(toolpath), "deg_mm")), job.axis.rate_deg_mm
+    fastest, most = float(from_si(fastest_turn(toolpath), "deg_mm")), from_si(job.axis.si.rate, "deg_mm")
     return toolpath, Reports((report, TurnReport(fastest, most))) if most and fastest > most * _SLACK else report
 
 
 def job_link_style(job: Job, mesh: Mesh, toolpath: Toolpath) -> LinkStyle:
     """Return how ways are led that the toolpath did not have: along the axis and over the clearance level."""
-    view = normalised(job.part.region_direction)
+    view = normalised(job.part.si.region_direction)
     top = max(float((mesh.vertices @ view).max()), float((toolpath.tips @ view).max()))
     style = _FILE_STYLE if isinstance(job.toolpath, FileTable) else job.toolpath.si
     level = top + max(style.clearance, 2.0 * style.approach)

@@ -1,8 +1,8 @@
 """The tables of a job file: every key with its unit, meaning, default and range, stated once.
 
-The keys of [toolpath] and [tool] are declared beside strategies and cutters (`Key`), all others here. Parser, error
-messages, `pentapod new` and the reference are made from them. Units are in the names; values are as in the file (mm,
-degrees, mm/min), and in SI at `table.si`.
+Keys of strategies, cutters, regions, orientations, gouges and tool limits are declared there, beside the SI fields that
+they set (`Key`); all others here. Parser, error messages, `pentapod new` and the reference are made from them. Units
+are in the names; values are as in the file (mm, degrees, mm/min), and in SI at `table.si`.
 """
 
 from __future__ import annotations
@@ -16,9 +16,12 @@ from pentapod.job.schema.placement import FixtureTable, PlacementTable
 from pentapod.job.schema.strategies import ToolpathTable, strategy_table
 from pentapod.job.schema.tool import AnyTool, tool_table
 from pentapod.machine.tool_limits import ToolLimits
+from pentapod.mesh.region import Region
+from pentapod.toolpath.axis.orientation import Orientation
+from pentapod.toolpath.gouge.report import GougeOptions
 
 
-class PartTable(Table):
+class MeshTable(Table):
     """The workpiece: its mesh, and which side of it is machined."""
 
     mesh: str = Field(
@@ -33,26 +36,21 @@ class PartTable(Table):
         default=False,
         description="turn facets so that all are wound alike (doubled or empty ones are left out anyway, and told)",
     )
-    region_box_mm: tuple[Vector, Vector] | None = Field(
-        default=None,
-        description="machine only inside this box: two opposite corners, mesh frame, scaled",
-    )
-    region_direction: Vector = Field(
-        default=(0.0, 0.0, 1.0), description="direction that the machined side faces, mesh frame"
-    )
-    region_angle_deg: float = Field(
-        default=80.0, gt=0.0, lt=90.0, description="machine only where the normal is within this angle of it"
-    )
 
     @model_validator(mode="after")
-    def _box(self) -> PartTable:
-        if self.region_box_mm is not None:
-            low, high = self.region_box_mm
-            if any(a == b for a, b in zip(low, high, strict=True)):
-                wrong("region_box_mm", "the box is flat", "corners that differ in x, y and z")
-        if not any(self.region_direction):
+    def _region(self) -> MeshTable:
+        box = self.si.region_box
+        if box is not None and (box[0] == box[1]).any():
+            wrong("region_box_mm", "the box is flat", "corners that differ in x, y and z")
+        if not any(self.si.region_direction):
             wrong("region_direction", "the direction is zero", "a direction such as [0, 0, 1]")
         return self
+
+
+if TYPE_CHECKING:
+    PartTable = MeshTable
+else:
+    PartTable = extended("PartTable", MeshTable, Region)
 
 
 class MachineTable(Table):
@@ -68,7 +66,7 @@ class MachineTable(Table):
         return self
 
 
-class AxisTable(Table):
+class ModeTable(Table):
     """How freely the tool axis may lean."""
 
     tilt_deg: float = Field(
@@ -86,14 +84,9 @@ class AxisTable(Table):
     line: Vector | None = Field(default=None, description="toward, from: direction of a line through the point")
     places_mm: tuple[Vector, ...] | None = Field(default=None, description="between: where the directions hold")
     directions: tuple[Vector, ...] | None = Field(default=None, description="between: one direction for each place")
-    lead_deg: float = Field(default=0.0, ge=-80.0, le=80.0, description="leaning forwards, along the feed")
-    side_deg: float = Field(default=0.0, ge=-80.0, le=80.0, description="leaning to the left of the feed")
-    smoothing_deg: float = Field(default=0.0, ge=0.0, le=45.0, description="by which smoothing may turn an axis")
-    smoothing_reach_mm: Positive = Field(default=5.0, description="over which it works, along and across the passes")
-    rate_deg_mm: Positive | None = Field(default=None, description="most turning of the axis per mm of a cut")
 
     @model_validator(mode="after")
-    def _mode_keys(self) -> AxisTable:
+    def _mode_keys(self) -> ModeTable:
         needed = _MODE_KEYS[self.mode]
         for key in ("direction", "point_mm", "places_mm", "directions"):
             given = getattr(self, key) is not None
@@ -110,6 +103,11 @@ class AxisTable(Table):
         return self
 
 
+if TYPE_CHECKING:
+    AxisTable = ModeTable
+else:
+    AxisTable = extended("AxisTable", ModeTable, Orientation)
+
 _MODE_KEYS: dict[str, tuple[str, ...]] = {
     "normal": (),
     "fixed": ("direction",),
@@ -119,7 +117,7 @@ _MODE_KEYS: dict[str, tuple[str, ...]] = {
 }
 
 
-class GougeTable(Table):
+class RemedyTable(Table):
     """What is done where cutter, shank or holder would cut into the part."""
 
     remedy: tuple[Literal["tilt", "lift", "drop", "report"], ...] | None = Field(
@@ -128,9 +126,12 @@ class GougeTable(Table):
         description='tried in this order: "tilt", "lift", "drop"; or "report" alone, and the verdict fails where it'
         ' gouges; when left out "drop", for a toolpath from a file "report"',
     )
-    tolerance_mm: Positive = Field(default=0.05, description="depth that counts as none")
-    cone_deg: float = Field(default=30.0, gt=0.0, lt=90.0, description="tilt: most that an axis may turn")
-    highest_mm: Positive = Field(default=20.0, description="lift: most that a waypoint may rise")
+
+
+if TYPE_CHECKING:
+    GougeTable = RemedyTable
+else:
+    GougeTable = extended("GougeTable", RemedyTable, GougeOptions)
 
 
 class SpeedTable(Table):

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import Key, check_fields
 from pentapod.base.values import Value
 from pentapod.geometry.runs import run_starts
 from pentapod.toolpath.axis.modes import AxisMode, Normal, leaned
@@ -17,28 +19,22 @@ from pentapod.toolpath.axis.smoothing import rate_capped, smoothed, tangents
 
 @dataclass(frozen=True)
 class Orientation(Value):
-    """How the tool stands. mode: the direction; lead, tilt: radians from it, forwards and to the left of the feed.
+    """The nominal tool axis along the passes. mode: the direction from which lead and tilt count.
 
-    smoothing: radians by which smoothing may turn an axis, 0 for none; reach: metres over which it works, along and
-    across the passes. rate: most radians of turning per metre of path, None for no cap. Raises ToolpathError for
-    values that make no sense.
+    smoothing: 0 for none. rate: radians per metre, None for no cap. Raises ToolpathError for values out of range.
     """
 
     mode: AxisMode = field(default_factory=Normal)
-    lead: float = 0.0
-    tilt: float = 0.0
-    smoothing: float = 0.0
-    reach: float = 5e-3
-    rate: float | None = None
+    lead: Annotated[float, Key("deg", "lead angle: to the front, along the feed", ge=-80.0, le=80.0)] = 0.0
+    tilt: Annotated[float, Key("deg", "side tilt: to the left of the feed", name="side", ge=-80.0, le=80.0)] = 0.0
+    smoothing: Annotated[float, Key("deg", "largest angle by which smoothing may turn an axis", ge=0.0, le=45.0)] = 0.0
+    reach: Annotated[
+        float, Key("mm", "distance over which it works, along and across the passes", name="smoothing_reach", gt=0.0)
+    ] = 5e-3
+    rate: Annotated[float | None, Key("deg_mm", "largest turn of the axis per mm of a cut", gt=0.0)] = None
 
     def __post_init__(self) -> None:
-        for key in ("lead", "tilt"):
-            if not abs(getattr(self, key)) <= np.radians(80.0):
-                raise ToolpathError("out of range", key=key, value=getattr(self, key), expected="within ±80°")
-        if not (0.0 <= self.smoothing < np.pi and 0.0 < self.reach < np.inf):
-            raise ToolpathError("impossible smoothing", key="smoothing", value=(self.smoothing, self.reach))
-        if self.rate is not None and not 0.0 < self.rate < np.inf:
-            raise ToolpathError("must be positive", key="rate", value=self.rate)
+        check_fields(self, ToolpathError)
 
     def axes(self, runs: list[tuple[Floats, Floats]]) -> list[Floats]:
         """Return unit axes (n, 3) for each run of contacts and unit normals (n, 3), in the order and sense of travel.

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import check_size
 from pentapod.base.progress import Progress, silent
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
@@ -30,7 +32,11 @@ _RISES = (0.05, 0.1, 0.25, 0.5, 1.0)
 def without_gouges(
     toolpath: Toolpath, tool: Tool, part: Mesh, options: GougeOptions, progress: Progress = silent
 ) -> tuple[Toolpath, GougeReport]:
-    """Return `checked` against a part as it is loaded: the toolpath with its gouges remedied, and what was found."""
+    """Return `checked` against a part as it is loaded: the toolpath with its gouges remedied, and what was found.
+
+    Raises ToolpathError for lengths of the options that are much larger than the part.
+    """
+    check_size(options, float(np.ptp(part.bounds, axis=0).max()), ToolpathError)
     return checked(toolpath, tool, FacetTree.of(part), options, progress)
 
 

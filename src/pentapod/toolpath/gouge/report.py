@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Annotated
 
 import numpy as np
 
 from pentapod.base.errors import ToolpathError
+from pentapod.base.keys import Key, check_fields
 from pentapod.base.values import Value
 from pentapod.geometry.solids import KINDS
 from pentapod.toolpath.linking.links import LinkStyle
@@ -27,24 +29,22 @@ class Remedy(StrEnum):
 
 @dataclass(frozen=True)
 class GougeOptions(Value):
-    """remedies: tried in this order on what still gouges. tolerance: depth that counts as none, metres.
+    """What is done about gouges. remedies: tried in this order on what still gouges.
 
-    cone: half angle in radians within which tilting may turn the axis. highest: most that lifting may lift, metres.
     links: how ways between cuts are led anew where the old ones meet the part; None: they stay, and are told.
     Raises ToolpathError for values that make no sense.
     """
 
     remedies: tuple[Remedy, ...] = (Remedy.REPORT,)
-    tolerance: float = 20e-6
-    cone: float = float(np.radians(30.0))
-    highest: float = 20e-3
+    tolerance: Annotated[float, Key("mm", "depth that counts as none", gt=0.0)] = 50e-6
+    cone: Annotated[float, Key("deg", "tilt: largest angle by which an axis may turn", gt=0.0, lt=90.0)] = float(
+        np.radians(30.0)
+    )
+    highest: Annotated[float, Key("mm", "lift: largest rise of a waypoint", gt=0.0)] = 20e-3
     links: LinkStyle | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        if not (self.tolerance > 0.0 and 0.0 < self.cone < 0.5 * np.pi and self.highest > 0.0):
-            raise ToolpathError(
-                "impossible limits", key="gouge", value=(self.tolerance, self.cone, self.highest), expected="positive"
-            )
+        check_fields(self, ToolpathError)
 
 
 @dataclass(frozen=True)
