@@ -10,7 +10,7 @@ from pentapod.base.refusal import Refusal
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
 from pentapod.planning import LegPath, PlacedPath, leg_path, plan
-from pentapod.planning.placement.sampling import best_tilted_margins, first_guesses
+from pentapod.planning.placement.sampling import SamplingOptions, best_tilted_margins, first_guesses
 from pentapod.planning.plan import NEEDED_MARGIN
 from pentapod.planning.problem.constraints import FREE
 from pentapod.planning.problem.problem import PlacementProblem
@@ -27,7 +27,7 @@ AXIS_TOLERANCE = np.radians(0.5)
 def brute_force(instance: Instance, machine: Machine, samples: int) -> float:
     """Return the best smallest margin of random placements with each waypoint's tilt chosen by itself."""
     task = ToolpathSamples.of(instance.toolpath, instance.tilt)
-    guesses = first_guesses(PlacementProblem.of(task, machine), seed=99, tries=samples)
+    guesses = first_guesses(PlacementProblem.of(task, machine), seed=99, options=SamplingOptions(tries=samples))
     return max(best_tilted_margins(task, g.margins, g.transform)[0].min() for g in guesses)
 
 

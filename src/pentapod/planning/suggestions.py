@@ -1,9 +1,9 @@
-"""What would make a refused part fit, found by trying: another place, a wider cone, a smaller region."""
+"""Suggestions for a part that does not fit, found by trying: another place, a wider tilt cone, a smaller region."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,9 +14,22 @@ from pentapod.planning.problem.problem import Candidate, PlacementProblem
 Raise = Callable[[PlacementProblem, Candidate], Candidate]
 """Improves a candidate of a problem, its placement free, until it fits."""
 
-_WIDER = np.radians([5.0, 10.0, 20.0])
-_WIDEST = np.radians(45.0)
-_SMALLEST_SHARE, _HALVINGS = 0.25, 4
+
+@dataclass(frozen=True)
+class SuggestionOptions:
+    """What is tried.
+
+    wider_deg: by how much the cone is widened, up to widest_deg. halvings: steps of the bisection for the largest
+    region; smallest_share: of the path's extents, below which none is suggested.
+    """
+
+    wider_deg: tuple[float, ...] = (5.0, 10.0, 20.0)
+    widest_deg: float = 45.0
+    halvings: int = 4
+    smallest_share: float = 0.25
+
+
+_OPTIONS = SuggestionOptions()
 
 
 def suggestions(problem: PlacementProblem, best: Candidate, improve: Raise, needed: float) -> tuple[str, ...]:
@@ -41,7 +54,9 @@ def _move(problem: PlacementProblem, best: Candidate, improve: Raise, needed: fl
 def _cone(problem: PlacementProblem, best: Candidate, improve: Raise, needed: float) -> str:
     """Return the least of a few wider cones that was found to do; the widest is tried first: it may not do either."""
     samples = problem.samples
-    wider = [float(tilt) for tilt in samples.tilt + _WIDER if tilt <= _WIDEST]
+    wider = [
+        float(tilt) for tilt in samples.tilt + np.radians(_OPTIONS.wider_deg) if tilt <= np.radians(_OPTIONS.widest_deg)
+    ]
 
     def fits(tilt: float) -> bool:
         there = problem.along(replace(samples, tilt=tilt))
@@ -63,7 +78,7 @@ def _region(problem: PlacementProblem, best: Candidate, improve: Raise, needed: 
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     fits, too_large, start = 0.0, 1.0, best
     share = 0.6
-    for _ in range(_HALVINGS):
+    for _ in range(_OPTIONS.halvings):
         inside = np.flatnonzero((np.abs(problem.samples.pivots - middle) <= share * half + 1e-9).all(axis=1))
         found = None
         if len(inside) > 0:
@@ -74,7 +89,7 @@ def _region(problem: PlacementProblem, best: Candidate, improve: Raise, needed: 
         else:
             too_large = share
         share = 0.5 * (fits + too_large) if fits > 0.0 else 0.5 * share
-        if share < _SMALLEST_SHARE:
+        if share < _OPTIONS.smallest_share:
             break
     if fits == 0.0:
         return ""

@@ -16,7 +16,7 @@ from pentapod.planning.diagnosis import diagnose
 from pentapod.planning.limits.limit import Comforts
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.ipopt import IpoptSolver
-from pentapod.planning.placement.sampling import first_candidate, first_guesses
+from pentapod.planning.placement.sampling import SamplingOptions, first_candidate, first_guesses
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.formulation import step_slopes, stepped
 from pentapod.planning.problem.problem import PlacementProblem
@@ -149,7 +149,7 @@ def problem(desk, cap):
 @pytest.fixture(scope="module")
 def free(desk, problem):
     """A first guess where nothing is in the way."""
-    guess = first_guesses(problem, tries=2000)[0]
+    guess = first_guesses(problem, options=SamplingOptions(tries=2000))[0]
     return first_candidate(problem, guess.margins, guess.transform)
 
 
@@ -236,7 +236,7 @@ def test_a_refusal_names_the_fixture(desk, problem, free):
 
 def test_first_guesses_see_the_fixture(desk, problem, free):
     crowded = Surroundings((beside(desk, problem, free, 1, 0.0),))
-    plain = first_guesses(problem, tries=1500)
+    plain = first_guesses(problem, options=SamplingOptions(tries=1500))
     there = PlacementProblem.of(problem.samples, desk, component=PLUS, surroundings=crowded)
-    seen = first_guesses(there, tries=1500)
+    seen = first_guesses(there, options=SamplingOptions(tries=1500))
     assert seen[0].margin <= plain[0].margin

@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 from pentapod.kinematics.component import Component
 from pentapod.numerics.convex.dense_qp import dense_qp
 from pentapod.planning.placement.curvature import Curvature
-from pentapod.planning.placement.sampling import first_candidate, first_guesses
+from pentapod.planning.placement.sampling import SamplingOptions, first_candidate, first_guesses
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.formulation import stepped
 from pentapod.planning.problem.problem import PlacementProblem
@@ -53,7 +53,7 @@ def test_without_an_interior_there_is_no_answer():
 def test_curvature_against_differences(desk, cap):
     """The Lagrangian of the margins, weighed by multipliers, along a line: second differences of the margins."""
     problem = PlacementProblem.of(ToolpathSamples.of(cap, np.radians(15.0)), desk, component=Component(1, 1))
-    guess = first_guesses(problem, tries=2000)[0]
+    guess = first_guesses(problem, options=SamplingOptions(tries=2000))[0]
     at = first_candidate(problem, guess.margins, guess.transform)
     rows = np.arange(len(problem.samples.pivots))
     model = SequentialSolver(problem, free=True).model(at, rows, at.smallest)

@@ -7,7 +7,7 @@ from planning_instances import instances
 
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.placement.ipopt import IpoptSolver
-from pentapod.planning.placement.sampling import first_candidate, first_guesses
+from pentapod.planning.placement.sampling import SamplingOptions, first_candidate, first_guesses
 from pentapod.planning.placement.search import search
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.formulation import stepped
@@ -28,7 +28,7 @@ def problem(desk):
 
 @pytest.fixture(scope="module")
 def start(problem, desk):
-    guess = first_guesses(problem, tries=2000)[0]
+    guess = first_guesses(problem, options=SamplingOptions(tries=2000))[0]
     return first_candidate(problem, guess.margins, guess.transform)
 
 

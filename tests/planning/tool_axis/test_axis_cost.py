@@ -8,21 +8,22 @@ from planning_instances import instances
 from pentapod.planning.leg_path.leg_path import leg_path
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.planning.placement.placement import Placement
-from pentapod.planning.placement.sampling import first_candidate, first_guesses
+from pentapod.planning.placement.sampling import SamplingOptions, first_candidate, first_guesses
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
-from pentapod.planning.tool_axis import cost as axis_cost
-from pentapod.planning.tool_axis.cost import EXCESS_WEIGHT, AxisCost
+from pentapod.planning.tool_axis.cost import AxisCost, CostOptions
+from pentapod.planning.tool_axis.smoothing import SmoothingOptions, smoothed
 from pentapod.planning.tool_axis.spline import BANDS, FORESIGHT_M, AxisSpline
 
 KEPT = 0.9
+COST = CostOptions()
 
 
 def candidate_of(instance, desk):
     problem = PlacementProblem.of(ToolpathSamples.of(instance.toolpath, max(instance.tilt, 0.1)), desk)
-    guess = first_guesses(problem, tries=2000)[0]
+    guess = first_guesses(problem, options=SamplingOptions(tries=2000))[0]
     return problem, first_candidate(problem, guess.margins, guess.transform)
 
 
@@ -70,7 +71,7 @@ def test_charges_are_sums_over_the_nodes(made, desk):
     worst = strict.max(axis=1)
     nominal = problem.samples.nominal[course_of(problem).nodes]
     rates = np.linalg.norm(np.diff(nominal, axis=0), axis=1) / np.diff(way)
-    price = EXCESS_WEIGHT * FORESIGHT_M**2 * ((np.diff(way) * rates**2).sum() / (way[-1] - way[0]) + 0.1**2)
+    price = CostOptions().weight * FORESIGHT_M**2 * ((np.diff(way) * rates**2).sum() / (way[-1] - way[0]) + 0.1**2)
     charge = 0.0
     for j, row in enumerate(ours):
         excess = np.maximum(row - worst[j] - 0.01 * np.median(worst), 0.0) / (worst[j] + 0.5 * np.median(worst))
@@ -124,22 +125,21 @@ def _least_excess(lacking, count):
 
 
 @pytest.mark.parametrize("number", [2, 6, 11])
-def test_calm_axes_ask_no_more_of_axis_and_legs_than_strict_normals(desk, number):
+def test_smooth_axes_ask_no_more_of_axis_and_legs_than_strict_normals(desk, number):
     """Along the finished path, within 10 % of the strict normals' and 1 % of their peak, but for a hundredth of it."""
     assert above_strict(desk, number) < 0.01
 
 
-def test_without_charges_the_calmest_axes_ask_more_of_the_legs(desk, monkeypatch):
-    monkeypatch.setattr(axis_cost, "EXCESS_WEIGHT", 1e-9)
-    assert above_strict(desk, 6) > 0.05
+def test_without_charges_the_smoothest_axes_ask_more_of_the_legs(desk):
+    assert above_strict(desk, 6, CostOptions(weight=1e-9)) > 0.05
 
 
-def above_strict(desk, number):
+def above_strict(desk, number, cost=COST):
     """Return the share of a path where a leg's acceleration is above what strict normals ask of any leg there."""
     instance = instances(12)[number]
     problem, at = candidate_of(instance, desk)
     at = SequentialSolver(problem, free=True).raise_margin(at)
-    smooth = SequentialSolver(problem, free=False).smooth(at, KEPT * at.smallest)
+    smooth = smoothed(problem, at, KEPT * at.smallest, SmoothingOptions(cost=cost))
     strict, ours = (
         accelerations(instance, problem, at, desk, axes)
         for axes in (problem.samples.nominal, lean(problem.samples.nominal, course_of(problem).leans(smooth)))

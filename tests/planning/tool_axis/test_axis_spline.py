@@ -9,7 +9,7 @@ from planning_instances import instances
 from scipy import sparse
 
 from pentapod.numerics.convex.banded_qp import BandedQP, SoftRows
-from pentapod.planning.placement.sampling import first_candidate, first_guesses
+from pentapod.planning.placement.sampling import SamplingOptions, first_candidate, first_guesses
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.tool_axis.smoothing import smoothed
@@ -158,7 +158,7 @@ def test_short_paths_and_single_places_have_a_course(moved, desk):
     pivots = np.array(moved)[:, None] * [1.0, 0.0, 0.0]
     task = ToolpathSamples(pivots, np.tile([0.0, 0.0, 1.0], (len(pivots), 1)), 0.003, 0.2)
     problem = PlacementProblem.of(task, desk)
-    guess = first_guesses(problem, tries=500)[0]
+    guess = first_guesses(problem, options=SamplingOptions(tries=500))[0]
     start = first_candidate(problem, guess.margins, guess.transform)
     strict = problem.values_of(start.margins, start.transform, np.zeros_like(pivots)).min()
     smooth = smoothed(problem, start, strict - 0.01)

@@ -15,7 +15,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.progress import Progress, silent
 from pentapod.machine.machine import Machine
 from pentapod.planning.placement.rail_positions import DIGITS, at_rail_positions, guides_of
-from pentapod.planning.placement.sampling import best_tilted_margins, first_guesses
+from pentapod.planning.placement.sampling import SamplingOptions, best_tilted_margins, first_guesses
 from pentapod.planning.placement.search import SOLVERS, Search, SolverName, search
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.problem import PlacementProblem
@@ -94,7 +94,7 @@ def _promising(
 
 def _promise(problem: PlacementProblem, seed: int, options: ReconfigurationOptions) -> float:
     if problem.constraints.moves:
-        return max(guess.margin for guess in first_guesses(problem, seed, options.tries))
+        return max(guess.margin for guess in first_guesses(problem, seed, SamplingOptions(tries=options.tries)))
     few = problem.samples.at(problem.samples.representatives(options.waypoints))
     poses = problem.constraints.poses
     return max(float(best_tilted_margins(few, m, pose)[0].min()) for m in problem.margins for pose in poses)

@@ -19,14 +19,6 @@ from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.tool_axis.cost import AxisCost
 from pentapod.planning.tool_axis.spline import AxisSpline, within_discs
 
-_POINTS, _ROUNDS = 96, 16
-_NEAR = 0.6
-"""Kinds of margin within this much of the smallest one are considered from the start."""
-_ENOUGH, _NEARER, _NEAREST = 1e-4, 0.25, 1e-3
-"""With contacts: a gain that calls for another round; by how much steps are shortened without one, and how far."""
-_TRANSLATION_STEP_M, _ROTATION_STEP = 0.4, 0.8
-_UPRIGHT_WEIGHT = 1e-6
-"""Of the field's coefficients beside the margin: they only decide where the margin does not."""
 _OPTIONS: dict[str, Any] = {
     "print_time": False,
     "error_on_fail": False,
@@ -41,6 +33,28 @@ _OPTIONS: dict[str, Any] = {
 }
 
 
+@dataclass(frozen=True)
+class IpoptOptions:
+    """Options of the constraint generation; those of IPOPT itself are fixed.
+
+    waypoints, rounds: so many at first, and at most so many programs. near: kinds of margin within this much of the
+    smallest one are considered from the start. gain: with contacts, a gain that calls for another round; shorter,
+    shortest: factor on the steps without such a gain, and the least. translation_m, rotation: longest step of the
+    placement, metres and tan(angle / 2). upright: weight of the field's coefficients beside the margin, which decides
+    where the margin does not.
+    """
+
+    waypoints: int = 96
+    rounds: int = 16
+    near: float = 0.6
+    gain: float = 1e-4
+    shorter: float = 0.25
+    shortest: float = 1e-3
+    translation_m: float = 0.4
+    rotation: float = 0.8
+    upright: float = 1e-6
+
+
 @dataclass(eq=False)
 class IpoptSolver:
     """Improves candidates of one problem with IPOPT; free: whether the placement may move.
@@ -53,13 +67,14 @@ class IpoptSolver:
     free: bool
     whole: bool = False
     patience: float = 1e6
+    options: IpoptOptions = IpoptOptions()
     _solvers: dict[Any, Any] = field(default_factory=dict[Any, Any])
 
     def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
         """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one."""
         best, (rows, kinds), reach = start, self._first(start), 1.0
         touching = bool(start.margins.surroundings.obstacles)
-        for _ in range(_ROUNDS):
+        for _ in range(self.options.rounds):
             transform, raw = self._solve(best, rows, kinds, reach)
             coefficients = self.problem.within_cone(raw)
             values = self.problem.values(best.margins, transform, coefficients)
@@ -68,11 +83,11 @@ class IpoptSolver:
             if smallest > before:
                 best = Candidate(best.margins, transform, coefficients, smallest)
             more = self._with_worst(rows, kinds, values, max(considered, before), raw)
-            if touching and smallest <= before + _ENOUGH:  # contacts hold near where they were taken
-                reach *= _NEARER
+            if touching and smallest <= before + self.options.gain:  # contacts hold near where they were taken
+                reach *= self.options.shorter
             elif not touching and len(more[0]) == len(rows) and len(more[1]) == len(kinds):
                 break
-            if reach < _NEAREST or best.smallest >= enough:
+            if reach < self.options.shortest or best.smallest >= enough:
                 break
             rows, kinds = more
         return best
@@ -89,7 +104,7 @@ class IpoptSolver:
         spline = AxisSpline.of(samples, problem.cone)
         count, first = len(samples.pivots), spline.fitted(problem.leans(start.coefficients))
         margins = problem.values_of(start.margins, start.transform, spline.leans(first))
-        kinds = [int(k) for k in np.flatnonzero((margins.min(axis=0) < keep + _NEAR) | self.whole)]
+        kinds = [int(k) for k in np.flatnonzero((margins.min(axis=0) < keep + self.options.near) | self.whole)]
         c = ca.MX.sym("c", 2, len(first))
         margins, _ = point_function(problem, start.margins, kinds).map(count)(
             ca.DM.zeros(6, count), spline.cone * ca.mtimes(c, ca.DM(spline.basis.T)),
@@ -108,7 +123,7 @@ class IpoptSolver:
         free, charged = first.size, excess.numel()
         begin = np.concatenate([first.ravel(), np.ones(charged)])
         least = np.concatenate([np.full(len(kinds) * count, keep), np.zeros(len(first) + room.numel())])
-        solver = ca.nlpsol("smooth", "ipopt", program, self._options)
+        solver = ca.nlpsol("smooth", "ipopt", program, self._ipopt)
         lowest = np.concatenate([np.full(free, -np.inf), np.zeros(charged)])
         found = np.asarray(solver(x0=begin, lbx=lowest, lbg=least, ubg=np.inf)["x"], dtype=np.float64)
         found = found.ravel()[:free].reshape(-1, 2)
@@ -119,9 +134,9 @@ class IpoptSolver:
     def _first(self, start: Candidate) -> tuple[Ints, Ints]:
         if self.whole:
             return np.arange(len(self.problem.samples.pivots)), np.arange(len(start.margins.limits))
-        rows = self.problem.samples.representatives(_POINTS)
+        rows = self.problem.samples.representatives(self.options.waypoints)
         values = self.problem.values(start.margins, start.transform, start.coefficients, rows).min(axis=0)
-        return np.sort(rows), np.flatnonzero(values < values.min() + _NEAR)
+        return np.sort(rows), np.flatnonzero(values < values.min() + self.options.near)
 
     def _with_worst(
         self, rows: Ints, kinds: Ints, values: Floats, level: float, coefficients: Floats
@@ -145,7 +160,7 @@ class IpoptSolver:
         basis, c = problem.basis[rows], at.coefficients
         motion = self._motion
         shifts = np.abs(motion[:3]).sum(axis=0) > 0.0
-        reach, moving = share * np.where(shifts, _TRANSLATION_STEP_M, _ROTATION_STEP), motion.shape[1]
+        reach, moving = share * np.where(shifts, self.options.translation_m, self.options.rotation), motion.shape[1]
         start = np.concatenate([np.zeros(moving), [at.smallest], c.ravel(), (basis @ c).ravel()])
         if samples.tilt == 0.0:
             start = start[: moving + 1]
@@ -173,7 +188,7 @@ class IpoptSolver:
         return problem.constraints.nearest_to(stepped(at.transform, motion @ x[:moving])), coefficients
 
     @property
-    def _options(self) -> dict[str, Any]:
+    def _ipopt(self) -> dict[str, Any]:
         return _OPTIONS | {"ipopt.max_cpu_time": self.patience}
 
     @property
@@ -218,8 +233,8 @@ class IpoptSolver:
         program = {
             "x": ca.vertcat(*unknowns),
             "p": ca.vertcat(ca.vec(points), ca.vec(basis), ca.vec(rotation), translation, ca.vec(touching)),
-            "f": -least + _UPRIGHT_WEIGHT * lean,
+            "f": -least + self.options.upright * lean,
             "g": ca.vertcat(*conditions),
         }
-        self._solvers[key] = ca.nlpsol("plan", "ipopt", program, self._options)
+        self._solvers[key] = ca.nlpsol("plan", "ipopt", program, self._ipopt)
         return self._solvers[key]

@@ -1,4 +1,4 @@
-"""First guesses for the placement: many at random, ranked by their smallest margin over a few waypoints."""
+"""Random sampling of placements: first guesses, ranked by their smallest margin over a few waypoints."""
 
 from __future__ import annotations
 
@@ -15,15 +15,25 @@ from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
 
-SAMPLES = 12_000
-KEPT = 6
-"""Guesses returned for each component; they differ from each other."""
 
-_RANKED = 48
-_FITTED = 192
-_APART_M, _APART_RAD = 0.02, np.radians(15.0)
-LARGEST_SLOPE = np.radians(40.0)
-"""How far the part's mean axis may lean from the base normal in a first guess."""
+@dataclass(frozen=True)
+class SamplingOptions:
+    """How many random placements are tried, and which are kept.
+
+    tries: for each branch. kept: guesses returned for each branch, which differ by apart_m in place or apart_rad in
+    orientation. ranked: the best that are refined. largest_slope: how far the part's mean axis may lean from the base
+    normal, radians.
+    """
+
+    tries: int = 12_000
+    kept: int = 6
+    ranked: int = 48
+    apart_m: float = 0.02
+    apart_rad: float = float(np.radians(15.0))
+    largest_slope: float = float(np.radians(40.0))
+
+
+_FITTED = 192  # waypoints to which the first tilt field is fitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,14 +45,16 @@ class Guess:
     margin: float
 
 
-def first_guesses(problem: PlacementProblem, seed: int = 0, tries: int = SAMPLES) -> list[Guess]:
+def first_guesses(
+    problem: PlacementProblem, seed: int = 0, options: SamplingOptions = SamplingOptions()
+) -> list[Guess]:
     """Return the best few of the allowed placements for each branch, best first.
 
     The same for a seed, on one kind of processor and with one set of libraries.
     Each placement is judged on a dozen representatives with their nominal axes, the best again with a cone of tilts and
     with the surroundings.
     """
-    samples, machine, constraints = problem.samples, problem.machine, problem.constraints
+    samples, machine, constraints, tries = problem.samples, problem.machine, problem.constraints, options.tries
     rng = np.random.default_rng(seed)
     rows = samples.representatives(12)
     centre, mean_axis = samples.pivots.mean(axis=0), samples.nominal.mean(axis=0)
@@ -50,12 +62,13 @@ def first_guesses(problem: PlacementProblem, seed: int = 0, tries: int = SAMPLES
     guesses: list[Guess] = []
     for margins in problem.margins:
         simple = samples.tilt == 0.0 and not margins.surroundings.obstacles
-        rotations, places = _rotations(mean_axis, -float(margins.component.w), tries, rng), _places(machine, tries, rng)
+        rotations = _rotations(mean_axis, -float(margins.component.w), tries, options.largest_slope, rng)
+        places = _places(machine, tries, rng)
         if constraints.is_bounded:
             rotations, origins = constraints.within(rotations, places - rotations @ centre, rng)
             places = origins + rotations @ centre
         for spread in (0.08, 0.03):  # twice closer around the best
-            best = _best(_score(samples, margins, rotations, places - rotations @ centre, rows))
+            best = _best(_score(samples, margins, rotations, places - rotations @ centre, rows), options.ranked)
             repeat = tries // 3 // len(best)
             turned, near = rotations[best].repeat(repeat, axis=0), places[best].repeat(repeat, axis=0)
             rotations = np.concatenate([rotations[best], _turned(turned, spread, rng)])
@@ -65,13 +78,13 @@ def first_guesses(problem: PlacementProblem, seed: int = 0, tries: int = SAMPLES
                 places = origins + rotations @ centre
         translations = places - rotations @ centre
         score = _score(samples, margins, rotations, translations, rows)
-        best = _best(score)
+        best = _best(score, options.ranked)
         found = [
             Guess(margins, t, float(score[k] if simple else _smallest(samples, margins, t, rows)))
             for k in best
             for t in (constraints.nearest_to(RigidTransform(_orthonormal(rotations[k]), translations[k])),)
         ]
-        guesses += _different(sorted(found, key=lambda g: -g.margin), centre)
+        guesses += _different(sorted(found, key=lambda g: -g.margin), centre, options)
     return sorted(guesses, key=lambda g: -g.margin)
 
 
@@ -116,22 +129,22 @@ def best_tilted_margins(
     return out, leans
 
 
-def _best(score: Floats) -> Ints:
-    return np.argsort(-score, kind="stable")[:_RANKED]
+def _best(score: Floats, count: int) -> Ints:
+    return np.argsort(-score, kind="stable")[:count]
 
 
-def _different(guesses: list[Guess], centre: Floats) -> list[Guess]:
-    """Return the first KEPT guesses that are not all but the same as one before."""
+def _different(guesses: list[Guess], centre: Floats, options: SamplingOptions) -> list[Guess]:
+    """Return the first guesses that differ from those before."""
     kept: list[Guess] = []
     for guess in guesses:
         for other in kept:
             apart = float(np.linalg.norm(guess.transform.apply(centre) - other.transform.apply(centre)))
             turn = 0.5 * (float(np.trace(guess.transform.rotation.T @ other.transform.rotation)) - 1.0)
-            if apart < _APART_M and turn > np.cos(_APART_RAD):
+            if apart < options.apart_m and turn > np.cos(options.apart_rad):
                 break
         else:
             kept.append(guess)
-        if len(kept) == KEPT:
+        if len(kept) == options.kept:
             break
     return kept
 
@@ -146,9 +159,9 @@ def _smallest(samples: ToolpathSamples, margins: Margins, placement: RigidTransf
     return float(best_tilted_margins(samples.at(rows), margins, placement)[0].min())
 
 
-def _rotations(mean_axis: Floats, side: float, count: int, rng: np.random.Generator) -> Floats:
-    """Return rotations (count, 3, 3) that turn the mean tool axis to within LARGEST_SLOPE of side · z."""
-    cosine = rng.uniform(np.cos(LARGEST_SLOPE), 1.0, count)
+def _rotations(mean_axis: Floats, side: float, count: int, slope: float, rng: np.random.Generator) -> Floats:
+    """Return rotations (count, 3, 3) that turn the mean tool axis to within `slope` radians of side · z."""
+    cosine = rng.uniform(np.cos(slope), 1.0, count)
     azimuth, spin = rng.uniform(0.0, 2.0 * np.pi, (2, count))
     sine = np.sqrt(1.0 - cosine * cosine)
     target = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), side * cosine], axis=1)

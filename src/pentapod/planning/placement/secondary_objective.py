@@ -1,8 +1,8 @@
-"""The second aim: beside enough margin, small leg forces or a short machining time.
+"""Secondary objective: small leg forces or a short machining time, by sequential linear programming.
 
-What the first aim leaves undecided, and a tenth of what it reached, is spent on the second: sequential linear
-programming on the linear model of the margins, the aim's own derivatives by central differences of its few ingredients
-at each waypoint (by the placement's motion and the waypoint's lean; the field follows from the leans by its basis).
+The margin may fall to nine tenths of the largest. The programs hold the linear model of the margins, and derivatives of
+the objective by central differences at each waypoint: by the placement's motion and the waypoint's lean; those by the
+tilt field follow from its basis.
 """
 
 from __future__ import annotations
@@ -26,10 +26,8 @@ from pentapod.toolpath.toolpath import Toolpath
 
 SecondaryObjective = Literal["force", "time"]
 
-_STEPS = 40
-_WORST, _SPREAD = 48, 96
-_STEP = 1e-5
-_SMALLEST_REACH, _ENOUGH, _SLACK = 1e-3, 1e-3, 1e-5
+_WORST, _SPREAD = 48, 96  # waypoints whose forces enter a program: the worst ones, and some everywhere
+_STEP = 1e-5  # of central differences
 _NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
 
 Poses = tuple[Floats, Floats]
@@ -37,20 +35,20 @@ Poses = tuple[Floats, Floats]
 
 
 class Objective(Protocol):
-    """What is to become small: the largest of some pieces, each of which depends on ingredients at waypoints."""
+    """What is minimised: the largest of some pieces, each a function of quantities at the waypoints."""
 
     def value(self, at: Candidate) -> float:
-        """Return the aim over the whole path."""
+        """Return the objective over the whole path."""
         ...
 
     def pieces(self, at: Candidate, model: LinearModel) -> tuple[Floats, Floats]:
-        """Return pieces (K,), of which the largest is the aim, and derivatives (K, n) by the model's unknowns."""
+        """Return pieces (K,), of which the largest is the objective, and derivatives (K, n) by the model's unknowns."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class LeastForce:
-    """The largest force in the legs that one newton at the tip calls up anywhere on the path, N/N."""
+    """The largest leg forces that one newton at the tip causes anywhere on the path, N/N."""
 
     problem: PlacementProblem
 
@@ -129,21 +127,41 @@ class LeastTime:
 
 
 def objective_of(name: SecondaryObjective, problem: PlacementProblem, toolpath: Toolpath) -> Objective:
-    """Return the aim of this name for the problem of a toolpath."""
+    """Return the objective of this name for the problem of a toolpath."""
     if name == "force":
         return LeastForce(problem)
     feeds = np.array([segment.feed for segment in toolpath.segments])[toolpath.segment_of_interval]
     return LeastTime(problem, np.minimum(feeds, problem.machine.rapid_velocity))
 
 
-def improved(solver: SequentialSolver, start: Candidate, aim: Objective, keep: float) -> Candidate:
-    """Return a candidate near `start`, with the smallest margin `keep` at least, that is better by the aim."""
+@dataclass(frozen=True)
+class ObjectiveOptions:
+    """When the sequential linear programming ends.
+
+    steps: at most so many. least_reach: the smallest trust region, in units of the placement step. decrease: relative
+    decrease of the objective below which the iteration stops. slack: how far the margin may come below the one to keep.
+    """
+
+    steps: int = 40
+    least_reach: float = 1e-3
+    decrease: float = 1e-3
+    slack: float = 1e-5
+
+
+def improved(
+    solver: SequentialSolver,
+    start: Candidate,
+    objective: Objective,
+    keep: float,
+    options: ObjectiveOptions = ObjectiveOptions(),
+) -> Candidate:
+    """Return a candidate near `start`, with the smallest margin `keep` at least, that is better by the objective."""
     problem, rows = solver.problem, np.arange(len(solver.problem.samples.pivots))
     best, reach, extra = start, 0.3, _NO_ROWS
-    value = aim.value(best)
+    value = objective.value(best)
     model = solver.model(best, rows, keep)
-    pieces = aim.pieces(best, model)
-    for _ in range(_STEPS):
+    pieces = objective.pieces(best, model)
+    for _ in range(options.steps):
         step = _lowest(model, pieces, keep, reach)
         trial, promise = None, 0.0
         if step is not None:
@@ -152,18 +170,18 @@ def improved(solver: SequentialSolver, start: Candidate, aim: Objective, keep: f
             transform = stepped(best.transform, motion) if model.moves.size else best.transform
             transform = problem.constraints.nearest_to(transform)
             trial = problem.candidate(best.margins, transform, problem.within_cone(best.coefficients + change))
-        gain = value - aim.value(trial) if trial is not None else 0.0
-        if trial is not None and trial.smallest >= keep - _SLACK and gain > 0.1 * promise and gain > 0.0:
-            done = gain < _ENOUGH * value
+        gain = value - objective.value(trial) if trial is not None else 0.0
+        if trial is not None and trial.smallest >= keep - options.slack and gain > 0.1 * promise and gain > 0.0:
+            done = gain < options.decrease * value
             best, value, extra = trial, value - gain, _NO_ROWS
             reach *= 2.0 if gain > 0.6 * promise else 1.0
             if done:
                 break
             model = solver.model(best, rows, keep)
-            pieces = aim.pieces(best, model)
+            pieces = objective.pieces(best, model)
         else:
             reach *= 0.4
-            if reach < _SMALLEST_REACH:
+            if reach < options.least_reach:
                 break
             if trial is not None and trial.smallest < keep:  # what came out worst may not have been in the model
                 values = problem.values(trial.margins, trial.transform, trial.coefficients)

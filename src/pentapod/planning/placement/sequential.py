@@ -1,8 +1,7 @@
-"""The default solver: small quadratic programs in sequence, on the waypoints and margins that are smallest.
+"""The default placement solver: sequential quadratic programming with a trust region, for the max-min problem.
 
-Raising the smallest margin is sequential quadratic programming with a trust region (Fletcher, Practical Methods of
-Optimization, ch. 14: minimax); smoothing the field is a convex cost under the margins to keep, by feasible steps only.
-Every step is judged by the margins themselves, so a poor model costs a step, never a limit.
+Each program holds only the smallest margins, at the waypoints where they are smallest (Fletcher, Practical Methods of
+Optimization, ch. 14: minimax). Every step is judged by the margins themselves: a poor model costs a step, no limit.
 """
 
 from __future__ import annotations
@@ -22,14 +21,23 @@ from pentapod.planning.problem.linear_model import REACH, LinearModel, valleys
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.tool_axis.smoothing import smoothed
 
-_CONSIDERED = 4000
-"""Waypoints whose margins are looked at in every step; all are looked at when the steps have ended."""
-_STEPS, _ROUNDS = 60, 6
-_ENOUGH = 1e-4
-"""A smallest margin over all waypoints that is lower by more than this calls for another round."""
-_LEAST = 1e-5
-"""A promise of less margin, or a trust region smaller than this, ends the climb."""
 _NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
+
+
+@dataclass(frozen=True)
+class SequentialOptions:
+    """When the iteration ends, and at how many waypoints margins are computed.
+
+    waypoints: at most so many are used in every step; all are checked when the steps have ended. steps, rounds: at most
+    so many steps, and checks at all waypoints. tolerance: a smallest margin over all waypoints that is lower by more
+    than this calls for another round. least: smaller predicted gains, and smaller trust regions, end the steps.
+    """
+
+    waypoints: int = 4000
+    steps: int = 60
+    rounds: int = 6
+    tolerance: float = 1e-4
+    least: float = 1e-5
 
 
 @dataclass(eq=False)
@@ -39,28 +47,29 @@ class SequentialSolver:
     problem: PlacementProblem
     free: bool
     guides: bool = False
+    options: SequentialOptions = SequentialOptions()
 
     def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
         """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one."""
-        rows, best = self._considered(), start
-        for _ in range(_ROUNDS):
-            found = self._climb(best, rows, enough + _ENOUGH)
+        rows, best = self._waypoints(), start
+        for _ in range(self.options.rounds):
+            found = self._climb(best, rows, enough + self.options.tolerance)
             values = self.problem.values(found.margins, found.transform, found.coefficients)
             smallest = float(values.min())
             if smallest > best.smallest:
                 best = Candidate(found.margins, found.transform, found.coefficients, smallest)
-            if smallest >= found.smallest - _ENOUGH:
+            if smallest >= found.smallest - self.options.tolerance:
                 break
-            rows = np.union1d(rows, np.argsort(values.min(axis=1), kind="stable")[: _CONSIDERED // 8])
+            rows = np.union1d(rows, np.argsort(values.min(axis=1), kind="stable")[: self.options.waypoints // 8])
         return best
 
     def smooth(self, start: Candidate, keep: float) -> Floats | None:
         """Return coefficients (K, 2) of the smoothest spline at the placement of `start` that keeps `keep`."""
         return smoothed(self.problem, start, keep)
 
-    def _considered(self) -> Ints:
+    def _waypoints(self) -> Ints:
         count = len(self.problem.samples.pivots)
-        return np.unique(np.linspace(0, count - 1, min(count, _CONSIDERED)).astype(np.intp))
+        return np.unique(np.linspace(0, count - 1, min(count, self.options.waypoints)).astype(np.intp))
 
     def _climb(self, start: Candidate, rows: Ints, enough: float) -> Candidate:
         """Return the candidate that a trust-region method reaches, with its smallest margin over `rows`."""
@@ -70,11 +79,11 @@ class SequentialSolver:
         slopes = step_slopes(problem, start.margins, guides=self.guides)
         curvature = Curvature(problem, start.margins, self.guides)
         model = self.model(best, rows, best.smallest, slopes=slopes)
-        for _ in range(_STEPS):
+        for _ in range(self.options.steps):
             if best.smallest >= enough:
                 break
             step, change, promise = curvature.best_step(model, best, reach)
-            if promise < _LEAST:
+            if promise < self.options.least:
                 break
             coefficients, values, gain = problem.within_cone(best.coefficients + change), np.zeros((0, 1)), -np.inf
             moved = self._moved(best, step)
@@ -84,7 +93,7 @@ class SequentialSolver:
             reach *= 2.0 if gain > 0.6 * promise else 1.0 if gain > 0.25 * promise else 0.4
             if moved is not None and gain > 0.05 * promise:
                 best = Candidate(*moved, coefficients, float(values.min()))
-            elif reach < _LEAST:
+            elif reach < self.options.least:
                 break
             elif moved is not None:  # what came out worst may not have been in the model
                 steepness = problem.steepness(best.coefficients + change, rows)

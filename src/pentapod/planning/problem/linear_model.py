@@ -15,10 +15,22 @@ from pentapod.planning.problem.problem import Candidate, PlacementProblem
 REACH = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
 """The unit of a placement step: metres, and tan(angle / 2)."""
 
-_NEAR = 0.4
-"""Margins within this much of the level enter the model."""
-_WORST_OF_KIND, _STEEPEST, _STEEP = 12, 60, 0.3
-_TANGENTS = np.radians([-36.0, -22.0, -12.0, -5.0, 0.0, 5.0, 12.0, 22.0, 36.0])
+_WORST_OF_KIND = 12
+
+
+@dataclass(frozen=True)
+class ModelOptions:
+    """What enters the model. near: margins within this much of the level.
+
+    steepest: the leans at so many waypoints, if they use the share `steep` of the cone. tangents_deg: of the cone at
+    each of these leans, degrees from the lean.
+    """
+
+    near: float = 0.4
+    steepest: int = 60
+    steep: float = 0.3
+    tangents_deg: tuple[float, ...] = (-36.0, -22.0, -12.0, -5.0, 0.0, 5.0, 12.0, 22.0, 36.0)
+
 
 Slopes = Callable[[Margins, RigidTransform, Floats, Ints], Floats]
 
@@ -57,6 +69,7 @@ class LinearModel:
         slopes: Slopes,
         room: tuple[Floats, Floats],
         moves: Floats,
+        options: ModelOptions = ModelOptions(),
     ) -> LinearModel:
         """Return the model of what comes near `level` among waypoints `rows`, and of rows[extra] in any case.
 
@@ -66,8 +79,8 @@ class LinearModel:
         length, count = moves.shape
         values = problem.values(at.margins, at.transform, at.coefficients, rows)
         chosen = np.union1d(valleys(values, _WORST_OF_KIND), extra)
-        chosen = chosen[values[chosen].min(axis=1) < level + _NEAR]
-        point, kinds = np.nonzero(values[chosen] < level + _NEAR)
+        chosen = chosen[values[chosen].min(axis=1) < level + options.near]
+        point, kinds = np.nonzero(values[chosen] < level + options.near)
         few = rows[chosen]
         slope = (
             slopes(at.margins, at.transform, at.coefficients, few)[point, kinds]
@@ -75,7 +88,7 @@ class LinearModel:
             else np.zeros((0, length + 2))
         )
         field = by_field(problem.basis[few][point], slope[:, length:]) * problem.cone
-        steep, share, steep_by_field = _cone_tangents(problem, at, rows, extra)
+        steep, share, steep_by_field = _cone_tangents(problem, at, rows, extra, options)
         return cls(
             problem,
             at,
@@ -115,23 +128,26 @@ def valleys(values: Floats, count: int = _WORST_OF_KIND) -> Ints:
     return np.unique(worst[np.take_along_axis(valley, worst, axis=0)])
 
 
-def _cone_tangents(problem: PlacementProblem, at: Candidate, rows: Ints, extra: Ints) -> tuple[Ints, Floats, Floats]:
+def _cone_tangents(
+    problem: PlacementProblem, at: Candidate, rows: Ints, extra: Ints, options: ModelOptions
+) -> tuple[Ints, Floats, Floats]:
     """Return tangents of the cone at the steepest leans: waypoints, the share used in that direction, its derivatives.
 
     Several tangents for each lean, since a lean on the edge may well turn along it.
     """
+    tangents = np.radians(options.tangents_deg)
     steepness = problem.steepness(at.coefficients, rows)
-    steep = np.union1d(valleys(-steepness[:, None], _STEEPEST), extra)
-    steep = steep[steepness[steep] > _STEEP]
+    steep = np.union1d(valleys(-steepness[:, None], options.steepest), extra)
+    steep = steep[steepness[steep] > options.steep]
     nominal, basis = problem.samples.nominal[rows[steep]], problem.basis[rows[steep]]
     outward = problem.leans(at.coefficients, rows[steep]) / (steepness[steep, None] * problem.cone)
     aside = np.cross(nominal, outward)
     shares, derivatives = [np.zeros(0)], [np.zeros((0, 2 * problem.basis.shape[1]))]
-    for turn in _TANGENTS:
+    for turn in tangents:
         direction = np.cos(turn) * outward + np.sin(turn) * aside
         shares.append(np.cos(turn) * steepness[steep])
         derivatives.append(by_field(basis, direction @ problem.domain.lean_plane.T))
-    return np.tile(rows[steep], len(_TANGENTS)), np.concatenate(shares), np.concatenate(derivatives)
+    return np.tile(rows[steep], len(tangents)), np.concatenate(shares), np.concatenate(derivatives)
 
 
 def by_field(basis: Floats, by_lean: Floats) -> Floats:

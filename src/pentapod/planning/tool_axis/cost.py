@@ -21,17 +21,28 @@ from pentapod.planning.problem.formulation import leg_function
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.tool_axis.spline import BANDS, FORESIGHT_M, AxisSpline
 
-EXCESS_WEIGHT = 1e4
-"""Of the mean square of an excess, as a share of what the nominal axes have there, beside the cost of their rates."""
-_FREE_OF_MIDDLE, _UNIT_OF_MIDDLE = 0.01, 0.5
-"""Of the median that nominal axes have: free beside what they have at a node, and in the unit of excess beside it."""
-_LEAST_RATE, _LEAST_BEND = 0.1, 1e-9
-"""Of an axis, rad/m, and of a leg, 1/m: nominal axes that turn less are as good as fixed."""
+
+@dataclass(frozen=True)
+class CostOptions:
+    """Options of the penalty on excess, which is a rate or bend beyond that of the nominal axes at the same node.
+
+    weight: of the mean square of the relative excess, beside the cost of rates. free, unit: shares of the median of the
+    nominal axes that are added to what is free of charge, and to the unit of excess. least_rate, least_bend: smaller
+    medians count as this, rad/m of an axis and 1/m of a leg. near: rates and bends below this share of what is free do
+    not enter a program.
+    """
+
+    weight: float = 1e4
+    free: float = 0.01
+    unit: float = 0.5
+    least_rate: float = 0.1
+    least_bend: float = 1e-9
+    near: float = 0.7
+
+
 _ANGLES = np.arange(12) * np.pi / 6.0
 _DIRECTIONS = np.array([np.cos(_ANGLES), np.sin(_ANGLES)])
-"""In which rates are looked at, columns: one that exceeds what is free in none of them does so by 3.5 % at most."""
-_NEAR = 0.7
-"""Of what is free: rates and accelerations below it do not enter a program."""
+"""Columns: the directions in which rates are measured; a rate is at most 3.5 % larger than in the nearest of them."""
 
 
 _Rows = tuple[Floats, Ints, Floats, Floats]
@@ -42,18 +53,19 @@ _Rows = tuple[Floats, Ints, Floats, Floats]
 class _Charge:
     """What a quantity costs at the nodes where it exceeds what is free there; all (n,).
 
-    unit: what an excess is measured by; price: of the square of the excess so measured.
+    unit: what an excess is measured by; price: of the square of the excess so measured. near: see `CostOptions`.
     """
 
     free: Floats
     unit: Floats
     price: Floats
+    near: float
 
     @classmethod
-    def beyond(cls, nominal: Floats, least: float, price: Floats) -> _Charge:
-        """Return the charge of exceeding what the nominal axes have; least: less than this is as good as nothing."""
+    def beyond(cls, nominal: Floats, least: float, price: Floats, options: CostOptions) -> _Charge:
+        """Return the charge of exceeding what the nominal axes have; least: smaller medians count as this."""
         middle = max(float(np.median(nominal)) if len(nominal) else 0.0, least)
-        return cls(nominal + _FREE_OF_MIDDLE * middle, nominal + _UNIT_OF_MIDDLE * middle, price)
+        return cls(nominal + options.free * middle, nominal + options.unit * middle, price, options.near)
 
     def of(self, values: Floats) -> float:
         """Return the charge of values (n, m)."""
@@ -68,20 +80,22 @@ class _Charge:
         excess = ca.MX.sym("excess", *values.shape)
         return ca.dot(price, excess**2), ca.vec(excess), ca.vec(excess - (values - free) / unit)
 
-    def near(self, each: list[Floats]) -> tuple[Ints, Ints]:
+    def entering(self, each: list[Floats]) -> tuple[Ints, Ints]:
         """Return the nodes and columns at which one of several values (n, m) comes near what is free."""
-        node, column = np.nonzero(np.any([values > _NEAR * self.free[:, None] for values in each], axis=0))
+        node, column = np.nonzero(np.any([values > self.near * self.free[:, None] for values in each], axis=0))
         return node, column
 
 
 class AxisCost:
     """The cost of coefficients (K, 2) of a spline of the axes, at the placement of a candidate.
 
-    The spline's own, and EXCESS_WEIGHT times the excesses. Rates are of nominal plus lean, not normalised, by the way
-    of the spline; bends are the second derivatives of the leg lengths by it.
+    That of the spline, and `CostOptions.weight` times the excesses. Rates are of nominal plus lean, not normalised, by
+    the path length of the spline; bends are the second derivatives of the leg lengths by it.
     """
 
-    def __init__(self, problem: PlacementProblem, spline: AxisSpline, at: Candidate) -> None:
+    def __init__(
+        self, problem: PlacementProblem, spline: AxisSpline, at: Candidate, options: CostOptions = CostOptions()
+    ) -> None:
         self.spline, samples = spline, problem.samples
         nodes, way = self.spline.nodes, self.spline.way
         self.basis = self.spline.basis[nodes]
@@ -101,9 +115,9 @@ class AxisCost:
         self.nominal_rates = np.einsum("nk,nak->na", turning, self.frames[: len(turning)])
         rates = np.linalg.norm(turning, axis=1)
         bends = np.abs(self.bends(np.zeros((self.basis.shape[1], 2)))).max(axis=1)
-        price = EXCESS_WEIGHT * FORESIGHT_M**2 * (float(rate_shares @ rates**2) + _LEAST_RATE**2)
-        self.fast = _Charge.beyond(rates, _LEAST_RATE, price * rate_shares)
-        self.hard = _Charge.beyond(bends, _LEAST_BEND, price * bend_shares)
+        price = options.weight * FORESIGHT_M**2 * (float(rate_shares @ rates**2) + options.least_rate**2)
+        self.fast = _Charge.beyond(rates, options.least_rate, price * rate_shares, options)
+        self.hard = _Charge.beyond(bends, options.least_bend, price * bend_shares, options)
 
     def of(self, c: Floats) -> float:
         """Return the cost of coefficients c (K, 2)."""
@@ -146,10 +160,10 @@ class AxisCost:
         """
         legs, slopes = self._legs(c)
         rates, bends = self.rates(c) @ _DIRECTIONS, _both_ways(differences(self.bend, legs))
-        near, column = self.fast.near([rates, *(self.rates(x) @ _DIRECTIONS for x in others)])
+        near, column = self.fast.entering([rates, *(self.rates(x) @ _DIRECTIONS for x in others)])
         parts = [(near + k, self.rate[near, k, None] * _DIRECTIONS.T[column]) for k in range(2)]
         fast = self._rows(c, self.fast, near, rates[near, column], parts)
-        near, column = self.hard.near([bends, *(_both_ways(self.bends(x)) for x in others)])
+        near, column = self.hard.entering([bends, *(_both_ways(self.bends(x)) for x in others)])
         towards = _both_ways(slopes)
         parts = [(near + k, self.bend[near, k, None] * towards[near + k, column]) for k in range(3)]
         hard = self._rows(c, self.hard, near, bends[near, column], parts)

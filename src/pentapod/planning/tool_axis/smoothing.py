@@ -7,7 +7,7 @@ where the margin came out short are looked at from then on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,25 +16,40 @@ from pentapod.numerics.convex.banded_qp import NO_ROWS, BandedQP
 from pentapod.planning.problem.formulation import Slopes, lean_slopes
 from pentapod.planning.problem.linear_model import valleys
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
-from pentapod.planning.tool_axis.cost import AxisCost
+from pentapod.planning.tool_axis.cost import AxisCost, CostOptions
 from pentapod.planning.tool_axis.spline import AxisSpline, within_discs
 
 SLACK = 1e-5
 """How far below the margin to keep smooth axes may come: micrometres of a stroke."""
 
-_STEPS, _ROUNDS = 40, 8
-_NEAR, _UNREACHED = 0.15, 0.02
-"""Margins within this much of the one to keep enter a program, but for those that, in so far as they are linear, stay
-this far above it within the trust region; others when they came out short."""
-_ENOUGH = 2e-4
-"""Of the cost: a step that gains less is the last one."""
-_NEARLY, _MUCH = 1e-2, 0.1
-"""Shorter than this of the margin to keep, a step is taken if it saves this share of the cost: the next makes it up."""
-_WHOLE, _LEAST_REACH, _SHORTER = 2.0, 1e-3, 0.4
-"""Trust regions, as shares of the cone: all of it, and one in which nothing more is to be gained. A step that led
-nowhere shortens them to this share of itself."""
-_ROUGH, _FINE, _FINER = 1e-3, 1e-6, 1e-2
-"""Accuracies of the first program and of the last; in between, this share of what the step before gained."""
+
+@dataclass(frozen=True)
+class SmoothingOptions:
+    """Options of the sequential convex programming.
+
+    steps, rounds: at most so many programs, and checks at all waypoints. near: margins within this much of the one to
+    keep enter a program. spare: but not those that, to first order, stay this much above it within the trust region.
+    decrease: relative decrease of the cost below which the iteration stops. shortfall, saving: a step whose margin is
+    short by less than `shortfall` is taken if it saves the share `saving` of the cost; the next step restores the
+    margin. whole, least_reach: the largest and the smallest trust region, as shares of the cone. shorter: factor on the
+    trust region after a rejected step. rough, fine, finer: accuracies of the first program and of the last, and the
+    accuracy in between as a share of the gain of the step before. cost: of the penalty on excess.
+    """
+
+    steps: int = 40
+    rounds: int = 8
+    near: float = 0.15
+    spare: float = 0.02
+    decrease: float = 2e-4
+    shortfall: float = 1e-2
+    saving: float = 0.1
+    whole: float = 2.0
+    least_reach: float = 1e-3
+    shorter: float = 0.4
+    rough: float = 1e-3
+    fine: float = 1e-6
+    finer: float = 1e-2
+    cost: CostOptions = field(default_factory=CostOptions)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,15 +74,17 @@ class _Model:
         return np.maximum(promised - values[self.looked, self.kinds], 0.0)
 
 
-def smoothed(problem: PlacementProblem, start: Candidate, keep: float) -> Floats | None:
+def smoothed(
+    problem: PlacementProblem, start: Candidate, keep: float, options: SmoothingOptions = SmoothingOptions()
+) -> Floats | None:
     """Return coefficients (K, 2) of the smoothest spline of the axes that keeps the margin `keep`.
 
     It starts at the leans of `start`, at whose placement it stays. None where no spline of the axes was found to keep
     it.
     """
-    run = _Smoothing(problem, start, keep)
+    run = _Smoothing(problem, start, keep, options)
     run.begin()
-    for _ in range(_ROUNDS):
+    for _ in range(options.rounds):
         found = run.smoothest()
         if found is None or not run.looks_at_more():
             return found
@@ -81,13 +98,13 @@ class _Smoothing:
     kinds (M,): which have come near. reach: the trust region; accuracy: of the next program.
     """
 
-    def __init__(self, problem: PlacementProblem, start: Candidate, keep: float) -> None:
-        self.problem, self.start, self.keep = problem, start, keep
+    def __init__(self, problem: PlacementProblem, start: Candidate, keep: float, options: SmoothingOptions) -> None:
+        self.problem, self.start, self.keep, self.options = problem, start, keep, options
         self.spline = AxisSpline.of(problem.samples, problem.cone)
-        self.cost = AxisCost(problem, self.spline, start)
+        self.cost = AxisCost(problem, self.spline, start, options.cost)
         self.slopes: dict[tuple[int, ...], Slopes] = {}
         self.kinds: Bools = np.zeros(len(start.margins.limits), dtype=bool)
-        self.reach, self.accuracy = _WHOLE, _ROUGH
+        self.reach, self.accuracy = self.options.whole, self.options.rough
         self.c = self.spline.fitted(problem.leans(start.coefficients))
         self.spent = self.cost.of(self.c)
         everywhere = self.values(self.c, np.arange(len(self.spline.frames)))
@@ -115,17 +132,17 @@ class _Smoothing:
             trial = within_discs(trial)
             margins, spent = self.values(trial, self.rows), self.cost.of(trial)
             short = self.keep - float(margins.min())
-            if spent < self.spent and short < max(self.short, _NEARLY):
+            if spent < self.spent and short < max(self.short, self.options.shortfall):
                 self.c, self.margins, self.short, self.spent = trial, margins, short, spent
 
     def smoothest(self) -> Floats | None:
         """Return the smoothest spline that keeps the margin at the waypoints looked at, or None."""
         model, missed, tried = self.model(), None, list[Floats]()
-        for _ in range(_STEPS):
+        for _ in range(self.options.steps):
             program = self.program(model, missed, tried)
             trial = program.solved()
             if trial is None:
-                self.reach, missed = _SHORTER * self.reach, None
+                self.reach, missed = self.options.shorter * self.reach, None
             else:
                 trial = within_discs(trial)
                 margins, spent = self.values(trial, self.rows), self.cost.of(trial)
@@ -134,16 +151,26 @@ class _Smoothing:
                 way = float(np.linalg.norm(trial - self.c, axis=1).max())
                 self.late |= margins < self.keep
                 if self.accepts(short, gain):
-                    last = self.short <= SLACK and max(gain, promise) < _ENOUGH * self.spent and way < 0.99 * self.reach
-                    self.accuracy = float(np.clip(_FINER * gain / self.spent, _FINE, _ROUGH))
+                    last = (
+                        self.short <= SLACK
+                        and max(gain, promise) < self.options.decrease * self.spent
+                        and way < 0.99 * self.reach
+                    )
+                    self.accuracy = float(
+                        np.clip(self.options.finer * gain / self.spent, self.options.fine, self.options.rough)
+                    )
                     self.c, self.margins, self.short, self.spent = trial, margins, short, spent
                     if last:
                         break
                     self.reach = (
-                        min(2.0 * self.reach, _WHOLE) if gain > 0.25 * promise else max(0.5 * way, _LEAST_REACH)
+                        min(2.0 * self.reach, self.options.whole)
+                        if gain > 0.25 * promise
+                        else max(0.5 * way, self.options.least_reach)
                     )
                     model, missed, tried = self.model(), None, []
-                elif short <= SLACK and promise < _ENOUGH * self.spent:  # no smoother than before, nor to be so
+                elif (
+                    short <= SLACK and promise < self.options.decrease * self.spent
+                ):  # no smoother than before, nor to be so
                     break
                 elif short > SLACK and missed is None:  # once more, with what the model had missed or did not hold
                     model = self.model()
@@ -151,8 +178,8 @@ class _Smoothing:
                 elif short <= SLACK and not tried:  # once more, with what it would be charged for
                     tried = [trial]
                 else:
-                    self.reach, missed = _SHORTER * min(self.reach, way), None
-            if self.reach < _LEAST_REACH:
+                    self.reach, missed = self.options.shorter * min(self.reach, way), None
+            if self.reach < self.options.least_reach:
                 break
         return self.c if self.short <= SLACK else None
 
@@ -160,7 +187,9 @@ class _Smoothing:
         """Return whether a trial is better: smoother and within limits, much smoother and nearly so, or less short."""
         if short <= SLACK and self.short <= SLACK:
             return gain > 0.0
-        return short <= max(SLACK, 0.5 * self.short) or (short < _NEARLY and gain > _MUCH * self.spent)
+        return short <= max(SLACK, 0.5 * self.short) or (
+            short < self.options.shortfall and gain > self.options.saving * self.spent
+        )
 
     def values(self, c: Floats, rows: Ints) -> Floats:
         """Return the margins (n, M) at waypoints `rows`."""
@@ -169,7 +198,7 @@ class _Smoothing:
     def model(self) -> _Model:
         """Return the linear model of the margins near the one to keep, and of those that came out short before."""
         spline, start, c = self.spline, self.start, self.c
-        near = (self.margins < self.keep + _NEAR) | self.late
+        near = (self.margins < self.keep + self.options.near) | self.late
         looked = np.flatnonzero(near.any(axis=1))
         near, rows = near[looked], self.rows[looked]
         self.kinds |= near.any(axis=0)  # once in, always in: making their function takes longer than calling it
@@ -179,7 +208,7 @@ class _Smoothing:
             self.slopes[key] = lean_slopes(self.problem, start.margins, start.transform, key)
         slopes = spline.cone * self.slopes[key](spline.frames[rows], spline.cone * (spline.basis[rows] @ c), rows)
         values = self.margins[np.ix_(looked, kinds)]
-        reached = values < self.keep + _UNREACHED + self.reach * np.linalg.norm(slopes, axis=2)
+        reached = values < self.keep + self.options.spare + self.reach * np.linalg.norm(slopes, axis=2)
         point, kind = np.nonzero(near[:, kinds] & reached)
         return _Model(c, looked[point], rows[point], kinds[kind], values[point, kind], slopes[point, kind])
 
