@@ -18,7 +18,7 @@ from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
 from pentapod.job.plan_arrays import arrays_of
 from pentapod.job.run_folder import staged, unstaged
 from pentapod.job.schema.job import Job
-from pentapod.job.stage_runner import Clock
+from pentapod.job.stage_runner import StageRunner
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
 from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
@@ -57,14 +57,14 @@ def run(
     """
     folder = Path(out)
     check_folder(folder)
-    clock = Clock(progress)
+    runner = StageRunner(progress)
     with staged(folder) as staging:  # from the start: a second run on the folder is told at once
         machine = job_machine(job)
-        mesh = clock.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
-        asked = job_specification(job, machine, mesh, lambda: _toolpath(job, mesh, piece, clock))
+        mesh = runner.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
+        asked = job_specification(job, machine, mesh, lambda: _toolpath(job, mesh, piece, runner))
         if piece is not None:  # whoever asks for a piece has the others made elsewhere
             asked = dataclasses.replace(asked, setups=max(asked.setups, 2))
-        task = _Task(job, asked, clock, piece, tuple(limits), tuple(claims))
+        task = _Task(job, asked, runner, piece, tuple(limits), tuple(claims))
         outcome = _reached(task, staging, writers or {})
         refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
         if refusal is not None and refusal.stage == "placement" and splits:
@@ -73,28 +73,28 @@ def run(
     return outcome
 
 
-def _toolpath(job: Job, mesh: Mesh, piece: Piece | None, clock: Clock) -> Toolpath:
+def _toolpath(job: Job, mesh: Mesh, piece: Piece | None, runner: StageRunner) -> Toolpath:
     """Return the job's toolpath, or a piece of it, as a stage of the run."""
     if piece is None:
-        return clock.time("toolpath", lambda: job_toolpath(job, mesh, clock.progress), says=lambda it: str(it[1]))[0]
-    made = clock.time(
-        "toolpath", lambda: (job_piece(job, mesh, piece, clock.progress), piece), says=lambda _: str(piece)
+        return runner.time("toolpath", lambda: job_toolpath(job, mesh, runner.progress), says=lambda it: str(it[1]))[0]
+    made = runner.time(
+        "toolpath", lambda: (job_piece(job, mesh, piece, runner.progress), piece), says=lambda _: str(piece)
     )
     return made[0]
 
 
 def _reached(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
     """Run the stages after the toolpath and the verdict, write the files, and return what was reached."""
-    program, clock = task.program(staging / PROGRAM), task.clock
+    program, runner = task.program(staging / PROGRAM), task.runner
     if isinstance(program, Refusal):
         verdict = refusal_verdict(program, task.asked.sources)
     else:
         file = staging / PROGRAM
-        verdict = clock.time("verify", lambda: judged(file, task.asked, claims=task.claims, progress=clock.progress))
-    outcome = Outcome(task.job, task.machine, tuple(clock.stages), verdict)
+        verdict = runner.time("verify", lambda: judged(file, task.asked, claims=task.claims, progress=runner.progress))
+    outcome = Outcome(task.job, task.machine, tuple(runner.stages), verdict)
     if (placed := outcome.find(PlacedPath)) is not None:
         outcome = dataclasses.replace(outcome, machine=task.on(placed.placement).machine)
-    return _written(outcome, staging, writers, clock.progress)
+    return _written(outcome, staging, writers, runner.progress)
 
 
 def _written(outcome: Outcome, staging: Path, writers: Mapping[str, Writer], progress: Progress) -> Outcome:
@@ -108,30 +108,30 @@ def _written(outcome: Outcome, staging: Path, writers: Mapping[str, Writer], pro
 
 def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
     """Do a job that one placement cannot do in several set-ups, each in a folder of its own; or refuse it."""
-    job, toolpath, clock = task.job, task.toolpath, task.clock
+    job, toolpath, runner = task.job, task.toolpath, task.runner
     # What was refused is not what is reached in the end.
-    clock.stages = [stage for stage in clock.stages if stage.value is not refusal]
-    search = (task.toolpath, task.fits, style, job.placement.setups, refusal, clock.progress)
-    found = clock.time("set-ups", lambda: setups(*search))
+    runner.stages = [stage for stage in runner.stages if stage.value is not refusal]
+    search = (task.toolpath, task.fits, style, job.placement.setups, refusal, runner.progress)
+    found = runner.time("set-ups", lambda: setups(*search))
     if isinstance(found, Refusal):
         verdict = refusal_verdict(found, task.asked.sources)
-        return _written(Outcome(job, task.machine, tuple(clock.stages), verdict), staging, writers, clock.progress)
+        return _written(Outcome(job, task.machine, tuple(runner.stages), verdict), staging, writers, runner.progress)
     cutting, missed = missed_cuts(toolpath, found)
     parts: list[SetUp] = []
-    before = [stage for stage in clock.stages if stage.name not in ("toolpath", "set-ups")]
+    before = [stage for stage in runner.stages if stage.name not in ("toolpath", "set-ups")]
     for number, piece in enumerate(found, start=1):
-        clock.progress("set-ups", (number - 1) / len(found), f"planning {number} of {len(found)}")
-        own, part = Clock(clock.progress), part_of(toolpath, piece, style)
+        runner.progress("set-ups", (number - 1) / len(found), f"planning {number} of {len(found)}")
+        own, part = StageRunner(runner.progress), part_of(toolpath, piece, style)
         own.stages += [*before, Stage("toolpath", 0.0, (part, piece), f"set-up {number} of {len(found)}: {piece}")]
         folder = staging / SetUp.folder_of(number)
         folder.mkdir()
         own_task = dataclasses.replace(
-            task, asked=dataclasses.replace(task.asked, toolpath=part, missed=missed), clock=own, piece=piece
+            task, asked=dataclasses.replace(task.asked, toolpath=part, missed=missed), runner=own, piece=piece
         )
         parts.append(SetUp(number, piece, _reached(own_task, folder, writers)))
     done = SetUps(tuple(parts), cutting, missed, job.placement.setups)
-    clock.stages.append(Stage("set-ups planned", sum(part.seconds for part in parts), done, str(done)))
-    return _written(Outcome(job, task.machine, tuple(clock.stages), done.verdict), staging, writers, clock.progress)
+    runner.stages.append(Stage("set-ups planned", sum(part.seconds for part in parts), done, str(done)))
+    return _written(Outcome(job, task.machine, tuple(runner.stages), done.verdict), staging, writers, runner.progress)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -140,7 +140,7 @@ class _Task:
 
     job: Job
     asked: Specification
-    clock: Clock
+    runner: StageRunner
     piece: Piece | None = None
     limits: tuple[Limit, ...] = ()
     claims: tuple[Claim, ...] = ()
@@ -155,7 +155,7 @@ class _Task:
 
     def program(self, file: Path) -> Program | Refusal:
         """Plan, write the program to `file` and return it; or return the first refusal."""
-        placed = self.clock.time("placement", self._placed, says=_remarks)
+        placed = self.runner.time("placement", self._placed, says=_remarks)
         if isinstance(placed, Refusal):
             return placed
         return self.on(placed.placement).written(placed, file)
@@ -169,15 +169,15 @@ class _Task:
 
     def written(self, placed: PlacedPath, file: Path) -> Program | Refusal:
         """Write the program of a placed path to `file` and return it; or return the first refusal."""
-        path = self.clock.time("leg path", lambda: self._path(placed))
+        path = self.runner.time("leg path", lambda: self._path(placed))
         if isinstance(path, Refusal):
             return path
-        machine, progress = self.machine, self.clock.progress
-        trajectory = self.clock.time("timing", lambda: retime(path, machine, limits=self.limits, progress=progress))
+        machine, progress = self.machine, self.runner.progress
+        trajectory = self.runner.time("timing", lambda: retime(path, machine, limits=self.limits, progress=progress))
         if isinstance(trajectory, Refusal):
             return trajectory
-        program = self.clock.time("program", lambda: self._program(placed, trajectory, file))
-        self.clock.time("explain", lambda: self._explanation(path, trajectory, program), says=str)
+        program = self.runner.time("program", lambda: self._program(placed, trajectory, file))
+        self.runner.time("explain", lambda: self._explanation(path, trajectory, program), says=str)
         return program
 
     def fits(self, part: Toolpath) -> bool:
@@ -185,7 +185,7 @@ class _Task:
         return fits(part, self.machine, **self._options())
 
     def _placed(self) -> PlacedPath | Refusal:
-        objective, progress = self.job.placement.then, self.clock.progress
+        objective, progress = self.job.placement.then, self.runner.progress
         return plan(self.toolpath, self.machine, **self._options(), secondary_objective=objective, progress=progress)
 
     def _options(self) -> PlacementOptions:

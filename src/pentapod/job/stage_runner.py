@@ -1,4 +1,4 @@
-"""Clock: runs the stages of a job, and keeps what they gave."""
+"""StageRunner: runs the stages of a job, and keeps what they gave."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pentapod.job.outcome import Stage
 Value = TypeVar("Value")
 
 
-class Clock:
+class StageRunner:
     """Runs stages and keeps their names, times and values."""
 
     def __init__(self, progress: Progress) -> None:

@@ -281,11 +281,10 @@ def _string(text: str) -> str:
 
 
 def _matrix(placement: RigidTransform) -> str:
-    matrix: Floats = placement.matrix
     shifts = [[3 if j == 3 and k < 3 else 0 for j in range(4)] for k in range(4)]
     rows = (
         "[" + ", ".join(_decimal(float(x), n) for x, n in zip(row, shift, strict=True)) + "]"
-        for row, shift in zip(matrix, shifts, strict=True)
+        for row, shift in zip(placement.matrix, shifts, strict=True)
     )
     return "[" + ", ".join(rows) + "]"
 
