@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -19,6 +19,7 @@ from pentapod.base.errors import JobError, nearest
 from pentapod.base.tables import problem_of
 from pentapod.base.toml import line_of, parsed, read_toml
 from pentapod.base.values import Value
+from pentapod.cutters.registry import CUTTERS
 from pentapod.job.schema.placement import FixtureTable, PlacementTable
 from pentapod.job.schema.strategies import StrategyTable, file_keys, job_strategies, strategy_table
 from pentapod.job.schema.tables import (
@@ -262,12 +263,16 @@ def _resolve(job: Path, text: str | None, where: tuple[str, str], name: str) -> 
 
 def _problem(error: ValidationError, content: Content) -> tuple[tuple[str, ...], dict[str, Any]]:
     """Return the place of the first error, and its message."""
-    given = content.get("toolpath")
-    named = cast(Content, given).get("strategy", "raster") if isinstance(given, Mapping) else "raster"
-    strategy = str(named) if named in job_strategies() else "raster"
+
+    def named(table: str, key: str, known: Container[str], usual: str) -> str:
+        given = content.get(table)
+        name = cast(Content, given).get(key) if isinstance(given, Mapping) else None
+        return name if isinstance(name, str) and name in known else usual
+
+    strategy, tool = named("toolpath", "strategy", job_strategies(), "raster"), named("tool", "type", CUTTERS, "ball")
 
     def model(name: str) -> type[BaseModel] | None:
-        return table_model(name, strategy) if name in JobTables.model_fields else None
+        return table_model(name, strategy, tool) if name in JobTables.model_fields else None
 
     where, details = problem_of(error, JobTables, model)
     if details["what"] == "unknown key" and len(where) == 2 and where[0] == "toolpath":

@@ -232,8 +232,11 @@ class JobTables(Table):
         return self
 
 
-def table_model(name: str, strategy: str = "raster") -> type[Table]:
-    """Return the model of a table of job files; strategy: whose keys [toolpath] has. Raises KeyError: no such table."""
-    if name in ("toolpath", "tool"):
-        return strategy_table(strategy) if name == "toolpath" else tool_table()
-    return cast("type[Table]", JobTables.model_fields[name].annotation)
+def table_model(name: str, strategy: str = "raster", tool: str = "ball") -> type[Table]:
+    """Return the model of a table of job files. strategy: whose keys [toolpath] has; tool: type whose keys [tool] has.
+
+    Raises KeyError: no such table.
+    """
+    if name == "toolpath":
+        return strategy_table(strategy)
+    return tool_table(tool) if name == "tool" else cast("type[Table]", JobTables.model_fields[name].annotation)
