@@ -1,4 +1,4 @@
-"""How much of each limit a sampled program uses at most, and where: exact extrema of what the controller does."""
+"""Certificates: the largest share of each limit that a sampled program uses, by exact extrema of its interpolation."""
 
 from __future__ import annotations
 

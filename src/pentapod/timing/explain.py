@@ -1,4 +1,4 @@
-"""Where the time goes: which limit holds the motion back, where, and what that costs against a lower bound."""
+"""Explanation of a cycle time: the active limit at each place, and its cost in time against a lower bound."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ _WORTH = 1e-4  # of the gap: what costs less is not told
 
 @dataclass(frozen=True)
 class Cause(Value):
-    """A limit: seconds during which it is the one that holds the motion back, and what that costs in seconds.
+    """An active limit: the seconds during which it limits the motion, and its cost in seconds.
 
-    cost: beyond the least time that these stretches of the path could take.
+    cost: time beyond the lower bound of these stretches of the path.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Cause(Value):
 
 @dataclass(frozen=True)
 class CostlyPlace(Value):
-    """A stretch of the path where one cause costs time.
+    """A stretch of the path where one limit costs time.
 
     cost in seconds; segments: first and last of the toolpath; stations: from and to, global s in metres; time: when it
     costs most, seconds; subject: how a sentence calls the cause.
@@ -62,7 +62,7 @@ class CostlyPlace(Value):
 
 @dataclass(frozen=True)
 class Explanation(Value):
-    """Why a trajectory takes as long as it does.
+    """Analysis of a cycle time: active limits, costly places, and shares of the limits.
 
     duration (s); lower_bound (s): ∫ max(1/feed, max_i |l_i′|/v_i) ds, which no motion along this path can beat; causes:
     most costly first, their times add up to the duration and their costs to the gap; places: the ten
@@ -88,7 +88,10 @@ class Explanation(Value):
             f"cycle time {self.duration:.3f} s, {100.0 * self.gap / self.lower_bound:.1f} % above what feeds and leg "
             f"velocities alone would take ({self.lower_bound:.3f} s)"
         ]
-        lines += [f"  {c.name}: holds the motion for {c.time:.3g} s, costs {c.cost:.3g} s" for c in self.causes]
+        lines += [
+            f"  {c.name}: limits the motion for {c.time:.3g} s; without it at most {c.cost:.3g} s shorter"
+            for c in self.causes
+        ]
         lines += [f"  {place}" for place in self.places]
         lines += [f"  {use}" for use in self.uses]
         if self.slow_cuts:
@@ -117,7 +120,7 @@ def explain(
     uses: tuple[LimitUse, ...] = (),
     slow_cuts: tuple[Unheld, ...] = (),
 ) -> Explanation:
-    """Return why the trajectory takes as long as it does, from its profile at the gridpoints.
+    """Return the analysis of a trajectory's cycle time, from its profile at the gridpoints.
 
     uses: by `certify`; slow_cuts: by `unheld`; both are only told on.
     """

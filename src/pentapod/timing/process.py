@@ -1,4 +1,4 @@
-"""The rule of processes that burn or coat at a rate: constant speed on the surface; where it is not held, and why."""
+"""Constant surface speed for processes such as laser or spray: where it is not reached, and the active limit there."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Unheld(Value):
     """A stretch of a cut whose surface speed is below the feed.
 
     segment: of the toolpath; stations: from and to, global s in metres; seconds: how long; share: the least speed over
-    the feed; constraint: what holds the motion back there.
+    the feed; constraint: the active limit there.
     """
 
     segment: int

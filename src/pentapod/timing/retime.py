@@ -1,4 +1,4 @@
-"""From a leg path to a trajectory: the fastest motion that the machine's limits and the feeds allow."""
+"""Time-optimal retiming: from a leg path to the fastest trajectory within the machine's limits and the feeds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Long paths from disk to disk: the passes of TOPP-RA and the jerk limits, block by block, in constant memory.
+"""Out-of-core TOPP-RA and jerk limits: long paths from disk to disk, block by block, in constant memory.
 
 The backward pass needs of what lies behind a block two numbers, the controllable speeds at its end; so blocks taken one
 after the other, from the last to the first, are the pass over the whole, and likewise forwards. Several processes begin

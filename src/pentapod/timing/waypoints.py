@@ -1,4 +1,4 @@
-"""From bare waypoints to samples: the fastest motion along the cubic spline through them, velocities and accelerations.
+"""Time-optimal motion through waypoints: a cubic spline under velocity and acceleration limits, and its samples.
 
 For rows of joint positions that come from elsewhere, dense enough to be the path: no toolpath, no feed, no jerk limit.
 Limits hold at the waypoints and, accelerations being linear in what changes, nearly so between them; what is proven

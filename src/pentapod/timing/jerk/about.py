@@ -1,4 +1,4 @@
-"""Passes about single stations of a problem; what is far from these stays."""
+"""Local passes of the jerk problem: solved anew about single stations; the rest of the spline stays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Laws limited in jerk, solved anew about the places where setpoints exceed, with lower limits there.
+"""Constraint tightening: laws limited in jerk are solved again with lower limits where setpoints exceed them.
 
 Between its setpoints the controller makes a spline of its own, which rings where jerks step. Where it exceeds a limit
 the rows of the nearest gridpoints get less of that limit; the law changes there and hardly anywhere else.

@@ -1,4 +1,4 @@
-"""Where the spline of a jerk-limited law has its knots: close where there is something to find, few where not."""
+"""Knot placement for the spline of a jerk-limited law: dense where its curvature changes, sparse elsewhere."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Jerk limits: the fastest law below the TOPP-RA profile whose leg jerks hold, with S-curve starts and stops.
+"""Jerk-limited time law: sequential convex programming below the TOPP-RA profile, with S-curve starts and stops.
 
 x(s) = ṡ² becomes a cubic spline. A leg's jerk is √x (q‴ x + 1.5 q″ x′ + 0.5 q′ x″); with 1/√x replaced by its
 tangent at the last iterate the limit is linear, and stricter than the true one. So each pass is convex, its answer

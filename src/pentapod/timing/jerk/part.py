@@ -1,4 +1,4 @@
-"""The part of a path that one problem of the jerk passes is about, and its ends: rests, given speeds, or open ones."""
+"""The domain of one jerk problem, a part of the path, and its end conditions: rest, given speed, or open."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The passes over one part of a path: knots by the law that was found, until nothing is gained, checked in between."""
+"""Sequential convex programming over one part: knots follow the last law; passes go on until they gain nothing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One convex problem after the other: the jerk passes over one stretch of the path."""
+"""One convex subproblem of the jerk passes: a cubic B-spline with linear rows at its gridpoints, solved in windows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What limits a law with bounded jerk, at any stations; and where its setpoints exceed the limits."""
+"""Linear rows of a jerk-limited law at any stations, and the places where its setpoints exceed the limits."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Time laws and trajectories, and what timing has to know of a path."""
+"""Time laws s(t) and trajectories; refusals of paths that have none."""

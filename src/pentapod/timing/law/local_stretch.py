@@ -1,4 +1,4 @@
-"""Running a law slower about single places, and nowhere else."""
+"""Local time scaling: a law run slower about single places, and nowhere else."""
 
 from __future__ import annotations
 

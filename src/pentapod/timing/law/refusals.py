@@ -1,4 +1,4 @@
-"""What cannot be timed, as refusals: the place, the limits that conflict, and the path's tangent there."""
+"""Refusals of the time law: the place, the limits in conflict, and the tangent of the path there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pieces whose law had to be made slower so that its setpoints keep the limits: by how much, and where."""
+"""Report of pieces that had to be slower than their first law, so that the setpoints keep the limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cutting motion laws and joining them again."""
+"""Splicing of time laws: cutting them at times, and joining the parts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""MotionLaw: arc length as a function of time, from rest to rest."""
+"""MotionLaw: arc length as a function of time, a piecewise cubic, from rest to rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Trajectory: the leg path with its time law."""
+"""Trajectory: the legs as functions of time, a path with its time laws."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _PLOTTED = 2000
 
 @dataclass(frozen=True, eq=False)
 class Profile(Value):
-    """The plan at its gridpoints, for explanation: what holds the motion back, and where.
+    """Speed profile at the gridpoints, with the active limit at each.
 
     times (K,) s; stations (K,) global tip arc length, m; speeds (K,) tip, m/s; active (K,): index into
     `constraints`; shares (K,): how much of that limit (less the margin) is used. Where smoothing

@@ -1,4 +1,4 @@
-"""Limit of the feed: the speed, on cuts and links, of the point whose speed the feed is."""
+"""Limit of the feed rate: the speed, on cuts and links, of the tip or of the spot that a beam meets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Limit: one thing that a motion along a path must not exceed, as rows that are linear in ṡ² and s̈.
+"""Limit: a constraint on the motion along a path, as rows that are linear in ṡ² and s̈.
 
 With x = ṡ² and u = s̈, a leg moves at q′ √x and accelerates with q′ u + q″ x; a force in a leg has an offset beside
 that, which is there at rest as well. A limit of one's own is a class with `names` and one of the three kinds of rows:

@@ -1,4 +1,4 @@
-"""The limits of a motion, together: the list of those that machines set, and the rows of all that hold for a path."""
+"""The set of limits of a plan: those that machines set, those added to them, and the rows of all together."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Limits on the length of a vector as linear rows: polygons and polyhedra in the frame in which the path moves.
+"""Polyhedral approximation of norm limits: linear rows in the frame in which the path moves.
 
 The acceleration of a point on the path is f u + g x, with f along the path: it stays in the plane of f and g. Its
 jerk needs a third direction. Rows say |n · vector| ≤ 1 for normals n spread over the half circle, or the half sphere.

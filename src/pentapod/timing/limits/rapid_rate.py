@@ -1,4 +1,4 @@
-"""Limit of the tip's own speed, which rapids run at."""
+"""Limit of the tip speed: the rapid rate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Feed override: what a running trajectory becomes when the operator turns the knob.
+"""Feed override: the trajectory that follows when the operator turns the knob on a running program.
 
 The rest of the path is planned anew with its feeds scaled, and the motion passes from the old plan to the new one
 within a short transition: the speed at each place goes over from the one to the other by a fraction that rises
@@ -29,7 +29,7 @@ from pentapod.timing.retime import retime
 
 LEAST_SHARE, LARGEST_SHARE = 0.01, 1.5
 TRANSITION = Constraint("feed override", "feed override")
-"""What holds the motion back during a transition, in the profile."""
+"""The active limit during a transition, in the profile."""
 
 
 @stage

@@ -1,4 +1,4 @@
-"""PiecePart: a piece of the leg path from some station on, with its feeds overridden."""
+"""PiecePart: the rest of a piece from some station on, with its feeds overridden."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Transitions: how a running motion leaves its plan, to stop or to pass over to another plan.
+"""Transitions between two time laws: a smooth stop, or a smooth change from the old plan to the new one.
 
 How short a transition may be is tried, not assumed: the first one whose setpoints keep every limit is taken.
 """

@@ -1,4 +1,4 @@
-"""Setpoints as the controller joins them: polynomials of legs, station, tip and tool axis over time."""
+"""Interpolated setpoints: legs, station, tip and tool axis over time, as polynomials of the controller."""
 
 from __future__ import annotations
 

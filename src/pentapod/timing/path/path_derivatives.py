@@ -1,4 +1,4 @@
-"""PathDerivatives: legs, tip and tool axis of a piece of the path, differentiated by arc length at given stations."""
+"""PathDerivatives: derivatives of legs, tip and tool axis by arc length, at given stations of a piece."""
 
 from __future__ import annotations
 

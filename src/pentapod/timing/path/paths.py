@@ -1,4 +1,4 @@
-"""What timing needs to know of a path: the shape that a `LegPath` has."""
+"""The protocols of a path: what timing asks of a `LegPath` and its pieces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Laws with given speeds at their ends, in whole periods of the controller."""
+"""Boundary speeds: time laws with given speeds at their ends, stretched to whole periods of the controller."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where setpoints of a law would exceed a limit as the controller joins them, whatever their phase against the path."""
+"""Limit violations of interpolated setpoints, at any phase of the controller's period against the path."""
 
 from __future__ import annotations
 

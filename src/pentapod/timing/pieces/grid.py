@@ -1,4 +1,4 @@
-"""Gridpoints: fine enough that limits kept at the points are kept between them."""
+"""Grid refinement for TOPP-RA: gridpoints so dense that limits kept at them are kept between them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the pieces of a program use of the limits, one beside the other, as the controller joins their setpoints."""
+"""Use of the limits by the setpoints of all pieces in a row, as the controller interpolates across their borders."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Laws limited in jerk, slower about the places where their setpoints would exceed a limit, whatever their phase."""
+"""Local slowing of jerk-limited laws where their setpoints would still exceed a limit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The time law of one piece: solved, measured between the gridpoints, mended until it holds there too."""
+"""The speed profile of one piece: TOPP-RA, checked between the gridpoints, refined until the limits hold there."""
 
 from __future__ import annotations
 

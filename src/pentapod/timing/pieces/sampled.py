@@ -1,4 +1,4 @@
-"""Time laws whose limits hold on the sampled program, as the controller joins its setpoints.
+"""Time laws whose setpoints keep the limits as the controller interpolates them.
 
 A law that keeps the limits at every instant does not yet keep them so: the cubic spline through its setpoints
 overshoots where accelerations jump (by 27 % at a reversal from full acceleration to full braking) or jerks do. What

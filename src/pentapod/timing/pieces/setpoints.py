@@ -1,4 +1,4 @@
-"""The setpoints of a piece's law, and how much of the limits a controller uses that joins them."""
+"""Setpoints of a time law, and the shares of the limits that the controller's interpolation uses."""
 
 from __future__ import annotations
 

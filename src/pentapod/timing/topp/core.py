@@ -1,4 +1,4 @@
-"""The compiled core: the two passes over one range of stages, and what went wrong in words."""
+"""The compiled TOPP-RA engine: both passes over one range of stages, and failures in words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The largest ṡ² along a grid: one interface to the compiled core and to toppra, the reference."""
+"""Time-optimal path parametrisation: one interface to the compiled engine and to toppra, the reference."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The reference engine, and the one place that speaks to toppra: the largest ṡ² along a grid.
+"""The toppra engine: the reference solution of the largest ṡ² along a grid.
 
 toppra compares with absolute tolerances (1e-8 and the like), so what it is given has no units: squared
 speeds are of order one, and so are the path accelerations that the limits allow. Metres with

@@ -1,4 +1,4 @@
-"""The problem of the passes, free of units, and why it may have no answer."""
+"""The discretised problem of TOPP-RA, free of units, and the reasons why it may have no solution."""
 
 from __future__ import annotations
 
