@@ -20,10 +20,10 @@ from scipy.interpolate import make_interp_spline
 from timing_peers import copp_robot, highs, our_chain, socp, toppra_chain
 from timing_robots import drake_solver, ruckig_line
 
-from pentapod.timing.jerk.knots import KNOTS_PER_RAMP, law_knots
+from pentapod.timing.jerk.knots import law_knots
 from pentapod.timing.jerk.limited import jerk_limited
+from pentapod.timing.jerk.options import USUAL, JerkOptions
 from pentapod.timing.jerk.part import Part
-from pentapod.timing.jerk.passes import PASSES
 from pentapod.timing.jerk.problem import Problem as Pass
 from pentapod.timing.jerk.rows import JerkRows
 from pentapod.timing.law.time_law import MotionLaw
@@ -151,7 +151,7 @@ def core(sizes: list[int]) -> None:
 def one_pass(p: Problem, x: np.ndarray) -> tuple[Pass, float, float]:
     """Return a pass as the product makes it, and its seconds: as the first one, and as the next."""
     part = Part.of(p.s, x, p.jerk_rows, NO_MARKS, (False, False), 0.0)
-    problem = Pass.on(part, law_knots(part, x, 1.0, KNOTS_PER_RAMP))
+    problem = Pass.on(part, law_knots(part, x, 1.0))
     start, around = problem.start(), np.minimum(problem.top, problem.ramps)
     problem.improved(start, around, 0)
     first, y = best(lambda: problem.improved(start, around, 0), 3)
@@ -169,13 +169,15 @@ def jerk(n: int) -> None:
         x = p.solved("core")
         problem, first, later = one_pass(p, x)
         count, durations, used = len(problem.s), [], 0.0
-        for passes in (1, 2, PASSES):
-            used, profile = best(lambda k=passes, p=p, x=x: jerk_limited(p.s, x, p.jerk_rows, NO_MARKS, k), 2)
+        for passes in (1, 2, USUAL.passes):
+            used, profile = best(
+                lambda k=passes, p=p, x=x: jerk_limited(p.s, x, p.jerk_rows, NO_MARKS, options=JerkOptions(k)), 2
+            )
             durations.append(MotionLaw.through(profile.s, profile.x, profile.slope).duration)
         print(
             f"{kind:7s} {count:8d} gridpoints, jerk: first pass {1e6 * first / count:.1f} µs, the next "
             f"{1e6 * later / count:.1f} µs; the whole law {1e6 * used / n:.1f} µs for each of {n} gridpoints given; "
-            f"durations with at most 1, 2, {PASSES} passes: " + ", ".join(f"{d:.4f}" for d in durations)
+            f"durations with at most 1, 2, {USUAL.passes} passes: " + ", ".join(f"{d:.4f}" for d in durations)
             + f" s (without jerk limits {p.duration(x):.4f} s)",
             flush=True,
         )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from pentapod.timing.certificates import LimitUse, certify
 from pentapod.timing.explain import Cause, CostlyPlace, Explanation, explain
+from pentapod.timing.jerk.options import JerkOptions
 from pentapod.timing.law.slowed import Slowed
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.law.trajectory import Profile, Trajectory
@@ -20,6 +21,7 @@ __all__ = [
     "Cause",
     "CostlyPlace",
     "Explanation",
+    "JerkOptions",
     "LegPathLike",
     "Limit",
     "LimitUse",

@@ -11,6 +11,7 @@ from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal, stage
 from pentapod.machine.machine import Machine
+from pentapod.timing.jerk.options import USUAL, JerkOptions
 from pentapod.timing.law.refusals import STILL_M, refusal, unfit
 from pentapod.timing.law.slowed import slowed
 from pentapod.timing.law.time_law import MotionLaw
@@ -38,6 +39,7 @@ def retime(
     start_speed: float = 0.0,
     end_speed: float = 0.0,
     limits: Sequence[Limit] = (),
+    jerk_options: JerkOptions = USUAL,
 ) -> Trajectory | Refusal:
     """Return the fastest trajectory along a path, or the named cause why there is none.
 
@@ -56,7 +58,7 @@ def retime(
     they cannot be kept the refusal says so.
 
     limits: further ones (`Limit`), which hold beside those of the machine, less the same margins. One that standing
-    still would exceed is a Refusal.
+    still would exceed is a Refusal. jerk_options: how long faster laws within the jerk limits are searched for.
 
     Raises InputError where a margin is not in (0, 0.5), for an unknown engine, for a speed below 0 or next to a dwell,
     or for a speed with a cubic controller whose jerks are not limited.
@@ -89,7 +91,7 @@ def retime(
     for k in indices:
         speeds = (start_speed if k == indices[0] else 0.0, end_speed if k == indices[-1] else 0.0)
         slacks = (0.5 * velocity_margin, 0.7 * acceleration_margin)
-        profile = time_piece(path.pieces[k], kept, *slacks, engine, speeds)
+        profile = time_piece(path.pieces[k], kept, *slacks, engine, speeds, jerk_options)
         if isinstance(profile, Failure):
             return refusal(path, k, profile)
         profiles.append(profile)

@@ -28,7 +28,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError
 from pentapod.timing.jerk.limited import APART, Block, Solved, blocks, leads, runs_of, solved
-from pentapod.timing.jerk.passes import PASSES
+from pentapod.timing.jerk.options import USUAL, JerkOptions
 from pentapod.timing.jerk.rows import RowsAt, Run
 from pentapod.timing.topp.core import admitted, backward, forward
 from pentapod.timing.topp.stages import Failure, Stages
@@ -139,7 +139,7 @@ def limit_stored(
     marks: Floats,
     out: Path,
     *,
-    passes: int = PASSES,
+    options: JerkOptions = USUAL,
     least_step: float = 0.0,
     processes: int = 1,
 ) -> Failure | None:
@@ -154,7 +154,7 @@ def limit_stored(
     for lead in leads(count):
         with tempfile.TemporaryDirectory(dir=out.parent) as scratch:
             raw = Path(scratch) / "runs"
-            work = partial(_limited, stored, rows_at, marks, passes, least_step)
+            work = partial(_limited, stored, rows_at, marks, options, least_step)
             with closing(_in_order(work, blocks(count, lead), processes)) as found:
                 reason = _write(raw, runs_of(stored.s, count, lead, map(_law, found)))
             if reason is None:
@@ -208,9 +208,9 @@ class _NoLawError(Exception):
 
 
 def _limited(
-    stored: StoredProfile, rows_at: RowsAt, marks: Floats, passes: int, least_step: float, block: Block
+    stored: StoredProfile, rows_at: RowsAt, marks: Floats, options: JerkOptions, least_step: float, block: Block
 ) -> Solved | Failure:
-    return solved(stored.s, stored.x, rows_at, marks, passes, least_step, None, block)
+    return solved(stored.s, stored.x, rows_at, marks, options, least_step, None, block)
 
 
 def _law(found: Solved | Failure) -> Solved:

@@ -9,6 +9,7 @@ import pytest
 from pentapod.base.errors import InputError
 from pentapod.timing.jerk import limited as jerk
 from pentapod.timing.jerk.limited import jerk_limited
+from pentapod.timing.jerk.options import JerkOptions
 from pentapod.timing.jerk.rows import JerkRows
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.stored import StoredProfile, limit_stored
@@ -160,7 +161,10 @@ def test_memory_does_not_grow_with_the_path(small, tmp_path):
         np.save(folder / "s.npy", s)
         np.save(folder / "x.npy", x)
         tracemalloc.start()
-        assert limit_stored(StoredProfile(folder), Waves(), NO_MARKS, folder / "law.npy", passes=1) is None
+        assert (
+            limit_stored(StoredProfile(folder), Waves(), NO_MARKS, folder / "law.npy", options=JerkOptions(passes=1))
+            is None
+        )
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.3 * peaks[0]

@@ -7,9 +7,6 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.timing.jerk.problem import LEAD, Problem
 
-SETTLED = 2e-4
-"""Share of the time that a pass must have gained for another one."""
-
 _LONGER = 4
 """By how much longer a stretch is tried in which nothing was found."""
 
@@ -21,7 +18,7 @@ def tangents(problem: Problem, y: Floats) -> Floats:
     return np.maximum(problem.values(y)[:, 0], _LEAST * problem.top)
 
 
-def about(problem: Problem, y: Floats, around: Floats, stations: Floats, passes: int) -> tuple[Floats, Floats]:
+def about(problem: Problem, y: Floats, around: Floats, stations: Floats) -> tuple[Floats, Floats]:
     """Return coefficients solved anew about sorted stations (n,), and between which stations (2, k) they are.
 
     around (N,): tangents to begin with. Where nothing is found the stretch becomes longer, until it is the whole.
@@ -29,7 +26,7 @@ def about(problem: Problem, y: Floats, around: Floats, stations: Floats, passes:
     n, lead, changed = len(y), LEAD // 2, [np.zeros((2, 0))]
     while len(stations):
         stretches, last, failed = problem.stretches(stations, lead), np.inf, np.zeros(len(stations), dtype=bool)
-        for number in range(passes):
+        for number in range(problem.options.passes):
             found: list[tuple[int, int]] = []
             for low, high in stretches:
                 ends = (problem.held[0] if low == 0 else 3, problem.held[1] if high == n else 3)
@@ -44,7 +41,7 @@ def about(problem: Problem, y: Floats, around: Floats, stations: Floats, passes:
             taken = sum(float((problem.weight[part] / np.sqrt(around[part])).sum()) for part in parts)
             if number == 0:
                 changed.append(np.array([problem.knots[[low, high + 3]] for low, high in found]).reshape(-1, 2).T)
-            if last - taken < SETTLED * taken or not stretches:
+            if last - taken < problem.options.settled * taken or not stretches:
                 break
             last = taken
         if lead >= n:

@@ -15,14 +15,6 @@ from pentapod.timing.jerk.about import about, tangents
 from pentapod.timing.jerk.problem import Answer, Problem
 from pentapod.timing.jerk.rows import Measure
 
-_ROUNDS = 10
-_EXTRA = 0.003
-"""Share by which a limit becomes lower than it would have to be, and by as much more in each round: what moves at one
-place shifts later setpoints against the path."""
-
-_LEAST = 0.75
-"""Share of a limit that is left at least."""
-
 _JERK, _PUSH = 0.7, 0.9
 """Shares of the limits that a law uses at gridpoints near which setpoints may exceed."""
 
@@ -36,24 +28,25 @@ class Eased:
     exceeds: bool
 
 
-def eased(problem: Problem, y: Floats, measure: Measure, passes: int) -> Eased:
+def eased(problem: Problem, y: Floats, measure: Measure) -> Eased:
     """Return an answer whose setpoints keep the limits, as far as that is found."""
-    lowest = (0.0, _LEAST, _LEAST)
+    options = problem.options
+    lowest = (0.0, options.least_left, options.least_left)
     factors = [np.ones(len(problem.s)) for _ in lowest]
     begun, taken, between = problem, problem.seconds(y), _near_limits(problem, y)
-    for attempt in range(_ROUNDS):
+    for attempt in range(options.tightenings):
         over = measure(problem.run(y), between)
         if not len(over.s):
             return Eased((problem, y), problem.seconds(y) - taken, False)
         low = np.maximum(np.searchsorted(problem.s, over.s - over.reach) - 1, 0)
         high = np.minimum(np.searchsorted(problem.s, over.s + over.reach) + 1, len(problem.s))
-        extra = 1.0 + (attempt + 1) * _EXTRA
+        extra = 1.0 + (attempt + 1) * options.tighter
         for factor, shares, least in zip(factors, (over.speed, over.acceleration, over.jerk), lowest, strict=True):
             worst = np.ones(len(factor))
             _spread(worst, low, high, np.where(shares > 1.0, shares * extra, 1.0))
             factor[:] = np.maximum(factor / worst, np.minimum(factor, least))
         problem = _with(begun, *factors)
-        y, changed = about(problem, y, tangents(problem, y), over.s, passes)
+        y, changed = about(problem, y, tangents(problem, y), over.s)
         between = np.concatenate([changed, np.stack([over.s - over.reach, over.s + over.reach])], axis=1)
     return Eased((problem, y), problem.seconds(y) - taken, True)
 

@@ -10,8 +10,6 @@ from pentapod.timing.jerk.part import Part
 from pentapod.timing.jerk.rows import JerkRows
 from pentapod.timing.limits.limit import share_of_room
 
-KNOTS_PER_RAMP = 8.0
-_LEAST_KNOTS = 96
 _GROWTH = 1.5
 
 _BENT = 0.05
@@ -26,7 +24,7 @@ _CALM_MARGIN, _CALM_GROWTH, _CALM_MOST = 3.0, 0.3, 12.0
 _CALM_SHARE = 0.5
 
 
-def law_knots(part: Part, x: Floats, pushed: float, per_ramp: float) -> Floats:
+def law_knots(part: Part, x: Floats, pushed: float, share: float = 1.0) -> Floats:
     """Return inner knots (K,) even in the time of the law x (N + 1,), at the path's kinks, ever closer to the rests.
 
     So many for each ramp: the time in which jerk brings the accelerations to the share `pushed` of their limits; but
@@ -42,7 +40,10 @@ def law_knots(part: Part, x: Floats, pushed: float, per_ramp: float) -> Floats:
     steps = 2.0 * np.diff(s) / (speed[:-1] + speed[1:])
     ramp = pushed * _ramp(rows)
     room = _seconds_to_others(steps, calm) - _CALM_MARGIN * ramp
-    every = min(max(ramp / per_ramp, part.least_step), float(steps.sum()) / _LEAST_KNOTS)
+    every = min(
+        max(ramp / (share * part.options.knots_per_ramp), part.least_step),
+        float(steps.sum()) / part.options.least_knots,
+    )
     wide = every * np.clip(1.0 + _CALM_GROWTH * room / every, 1.0, _CALM_MOST)
     number = np.concatenate([[0.0], np.cumsum(2.0 * steps / (wide[:-1] + wide[1:]))])
     even = np.interp(np.linspace(0.0, number[-1], int(np.ceil(number[-1])) + 1), number, s)

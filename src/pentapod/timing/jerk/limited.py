@@ -25,8 +25,9 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.timing.jerk.eased import Eased, eased
+from pentapod.timing.jerk.options import USUAL, JerkOptions
 from pentapod.timing.jerk.part import Part
-from pentapod.timing.jerk.passes import PASSES, answer_of
+from pentapod.timing.jerk.passes import answer_of
 from pentapod.timing.jerk.problem import Problem
 from pentapod.timing.jerk.rows import NO_ROWS, JerkRows, Measure, Over, RowsAt, Run
 from pentapod.timing.topp.stages import Failure
@@ -109,8 +110,8 @@ def jerk_limited(
     x: Floats,
     rows_at: RowsAt,
     marks: Floats,
-    passes: int = PASSES,
     *,
+    options: JerkOptions = USUAL,
     least_step: float = 0.0,
     measure: Measure | None = None,
 ) -> SmoothProfile | Failure:
@@ -120,7 +121,7 @@ def jerk_limited(
     path's third derivative has kinks. least_step: seconds below which the law needs no freedom. A Failure where the
     passes find nothing. measure: says where setpoints of a law exceed; there it is solved anew with lower limits.
     """
-    return _joined(s, len(s), lambda block: solved(s, x, rows_at, marks, passes, least_step, measure, block))
+    return _joined(s, len(s), lambda block: solved(s, x, rows_at, marks, options, least_step, measure, block))
 
 
 def blocks(count: int, lead: int) -> list[Block]:
@@ -139,7 +140,7 @@ def solved(
     x: Floats,
     rows_at: RowsAt,
     marks: Floats,
-    passes: int,
+    options: JerkOptions,
     least_step: float,
     measure: Measure | None,
     block: Block,
@@ -147,13 +148,13 @@ def solved(
     """Return the answer of one block, without its rows; arguments as for `jerk_limited`."""
     here, shift = slice(block.low, block.high + 1), float(s[block.low])
     local, rows = np.asarray(s[here]) - shift, partial(_shifted, rows_at, shift)
-    part = Part.of(local, np.asarray(x[here]), rows, marks - shift, block.goes_on(len(s)), least_step)
-    answer = answer_of(part, passes)
+    part = Part.of(local, np.asarray(x[here]), rows, marks - shift, block.goes_on(len(s)), least_step, options)
+    answer = answer_of(part)
     if answer is None:
         return Failure(-1, NOT_LIMITED)
     softer = Eased(answer, 0.0, exceeds=True)
     if measure is not None:
-        softer = eased(*answer, partial(_measured, measure, shift), passes)
+        softer = eased(*answer, partial(_measured, measure, shift))
     problem, y = softer.answer
     return Solved(replace(problem, rows=NO_ROWS), y, shift, softer.longer, softer.exceeds)
 

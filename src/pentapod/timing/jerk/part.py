@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.timing.jerk.options import USUAL, JerkOptions
 from pentapod.timing.jerk.rows import ROW_NAMES, JerkRows, RowsAt
 
 _JOIN = 0.01
@@ -128,10 +129,18 @@ class Part:
     begin: End
     end: End
     least_step: float
+    options: JerkOptions = USUAL
 
     @classmethod
     def of(
-        cls, s: Floats, x: Floats, rows_at: RowsAt, marks: Floats, goes_on: tuple[bool, bool], least_step: float
+        cls,
+        s: Floats,
+        x: Floats,
+        rows_at: RowsAt,
+        marks: Floats,
+        goes_on: tuple[bool, bool],
+        least_step: float,
+        options: JerkOptions = USUAL,
     ) -> Part:
         """Return the part; goes_on: whether the path goes on beyond either end. At rest where x is 0, else steady."""
         rows = rows_at(s)
@@ -141,7 +150,7 @@ class Part:
             for on, there, at, here in ((goes_on[0], rows, s, x[0]), (goes_on[1], turned, s[::-1], x[-1]))
         )
         inner = marks[(marks > 0.0) & (marks < s[-1])]
-        return cls(s, x, rows_at, rows, inner, begin, end, least_step)
+        return cls(s, x, rows_at, rows, inner, begin, end, least_step, options)
 
     @property
     def length(self) -> float:

@@ -5,68 +5,52 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats
-from pentapod.timing.jerk.about import SETTLED, about, tangents
-from pentapod.timing.jerk.knots import KNOTS_PER_RAMP, law_knots
+from pentapod.timing.jerk.about import about, tangents
+from pentapod.timing.jerk.knots import law_knots
 from pentapod.timing.jerk.part import Part
 from pentapod.timing.jerk.problem import GRIDPOINTS_PER_KNOT, Answer, Problem
-
-PASSES = 8
-"""Passes at most once the knots are where they stay."""
-
-_FIRST = 2
-_FIRST_KNOTS = 0.5
-"""Passes that find out how hard the law pushes, and how many knots they have beside the last ones."""
-
-_RAMPS = 5
-"""Ramps out of rests that are tried, each shorter than the one before."""
-
-_ROUNDS = 3
-_JERK, _PUSH, _FAST, _SLOW = 1.03, 1.005, 1.005, 0.2
-"""Shares of the limits above which knots are halved, and of ṡ² beside it below which."""
 
 _SPARE = 1.1
 _LEAST = 1e-9
 _REACHED = 0.995
 
 
-def answer_of(part: Part, passes: int = PASSES) -> Answer | None:
+def answer_of(part: Part) -> Answer | None:
     """Return the fastest law of a part, None where none is found; ramps out of rests are shorter where they must be."""
-    for _ in range(_RAMPS):
-        answer = _answer_of(part, passes)
+    for _ in range(part.options.ramps + 1):
+        answer = _answer_of(part)
         if answer is not None:
             return answer
         part = part.shorter()
     return None
 
 
-def _answer_of(part: Part, passes: int) -> Answer | None:
-    found = _first(part)
+def _answer_of(part: Part) -> Answer | None:
+    options, found = part.options, _first(part)
     if found is None:
-        inner = law_knots(part, part.x, 1.0, KNOTS_PER_RAMP)
+        inner = law_knots(part, part.x, 1.0)
         problem = Problem.on(part, inner)
         y, around = problem.start(), np.minimum(problem.top, problem.ramps)
     else:
         coarse, rough = found
-        problem = Problem.on(
-            part, law_knots(part, _law_at(part, coarse, rough), _pushed(coarse, rough), KNOTS_PER_RAMP)
-        )
+        problem = Problem.on(part, law_knots(part, _law_at(part, coarse, rough), _pushed(coarse, rough)))
         y, around = _carried(coarse, rough, problem)
-    better = _settled(problem, y, around, passes)
+    better = _settled(problem, y, around, options.passes)
     if better is None:
         return None
     answer = problem, better
-    for _ in range(_ROUNDS):
+    for _ in range(options.halvings):
         bad = _exceeding(part, *answer)
         if not bad.any():
             break
-        answer = _halved(part, *answer, bad, passes)
+        answer = _halved(part, *answer, bad)
     return answer
 
 
 def _first(part: Part) -> Answer | None:
     """Return a rough answer with few knots, even in the time of the law without jerk limits."""
-    problem = Problem.on(part, law_knots(part, part.x, 1.0, _FIRST_KNOTS * KNOTS_PER_RAMP))
-    better = _settled(problem, problem.start(), np.minimum(problem.top, problem.ramps), _FIRST)
+    problem = Problem.on(part, law_knots(part, part.x, 1.0, part.options.rough_knots))
+    better = _settled(problem, problem.start(), np.minimum(problem.top, problem.ramps), part.options.rough_passes)
     return None if better is None else (problem, better)
 
 
@@ -80,28 +64,32 @@ def _settled(problem: Problem, y: Floats, around: Floats, passes: int) -> Floats
         y, around = better, tangents(problem, better)
         taken = problem.weight / np.sqrt(around)
         if number > 0:
-            gains = last - (1.0 + SETTLED) * taken
-            if (last - taken).sum() <= SETTLED * taken.sum():
+            gains = last - (1.0 + problem.options.settled) * taken
+            if (last - taken).sum() <= problem.options.settled * taken.sum():
                 break
         last = taken
     return y
 
 
-def _halved(part: Part, problem: Problem, y: Floats, bad: Bools, passes: int) -> Answer:
+def _halved(part: Part, problem: Problem, y: Floats, bad: Bools) -> Answer:
     """Return the answer with knots twice as close where it is bad (K − 1,) and beside; solved anew about there."""
     near = bad | np.append(bad[1:], False) | np.append(False, bad[:-1])
     middles = ((problem.inner[1:] + problem.inner[:-1]) / 2.0)[near]
     finer = Problem.on(part, np.sort(np.concatenate([problem.inner, middles])), problem)
-    return finer, about(finer, *_carried(problem, y, finer), middles, passes)[0]
+    return finer, about(finer, *_carried(problem, y, finer), middles)[0]
 
 
 def _exceeding(part: Part, problem: Problem, y: Floats) -> Bools:
     """Return between which inner knots (K − 1,) the spline exceeds a limit, or all but stops, between gridpoints."""
     s = (problem.s[1:] + problem.s[:-1]) / 2.0
     rows, v = part.rows_at(s), problem.at(y, s)
-    x, ends = v[:, 0], problem.values(y)[:, 0]
-    bad = (rows.jerk_uses(v) > _JERK) | (rows.pushes(v) > _PUSH) | (x > _FAST * rows.ceiling)
-    bad |= x < _SLOW * np.minimum(ends[:-1], ends[1:])
+    x, ends, options = v[:, 0], problem.values(y)[:, 0], part.options
+    bad = (
+        (rows.jerk_uses(v) > options.over_jerk)
+        | (rows.pushes(v) > options.over_push)
+        | (x > options.over_speed * rows.ceiling)
+    )
+    bad |= x < options.under_speed * np.minimum(ends[:-1], ends[1:])
     return np.asarray(bad.reshape(-1, GRIDPOINTS_PER_KNOT).any(axis=1))
 
 

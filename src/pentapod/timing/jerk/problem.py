@@ -9,6 +9,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.timing.jerk.jerk_kernels import convex_pass
+from pentapod.timing.jerk.options import JerkOptions
 from pentapod.timing.jerk.part import End, Part
 from pentapod.timing.jerk.rows import ROW_NAMES, JerkRows, Run
 from pentapod.timing.jerk.spline_kernels import cubic_basis, spline_values
@@ -45,6 +46,7 @@ class Problem:
     begin: End
     end: End
     length: float
+    options: JerkOptions
 
     @classmethod
     def on(cls, part: Part, inner: Floats, before: Problem | None = None) -> Problem:
@@ -59,7 +61,7 @@ class Problem:
         weight = np.gradient(grid)
         ramps = np.minimum(part.begin.bound(grid), part.end.bound(part.length - grid))
         weight *= len(grid) / (weight / np.sqrt(np.minimum(top, ramps))).sum()
-        return cls(grid, knots, basis, first, rows, top, ramps, weight, part.begin, part.end, part.length)
+        return cls(grid, knots, basis, first, rows, top, ramps, weight, part.begin, part.end, part.length, part.options)
 
     @property
     def inner(self) -> Floats:

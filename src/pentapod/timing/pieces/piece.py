@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.timing.jerk.options import USUAL, JerkOptions
 from pentapod.timing.jerk.rows import JerkRows
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.limits.limit import AccelerationRows, Motion, share_of_room
@@ -21,7 +22,8 @@ from pentapod.timing.topp.stages import STANDS_BEYOND, Failure
 
 if TYPE_CHECKING:
     from pentapod.timing.jerk.limited import SmoothProfile
-    from pentapod.timing.jerk.rows import Measure
+    from pentapod.timing.jerk.options import USUAL, JerkOptions
+from pentapod.timing.jerk.rows import Measure
 
 _BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 _REFINEMENTS = 4
@@ -53,6 +55,7 @@ class PieceProfile:
     engine: Engine = "core"
     x_start: float = 0.0
     x_end: float = 0.0
+    jerk_options: JerkOptions = USUAL
 
     @property
     def moving(self) -> bool:
@@ -101,7 +104,9 @@ class PieceProfile:
             capped = self._fastest(s, AccelerationRows(first, second, offset), ceiling)
             x = x if isinstance(capped, Failure) else np.minimum(x, capped)
         least = _LEAST_PERIODS * self.limits.period
-        return jerk_limited(s, x, self._jerk_rows, self.piece.knots, least_step=least, measure=measure)
+        return jerk_limited(
+            s, x, self._jerk_rows, self.piece.knots, least_step=least, measure=measure, options=self.jerk_options
+        )
 
     def _fine_grid(self) -> Floats:
         """Return the gridpoints and more between them, so that no stage lasts longer than a period.
@@ -172,9 +177,8 @@ class PieceProfile:
         added += [(self.s[:-1] + between * np.diff(self.s))[exceeding] for between in _BETWEEN]
         s = np.unique(np.concatenate([self.s, *added]))
         x, *eases = (np.interp(s, self.s, y) for y in (self.x, self.ease_acceleration, self.ease_speed))
-        return PieceProfile(
-            self.piece, self.limits, s, x, *eases, engine=self.engine, x_start=self.x_start, x_end=self.x_end
-        )
+        speed, acceleration = eases[1], eases[0]
+        return replace(self, s=s, x=x, ease_acceleration=acceleration, ease_speed=speed)
 
     def path_accelerations(self) -> Floats:
         """Return s̈ (N,) of each stage, m/s²."""
@@ -253,6 +257,7 @@ def time_piece(
     acceleration_slack: float,
     engine: Engine = "core",
     speeds: tuple[float, float] = (0.0, 0.0),
+    jerk_options: JerkOptions = USUAL,
 ) -> PieceProfile | Failure:
     """Return the fastest profile of a piece that keeps the limits between gridpoints as well.
 
@@ -264,6 +269,7 @@ def time_piece(
     x_start, x_end = speeds[0] ** 2, speeds[1] ** 2
     ones = (np.ones_like(s) for _ in range(2))
     problem = PieceProfile(piece, limits, s, np.zeros_like(s), *ones, engine=engine, x_start=x_start, x_end=x_end)
+    problem = replace(problem, jerk_options=jerk_options)
     profile = problem.solved()
     for attempt in range(_REFINEMENTS + _EASINGS):
         if isinstance(profile, Failure):
