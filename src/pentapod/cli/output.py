@@ -1,4 +1,4 @@
-"""What the verbs share: options, the progress bar on stderr, JSON on stdout."""
+"""Shared by the commands: options, progress bar on stderr, JSON on stdout."""
 
 # ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
 
@@ -77,7 +77,7 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
 
         def show(stage: str, fraction: float, note: str = "") -> None:
             if stage not in tasks:
-                # What does not tell how far it is pulses, so that it is seen to be at work.
+                # A stage without a known length shows a pulsing bar.
                 tasks[stage] = bars.add_task(stage, total=None, note=note, rate="")
             speed = bars.tasks[tasks[stage]].speed
             rate = f"{100.0 * speed:.3g} %/s" if speed and fraction < 1.0 else ""
@@ -99,7 +99,7 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
 
 
 def note_changes(folder: Path) -> None:
-    """Say on stderr where the files of a run's folder are not of one run."""
+    """Warn on stderr where the files of a folder belong to different runs."""
     from pentapod.base.errors import InputError
     from pentapod.job.run_folder import check_run
 

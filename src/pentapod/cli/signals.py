@@ -44,7 +44,7 @@ def _take(number: int, frame: FrameType | None) -> None:
 
 
 def _is_loading(frame: FrameType | None) -> bool:
-    """Whether a module is being loaded: then the import system is among the callers."""
+    """Whether a module is being imported: then the import system is among the callers."""
     while frame is not None:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
             return True

@@ -1,4 +1,4 @@
-"""One job, from its file to every artefact: schema, values, the run of its stages, the outcome and its files.
+"""Planning pipeline of one job: schema of the job file, run of the stages, outcome, output files.
 
 The names below are loaded when they are first used: to read a job file needs no solver.
 """

@@ -16,14 +16,14 @@ from pentapod.base.files import atomic_write, packed_arrays
 PROGRAM, VERDICT, REPORT, ARRAYS = "program.csv", "verdict.json", "report.html", "plan.npz"
 MANIFEST = "manifest.json"
 NAMES = (PROGRAM, ARRAYS, REPORT, VERDICT, MANIFEST)
-"""In the order in which they move into the folder: the manifest comes last and stands for all."""
+"""In the order in which they move into the folder; the manifest is last and shows that all are there."""
 
 SETUPS = "setup-[1-9]*"
 """Folders of the same files, one for each set-up of a job that needs several."""
 
 
 def check_folder(folder: Path) -> None:
-    """Raise InputError where the folder cannot be made or written; makes nothing that stays."""
+    """Raise InputError where the folder cannot be made or written. It leaves nothing behind."""
     existing = folder
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
@@ -38,7 +38,7 @@ def check_folder(folder: Path) -> None:
 
 
 def write_json(content: Mapping[str, Any], path: Path) -> None:
-    """Write JSON that a person can read, atomically. NaN is an error, for JSON has none."""
+    """Write indented JSON atomically. NaN is an error: JSON has none."""
     text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
     with atomic_write(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")

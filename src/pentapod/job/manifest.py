@@ -1,4 +1,4 @@
-"""manifest.json: the files of a run with their SHA-256, by which files of different runs are told apart."""
+"""manifest.json: the files of a run with their SHA-256; it shows mixed files of different runs."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def changed_files(folder: Path) -> list[str]:
 
 
 def _is(path: Path, sha256: str, size: int) -> bool:
-    """Whether a file is there with these bytes; its size is asked first, for it costs nothing."""
+    """Whether a file is there with these bytes; its size is compared first."""
     try:
         return path.stat().st_size == size and sha256_of(path) == sha256
     except OSError:

@@ -1,4 +1,4 @@
-"""Outcome: what a run reached: the value of each stage with its time, and the verdict."""
+"""Outcome: the results of a run, stage by stage with wall times, and the verdict."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Stage(Value):
-    """One stage that ran: its name, its wall time in seconds, the value that it gave, and what it says of it.
+    """A stage that ran: its name, wall time in seconds, result, and a text about it.
 
     A value that is a tuple is several values of one stage.
     """
@@ -35,7 +35,7 @@ class Stage(Value):
 
 @dataclass(frozen=True)
 class Outcome(Result):
-    """What a run reached. stages: in the order of the flow, as far as it came; a refusal ends it.
+    """The results of a run. stages: in the order of the flow; a refusal is the last one.
 
     machine: with the job's own tool length and controller settings.
     """
@@ -57,7 +57,7 @@ class Outcome(Result):
 
     @property
     def refusal(self) -> Refusal | None:
-        """Why the job cannot be done; None where a program was made."""
+        """The reason why the job cannot be done; None where a program was made."""
         return self.find(Refusal)
 
     @property
@@ -72,7 +72,7 @@ class Outcome(Result):
         return self
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the content of verdict.json; one of a refused job, or of several set-ups, tells so."""
+        """Return the content of verdict.json, with the refusal or the set-ups where there are any."""
         content = self.verdict.to_dict()
         if self.refusal is not None:
             content["refusal"] = refusal_dict(self.refusal)
@@ -83,7 +83,7 @@ class Outcome(Result):
 
 @dataclass(frozen=True)
 class SetUp(Value):
-    """One of several set-ups: its number from 1, the piece of the job's toolpath, and what its own run reached."""
+    """One of several set-ups: its number from 1, its piece of the toolpath, and the outcome of its run."""
 
     number: int
     piece: Piece
@@ -153,14 +153,14 @@ class SetUps(Value):
 
     @property
     def verdict(self) -> Verdict:
-        """All claims about all set-ups, and that they are the whole work."""
+        """All claims about all set-ups, and the claim that together they make every cut once."""
         return setups_verdict(
             [(part.number, part.outcome.verdict) for part in self.parts], self.cuts, self.missed, self.most
         )
 
 
 def setups_verdict(verdicts: Sequence[tuple[int, Verdict]], cuts: int, missed: int, most: int) -> Verdict:
-    """Return all claims about all set-ups, by number, and that they are the whole work; most: that the job allows.
+    """Return the verdict on all set-ups, and that together they make every cut once; most: set-ups that the job allows.
 
     Its sources name no program: each set-up's verdict names its own.
     """

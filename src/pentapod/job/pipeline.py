@@ -1,4 +1,4 @@
-"""From a job file to every artefact: the stages in order, each timed, as far as they go."""
+"""Planning pipeline: runs the stages of a job in order and writes their results."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def run(
     limits: Sequence[Limit] = (),
     claims: Sequence[Claim] = (),
 ) -> Outcome:
-    """Plan a job, write program.csv, plan.npz and verdict.json into `out`, and return what was reached.
+    """Plan a job, write program.csv, plan.npz and verdict.json into `out`, and return the outcome.
 
     piece: of the job's toolpath, where only that is to be planned, in one set-up. writers: further files, by name,
     each made from the outcome (the report, which stands above this floor). limits: further ones for the time law;
@@ -58,11 +58,11 @@ def run(
     folder = Path(out)
     check_folder(folder)
     runner = StageRunner(progress)
-    with staged(folder) as staging:  # from the start: a second run on the folder is told at once
+    with staged(folder) as staging:  # from the start: a second run on the folder fails at once
         machine = job_machine(job)
         mesh = runner.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
         asked = job_specification(job, machine, mesh, lambda: _toolpath(job, mesh, piece, runner))
-        if piece is not None:  # whoever asks for a piece has the others made elsewhere
+        if piece is not None:  # the caller plans the other pieces elsewhere
             asked = dataclasses.replace(asked, setups=max(asked.setups, 2))
         task = _Task(job, asked, runner, piece, tuple(limits), tuple(claims))
         outcome = _reached(task, staging, writers or {})
@@ -84,7 +84,7 @@ def _toolpath(job: Job, mesh: Mesh, piece: Piece | None, runner: StageRunner) ->
 
 
 def _reached(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
-    """Run the stages after the toolpath and the verdict, write the files, and return what was reached."""
+    """Run the stages after the toolpath, verify, write the files, and return the outcome."""
     program, runner = task.program(staging / PROGRAM), task.runner
     if isinstance(program, Refusal):
         verdict = refusal_verdict(program, task.asked.sources)
@@ -107,9 +107,9 @@ def _written(outcome: Outcome, staging: Path, writers: Mapping[str, Writer], pro
 
 
 def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
-    """Do a job that one placement cannot do in several set-ups, each in a folder of its own; or refuse it."""
+    """Split a job that one placement cannot reach into set-ups, each in a folder of its own; or refuse it."""
     job, toolpath, runner = task.job, task.toolpath, task.runner
-    # What was refused is not what is reached in the end.
+    # The refusal is not part of the outcome.
     runner.stages = [stage for stage in runner.stages if stage.value is not refusal]
     search = (task.toolpath, task.fits, style, job.placement.setups, refusal, runner.progress)
     found = runner.time("set-ups", lambda: setups(*search))
@@ -217,7 +217,7 @@ class _Task:
     def _explanation(self, path: LegPath, trajectory: Trajectory, program: Program) -> Explanation:
         position, direction = self.machine.robot.pose(program.legs, program.component)
         tips = position + self.machine.tool_length * direction
-        # A beam or a spray works at a rate: it wants constant speed on the surface. A cutter only wants no more.
+        # A beam or a spray needs constant speed on the surface; a cutter only has an upper bound.
         beam, period = self.toolpath.pivot < 0.0, self.machine.controller.period
         slow = unheld(trajectory, period, path.surface_rate) if beam else ()
         spot = self.toolpath.pivot if beam else 0.0
@@ -226,7 +226,7 @@ class _Task:
 
 
 def _remarks(placed: PlacedPath | Refusal) -> str:
-    """Return where guides are to stand, and what an interrupted search came to; nothing else is worth a line."""
+    """Return the positions of guides, and the result of an interrupted search."""
     if isinstance(placed, Refusal):
         return ""
     chosen = placed.placement

@@ -1,4 +1,4 @@
-"""The arrays of all stages, named and in the units of files: the content of plan.npz."""
+"""The content of plan.npz: the arrays of all stages by name, with units."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from pentapod.toolpath.toolpath import Toolpath
 Arrays = dict[str, NDArray[Any]]
 
 JOB_FILE = "job.file"
-"""The job file that the run was made from: relative to the run's folder where there is such a way."""
+"""The job file of the run, relative to the run's folder where possible."""
 
 GUIDES = "placed.guides_mm"
-"""Where the guides of a reconfigurable machine are to stand, slides (5,) along them."""
+"""Positions of the base joints along their guides, for a reconfigurable machine."""
 
 WAYPOINTS, BOX = "setup.waypoints", "setup.box_mm"
 """Of one of several set-ups: its piece of the job's toolpath, first and last waypoint (2,) and corners (2, 3)."""
@@ -79,12 +79,12 @@ def piece_in(arrays: Mapping[str, NDArray[Any]]) -> Piece | None:
 
 
 def guides_in(arrays: Mapping[str, NDArray[Any]]) -> list[float] | None:
-    """Return where the placement wants the guides, slides (5,) in metres; None where there are none."""
+    """Return the positions along the guides, metres; None for a machine without guides."""
     return _metres(arrays[GUIDES]) if GUIDES in arrays else None
 
 
 def _metres(values_mm: Floats) -> list[float]:
-    """Return metres to the nanometre: those of whole micrometres, as the planner sets them, come back exactly."""
+    """Return metres rounded to the nanometre: whole micrometres, as the planner sets them, are read back exactly."""
     return [round(value, 9) for value in to_si(values_mm, "mm").tolist()]
 
 

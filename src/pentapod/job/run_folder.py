@@ -1,4 +1,4 @@
-"""The folder of a run: its files are all of one run that ended, or those that stood there before.
+"""Transactional output folder: all files are those of one finished run, or of the one before.
 
     DIR/.unfinished-PID-…   what a run writes; its end is one rename to
     DIR/.finished           a whole run, with its manifest: from here on it is the run of this folder
@@ -80,7 +80,7 @@ def _filled(folder: Path) -> Generator[Path]:
             staging.rename(folder / _FINISHED)
             _settle(folder)
         except BaseException:
-            _settle(folder)  # a run that has ended: an interruption must not leave half of it
+            _settle(folder)  # the run has ended: an interruption must not leave half of its files
             raise
     finally:
         shutil.rmtree(staging, ignore_errors=True)
@@ -153,7 +153,7 @@ def _try(handle: int, folder: Path) -> bool:
 
 
 def _sweep(folder: Path) -> None:
-    """Remove what killed runs left unfinished: whoever holds the lock knows that they are dead."""
+    """Remove unfinished folders of killed runs; the lock shows that those runs have ended."""
     for path in folder.glob(".unfinished-*"):
         if path.is_dir() and not path.is_symlink() and _UNFINISHED.fullmatch(path.name):
             shutil.rmtree(path, ignore_errors=True)
@@ -182,7 +182,7 @@ def _settle(folder: Path) -> None:
 
 
 def _of_the_folder(error: InputError) -> InputError:
-    """Return an error about a file that is still staged as one about the file that the user knows."""
+    """Return an error about a staged file with the name of the final file."""
     return type(error)(
         error.what, file=unstaged(Path(error.file or "")), key=error.key, line=error.line, column=error.column,
         value=error.value, expected=error.expected, remedy=error.remedy,
@@ -190,7 +190,7 @@ def _of_the_folder(error: InputError) -> InputError:
 
 
 def _sync(folder: Path) -> None:
-    """Bring the names in a folder to the disk, so that a power cut keeps their order."""
+    """Flush the entries of a folder to the disk, so that their order survives a power failure."""
     with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:

@@ -1,4 +1,4 @@
-"""StageRunner: runs the stages of a job, and keeps what they gave."""
+"""StageRunner: runs the stages of a job and records their results and times."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Value = TypeVar("Value")
 
 
 class StageRunner:
-    """Runs stages and keeps their names, times and values."""
+    """Runs stages and records their names, wall times and results."""
 
     def __init__(self, progress: Progress) -> None:
         self.progress = progress
         self.stages: list[Stage] = []
 
     def time(self, name: str, stage: Callable[[], Value], says: Callable[[Value], str] | None = None) -> Value:
-        """Return what a stage gives; it is kept with its wall time, and with what `says` says of it."""
+        """Return the result of a stage; it is recorded with its wall time and, if `says` is given, a text about it."""
         self.progress(name, 0.0)
         start = time.perf_counter()
         value = stage()

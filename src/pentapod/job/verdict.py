@@ -1,4 +1,4 @@
-"""judge: the verdict on a program file, or on the folder of a run, by all that its job implies."""
+"""Verification of a program file, or of a run's folder, against its job."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pentapod.verify import Verdict, judged
 
 
 def judge(job: Job, program: str | Path, progress: Progress = silent, *, strict: bool = False) -> Verdict:
-    """Return the verdict on a program file, or on the folder of a run, by all that the job implies.
+    """Return the verdict on a program file, or on the folder of a run, against its job.
 
     A folder holds one program, or one for each set-up in setup-1, setup-2, and so on: then all of them are judged, and
     that together they make every cut once. The program of one set-up alone leaves that "not judged". strict as in

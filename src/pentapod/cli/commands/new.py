@@ -1,4 +1,4 @@
-"""pentapod new: a commented job to start from, written from the schema itself, with a small part."""
+"""pentapod new: a commented job file made from the schema, and a small part."""
 
 # ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
 

@@ -1,4 +1,4 @@
-"""pentapod plan: a job file → every artefact."""
+"""pentapod plan: plan a job and write its files."""
 
 # ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
 

@@ -1,4 +1,4 @@
-"""pentapod post: a program as a controller takes it."""
+"""pentapod post: write a program in the format of a controller."""
 
 # ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
 
@@ -72,7 +72,7 @@ def post(
     from pentapod.program.judged import check_passed
     from pentapod.program.posts import PostInput, find_post, placed_toolpath, write_post
 
-    takes_toolpath = find_post(name).takes_toolpath  # an unknown one is said at once
+    takes_toolpath = find_post(name).takes_toolpath  # an unknown format fails at once
     note_changes(program.parent)
     with progress_bar(quiet=quiet or as_json) as progress:
         progress("reading", 0.0, program.name)

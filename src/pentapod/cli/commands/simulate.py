@@ -1,4 +1,4 @@
-"""pentapod simulate: what a real machine would make of a program."""
+"""pentapod simulate: tracking errors of a program on a simulated machine."""
 
 # ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
 
@@ -60,7 +60,7 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
     engine, within_mm, plots = given["engine"], given["within_mm"], given.pop("plots")
     _check_options(ctx, engine)
     if engine == "mujoco":
-        load_mujoco()  # a missing one is said at once
+        load_mujoco()  # fails at once where it is not installed
     read, loaded = read_csv(program), Job.load(job)
     reference = Reference(read, PostInput(read, job_machine(loaded)).the_machine())
     same_job = read.provenance.job_digest == loaded.digest

@@ -31,7 +31,7 @@ def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet
     from pentapod.job.schema.job import Job
     from pentapod.toolpath.formats import format_of, write_toolpath
 
-    format_of(out, format_name)  # an unknown one is said at once
+    format_of(out, format_name)  # an unknown format fails at once
     loaded = Job.load(job)
     with progress_bar(quiet=quiet or as_json) as progress:
         progress("mesh", 0.0)

@@ -1,4 +1,4 @@
-"""pentapod verify: judge a program file afresh."""
+"""pentapod verify: verify a program file against its job."""
 
 # ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
 

@@ -33,7 +33,7 @@ def view(folder: Path, job: Path | None, host: str, port: int, opens: bool, as_j
     from pentapod.view import Viewer, open_run
     from pentapod.view.doors import load_viser
 
-    load_viser()  # a missing one is said at once
+    load_viser()  # fails at once where it is not installed
     with progress_bar(quiet=quiet or as_json) as progress:
         run = open_run(folder, job, progress)
     with Viewer(run, host=host, port=port) as viewer:

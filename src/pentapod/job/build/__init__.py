@@ -1,1 +1,1 @@
-"""From a job to the values that its stages start from, in SI units."""
+"""The inputs of the stages, SI, made from a job."""

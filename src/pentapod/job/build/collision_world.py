@@ -1,4 +1,4 @@
-"""From a job to what legs, spindle and tool must not touch: the part, its fixture, and the legs the tool."""
+"""Collision world from a job: the part, its fixture, legs, spindle and tool."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a job to what its program is to machine: the region of the part, and how much may be left there."""
+"""Coverage from a job: the region to be machined, and the material that may be left there."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pentapod.verify import Coverage
 
 
 def job_coverage(job: Job, mesh: Mesh) -> Coverage:
-    """Return what a job's program is to machine: nothing where its strategy draws lines and covers no surface.
+    """Return the region that a job's program must machine; none where its strategy covers no surface.
 
     Where the job says how much may be left, its region is to be machined whatever the strategy.
     """

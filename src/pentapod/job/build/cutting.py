@@ -1,4 +1,4 @@
-"""From a job to what cuts into its part, and how deep it may."""
+"""Gouge limits from a job: the bodies that cut, and the largest depth."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a job's table [placement] to the placements that the planner may choose from, and back."""
+"""Placement constraints from a job's table [placement], and the table of a placement."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from pentapod.planning.problem.weights import Weights
 
 _EVERYWHERE = (-np.inf, np.inf)
 _PLACE_KEYS = frozenset(("mode", "setups", *(key for keys in PLACEMENT_KEYS.values() for key in keys)))
-"""What says where the part may go; the other keys say what is wanted of the plan."""
+"""Keys that bound the placement; the other keys are objectives."""
 
 
 def job_constraints(job: Job, machine: Machine, mesh: Mesh) -> PlacementConstraints:
@@ -50,7 +50,7 @@ def job_weights(job: Job) -> Weights:
 
 
 def job_at(job: Job, placement: RigidTransform) -> Job:
-    """Return the job with its part fixed at a placement, told as `placement_toml` tells it; all else stays."""
+    """Return the job with its part fixed at a placement, rounded as in `placement_toml`."""
     table = job.placement
     kept = {name: getattr(table, name) for name in table.model_fields_set - _PLACE_KEYS}
     position = _rounded(from_si(placement.translation, "mm"), 6)
@@ -65,7 +65,7 @@ def _rounded(values: Floats, digits: int) -> Vector:
 
 
 def placement_toml(table: PlacementTable) -> str:
-    """Return a table [placement] as a job file has it: what is not as by default."""
+    """Return a table [placement] in TOML, without keys that have their defaults."""
     content = table.model_dump(mode="json", exclude_defaults=True)
     lines = [f"{key} = {json.dumps(value)}" for key, value in content.items()]
     return "\n".join(["[placement]", *lines])

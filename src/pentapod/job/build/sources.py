@@ -1,4 +1,4 @@
-"""From a job to the files that it was read from, by their bytes."""
+"""Provenance: the SHA-256 of the files that a job was read from."""
 
 from __future__ import annotations
 

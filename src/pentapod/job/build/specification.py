@@ -1,4 +1,4 @@
-"""From a job to what its program is judged against."""
+"""Specification from a job: everything that its program is verified against."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pentapod.verify import Specification
 
 
 def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Callable[[], Toolpath]) -> Specification:
-    """Return all that the job asks of its program; machine and mesh are the job's own.
+    """Return the requirements of a job on its program; machine and mesh: those of the job.
 
     make_toolpath: called last, so that errors of the job's tables are told before the long work.
     Raises JobError where tables of the job do not go with the machine or the mesh.

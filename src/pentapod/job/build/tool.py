@@ -1,4 +1,4 @@
-"""From a job's tables to the values of the toolpath floor: the tool, its axes, what is done about gouges."""
+"""Tool, tool axes and gouge check from a job."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.toolpath import Toolpath
 
 _SLACK = 1.05
-"""The cap counts along the contacts; the pivot's way is a little longer or shorter."""
+"""The cap holds along the contact points; the path of the pivot is a little longer or shorter."""
 _FILE_STYLE = PathOptions()
 """Clearance, approach and spacing where the path comes from a file."""
 
 
 @dataclass(frozen=True)
 class Reports:
-    """What the steps to a toolpath came to, one after the other."""
+    """The reports of the steps that made a toolpath."""
 
     parts: tuple[object, ...]
 
@@ -80,37 +80,37 @@ def job_tool(job: Job) -> Tool:
 
 
 def job_orientation(job: Job) -> Orientation:
-    """Return how the job wants the tool to stand."""
+    """Return the nominal tool axis of the job."""
     return Orientation(mode=_mode(job), **fields_from(Orientation, job.axis))
 
 
 def finished_as_asked(
     job: Job, mesh: Mesh, tool: Tool, toolpath: Toolpath, progress: Progress = silent
 ) -> tuple[Toolpath, object]:
-    """Return a toolpath with the axes and without the gouges that the job asks for, and what the check found."""
+    """Return a toolpath with the job's tool axes and gouge remedies applied, and the report of the gouge check."""
     from_file = isinstance(job.toolpath, FileTable)
     axis_step = np.inf if from_file else job.toolpath.si.axis_step
     if not from_file:
         toolpath = stepped(oriented(toolpath, tool, job_orientation(job)), axis_step)
     gouge = fields_from(GougeOptions, job.gouge)
     options = GougeOptions(
-        # A toolpath from a file is somebody's: nothing is taken out of it unasked.
+        # By default, nothing is taken out of a toolpath that was read from a file.
         tuple(Remedy(name) for name in job.gouge.remedy or ("report" if from_file else "drop",)),
-        # What is engraved is meant to be below the surface.
+        # An engraving lies below the surface on purpose.
         **{**gouge, "tolerance": gouge["tolerance"] + job_sink(job)},
         links=None if from_file else job_link_style(job, mesh, toolpath),
     )
     toolpath, report = without_gouges(toolpath, tool, mesh, options, progress)
     if not report.tilted:
         return toolpath, report
-    # What was tilted clear may turn faster than before.
+    # Tilted axes may turn faster than before.
     toolpath = stepped(toolpath, axis_step)
     fastest, most = float(from_si(fastest_turn(toolpath), "deg_mm")), from_si(job.axis.si.rate, "deg_mm")
     return toolpath, Reports((report, TurnReport(fastest, most))) if most and fastest > most * _SLACK else report
 
 
 def job_link_style(job: Job, mesh: Mesh, toolpath: Toolpath) -> LinkStyle:
-    """Return how ways are led that the toolpath did not have: along the axis and over the clearance level."""
+    """Return the style of additional links: along the axis and over the clearance level."""
     view = normalised(job.part.si.region_direction)
     top = max(float((mesh.vertices @ view).max()), float((toolpath.tips @ view).max()))
     style = _FILE_STYLE if isinstance(job.toolpath, FileTable) else job.toolpath.si

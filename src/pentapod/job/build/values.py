@@ -1,4 +1,4 @@
-"""From a job to the values that its stages start from: machine, mesh and toolpath."""
+"""Machine, mesh and toolpath from a job."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
 
 
 def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Toolpath, Reports]:
-    """Return the job's toolpath, workpiece frame, and what it came to.
+    """Return the job's toolpath, workpiece frame, and its reports.
 
     Raises ToolpathError where nothing is there to machine, or the toolpath file cannot be read.
     """
@@ -78,7 +78,7 @@ def program_toolpath(job: Job, mesh: Mesh, program: Path, progress: Progress = s
 
 
 def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
-    """Return the toolpath as a strategy lays it or a file tells it, and what that came to."""
+    """Return the toolpath of the strategy or of the file, and its report."""
     if isinstance(job.toolpath, FileTable):
         file = job.file("file")
         read = read_toolpath(file, job.toolpath.format, pivot=tool.pivot, feed=job.feed.si.cut)

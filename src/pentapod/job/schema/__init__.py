@@ -1,1 +1,1 @@
-"""The job file: every key with its unit, default and range."""
+"""Schema of the job file: every key with its unit, default and range."""

@@ -1,4 +1,4 @@
-"""The tables of a job file that say where the part stands, and what holds it there."""
+"""Schema of [placement] and [fixture]: where the part stands, and what holds it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class PlacementTable(Table):
         default=None, description="free: the mesh's origin stays in this box: two opposite corners, machine frame"
     )
     largest_turn_deg: float | None = Field(
-        default=None, ge=0.0, le=180.0, description="free: by which the part may be turned from rotation_deg at most"
+        default=None, ge=0.0, le=180.0, description="free: largest turn of the part from rotation_deg"
     )
     table_z_mm: float | None = Field(
         default=None, description="table: z of its surface, machine frame; the part's lowest point rests on it"
@@ -49,14 +49,15 @@ class PlacementTable(Table):
         default=None, min_length=1, description="fixture: poses to choose from, each position_mm and rotation_deg"
     )
     weight_strokes: Positive = Field(
-        default=1.0, description="room that the legs' strokes are to have, against singularities, joints and bodies"
+        default=1.0, description="weight of the margins of the strokes, against singularities, joints and bodies"
     )
-    weight_singularities: Positive = Field(default=1.0, description="the same for distances to the singular surfaces")
-    weight_joints: Positive = Field(default=1.0, description="the same for the angles of base and platform joints")
-    weight_bodies: Positive = Field(default=1.0, description="the same for gaps between bodies")
+    weight_singularities: Positive = Field(default=1.0, description="weight of the distances to singular poses")
+    weight_joints: Positive = Field(default=1.0, description="weight of the angles of base and platform joints")
+    weight_bodies: Positive = Field(default=1.0, description="weight of the gaps between bodies")
     then: Literal["force", "time"] | None = Field(
         default=None,
-        description="second aim, for a tenth of the margin: least leg force per cutting force, or least machining time",
+        description="secondary objective, for up to a tenth of the margin: least leg force per cutting force, or least "
+        "machining time",
     )
     component: Literal["++", "+-", "-+", "--"] | None = Field(
         default=None, description="signs of w and S of the assembly mode; the best one when left out"
@@ -105,11 +106,11 @@ PLACEMENT_KEYS: dict[str, tuple[str, ...]] = {
     "table": ("table_z_mm", "table_x_mm", "table_y_mm", "up"),
     "fixture": ("poses_mm_deg",),
 }
-"""Of each mode: the keys that mean something in it."""
+"""The keys that each mode takes."""
 
 
 class FixtureTable(Table):
-    """What else legs, spindle and tool must not touch: what holds the part, or what stands in the machine."""
+    """Fixture: a further body that legs, spindle and tool must not touch."""
 
     mesh: str | None = Field(
         default=None, min_length=1, description="mesh file of a vise, clamps, a table; relative to this job file"

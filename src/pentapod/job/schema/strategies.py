@@ -16,17 +16,17 @@ from pentapod.toolpath.strategies.registry import STRATEGIES
 
 
 class StrategyTable(Table):
-    """How the tool goes over the surface: a strategy, and its keys."""
+    """Toolpath strategy and its options."""
 
     strategy: str = Field(default="raster", description="how the surface is machined")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle what is said: the model is made anew from the strategy's options."""
+        """Pickle the given values; the model is made again from the strategy's options."""
         return _of_strategy, ({"strategy": self.strategy, **self.model_dump(exclude_unset=True)},)
 
 
 class FileTable(StrategyTable):
-    """A toolpath that is there already."""
+    """A toolpath read from a file."""
 
     strategy: str = Field(default="file", description="how the surface is machined")
     file: str = Field(min_length=1, description="the toolpath (APT, G-code, CSV, npz), relative to this job file")

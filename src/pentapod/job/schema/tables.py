@@ -1,4 +1,4 @@
-"""The tables of a job file: every key with its unit, meaning, default and range, stated once.
+"""Schema of the job file: every key with its unit, meaning, default and range, stated once.
 
 Keys of strategies, cutters, regions, orientations, gouges and tool limits are declared there, beside the SI fields that
 they set (`Key`); all others here. Parser, error messages, `pentapod new` and the reference are made from them. Units
@@ -67,7 +67,7 @@ class MachineTable(Table):
 
 
 class ModeTable(Table):
-    """How freely the tool axis may lean."""
+    """Tool axis: nominal direction, tilt cone, lead and side angle, smoothing."""
 
     tilt_deg: float = Field(
         default=15.0,
@@ -118,7 +118,7 @@ _MODE_KEYS: dict[str, tuple[str, ...]] = {
 
 
 class RemedyTable(Table):
-    """What is done where cutter, shank or holder would cut into the part."""
+    """Gouge check: what is done where cutter, shank or holder would cut into the part."""
 
     remedy: tuple[Literal["tilt", "lift", "drop", "report"], ...] | None = Field(
         default=None,
@@ -135,7 +135,7 @@ else:
 
 
 class SpeedTable(Table):
-    """Speeds of the tool tip, and what this job asks of tip and axis beyond the machine's own limits."""
+    """Feed rates of the tool tip, exact stops, and limits of tip and tool axis in addition to the machine's."""
 
     cut_mm_min: Positive = Field(le=100_000.0, description="feed while cutting")
     link_mm_min: Positive | None = Field(
@@ -145,20 +145,20 @@ class SpeedTable(Table):
         default=None,
         ge=0.0,
         le=1.0,
-        description="of the feed, that cuts and links reach wherever no limit of machine or job is used; below it the "
-        "verdict fails. 0.9 when left out, 0.95 for laser and spray; 0 asks for none",
+        description="share of the feed that cuts and links must reach where no limit of machine or job is active; "
+        "below it the verdict fails. 0.9 when left out, 0.95 for laser and spray; 0 asks for none",
     )
     dwell_s: float | None = Field(
         default=None,
         ge=0.0,
         le=3600.0,
-        description="at the end of each cut: an exact stop, and standing for so long; no stop when left out",
+        description="dwell in an exact stop at the end of each cut; no stop when left out",
     )
     stop_angle_deg: float = Field(
         default=135.0,
         gt=0.0,
         le=180.0,
-        description="an exact stop at every corner where the toolpath turns by more; others are rounded in passing",
+        description="exact stop at corners where the toolpath turns by more; other corners are blended",
     )
 
 
@@ -169,7 +169,7 @@ else:
 
 
 class ToleranceTable(Table):
-    """How far the motion may stray from the surface and from the chosen axis."""
+    """Tolerances of the path, of the tool axis and of the material left."""
 
     chordal_mm: Positive = Field(default=0.01, description="between the waypoints' chords and the mesh")
     path_mm: Positive = Field(
@@ -177,7 +177,10 @@ class ToleranceTable(Table):
         description="between the motion of the tool's pivot (a ball's centre, a beam's spot) and the toolpath",
     )
     axis_deg: float = Field(
-        default=0.5, gt=0.0, le=10.0, description="by which the axis may leave the tilt cone on the way"
+        default=0.5,
+        gt=0.0,
+        le=10.0,
+        description="largest angle by which the axis may leave the tilt cone between waypoints",
     )
     left_mm: Positive | None = Field(
         default=None,
@@ -188,12 +191,12 @@ class ToleranceTable(Table):
         default=0.001,
         ge=0.0,
         le=1.0,
-        description="of the region's area, 0 to 1: on so much of it more may be left, where the cutter could reach",
+        description="share of the region's area, 0 to 1, on which more may be left where the cutter can reach",
     )
 
 
 class OutputTable(Table):
-    """The program's rows; the machine's own controller settings when left out."""
+    """Sampling of the program; the machine's controller settings when left out."""
 
     period_ms: Positive | None = Field(default=None, ge=0.1, le=100.0, description="time between rows")
     interpolation: Literal["linear", "cubic"] | None = Field(
@@ -202,11 +205,9 @@ class OutputTable(Table):
 
 
 class VerifyTable(Table):
-    """What the verdict may leave out."""
+    """Claims that the verdict may waive."""
 
-    waive: tuple[str, ...] = Field(
-        default=(), description="names of claims without which the verdict passes where they cannot be judged"
-    )
+    waive: tuple[str, ...] = Field(default=(), description="claims that may stay unjudged without failing the verdict")
 
 
 class JobTables(Table):

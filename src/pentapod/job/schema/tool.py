@@ -28,7 +28,7 @@ class ToolTable(Table):
     )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle what is said: the model is made anew from the cutters."""
+        """Pickle the given values; the model is made again from the cutters."""
         return _of_type, (self.model_dump(exclude_unset=True),)
 
     def sizes(self) -> dict[str, float]:
