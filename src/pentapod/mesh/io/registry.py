@@ -9,6 +9,7 @@ from pathlib import Path
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import MeshError
 from pentapod.base.registry import Registry
+from pentapod.base.values import Value
 
 
 def _anything(_path: Path, _head: bytes, _size: int) -> None:
@@ -16,7 +17,7 @@ def _anything(_path: Path, _head: bytes, _size: int) -> None:
 
 
 @dataclass(frozen=True)
-class MeshFormat:
+class MeshFormat(Value):
     """A format of mesh files.
 
     read: path, data and `loose` → vertices (V, 3) in the file's own numbers, facets (F, 3), and notes; loose: whether

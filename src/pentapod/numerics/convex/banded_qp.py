@@ -17,7 +17,7 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.numerics.banded import banded_product
-from pentapod.numerics.convex.interior_point import ConvexProgram
+from pentapod.numerics.convex.interior_point import ConvexProgram, InteriorPointOptions
 
 if TYPE_CHECKING:
     from pentapod.numerics.convex.banded_rows_kernels import Rows
@@ -82,7 +82,8 @@ class _Solver(ConvexProgram):
     def __init__(self, program: BandedQP) -> None:
         from pentapod.numerics.convex import banded_rows_kernels  # noqa: PLC0415  kernels are loaded where used
 
-        self.p, self.kernels, self.scale, self.accuracy = program, banded_rows_kernels, program.scale, program.accuracy
+        self.p, self.kernels, self.scale = program, banded_rows_kernels, program.scale
+        self.options = InteriorPointOptions(program.accuracy)
         self.coefficients, soft = len(program.centre), program.soft
         self.rows: Rows = (
             program.basis.data.reshape(-1, _FOUR),

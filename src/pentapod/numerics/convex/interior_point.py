@@ -8,28 +8,40 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import LinAlgError
 
 from pentapod.base.arrays import Floats
 
-_ITERATIONS = 80
-_TO_BOUNDARY = 0.995
-_SHORTEST = 1e-9
-_LEAST_SLACK = 1e-2
-"""Slacks start from this at least, in the units of the constraints: numbers of the size of 1."""
+
+@dataclass(frozen=True)
+class InteriorPointOptions:
+    """How the method steps and when it stops.
+
+    accuracy: the duality gap, as a share of the cost's scale, at which an answer is good; ten times as much of the
+    gradient. iterations: at most. to_boundary: largest share of the way to the boundary that a step takes. shortest:
+    share of a Newton step below which the method has failed. least_slack: from which slacks start at least, in the
+    units of the constraints, which are numbers of the size of 1.
+    """
+
+    accuracy: float = 1e-6
+    iterations: int = 80
+    to_boundary: float = 0.995
+    shortest: float = 1e-9
+    least_slack: float = 1e-2
 
 
 class ConvexProgram(ABC):
     """Smallest cost, about `scale`, of unknowns x for which M constraints are not negative.
 
-    accuracy: the duality gap, as a share of the scale, at which an answer is good. give (M,), or 0: what a unit of
-    multiplier adds to each slack; a soft constraint that is exceeded by t has the multiplier t / give.
+    give (M,), or 0: what a unit of multiplier adds to each slack; a soft constraint that is exceeded by t has the
+    multiplier t / give.
     """
 
     scale: float = 1.0
-    accuracy: float = 1e-6
+    options: InteriorPointOptions = InteriorPointOptions()
     give: Floats | float = 0.0
 
     @abstractmethod
@@ -66,10 +78,11 @@ class ConvexProgram(ABC):
         """
         from pentapod.numerics.convex.banded_rows_kernels import longest_step  # noqa: PLC0415  loaded where used
 
-        good = self.accuracy * self.scale
-        s = np.maximum(self.constraints(x), _LEAST_SLACK)
+        o = self.options
+        good = o.accuracy * self.scale
+        s = np.maximum(self.constraints(x), o.least_slack)
         z = self.scale / len(s) / s
-        for _ in range(_ITERATIONS):
+        for _ in range(o.iterations):
             off, gap = self.constraints(x) + self.give * z - s, float(s @ z)
             dual = self.cost_gradient(x) - self.transposed(x, z)
             if gap < good and np.abs(dual).max() < 10.0 * good and self.keeps(off):
@@ -82,10 +95,10 @@ class ConvexProgram(ABC):
             least = min(longest_step(s, ds), longest_step(z, dz))
             ahead = float((s + least * ds) @ (z + least * dz))
             # No further than the gap that is good enough: beyond it the matrix only loses digits.
-            centring = max((ahead / gap) ** 3 * gap, 0.3 * self.accuracy * self.scale) / len(s)
+            centring = max((ahead / gap) ** 3 * gap, 0.3 * o.accuracy * self.scale) / len(s)
             dx, ds, dz = step(centring - ds * dz)
-            length = _TO_BOUNDARY * min(longest_step(s, ds), longest_step(z, dz), 1.0 / _TO_BOUNDARY)
-            if length < _SHORTEST:
+            length = o.to_boundary * min(longest_step(s, ds), longest_step(z, dz), 1.0 / o.to_boundary)
+            if length < o.shortest:
                 return None
             x, s, z = x + length * dx, s + length * ds, z + length * dz
         return None

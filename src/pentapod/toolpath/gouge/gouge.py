@@ -22,12 +22,6 @@ from pentapod.toolpath.linking.links import RAPID_SPACING_M
 from pentapod.toolpath.linking.relinking import relinked
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
-_RINGS, _SPOKES = 4, 16
-_LIFTS = 40
-_ROUNDS = 3
-_RISES = (0.05, 0.1, 0.25, 0.5, 1.0)
-"""Of the most that lifting may lift: how high a link is tried that stands for a dropped cut."""
-
 
 def without_gouges(
     toolpath: Toolpath, tool: Tool, part: Mesh, options: GougeOptions, progress: Progress = silent
@@ -145,15 +139,16 @@ class _Work:
         original = self.axes.copy()
         turn = np.zeros((len(self.tips), 2))
         t1, t2 = tangent_frame(original)
-        for _ in range(_ROUNDS):
+        search = self.options.search
+        for _ in range(search.rounds):
             rows = np.flatnonzero(_ends(bad))
             open_rows = rows
-            for ring in range(1, _RINGS + 1):
-                angle = np.tan(self.options.cone * ring / _RINGS)
-                for spoke in range(_SPOKES):
+            for ring in range(1, search.rings + 1):
+                angle = np.tan(self.options.cone * ring / search.rings)
+                for spoke in range(search.spokes):
                     if not len(open_rows):
                         break
-                    way = 2.0 * np.pi * spoke / _SPOKES
+                    way = 2.0 * np.pi * spoke / search.spokes
                     trial = np.tile([angle * np.cos(way), angle * np.sin(way)], (len(open_rows), 1))
                     axes = _leaned(original[open_rows], t1[open_rows], t2[open_rows], trial)
                     tips = pivots[open_rows] - self.tool.pivot * axes
@@ -161,7 +156,7 @@ class _Work:
                     clear = met.deepest == -np.inf
                     turn[open_rows[clear]] = trial[clear]
                     open_rows = open_rows[~clear]
-            faded = _faded(turn)
+            faded = _faded(turn, search.fade)
             self.axes = _leaned(original, t1, t2, faded)
             self.tips = np.where((faded != 0.0).any(axis=1)[:, None], pivots - self.tool.pivot * self.axes, self.tips)
             bad = bad | self.bad(self.found())
@@ -172,7 +167,7 @@ class _Work:
     def lift(self, bad: Bools) -> tuple[int, float]:
         """Raise gouging waypoints along their axes until their motions are clear; return how many, and the most."""
         lift, start = np.zeros(len(self.tips)), self.tips.copy()
-        for _ in range(_LIFTS):
+        for _ in range(self.options.search.lifts):
             met = _met(self, self.tips, self.axes, np.flatnonzero(bad), self.options.tolerance)
             depth = np.zeros(len(bad))
             depth[bad] = np.maximum(met.deepest, 0.0)
@@ -213,7 +208,7 @@ class _Work:
         kept = self._kept()
         over = slice(first + (not kept[first]), last + int(kept[last]))
         way = self.tips[first : last + 1], self.axes[first : last + 1]
-        for rise in _RISES:
+        for rise in self.options.search.rises:
             middle = self.path.tips[over] + rise * self.options.highest * self.axes[over]
             tips, axes = [self.tips[first : first + 1]], [self.axes[first : first + 1]]
             if kept[first]:
@@ -272,15 +267,12 @@ def _leaned(axes: Floats, t1: Floats, t2: Floats, turn: Floats) -> Floats:
     return np.where((turn == 0.0).all(axis=1)[:, None], axes, mixed)
 
 
-_FADE = 0.75
-
-
-def _faded(turn: Floats) -> Floats:
-    """Return turns (N, 2) carried over to neighbours, three quarters of it at each step away."""
+def _faded(turn: Floats, fade: float) -> Floats:
+    """Return turns (N, 2) carried over to neighbours, a share of them at each step away."""
     result = turn.copy()
     for order, before in ((range(1, len(turn)), -1), (range(len(turn) - 2, -1, -1), 1)):
         for k in order:
-            carried = _FADE * result[k + before]
+            carried = fade * result[k + before]
             if np.square(carried).sum() > max(np.square(result[k]).sum(), 1e-6):
                 result[k] = carried
     return result

@@ -28,11 +28,28 @@ class Remedy(StrEnum):
 
 
 @dataclass(frozen=True)
+class RemedySearch(Value):
+    """How remedies are searched for.
+
+    rings, spokes: directions tried within the cone, from the middle outwards. fade: share of a tilt that a neighbour
+    takes over. rounds: of tilting, and lifts: of lifting, at most. rises: heights tried for a link that stands for a
+    dropped cut, as shares of the most that lifting may lift.
+    """
+
+    rings: int = 4
+    spokes: int = 16
+    fade: float = 0.75
+    rounds: int = 3
+    lifts: int = 40
+    rises: tuple[float, ...] = (0.05, 0.1, 0.25, 0.5, 1.0)
+
+
+@dataclass(frozen=True)
 class GougeOptions(Value):
     """What is done about gouges. remedies: tried in this order on what still gouges.
 
     links: how ways between cuts are led anew where the old ones meet the part; None: they stay, and are told.
-    Raises ToolpathError for values that make no sense.
+    search: see `RemedySearch`. Raises ToolpathError for values that make no sense.
     """
 
     remedies: tuple[Remedy, ...] = (Remedy.REPORT,)
@@ -42,6 +59,7 @@ class GougeOptions(Value):
     )
     highest: Annotated[float, Key("mm", "lift: largest rise of a waypoint", gt=0.0)] = 20e-3
     links: LinkStyle | None = field(default=None, compare=False)
+    search: RemedySearch = RemedySearch()
 
     def __post_init__(self) -> None:
         check_fields(self, ToolpathError)

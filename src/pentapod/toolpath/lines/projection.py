@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,12 +17,24 @@ from pentapod.toolpath.options import PathOptions
 Landing = Callable[[Floats], tuple[Floats, Floats, Bools]]
 """Points of the plane (N, 2) → points on the surface (N, 3), normals (N, 3), and whether (N,) they landed."""
 
-_MOST_ROUNDS = 16
-_STRETCH, _STEEPEST, _ROUGH = 4.0, 60.0, 0.1
-_FINE = 0.02
-_FIRST = 0.25
-_PLACES = (0.47, 0.21, 0.78)
-"""Where a chord is tested, one after the other: a symmetric bend would hide in the middle, two bends from one place."""
+
+@dataclass(frozen=True)
+class ProjectionOptions:
+    """How lines are refined on the surface, and where they are broken.
+
+    first: spacing of the first points, as a share of the largest. fine: distance of chords from the surface's line, as
+    a share of the chordal tolerance. places: where a chord is tested, one after the other: a symmetric bend would hide
+    in the middle, two bends from one place. rounds: of halving, at most. stretch: of wrapped lines, at most, beside
+    `bridge` of the spacing that is bridged at corners of the mesh. steepest: stretch of projected lines, at most.
+    """
+
+    first: float = 0.25
+    fine: float = 0.02
+    places: tuple[float, ...] = (0.47, 0.21, 0.78)
+    rounds: int = 16
+    stretch: float = 4.0
+    bridge: float = 0.1
+    steepest: float = 60.0
 
 
 def projected(
@@ -33,6 +46,7 @@ def projected(
     wrapped: bool,
     sink: float = 0.0,
     slope: float = 0.0,
+    how: ProjectionOptions | None = None,
 ) -> tuple[Passes, tuple[str, ...]]:
     """Return flat lines (n, 2) on a surface, and a note of what did not land.
 
@@ -43,15 +57,15 @@ def projected(
     stretched on slopes. sink: depth of the landing in metres, by which neighbours part at a crease; slope: by how much
     it changes per metre.
     """
-    # Two bends within one chord could hide from a test of one place.
-    fine = [spaced(line, _FIRST * spacing) for line in lines]
+    how = how or ProjectionOptions()
+    fine = [spaced(line, how.first * spacing) for line in lines]
     owner = np.repeat(np.arange(len(fine)), [len(line) for line in fine])
-    plane, owner, points, normals, landed = _refined(np.concatenate(fine), owner, landing, options.chordal)
+    plane, owner, points, normals, landed = _refined(np.concatenate(fine), owner, landing, options.chordal, how)
     steps = np.where(owner[1:] == owner[:-1], np.linalg.norm(np.diff(plane, axis=0), axis=1), 0.0)
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     swing = sink * np.linalg.norm(np.diff(normalised(normals), axis=0), axis=1)
-    steepest = min(1.1 / max(np.cos(options.region.angle), 1e-9), _STEEPEST)
-    stretch, bridge = (_STRETCH, _ROUGH * spacing) if wrapped else (steepest, options.chordal)
+    steepest = min(1.1 / max(np.cos(options.region.angle), 1e-9), how.steepest)
+    stretch, bridge = (how.stretch, how.bridge * spacing) if wrapped else (steepest, options.chordal)
     near = gaps <= (stretch + slope) * steps + bridge + swing
     whole = (owner[1:] == owner[:-1]) & landed[1:] & landed[:-1] & near
     runs = marked_runs(whole)
@@ -73,16 +87,16 @@ def sunk(landing: Landing, depth: Callable[[Floats], Floats]) -> Landing:
 
 
 def _refined(
-    plane: Floats, owner: Ints, landing: Landing, chordal: float
+    plane: Floats, owner: Ints, landing: Landing, chordal: float, how: ProjectionOptions
 ) -> tuple[Floats, Ints, Floats, Floats, Bools]:
     """Return points of lines, the line (N,) of each, with more between, where they land, normals, and whether."""
     points, normals, landed = landing(plane)
-    passed = np.where(owner[1:] == owner[:-1], 0, len(_PLACES))
-    for _ in range(_MOST_ROUNDS):
-        rows = np.flatnonzero(passed < len(_PLACES))
+    passed = np.where(owner[1:] == owner[:-1], 0, len(how.places))
+    for _ in range(how.rounds):
+        rows = np.flatnonzero(passed < len(how.places))
         if not len(rows):
             break
-        share = np.array(_PLACES)[passed[rows], None]
+        share = np.array(how.places)[passed[rows], None]
         between = (1.0 - share) * plane[rows] + share * plane[rows + 1]
         new_points, new_normals, new_landed = landing(between)
         chord = (1.0 - share) * points[rows] + share * points[rows + 1]
@@ -90,7 +104,7 @@ def _refined(
         off = np.where(all_landed, np.linalg.norm(new_points - chord, axis=1), 0.0)
         rim = (landed[rows] != new_landed) | (landed[rows + 1] != new_landed)
         length = np.linalg.norm(plane[rows + 1] - plane[rows], axis=1)
-        split = (off > _FINE * chordal) | (rim & (length > chordal))
+        split = (off > how.fine * chordal) | (rim & (length > chordal))
         at = rows[split] + 1
         plane, points, normals = (
             np.insert(old, at, new[split], axis=0)

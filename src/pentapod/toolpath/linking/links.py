@@ -22,16 +22,16 @@ from pentapod.toolpath.toolpath import Segment, SegmentKind
 
 RAPID_SPACING_M = 5e-3
 RAPID_AXIS_STEP = np.radians(3.0)
-_ROUNDING_M = 5e-3
 _SAME_CORNER_M = 1e-4
-_ARC_STEP = np.radians(6.0)
 
 
 @dataclass(frozen=True)
 class LinkStyle(Value):
     """How links are made. view (3,): unit, towards the tool. level: metres along it at which rapids cross.
 
-    approach, spacing: metres. feed: of links on feed, m/s. entry: their form. axis_step: radians.
+    approach, spacing: metres. feed: of links on feed, m/s. entry: their form. axis_step: radians between waypoints of
+    rapids, rapid_spacing: metres between them. blend: metres of each leg, at most, that the arc at a corner takes.
+    arc_step: radians between points of arcs.
     """
 
     view: Floats
@@ -41,6 +41,9 @@ class LinkStyle(Value):
     feed: float
     entry: Entry = Entry.AXIS
     axis_step: float = RAPID_AXIS_STEP
+    rapid_spacing: float = RAPID_SPACING_M
+    blend: float = 5e-3
+    arc_step: float = float(np.radians(6.0))
 
 
 def approach(tip: Floats, axis: Floats, ahead: Floats, style: LinkStyle) -> Segment:
@@ -56,7 +59,7 @@ def approach(tip: Floats, axis: Floats, ahead: Floats, style: LinkStyle) -> Segm
     elif style.entry is Entry.STRAIGHT:
         corners = np.stack([tip + style.approach * (axis - 2.0 * flat / length), tip])
     else:
-        turn = np.linspace(0.5 * np.pi, 0.0, 2 + int(np.ceil(0.5 * np.pi / _ARC_STEP)))[:, None]
+        turn = np.linspace(0.5 * np.pi, 0.0, 2 + int(np.ceil(0.5 * np.pi / style.arc_step)))[:, None]
         corners = tip + style.approach * ((1.0 - np.cos(turn)) * axis - np.sin(turn) * flat / length)
         corners[-1] = tip
     tips = spaced(corners, style.spacing)
@@ -73,23 +76,23 @@ def rapid(start: Floats, start_axis: Floats, end: Floats, end_axis: Floats, styl
     """Return the rapid between two poses, off the surface by `approach`, over the clearance level."""
     up = _rise(start, start_axis, style)
     down = _rise(end, end_axis, style)[::-1]
-    way = blended(np.vstack([up, down]))
+    way = blended(np.vstack([up, down]), style)
     # Midway the axis turns 15/8 times as fast as on average.
     turn = 1.875 * float(angle_between(start_axis, end_axis))
     length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
-    tips = spaced(way, min(RAPID_SPACING_M, length * style.axis_step / max(turn, style.axis_step)))
+    tips = spaced(way, min(style.rapid_spacing, length * style.axis_step / max(turn, style.axis_step)))
     return Segment(SegmentKind.RAPID, tips, _turning(start_axis, end_axis, tips), np.inf)
 
 
 def entry(tip: Floats, axis: Floats, style: LinkStyle) -> Segment:
     """Return the rapid from the clearance level down to the start of an approach at `tip` (3,)."""
-    tips = spaced(blended(_rise(tip, axis, style)[::-1]), RAPID_SPACING_M)
+    tips = spaced(blended(_rise(tip, axis, style)[::-1], style), style.rapid_spacing)
     return Segment(SegmentKind.RAPID, tips, np.tile(axis, (len(tips), 1)), np.inf)
 
 
 def leave(tip: Floats, axis: Floats, style: LinkStyle) -> Segment:
     """Return the rapid from the end of a retract at `tip` (3,) up to the clearance level."""
-    tips = spaced(blended(_rise(tip, axis, style)), RAPID_SPACING_M)
+    tips = spaced(blended(_rise(tip, axis, style), style), style.rapid_spacing)
     return Segment(SegmentKind.RAPID, tips, np.tile(axis, (len(tips), 1)), np.inf)
 
 
@@ -114,10 +117,10 @@ def _turning(start: Floats, end: Floats, tips: Floats) -> Floats:
     return axes
 
 
-def blended(corners: Floats) -> Floats:
+def blended(corners: Floats, style: LinkStyle) -> Floats:
     """Return a polyline (M, 3) with its inner corners replaced by parabolic arcs; ends and legs stay.
 
-    An arc takes up to 5 mm of each leg, less than half of it, so that arcs never meet.
+    An arc takes up to `blend` of each leg, less than half of it, so that arcs never meet.
     """
     apart = np.linalg.norm(np.diff(corners, axis=0), axis=1) > _SAME_CORNER_M
     keep = np.concatenate([[True], apart])
@@ -134,10 +137,10 @@ def blended(corners: Floats) -> Floats:
             parts.append(corner[None])
             continue
         back, ahead = before - corner, after - corner
-        reach = min(_ROUNDING_M, 0.45 * float(np.linalg.norm(back)), 0.45 * float(np.linalg.norm(ahead)))
+        reach = min(style.blend, 0.45 * float(np.linalg.norm(back)), 0.45 * float(np.linalg.norm(ahead)))
         enter = corner + reach * back / np.linalg.norm(back)
         leave_at = corner + reach * ahead / np.linalg.norm(ahead)
-        t = np.linspace(0.0, 1.0, 2 + int(np.ceil(turn / _ARC_STEP)))[:, None]
+        t = np.linspace(0.0, 1.0, 2 + int(np.ceil(turn / style.arc_step)))[:, None]
         parts.append((1.0 - t) ** 2 * enter + 2.0 * t * (1.0 - t) * corner + t * t * leave_at)
     parts.append(corners[-1:])
     return np.vstack(parts)

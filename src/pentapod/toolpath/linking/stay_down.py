@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pentapod.base.arrays import Floats
@@ -9,23 +11,36 @@ from pentapod.geometry.directions import angle_between, normalised
 from pentapod.mesh.query.heightfield import HeightField
 from pentapod.toolpath.options import PathOptions
 
-MOST_TURN = np.radians(30.0)
-STEEPEST_RISE = np.tan(np.radians(80.0))
-_BEYOND_REGION = np.radians(10.0)
+
+@dataclass(frozen=True)
+class StayDownLimits:
+    """Where a link leaves the surface. turn: of the normals along it, in all. rise: metres up per metre along.
+
+    beyond: how much steeper than the region it may be. Angles in radians.
+    """
+
+    turn: float = float(np.radians(30.0))
+    rise: float = float(np.tan(np.radians(80.0)))
+    beyond: float = float(np.radians(10.0))
+
 
 LinkEnds = tuple[Floats, Floats, Floats, Floats]
 """Contacts and normals of the pass that is left, then of the pass that is entered."""
 
 
 def surface_links(
-    field: HeightField, options: PathOptions, stepover: float, ends: list[LinkEnds]
+    field: HeightField,
+    options: PathOptions,
+    stepover: float,
+    ends: list[LinkEnds],
+    limits: StayDownLimits | None = None,
 ) -> list[tuple[Floats, Floats] | None]:
     """Return for each pair of passes contacts and normals (n, 3) of a link on the surface, or None.
 
     None: the tool must retract. The link runs straight as seen along the view, on the topmost surface. It
     may bridge the outside of a border that curves inwards, where nothing lies below; it may neither jump in
-    height (a wall, a step), nor turn by more than 30° in all, nor leave the region by more than a stepover
-    or 10°.
+    height (a wall, a step), nor turn by more than the limits allow, nor leave the region by more than a stepover
+    or `beyond`.
     """
     if not ends:
         return []
@@ -45,6 +60,7 @@ def surface_links(
                 field,
                 options,
                 stepover,
+                limits or StayDownLimits(),
                 t=np.concatenate([[0.0], t[rows], [1.0]]),
                 contacts=np.vstack([starts[k], surface[rows], stops[k]]),
                 normals=np.vstack([before[-1], normals[rows], after[0]]),
@@ -57,6 +73,7 @@ def _checked(
     field: HeightField,
     options: PathOptions,
     stepover: float,
+    limits: StayDownLimits,
     *,
     t: Floats,
     contacts: Floats,
@@ -77,10 +94,10 @@ def _checked(
     facing = angle_between(normals, region.direction)
     if (
         (flat < 0.1 * options.closest).any()
-        or (rise > STEEPEST_RISE * flat).any()
-        or angle_between(normals[1:], normals[:-1]).sum() > MOST_TURN
+        or (rise > limits.rise * flat).any()
+        or angle_between(normals[1:], normals[:-1]).sum() > limits.turn
         or leaves_box
-        or (facing > min(region.angle + _BEYOND_REGION, np.pi / 2)).any()
+        or (facing > min(region.angle + limits.beyond, np.pi / 2)).any()
     ):
         return None
     return contacts, normals
