@@ -1,4 +1,4 @@
-"""Which limits bind a plan, where, and how much room they leave: the blame table of a plan that fits."""
+"""Active limits: the limits of a plan that fits, where they are nearest, and the room that they leave."""
 
 from __future__ import annotations
 

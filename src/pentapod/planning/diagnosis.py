@@ -1,4 +1,4 @@
-"""From margins below zero to a refusal that a user can act on."""
+"""Diagnosis: which limits a placement exceeds, where and by how much, as a refusal."""
 
 from __future__ import annotations
 

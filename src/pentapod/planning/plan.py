@@ -1,4 +1,4 @@
-"""plan: where to clamp the part, in which component to work, and how to tilt the tool."""
+"""Placement optimisation: where to clamp the part, in which component to work, and how to tilt the tool."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ KEPT_SHARE = 0.9
 
 
 class PlacementOptions(TypedDict):
-    """What `plan` and `fits` are told of a placement."""
+    """The options of `plan` that `fits` takes, too."""
 
     tilt: float
     constraints: PlacementConstraints

@@ -1,4 +1,4 @@
-"""setups: the fewest pieces of a path that fit the machine one by one, each clamped anew."""
+"""Set-ups: partition of a path into the fewest pieces that fit the machine one by one, each clamped anew."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pentapod.toolpath.toolpath import Toolpath
 Fits = Callable[[Toolpath], bool]
 
 SLICES = 32
-"""Box borders stand at so many places along the part's extent."""
+"""Number of places along the part's extent where a box may end."""
 
 
 def setups(

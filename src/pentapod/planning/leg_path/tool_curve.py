@@ -1,4 +1,4 @@
-"""ToolCurve: a C3 motion of pivot and tool axis, parametrised by the way of the tip and the turn of the axis."""
+"""ToolCurve: a C3 motion of pivot and tool axis, over the tip's path length and the axis's turn."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Contacts: margins of all that moves against the part, its fixture and what stands in the machine.
+"""Contacts: signed distances of moving bodies from meshes, and the point pairs that give their derivatives.
 
-Gaps are exact distances from meshes. How they change is told by contacts: the line point of a body (on a leg, on the
-tool's axis) whose ball is the body's nearest part, and the mesh point and normal opposite. The gap of that ball from
-the plane through the mesh point is a formula of the pose, equal to the true gap and with its derivatives where the
-contact was taken. Both solvers work with that formula, and are judged by the true gaps.
+Gaps are exact distances. A contact is a point on a body's line (a leg, the tool axis), the radius of the body there,
+and the nearest mesh point with its normal. The gap of that ball from the plane through the mesh point is a formula of
+the pose; where the contact was taken, its value and first derivatives are those of the true gap. The solvers use this
+formula, and every step is judged by the true gaps.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts:
         near = found.distance < cap + radius
         at = starts + found.place[:, None] * (ends - starts)
         place = found.place if body < n_legs else top + found.place * (nose - top)
-        # Where no way out is known the gap is a number that no step changes.
+        # Where the normal is unknown the gap is a constant.
         known, gap = found.normal.any(axis=1), found.distance - radius
         numbers = (gap, place, *found.normal.T, *(at - found.distance[:, None] * found.normal).T)
         exact = np.column_stack([*numbers, np.where(known, radius, -gap)])

@@ -147,8 +147,8 @@ class Margins:
 
         turn, shift: the workpiece's rotation (3×3) and translation; numbers: of its contacts, see `contacts`. All three
         are needed where there are obstacles. joints: where base joints on guides, and the platform joints that belong
-        to them, are, as expressions. The singular surfaces do not change with them, and gaps between a leg and what
-        hangs on its platform line so little that they are taken as they are.
+        to them, are, as expressions. The singular surfaces do not depend on them. The gaps between a leg and the
+        bodies on its platform line hardly do, and are computed with the joints of the machine.
         """
         import casadi as ca  # noqa: PLC0415  heavy: only when planning
 

@@ -1,4 +1,4 @@
-"""Obstacles: gaps between all that moves and the part, its fixture and what stands in the machine."""
+"""Obstacles: gaps between the moving bodies and the part, its fixture and the machine's table."""
 
 from __future__ import annotations
 

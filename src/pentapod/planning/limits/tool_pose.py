@@ -1,4 +1,4 @@
-"""ToolPose: a tool pose with the leg vectors, lengths and angles that limits are stated in."""
+"""ToolPose: a tool pose with the leg vectors, lengths and angles in which limits are stated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Curvature: what a linear model leaves out, by the Hessian of the Lagrangian; the steps that take it into account.
+"""Curvature: the Hessian of the Lagrangian, and the steps of sequential quadratic programming with it.
 
 Where fewer limits bind than there are unknowns, the best candidate is no vertex, and linear programs would only creep
 towards it. Quadratic programs with the curvature of the binding margins and leans get there in a few steps
@@ -55,7 +55,7 @@ class Curvature:
         return *model.step_of(x[:-1]), float(x[-1] - 0.5 * x @ hessian @ x)
 
     def hessian(self, model: LinearModel, at: Candidate, multipliers: Floats) -> Floats:
-        """Return the Lagrangian's Hessian by the unknowns x of the model, in so far as it is positive."""
+        """Return the Lagrangian's Hessian by the unknowns x of the model, with negative eigenvalues set to zero."""
         margins, leans = multipliers[: len(model.values)], multipliers[len(model.values) :][: len(model.steep)]
         return _positive(self._of_margins(model, at, margins) + self._of_cone(model, at, leans))
 

@@ -1,7 +1,7 @@
-"""The reference solver: the same program handed to IPOPT, with constraint generation.
+"""The reference placement solver: the interior-point method of IPOPT, with constraint generation.
 
-It considers a few waypoints and kinds of margin, and adds those that come out worst until none is worse than what was
-considered. Slower than the default solver by an order of magnitude; it is what the default is measured against.
+It starts with a few waypoints and kinds of margin, and adds the worst ones until none is worse than those considered.
+Slower than the default solver by an order of magnitude; tests measure the default against it.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class IpoptSolver:
     def smooth(self, start: Candidate, keep: float) -> Floats | None:
         """Return coefficients (K, 2) of the smoothest spline at the placement of `start` that keeps the margin `keep`.
 
-        All waypoints at once, and all kinds of margin that come near at the start. None where IPOPT found no such
+        All waypoints at once, and all kinds of margin near the one to keep at the start. None where IPOPT found no such
         spline.
         """
         import casadi as ca  # noqa: PLC0415  heavy: only when planning

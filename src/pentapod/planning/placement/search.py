@@ -1,4 +1,4 @@
-"""search: the placement and component with the largest smallest margin, from many starts; it can be interrupted."""
+"""Multi-start search for the placement and component with the largest smallest margin; it can be interrupted."""
 
 from __future__ import annotations
 

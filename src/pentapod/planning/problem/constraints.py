@@ -1,4 +1,4 @@
-"""PlacementConstraints: which placements are allowed, and in which of its six directions a placement may move.
+"""PlacementConstraints: the feasible set of placements, and the directions in which a placement may move.
 
 A step of the optimisers moves the workpiece's origin in the machine frame and turns the workpiece about that origin
 (`formulation.stepped`). What a fixture, a table or a box leaves of that is stated here once: for sampling, as a way to

@@ -1,8 +1,8 @@
-"""The optimisation problem, stated once in casadi: margins and cone of one waypoint as functions of the unknowns.
+"""The optimisation problem in casadi: margins and tilt cone of one waypoint as functions of the unknowns.
 
-Unknowns: a small placement step (3 translations in metres, a Cayley rotation vector) around a given placement, in so
-far as the placement is free, and the lean a (2) of the waypoint, told in a pair of directions. Both solvers build on
-this function: the reference hands it to IPOPT, the default takes its derivatives.
+Unknowns: a small placement step (3 translations in metres, a Cayley rotation vector) around a given placement, if the
+placement is free, and the lean a (2) of the waypoint in a pair of directions. Both solvers use this function: the
+reference passes it to IPOPT, the default takes its derivatives.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def point_function(problem: PlacementProblem, margins: Margins, kinds: Sequence[
     """Return the casadi function of one waypoint: margins K, and the square of the lean (of the tangent of its angle).
 
     Of step 6, lean a 2, pivot 3, nominal 3, pair 3×2, R 3×3, t 3, contacts. The margins are weighed; kinds: which.
-    pair: columns, the directions of the lean's two numbers; what of them lies along the nominal axis does not count.
+    pair: columns, the directions of the lean's two numbers; only their components across the nominal axis are used.
     by: also return the margins' derivatives by a, K × 2, or by (step, a), K × 8.
     """
     import casadi as ca  # noqa: PLC0415  heavy: only when planning

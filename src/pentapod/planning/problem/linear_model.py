@@ -1,4 +1,4 @@
-"""LinearModel: margins and leans around a candidate, to first order, by placement, slides of guides and tilt field."""
+"""LinearModel: first-order model of margins and leans by placement, rail positions and tilt field."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class LinearModel:
     """Unknowns x: along moves (p, q), in their units, and the change of coefficients (2·size), in units of the cone.
 
     moves: columns of a placement step (p = 6), or of one and of the guides' slides (p = 11).
-    Margins ≈ values + matrix @ x, (R,), of the margins that come near the level, kinds (R,) at waypoints points (R,);
+    Margins ≈ values + matrix @ x, (R,), of the margins near the level, kinds (R,) at waypoints points (R,);
     leans as shares of the cone ≈ steepness + steep_matrix @ x, several rows for each waypoint of steep; the room of the
     placement (L,) ≈ room + room_matrix @ x.
     """
@@ -71,7 +71,7 @@ class LinearModel:
         moves: Floats,
         options: ModelOptions = ModelOptions(),
     ) -> LinearModel:
-        """Return the model of what comes near `level` among waypoints `rows`, and of rows[extra] in any case.
+        """Return the model of the margins near `level` at waypoints `rows`, and of rows[extra] in any case.
 
         room (L,) of the placement and the slides, with its derivatives (L, p). slopes: the margins' (n, M, p + 2) by
         step, slides and lean.
@@ -113,7 +113,7 @@ class LinearModel:
         return np.vstack([rising, kept]), np.concatenate([self.values - self.values.min(), spare])
 
     def step_of(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return the step (p,) of placement and slides, and the change of coefficients (size, 2), of unknowns x."""
+        """Return the step (p,) of placement and guides, and the change of coefficients (size, 2), of unknowns x."""
         count = self.moves.shape[1]
         return self.moves @ x[:count], (x[count:] * self.problem.cone).reshape(-1, 2)
 

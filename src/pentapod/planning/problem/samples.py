@@ -1,4 +1,4 @@
-"""ToolpathSamples: what the planner needs of a toolpath, as arrays; and the few points that represent it."""
+"""ToolpathSamples: the waypoints of a toolpath as arrays, and a farthest-point sampling of them."""
 
 from __future__ import annotations
 

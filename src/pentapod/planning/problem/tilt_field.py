@@ -1,4 +1,4 @@
-"""TiltField: how the tool axis leans away from its nominal direction, as a smooth field over the part.
+"""TiltField: the lean of the tool axis from its nominal direction, as a bicubic spline over the part.
 
 The lean is a vector b(x) in the plane across the mean axis that varies with the place x like a bicubic spline; the
 tool axis is the nominal one plus the part of b perpendicular to it. Neighbouring passes therefore lean alike, and

@@ -1,4 +1,4 @@
-"""Weights: how much room beside its limits each group of margins is to have, against the others."""
+"""Weights of the groups of margins in the max-min objective."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """AxisCost: smoothness cost of the tool axes, with a penalty where they turn faster than the nominal axes.
 
-The smoothest axes alone would be fixed ones. But a nominal axis that turns may carry the platform just the way that the
-legs like, and there a fixed axis asks more of them. So where the axis turns faster, or a leg accelerates more along the
-path, than the nominal axes would have it, the excess is charged.
+The smoothest axes are fixed ones, but fixed axes may cost the legs more acceleration than the nominal axes, which turn
+with the surface. So where the axis turns faster, or the second derivative of a leg length by the path is larger, than
+with the nominal axes, the square of the excess is added.
 """
 
 from __future__ import annotations
@@ -154,9 +154,9 @@ class AxisCost:
         return differences(self.bend, self._legs(c)[0])
 
     def excess(self, c: Floats, *others: Floats) -> SoftRows:
-        """Return what is charged for, around coefficients c (K, 2) to first order, in so far as it comes near there.
+        """Return the soft rows of the penalty around coefficients c (K, 2), to first order, where a limit is near.
 
-        others: coefficients at which it is looked at, too, whether it comes near.
+        others: further coefficients at which a limit may be near.
         """
         legs, slopes = self._legs(c)
         rates, bends = self.rates(c) @ _DIRECTIONS, _both_ways(differences(self.bend, legs))

@@ -1,8 +1,8 @@
 """Smoothing of the tool axis: the smoothest axes that keep a margin, by sequential convex programming.
 
-Each program holds the margins near the one to keep to first order, and what is charged for; its answer is judged by
-margins and cost themselves, at the waypoints where the spline has its nodes. In the end all waypoints are judged: those
-where the margin came out short are looked at from then on.
+Each program holds the margins near the one to keep, to first order, and the penalty on excess. Its answer is judged by
+the margins and the cost themselves, at the waypoints where the spline has its nodes. In the end all waypoints are
+checked; those with too little margin are added, and the iteration is repeated.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ class SmoothingOptions:
 class _Model:
     """Margins near the one to keep, around coefficients c, to first order.
 
-    looked, rows, kinds, values (R,): whose margin, among the waypoints looked at and among all, which, and what it is
-    at c; slopes (R, 2): by the lean as a share of the cone.
+    active, rows (R,): the waypoint, as index into the active ones and into all; kinds, values (R,): which margin, and
+    its value at c; slopes (R, 2): derivatives by the lean as a share of the cone.
     """
 
     c: Floats
-    looked: Ints
+    active: Ints
     rows: Ints
     kinds: Ints
     values: Floats
@@ -71,7 +71,7 @@ class _Model:
         """Return by how much (R,) the linear model overrated the margins `values` (n, M) at `trial`."""
         moved = (spline.basis @ (trial - self.c))[self.rows]
         promised = self.values + (self.slopes * moved).sum(axis=1)
-        return np.maximum(promised - values[self.looked, self.kinds], 0.0)
+        return np.maximum(promised - values[self.active, self.kinds], 0.0)
 
 
 def smoothed(
@@ -79,23 +79,22 @@ def smoothed(
 ) -> Floats | None:
     """Return coefficients (K, 2) of the smoothest spline of the axes that keeps the margin `keep`.
 
-    It starts at the leans of `start`, at whose placement it stays. None where no spline of the axes was found to keep
-    it.
+    It starts at the leans of `start` and keeps its placement. None where no such spline was found.
     """
     run = _Smoothing(problem, start, keep, options)
     run.begin()
     for _ in range(options.rounds):
         found = run.smoothest()
-        if found is None or not run.looks_at_more():
+        if found is None or not run.add_short_ones():
             return found
     return None
 
 
 class _Smoothing:
-    """One run. c: the coefficients so far; short: by how much they miss the margin to keep; spent: what they cost.
+    """One run. c: the coefficients so far; short: by how much they miss the margin to keep; spent: their cost.
 
-    rows (n,): the waypoints looked at; margins (n, M): theirs, at c; late (n, M): which of them came out short before;
-    kinds (M,): which have come near. reach: the trust region; accuracy: of the next program.
+    rows (n,): the active waypoints; margins (n, M): theirs, at c; late (n, M): which of them were short before; kinds
+    (M,): which margins have been near the one to keep. reach: the trust region; accuracy: of the next program.
     """
 
     def __init__(self, problem: PlacementProblem, start: Candidate, keep: float, options: SmoothingOptions) -> None:
@@ -108,25 +107,25 @@ class _Smoothing:
         self.c = self.spline.fitted(problem.leans(start.coefficients))
         self.spent = self.cost.of(self.c)
         everywhere = self.values(self.c, np.arange(len(self.spline.frames)))
-        self.look_at(np.union1d(self.spline.nodes, valleys(everywhere)))
+        self.activate(np.union1d(self.spline.nodes, valleys(everywhere)))
 
-    def look_at(self, rows: Ints) -> None:
-        """Look at these waypoints from now on."""
+    def activate(self, rows: Ints) -> None:
+        """Compute margins at these waypoints from now on."""
         self.rows = rows
         self.margins = self.values(self.c, rows)
         self.short = self.keep - float(self.margins.min())
         self.late: Bools = self.margins < self.keep
 
-    def looks_at_more(self) -> bool:
-        """Judge all waypoints; tell whether some came out short that were not looked at, and look at them as well."""
+    def add_short_ones(self) -> bool:
+        """Check all waypoints, activate those with too little margin, and return whether there were any."""
         margins = self.values(self.c, np.arange(len(self.spline.frames)))
         worst = np.flatnonzero(margins.min(axis=1) < self.keep - SLACK)
         if len(worst) > 0:
-            self.look_at(np.union1d(self.rows, worst))
+            self.activate(np.union1d(self.rows, worst))
         return len(worst) > 0
 
     def begin(self) -> None:
-        """Start from the smoothest spline without charges, if that costs less: it is near, and its program is easy."""
+        """Start from the smoothest spline without the penalty, if that costs less."""
         trial = self.program(self.model(), None, None).solved()
         if trial is not None:
             trial = within_discs(trial)
@@ -136,7 +135,7 @@ class _Smoothing:
                 self.c, self.margins, self.short, self.spent = trial, margins, short, spent
 
     def smoothest(self) -> Floats | None:
-        """Return the smoothest spline that keeps the margin at the waypoints looked at, or None."""
+        """Return the smoothest spline that keeps the margin at the active waypoints, or None."""
         model, missed, tried = self.model(), None, list[Floats]()
         for _ in range(self.options.steps):
             program = self.program(model, missed, tried)
@@ -175,7 +174,7 @@ class _Smoothing:
                 elif short > SLACK and missed is None:  # once more, with what the model had missed or did not hold
                     model = self.model()
                     missed = model.missed(self.spline, trial, margins)
-                elif short <= SLACK and not tried:  # once more, with what it would be charged for
+                elif short <= SLACK and not tried:  # once more, with the penalty at the trial
                     tried = [trial]
                 else:
                     self.reach, missed = self.options.shorter * min(self.reach, way), None
@@ -224,7 +223,7 @@ class _Smoothing:
         here = (model.slopes * (basis @ model.c)[point]).sum(axis=1)
         upper = model.values - self.keep - here - (0.0 if missed is None else missed)
         soft = NO_ROWS if tried is None else self.cost.excess(model.c, *tried)
-        # Where charges still dwarf the spline's own cost, an answer good for the one need not be so for the other.
+        # Where the penalty is much larger than the spline's own cost, the accuracy is relative to both.
         scale = max(float(np.sqrt(spline.cost_of(model.c) * self.spent)), 1e-9)
         return BandedQP(
             spline.hessian, spline.gradient, scale, basis, point, -model.slopes, upper, model.c, self.reach, soft,

@@ -1,7 +1,7 @@
-"""AxisSpline: the lean of the tool along a path as one spline, and the cost that a smooth spline makes small.
+"""AxisSpline: the lean of the tool along a path as a cubic B-spline, and its quadratic smoothness cost.
 
-The lean is a vector across the nominal axis, told in a pair of directions that is carried along the path; its two
-numbers are a cubic spline over the way of the pivot, with knots at waypoints. The spline stays within the
+The lean is a vector across the nominal axis, given in a frame that is transported in parallel along the path; its two
+numbers are a cubic spline over the path length of the pivot, with knots at waypoints. The spline stays within the
 convex hull of its coefficients, so a spline whose coefficients keep the cone keeps it everywhere, and turns nowhere
 faster than they do.
 """
@@ -35,7 +35,7 @@ UPRIGHT_WEIGHT = 1e-2
 _DEGREE = 3
 _NODES = 2  # at most, a knot interval
 _INTERVALS_PER_EXTENT = 50
-_NOWHERE_M = 1e-9  # as good as standing still
+_NOWHERE_M = 1e-9  # shorter ways count as none
 _LEAST_CURVATURE = 1e-10  # of coefficients that the cost does not see
 BANDS = 10
 """Diagonals of the cost, main one and below: a second difference reaches over five coefficients of two numbers."""
@@ -46,7 +46,7 @@ class AxisSpline:
     """Leans along a samples's path: those at its waypoints are cone · basis @ c, for coefficients c in the unit disc.
 
     c (K, 2); basis (N, K) sparse, four neighbours a row; frames (N, 2, 3): the pair at each waypoint, workpiece frame.
-    nodes (n,): waypoints that stand for all, as many as the spline can tell apart; there the cost takes derivatives.
+    nodes (n,): waypoints at which the cost takes derivatives, as many as the spline can tell apart.
     way (n,): how far along they are, metres.
     The cost of c is cᵀHc/2 + gᵀc + constant, hessian (BANDS, 2K) in SciPy's lower banded form, in the order of
     c.ravel().
