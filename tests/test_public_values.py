@@ -235,7 +235,6 @@ def test_a_placement_without_component_is_refused(reached):
 
 
 def test_frames(reached):
-    pytest.importorskip("pandas")
     program = reached.find(Program)
     frame = program.to_frame()
     assert list(frame) == ["leg1_mm", "leg2_mm", "leg3_mm", "leg4_mm", "leg5_mm"]
@@ -303,8 +302,7 @@ def test_notebooks_show_small_escaped_html_without_colours_of_its_own(reached):
 
 
 def test_plots_show_path_margins_and_rates(reached):
-    pytest.importorskip("matplotlib").use("Agg")
-    from matplotlib import pyplot
+    matplotlib.use("Agg")
 
     drawn = reached.find(Toolpath).plot()
     assert {line.get_label() for line in drawn.lines} == {"cut", "link", "rapid"}
