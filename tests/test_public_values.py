@@ -13,8 +13,10 @@ from dataclasses import fields, is_dataclass, replace
 from html.parser import HTMLParser
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pytest
+from matplotlib import pyplot
 
 import pentapod
 from pentapod import (
@@ -303,7 +305,6 @@ def test_notebooks_show_small_escaped_html_without_colours_of_its_own(reached):
 
 def test_plots_show_path_margins_and_rates(reached):
     matplotlib.use("Agg")
-
     drawn = reached.find(Toolpath).plot()
     assert {line.get_label() for line in drawn.lines} == {"cut", "link", "rapid"}
     placed = reached.find(PlacedPath)

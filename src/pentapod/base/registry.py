@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping
+from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -12,6 +14,15 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 T = TypeVar("T")
+
+
+@cache
+def _entries_of(group: str, path: tuple[str, ...]) -> dict[str, EntryPoint]:
+    """Return the entry points of a group by name. path: where Python looks for packages."""
+    from importlib.metadata import entry_points  # noqa: PLC0415 - a plain command does not read them
+
+    del path  # only another path makes another answer
+    return {entry.name: entry for entry in entry_points(group=group)}
 
 
 class Registry(Mapping[str, T], Generic[T]):
@@ -78,9 +89,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return len(tuple(iter(self)))
 
     def _entries(self) -> dict[str, EntryPoint]:
-        from importlib.metadata import entry_points  # noqa: PLC0415 - a plain command does not read them
-
-        return {entry.name: entry for entry in entry_points(group=self.group)}
+        return _entries_of(self.group, tuple(sys.path))
 
     def _loaded(self, entry: EntryPoint) -> T:
         """Return what an entry point names. Raises InputError that names the package."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.base.registry import Registry
 from pentapod.machine.machine import Machine
 from pentapod.machine.rounding import jerk_of_rounding
 from pentapod.timing.limits.axis_acceleration import AxisAcceleration
@@ -44,13 +45,16 @@ LIMITS: tuple[type[MachineLimit], ...] = (
 )
 """Every limit that a machine or a path sets, in the order of rows and certificates: a new one is added here."""
 
+PLUGGED: Registry[type] = Registry("limit", "pentapod.timing_limits", type)
+"""Limits of other packages, by entry points of this group: classes like those of `LIMITS`."""
+
 _RINGING = 0.975
 """Share of a jerk limit that is planned with: where jerk steps, the spline through setpoints rings above it."""
 
 
 def machine_limits(machine: Machine, reserve: Reserve = NOTHING_LEFT_FREE) -> tuple[Limit, ...]:
     """Return the limits that a machine sets, less a reserve."""
-    found = (limit.of(machine, reserve) for limit in LIMITS)
+    found = (limit.of(machine, reserve) for limit in (*LIMITS, *PLUGGED.values()))
     return tuple(limit for limit in found if limit is not None)
 
 

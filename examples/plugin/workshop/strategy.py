@@ -1,0 +1,32 @@
+"""A strategy: parallel plane slices along the diagonal of the part as seen from above."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+
+from pentapod import Mesh, RasterOptions
+from pentapod.base.keys import Key
+from pentapod.cutters import Tool
+from pentapod.toolpath.drawing import Drawing
+from pentapod.toolpath.strategies.raster import draw_raster
+from pentapod.toolpath.strategies.strategy import Strategy
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DiagonalOptions(RasterOptions):
+    """turn: radians from the diagonal; in a job file `turn_deg`."""
+
+    turn: Annotated[float, Key("deg", "of the passes against the part's diagonal", ge=-90.0, le=90.0)] = 0.0
+
+
+def draw_diagonal(mesh: Mesh, tool: Tool, options: DiagonalOptions) -> Drawing:
+    """Return the passes of a raster along the diagonal."""
+    low, high = mesh.bounds
+    diagonal = float(np.arctan2(high[1] - low[1], high[0] - low[0]))
+    return draw_raster(mesh, tool, replace(options, direction=diagonal + options.turn))
+
+
+STRATEGY = Strategy("diagonal", DiagonalOptions, draw_diagonal)
