@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import secrets
 import subprocess
 import sys
 import tomllib
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 import pentapod
 from pentapod import Job, LegPath, PlacedPath, Program, read_post, retime, run, write_post
+from pentapod.cli.commands.new import dome_stl
 from pentapod.cli.main import run as command
 from pentapod.cutters import CUTTERS
 from pentapod.program.posts import POSTS, PostInput
 from pentapod.timing import Explanation
 from pentapod.toolpath import STRATEGIES
 from plugins import install
+from usual_job import job_text
 
 PLUGIN = Path(__file__).parents[2] / "examples" / "plugin"
 CHANGES = (
@@ -25,17 +29,32 @@ CHANGES = (
 )
 
 
-@pytest.fixture
-def plugin(tmp_path, monkeypatch):
-    """The package as it is when it is installed, for this test."""
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The package as it stands when it is installed; for `with` blocks, outside of which nothing is known of it."""
     groups = tomllib.loads((PLUGIN / "pyproject.toml").read_text(encoding="utf-8"))["project"]["entry-points"]
-    install(tmp_path / "site", monkeypatch, groups)
-    monkeypatch.syspath_prepend(PLUGIN)
+    folder = tmp_path_factory.mktemp("site")
+
+    @contextmanager
+    def installed():
+        with pytest.MonkeyPatch.context() as patch:
+            install(folder / secrets.token_hex(4), patch, groups)
+            patch.syspath_prepend(PLUGIN)
+            yield
+
+    return installed
 
 
-@pytest.fixture
-def planned(plugin, make_job, tmp_path):
-    return run(Job.load(make_job(*CHANGES)), tmp_path / "out")
+@pytest.fixture(scope="module")
+def planned(site, tmp_path_factory):
+    """What a job reached that names the package's strategy and cutter."""
+    folder, text = tmp_path_factory.mktemp("planned"), job_text()
+    for old, new in CHANGES:
+        text = text.replace(old, new)
+    (folder / "part.stl").write_bytes(dome_stl(cells=12))
+    (folder / "job.toml").write_text(text, encoding="utf-8")
+    with site():
+        return run(Job.load(folder / "job.toml"), folder / "out")
 
 
 def test_nothing_of_it_is_known_before_it_is_installed(make_job):
@@ -46,26 +65,26 @@ def test_nothing_of_it_is_known_before_it_is_installed(make_job):
         Job.load(make_job(*CHANGES[1:]))
 
 
-def test_a_job_is_planned_with_strategy_cutter_and_limits_of_the_package(planned, tmp_path):
-    assert planned.unwrap().passed, planned.verdict.answer
+def test_a_job_is_planned_with_strategy_cutter_and_limits_of_the_package(planned, site, tmp_path):
+    assert planned.unwrap().passed, [c for c in planned.verdict.certificates if not c.passed]
     assert "tool tip in the table" in planned.find(PlacedPath).margin_names
     names = {use.name for use in planned.find(Explanation).uses}
     assert "leg velocity while running in" in names, names
     folder = tmp_path / "post"
-    (file,) = write_post(PostInput(planned.find(Program)), "drives-ms", folder, verdict=planned.to_dict())
+    with site():
+        (file,) = write_post(PostInput(planned.find(Program)), "drives-ms", folder, verdict=planned.to_dict())
+        assert (read_post(folder, "drives-ms").legs == planned.find(Program).legs).all()
     assert file.read_text(encoding="utf-8").startswith("% pentapod_program")
-    assert (read_post(folder, "drives-ms").legs == planned.find(Program).legs).all()
 
 
-def test_the_limit_of_the_package_holds_in_the_time_law(planned, monkeypatch):
+def test_the_limit_of_the_package_holds_in_the_time_law(planned):
     path, machine = planned.find(LegPath), planned.machine
-    slow = planned.find(Program).duration
-    monkeypatch.undo()  # the package is gone
-    assert retime(path, machine).unwrap().duration < slow
+    assert retime(path, machine).unwrap().duration < planned.find(Program).duration
 
 
-def test_the_command_line_lists_what_the_package_adds(plugin, capsys):
-    assert command(["post", "--formats"]) == 0
+def test_the_command_line_lists_what_the_package_adds(site, capsys):
+    with site():
+        assert command(["post", "--formats"]) == 0
     assert "the workshop's drives" in capsys.readouterr().out
 
 

@@ -83,7 +83,9 @@ class Registry(Mapping[str, T], Generic[T]):
         return name in self._homes or name in self._own or name in self._entries()
 
     def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys((*self._homes, *self._own, *self._entries())))
+        own = dict.fromkeys((*self._homes, *self._own))
+        yield from own
+        yield from (name for name in self._entries() if name not in own)
 
     def __len__(self) -> int:
         return len(tuple(iter(self)))

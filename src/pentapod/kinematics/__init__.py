@@ -1,8 +1,5 @@
 """The robot as mathematics: leg lengths, assembly modes, singularities, Jacobian, forces, certificates."""
 
-from importlib import import_module
-from typing import Any
-
 from pentapod.kinematics.answers import Chords
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
@@ -97,31 +94,3 @@ __all__ = [
     "tip_moment_amplification",
     "tip_stiffness",
 ]
-
-_ELSEWHERE = {
-    "ArchitecturalDistance": "theory",
-    "Calibration": "machine",
-    "Cell": "theory",
-    "CellDecomposition": "theory",
-    "GuideChoice": "theory",
-    "ReachField": "theory",
-    "SingularityFreeSphere": "theory",
-    "Workspace": "theory",
-    "architectural_distance": "theory",
-    "calibrate": "machine",
-    "cell_decomposition": "theory",
-    "cell_of": "theory",
-    "choose_slides": "theory",
-    "conditioning_criterion": "theory",
-    "poses_in_cell": "theory",
-    "singularity_free_sphere": "theory",
-    "stiffness_criterion": "theory",
-}
-"""Names that were here, and the packages in which they are now."""
-
-
-def __getattr__(name: str) -> Any:
-    """Load a name that is now in another package from there. Raises AttributeError for others."""
-    if name not in _ELSEWHERE:
-        raise AttributeError(f"module 'pentapod.kinematics' has no attribute {name!r}")
-    return getattr(import_module(f"pentapod.{_ELSEWHERE[name]}"), name)

@@ -1,0 +1,59 @@
+"""CONTRIBUTING: ten recipes, whose files, lists and entry points exist; and the measures of the tree."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from pentapod.base import Registry
+from pentapod.cutters import CUTTERS
+from pentapod.mesh.io.formats import MESH_FORMATS
+from pentapod.planning.limits import margins
+from pentapod.program.posts import POSTS
+from pentapod.timing.limits import limits
+from pentapod.toolpath import STRATEGIES
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+RECIPES = re.split(r"^\d+\. ", TEXT[TEXT.index("## Ten recipes") : TEXT.index("## What a change")], flags=re.M)[1:]
+
+
+def test_there_are_ten_recipes_in_their_order():
+    titles = [re.match(r"\*\*(?:An? )?([\w ]+)", recipe)[1] for recipe in RECIPES]
+    assert titles == [
+        "post", "strategy", "cutter", "mesh format", "limit", "claim", "robot family", "machine file", "job key",
+        "controller",
+    ]  # fmt: skip
+
+
+def test_files_and_lists_that_recipes_name_exist():
+    for recipe in RECIPES:
+        folder = ROOT / "src" / "pentapod"
+        named = re.findall(r"`([\w/]+/|[\w/]*\w+\.py)`", recipe)
+        assert named, recipe
+        rooms = [ROOT / "src" / "pentapod" / name for name in named if name.endswith("/")]
+        for name in named:
+            places = [folder / name, ROOT / name, *(room / name for room in rooms)]
+            assert any(place.exists() for place in places), name
+    source = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
+    for name in ("_NAMES", "STRATEGY", "CUTTER", "_HOMES", "FORMAT", "homes", "LIMITS", "CLAIMS", "Interpolation"):
+        assert f"`{name}" in TEXT
+        assert re.search(rf"^\s*{name}\b.*=", source, re.M), name
+
+
+def test_entry_points_that_are_named_are_read():
+    registries = (POSTS, STRATEGIES, CUTTERS, MESH_FORMATS, margins.PLUGGED, limits.PLUGGED)
+    groups = {registry.group for registry in registries if isinstance(registry, Registry)}
+    assert set(re.findall(r"`(pentapod\.[a-z_]+)`", TEXT)) == groups
+    plugin = (ROOT / "examples" / "plugin" / "pyproject.toml").read_text(encoding="utf-8")
+    assert set(re.findall(r'entry-points\."([\w.]+)"', plugin)) | {"pentapod.mesh_formats"} == groups
+
+
+def test_the_measures_of_the_tree_are_printed():
+    made = subprocess.run(
+        [sys.executable, ROOT / "benchmarks" / "structure.py"], capture_output=True, text=True, check=True
+    )
+    assert re.search(r"^folders above 15 files +0 +0$", made.stdout, re.M)
+    assert re.search(r"^lines without theory/ +<= 34,500 +\d\d,\d{3}$", made.stdout, re.M)
