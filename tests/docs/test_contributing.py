@@ -9,6 +9,7 @@ from pathlib import Path
 
 from pentapod.base import Registry
 from pentapod.cutters import CUTTERS
+from pentapod.machine.families import FAMILIES
 from pentapod.mesh.io.formats import MESH_FORMATS
 from pentapod.planning.limits import margins
 from pentapod.program.posts import POSTS
@@ -38,13 +39,24 @@ def test_files_and_lists_that_recipes_name_exist():
             places = [folder / name, ROOT / name, *(room / name for room in rooms)]
             assert any(place.exists() for place in places), name
     source = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
-    for name in ("_NAMES", "STRATEGY", "CUTTER", "_HOMES", "FORMAT", "homes", "LIMITS", "CLAIMS", "Interpolation"):
+    for name in (
+        "_NAMES",
+        "STRATEGY",
+        "FAMILY",
+        "CUTTER",
+        "_HOMES",
+        "FORMAT",
+        "homes",
+        "LIMITS",
+        "CLAIMS",
+        "Interpolation",
+    ):
         assert f"`{name}" in TEXT
         assert re.search(rf"^\s*{name}\b.*=", source, re.M), name
 
 
 def test_entry_points_that_are_named_are_read():
-    registries = (POSTS, STRATEGIES, CUTTERS, MESH_FORMATS, margins.PLUGGED, limits.PLUGGED)
+    registries = (POSTS, STRATEGIES, CUTTERS, MESH_FORMATS, FAMILIES, margins.LIMITS, limits.PLUGGED)
     groups = {registry.group for registry in registries if isinstance(registry, Registry)}
     assert set(re.findall(r"`(pentapod\.[a-z_]+)`", TEXT)) == groups
     plugin = (ROOT / "examples" / "plugin" / "pyproject.toml").read_text(encoding="utf-8")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import secrets
 import subprocess
 import sys
@@ -16,6 +17,9 @@ from pentapod import Job, LegPath, PlacedPath, Program, read_post, retime, run, 
 from pentapod.cli.commands.new import dome_stl
 from pentapod.cli.main import run as command
 from pentapod.cutters import CUTTERS
+from pentapod.kinematics import GeneralPentapod
+from pentapod.machine import read_machine
+from pentapod.machine.reader import machine_bytes
 from pentapod.program.posts import POSTS, PostInput
 from pentapod.timing import Explanation
 from pentapod.toolpath import STRATEGIES
@@ -86,6 +90,17 @@ def test_the_command_line_lists_what_the_package_adds(site, capsys):
     with site():
         assert command(["post", "--formats"]) == 0
     assert "the workshop's drives" in capsys.readouterr().out
+
+
+def test_a_machine_file_names_the_family_of_the_package(site):
+    heights = "platform_mm = [-110.4, -38.2, 20.0, 64.1, 108.4]"
+    text = re.sub(r"^delta = .*$", f'family = "any-heights"\n{heights}', machine_bytes("desk").decode(), flags=re.M)
+    with pytest.raises(pentapod.InputError, match=r"geometry\.family.*unknown robot family"):
+        read_machine(text, "own.toml")
+    with site():
+        machine = read_machine(text, "own.toml")
+    assert isinstance(machine.robot, GeneralPentapod)
+    assert machine.robot.offsets[2] == 0.02
 
 
 @pytest.mark.slow

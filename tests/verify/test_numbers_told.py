@@ -8,7 +8,7 @@ import replay_cases as cases
 
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import CLAIMS, verify
-from pentapod.verify.claims.speed import _limits
+from pentapod.verify.claims.speed import speed_limits
 
 
 @pytest.fixture(scope="module", params=["cubic", "linear"])
@@ -107,7 +107,7 @@ def test_which_segment_sets_the_limit():
         machine=SimpleNamespace(rapid_velocity=0.4),
         path_tolerance=0.1,
     )
-    limits, governing = _limits(replay)
+    limits, governing = speed_limits(replay)
     #  chord to:            0.5 0.8 .95 1.05 1.15 1.35 1.5 2.05 2.11 3.05 3.15 3.5 4.2
     assert governing.tolist() == [0, 0, 1, 1, 1, 1, 2, 2, 3, 3, 3, 3, 4]
     expected = [0.03, 0.03, 0.05, 0.05, 0.05, 0.05, 0.02, 0.02, 0.4, 0.4, 0.4, 0.4, 0.4]
@@ -124,7 +124,7 @@ def test_a_chord_over_many_segments_may_go_as_fast_as_the_fastest(fastest):
         machine=SimpleNamespace(rapid_velocity=1.0),
         path_tolerance=1e-3,
     )
-    limits, governing = _limits(replay)
+    limits, governing = speed_limits(replay)
     assert governing.tolist() == [0, fastest, 4]
     assert limits[1] == 0.03
 

@@ -91,13 +91,13 @@ def test_colours_go_from_red_to_green(margins):
 
 
 def test_a_long_path_is_thinned_and_keeps_the_ends_of_its_passes():
-    from pentapod.view.study import _shown
+    from pentapod.view.study import drawn_waypoints
 
     starts = np.concatenate([[0], np.cumsum(np.full(200, 500))])
-    shown = _shown(starts)
+    shown = drawn_waypoints(starts)
     assert len(shown) < 4_000
     assert np.isin(starts, shown).all()
-    assert np.isin(np.arange(50), _shown(np.array([0, 20, 49]))).all()
+    assert np.isin(np.arange(50), drawn_waypoints(np.array([0, 20, 49]))).all()
 
 
 def test_many_waypoints_are_judged_evenly(opened):

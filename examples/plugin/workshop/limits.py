@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pentapod import Machine
-from pentapod.planning.limits.limit import LengthLimit, Scene
+from pentapod.planning.limits.limit import LengthLimit, LimitKind, Scene
 from pentapod.planning.limits.tool_pose import ToolPose
 from pentapod.timing.limits.leg_velocity import LegVelocity
 from pentapod.timing.limits.limit import Reserve
@@ -40,3 +40,6 @@ class AboveTable(LengthLimit):
     def margin(self, pose: ToolPose) -> Any:
         """Return the distance that is left, over the comfortable one."""
         return (TABLE_M - pose.tip[2]) / self.comfort
+
+
+ABOVE_TABLE = LimitKind(AboveTable.of)

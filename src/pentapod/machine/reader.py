@@ -19,12 +19,12 @@ from pentapod.base.tables import problem_of
 from pentapod.base.toml import line_of, parsed, read_toml
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
+from pentapod.kinematics.robot import Robot
 from pentapod.machine.drives import Drives, Masses
+from pentapod.machine.families import FAMILIES
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, WorkVolume
-from pentapod.machine.tables import FILE_KEYS, PARTS, GeometryTable, GuidesTable, MachineTables
+from pentapod.machine.tables import FILE_KEYS, PARTS, GuidesTable, MachineTables
 from pentapod.machine.tool_limits import ToolLimits
-
-OFFSET_TOLERANCE_M = 1e-6  # offsets in a file are rounded; beyond a micrometre they mean another machine
 
 _Made_co = TypeVar("_Made_co", covariant=True)
 
@@ -36,7 +36,7 @@ class Maker(Protocol[_Made_co]):
         self,
         *,
         name: str,
-        robot: LinearPentapod,
+        robot: Any,
         legs: LegLimits,
         joints: JointLimits,
         bodies: Bodies,
@@ -121,7 +121,7 @@ def _library() -> Traversable:
 
 def _made(tables: Any, make: Maker[_Made_co]) -> _Made_co:
     """Return what is made of the parts; tables: a `MachineTables`."""
-    robot, joints = _geometry(tables.geometry), tables.joints
+    robot, joints = FAMILIES[tables.geometry.family].robot(tables.geometry), tables.joints
     parts = {name: fields_from(part, getattr(tables, name)) for name, part in PARTS.items()}
     return make(
         name=tables.name,
@@ -142,10 +142,13 @@ def _made(tables: Any, make: Maker[_Made_co]) -> _Made_co:
     )
 
 
-def _guides(table: GuidesTable, pentapod: LinearPentapod) -> ReconfigurablePentapod | None:
+def _guides(table: GuidesTable, robot: Robot) -> ReconfigurablePentapod | None:
     travel = np.stack([table.si.least, table.si.greatest], axis=1)
     if not travel.any():
         return None
+    if not isinstance(robot, LinearPentapod):
+        family = type(robot).__name__
+        raise MachineError("guides are for the quadratic family alone", key="guides.direction", value=family)
     if ((travel[:, 0] > 0.0) | (travel[:, 1] < 0.0)).any():
         raise MachineError(
             "base_mm is not within the travel of the guides",
@@ -153,28 +156,7 @@ def _guides(table: GuidesTable, pentapod: LinearPentapod) -> ReconfigurablePenta
             value=travel.tolist(),
             expected="least_mm at most 0, greatest_mm at least 0",
         )
-    return ReconfigurablePentapod(pentapod, np.asarray(table.direction), travel)
-
-
-def _geometry(table: GeometryTable) -> LinearPentapod:
-    base = table.si.base
-    if table.platform_mm is None:
-        if table.delta is None:
-            raise MachineError(
-                "the platform is missing", key="geometry", expected="delta, or platform_mm with five numbers"
-            )
-        return LinearPentapod.quadratic(base, table.delta)
-    try:
-        return LinearPentapod.from_offsets(base, table.si.platform, table.delta, tolerance=OFFSET_TOLERANCE_M)
-    except MachineError as error:
-        if table.delta is not None or error.key != "offsets":
-            raise
-        raise MachineError(
-            f"only the quadratic family is supported, platform offsets z_3 + delta (x_i − x_3); {error.what}",
-            key="offsets",
-            value=error.value,
-            expected=error.expected,
-        ) from error
+    return ReconfigurablePentapod(robot, np.asarray(table.direction), travel)
 
 
 def _table(name: str) -> type[BaseModel] | None:

@@ -12,19 +12,10 @@ from pydantic import Field, create_model
 from pentapod.base.keys import declared
 from pentapod.base.tables import Positive, Table, extended, table_of
 from pentapod.machine.drives import Drives, Masses
-from pentapod.machine.fields import FIVE_NUMBERS, FIVE_PAIRS, PER_LEG
+from pentapod.machine.families import OfFamily
+from pentapod.machine.fields import FIVE_PAIRS, PER_LEG
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, WorkVolume
 from pentapod.machine.tool_limits import ToolLimits
-
-
-class GeometryTable(Table):
-    """Where the joints are. Give delta, or platform_mm, or both if they agree."""
-
-    base_mm: FIVE_PAIRS = Field(description="base joints [x, y] in the base plane z = 0, leg 1 to leg 5")
-    delta: float | None = Field(default=None, description="platform joint i is at delta · x_i along the tool axis")
-    platform_mm: FIVE_NUMBERS | None = Field(
-        default=None, description="platform joints along the line towards the tip, leg 1 to leg 5"
-    )
 
 
 class GuidesTable(Table):
@@ -56,7 +47,7 @@ class NamedTable(Table):
 
     name: Annotated[str, Field(min_length=1, pattern=r"^[\w .+-]+$")] = Field(description="what it is called")
     description: str = Field(default="", description="one sentence")
-    geometry: GeometryTable
+    geometry: OfFamily
     guides: GuidesTable = Field(default_factory=GuidesTable, description="on which base joints can be set, if they can")
 
 

@@ -74,7 +74,7 @@ class Study(Value):
         """Return the study of a run."""
         samples = ToolpathSamples.of(run.toolpath, float(np.radians(run.job.axis.tilt_deg)))
         margins = Margins.of(run.machine, run.component, run.surroundings)
-        return cls(samples, run.axes, margins, _shown(run.toolpath.starts))
+        return cls(samples, run.axes, margins, drawn_waypoints(run.toolpath.starts))
 
     def at(self, placement: RigidTransform, *, tilted: bool = False, thorough: bool = False) -> Reach:
         """Return what a placement comes to, quickly: at the waypoints that are drawn.
@@ -108,7 +108,7 @@ def margin_colours(margins: Floats) -> NDArray[np.uint8]:
     return np.where((margins < 0.0)[:, None], _BEYOND, within).astype(np.uint8)
 
 
-def _shown(starts: Ints) -> Ints:
+def drawn_waypoints(starts: Ints) -> Ints:
     """Return the waypoints to draw: where segments begin and end, as far as there is room, and evenly between."""
     count = int(starts[-1]) + 1
     even = np.linspace(0, count - 1, min(count, _SHOWN)).astype(np.intp)

@@ -9,13 +9,13 @@ import pytest
 
 from pentapod.base.errors import ToolpathError
 from pentapod.toolpath import lettering
-from pentapod.toolpath.inputs.lettering import CAPITAL, _font, characters
+from pentapod.toolpath.inputs.lettering import CAPITAL, characters, stroke_font
 
 
 def test_every_printable_character_is_there():
     assert set(string.printable[:95]) <= set(characters())
     assert set("ÄÖÜäöüß°±µ×Ø") <= set(characters())
-    for character, glyph in _font().items():
+    for character, glyph in stroke_font().items():
         assert glyph.advance > 0
         assert (len(glyph.strokes) == 0) == (character == " ")
         for stroke in glyph.strokes:
@@ -28,7 +28,7 @@ def test_every_printable_character_is_there():
 
 def test_strokes_have_no_jumps():
     """What one stroke draws is one line: no step is longer than a letter is high."""
-    for glyph in _font().values():
+    for glyph in stroke_font().values():
         for stroke in glyph.strokes:
             assert np.linalg.norm(np.diff(stroke, axis=0), axis=1).max() <= 13.0
             assert np.linalg.norm(np.diff(stroke, axis=0), axis=1).min() > 0
@@ -41,7 +41,7 @@ def test_capitals_and_digits_are_as_high_as_asked_for(letter):
 
 
 def test_letters_differ():
-    shapes = {c: np.concatenate(g.strokes) for c, g in _font().items() if g.strokes}
+    shapes = {c: np.concatenate(g.strokes) for c, g in stroke_font().items() if g.strokes}
     for a, one in shapes.items():
         for b, two in shapes.items():
             assert a == b or one.shape != two.shape or np.abs(one - two).max() > 0.1, (a, b)

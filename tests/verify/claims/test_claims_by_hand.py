@@ -12,7 +12,7 @@ from pentapod.cli.output import verdict_text
 from pentapod.program import quantised
 from pentapod.verify import CLAIMS, Certificate, Claim, NotJudged, Place, Verdict, verify, write_verdict
 from pentapod.verify.claims.provenance import guides
-from pentapod.verify.claims.tracking import _raised, at_samples
+from pentapod.verify.claims.tracking import angle_bound, at_samples
 from pentapod.verify.replay.claim import Finding, Idle
 from pentapod.verify.replay.interval_bounds import ComponentFindings, Extreme
 
@@ -145,10 +145,10 @@ def test_waypoints_that_are_missed_are_counted(linear):
 def test_what_unit_vectors_may_turn_between_two_samples(rise):
     """An arc of the given height over its chord adds that much, at any angle."""
     for angle in (0.0, 0.1, 1.0, 3.0):
-        raised = _raised(np.array([angle]), np.array([rise]), np.array([0.25]))[0] - 0.25
+        raised = angle_bound(np.array([angle]), np.array([rise]), np.array([0.25]))[0] - 0.25
         apart = 2.0 * np.sin(0.5 * raised) - 2.0 * np.sin(0.5 * angle)
         assert apart == pytest.approx(rise, abs=1e-12)
-    assert _raised(np.array([np.pi]), np.array([1.0]), np.array([0.0]))[0] == pytest.approx(np.pi)
+    assert angle_bound(np.array([np.pi]), np.array([1.0]), np.array([0.0]))[0] == pytest.approx(np.pi)
 
 
 def test_chords_that_meet_at_a_sample():
@@ -165,7 +165,7 @@ def test_the_axis_is_bounded_between_coarse_samples():
     angles = np.arccos(np.clip((straight * along).sum(axis=1) / np.linalg.norm(straight, axis=1), -1, 1))
     ends = max(angles[0], angles[-1])
     rise = 0.25 * own**2 + 0.125 * path**2 + path**3 / 50.0
-    assert angles.max() <= _raised(np.array([ends]), np.array([rise]), np.zeros(1))[0]
+    assert angles.max() <= angle_bound(np.array([ends]), np.array([rise]), np.zeros(1))[0]
 
 
 # Claims and verdicts as such.

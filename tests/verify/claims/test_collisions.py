@@ -16,7 +16,7 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.program.program import Program
 from pentapod.verify import verify
-from pentapod.verify.replay.clearance_bounds import _controls
+from pentapod.verify.replay.clearance_bounds import leg_control_points
 
 LARGE = 1e4  # trimesh counts in units of about this many to the metre
 TOOL = (Solid("shank", 6e-3, 0.03, 2e-3, 2e-3), Solid("holder", 0.03, 0.05, 8e-3, 8e-3))
@@ -136,7 +136,7 @@ def test_the_hull_of_a_stretch_is_of_bernstein_coefficients(short):
     slopes = CubicSpline(np.arange(len(legs)), legs, bc_type="clamped")(np.arange(len(legs)), 1)
     replay = cases.replay_of(short)
     intervals = np.array([[0, 1, 2], [40, 41, 42]])
-    found = _controls(replay, intervals)
+    found = leg_control_points(replay, intervals)
     for row, (first, *_, last) in zip(found, intervals, strict=True):
         knots = np.arange(first, last + 2)
         wanted = BPoly.from_derivatives(knots * period, np.stack([legs[knots], slopes[knots] / period], axis=1)).c

@@ -15,8 +15,8 @@ from pentapod.machine.clearance.leg_clearance import pair_names
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.verify.claims.bodies import clearance
-from pentapod.verify.claims.collisions import _moves, _offsets, claims
-from pentapod.verify.replay.clearance_bounds import Stray, _stray, approach
+from pentapod.verify.claims.collisions import body_moves, claims, line_offsets
+from pentapod.verify.replay.clearance_bounds import Stray, approach, stray_of
 
 SHANK = Solid("shank", 0.006, 0.03, 2e-3, 2e-3)
 HOLDER = Solid("holder", 0.03, 0.05, 8e-3, 8e-3)
@@ -134,15 +134,15 @@ def test_legs_and_holder_of_a_machine_that_stands(still, pose):
 def test_which_points_bodies_move_by(still):
     machine = still.machine
     cone = Solid("holder", 0.03, 0.07, 8e-3, 9e-3, rounding=1e-3)
-    offsets = _offsets(machine, (SHANK, cone))
+    offsets = line_offsets(machine, (SHANK, cone))
     np.testing.assert_allclose(offsets[:5], machine.robot.offsets)
     ends = machine.tool_length - np.array([0.07, 0.006])
     np.testing.assert_allclose(np.sort(offsets[7:]), ends)
-    np.testing.assert_allclose(offsets[5:7], _offsets(machine, ())[5:])
-    assert len(_offsets(machine, ())) == 7
+    np.testing.assert_allclose(offsets[5:7], line_offsets(machine, ())[5:])
+    assert len(line_offsets(machine, ())) == 7
     stray = Stray(np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 6.0, 8.0, 9.0]]), np.array([0.5]))
-    np.testing.assert_allclose(_moves(stray, (SHANK, cone)), [[1, 2, 3, 4, 5, 7, 9 + 0.5 * 0.010]])
-    np.testing.assert_allclose(_moves(Stray(stray.line[:, :7], stray.turn), ()), [[1, 2, 3, 4, 5, 7]])
+    np.testing.assert_allclose(body_moves(stray, (SHANK, cone)), [[1, 2, 3, 4, 5, 7, 9 + 0.5 * 0.010]])
+    np.testing.assert_allclose(body_moves(Stray(stray.line[:, :7], stray.turn), ()), [[1, 2, 3, 4, 5, 7]])
 
 
 # The search for the smallest gap, on a replay whose gaps are given.
@@ -154,12 +154,12 @@ def searched(gaps, moved, monkeypatch, **bound):
     count = (len(gaps) - 1) // 2
     asked = []
 
-    def stray(_replay, starts, size, _offsets):
+    def stray(_replay, starts, size, line_offsets):
         # Seen from the middle of a stretch, at most half of it away.
         asked.append((starts.copy(), size))
         return Stray(np.full((len(starts), 1), 0.5 * size * moved), np.zeros(len(starts)))
 
-    monkeypatch.setattr("pentapod.verify.replay.clearance_bounds._stray", stray)
+    monkeypatch.setattr("pentapod.verify.replay.clearance_bounds.stray_of", stray)
     replay = SimpleNamespace(program=SimpleNamespace(legs=np.zeros((count + 1, 5))), shared={})
     found = approach(replay, lambda at: gaps[at], lambda s: s.line, np.zeros(1), **bound)
     return found, asked
@@ -214,7 +214,7 @@ def test_stretches_are_seen_from_their_middle_by_all_their_legs(cubic, interpola
         return np.ones((2, 1)), np.zeros(2)
 
     monkeypatch.setattr("pentapod.verify.replay.clearance_bounds.roaming", told)
-    found = _stray(replay, np.array([0, 64]), 64, np.zeros(1))
+    found = stray_of(replay, np.array([0, 64]), 64, np.zeros(1))
     assert (found.line.tolist(), found.turn.tolist()) == ([[1.0], [1.0]], [0.0, 0.0])
     ((robot, position, direction, lengths, offsets),) = seen
     assert (robot, position[:, 0].tolist(), direction[:, 2].tolist()) == ("robot", [64.0, 133.0], [64.0, 133.0])

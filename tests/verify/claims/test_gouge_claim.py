@@ -18,9 +18,9 @@ from pentapod.geometry.interpolant import Interpolant
 from pentapod.mesh.query.swept_depth import RESOLUTION_M
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify import Cutting, verify
-from pentapod.verify.claims.gouge import _rapid, gouge
+from pentapod.verify.claims.gouge import gouge, rapid_chords
 from pentapod.verify.replay.claim import Idle
-from pentapod.verify.replay.gouge_bounds import Immersion, _unresolved
+from pentapod.verify.replay.gouge_bounds import Immersion, depth_resolution
 from pentapod.verify.replay.stretches import Stretches, strays
 
 CUTS, RAPIDS = "gouge on cuts and links", "gouge on rapids"
@@ -102,7 +102,7 @@ def test_the_depth_of_a_ball_is_proven_and_close(good, rise):
 def test_what_the_sweep_leaves_open_is_added(told):
     """A sweep is exact to its resolution and 1 %: no true depth may be above what is claimed of it."""
     true = told + RESOLUTION_M + 0.01 * max(told, 0.0)
-    assert told + float(_unresolved(told)) == pytest.approx(true, rel=1e-12)
+    assert told + float(depth_resolution(told)) == pytest.approx(true, rel=1e-12)
 
 
 @pytest.mark.parametrize("rise", [8e-5, 1e-3])
@@ -257,7 +257,7 @@ def test_rapids_are_the_chords_that_meet_rapids_alone(replay):
     """Each chord against each segment, on the arc length of the toolpath."""
     path, tolerance = replay.toolpath, replay.path_tolerance
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path.pivots, axis=0), axis=1))])
-    marked = _rapid(replay)
+    marked = rapid_chords(replay)
     chords = range(0, len(marked), 3)
     expected = []
     for k in chords:
@@ -281,7 +281,7 @@ def test_a_kind_that_is_missing_is_not_judged(replay, kind, missing):
     _ = replay.match
     other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"survey", "match"}})
     assert gouge(other, rapid=kind is SegmentKind.CUT) == Idle(f"no moment belongs to {missing}")
-    assert _rapid(other).all() == (kind is SegmentKind.RAPID)
+    assert rapid_chords(other).all() == (kind is SegmentKind.RAPID)
 
 
 def test_what_the_claims_say_is_allowed(cubic):

@@ -11,7 +11,7 @@ from pentapod.geometry.solids import Solid
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.verify.claims.gouge import CLAIMS, _enclosed, gouge
+from pentapod.verify.claims.gouge import CLAIMS, begins_inside, gouge
 from pentapod.verify.replay.claim import Idle
 from pentapod.verify.replay.gouge_bounds import immersion
 from pentapod.verify.replay.stretches import Stretches, strays
@@ -262,4 +262,4 @@ def test_a_cutter_whose_top_is_inside_begins_inside(top, passed):
     faces += [[3, 0, 4], [3, 4, 7]]
     mesh = Mesh.of(first + [0.0, 0.0, top] + 4e-4 * block, np.array(faces))
     replay.cutting = Cutting(MeshDistance.of(mesh), BallCutter(RADIUS, flute=6.1e-3).solids, 5e-5)
-    assert _enclosed(replay, replay.cutting.surface, replay.cutting.cutter) is not passed
+    assert begins_inside(replay, replay.cutting.surface, replay.cutting.cutter) is not passed

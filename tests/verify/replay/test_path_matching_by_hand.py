@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pentapod.verify.replay.free_space import PosedPolyline
-from pentapod.verify.replay.path_matching import _fractions, _turning, match
+from pentapod.verify.replay.path_matching import interval_fractions, match, turns_on_spot
 
 
 def leaning(angle):
@@ -24,7 +24,7 @@ def test_where_the_axis_counts():
     length = 1e-3 * np.array([0.5, 0.5, 0.999, 1.001, 0.0, 0.0, 0.999])
     turn = np.array([0.0251, 0.0249, 1.0, 1.0, 1e-9, 0.0, 0.0501])
     path = course(np.concatenate([[0.0], np.cumsum(length)]), np.concatenate([[0.0], np.cumsum(turn)]))
-    assert _turning(path, 1e-3).tolist() == [True, False, True, False, True, False, True]
+    assert turns_on_spot(path, 1e-3).tolist() == [True, False, True, False, True, False, True]
 
 
 def test_shares_of_an_interval_by_pivot_and_by_axis():
@@ -32,7 +32,7 @@ def test_shares_of_an_interval_by_pivot_and_by_axis():
     path = course([0.0, 4e-4, 2.0], [0.0, 0.1, 0.1])
     moments = course([1e-4, 3e-4, -1e-4, 9e-4, 0.5004, -1.0, 3.0], [0.075, 0.0, -0.1, 0.2, 0.0, 0.0, 0.0])
     interval = np.array([0, 0, 0, 0, 1, 1, 1])
-    found = _fractions(moments, path, np.array([True, False]), 1e-3, interval)
+    found = interval_fractions(moments, path, np.array([True, False]), 1e-3, interval)
     by_pivot, by_axis = 0.4**2, 2.0**2
     both = [(by_pivot * a + by_axis * b) / (by_pivot + by_axis) for a, b in ((0.25, 0.75), (0.75, 0.0), (0, 0), (1, 1))]
     np.testing.assert_allclose(found, [*both, 0.5 / 1.9996, 0.0, 1.0], atol=1e-12)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pentapod.verify.replay.free_space import PosedPolyline
-from pentapod.verify.replay.path_matching import _at, match
+from pentapod.verify.replay.path_matching import match, pose_at
 
 
 def course(points, axes=None):
@@ -264,7 +264,7 @@ def test_turn_on_the_spot_is_matched_by_the_axis(pause):
 def test_between_waypoints_points_are_on_the_line_and_axes_on_the_arc(angle):
     share = np.linspace(0.0, 1.0, 11)
     axes = np.array([[0.0, 0.0, 1.0], [np.sin(angle), 0.0, np.cos(angle)]])
-    points, found = _at(course(np.array([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]]), axes), np.array([angle]), share)
+    points, found = pose_at(course(np.array([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]]), axes), np.array([angle]), share)
     np.testing.assert_allclose(points, np.stack([1.0 + 2.0 * share, 0.0 * share, 0.0 * share], axis=1), atol=1e-15)
     expected = np.stack([np.sin(share * angle), 0.0 * share, np.cos(share * angle)], axis=1)
     np.testing.assert_allclose(found, expected, atol=1e-15)

@@ -52,11 +52,11 @@ def lettering(text: str, height: float, *, spacing: float = 1.0, align: str = "c
 
 def characters() -> str:
     """Return all characters that the font has."""
-    return "".join(_font())
+    return "".join(stroke_font())
 
 
 def _glyph(character: str) -> Glyph:
-    glyph = _font().get(character)
+    glyph = stroke_font().get(character)
     if glyph is None:
         raise ToolpathError(
             "the font has no such character", key="text", value=character, expected=f"one of {characters()!r}"
@@ -65,7 +65,7 @@ def _glyph(character: str) -> Glyph:
 
 
 @cache
-def _font() -> dict[str, Glyph]:
+def stroke_font() -> dict[str, Glyph]:
     """Return the glyphs of the font's file: see its head for the notation."""
     text = files("pentapod.toolpath.inputs.fonts").joinpath("strokes.txt").read_text(encoding="utf-8")
     glyphs: dict[str, Glyph] = {}

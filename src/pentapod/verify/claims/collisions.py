@@ -75,8 +75,8 @@ def _clear(replay: Replay, *, obstacle: Obstacle, surroundings: Surroundings, co
         )
         return chosen.segments(obstacle.surface, _FAR_M).distance.reshape(-1, len(columns))
 
-    offsets = _offsets(machine, surroundings.tool)
-    found = approach(replay, gaps, lambda stray: _moves(stray, surroundings.tool)[:, columns], offsets, bound=bound)
+    offsets = line_offsets(machine, surroundings.tool)
+    found = approach(replay, gaps, lambda stray: body_moves(stray, surroundings.tool)[:, columns], offsets, bound=bound)
     name, most = surroundings.names[columns[found.column]], _TOOL_FAR_M if tool else _FAR_M
     if found.least > bound and _enclosed(replay, obstacle, frame, columns):
         return Finding(False, None, MM * bound, "mm", replay.place(0), f"{name} is inside the {obstacle.name}")
@@ -100,10 +100,10 @@ def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
         return leg_tool_gaps(machine, tool, position, direction)
 
     def moves(stray: Stray) -> Floats:
-        both = _moves(stray, tool)
+        both = body_moves(stray, tool)
         return both[:, :LEGS] + both[:, LEGS + 1 :]
 
-    found = approach(replay, gaps, moves, _offsets(machine, tool))
+    found = approach(replay, gaps, moves, line_offsets(machine, tool))
     method = (
         f"leg {found.column + 1} comes closest; distance of its body from shank and holder in the plane of leg and "
         f"tool axis, {_PROVEN}"
@@ -111,13 +111,13 @@ def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
     return Finding(found.least > 0.0, MM * found.least, 0.0, "mm", replay.place(found.sample), method)
 
 
-def _offsets(machine: Machine, tool: tuple[Solid, ...]) -> Floats:
+def line_offsets(machine: Machine, tool: tuple[Solid, ...]) -> Floats:
     """Return the offsets along the platform line that bodies move by: joints, spindle's ends, tool body's ends."""
     ends = [machine.tool_length - height for solid in tool for height in (solid.low, solid.high)]
     return np.array([*machine.robot.line_heights, *spindle_ends(machine), *([min(ends), max(ends)] if ends else [])])
 
 
-def _moves(stray: Stray, tool: tuple[Solid, ...]) -> Floats:
+def body_moves(stray: Stray, tool: tuple[Solid, ...]) -> Floats:
     """Return by how much (n, K) the bodies move at most: a point of a leg never more than its platform joint."""
     line = stray.line
     moved = [line[:, :LEGS], line[:, LEGS : LEGS + 2].max(axis=1, keepdims=True)]

@@ -27,7 +27,7 @@ def gouge(replay: Replay, *, rapid: bool) -> Finding | Idle:
         return Idle("no part's mesh to compare with", unknown=True)
     if not cutting.cutter:
         return Idle("the tool has no cutting part")
-    chords = _rapid(replay) if rapid else ~_rapid(replay)
+    chords = rapid_chords(replay) if rapid else ~rapid_chords(replay)
     if not chords.any():
         return Idle(f"no moment belongs to {'a rapid' if rapid else 'a cut or a link'}")
     allowed = 0.0 if rapid else cutting.depth
@@ -38,7 +38,7 @@ def gouge(replay: Replay, *, rapid: bool) -> Finding | Idle:
     rise = max(bound - _THICK * thickness, 0.0)
     cutter = tuple(replace(solid, low=solid.low + rise, high=solid.high + rise) for solid in cutting.cutter)
     found = immersion(replay, cutting.surface, cutter, chords, bound=bound - rise)
-    most, inside = found.most + rise, _enclosed(replay, cutting.surface, cutter)
+    most, inside = found.most + rise, begins_inside(replay, cutting.surface, cutter)
     passed = most <= bound
     if passed and inside:
         return Finding(False, None, MM * bound, "mm", replay.place(0), "the cutter begins inside the part")
@@ -62,7 +62,7 @@ def _method(found: Immersion, rise: float) -> str:
     )
 
 
-def _rapid(replay: Replay) -> Bools:
+def rapid_chords(replay: Replay) -> Bools:
     """Return which chords (M − 1,) are rapids; within the path tolerance of a cut or a link they are not."""
     toolpath, arcs = replay.toolpath, replay.match.arcs
     ends = arc_length(toolpath.pivots)[toolpath.starts]
@@ -73,7 +73,7 @@ def _rapid(replay: Replay) -> Bools:
     return np.asarray(before[behind] == before[first])
 
 
-def _enclosed(replay: Replay, surface: MeshDistance, cutter: tuple[Solid, ...]) -> bool:
+def begins_inside(replay: Replay, surface: MeshDistance, cutter: tuple[Solid, ...]) -> bool:
     """Return whether the cutter begins wholly inside: what never meets the surface stays on its side."""
     top = max(solid.top for solid in cutter) - replay.toolpath.pivot
     return bool(surface.contains(replay.pivots[:1] + top * replay.axes[:1]).any())

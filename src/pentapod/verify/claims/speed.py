@@ -21,7 +21,7 @@ def feed(replay: Replay, kind: SegmentKind) -> Finding | Idle:
     A cutter's feed is the speed of its tip. What works from a stand-off meets the surface at the pivot: there the
     feed is the speed of that spot, while the tip may go as fast as on rapids, and has to keep to that everywhere.
     """
-    limit, governing = _limits(replay)
+    limit, governing = speed_limits(replay)
     standoff, rapid = replay.toolpath.pivot < 0.0, kind == SegmentKind.RAPID
     kinds = np.array([segment.kind == kind for segment in replay.toolpath.segments])
     chords = np.flatnonzero(kinds[governing])
@@ -57,7 +57,7 @@ def _between_rows(replay: Replay, *, spot: bool) -> Floats:
     return np.repeat(np.linalg.norm(np.diff(points, axis=0), axis=1) / replay.program.period, 2)
 
 
-def _limits(replay: Replay) -> tuple[Floats, Ints]:
+def speed_limits(replay: Replay) -> tuple[Floats, Ints]:
     """Return the speed limit (M − 1,) in m/s between consecutive samples, and the segment that sets it.
 
     A chord that comes within the path tolerance of another segment, along the path, may go at the faster

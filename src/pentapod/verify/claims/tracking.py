@@ -76,9 +76,9 @@ def axis_deviation(replay: Replay) -> Finding:
     # Along the arc they lag behind by less than a fiftieth of the angle cubed (lemma 14 of docs/proofs.md).
     rise = 0.25 * own**2 + 0.125 * replay.chord_arcs**2 + replay.chord_arcs**3 / 50.0
     stray = replay.survey.turned
-    at_sample = _raised(match.angles, at_samples(rise), at_samples(stray))
+    at_sample = angle_bound(match.angles, at_samples(rise), at_samples(stray))
     chord = np.minimum(match.times.astype(np.intp), len(stray) - 1)
-    at_waypoint = _raised(match.waypoint_angles, rise[chord], stray[chord])
+    at_waypoint = angle_bound(match.waypoint_angles, rise[chord], stray[chord])
     worst, worst_waypoint = int(np.argmax(at_sample)), int(np.argmax(at_waypoint))
     value, sample = float(at_sample[worst]), float(worst)
     if at_waypoint[worst_waypoint] > value:
@@ -111,7 +111,7 @@ def at_samples(chords: Floats) -> Floats:
     return np.maximum(np.append(chords, chords[-1]), np.append(chords[0], chords))
 
 
-def _raised(angles: Floats, rise: Floats, stray: Floats) -> Floats:
+def angle_bound(angles: Floats, rise: Floats, stray: Floats) -> Floats:
     """Return angles that bound those between two samples, radians, from the angles at both.
 
     rise: by how much the unit vectors may be farther apart in between than straight lines between them are; stray: by

@@ -71,7 +71,7 @@ def approach(replay: Replay, gaps: Gaps, moves: Moves, offsets: Floats, *, bound
         if size == _LONGEST:
             lower = values - moves(_first_stray(replay, starts, offsets))
         else:
-            strays = (moves(_stray(replay, starts[part], size, offsets)) for part in blocks(len(starts), _AT_ONCE))
+            strays = (moves(stray_of(replay, starts[part], size, offsets)) for part in blocks(len(starts), _AT_ONCE))
             lower = values - np.concatenate(list(strays))
         target = met - max(_NEAR_M, _NEAR * (met - bound))
         again = (lower.min(axis=1) < target) if size > 1 else np.zeros(len(starts), dtype=np.bool_)
@@ -90,25 +90,25 @@ def _first_stray(replay: Replay, starts: Ints, offsets: Floats) -> Stray:
     """Return how far the platform strays within the longest stretches: claims that ask the same share the answer."""
     key = ("stray", offsets.tobytes())
     if key not in replay.shared:
-        replay.shared[key] = _stray(replay, starts, _LONGEST, offsets)
+        replay.shared[key] = stray_of(replay, starts, _LONGEST, offsets)
     return cast("Stray", replay.shared[key])
 
 
-def _stray(replay: Replay, starts: Ints, size: int, offsets: Floats) -> Stray:
+def stray_of(replay: Replay, starts: Ints, size: int, offsets: Floats) -> Stray:
     """Return how far the platform strays within `size` intervals from each start, seen from their middle."""
     (position, direction), last = replay.pose, len(replay.program.legs) - 2
     line, turn = np.empty((len(starts), len(offsets))), np.empty(len(starts))
     for first in range(0, len(starts), _CHUNK):
         rows = slice(first, first + _CHUNK)
         intervals = np.minimum(starts[rows, None] + np.arange(size), last)
-        lengths = _controls(replay, intervals)
+        lengths = leg_control_points(replay, intervals)
         middle = starts[rows] + np.minimum(starts[rows] + size, last + 1)
         ends = position[middle], direction[middle]
         line[rows], turn[rows] = replay.machine.robot.enclose(ends, lengths, offsets)
     return Stray(line, turn)
 
 
-def _controls(replay: Replay, intervals: Ints) -> Floats:
+def leg_control_points(replay: Replay, intervals: Ints) -> Floats:
     """Return leg lengths (n, M, n_legs) whose hull holds the legs on intervals (n, m): the Bernstein coefficients."""
     legs, slopes = replay.program.legs, replay.slopes
     if slopes is None:

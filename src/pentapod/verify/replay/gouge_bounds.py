@@ -65,9 +65,9 @@ def immersion(
             rows = order[part]
             own, off = todo.where(rows), stray[rows]
             target = _target(met, bound)
-            enough = target - float(_unresolved(target)) - float(off[-1])
+            enough = target - float(depth_resolution(target)) - float(off[-1])
             depth, known = _swept(replay, surface, body, own, max(enough, -_FAR_M))
-            upper = depth + _unresolved(depth) + off
+            upper = depth + depth_resolution(depth) + off
             lower = np.where(known, depth - off, -np.inf)
             deepest = int(np.argmax(lower))
             if lower[deepest] > met.most:
@@ -90,7 +90,7 @@ def _target(met: Immersion, bound: float) -> float:
     return met.most + max(_NEAR_M, _NEAR * (bound - met.most))
 
 
-def _unresolved(depth: ArrayLike) -> Floats:
+def depth_resolution(depth: ArrayLike) -> Floats:
     """Return by how much a depth may be larger than the sweep says."""
     return RESOLUTION_M + 0.01 * np.maximum(depth, 0.0)
 

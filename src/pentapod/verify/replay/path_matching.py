@@ -73,7 +73,7 @@ def match(
     regard to the axes. away (M − 1,): metres by which the motion may be off its chords; it adds to the distances.
     Beyond a few tolerances the matching has the least sum of squared distances instead, in order.
     """
-    turning = _turning(path, tolerance)
+    turning = turns_on_spot(path, tolerance)
     off = np.zeros(len(motion.points) - 1) if away is None else np.where(np.isfinite(away), away, 0.0)
     near_turn = np.append(turning, False) | np.append(False, turning)
     scale = (tolerance / _AXIS_SCALE_RAD) ** 2
@@ -117,11 +117,11 @@ def _places(motion: PosedPolyline, path: PosedPolyline, turning: Bools, toleranc
     places, interval = np.empty(len(motion.points)), pairing.intervals
     for part in blocks(len(places), _BLOCK):
         own = PosedPolyline(motion.points[part], motion.axes[part])
-        places[part] = interval[part] + _fractions(own, path, turning, tolerance, interval[part])
+        places[part] = interval[part] + interval_fractions(own, path, turning, tolerance, interval[part])
     return pairing.ordered_places(places)
 
 
-def _turning(path: PosedPolyline, tolerance: float) -> Bools:
+def turns_on_spot(path: PosedPolyline, tolerance: float) -> Bools:
     """Return the intervals (n − 1,) on which the axis turns while the pivot (as good as) stands."""
     length = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
     turn = np.linalg.norm(np.diff(path.axes, axis=0), axis=1)
@@ -134,7 +134,7 @@ def _measure(motion: PosedPolyline, path: PosedPolyline, pairing: Pairing, place
     turns = angle_between(path.axes[:-1], path.axes[1:])
     distances, angles = np.empty(len(places)), np.empty(len(places))
     for part in blocks(len(places), _BLOCK):
-        points, axes = _at(path, turns, places[part])
+        points, axes = pose_at(path, turns, places[part])
         distances[part] = np.linalg.norm(motion.points[part] - points, axis=1)
         angles[part] = angle_between(motion.axes[part], axes)
     chord = np.minimum(times.astype(np.intp), len(motion.points) - 2)
@@ -154,7 +154,9 @@ def _measure(motion: PosedPolyline, path: PosedPolyline, pairing: Pairing, place
     )
 
 
-def _fractions(motion: PosedPolyline, path: PosedPolyline, turning: Bools, tolerance: float, interval: Ints) -> Floats:
+def interval_fractions(
+    motion: PosedPolyline, path: PosedPolyline, turning: Bools, tolerance: float, interval: Ints
+) -> Floats:
     """Return how far along its interval, in [0, 1], each sample is: by its pivot, or its axis on the spot."""
     step = np.diff(path.points, axis=0)
     square = np.einsum("ij,ij->i", step, step)
@@ -180,7 +182,7 @@ def _arc_fraction(axes: Floats, first: Floats, second: Floats) -> tuple[Floats, 
     return np.clip(turned / angle, 0.0, 1.0), angle
 
 
-def _at(path: PosedPolyline, turns: Floats, places: Floats) -> tuple[Floats, Floats]:
+def pose_at(path: PosedPolyline, turns: Floats, places: Floats) -> tuple[Floats, Floats]:
     """Return points (M, 3), linear, and axes (M, 3), along great arcs, of the path at these places.
 
     turns (n − 1,): the angles of those arcs.
