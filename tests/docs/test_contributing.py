@@ -10,7 +10,7 @@ from pathlib import Path
 from pentapod.base import Registry
 from pentapod.cutters import CUTTERS
 from pentapod.machine.families import FAMILIES
-from pentapod.mesh.io.formats import MESH_FORMATS
+from pentapod.mesh.io.registry import MESH_FORMATS
 from pentapod.planning.limits import margins
 from pentapod.program.posts import POSTS
 from pentapod.timing.limits import limits
