@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -119,6 +120,8 @@ BY_HAND = [
     pentapod.SpiralOptions(stepover=3e-3),
     pentapod.EdgeOptions(),
     pentapod.CurveOptions(lines=CURVES),
+    pentapod.DrawingOptions(file=Path(__file__).parents[1] / "toolpaths" / "flower.svg"),
+    pentapod.TextOptions(text="pentapod"),
     pentapod.PolylineOptions(lines=[np.array([[0.0, 0, 0], [0.01, 0, 0]])]),
     pentapod.ImageOptions(darkness=np.ones((2, 2)), width=0.01, stepover=1e-3),
     pentapod.Region(),

@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from pentapod.toolpath import Cone as Cone
     from pentapod.toolpath import CrossHatchOptions as CrossHatchOptions
     from pentapod.toolpath import CurveOptions as CurveOptions
+    from pentapod.toolpath import DrawingOptions as DrawingOptions
     from pentapod.toolpath import EdgeOptions as EdgeOptions
     from pentapod.toolpath import Fixed as Fixed
     from pentapod.toolpath import GougeOptions as GougeOptions
@@ -78,6 +79,7 @@ if TYPE_CHECKING:
     from pentapod.toolpath import Segment as Segment
     from pentapod.toolpath import SegmentKind as SegmentKind
     from pentapod.toolpath import SpiralOptions as SpiralOptions
+    from pentapod.toolpath import TextOptions as TextOptions
     from pentapod.toolpath import Toolpath as Toolpath
     from pentapod.toolpath import WaterlineOptions as WaterlineOptions
     from pentapod.toolpath import lettering as lettering
@@ -106,8 +108,8 @@ _ROOMS = {
     "kinematics": "Component LinearPentapod",
     "machine": "Machine Surroundings",
     "toolpath": "Cone RasterOptions CrossHatchOptions WaterlineOptions OffsetOptions SpiralOptions EdgeOptions "
-    "CurveOptions PolylineOptions ImageOptions lettering read_lines read_points read_darkness "
-    "make_toolpath toolpath_with_report Orientation Normal Fixed Pointed Between oriented stepped "
+    "CurveOptions DrawingOptions TextOptions PolylineOptions ImageOptions lettering read_lines read_points "
+    "read_darkness make_toolpath toolpath_with_report Orientation Normal Fixed Pointed Between oriented stepped "
     "GougeOptions Remedy LinkStyle without_gouges Segment SegmentKind Toolpath",
     "toolpath.formats": "read_toolpath write_toolpath",
     "planning": "plan PlacementConstraints Weights Placement PlacedPath leg_path LegPath",
