@@ -8,8 +8,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
-from pentapod.timing.law.local_stretch import Stretchable
-from pentapod.timing.law.time_law import MotionLaw
+from pentapod.timing.law.time_law import MotionLaw, Stretchable
 from pentapod.timing.pieces.exceeding import exceeding, law_times
 from pentapod.timing.pieces.piece import PieceProfile
 

@@ -32,10 +32,8 @@ _SWITCHING_LOSS = 3e-4
 
 _EASINGS = 3
 
-_LEAST_PERIODS = 1.0
-"""Periods of the controller below which a law limited in jerk needs no freedom."""
-
-_STAGE_PERIODS = 1.0
+_FREE_PERIODS = 1.0
+"""Periods below which a law limited in jerk needs no freedom; stages between its gridpoints last no longer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +101,7 @@ class PieceProfile:
             )
             capped = self._fastest(s, AccelerationRows(first, second, offset), ceiling)
             x = x if isinstance(capped, Failure) else np.minimum(x, capped)
-        least = _LEAST_PERIODS * self.limits.period
+        least = _FREE_PERIODS * self.limits.period
         return jerk_limited(
             s, x, self._jerk_rows, self.piece.knots, least_step=least, measure=measure, options=self.jerk_options
         )
@@ -114,7 +112,7 @@ class PieceProfile:
         The law below lower accelerations switches where this grid has no points for it.
         """
         ds, speed = np.diff(self.s), np.sqrt(self.x)
-        longest = _STAGE_PERIODS * self.limits.period
+        longest = _FREE_PERIODS * self.limits.period
         if longest <= 0.0:
             return self.s
         counts = np.ceil(2.0 * ds / (speed[:-1] + speed[1:]) / longest).astype(np.intp)
@@ -170,14 +168,12 @@ class PieceProfile:
     def refined(self, exceeding: Bools, switching: Bools, where: Floats) -> PieceProfile:
         """Return the problem on a finer grid.
 
-        Exceeding stages (N,) get gridpoints where they were measured, switching ones are split at the
-        fractions `where` (N,).
+        Exceeding stages (N,) get gridpoints where they were measured, switching ones are split at fractions `where`.
         """
         added = [self.s[:-1][switching] + (where * np.diff(self.s))[switching]]
         added += [(self.s[:-1] + between * np.diff(self.s))[exceeding] for between in _BETWEEN]
         s = np.unique(np.concatenate([self.s, *added]))
-        x, *eases = (np.interp(s, self.s, y) for y in (self.x, self.ease_acceleration, self.ease_speed))
-        speed, acceleration = eases[1], eases[0]
+        x, acceleration, speed = (np.interp(s, self.s, y) for y in (self.x, self.ease_acceleration, self.ease_speed))
         return replace(self, s=s, x=x, ease_acceleration=acceleration, ease_speed=speed)
 
     def path_accelerations(self) -> Floats:
@@ -200,10 +196,10 @@ class PieceProfile:
     def switching(self) -> tuple[Bools, Floats]:
         """Return the stages (N,) within which the law should switch, and at which fraction (N,).
 
-        In a stage of an optimal law either an acceleration is at its limit or the speed is at its ceiling at
-        both ends. Where neither is, time is lost: at most what running at the faster end's speed would
-        save. None are returned where that adds up to little. A stage that ends at the ceiling and uses the
-        share r of the acceleration limit could get there within about the fraction r of its length.
+        In a stage of an optimal law either an acceleration is at its limit or the speed is at its ceiling at both ends.
+        Where neither is, time is lost: at most what running at the faster end's speed would save. None are returned
+        where that adds up to little. A stage that ends at the ceiling and uses the share r of the acceleration limit
+        could get there within about the fraction r of its length.
         """
         u, ds = self.path_accelerations(), np.diff(self.s)
         rows = self.rows()
@@ -266,10 +262,8 @@ def time_piece(
     and at the end.
     """
     s = first_grid(piece, limits)
-    x_start, x_end = speeds[0] ** 2, speeds[1] ** 2
-    ones = (np.ones_like(s) for _ in range(2))
-    problem = PieceProfile(piece, limits, s, np.zeros_like(s), *ones, engine=engine, x_start=x_start, x_end=x_end)
-    problem = replace(problem, jerk_options=jerk_options)
+    zero, one, ends = np.zeros_like(s), np.ones_like(s), (speeds[0] ** 2, speeds[1] ** 2)
+    problem = PieceProfile(piece, limits, s, zero, one, one, engine, *ends, jerk_options)
     profile = problem.solved()
     for attempt in range(_REFINEMENTS + _EASINGS):
         if isinstance(profile, Failure):
