@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -12,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+import pentapod
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import Key, check_fields, check_size, declared, fields_from, file_key
 from pentapod.base.tables import Table, table_of
@@ -116,3 +119,10 @@ def test_the_unit_of_a_key_is_its_end():
     assert split_key("levels") == ("levels", "")
     assert to_si(None, "mm") is None
     assert to_si(1800.0, "mm_min") == 1800.0 * (1e-3 / 60.0)
+
+
+def test_jobs_and_machine_files_convert_units_in_one_module():
+    source = Path(pentapod.__file__).parent
+    files = [*(source / "job").rglob("*.py"), source / "machine" / "reader.py", source / "machine" / "tables.py"]
+    conversion = re.compile(r"\b1e-?3\b|/ ?1000\b|\bradians\b")
+    assert [str(file) for file in files if conversion.search(file.read_text(encoding="utf-8"))] == []
