@@ -70,13 +70,13 @@ def against_ipopt(tasks: list[Instance], machine: Machine) -> None:
         line = f"{task.name:58s} {ours.smallest:8.4f} {theirs.smallest:8.4f} {their_seconds / seconds:6.1f}x"
         ratios.append((ours.smallest - theirs.smallest, their_seconds / seconds))
         if task.tilt > 0.0 and ours.smallest > 0.0:
-            line += calm_against(problem, ours, whole=False)
+            line += smooth_against(problem, ours, whole=False)
         print(line, flush=True)
     gain, faster = np.median(np.array(ratios), axis=0)
     print(f"median: margin {gain:+.4f} against IPOPT's, {faster:.1f}x as fast\n")
 
 
-def calm_against(problem: PlacementProblem, at: Candidate, *, whole: bool) -> str:
+def smooth_against(problem: PlacementProblem, at: Candidate, *, whole: bool) -> str:
     """Return the columns that compare the smoothest axes of both solvers."""
     keep = KEPT_SHARE * at.smallest
     ours, seconds = timed(lambda: SequentialSolver(problem, False).smooth(at, keep))
@@ -105,7 +105,7 @@ def against_ipopt_on_many(tasks: list[Instance], machine: Machine) -> None:
         problem = PlacementProblem.of(visited(task, 1_000, max(task.tilt, np.radians(5.0))), machine)
         raised = SequentialSolver(problem, True).raise_margin(start_of(problem))
         print(
-            f"{task.name:58s} axes, 1,000 waypoints, plain IPOPT: {calm_against(problem, raised, whole=True)}",
+            f"{task.name:58s} axes, 1,000 waypoints, plain IPOPT: {smooth_against(problem, raised, whole=True)}",
             flush=True,
         )
     print()
@@ -137,7 +137,9 @@ def rates(tasks: list[Instance], machine: Machine) -> None:
         smooth = SequentialSolver(problem, False).smooth(at, KEPT_SHARE * at.smallest) if at.smallest > 0.0 else None
         if smooth is None:
             continue
-        found = [along_path(task, problem, at, axes) for axes in (problem.samples.nominal, calm_axes(problem, smooth))]
+        found = [
+            along_path(task, problem, at, axes) for axes in (problem.samples.nominal, smooth_axes(problem, smooth))
+        ]
         row: list[float] = []
         for strict, turned, fits in zip(*found, strict_fits(problem, at), strict=True):
             above = (fits & (turned > 1.1 * strict + 0.01 * strict.max())).mean()
@@ -152,7 +154,7 @@ def rates(tasks: list[Instance], machine: Machine) -> None:
     print("above: share of the path where strict normals fit and theirs is exceeded by 10 % and by 1 % of its peak\n")
 
 
-def calm_axes(problem: PlacementProblem, smooth: np.ndarray) -> np.ndarray:
+def smooth_axes(problem: PlacementProblem, smooth: np.ndarray) -> np.ndarray:
     """Return the axes (N, 3) of a spline, workpiece frame."""
     return lean(problem.samples.nominal, AxisSpline.of(problem.samples, problem.cone).leans(smooth))
 

@@ -209,7 +209,7 @@ def test_the_linear_model_knows_contacts(desk, cap, problem, free):
     assert np.abs(slopes[:, -7:, :6]).max() > 1.0
 
 
-def test_calming_keeps_clear_of_a_fixture(desk, problem, free):
+def test_smoothing_keeps_clear_of_a_fixture(desk, problem, free):
     margins = Margins.of(desk, PLUS, Surroundings((beside(desk, problem, free, 1, -0.09),)))
     start = problem.candidate(margins, free.transform, free.coefficients)
     keep = start.smallest - 0.05

@@ -41,7 +41,7 @@ def here(desk):
     return RigidTransform(np.diag([1.0, -1.0, -1.0]), desk.work.centre)
 
 
-def setting_of(machine, here, tilt=0.0, size=0.08, waypoints=80):
+def problem_of(machine, here, tilt=0.0, size=0.08, waypoints=80):
     return PlacementProblem.of(
         ToolpathSamples.of(dome(size, 25.0, waypoints), tilt), machine, PlacementConstraints.fixture([here]),
         component=COMPONENT,
@@ -50,7 +50,7 @@ def setting_of(machine, here, tilt=0.0, size=0.08, waypoints=80):
 
 def test_derivatives_are_those_of_the_machine_with_its_guides_moved(sliding, here):
     """Against differences of the margins of machines that were built anew at each slide."""
-    problem = setting_of(sliding.at([0.01, -0.02, 0.0, 0.015, -0.005]), here, tilt=0.2)
+    problem = problem_of(sliding.at([0.01, -0.02, 0.0, 0.015, -0.005]), here, tilt=0.2)
     margins, task = Margins.of(problem.machine, COMPONENT), problem.samples
     rng, k = np.random.default_rng(1), 7
     slid, step, a = rng.uniform(-0.01, 0.01, 5), rng.uniform(-0.02, 0.02, 6), rng.uniform(-0.1, 0.1, 2)
@@ -77,7 +77,7 @@ def test_derivatives_are_those_of_the_machine_with_its_guides_moved(sliding, her
 
 def test_curvature_is_that_of_the_machine_with_its_guides_moved(sliding, here):
     """Second differences, along a line of placement, slides and tilt field, of machines built anew at each slide."""
-    start = setting_of(sliding, here, tilt=0.2)
+    start = problem_of(sliding, here, tilt=0.2)
     machine = sliding.at([0.01, -0.02, 0.0, 0.015, -0.005])
     problem = start.on(machine)
     at = problem.candidate(Margins.of(machine, COMPONENT), here, problem.upright + 0.05)
@@ -106,7 +106,7 @@ def test_curvature_is_that_of_the_machine_with_its_guides_moved(sliding, here):
 
 def test_slides_as_good_as_those_of_another_method(sliding, here):
     """A fixed placement, strict normals: slides alone are left to choose; against differential evolution."""
-    problem = setting_of(sliding, here)
+    problem = problem_of(sliding, here)
     task, least, greatest = problem.samples, *sliding.guides.travel.T
     few = task.at(task.representatives(30))
     poses = few.machine_poses(here, few.nominal)
@@ -149,7 +149,7 @@ def test_slides_that_cannot_be_reached_are_not_taken(sliding, here):
         sliding,
         guides=ReconfigurablePentapod(sliding.robot, sliding.guides.guides, np.tile((-2.0, 2.0), (5, 1))),
     )
-    problem = setting_of(wide, here)
+    problem = problem_of(wide, here)
     forbidden = wide.guides.forbidden_slides(0, np.zeros(5))
     assert len(forbidden) > 0
     beyond = np.zeros(5)
@@ -171,4 +171,4 @@ def test_guides_of_other_families_are_refused(sliding, here):
         sliding, robot=GeneralPentapod(sliding.robot.base, sliding.robot.offsets + 0.01 * np.eye(5)[1])
     )
     with pytest.raises(MachineError, match="quadratic family"):
-        reconfigured(setting_of(general, here))
+        reconfigured(problem_of(general, here))

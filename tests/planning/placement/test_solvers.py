@@ -64,7 +64,7 @@ def test_the_result_recomputed_is_what_was_claimed(problem, raised):
     assert values.min() == pytest.approx(raised.smallest, abs=1e-12)
 
 
-def test_calm_axes_match_the_reference(problem, raised):
+def test_smooth_axes_match_the_reference(problem, raised):
     """The same problem at a given placement: the same optimum to 0.1 %."""
     keep, spline = 0.9 * raised.smallest, AxisSpline.of(problem.samples, problem.cone)
     ours = SequentialSolver(problem, free=False).smooth(raised, keep)
@@ -75,7 +75,7 @@ def test_calm_axes_match_the_reference(problem, raised):
     assert spline.cost_of(ours) < spline.cost_of(spline.fitted(problem.leans(raised.coefficients)))
 
 
-def test_calm_axes_turn_slower_than_strict_normals(problem, raised):
+def test_smooth_axes_turn_slower_than_strict_normals(problem, raised):
     ours = SequentialSolver(problem, free=False).smooth(raised, 0.9 * raised.smallest)
     axes = lean(problem.samples.nominal, AxisSpline.of(problem.samples, problem.cone).leans(ours))
     strict, turned = (np.linalg.norm(np.diff(x, axis=0), axis=1) for x in (problem.samples.nominal, axes))

@@ -31,37 +31,37 @@ def candidate_of(instance, desk):
 def made(request, desk):
     """A problem, a candidate and its cost, for a raster, a spiral and a curve."""
     problem, at = candidate_of(instances(12)[request.param], desk)
-    return problem, at, AxisCost(problem, course_of(problem), at)
+    return problem, at, AxisCost(problem, spline_of(problem), at)
 
 
-def course_of(problem):
+def spline_of(problem):
     return AxisSpline.of(problem.samples, problem.cone)
 
 
 def random_coefficients(problem, size=0.3):
-    c = np.random.default_rng(0).normal(size=(course_of(problem).hessian.shape[1] // 2, 2))
+    c = np.random.default_rng(0).normal(size=(spline_of(problem).hessian.shape[1] // 2, 2))
     return size * c / np.maximum(1.0, np.linalg.norm(c, axis=1, keepdims=True))
 
 
 def legs_of(problem, at, desk, c):
     """Leg lengths at the nodes, by the robot's own inverse kinematics."""
-    rows = course_of(problem).nodes
-    axes = lean(problem.samples.nominal, course_of(problem).leans(c))[rows]
+    rows = spline_of(problem).nodes
+    axes = lean(problem.samples.nominal, spline_of(problem).leans(c))[rows]
     tips, turned = problem.samples.machine_poses(at.transform, axes, rows)
     return desk.robot.leg_lengths(tips + desk.tool_length * turned, -turned)
 
 
 def test_strict_normals_are_not_charged(made):
     problem, _, cost = made
-    strict = np.zeros((course_of(problem).hessian.shape[1] // 2, 2))
-    assert cost.of(strict) == pytest.approx(course_of(problem).cost_of(strict), rel=1e-12)
-    assert cost.of(random_coefficients(problem)) > 2.0 * course_of(problem).cost_of(random_coefficients(problem))
+    strict = np.zeros((spline_of(problem).hessian.shape[1] // 2, 2))
+    assert cost.of(strict) == pytest.approx(spline_of(problem).cost_of(strict), rel=1e-12)
+    assert cost.of(random_coefficients(problem)) > 2.0 * spline_of(problem).cost_of(random_coefficients(problem))
 
 
 def test_charges_are_sums_over_the_nodes(made, desk):
     """Node by node, from lengths of the robot's own kinematics and axes themselves, in plain loops."""
     problem, at, cost = made
-    c, way = random_coefficients(problem), course_of(problem).way
+    c, way = random_coefficients(problem), spline_of(problem).way
 
     def bent(legs):
         before, after = np.diff(way)[:-1, None], np.diff(way)[1:, None]
@@ -69,7 +69,7 @@ def test_charges_are_sums_over_the_nodes(made, desk):
 
     ours, strict = (np.abs(bent(legs_of(problem, at, desk, x))) for x in (c, np.zeros_like(c)))
     worst = strict.max(axis=1)
-    nominal = problem.samples.nominal[course_of(problem).nodes]
+    nominal = problem.samples.nominal[spline_of(problem).nodes]
     rates = np.linalg.norm(np.diff(nominal, axis=0), axis=1) / np.diff(way)
     price = CostOptions().weight * FORESIGHT_M**2 * ((np.diff(way) * rates**2).sum() / (way[-1] - way[0]) + 0.1**2)
     charge = 0.0
@@ -83,8 +83,8 @@ def test_rates_are_those_of_the_axes(made):
     """Told in pairs that are carried along they have the length of the axes' own, but for what lies along the axis."""
     problem, _, cost = made
     c = random_coefficients(problem, 0.05)
-    rows, way = course_of(problem).nodes, course_of(problem).way
-    axes = lean(problem.samples.nominal, course_of(problem).leans(c))[rows]
+    rows, way = spline_of(problem).nodes, spline_of(problem).way
+    axes = lean(problem.samples.nominal, spline_of(problem).leans(c))[rows]
     true = np.linalg.norm(np.diff(axes, axis=0), axis=1) / np.diff(way)
     np.testing.assert_allclose(np.linalg.norm(cost.rates(c), axis=1), true, rtol=0.02, atol=0.02 * true.max())
 
@@ -101,7 +101,7 @@ def test_soft_rows_are_the_derivatives_of_what_is_charged(made):
         return float(rows.weight @ np.square(np.maximum(values - rows.upper, 0.0)))
 
     def charged(x):
-        return cost.of(x) - course_of(problem).cost_of(x)
+        return cost.of(x) - spline_of(problem).cost_of(x)
 
     assert by_rows(c) == pytest.approx(charged(c), rel=1e-9)
     assert by_rows(c + d) - by_rows(c) == pytest.approx(charged(c + d) - charged(c), rel=1e-3)
@@ -142,7 +142,7 @@ def above_strict(desk, number, cost=COST):
     smooth = smoothed(problem, at, KEPT * at.smallest, SmoothingOptions(cost=cost))
     strict, ours = (
         accelerations(instance, problem, at, desk, axes)
-        for axes in (problem.samples.nominal, lean(problem.samples.nominal, course_of(problem).leans(smooth)))
+        for axes in (problem.samples.nominal, lean(problem.samples.nominal, spline_of(problem).leans(smooth)))
     )
     return (ours > 1.1 * strict + 0.01 * strict.max()).mean()
 

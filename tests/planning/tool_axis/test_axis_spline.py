@@ -18,7 +18,7 @@ from pentapod.planning.tool_axis.spline import BANDS, FORESIGHT_M, UPRIGHT_WEIGH
 CONE = 0.3
 
 
-def course_of(k):
+def spline_of(k):
     instance = instances(k + 1)[k]
     task = ToolpathSamples.of(instance.toolpath, 0.28)
     return task, AxisSpline.of(task, CONE)
@@ -32,7 +32,7 @@ def random_coefficients(spline, rng):
 @given(st.integers(0, 11), st.integers(0, 1000))
 @settings(max_examples=20)
 def test_coefficients_in_the_disc_keep_the_cone(k, seed):
-    task, spline = course_of(k)
+    task, spline = spline_of(k)
     leans = spline.leans(random_coefficients(spline, np.random.default_rng(seed)))
     assert np.linalg.norm(leans, axis=1).max() <= CONE * (1.0 + 1e-12)
     np.testing.assert_allclose((leans * task.nominal).sum(axis=1), 0.0, atol=1e-12)
@@ -40,7 +40,7 @@ def test_coefficients_in_the_disc_keep_the_cone(k, seed):
 
 @pytest.mark.parametrize("k", [0, 4, 8])
 def test_a_smooth_field_of_leans_is_fitted(k):
-    task, spline = course_of(k)
+    task, spline = spline_of(k)
     wave = 0.1 * np.sin(20.0 * task.pivots)
     wanted = wave - (wave * task.nominal).sum(axis=1, keepdims=True) * task.nominal
     assert np.abs(spline.leans(spline.fitted(wanted)) - wanted).max() < 0.02 * np.abs(wanted).max()
@@ -62,7 +62,7 @@ def test_the_cost_is_the_mean_square_of_rates_and_bends():
 
 @pytest.mark.parametrize("k", [2, 5])
 def test_the_cost_is_a_quadratic_with_its_gradient(k):
-    _, spline = course_of(k)
+    _, spline = spline_of(k)
     rng = np.random.default_rng(0)
     c, d = random_coefficients(spline, rng), random_coefficients(spline, rng)
     h = 1e-4
@@ -75,7 +75,7 @@ def test_the_cost_is_a_quadratic_with_its_gradient(k):
 @pytest.mark.parametrize("seed", range(4))
 def test_the_banded_program_is_solved_as_ipopt_solves_it(seed):
     rng = np.random.default_rng(seed)
-    task, spline = course_of(seed)
+    task, spline = spline_of(seed)
     point = np.sort(rng.integers(0, len(task.pivots), 150))
     slopes, upper = rng.normal(size=(len(point), 2)), rng.uniform(0.05, 0.5, len(point))
     centre = np.zeros((spline.hessian.shape[1] // 2, 2))
@@ -101,7 +101,7 @@ def test_the_banded_program_is_solved_as_ipopt_solves_it(seed):
 def test_soft_rows_are_exceeded_where_it_pays(seed):
     """Against IPOPT, with excesses as unknowns of its own; cheap and dear rows, the last of them at the path's end."""
     rng = np.random.default_rng(seed)
-    _, spline = course_of(seed)
+    _, spline = spline_of(seed)
     centre = np.zeros((spline.hessian.shape[1] // 2, 2))
     starts = 2 * np.append(rng.integers(0, len(centre) - 5, 60), len(centre) - 4)
     windows = rng.normal(size=(61, BANDS))
@@ -141,7 +141,7 @@ def test_soft_rows_are_exceeded_where_it_pays(seed):
 
 
 def test_a_program_without_interior_has_no_answer():
-    _, spline = course_of(0)
+    _, spline = spline_of(0)
     centre = np.zeros((spline.hessian.shape[1] // 2, 2))
     point, slopes = np.array([3, 3]), np.array([[1.0, 0.0], [-1.0, 0.0]])
     program = BandedQP(

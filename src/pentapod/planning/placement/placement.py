@@ -12,7 +12,7 @@ from pentapod.geometry.rigid import RigidTransform
 class Placement(Value):
     """Rigid transform workpiece → machine, and what it was chosen by ("job", "largest smallest margin", ...).
 
-    slides (5,): where the guides of a reconfigurable machine are to stand, metres; None for other machines.
+    slides (n,): rail positions of a reconfigurable machine, metres; None for other machines.
     """
 
     summary = ("chosen_by",)
