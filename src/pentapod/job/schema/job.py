@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Generic, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
 
@@ -38,6 +38,20 @@ from pentapod.job.schema.tool import ToolTable
 
 _VARIABLE = re.compile(r"\$\{(\w+)\}")
 Content = Mapping[str, Any]
+T = TypeVar("T")
+
+
+class _TableOf(Generic[T]):
+    """Attribute of a job: its table of that name."""
+
+    def __init__(self, kind: type[T]) -> None:
+        self.kind = kind
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, job: Job | None, owner: type) -> T:
+        return cast(T, self if job is None else getattr(job.tables, self.name))
 
 
 @dataclass(frozen=True)
@@ -57,6 +71,19 @@ class Job(Value):
     files: dict[str, Path] = field(default_factory=dict[str, Path])
     fixture_mesh: Path | None = None
     from_file: bool = field(default=True, compare=False)
+
+    part = _TableOf(PartTable)
+    machine = _TableOf(MachineTable)
+    tool = _TableOf(ToolTable)
+    toolpath = _TableOf(StrategyTable)
+    axis = _TableOf(AxisTable)
+    gouge = _TableOf(GougeTable)
+    feed = _TableOf(FeedTable)
+    tolerance = _TableOf(ToleranceTable)
+    placement = _TableOf(PlacementTable)
+    fixture = _TableOf(FixtureTable)
+    output = _TableOf(OutputTable)
+    verify = _TableOf(VerifyTable)
 
     @classmethod
     def load(cls, path: str | Path) -> Job:
@@ -124,69 +151,9 @@ class Job(Value):
             if name not in CLAIM_NAMES:
                 raise self.error("verify", "waive", "no such claim", remedy=nearest(name, CLAIM_NAMES))
 
-    @property
-    def part(self) -> PartTable:
-        """The table [part]."""
-        return self.tables.part
-
-    @property
-    def machine(self) -> MachineTable:
-        """The table [machine]."""
-        return self.tables.machine
-
-    @property
-    def tool(self) -> ToolTable:
-        """The table [tool]."""
-        return self.tables.tool
-
-    @property
-    def toolpath(self) -> StrategyTable:
-        """The table [toolpath]."""
-        return self.tables.toolpath
-
     def file(self, key: str) -> Path:
         """Return the file that a key of [toolpath] names."""
         return self.files[key]
-
-    @property
-    def axis(self) -> AxisTable:
-        """The table [axis]."""
-        return self.tables.axis
-
-    @property
-    def gouge(self) -> GougeTable:
-        """The table [gouge]."""
-        return self.tables.gouge
-
-    @property
-    def feed(self) -> FeedTable:
-        """The table [feed]."""
-        return self.tables.feed
-
-    @property
-    def tolerance(self) -> ToleranceTable:
-        """The table [tolerance]."""
-        return self.tables.tolerance
-
-    @property
-    def placement(self) -> PlacementTable:
-        """The table [placement]."""
-        return self.tables.placement
-
-    @property
-    def fixture(self) -> FixtureTable:
-        """The table [fixture]."""
-        return self.tables.fixture
-
-    @property
-    def output(self) -> OutputTable:
-        """The table [output]."""
-        return self.tables.output
-
-    @property
-    def verify(self) -> VerifyTable:
-        """The table [verify]."""
-        return self.tables.verify
 
     @cached_property
     def digest(self) -> str:
