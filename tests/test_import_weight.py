@@ -6,7 +6,19 @@ import sys
 
 import pytest
 
-HEAVY = ("casadi", "toppra", "matplotlib", "plotly", "trimesh", "scipy", "pydantic", "rich", "jinja2", "numba")
+HEAVY = (
+    "casadi",
+    "pandas",
+    "toppra",
+    "matplotlib",
+    "plotly",
+    "trimesh",
+    "scipy",
+    "pydantic",
+    "rich",
+    "jinja2",
+    "numba",
+)
 
 FIND = "import json, sys; print(json.dumps([m for m in {heavy!r} if m in sys.modules]))"
 

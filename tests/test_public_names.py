@@ -11,6 +11,7 @@ from pentapod import (
     Cone,
     Coverage,
     Cutting,
+    Fixed,
     FlatEnd,
     GougeOptions,
     Lollipop,
@@ -18,6 +19,7 @@ from pentapod import (
     Mesh,
     Orientation,
     PlacementConstraints,
+    PostInput,
     RasterOptions,
     Remedy,
     RigidTransform,
@@ -27,14 +29,17 @@ from pentapod import (
     make_toolpath,
     oriented,
     plan,
+    read_csv,
+    read_post,
     retime,
     sample,
+    stepped,
+    verify,
     without_gouges,
     write_csv,
+    write_post,
 )
 from pentapod.cli.commands.new import dome_stl
-from pentapod.toolpath import Fixed, stepped
-from pentapod.verify import verify
 
 BODY = {"shank": (Cone(0.02, 4e-3, 4e-3),), "holder": (Cone(0.02, 8e-3, 12e-3),)}
 TOOLS = {
@@ -88,13 +93,17 @@ def test_a_part_with_tool_body_and_fixture(kind, tmp_path):
     limits = {"path_tolerance": 50e-6, "axis_tolerance": np.radians(0.5)}
     placed = plan(toolpath, machine, **asked)
     trajectory = retime(leg_path(placed, machine, **limits), machine)
-    program = write_csv(sample(trajectory, machine, placed.placement.transform, placed.component), tmp_path / "a.csv")
+    program = write_csv(sample(trajectory, machine, placed), tmp_path / "a.csv")
     coverage = Coverage.of(part, tool, passes, path_tolerance=limits["path_tolerance"], share=1.0)
     told = {**asked, **limits, "tilt": 0.0, "cutting": Cutting.of(part, tool, coverage=coverage)}
     verdict = verify(program, machine, toolpath, **told)
     assert verdict.passed, verdict.answer
     claims = {c.claim for c in verdict.certificates}
     assert {"gouge on cuts and links", "surface left on the region", "placement as the job asks"} <= claims
+
+    posted = PostInput(read_csv(program), machine)
+    write_post(posted, "npz", tmp_path / "post", verdict=verdict.to_dict())
+    assert read_post(tmp_path / "post", "npz") == posted.program
 
     # A vise that stands where the holder goes is found, and what was not told does not pass.
     high = block((-0.06, -0.01, -0.03), (0.06, 0.01, 0.06))

@@ -19,14 +19,23 @@ from pentapod.toolpath import STRATEGIES
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 RECIPES = re.split(r"^\d+\. ", TEXT[TEXT.index("## Ten recipes") : TEXT.index("## What a change")], flags=re.M)[1:]
+TITLES = [
+    "post",
+    "strategy",
+    "cutter",
+    "mesh format",
+    "limit",
+    "claim",
+    "robot family",
+    "machine file",
+    "job key",
+    "controller",
+]
 
 
 def test_there_are_ten_recipes_in_their_order():
     titles = [re.match(r"\*\*(?:An? )?([\w ]+)", recipe)[1] for recipe in RECIPES]
-    assert titles == [
-        "post", "strategy", "cutter", "mesh format", "limit", "claim", "robot family", "machine file", "job key",
-        "controller",
-    ]  # fmt: skip
+    assert titles == TITLES
 
 
 def test_files_and_lists_that_recipes_name_exist():
@@ -69,3 +78,16 @@ def test_the_measures_of_the_tree_are_printed():
     )
     assert re.search(r"^folders above 15 files +0 +0$", made.stdout, re.M)
     assert re.search(r"^lines without theory/ +<= 34,500 +\d\d,\d{3}$", made.stdout, re.M)
+
+
+def test_architecture_names_every_folder_and_is_two_pages():
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 80
+    tree = text.split("```")[1]
+    source = ROOT / "src" / "pentapod"
+    for folder in {path.parent.relative_to(source) for path in source.rglob("*.py")} - {Path()}:
+        assert f"{folder.name}/" in tree or folder.parts[0] == "cli" or len(folder.parts) > 2, folder
+    for name in re.findall(r"`([\w/]+(?:/|\.py))`", text):
+        assert (source / name).exists() or (ROOT / name).exists(), name
+    for recipe in TITLES:
+        assert f"({recipe})" in tree, recipe

@@ -1,4 +1,4 @@
-"""What everything stands on: errors, refusals, arrays, files, versions. No mathematics."""
+"""Base: errors, refusals, values, registries, files and versions. No mathematics."""
 
 from pentapod.base.errors import (
     ArrayError,

@@ -1,4 +1,4 @@
-"""NumPy archives that somebody gives: arrays by name, with every size checked before anything is unpacked."""
+"""NumPy archives (.npz): arrays by name, with every size checked before anything is unpacked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arrays at the borders of the library: shape, finiteness, read-only copies."""
+"""Validation of array arguments: shape, finiteness, read-only copies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What people look at, in notebooks and plots: optional packages loaded when they are used, and small HTML tables."""
+"""Display in notebooks and plots: optional packages loaded when they are used, and small HTML tables."""
 
 from __future__ import annotations
 

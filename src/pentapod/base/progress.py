@@ -1,4 +1,4 @@
-"""How long work tells how far it is."""
+"""Progress: the callback by which long stages report how far they are."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ class Progress(Protocol):
     """Called by long stages: the stage's name, the fraction done in [0, 1], and a short note."""
 
     def __call__(self, stage: str, fraction: float, note: str = "") -> None:
-        """Take the news; must return quickly and never raise."""
+        """Receive a report. Must return quickly and never raise."""
         ...
 
 
 def silent(stage: str, fraction: float, note: str = "") -> None:
-    """Take the news and say nothing."""
+    """Ignore the report: the default of all stages."""

@@ -1,4 +1,4 @@
-"""What cannot be done, as a value: the cause, where on the path, and by how much."""
+"""Refusal: what cannot be done, as a value: the cause, where on the path, and by how much. RefusalError raises it."""
 
 from __future__ import annotations
 

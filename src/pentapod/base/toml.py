@@ -1,4 +1,4 @@
-"""TOML files that people write: read and parsed, and what is wrong with them told by line, key and remedy."""
+"""TOML files: reading and parsing, with errors that name line, key and remedy."""
 
 from __future__ import annotations
 
