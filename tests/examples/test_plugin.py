@@ -72,7 +72,7 @@ def test_nothing_of_it_is_known_before_it_is_installed(make_job):
 def test_a_job_is_planned_with_strategy_cutter_and_limits_of_the_package(planned, site, tmp_path):
     assert planned.unwrap().passed, [c for c in planned.verdict.certificates if not c.passed]
     assert "tool tip in the table" in planned.find(PlacedPath).margin_names
-    names = {use.name for use in planned.find(Explanation).uses}
+    names = {use.quantity for use in planned.find(Explanation).uses}
     assert "leg velocity while running in" in names, names
     folder = tmp_path / "post"
     with site():

@@ -11,13 +11,13 @@ from pentapod.planning.limits.tool_pose import ToolPose
 from pentapod.timing.limits.leg_velocity import LegVelocity
 from pentapod.timing.limits.limit import Reserve
 
-SHARE = 0.8
+SHARE = 0.57
 TABLE_M, COMFORT_M = 0.9, 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class RunningIn(LegVelocity):
-    """Legs move at four fifths of their greatest velocity at most."""
+    """Legs move at little more than half their greatest velocity."""
 
     quantity = "leg velocity while running in"
 
