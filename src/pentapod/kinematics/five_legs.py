@@ -62,6 +62,11 @@ class FiveLegs:
         legs[..., :2] -= self.base
         return legs
 
+    def platform_joints(self, position: ArrayLike, direction: ArrayLike) -> Floats:
+        """Return b_i (..., 5, 3), metres, in poses (..., 3)."""
+        p, i = as_poses(position, direction)
+        return p[..., None, :] + self.offsets[:, None] * i[..., None, :]
+
     def jacobian(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return ∂legs/∂(p, i) (..., 5, 6) at poses (..., 3): rows [e_i, z_i e_i], e_i the leg's unit vector.
 

@@ -99,6 +99,10 @@ class Robot(Protocol):
         """Return the vectors (..., n_legs, 3) from the base joints to the platform joints in poses (..., 3)."""
         ...
 
+    def platform_joints(self, position: ArrayLike, direction: ArrayLike) -> Floats:
+        """Return where the legs end (..., n_legs, 3) in poses (..., 3)."""
+        ...
+
     def jacobian(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return ∂readings/∂(p, i) (..., n_legs, 6) in poses (..., 3): m/m, then metres per change of i."""
         ...

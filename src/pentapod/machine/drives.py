@@ -11,7 +11,7 @@ from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import MachineError
 from pentapod.base.keys import Key, check_fields, declared
 from pentapod.base.values import Value
-from pentapod.machine.fields import LIST_OF_3, PER_LEG, per_leg
+from pentapod.machine.fields import LEGS, LIST_OF_3, PER_LEG, per_leg
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,28 +22,28 @@ class Drives(Value):
         acceleration = velocity_gain · (rate error + velocity_integral · ∫ rate error)
                        + acceleration_feedforward · acceleration wanted + load_feedforward · load / moving_mass
 
-    Programs do not depend on it. Arrays (5,), scalars hold for all legs: gains in 1/s, moving_mass in kg, ripple_force
+    Programs do not depend on it. Arrays (n,), scalars hold for all legs: gains in 1/s, moving_mass in kg, ripple_force
     in N, once up and down in ripple_pitch metres of travel. The other fields hold for all legs, SI; the load is that of
     the `Masses`. Raises MachineError: numbers out of range or not finite.
     """
 
     position_gain: Annotated[Floats, Key("per_s", "gain of the position loop (Kv)", kind=PER_LEG, gt=0.0)] = field(
-        default_factory=lambda: np.full(5, 80.0)
+        default_factory=lambda: np.full(LEGS, 80.0)
     )
     velocity_gain: Annotated[
         Floats, Key("per_s", "gain of the velocity loop, its bandwidth in rad/s", kind=PER_LEG, gt=0.0)
-    ] = field(default_factory=lambda: np.full(5, 600.0))
+    ] = field(default_factory=lambda: np.full(LEGS, 600.0))
     velocity_integral: Annotated[
         Floats, Key("per_s", "integral share of the velocity loop, 1 / reset time", kind=PER_LEG, ge=0.0)
-    ] = field(default_factory=lambda: np.full(5, 50.0))
+    ] = field(default_factory=lambda: np.full(LEGS, 50.0))
     moving_mass: Annotated[Floats, Key("kg", "what a drive feels, motor and screw included", kind=PER_LEG, gt=0.0)] = (
-        field(default_factory=lambda: np.full(5, 100.0))
+        field(default_factory=lambda: np.full(LEGS, 100.0))
     )
     ripple_force: Annotated[Floats, Key("n", "amplitude of the force ripple", "ripple", kind=PER_LEG, ge=0.0)] = field(
-        default_factory=lambda: np.full(5, 20.0)
+        default_factory=lambda: np.full(LEGS, 20.0)
     )
     ripple_pitch: Annotated[Floats, Key("mm", "travel of one period of the ripple", kind=PER_LEG, gt=0.0)] = field(
-        default_factory=lambda: np.full(5, 5e-3)
+        default_factory=lambda: np.full(LEGS, 5e-3)
     )
     velocity_feedforward: Annotated[
         float, Key("", "share of the wanted velocity given to the velocity loop", ge=0.0, le=2.0)

@@ -11,19 +11,31 @@ from pydantic_core import PydanticCustomError
 
 from pentapod.base.arrays import frozen, set_frozen
 from pentapod.base.errors import MachineError
+from pentapod.kinematics.five_legs import FiveLegs
+
+LEGS = FiveLegs.n_legs
+"""Of the machines that files describe."""
 
 
-def per_leg(owner: object, *names: str) -> None:
-    """Replace scalars or five numbers by read-only arrays (5,). Raises MachineError naming the field."""
-    for name in names:
-        value = np.asarray(getattr(owner, name), dtype=np.float64)
-        if value.shape not in {(), (1,), (5,)}:
+def per_leg(owner: object, *names: str, **widths: int) -> None:
+    """Replace fields by read-only arrays with an entry for each leg: (n,), or (n, width) for those with a width.
+
+    One entry counts for all legs; where every field has only one, n is that of a linear pentapod. Raises MachineError
+    naming the field.
+    """
+    tails: dict[str, tuple[int, ...]] = dict.fromkeys(names, ())
+    tails |= {name: (width,) for name, width in widths.items()}
+    values = {name: np.asarray(getattr(owner, name), dtype=np.float64) for name in tails}
+    counts = [v.shape[0] for name, v in values.items() if v.shape[1:] == tails[name] and v.ndim]
+    count = next((c for c in counts if c > 1), FiveLegs.n_legs)
+    for name, value in values.items():
+        if value.shape not in {tails[name], (1, *tails[name]), (count, *tails[name])}:
             raise MachineError(
-                "wrong count", key=name, value=value.shape, expected="one number, or one for each of 5 legs"
+                "wrong count", key=name, value=value.shape, expected=f"one for all legs, or one for each of {count}"
             )
         if not np.isfinite(value).all():
             raise MachineError("not finite", key=name, value=value.tolist())
-        set_frozen(owner, **{name: frozen(np.broadcast_to(value, (5,)), name, (5,))})
+        set_frozen(owner, **{name: frozen(np.broadcast_to(value, (count, *tails[name])), name)})
 
 
 def positive(owner: object, *names: str) -> None:
@@ -48,9 +60,9 @@ def _one_or_five(value: object) -> list[float]:
     expected = "one finite number, or five (one for each leg)"
     _require(_numbers(value), "not finite numbers", expected)
     if not isinstance(value, list):
-        return [float(cast(float, value))] * 5
+        return [float(cast(float, value))] * LEGS
     items = cast(list[float], value)
-    _require(len(items) == 5, f"{len(items)} numbers where there are five legs", expected)
+    _require(len(items) == LEGS, f"{len(items)} numbers where there are five legs", expected)
     return [float(x) for x in items]
 
 
@@ -62,7 +74,7 @@ def _five(value: object) -> list[float]:
 def _rows(value: object, width: int, words: str) -> list[list[float]]:
     _require(isinstance(value, list), "not a list", words)
     rows = cast(list[Any], value)
-    _require(len(rows) == 5, f"{len(rows)} entries where there are five legs", words)
+    _require(len(rows) == LEGS, f"{len(rows)} entries where there are five legs", words)
     for k, row in enumerate(rows, start=1):
         ok = isinstance(row, list) and len(cast(list[Any], row)) == width and _numbers(cast(object, row))
         _require(ok, f"entry {k} is not {width} finite numbers", words)
@@ -76,7 +88,7 @@ def _pairs(value: object) -> list[list[float]]:
 def _axes(value: object) -> list[list[float]]:
     words = "one unit vector [x, y, z], or five (one for each leg)"
     single = isinstance(value, list) and len(cast(list[Any], value)) == 3 and _numbers(cast(object, value))
-    return _rows([value] * 5 if single else value, 3, words)
+    return _rows([value] * LEGS if single else value, 3, words)
 
 
 PER_LEG = Annotated[list[float], BeforeValidator(_one_or_five)]

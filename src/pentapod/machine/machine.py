@@ -16,6 +16,8 @@ from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
+from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.kinematics.robot import Robot
 from pentapod.machine import reader
 from pentapod.machine.digest import digest_of
 from pentapod.machine.drives import Drives, Masses
@@ -34,7 +36,7 @@ class Machine(Value):
     tool_length: metres from p (the platform line's origin, where offset = 0) along i to the tool tip.
     rapid_velocity: largest tip speed in m/s on rapids. drives, masses: for simulation alone; a program does not
     depend on them. tool_limits: of the motion of tip and axis, none unless set. guides: of a reconfigurable machine, on
-    which the base joints are set before a program runs; slides (5,) metres: where they stand, `robot` is that
+    which the base joints are set before a program runs; slides (n_legs,) metres: where they stand, `robot` is that
     geometry.
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
@@ -44,7 +46,7 @@ class Machine(Value):
     summary = ("name",)
 
     name: str
-    robot: LinearPentapod
+    robot: Robot
     legs: LegLimits
     joints: JointLimits
     bodies: Bodies
@@ -56,12 +58,13 @@ class Machine(Value):
     masses: Masses = field(default_factory=Masses)
     tool_limits: ToolLimits = field(default_factory=ToolLimits)
     guides: ReconfigurablePentapod | None = None
-    slides: Floats = field(default_factory=lambda: np.zeros(5))
+    slides: Floats = field(default_factory=lambda: np.zeros(FiveLegs.n_legs))
     architecture: float = field(init=False)
 
     def __post_init__(self) -> None:
         positive(self, "tool_length", "rapid_velocity")
-        set_frozen(self, slides=frozen(self.slides, "slides", (5,)))
+        set_frozen(self, slides=frozen(self.slides, "slides", (self.robot.n_legs,)))
+        self._check_legs()
         measure = self.robot.conditioning
         set_frozen(self, architecture=measure)
         if measure < ARCHITECTURAL_LIMIT:
@@ -79,6 +82,25 @@ class Machine(Value):
                 key="tool_length",
                 value=self.tool_length,
                 expected="at least the largest offset + shaft_end",
+            )
+
+    def _check_legs(self) -> None:
+        """Raise MachineError where a limit is not given for each leg, or the guides are another robot's."""
+        count = self.robot.n_legs
+        rows = {
+            "min_length": self.legs.min_length,
+            "base_cone": self.joints.base_cone,
+            "moving_mass": self.drives.moving_mass,
+        }
+        for key, values in rows.items():
+            if len(values) != count:
+                raise MachineError("wrong count", key=key, value=len(values), expected=f"one for each of {count} legs")
+        if self.guides is not None and not isinstance(self.robot, LinearPentapod):
+            raise MachineError(
+                "guides are for machines of the quadratic family alone",
+                key="guides",
+                value=type(self.robot).__name__,
+                remedy="a machine without guides, built where they stand",
             )
 
     @classmethod
@@ -99,7 +121,7 @@ class Machine(Value):
         return dataclasses.replace(self, tool_length=tool_length)
 
     def at(self, slides: ArrayLike) -> Machine:
-        """Return this machine with its guides at slides (5,), metres.
+        """Return this machine with its guides at slides (n_legs,), metres.
 
         Raises MachineError: it has no guides, or is architecturally singular there. Their travel is not looked at.
         """

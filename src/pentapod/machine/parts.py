@@ -20,7 +20,7 @@ Interpolation = Literal["linear", "cubic"]
 class LegLimits(Value):
     """Limits of each leg.
 
-    Arrays (5,), SI; scalars hold for all legs. Raises MachineError: not positive and finite, min_length ≥ max_length.
+    Arrays (n,), SI; scalars hold for all legs. Raises MachineError: not positive and finite, min_length ≥ max_length.
     """
 
     min_length: Annotated[Floats, Key("mm", "shortest leg, base joint to platform joint", kind=PER_LEG)]
@@ -43,7 +43,7 @@ class LegLimits(Value):
 
     @property
     def stroke(self) -> Floats:
-        """max_length − min_length, (5,) metres."""
+        """max_length − min_length, (n_legs,) metres."""
         return self.max_length - self.min_length
 
 
@@ -51,8 +51,8 @@ class LegLimits(Value):
 class JointLimits(Value):
     """Cones within which the joints let the legs move.
 
-    base_axes (5, 3): unit axis of each base joint's cone, machine frame. base_cone (5,): largest angle of the
-    leg to that axis, radians. platform_range (5, 2): least and largest angle in radians between the leg
+    base_axes (n_legs, 3): unit axis of each base joint's cone, machine frame. base_cone (n_legs,): largest angle of the
+    leg to that axis, radians. platform_range (n_legs, 2): least and largest angle in radians between the leg
     (from platform joint towards base joint) and the tool axis tip → spindle.
 
     Raises MachineError: axes that are not unit to 1e-3 (they are then normalised), a cone beyond 90°, a range
@@ -67,20 +67,19 @@ class JointLimits(Value):
     platform_range: Floats
 
     def __post_init__(self) -> None:
-        per_leg(self, "base_cone")
+        per_leg(self, "base_cone", base_axes=3, platform_range=2)
         positive(self, "base_cone")
-        axes = frozen(np.broadcast_to(self.base_axes, (5, 3)), "base_axes", (5, 3))
+        axes, limits = self.base_axes, self.platform_range
         norms = np.linalg.norm(axes, axis=1, keepdims=True)
         if (np.abs(norms - 1.0) > 1e-3).any():
             leg = int(np.argmax(np.abs(norms - 1.0)))
             raise MachineError(f"leg {leg + 1}: not a unit vector", key="base_axes", value=axes[leg].tolist())
-        limits = frozen(np.broadcast_to(self.platform_range, (5, 2)), "platform_range", (5, 2))
         if (self.base_cone > 0.5 * np.pi).any():
             raise MachineError("beyond 90 degrees", key="base_cone", value=np.degrees(self.base_cone).tolist())
         if (limits[:, 0] < 0.0).any() or (limits[:, 1] > np.pi).any() or (limits[:, 0] >= limits[:, 1]).any():
             value = np.degrees(limits).tolist()
             raise MachineError("not a range", key="platform_range", value=value, expected="0 ≤ min < max ≤ 180 degrees")
-        set_frozen(self, base_axes=frozen(axes / norms, "base_axes"), platform_range=limits)
+        set_frozen(self, base_axes=frozen(axes / norms, "base_axes"))
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from pentapod.base.keys import declared
 from pentapod.base.tables import Positive, Table, extended, table_of
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.families import OfFamily
-from pentapod.machine.fields import FIVE_PAIRS, PER_LEG
+from pentapod.machine.fields import FIVE_PAIRS, LEGS, PER_LEG
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, WorkVolume
 from pentapod.machine.tool_limits import ToolLimits
 
@@ -22,10 +22,11 @@ class GuidesTable(Table):
     """Guides of a reconfigurable machine: the base joints are set along them before a program runs."""
 
     direction: FIVE_PAIRS = Field(
-        default=[[0.0, 1.0]] * 5, description="of each guide in the base plane, unit [x, y]; [0, 0] for a fixed joint"
+        default=[[0.0, 1.0]] * LEGS,
+        description="of each guide in the base plane, unit [x, y]; [0, 0] for a fixed joint",
     )
-    least_mm: PER_LEG = Field(default=[0.0] * 5, description="least slide from base_mm along it")
-    greatest_mm: PER_LEG = Field(default=[0.0] * 5, description="greatest slide; no guides where none can move")
+    least_mm: PER_LEG = Field(default=[0.0] * LEGS, description="least slide from base_mm along it")
+    greatest_mm: PER_LEG = Field(default=[0.0] * LEGS, description="greatest slide; no guides where none can move")
 
 
 class ToolTable(Table):

@@ -62,7 +62,7 @@ def read_header(path: str | Path) -> Header:
 def _pieces(program: Program) -> Iterator[bytes]:
     """Yield the file in pieces, so that a long program is never in memory as text as a whole."""
     decimals = _time_decimals(program.period)
-    row = f"%.{decimals}f" + f",%.{MM_DECIMALS}f" * 5 + "\n"
+    row = f"%.{decimals}f" + f",%.{MM_DECIMALS}f" * program.legs.shape[1] + "\n"
     yield (header_text(program) + COLUMNS + "\n").encode()
     for start in range(0, len(program.legs), _CHUNK):
         legs = to_millimetres(program.legs[start : start + _CHUNK])

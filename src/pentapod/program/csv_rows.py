@@ -17,6 +17,7 @@ from pentapod.program.resolution import LARGEST_M, from_millimetres
 
 COLUMNS = "time_s,leg1_mm,leg2_mm,leg3_mm,leg4_mm,leg5_mm"
 _NAMES = COLUMNS.split(",")
+_WIDTH = len(_NAMES)
 _BLOCK = 1 << 22  # bytes
 _SHORTEST = len("0,1,1,1,1,1\n")
 _PLAIN = b"0123456789+-.eE,\n\r"
@@ -63,9 +64,9 @@ class TimeCheck:
 
 
 def read_rows(source: BufferedReader, rows: int, times: TimeCheck, first_line: int, file: Path) -> Floats:
-    """Return leg lengths (rows, 5) in metres from where the source stands to its end. Raises ProgramError."""
+    """Return leg lengths (rows, n_legs) in metres from where the source stands to its end. Raises ProgramError."""
     size = os.fstat(source.fileno()).st_size - source.tell()
-    legs = np.empty((0, 5))
+    legs = np.empty((0, _WIDTH - 1))
     count, rest = 0, b""
     while block := source.read(_BLOCK):
         end = block.rfind(b"\n") + 1
@@ -79,7 +80,7 @@ def read_rows(source: BufferedReader, rows: int, times: TimeCheck, first_line: i
         _check_lengths(table, first_line + count, file)
         if not count:
             # A header may promise more rows than there are; a file that holds no row at all costs nothing.
-            legs = np.empty((min(rows, size // _SHORTEST + 1), 5))
+            legs = np.empty((min(rows, size // _SHORTEST + 1), _WIDTH - 1))
         kept = max(0, min(len(table), len(legs) - count))
         legs[count : count + kept] = from_millimetres(table[:kept, 1:])
         count += len(table)
@@ -100,13 +101,13 @@ def read_rows(source: BufferedReader, rows: int, times: TimeCheck, first_line: i
 
 
 def _table(data: bytes, first_line: int, file: Path) -> Floats:
-    """Return the numbers (n, 6) of whole lines; what is out of the ordinary is read, or named, row by row."""
+    """Return the numbers (n, 1 + n_legs) of whole lines; what is out of the ordinary is read, or named, row by row."""
     letters = np.frombuffer(data, np.uint8)
     ends = letters[np.flatnonzero((letters == ord(",")) | (letters == ord("\n")))]
     plain = not data.translate(None, _PLAIN) and data.count(b"\r") == data.count(b"\r\n")
-    if plain and len(ends) % 6 == 0:
-        columns = ends.reshape(-1, 6)
-        if (columns[:, 5] == ord("\n")).all() and (columns[:, :5] == ord(",")).all():
+    if plain and len(ends) % _WIDTH == 0:
+        columns = ends.reshape(-1, _WIDTH)
+        if (columns[:, -1] == ord("\n")).all() and (columns[:, :-1] == ord(",")).all():
             with warnings.catch_warnings():
                 warnings.simplefilter("error", DeprecationWarning)  # what it says of text that is no number
                 try:
@@ -114,17 +115,19 @@ def _table(data: bytes, first_line: int, file: Path) -> Floats:
                 except (DeprecationWarning, ValueError):
                     numbers = np.empty(0)
             if numbers.size == columns.size and np.isfinite(numbers).all():
-                return numbers.reshape(-1, 6)
+                return numbers.reshape(-1, _WIDTH)
     return _row_by_row(data, first_line, file)
 
 
 def _row_by_row(data: bytes, first_line: int, file: Path) -> Floats:
-    """Return the numbers (n, 6) of whole lines. Raises ProgramError at the first row that is not six finite numbers."""
+    """Return the numbers (n, 1 + n_legs) of whole lines. Raises ProgramError at the first other row."""
     table: list[list[float]] = []
     for number, line in enumerate(data.split(b"\n")[:-1], start=first_line):
         fields = line.split(b",")
-        if len(fields) != 6:
-            raise ProgramError("wrong number of columns", file=file, line=number, value=len(fields), expected="6")
+        if len(fields) != _WIDTH:
+            raise ProgramError(
+                "wrong number of columns", file=file, line=number, value=len(fields), expected=str(_WIDTH)
+            )
         table.append([_number(field, name, number, file) for name, field in zip(_NAMES, fields, strict=True)])
     return np.array(table)
 

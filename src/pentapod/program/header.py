@@ -17,6 +17,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.errors import ArrayError, InputError, ProgramError, ToolpathError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
+from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.program.program import FORMAT_VERSION, Program, Provenance
 from pentapod.toolpath.linking.partition import Piece
 
@@ -60,7 +61,7 @@ class Header:
     slides: tuple[float, ...] | None = None
 
     def program(self, legs: Floats) -> Program:
-        """Return the program of this header and its rows (N, 5), metres."""
+        """Return the program of this header and its rows (N, n_legs), metres."""
         return Program(
             period=self.period,
             legs=legs,
@@ -197,7 +198,7 @@ class _Reader:
             return None
         given = self.values[GUIDES]
         slides = [_number(entry, shift=-3) for entry in cast("list[Any]", given)] if isinstance(given, list) else []
-        if len(slides) != 5 or not all(map(math.isfinite, slides)):
+        if len(slides) != FiveLegs.n_legs or not all(map(math.isfinite, slides)):
             raise self._wrong(GUIDES, "five numbers of mm, one for each guide")
         return tuple(slides)
 

@@ -42,9 +42,9 @@ class Provenance(Value):
 
 @dataclass(frozen=True, eq=False)
 class Program(Result):
-    """Setpoints for the five legs.
+    """Setpoints for the legs.
 
-    legs (N, 5): lengths in metres, row k is due at k · period seconds. interpolation: how the controller
+    legs (N, n_legs): lengths in metres, row k is due at k · period seconds. interpolation: how the controller
     moves between rows: "linear", or "cubic": the C2 cubic spline through the rows with zero end
     velocities. component: in which the motion must stay. placement: workpiece → machine. slides: where the guides of a
     reconfigurable machine stand, metres; None for other machines.
@@ -61,7 +61,7 @@ class Program(Result):
     slides: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        set_frozen(self, legs=frozen(self.legs, "legs", (None, 5)))
+        set_frozen(self, legs=frozen(self.legs, "legs", (None, None)))
         if self.legs.ndim != 2 or len(self.legs) < 2:
             raise ProgramError("a program needs at least two rows", value=self.legs.shape)
         if not (np.isfinite(self.period) and self.period > 0.0):

@@ -22,17 +22,17 @@ LARGEST_M = 10_000.0
 
 
 def quantised(legs: ArrayLike) -> Floats:
-    """Return leg lengths (..., 5) in metres rounded to the resolution; idempotent. Raises ProgramError."""
-    return _counts(as_floats(legs, "legs", (5,)), QUANTA_PER_M) / QUANTA_PER_M
+    """Return leg lengths (..., n_legs) in metres rounded to the resolution; idempotent. Raises ProgramError."""
+    return _counts(as_floats(legs, "legs", (None,)), QUANTA_PER_M) / QUANTA_PER_M
 
 
 def to_millimetres(legs: Floats) -> Floats:
-    """Return the floats nearest to the decimal lengths in mm of `legs` (N, 5) in metres."""
+    """Return the floats nearest to the decimal lengths in mm of `legs` (N, n_legs) in metres."""
     return _counts(legs, QUANTA_PER_M) / QUANTA_PER_MM
 
 
 def from_millimetres(legs_mm: Floats) -> Floats:
-    """Return lengths (N, 5) in metres from decimal lengths in mm; the inverse of `to_millimetres`."""
+    """Return lengths (N, n_legs) in metres from decimal lengths in mm; the inverse of `to_millimetres`."""
     return _counts(legs_mm, QUANTA_PER_MM) / QUANTA_PER_M
 
 

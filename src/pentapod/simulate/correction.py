@@ -55,7 +55,7 @@ class Correction:
         return self.model, self.push, self.hold, np.stack([self.answer, self.lead]), self.memory
 
 
-NO_CORRECTION = Correction(np.zeros((5, 1, 1)), np.zeros((5, 1)), np.zeros((5, 1)), np.zeros(5), np.zeros(5), 0.0)
+NO_CORRECTION = Correction(np.zeros((1, 1, 1)), np.zeros((1, 1)), np.zeros((1, 1)), np.zeros(1), np.zeros(1), 0.0)
 """For drives that are left alone."""
 
 
@@ -140,8 +140,9 @@ def _sampled(gains: Floats, period: float, parts: int, delay: int) -> tuple[Floa
         step[3, 3] += 1.0
     if delay:
         step[:2, -1] += moves
-        step[4], command[4] = effort, kv * (1.0 + ki * dt) * kp
-        step[5:, 4:-1] = np.eye(delay - 1)
+        first = 4  # of the efforts on their way
+        step[first], command[first] = effort, kv * (1.0 + ki * dt) * kp
+        step[first + 1 :, first:-1] = np.eye(delay - 1)
     else:
         step[:2] += np.outer(moves, effort)
         command[:2] = moves * kv * (1.0 + ki * dt) * kp

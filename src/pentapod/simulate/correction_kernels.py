@@ -12,8 +12,8 @@ from pentapod.numerics.kernels import kernel
 
 Known = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats]
 """How pose and path are found: linear_map (4, 5) and constant (4,) of `LinearPart`; geometry (7,): delta, x_3, y_3,
-z_3, the squares of w and S near a singularity, tool length; component (1, 2) signs, base (5, 2), offsets (5,), path and
-path_directions (2N − 1, 3) at the rows and halfway."""
+z_3, the limits of w² and S², tool length; component (1, 2) signs, base joints (n, 3), heights (n,), path
+and path_directions (2N − 1, 3) at the rows and halfway."""
 
 Feedback = tuple[Floats, Floats, Floats, Floats, float]
 """How errors are answered: model (5, n, n), push (5, n) and hold (5, n) of `Correction`; answers (2, 5): its answer and
@@ -39,7 +39,7 @@ def contour(
     position, direction = np.empty((1, 3)), np.empty((1, 3))
     near = np.empty(1, dtype=np.bool_)
     poses(
-        legs.reshape(1, 5), component, linear_map, constant, geometry[0], geometry[1:4], geometry[4:6],
+        legs.reshape(1, -1), component, linear_map, constant, geometry[0], geometry[1:4], geometry[4:6],
         position, direction, near,
     )  # fmt: skip
     p, i, tool = position[0], direction[0], geometry[6]
@@ -69,7 +69,7 @@ def contour(
         to = first * path[2 * at, j] + middle * path[2 * at + 1, j] + last * path[2 * at + 2, j]
         turn[j] = first * axes[2 * at, j] + middle * axes[2 * at + 1, j] + last * axes[2 * at + 2, j] - i[j]
         move[j] = to - p[j] - tool * i[j] - tool * turn[j]
-    for leg in range(5):
+    for leg in range(len(error)):
         x = p[0] + offsets[leg] * i[0] - base[leg, 0]
         y = p[1] + offsets[leg] * i[1] - base[leg, 1]
         z = p[2] + offsets[leg] * i[2]
@@ -92,7 +92,7 @@ def correct(error: Floats, feedback: Feedback, state: Floats, trend: Floats, shi
     model, push, hold, answers, memory = feedback
     n = state.shape[1]
     later = np.empty(n)
-    for leg in range(5):
+    for leg in range(len(error)):
         expected = trend[0, leg] + trend[1, leg]
         off = error[leg] - expected
         trend[0, leg] = expected + (1.0 - memory * memory) * off

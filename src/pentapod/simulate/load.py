@@ -19,7 +19,7 @@ _BLOCK = 1 << 13  # rows
 
 
 def leg_loads(reference: Reference) -> Floats:
-    """Return the forces (N, 5) at the rows, newtons, positive where a drive has to push its leg longer.
+    """Return the forces (N, n_legs) at the rows, newtons, positive where a drive has to push its leg longer.
 
     Accelerations are second differences of the rows, from rest and to rest.
     """
@@ -33,7 +33,7 @@ def leg_loads(reference: Reference) -> Floats:
 
 
 def _loads(reference: Reference, rows: Ints) -> Floats:
-    """Return the loads (n, 5) at all these rows (n + 2,) but the first and the last."""
+    """Return the loads (n, n_legs) at all these rows (n + 2,) but the first and the last."""
     machine, period = reference.machine, reference.program.period
     gravity = machine.masses.gravity
     direction = reference.directions[::2][rows]
@@ -47,15 +47,15 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
     vectors = robot.leg_vectors(position, direction)
     lengths = np.linalg.norm(vectors, axis=2, keepdims=True)
     along = vectors / lengths
-    base = np.column_stack([robot.base, np.zeros(5)])
+    base = robot.base_joints
     middle = slice(1, -1)
-    loads = np.zeros((len(rows) - 2, 5))
+    loads = np.zeros((len(rows) - 2, robot.n_legs))
     # On the line: at offsets z that go with the platform. On the legs: across, as a share of the joint's way.
     at_p, at_i = np.zeros((2, len(loads), 3))
-    for mass, z in _masses(spindle(machine, float(robot.offsets.min()))):
+    for mass, z in _masses(spindle(machine, float(robot.line_heights.min()))):
         force = needed(mass, position + z * direction)
         at_p, at_i = at_p + force, at_i + z * force
-    for leg in range(5):
+    for leg in range(robot.n_legs):
         u, length = along[:, leg], lengths[:, leg]
         for capsule, slides in ((leg_cylinder(machine, leg), False), (leg_rod(machine, leg), True)):
             for mass, s in _masses(capsule):
@@ -64,7 +64,7 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
                 push = np.einsum("ni,ni->n", force, u[middle])
                 loads[:, leg] += push * float(slides)
                 across = (out / length)[middle] * (force - push[:, None] * u[middle])
-                at_p, at_i = at_p + across, at_i + robot.offsets[leg] * across
+                at_p, at_i = at_p + across, at_i + robot.line_heights[leg] * across
     ways = pose_jacobian(robot, position[middle], direction[middle])
     return loads + np.einsum("ni,nil->nl", at_p, ways[:, :3]) + np.einsum("ni,nil->nl", at_i, ways[:, 3:])
 

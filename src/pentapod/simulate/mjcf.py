@@ -32,8 +32,8 @@ def mjcf(machine: Machine, real: AsBuiltPentapod, position: Floats, direction: F
     real: the geometry that stands there, as it was measured or as it is wrong; a slide's position, and a drive's
     control, is the leg's length in metres. step: seconds. Lengths in metres, masses in kilograms.
     """
-    joints = position + real.offsets[:, None] * direction
-    vectors = joints - real.base
+    joints = position + real.line_heights[:, None] * direction
+    vectors = joints - real.base_joints
     lengths = np.linalg.norm(vectors, axis=1)
     root = Xml.Element("mujoco", model=machine.name)
     _add(root, "compiler", angle="radian", autolimits="true")
@@ -45,13 +45,13 @@ def mjcf(machine: Machine, real: AsBuiltPentapod, position: Floats, direction: F
     _add(defaults, "equality", solref=stiff, solimp=_SOLIMP)
     _add(defaults, "joint", solreflimit=stiff, solimplimit=_SOLIMP)
     world = _add(root, "worldbody")
-    for leg in range(5):
-        _leg(world, machine, leg, real.base[leg], vectors[leg] / lengths[leg], lengths[leg])
+    for leg in range(real.n_legs):
+        _leg(world, machine, leg, real.base_joints[leg], vectors[leg] / lengths[leg], lengths[leg])
     _platform(world, machine, real, position, direction)
     loops = _add(root, "equality")
     actuators = _add(root, "actuator")
     drives = machine.drives
-    for leg in range(5):
+    for leg in range(real.n_legs):
         _add(loops, "connect", name=f"loop{leg + 1}", site1=f"rod{leg + 1}", site2=f"platform{leg + 1}")
         damping = drives.moving_mass[leg] * drives.velocity_gain[leg]
         stiffness = damping * drives.position_gain[leg]
@@ -79,15 +79,15 @@ def _leg(world: Xml.Element, machine: Machine, leg: int, base: Floats, along: Fl
 
 def _platform(world: Xml.Element, machine: Machine, real: AsBuiltPentapod, position: Floats, direction: Floats) -> None:
     """Add the platform: a free body whose z axis is the platform line, its origin p."""
-    shaft, tool = spindle(machine, float(real.offsets.min())), machine.tool_length
+    shaft, tool = spindle(machine, float(real.line_heights.min())), machine.tool_length
     body = _add(world, "body", name="platform", pos=position, quat=_turn_from_z(direction))
     _add(body, "freejoint", name="platform")
     _capsule(body, shaft, _SPINDLE)
     _capsule(body, Capsule(shaft.high, tool, 0.2 * shaft.radius, 0.0), _STEEL)
     _add(body, "site", name="origin")
     _add(body, "site", name="tip", pos=[0.0, 0.0, tool])
-    for leg in range(5):
-        _add(body, "site", name=f"platform{leg + 1}", pos=[0.0, 0.0, real.offsets[leg]])
+    for leg in range(real.n_legs):
+        _add(body, "site", name=f"platform{leg + 1}", pos=[0.0, 0.0, real.line_heights[leg]])
 
 
 def _capsule(body: Xml.Element, capsule: Capsule, colour: str) -> None:

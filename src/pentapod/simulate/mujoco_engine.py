@@ -16,6 +16,7 @@ from pentapod.base.refusal import Refusal, stage
 from pentapod.base.values import Result
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.families.as_built_forward import as_built_pose
+from pentapod.kinematics.families.quadratic import as_quadratic
 from pentapod.simulate.load import leg_loads
 from pentapod.simulate.measures import Measure
 from pentapod.simulate.mjcf import mjcf
@@ -24,7 +25,6 @@ from pentapod.simulate.reference import Reference
 
 LONGEST_STEP_S = 5e-4
 _REST_S = 0.3  # so long the machine stands before the start, until the drives carry its weight
-_STILL = np.zeros(5)
 _NEWS = 500  # rows between two reports of progress
 
 
@@ -32,7 +32,7 @@ _NEWS = 500  # rows between two reports of progress
 class Physics(Result):
     """A program as MuJoCo played it.
 
-    leg_forces (N, 5): with which each leg pushes its platform joint away from its base joint, newtons: what bends and
+    leg_forces (N, n): with which each leg pushes its platform joint away from its base joint, newtons: what bends and
     buckles a leg; the drives' forces (`played.forces`) have to speed up motor and screw as well. closure (N,): the
     largest gap of a loop that should be closed, metres: it tells how rigid the simulated joints are.
     """
@@ -44,7 +44,7 @@ class Physics(Result):
     def __post_init__(self) -> None:
         set_frozen(
             self,
-            leg_forces=frozen(self.leg_forces, "leg_forces", (None, 5)),
+            leg_forces=frozen(self.leg_forces, "leg_forces", (None, None)),
             closure=frozen(self.closure, "closure", (None,)),
         )
 
@@ -74,12 +74,13 @@ def load_mujoco() -> Any:
 def plant(reference: Reference, *, base_errors: ArrayLike = 0.0, offset_errors: ArrayLike = 0.0) -> Plant | Refusal:
     """Return the machine as MJCF, its legs as long as the program's first row says; MuJoCo itself is not needed.
 
-    base_errors (5, 3) and offset_errors (5,): metres by which the real joints are off the machine file, or one number
+    base_errors (n, 3) and offset_errors (n,): metres by which the real joints are off the machine file, or one number
     for all. A Refusal says that the real machine has no pose there that can be trusted.
     """
     program, machine = reference.program, reference.machine
-    real = AsBuiltPentapod.of(machine.robot, base_errors=base_errors, offset_errors=offset_errors)
-    start = as_built_pose(real, machine.robot, program.legs[0], program.component)
+    robot = as_quadratic(machine.robot, "the rigid-body model")
+    real = AsBuiltPentapod.of(robot, base_errors=base_errors, offset_errors=offset_errors)
+    start = as_built_pose(real, robot, program.legs[0], program.component)
     if not start.proven:
         return Refusal(
             "simulation",
@@ -111,7 +112,8 @@ def _run(
     mujoco: Any, reference: Reference, stands: Plant, tip_forces: ArrayLike, progress: Progress
 ) -> Physics | Refusal:
     program, machine = reference.program, reference.machine
-    rows, parts = len(program.legs), _parts(program.period)
+    (rows, legs), parts = program.legs.shape, _parts(program.period)
+    still = np.zeros(legs)
     model = mujoco.MjModel.from_xml_string(stands.xml)
     data = mujoco.MjData(model)
     try:
@@ -125,11 +127,11 @@ def _run(
     drives = _Drives(reference, model, data)
     data.xfrc_applied[body] = wrench[0]
     for _ in range(int(np.ceil(_REST_S / model.opt.timestep))):
-        drives.tell(program.legs[0], _STILL, _STILL, wanted[3][0])
+        drives.tell(program.legs[0], still, still, wanted[3][0])
         mujoco.mj_step(model, data)
-    sites = [model.site(name).id for name in _SITES]
+    sites = [model.site(name).id for name in _sites(legs)]
     places, axes = np.empty((rows, len(sites), 3)), np.empty((rows, 3))
-    lengths, pushes, loops = np.empty((rows, 5)), np.empty((rows, 5)), np.empty((rows, 15))
+    lengths, pushes, loops = np.empty((rows, legs)), np.empty((rows, legs)), np.empty((rows, 3 * legs))
     for row in range(rows):
         if row:
             data.xfrc_applied[body] = wrench[row - 1]
@@ -137,7 +139,7 @@ def _run(
                 drives.tell(*(values[part] for values in wanted))
                 mujoco.mj_step(model, data)
         # A step leaves places and forces as they were at its start: they are told apart by where they are read.
-        pushes[row], loops[row] = data.actuator_force[:5], data.efc_force[:15]
+        pushes[row], loops[row] = data.actuator_force[:legs], data.efc_force[: 3 * legs]
         mujoco.mj_kinematics(model, data)
         places[row], axes[row], lengths[row] = data.site_xpos[sites], data.xmat[body][2::3], drives.lengths
         if row % _NEWS == 0:
@@ -154,15 +156,18 @@ def _run(
     return _physics(lengths, places, axes, pushes, loops, model.body_pos)
 
 
-_SITES = ("tip", *(f"rod{leg}" for leg in range(1, 6)), *(f"platform{leg}" for leg in range(1, 6)))
+def _sites(legs: int) -> tuple[str, ...]:
+    numbers = range(1, legs + 1)
+    return ("tip", *(f"rod{leg}" for leg in numbers), *(f"platform{leg}" for leg in numbers))
 
 
 def _physics(lengths: Floats, places: Floats, axes: Floats, pushes: Floats, loops: Floats, bodies: Floats) -> Physics:
-    tips, rods, joints = places[:, 0], places[:, 1:6], places[:, 6:]
-    legs = rods - bodies[[1, 3, 5, 7, 9]]
+    tips, (rods, joints) = places[:, 0], np.split(places[:, 1:], 2, axis=1)
+    # Bodies in the order of the model: the world, then cylinder and rod of each leg.
+    legs = rods - bodies[1 : 2 * rods.shape[1] : 2]
     legs /= np.linalg.norm(legs, axis=2, keepdims=True)
     # The constraint pushes the rod's end; the platform feels the opposite.
-    push = -np.einsum("nlc,nlc->nl", loops.reshape(-1, 5, 3), legs)
+    push = -np.einsum("nlc,nlc->nl", loops.reshape(*legs.shape), legs)
     gaps = np.linalg.norm(rods - joints, axis=2).max(axis=1)
     return Physics(Played(lengths, tips, axes, pushes), push, gaps)
 
@@ -172,17 +177,17 @@ class _Drives:
 
     def __init__(self, reference: Reference, model: Any, data: Any) -> None:
         self._drives, self._data, self._step = reference.machine.drives, data, model.opt.timestep
-        joints = [model.joint(f"leg{leg}").id for leg in range(1, 6)]
+        joints = [model.joint(f"leg{leg + 1}").id for leg in range(reference.machine.robot.n_legs)]
         self._places, self._rates = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
-        self._held, self._ahead = np.zeros(5), np.zeros(5)
+        self._held, self._ahead = np.zeros(len(joints)), np.zeros(len(joints))
 
     @property
     def lengths(self) -> Floats:
-        """Leg lengths (5,) now, metres."""
+        """Leg lengths (n_legs,) now, metres."""
         return self._data.qpos[self._places]
 
     def tell(self, length: Floats, rate: Floats, acceleration: Floats, load: Floats) -> None:
-        """Set what the drives want during the next step, and what they have to carry, each (5,)."""
+        """Set what the drives want during the next step, and what they have to carry, each (n_legs,)."""
         d = self._drives
         ahead = d.velocity_feedforward * rate
         # What moves now moves as it was told for the step before.
@@ -192,11 +197,11 @@ class _Drives:
         self._ahead = ahead
         push = d.velocity_gain * (ahead + d.velocity_integral * self._held) + d.acceleration_feedforward * acceleration
         push += d.load_feedforward * load / d.moving_mass
-        self._data.ctrl[:5] = length + push / (d.position_gain * d.velocity_gain)
+        self._data.ctrl[: len(length)] = length + push / (d.position_gain * d.velocity_gain)
 
 
 def _wanted(reference: Reference, parts: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return lengths, rates, accelerations and loads (K, 5) for each step.
+    """Return lengths, rates, accelerations and loads (K, n_legs) for each step.
 
     MuJoCo's steps set rates first and then move by the new rates. A leg that is to be at the next length after the step
     needs the forward difference as its rate, and the second difference as its acceleration.
@@ -204,10 +209,10 @@ def _wanted(reference: Reference, parts: int) -> tuple[Floats, Floats, Floats, F
     step = reference.program.period / parts
     lengths = reference.at(parts)[0]
     rates = np.diff(lengths, axis=0) / step
-    accelerations = np.diff(rates, axis=0, prepend=np.zeros((1, 5))) / step
+    accelerations = np.diff(rates, axis=0, prepend=np.zeros_like(rates[:1])) / step
     at_rows, share = leg_loads(reference), np.arange(parts)[:, None] / parts
     loads = at_rows[:-1, None] * (1.0 - share) + at_rows[1:, None] * share
-    return lengths[:-1], rates, accelerations, loads.reshape(-1, 5)
+    return lengths[:-1], rates, accelerations, loads.reshape(len(rates), -1)
 
 
 def _quiet(warning: object) -> None:

@@ -12,7 +12,7 @@ from pentapod.base.values import Result
 class Played(Result):
     """Where the tool really was at each row of the program, machine frame.
 
-    legs (N, 5): leg lengths; tips (N, 3), metres; directions (N, 3) of the platform. forces (N, 5): of the drives on
+    legs (N, n): leg lengths; tips (N, 3), metres; directions (N, 3) of the platform. forces (N, n): of the drives on
     what they move, newtons.
     """
 
@@ -24,8 +24,8 @@ class Played(Result):
     def __post_init__(self) -> None:
         set_frozen(
             self,
-            legs=frozen(self.legs, "legs", (None, 5)),
+            legs=frozen(self.legs, "legs", (None, None)),
             tips=frozen(self.tips, "tips", (None, 3)),
             directions=frozen(self.directions, "directions", (None, 3)),
-            forces=frozen(self.forces, "forces", (None, 5)),
+            forces=frozen(self.forces, "forces", (None, None)),
         )

@@ -37,9 +37,9 @@ class Reference(Value):
 
     @cached_property
     def lengths(self) -> Floats:
-        """Coefficients (N − 1, 5, 4) of the leg lengths between rows, by powers of the period's fraction, metres."""
+        """Coefficients (N − 1, n, 4) of the leg lengths between rows, by powers of the period's fraction, metres."""
         b = self._motion.bernstein
-        coefficients = np.zeros((len(b), 5, 4))
+        coefficients = np.zeros((*b.shape[:2], 4))
         coefficients[..., 0], coefficients[..., 1] = b[..., 0], self._motion.degree * (b[..., 1] - b[..., 0])
         if self._motion.degree == 3:
             coefficients[..., 2] = 3.0 * (b[..., 0] - 2.0 * b[..., 1] + b[..., 2])
@@ -48,11 +48,11 @@ class Reference(Value):
 
     @cached_property
     def accelerations(self) -> Floats:
-        """Coefficients (N − 1, 5, 2) of the accelerations that drives are told, m/s².
+        """Coefficients (N − 1, n_legs, 2) of the accelerations that drives are told, m/s².
 
         Those of the cubics; between straight lines the second difference of the rows, held over the period.
         """
-        coefficients = np.zeros((len(self.program.legs) - 1, 5, 2))
+        coefficients = np.zeros((len(self.program.legs) - 1, self.program.legs.shape[1], 2))
         second = self._motion.second
         coefficients[..., 0] = second[:-1]
         if self._motion.degree == 3:
@@ -71,13 +71,16 @@ class Reference(Value):
         return self._pose[1]
 
     def at(self, parts: int) -> tuple[Floats, Floats, Floats]:
-        """Return leg lengths, rates and accelerations (parts · (N − 1) + 1, 5), each period cut in equal parts."""
+        """Return leg lengths, rates and accelerations (parts · (N − 1) + 1, n_legs), each period cut in equal parts."""
         t = np.arange(parts) / parts
         c, a, period = self.lengths, self.accelerations, self.program.period
         lengths = c[..., :1] + t * (c[..., 1:2] + t * (c[..., 2:3] + t * c[..., 3:]))
         rates = (c[..., 1:2] + t * (2.0 * c[..., 2:3] + 3.0 * t * c[..., 3:])) / period
-        ends = self.program.legs[-1:], np.zeros((1, 5)), a[-1:, :, 0] + a[-1:, :, 1]
-        inner = (values.transpose(0, 2, 1).reshape(-1, 5) for values in (lengths, rates, a[..., :1] + t * a[..., 1:]))
+        ends = self.program.legs[-1:], np.zeros_like(self.program.legs[-1:]), a[-1:, :, 0] + a[-1:, :, 1]
+        inner = (
+            values.transpose(0, 2, 1).reshape(-1, self.program.legs.shape[1])
+            for values in (lengths, rates, a[..., :1] + t * a[..., 1:])
+        )
         found = [np.concatenate([values, end]) for values, end in zip(inner, ends, strict=True)]
         return found[0], found[1], found[2]
 

@@ -12,6 +12,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal, stage
+from pentapod.kinematics.families.quadratic import as_quadratic
 from pentapod.kinematics.forward.quadratic import NEAR_W_SQUARED
 from pentapod.simulate.correction import NO_CORRECTION, correction_for
 from pentapod.simulate.played import Played
@@ -34,9 +35,9 @@ def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False
     if seed < 0:
         raise InputError("must not be negative", key="seed", value=seed)
     program, machine = reference.program, reference.machine
-    drives, robot = machine.drives, machine.robot
+    drives, robot = machine.drives, as_quadratic(machine.robot, "the simulation of servo loops")
     parts = max(1, round(program.period / drives.period))
-    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 5)
+    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, robot.n_legs)
     delay = round(drives.dead_time * parts / program.period)
     correction = correction_for(drives, program.period, parts, delay) if correct else NO_CORRECTION
     if correction is None:
@@ -48,9 +49,9 @@ def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False
     rest = int(np.ceil(_REST_S / program.period))
     lengths, accelerations = _after_rest(reference.lengths, rest), _after_rest(reference.accelerations, rest)
     lengths[:rest, :, 0], lengths[:rest, :, 1:], accelerations[:rest] = program.legs[0], 0.0, 0.0
-    legs, efforts = np.empty((2, len(lengths) + 1, 5))
+    legs, efforts = np.empty((2, len(lengths) + 1, robot.n_legs))
     limits = np.array([NEAR_W_SQUARED, robot.linear_part.near_s_squared])
-    origin = np.append(robot.base[2], robot.offsets[2])
+    origin = np.append(robot.base_joints[2, :2], robot.line_heights[2])
     with np.errstate(all="ignore"):  # legs that run away, told below
         drive(
             lengths,
@@ -69,8 +70,8 @@ def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False
                 robot.linear_part.constant,
                 np.concatenate([[robot.delta], origin, limits, [machine.tool_length]]),
                 np.array([program.component], dtype=np.float64),
-                robot.base,
-                robot.offsets,
+                robot.base_joints,
+                robot.line_heights,
                 _after_rest(reference.tips, 2 * rest),
                 _after_rest(reference.directions, 2 * rest),
             ),

@@ -34,30 +34,30 @@ def drive(
     out: Floats,
     efforts: Floats,
 ) -> None:
-    """Fill leg lengths and accelerations of the drives, both (N, 5), at the rows; from rest at the first row.
+    """Fill leg lengths and accelerations of the drives, both (N, n_legs), at the rows; from rest at the first row.
 
-    lengths (N − 1, 5, 4), accelerations (N − 1, 5, 2): of `Reference`. parts: drive periods in a controller period;
-    delay: drive periods of dead time. gains (3, 5): position loop, velocity loop and its integral, 1/s; shares (2,): of
-    feed-forward. ripple (3, 5): amplitude m/s², pitch m, phase rad. corrected: whether to correct by the pose.
+    lengths (N − 1, n, 4), accelerations (N − 1, n, 2): of `Reference`. parts: drive periods in a controller period;
+    delay: drive periods of dead time. gains (3, n): position loop, velocity loop and its integral, 1/s; shares (2,): of
+    feed-forward. ripple (3, n_legs): amplitude m/s², pitch m, phase rad. corrected: whether to correct by the pose.
     """
-    count, dt = len(lengths), period / parts
+    count, legs, dt = len(lengths), lengths.shape[1], period / parts
     window = min(count, int(max(1.0 - shares[0], 0.0) / (gains[0].min() * period)) + 1)
-    place, rate, seen = lengths[0, :, 0].copy(), np.zeros(5), np.zeros(5)
-    for leg in range(5):
+    place, rate, seen = lengths[0, :, 0].copy(), np.zeros(legs), np.zeros(legs)
+    for leg in range(legs):
         seen[leg] = reading(place[leg], encoder_step)
-    waiting, turn, held = np.zeros((delay + 1, 5)), 0, np.zeros(5)
-    shift, error, alone = np.zeros(5), np.zeros(5), np.zeros(5)
-    state, trend = np.zeros(feedback[1].shape), np.zeros((2, 5))
+    waiting, turn, held = np.zeros((delay + 1, legs)), 0, np.zeros(legs)
+    shift, error, alone = np.zeros(legs), np.zeros(legs), np.zeros(legs)
+    state, trend = np.zeros(feedback[1].shape), np.zeros((2, legs))
     out[0], efforts[0] = place, 0.0
     for row in range(count):
         if corrected:
-            for leg in range(5):
+            for leg in range(legs):
                 alone[leg] = reading(place[leg], encoder_step) - state[leg, 0]
             contour(alone, row, window, known, error)
             correct(error, feedback, state, trend, shift)
         for part in range(parts):
             t = part / parts
-            for leg in range(5):
+            for leg in range(legs):
                 c = lengths[row, leg]
                 a = accelerations[row, leg]
                 wanted = c[0] + t * (c[1] + t * (c[2] + t * c[3])) + shift[leg]

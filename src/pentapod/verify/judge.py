@@ -124,7 +124,8 @@ def judged(
         )
     replay, unjudged = Replay(program, specification, progress), list[NotJudged]()
     _ = replay.survey
-    claims = (*CLAIMS, *collisions.claims(specification.surroundings), *claims)
+    around = collisions.claims(specification.surroundings, specification.machine.robot.n_legs)
+    claims = (*CLAIMS, *around, *claims)
     for k, claim in enumerate(claims):
         progress("verify", SURVEY_SHARE + (1.0 - SURVEY_SHARE) * k / len(claims), claim.name)
         answer = claim(replay)

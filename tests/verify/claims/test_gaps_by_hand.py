@@ -47,7 +47,7 @@ def corner(at, outwards, clamped=None, allowance=0.0):
 
 def judged(replay, obstacle=None, tool=()):
     surroundings = Surroundings(() if obstacle is None else (obstacle,), tool)
-    return {claim.name: claim(replay) for claim in claims(surroundings)}
+    return {claim.name: claim(replay) for claim in claims(surroundings, 5)}
 
 
 def across(direction):
@@ -141,8 +141,8 @@ def test_which_points_bodies_move_by(still):
     np.testing.assert_allclose(offsets[5:7], line_offsets(machine, ())[5:])
     assert len(line_offsets(machine, ())) == 7
     stray = Stray(np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 6.0, 8.0, 9.0]]), np.array([0.5]))
-    np.testing.assert_allclose(body_moves(stray, (SHANK, cone)), [[1, 2, 3, 4, 5, 7, 9 + 0.5 * 0.010]])
-    np.testing.assert_allclose(body_moves(Stray(stray.line[:, :7], stray.turn), ()), [[1, 2, 3, 4, 5, 7]])
+    np.testing.assert_allclose(body_moves(stray, (SHANK, cone), 5), [[1, 2, 3, 4, 5, 7, 9 + 0.5 * 0.010]])
+    np.testing.assert_allclose(body_moves(Stray(stray.line[:, :7], stray.turn), (), 5), [[1, 2, 3, 4, 5, 7]])
 
 
 # The search for the smallest gap, on a replay whose gaps are given.

@@ -79,6 +79,7 @@ def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_jso
     import numpy as np
 
     from pentapod.kinematics import COMPONENTS, Component, orientation_distance, position_distance
+    from pentapod.kinematics.families.quadratic import as_quadratic
 
     machine = _machine(machine_name)
     rows = _rows(legs, LEGS) * 1e-3
@@ -90,8 +91,9 @@ def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_jso
     columns["component"] = [str(c) for c in chosen] * len(rows)
     columns |= {name: tips[:, k] for k, name in enumerate(POSE[:3])}
     columns |= {name: -direction[:, k] for k, name in enumerate(POSE[3:])}
-    columns["singularity_mm"] = position_distance(machine.robot, position, direction) * 1e3
-    columns["singularity_deg"] = np.degrees(orientation_distance(machine.robot, position, direction))
+    robot = as_quadratic(machine.robot, "the distance to singularities")
+    columns["singularity_mm"] = position_distance(robot, position, direction) * 1e3
+    columns["singularity_deg"] = np.degrees(orientation_distance(robot, position, direction))
     _print(columns, as_json=as_json, one=bool(legs) and component is not None, quiet=quiet)
     return 0 if np.isfinite(tips).all() else 1
 

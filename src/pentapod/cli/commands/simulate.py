@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pentapod.cli.commands.kinematics import LEGS
 from pentapod.cli.numbers import Real, Whole
 from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from pentapod.toolpath import Toolpath
 
 _OF_SERVO, _OF_MUJOCO = ("correct", "seed"), ("export", "cutting_force_n", "base_error", "offset_error")
-_LEG, _MM = Whole(1, 5), Real()
+_LEG, _MM = Whole(1, len(LEGS)), Real()
 
 
 @click.command()
@@ -170,7 +171,7 @@ def _errors(base: list[tuple[int, float, float, float]], offset: list[tuple[int,
     """Return the errors of the options, millimetres, as arrays in metres."""
     import numpy as np
 
-    base_errors, offset_errors = np.zeros((5, 3)), np.zeros(5)
+    base_errors, offset_errors = np.zeros((len(LEGS), 3)), np.zeros(len(LEGS))
     for leg, *error in base:
         base_errors[leg - 1] += np.array(error) * 1e-3
     for leg, along in offset:

@@ -149,6 +149,10 @@ class AsBuiltPentapod(Value, ProvenByLegEquations):
         t, ratio, normal = self._in_tool_frame(p, i)
         return (self.offsets - t)[..., None] * i[..., None, :] - (1.0 - ratio)[..., None] * normal
 
+    def platform_joints(self, position: ArrayLike, direction: ArrayLike) -> Floats:
+        """Return the points of the rings (..., 5, 3) at which the legs end, metres."""
+        return self.base + self.leg_vectors(position, direction)
+
     def leg_derivatives(self, tips: Sequence[tuple[Floats, Floats]], tool_length: float) -> list[Floats]:
         """Return readings (n, 5) and their derivatives along a curve, of as many orders as are given.
 

@@ -30,7 +30,7 @@ from pentapod.kinematics.forward.quadratic_near import solve_near
 from pentapod.kinematics.mode import as_labels
 from pentapod.kinematics.proofs.by_leg_equations import ProvenByLegEquations
 from pentapod.kinematics.proofs.certificate import METHOD, certify_component
-from pentapod.kinematics.robot import Branch, Poses, SingularSurface
+from pentapod.kinematics.robot import Branch, Poses, Robot, SingularSurface
 from pentapod.numerics.blocks import blocks
 from pentapod.numerics.kernels import kernels_pay
 
@@ -232,6 +232,16 @@ class LinearPentapod(Value, FiveLegs, ProvenByLegEquations):
     def _origin(self) -> Floats:
         """x_3, y_3, z_3 (3,): what the reduced frame leaves out."""
         return np.append(self.base[2], self.offsets[2])
+
+
+def as_quadratic(robot: Robot, purpose: str) -> LinearPentapod:
+    """Return the robot where it is of the quadratic family; raises MachineError, which names the purpose, else."""
+    if isinstance(robot, LinearPentapod):
+        return robot
+    raise MachineError(
+        f"{purpose} needs a machine of the quadratic family", key="robot", value=type(robot).__name__,
+        expected="platform offsets z_3 + delta (x_i − x_3)",
+    )  # fmt: skip
 
 
 def _last(x: Floats, y: Floats, z: Floats) -> Floats:

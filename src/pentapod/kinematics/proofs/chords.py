@@ -121,7 +121,7 @@ class _Prover:
         reach = float(np.abs(legs).max(initial=0.0)) + 2.0 * float(np.abs(robot.base_joints).sum(axis=1).max())
         size = 2.0 * (reach + 2.0 * float(np.abs(robot.line_heights).max()) + 4.0 * float(robot.radii.max()))
         rows = np.column_stack([robot.base_joints, robot.line_heights, robot.radii])
-        return np.vstack([rows, [*last[:2], size, last[2], 0.0]])
+        return np.vstack([rows, [*last[:2], size, last[2], robot.radii.max()]])
 
     def _halve(self, found: Chords, legs: Floats, start: Floats, end: Floats, depth: int) -> None:
         """Fill in what two halves prove where the whole chord was not, or its speed was not."""

@@ -72,7 +72,7 @@ def chords(
         _corrections(inverse, residual, ROUND * size * size, geometry, rings, e, slack, y)
         if not enclosed(y, rest, inverse, geometry, rings, change, step, spread, spread_i, z, bound):
             continue
-        if not sided(start[h], end[h], bound, geometry[5], signs):
+        if not sided(start[h], end[h], bound, geometry[5, 0], geometry[5, 1], signs, size, geometry[5, 3]):
             continue
         proven[h] = True
         # Now that the solution is known to be this near, once more: closer.
@@ -95,10 +95,11 @@ def chords(
             own, one, two = legs[h, j], first[j], second[j]
             shortest = own.min()
             shift, rounding = _joined(bound, abs(geometry[j, 3])), 4.0 * ROUND * size / shortest
-            aside, radius = 0.0, geometry[j, 4]
+            aside, off_ring, radius = 0.0, 0.0, geometry[j, 4]
             if radius > 0.0:
+                off_ring = radius * _dot(rings[j, 5:], towards[j])
                 aside = radius * ring_swing(rings[j], about(spread[j], spread_i, abs(geometry[j, 3])))
-            base = _base_cosine(one, two, radius * rings[j, 5:], towards[j], own, lines_up)
+            base = _base_cosine(one, two, off_ring, towards[j], own, lines_up)
             base_cosines[h, j] = base - (shift + aside) / shortest - rounding
             # A ring's vector has the same part along the line as that to its centre, and is no longer than the leg, its
             # shift and the ring's radius.
@@ -139,16 +140,16 @@ def _residuals(
     """
     for j in range(5):
         _square(first[j], second[j], squares_up, residual[j])
-        radius, last = geometry[j, 4], residual.shape[1] - 1
-        if radius > 0.0:
-            for m in range(last + 1):
-                far = rings[j, 0] + m / last * (rings[j, 1] - rings[j, 0])
-                residual[j, m] += radius * (0.5 * radius - far)
         for a in range(len(products)):
             for b in range(len(products)):
                 residual[j, a + b] -= 0.5 * products[a, b] * legs[j, a] * legs[j, b]
     _square(start[3:], end[3:], squares_up, residual[5])
     residual[5] -= 0.5
+    last = residual.shape[1] - 1
+    for j in range(5 if geometry[5, 4] > 0.0 else 0):
+        for m in range(last + 1):
+            far = rings[j, 0] + m / last * (rings[j, 1] - rings[j, 0])
+            residual[j, m] += geometry[j, 4] * (0.5 * geometry[j, 4] - far)
 
 
 @kernel
@@ -174,7 +175,10 @@ def _corrections(
     for r in range(6):
         slack[r] = 4.0 * ROUND * abs(inverse[r, 5])
         for n in range(5):
-            slack[r] += (rounding + 0.125 * geometry[n, 4] * rings[n, 4]) * abs(inverse[r, n])
+            slack[r] += rounding * abs(inverse[r, n])
+        if geometry[5, 4] > 0.0:
+            for n in range(5):
+                slack[r] += 0.125 * geometry[n, 4] * rings[n, 4] * abs(inverse[r, n])
         y[r] = 0.0
         for m in range(e.shape[1]):
             e[r, m] = 0.0
@@ -213,7 +217,7 @@ def _derived(
         for j in range(5):
             reach = bound[n] + abs(geometry[j, 3]) * bound[3 + n]
             moved[j] += reach * (abs(change[j, n]) + ROUND * size)
-    for j in range(5):
+    for j in range(5 if geometry[5, 4] > 0.0 else 0):
         if geometry[j, 4] > 0.0:
             region, way = about(spread[j], spread_i, abs(geometry[j, 3])), (norm(step[:3]), norm(step[3:]))
             moved[j] += geometry[j, 4] * ring_bend(rings[j], region, (norm(bound[:3]), norm(bound[3:])), way)
@@ -236,12 +240,11 @@ def _derived(
 
 
 @kernel
-def _base_cosine(first: Floats, second: Floats, ring: Floats, towards: Floats, legs: Floats, lines_up: Floats) -> float:
-    """Return the least v · towards / l: v + ring on the line from first to second (3,), l of coefficients (k + 1,).
+def _base_cosine(first: Floats, second: Floats, off: float, towards: Floats, legs: Floats, lines_up: Floats) -> float:
+    """Return the least (v · towards − off) / l, v on the line from first to second (3,), l of coefficients (k + 1,).
 
     A quotient of polynomials lies between the quotients of their coefficients.
     """
-    off = _dot(ring, towards)
     b0, b1 = _dot(first, towards) - off, _dot(second, towards) - off
     least = np.inf
     for m in range(len(legs)):

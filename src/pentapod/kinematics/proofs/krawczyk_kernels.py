@@ -2,8 +2,8 @@
 
 G(x) = (½ (|p + z_j i − a_j|² − l_j²), ½ (|i|² − 1)) of x = (p, i), J its Jacobian, C ≈ J⁻¹ in the middle of the line.
 Legs may end on rings (`ring_kernels`). Poses and boxes are (6,), p in metres first. geometry (6, 5): base joints (3),
-offset and radius of the ring of each leg; then δ, the lever, a length that no sum of lengths exceeds, and 1 where the
-machine is of the quadratic family, 0 where it is not.
+offset and radius of the ring of each leg; then δ, the lever, a length that no sum of lengths exceeds, 1 where the
+machine is of the quadratic family, 0 where it is not, and the largest radius.
 """
 
 from __future__ import annotations
@@ -46,10 +46,12 @@ def line(
             change[j, n] = second[j, n] - first[j, n]
             jacobian[j, n] = 0.5 * (first[j, n] + second[j, n])
             jacobian[j, 3 + n] = offset * jacobian[j, n]
-        if geometry[j, 4] > 0.0:
-            ring_line(first[j], second[j], start, end, offset, geometry[j, 4], jacobian[j], rings[j])
     for n in range(3):
         jacobian[5, 3 + n] = 0.5 * (start[3 + n] + end[3 + n])
+    if geometry[5, 4] > 0.0:
+        for j in range(5):
+            if geometry[j, 4] > 0.0:
+                ring_line(first[j], second[j], start, end, geometry[j, 3], geometry[j, 4], jacobian[j], rings[j])
 
 
 @kernel
@@ -161,13 +163,25 @@ def mapped(
         across, offset = 0.0, abs(geometry[j, 3])
         for n in range(3):
             across += spread[j, n] * (v[n] + offset * v[3 + n])
-        if geometry[j, 4] > 0.0:
-            region = about(spread[j], spread_i, offset)
-            across += geometry[j, 4] * ring_bend(rings[j], region, region, (norm(v[:3]), norm(v[3:])))
         for r in range(6):
             out[r] += abs(inverse[r, j]) * across
+    if geometry[5, 4] > 0.0:
+        _add_rings(inverse, geometry, rings, spread, spread_i, v, out)
     for r in range(6):
         out[r] *= 1.0 + ROUND
+
+
+@kernel
+def _add_rings(
+    inverse: Floats, geometry: Floats, rings: Floats, spread: Floats, spread_i: Floats, v: Floats, out: Floats
+) -> None:
+    """Add to `mapped` what the bend of ρ makes of v."""
+    for j in range(5):
+        if geometry[j, 4] > 0.0:
+            region = about(spread[j], spread_i, abs(geometry[j, 3]))
+            across = geometry[j, 4] * ring_bend(rings[j], region, region, (norm(v[:3]), norm(v[3:])))
+            for r in range(6):
+                out[r] += abs(inverse[r, j]) * across
 
 
 @kernel
@@ -194,13 +208,14 @@ def angle_within(distance: float) -> float:
 
 
 @kernel
-def sided(start: Floats, end: Floats, bound: Floats, machine: Floats, signs: Floats) -> bool:
-    """Return whether w and S have these signs all over the tube around the line; machine: geometry's last row.
+def sided(
+    start: Floats, end: Floats, bound: Floats, delta: float, lever: float, signs: Floats, size: float, quadratic: float
+) -> bool:
+    """Return whether w and S have these signs all over the tube of this radius around the line.
 
     Outside the quadratic family there is no S, and w has the sign that it has at the start.
     """
-    delta, lever, size = machine[:3]
-    if machine[3] == 0.0:
+    if quadratic == 0.0:
         side = 1.0 if start[5] > 0.0 else -1.0
         return min(side * start[5], side * end[5]) - bound[5] > 4.0 * ROUND
     w = min(signs[0] * start[5], signs[0] * end[5]) - bound[5]

@@ -26,7 +26,10 @@ from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.machine.calibration.leg_noise import restricted_sigma
 
 _KINDS = ("x", "y", "z", "offset", "radius", "zero")
-_GROUPS = {"base": (0, 1, 2), "offsets": (3,), "zeros": (5,), "radii": (4,)}  # who is identified first
+LEGS, _EACH, _ZERO = FiveLegs.n_legs, 6, 5
+"""Legs; numbers of each leg: x, y, z, offset, radius, zero; the place of the zero among them."""
+
+_GROUPS = {"base": (0, 1, 2), "offsets": (3,), "zeros": (_ZERO,), "radii": (4,)}  # who is identified first
 PARAMETERS = tuple(f"leg {leg} {kind}" for leg in range(1, 6) for kind in _KINDS)
 """The 30 parameters in the order of `Calibration.covariance`."""
 
@@ -152,7 +155,7 @@ class _Fit:
                     f"{residual.size} readings cannot tell their own errors from {len(inner)} parameters",
                     expected="more poses, or leg_sigma",
                 )
-            columns = self._whitened(self._jacobian(theta), np.eye(5)).reshape(-1, 5, 30)[..., inner]
+            columns = self._whitened(self._jacobian(theta), np.eye(LEGS)).reshape(-1, LEGS, LEGS * _EACH)[..., inner]
             longest = float(np.abs(self.readings).max())
             leg_sigma = restricted_sigma(columns, residual, self._pose_covariances(), longest)
         covariance = np.zeros((30, 30))
@@ -209,7 +212,7 @@ class _Fit:
         return s_p**2 * by_p @ by_p.swapaxes(1, 2) + s_i**2 * by_i @ by_i.swapaxes(1, 2)
 
     def _covariances(self, leg_sigma: float) -> Floats:
-        return self._pose_covariances() + leg_sigma**2 * np.eye(5)
+        return self._pose_covariances() + leg_sigma**2 * np.eye(LEGS)
 
     def _whitening(self, leg_sigma: float) -> Floats:
         """Return W (N, 5, 5) with W Σ Wᵀ = 1."""
@@ -237,7 +240,7 @@ def _identifiable(
     """
     free: list[int] = []
     gauges: list[str] = []
-    for leg in range(5):
+    for leg in range(LEGS):
         a = columns[:, leg] / sigmas[:, leg, None]
         taken: list[int] = []
         for kind in wanted:
@@ -276,14 +279,14 @@ def _flat(machine: AsBuiltPentapod) -> Floats:
 
 
 def _machine(theta: Floats) -> AsBuiltPentapod:
-    rows = theta.reshape(5, 6)
-    return AsBuiltPentapod(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5])
+    rows = theta.reshape(LEGS, _EACH)
+    return AsBuiltPentapod(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, _ZERO])
 
 
 def _measured(position: ArrayLike, direction: ArrayLike, legs: ArrayLike) -> tuple[Floats, Floats, Floats]:
     p, i = as_floats(position, "position", (None, 3)), as_floats(direction, "direction", (None, 3))
-    readings = as_floats(legs, "legs", (None, 5))
-    for name, array, width in (("position", p, 3), ("direction", i, 3), ("legs", readings, 5)):
+    readings = as_floats(legs, "legs", (None, LEGS))
+    for name, array, width in (("position", p, 3), ("direction", i, 3), ("legs", readings, LEGS)):
         if array.shape != (len(p), width):
             expected = f"shape ({len(p)}, {width}): one row for each pose"
             raise ArrayError(f"{name} has shape {array.shape}", expected=expected)

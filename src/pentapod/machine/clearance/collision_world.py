@@ -20,8 +20,6 @@ from pentapod.mesh.query.distance import Gap, MeshDistance
 TOOL_BODY = "tool body"
 """How shank and holder are called in claims and margins."""
 
-LEGS = 5
-
 
 @dataclass(frozen=True, eq=False)
 class Obstacle(Value):
@@ -61,7 +59,7 @@ class Surroundings(Value):
         be in the part and still count as clear. Raises MachineError where the tool is too long for the machine.
         """
         body = mounted(tool.solids, machine)
-        room = machine.tool_length - float(machine.robot.offsets.max())
+        room = machine.tool_length - float(machine.robot.line_heights.max())
         if body and max(solid.high for solid in body) > room:
             raise MachineError(
                 "the tool stands above the lowest platform joint",
@@ -75,10 +73,9 @@ class Surroundings(Value):
                 found.append(Obstacle(name, MeshDistance.of(mesh), clamped=name == "fixture"))
         return cls(tuple(found), body)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """What moves (K,): five legs, the spindle, and the tool body where there is one."""
-        legs = tuple(f"leg {k + 1}" for k in range(LEGS))
+    def names(self, n_legs: int) -> tuple[str, ...]:
+        """Return what moves (K,): the legs, the spindle, and the tool body where there is one."""
+        legs = tuple(f"leg {k + 1}" for k in range(n_legs))
         return (*legs, "spindle", *((TOOL_BODY,) if self.tool else ()))
 
 
@@ -90,8 +87,8 @@ NOTHING = Surroundings()
 class MovingBodies:
     """Where the moving bodies are in N poses, in an obstacle's frame, metres.
 
-    starts, ends (N, 6, 3): axes of the five legs, base joint to platform joint, and of the spindle. tips, axes (N, 3):
-    of the tool, the axis unit, tip → spindle. radii (6,): of legs and spindle.
+    starts, ends (N, n_legs + 1, 3): axes of the legs, base joint to platform joint, and of the spindle. tips, axes
+    (N, 3): of the tool, the axis unit, tip → spindle. radii (n_legs + 1,): of legs and spindle.
     """
 
     starts: Floats
@@ -107,19 +104,21 @@ class MovingBodies:
         """Return the bodies at poses (N, 3) of the machine; frame: that of the obstacle → machine, if another."""
         robot, top, nose = machine.robot, *spindle_ends(machine)
         count = len(position)
-        bases = np.broadcast_to(np.column_stack([robot.base, np.zeros(LEGS)]), (count, LEGS, 3))
-        joints = position[:, None] + robot.offsets[:, None] * direction[:, None]
+        bases, joints = (
+            np.broadcast_to(robot.base_joints, (count, robot.n_legs, 3)),
+            robot.platform_joints(position, direction),
+        )
         starts = np.concatenate([bases, (position + top * direction)[:, None]], axis=1)
         ends = np.concatenate([joints, (position + nose * direction)[:, None]], axis=1)
         tips, axes = position + machine.tool_length * direction, -direction
         if frame is not None:
             back = frame.inverse()
             starts, ends, tips, axes = back.apply(starts), back.apply(ends), back.apply(tips), back.rotate(axes)
-        radii = np.append(np.full(LEGS, machine.bodies.leg_radius), machine.bodies.shaft_radius)
+        radii = np.append(np.full(robot.n_legs, machine.bodies.leg_radius), machine.bodies.shaft_radius)
         return cls(starts, ends, tips, axes, radii)
 
     def segments(self, surface: MeshDistance, within: float) -> Gap:
-        """Return the gaps of legs and spindle, (N · 6,) in rows of six, surface to surface, none above `within`."""
+        """Return the gaps of legs and spindle, (N · (n_legs + 1),), surface to surface, none above `within`."""
         axes = surface.segments(self.starts.reshape(-1, 3), self.ends.reshape(-1, 3), within + float(self.radii.max()))
         distance = axes.distance - np.tile(self.radii, len(self.tips))
         return Gap(np.minimum(distance, within), axes.place, axes.normal)
@@ -129,7 +128,7 @@ class MovingBodies:
 
         What runs through an open sheet is at most as deep in it as it is thick. The tool's allowance is added.
         """
-        found = self.segments(obstacle.surface, within).distance.reshape(-1, LEGS + 1)
+        found = self.segments(obstacle.surface, within).distance.reshape(-1, len(self.radii))
         if not tool:
             return found
         body, _ = obstacle.surface.bodies(tool, self.tips, self.axes, within)
@@ -138,7 +137,7 @@ class MovingBodies:
 
 def spindle_ends(machine: Machine) -> tuple[float, float]:
     """Return the offsets along the platform line of the spindle's top and of its nose, metres."""
-    return float(machine.robot.offsets.min()), machine.tool_length - machine.bodies.shaft_end
+    return float(machine.robot.line_heights.min()), machine.tool_length - machine.bodies.shaft_end
 
 
 def mounted(solids: Sequence[Solid], machine: Machine) -> tuple[Solid, ...]:

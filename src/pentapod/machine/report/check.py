@@ -10,11 +10,15 @@ from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
 from pentapod.geometry.directions import angle_between
 from pentapod.kinematics.component import Component
+from pentapod.kinematics.families.quadratic import as_quadratic
 from pentapod.kinematics.families.singularities import orientation_distance, position_distance, singularity_values
 from pentapod.kinematics.forces import tip_force_amplification
 from pentapod.machine.clearance.leg_clearance import clearances, pair_names
 from pentapod.machine.machine import ARCHITECTURAL_LIMIT, Machine
 from pentapod.machine.report.work_volume import sample_work_volume
+
+LEVELS = 5
+"""Heights at which the work volume is sampled."""
 
 AMPLIFICATION_LIMIT = 10.0
 """Tip force → leg forces beyond which `check` calls a machine weak: 100 N of cutting become 1 kN of leg."""
@@ -47,8 +51,8 @@ class Finding(Value):
 class MachineReport(Value):
     """What `check` found: the worst over all sampled poses.
 
-    length_range (5, 2) metres; base_angle (5,) largest angle to the base joint's axis, radians;
-    platform_range (5, 2) radians; least_w; least_s and least_turn: distance to S = 0 in metres, and to any
+    length_range (n_legs, 2) metres; base_angle (n_legs,) largest angle to the base joint's axis, radians;
+    platform_range (n_legs, 2) radians; least_w; least_s and least_turn: distance to S = 0 in metres, and to any
     singularity in radians of turning about the tip; amplification; clearance (m) and its pair. component: the
     one all poses lie in, or None.
     """
@@ -73,7 +77,7 @@ class MachineReport(Value):
         return all(finding.passed for finding in self.findings)
 
 
-def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = 5) -> MachineReport:
+def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = LEVELS) -> MachineReport:
     """Sample the work volume and return the worst of everything.
 
     rings, around, levels: density of the sample, see `sample_work_volume`. Never raises for a weak machine:
@@ -103,7 +107,7 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = 5
 class _Met:
     """What a machine meets at N poses: tips, axes (N, 3); SI units.
 
-    lengths (N, 5) of the legs; base, platform (N, 5): angles in the joints; w, s, s_distance, turn (N,): how near
+    lengths (N, n) of the legs; base, platform (N, n): angles in the joints; w, s, s_distance, turn (N,): how near
     singularities are; force (N,): N of the legs for each at the tip; gaps (N, pairs) between bodies.
     """
 
@@ -123,7 +127,7 @@ class _Met:
     @classmethod
     def at(cls, machine: Machine, tips: Floats, axes: Floats) -> _Met:
         position, direction = tips + machine.tool_length * axes, -axes
-        robot = machine.robot
+        robot = as_quadratic(machine.robot, "the report of a work volume")
         vectors = robot.leg_vectors(position, direction)
         w, s = singularity_values(robot, position, direction)
         return cls(
@@ -160,7 +164,7 @@ class _Met:
 
 def _of_strokes(met: _Met) -> list[Finding]:
     limits, found = met.machine.legs, list[Finding]()
-    for k in range(5):
+    for k in range(met.machine.robot.n_legs):
         lengths, low, high = 1e3 * met.lengths[:, k], 1e3 * limits.min_length[k], 1e3 * limits.max_length[k]
         found += [
             Finding(f"leg {k + 1} shortest", lengths.min(), "at least", low, "mm", met.where(lengths)),
@@ -171,7 +175,7 @@ def _of_strokes(met: _Met) -> list[Finding]:
 
 def _of_joints(met: _Met) -> list[Finding]:
     joints, found = met.machine.joints, list[Finding]()
-    for k in range(5):
+    for k in range(met.machine.robot.n_legs):
         cone, (least, most) = np.degrees(joints.base_cone[k]), np.degrees(joints.platform_range[k])
         base, seen = np.degrees(met.base[:, k]), np.degrees(met.platform[:, k])
         found += [

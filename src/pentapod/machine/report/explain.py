@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pentapod.kinematics.families.quadratic import as_quadratic
 from pentapod.machine.report.check import MachineReport
 
 
@@ -18,15 +19,15 @@ def explain(report: MachineReport) -> str:
         f"{1e3 * work.height:.0f} mm height",
         f"    around ({centre}) mm; tool axes within {np.degrees(work.tilt):.3g}° of -z",
         f"  tool {1e3 * m.tool_length:.1f} mm from the line's origin, "
-        f"{1e3 * (m.tool_length - m.robot.offsets.max()):.1f} mm beyond the lowest platform joint; "
-        f"delta {m.robot.delta:.6g}",
+        f"{1e3 * (m.tool_length - m.robot.line_heights.max()):.1f} mm beyond the lowest platform joint; "
+        f"delta {as_quadratic(m.robot, 'this report').delta:.6g}",
         f"  rapids {6e4 * m.rapid_velocity:.0f} mm/min; a setpoint every {1e3 * m.controller.period:g} ms, "
         f"{m.controller.interpolation} between them",
         "",
         f"  over {report.poses} poses of the work volume:",
         "  leg   length used (mm)    of stroke (mm)     stroke used   base joint     platform joint",
     ]
-    for k in range(5):
+    for k in range(m.robot.n_legs):
         low, high = report.length_range[k]
         used = (high - low) / legs.stroke[k]
         least, most = np.degrees(report.platform_range[k])

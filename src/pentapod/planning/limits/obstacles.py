@@ -25,7 +25,7 @@ class ObstacleClearance(LengthLimit):
     def of(cls, scene: Scene) -> list[ObstacleClearance]:
         """Return the gaps of all bodies to the first obstacle, then to the next."""
         surroundings = scene.surroundings
-        bodies = list(zip(surroundings.names, body_comforts(scene), strict=True))
+        bodies = list(zip(surroundings.names(scene.machine.robot.n_legs), body_comforts(scene), strict=True))
         return [
             cls(
                 name=f"{name} touches the {obstacle.name}", comfort=comfort,

@@ -16,6 +16,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ProgramError
+from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.program.header import UNVERIFIED, Header, header_text
 from pentapod.program.posts.motion import accelerations, velocities
 from pentapod.program.posts.registry import Post, PostInput, read_file, register
@@ -99,7 +100,7 @@ def _program(message: Any, header: Header, file: Path) -> Program:
             value=times[row] / _NANO, expected=f"{row * header.period:.9g} s",
         )  # fmt: skip
     legs = np.array([point["positions"] for point in points], dtype=np.float64)
-    if legs.shape != (len(points), 5):
+    if legs.shape != (len(points), FiveLegs.n_legs):
         raise ProgramError(
             "not five positions a point", file=file, key="positions", value=legs.shape, expected="(points, 5)"
         )

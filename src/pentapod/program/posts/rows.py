@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pentapod.base.archives import check_array
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ProgramError
+from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.program.header import Header, parse_header
 from pentapod.program.program import Program
 from pentapod.program.resolution import LARGEST_M, quantised
@@ -35,7 +36,7 @@ def check_rows(rows: int, header: Header, file: Path) -> None:
 
 
 def check_legs(legs: Floats, file: Path) -> Floats:
-    """Return leg lengths (N, 5), metres, at the resolution of programs. Raises ProgramError: no machine has one so."""
+    """Return leg lengths (N, n), metres, at the resolution of programs. Raises ProgramError: no machine has one so."""
     wrong = ~((legs > 0.0) & (legs <= LARGEST_M))
     if wrong.any():
         row, leg = (int(k) for k in np.argwhere(wrong)[0])
@@ -50,9 +51,9 @@ def check_legs(legs: Floats, file: Path) -> Floats:
 
 
 def of_archive(header: NDArray[Any], legs_mm: NDArray[Any], file: Path) -> Program:
-    """Return the program of an archive: its header's text and its legs (N, 5), millimetres. Raises ProgramError."""
+    """Return the program of an archive: its header's text and its legs (N, n), millimetres. Raises ProgramError."""
     check_array(header, "header", file, ProgramError, "U", ())
-    check_array(legs_mm, "legs_mm", file, ProgramError, "fi", (None, 5))
+    check_array(legs_mm, "legs_mm", file, ProgramError, "fi", (None, FiveLegs.n_legs))
     found = header_of(str(header).splitlines(), file)
     check_rows(len(legs_mm), found, file)
     return found.program(check_legs(legs_mm / 1e3, file))

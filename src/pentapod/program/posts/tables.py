@@ -24,6 +24,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError, ProgramError
 from pentapod.base.files import number_in
 from pentapod.base.values import Value
+from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.program.header import Header, header_text
 from pentapod.program.posts.motion import velocities
 from pentapod.program.posts.registry import Post, PostInput, read_file
@@ -39,6 +40,9 @@ UNITS: dict[Kind, dict[str, float]] = {
     "velocity": {"m/s": 1.0, "mm/s": 1e3, "mm/min": 6e4, "um/s": 1e6},
 }
 """How many of a unit make one of SI."""
+
+LEGS = range(1, FiveLegs.n_legs + 1)
+"""The numbers of the legs of a program file."""
 
 SIDECAR = "program.header"
 """Holds the header where a table has no place for comments."""
@@ -62,7 +66,7 @@ class Column(Value):
             raise InputError("unknown kind", key=self.title, value=self.kind, expected=", ".join(UNITS))
         if self.unit not in UNITS[self.kind]:
             raise InputError("unknown unit", key=self.title, value=self.unit, expected=", ".join(UNITS[self.kind]))
-        if (self.leg is None) != (self.kind == "time") or self.leg not in (None, 1, 2, 3, 4, 5):
+        if (self.leg is None) != (self.kind == "time") or self.leg not in (None, *LEGS):
             raise InputError("which leg?", key=self.title, value=self.leg, expected="1 to 5, none for time")
 
     @property
@@ -102,7 +106,7 @@ class Table(Value):
 
     def __post_init__(self) -> None:
         legs = {c.leg for columns in self.files.values() for c in columns if c.kind == "length"}
-        if legs != {1, 2, 3, 4, 5}:
+        if legs != set(LEGS):
             raise InputError(
                 "a leg's length is in none of the files", key="files", value=sorted(x for x in legs if x),
                 expected="a column of length for each of the legs 1 to 5",
@@ -111,7 +115,7 @@ class Table(Value):
 
 def leg_columns(title: str, kind: Kind, unit: str, decimals: int) -> tuple[Column, ...]:
     """Return five columns; "{leg}" in the title becomes the leg's number."""
-    return tuple(Column(title.format(leg=leg), kind, unit, decimals, leg) for leg in range(1, 6))
+    return tuple(Column(title.format(leg=leg), kind, unit, decimals, leg) for leg in LEGS)
 
 
 def table_post(name: str, about: str, table: Table) -> Post:
@@ -153,7 +157,7 @@ def _read(folder: Path, table: Table) -> Program:
                 legs[column.leg] = values / column.factor
             else:
                 rates.append((file, column, values))
-    program = header.program(check_legs(np.column_stack([legs[leg] for leg in range(1, 6)]), folder))
+    program = header.program(check_legs(np.column_stack([legs[leg] for leg in LEGS]), folder))
     for file, column, values in rates:
         _check_rates(values, column, program, file)
     return program

@@ -25,7 +25,11 @@ def placed_toolpath(plan: str | Path, program: Program) -> Toolpath:
     """
     file = Path(plan)
     given = read_toolpath(file, "npz")
-    forms = {"placed.tips_mm": given.tips.shape, "placed.axes": given.tips.shape, "program.legs_mm": (None, 5)}
+    forms = {
+        "placed.tips_mm": given.tips.shape,
+        "placed.axes": given.tips.shape,
+        "program.legs_mm": (None, program.legs.shape[1]),
+    }
     arrays = read_arrays(file, forms, InputError)
     for name, shape in forms.items():
         check_array(arrays[name], name, file, InputError, "f", shape)

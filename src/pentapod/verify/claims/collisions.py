@@ -10,7 +10,6 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.solids import Solid
 from pentapod.machine.clearance.collision_world import (
-    LEGS,
     TOOL_BODY,
     MovingBodies,
     Obstacle,
@@ -32,15 +31,15 @@ _PROVEN = (
 )
 
 
-def claims(surroundings: Surroundings | None) -> tuple[Claim, ...]:
-    """Return the claims about these surroundings, in the order of a verdict; none where nobody told them."""
+def claims(surroundings: Surroundings | None, legs: int) -> tuple[Claim, ...]:
+    """Return the claims about these surroundings of a machine with so many legs, in the order of a verdict; or none."""
     if surroundings is None:
         return ()
     made: list[Claim] = []
     if surroundings.tool:
         made.append(Claim(f"legs clear of the {TOOL_BODY}", partial(_legs_and_tool, tool=surroundings.tool)))
     for obstacle in surroundings.obstacles:
-        for title, columns in _groups(surroundings):
+        for title, columns in _groups(surroundings, legs):
             judge = partial(_clear, obstacle=obstacle, surroundings=surroundings, columns=columns)
             made.append(Claim(f"{title} clear of the {obstacle.name}", judge))
     return tuple(made)
@@ -52,17 +51,16 @@ def told(replay: Replay) -> Idle:
     return Idle("there is nothing more") if known else Idle("nobody told what is there", unknown=True)
 
 
-def _groups(surroundings: Surroundings) -> tuple[tuple[str, list[int]], ...]:
-    legs = ("legs", list(range(LEGS)))
-    tool = ((TOOL_BODY, [LEGS + 1]),) if surroundings.tool else ()
-    return (legs, ("spindle", [LEGS]), *tool)
+def _groups(surroundings: Surroundings, legs: int) -> tuple[tuple[str, list[int]], ...]:
+    tool = ((TOOL_BODY, [legs + 1]),) if surroundings.tool else ()
+    return (("legs", list(range(legs))), ("spindle", [legs]), *tool)
 
 
 def _clear(replay: Replay, *, obstacle: Obstacle, surroundings: Surroundings, columns: list[int]) -> Finding:
     """Judge that some of what moves keeps clear of one obstacle."""
-    machine = replay.machine
+    machine, legs = replay.machine, replay.machine.robot.n_legs
     frame = replay.program.placement if obstacle.clamped else None
-    tool = surroundings.tool if LEGS + 1 in columns else ()
+    tool = surroundings.tool if legs + 1 in columns else ()
     bound = -obstacle.allowance if tool else 0.0
 
     def gaps(samples: Ints) -> Floats:
@@ -76,8 +74,10 @@ def _clear(replay: Replay, *, obstacle: Obstacle, surroundings: Surroundings, co
         return chosen.segments(obstacle.surface, _FAR_M).distance.reshape(-1, len(columns))
 
     offsets = line_offsets(machine, surroundings.tool)
-    found = approach(replay, gaps, lambda stray: body_moves(stray, surroundings.tool)[:, columns], offsets, bound=bound)
-    name, most = surroundings.names[columns[found.column]], _TOOL_FAR_M if tool else _FAR_M
+    found = approach(
+        replay, gaps, lambda stray: body_moves(stray, surroundings.tool, legs)[:, columns], offsets, bound=bound
+    )
+    name, most = surroundings.names(legs)[columns[found.column]], _TOOL_FAR_M if tool else _FAR_M
     if found.least > bound and _enclosed(replay, obstacle, frame, columns):
         return Finding(False, None, MM * bound, "mm", replay.place(0), f"{name} is inside the {obstacle.name}")
     method = f"{name} comes closest; exact distance of its body from the mesh's facets, {_PROVEN}"
@@ -93,15 +93,15 @@ def _clear(replay: Replay, *, obstacle: Obstacle, surroundings: Surroundings, co
 
 def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
     """Judge that no leg touches shank or holder."""
-    machine = replay.machine
+    machine, legs = replay.machine, replay.machine.robot.n_legs
 
     def gaps(samples: Ints) -> Floats:
         position, direction = (x[samples] for x in replay.pose)
         return leg_tool_gaps(machine, tool, position, direction)
 
     def moves(stray: Stray) -> Floats:
-        both = body_moves(stray, tool)
-        return both[:, :LEGS] + both[:, LEGS + 1 :]
+        both = body_moves(stray, tool, legs)
+        return both[:, :legs] + both[:, legs + 1 :]
 
     found = approach(replay, gaps, moves, line_offsets(machine, tool))
     method = (
@@ -117,13 +117,13 @@ def line_offsets(machine: Machine, tool: tuple[Solid, ...]) -> Floats:
     return np.array([*machine.robot.line_heights, *spindle_ends(machine), *([min(ends), max(ends)] if ends else [])])
 
 
-def body_moves(stray: Stray, tool: tuple[Solid, ...]) -> Floats:
+def body_moves(stray: Stray, tool: tuple[Solid, ...], legs: int) -> Floats:
     """Return by how much (n, K) the bodies move at most: a point of a leg never more than its platform joint."""
     line = stray.line
-    moved = [line[:, :LEGS], line[:, LEGS : LEGS + 2].max(axis=1, keepdims=True)]
+    moved = [line[:, :legs], line[:, legs : legs + 2].max(axis=1, keepdims=True)]
     if tool:
         wide = max(max(s.low_radius, s.high_radius) + s.rounding for s in tool)
-        moved.append((line[:, LEGS + 2 :].max(axis=1) + wide * stray.turn)[:, None])
+        moved.append((line[:, legs + 2 :].max(axis=1) + wide * stray.turn)[:, None])
     return np.concatenate(moved, axis=1)
 
 

@@ -11,8 +11,12 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError
+from pentapod.kinematics.five_legs import FiveLegs
 
 Words = Mapping[str, object]
+
+LEGS = FiveLegs.n_legs
+"""Joints of the kinematics that LinuxCNC is given."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,7 @@ def ini_text(
         ("HAL", {"HALFILE": "pentapod.hal", "# HALFILE": "record.hal"}),
         ("TRAJ", {"COORDINATES": " ".join(a.letter for a in axes), "LINEAR_UNITS": "mm", "ANGULAR_UNITS": "degree",
                   "NO_FORCE_HOMING": 1, "ARC_BLEND_ENABLE": 1, **traj}),
-        ("KINS", {"KINEMATICS": kinematics, "JOINTS": 5}),
+        ("KINS", {"KINEMATICS": kinematics, "JOINTS": LEGS}),
     ]  # fmt: skip
     tables += [
         (
@@ -75,7 +79,7 @@ def ini_text(
 
 
 def joint_words(home: Floats, low: Floats, high: Floats, velocity: Floats, acceleration: Floats) -> list[Words]:
-    """Return the [JOINT_…] tables of five legs, arrays (5,) in mm, mm/s and mm/s²; homing finds them where they are."""
+    """Return the [JOINT_…] tables of the legs, arrays (n,) in mm, mm/s and mm/s²; homing finds them where they are."""
     return [
         {
             "TYPE": "LINEAR",
@@ -91,7 +95,7 @@ def joint_words(home: Floats, low: Floats, high: Floats, velocity: Floats, accel
             "FERROR": 1000,
             "MIN_FERROR": 1000,
         }
-        for k in range(5)
+        for k in range(LEGS)
     ]
 
 
@@ -105,7 +109,7 @@ def hal_text(parameters: Mapping[str, float] | None = None) -> str:
         "net estop-loop iocontrol.0.user-enable-out iocontrol.0.emc-enable-in",
         "net tool-prep-loop iocontrol.0.tool-prepare iocontrol.0.tool-prepared",
         "net tool-change-loop iocontrol.0.tool-change iocontrol.0.tool-changed",
-        *(f"net leg{k + 1} joint.{k}.motor-pos-cmd => joint.{k}.motor-pos-fb" for k in range(5)),
+        *(f"net leg{k + 1} joint.{k}.motor-pos-cmd => joint.{k}.motor-pos-fb" for k in range(LEGS)),
         *(f"setp {name} {number(value)}" for name, value in (parameters or {}).items()),
     ]
     return "\n".join(lines) + "\n"
@@ -116,8 +120,8 @@ def record_text() -> str:
     lines = [
         "loadrt sampler depth=16000 cfg=fffffs",
         "addf sampler.0 servo-thread",
-        *(f"net command{k + 1} joint.{k}.pos-cmd => sampler.0.pin.{k}" for k in range(5)),
-        "net kind-of-motion motion.motion-type => sampler.0.pin.5",
+        *(f"net command{k + 1} joint.{k}.pos-cmd => sampler.0.pin.{k}" for k in range(LEGS)),
+        f"net kind-of-motion motion.motion-type => sampler.0.pin.{LEGS}",
     ]
     return "\n".join(lines) + "\n"
 

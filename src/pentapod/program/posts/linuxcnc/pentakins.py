@@ -11,8 +11,10 @@ import dataclasses
 
 import numpy as np
 
-from pentapod.base.errors import InputError
+from pentapod.base.errors import InputError, MachineError
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.robot import Branch
 from pentapod.machine.machine import Machine
 from pentapod.program.posts.linuxcnc.config import (
@@ -84,18 +86,27 @@ def pentakins_files(given: PostInput) -> dict[str, bytes]:
 def controller_frame(machine: Machine, component: Branch) -> RigidTransform:
     """Return the transform machine frame → the controller's: z along the upright tool, zero in the work volume."""
     # Where the direction points to +z the tool comes from −z: half a turn about x puts it upright.
-    turned = np.diag([1.0, -1.0, -1.0]) if component[0] > 0 else np.eye(3)
+    turned = np.diag([1.0, -1.0, -1.0]) if component.w > 0 else np.eye(3)
     return RigidTransform(turned, -turned @ machine.work.centre)
 
 
 def parameters(machine: Machine, frame: RigidTransform) -> dict[str, float]:
-    """Return pentakins' parameters, mm; legs are numbered from 0, and no more than five may be named."""
-    base = 1e3 * frame.apply(np.column_stack([machine.robot.base, np.zeros(5)]))
-    joints = 1e3 * (machine.tool_length - machine.robot.offsets)
+    """Return pentakins' parameters, mm; legs are numbered from 0. Raises MachineError."""
+    robot = machine.robot
+    if not isinstance(robot, FiveLegs | AsBuiltPentapod) or robot.zeros.any():
+        raise MachineError(
+            "pentakins has no such kinematics", key="robot", value=type(robot).__name__,
+            expected="a linear pentapod whose scales read the lengths of the legs", remedy="play the setpoints instead",
+        )  # fmt: skip
+    base = 1e3 * frame.apply(robot.base_joints)
+    joints = 1e3 * (machine.tool_length - robot.line_heights)
     found: dict[str, float] = {}
-    for k in range(5):
+    for k in range(robot.n_legs):
         found |= {f"pentakins.base.{k}.{letter}": float(base[k, j]) for j, letter in enumerate("xyz")}
-        found |= {f"pentakins.effector.{k}.r": 0.0, f"pentakins.effector.{k}.z": float(joints[k])}
+        found |= {
+            f"pentakins.effector.{k}.r": 1e3 * float(robot.radii[k]),
+            f"pentakins.effector.{k}.z": float(joints[k]),
+        }
     # At the default of 100 nearly every start of the forward kinematics fails.
     return {**found, "pentakins.max-error": 1e6}
 

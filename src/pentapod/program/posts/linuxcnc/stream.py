@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pentapod.machine.machine import Machine
 from pentapod.program.posts.drives import HALSTREAMER
-from pentapod.program.posts.linuxcnc.config import number, packaged, servo_period_ns
+from pentapod.program.posts.linuxcnc.config import LEGS, number, packaged, servo_period_ns
 from pentapod.program.posts.registry import PostInput
 
 _ROUNDING = 1e-9
@@ -30,11 +30,11 @@ def _hal(machine: Machine, period_ns: int) -> str:
     ]
     # The limits are met to the last digit by good programs: what rounding adds must not be clipped.
     limits = machine.legs
-    for k in range(5):
+    for k in range(LEGS):
         leg = f"leg{k + 1}"
         lines += [
             f"net setpoint{k + 1} streamer.0.pin.{k} => {leg}.in sampler.0.pin.{k}",
-            f"net limited{k + 1} {leg}.out => sampler.0.pin.{k + 5}",
+            f"net limited{k + 1} {leg}.out => sampler.0.pin.{k + LEGS}",
             f"setp {leg}.min {number(1e3 * limits.min_length[k])}",
             f"setp {leg}.max {number(1e3 * limits.max_length[k])}",
             f"setp {leg}.maxv {number(1e3 * limits.max_velocity[k] * (1.0 + _ROUNDING))}",

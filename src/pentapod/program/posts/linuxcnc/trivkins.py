@@ -68,7 +68,7 @@ def trivkins_files(given: PostInput) -> dict[str, bytes]:
 
 
 def planner_acceleration(program: Program, machine: Machine) -> Floats:
-    """Return the accelerations (5,) in mm/s² that the planner is given and may command: more than the legs have."""
+    """Return the accelerations (n,) in mm/s² that the planner is given and may command: more than the legs have."""
     limits, dt = machine.legs, float(knots(program)[1])
     return np.maximum(1e3 * limits.max_acceleration, _HEADROOM * 2.0 * 1e3 * limits.max_velocity.max() / dt)
 
@@ -80,7 +80,7 @@ def knots(program: Program) -> Floats:
 
 
 def gcode(legs_mm: Floats, dt: float) -> bytes:
-    """Return G-code through leg lengths (M, 5) in mm, dt seconds apart. It starts where the legs stand."""
+    """Return G-code through leg lengths (M, n_legs) in mm, dt seconds apart. It starts where the legs stand."""
     words = " ".join(f"{letter}%.8f" for letter in LETTERS)
     lines = ["G21 G90 G40 G49", "G64", "G93"]
     block = f"G1 {words} F{60.0 / dt:.9f}"
@@ -89,7 +89,7 @@ def gcode(legs_mm: Floats, dt: float) -> bytes:
 
 
 def read_gcode(file: Path) -> tuple[Floats, Floats]:
-    """Return times (M,) in seconds and leg lengths (M, 5) in metres of such G-code. Raises ProgramError."""
+    """Return times (M,) in seconds and leg lengths (M, n_legs) in metres of such G-code. Raises ProgramError."""
     lines = read_file(file).decode(errors="replace").splitlines()
     if not lines or lines[-1] != "M2":
         raise ProgramError("M2 is missing: the file was cut off", file=file, line=max(len(lines), 1))
@@ -104,5 +104,5 @@ def read_gcode(file: Path) -> tuple[Floats, Floats]:
     if len(rows) < 2:
         raise ProgramError("there are no moves", file=file, expected="at least two")
     table = np.array(rows)
-    times = np.concatenate([[0.0], np.cumsum(60.0 / table[1:, 5])])
-    return times, quantised(table[:, :5] / 1e3)
+    times = np.concatenate([[0.0], np.cumsum(60.0 / table[1:, -1])])
+    return times, quantised(table[:, :-1] / 1e3)
