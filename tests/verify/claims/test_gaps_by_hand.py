@@ -197,7 +197,7 @@ def test_a_search_ends_where_a_gap_is_met(monkeypatch):
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
-def test_stretches_are_seen_from_their_middle_by_all_their_legs(cubic, interpolation, monkeypatch):
+def test_stretches_are_seen_from_their_middle_by_all_their_legs(cubic, interpolation):
     """Seventy rows: two stretches of up to 64 intervals, the second one of five; the hull of each is of its curve."""
     legs, seen = cubic.program.legs[200:270], []
     replay = SimpleNamespace(
@@ -206,18 +206,17 @@ def test_stretches_are_seen_from_their_middle_by_all_their_legs(cubic, interpola
         if interpolation == "linear"
         else CubicSpline(np.arange(70), legs, bc_type="clamped").derivative()(np.arange(70)),
         pose=(np.arange(139.0)[:, None] * [1.0, 0.0, 0.0], np.arange(139.0)[:, None] * [0.0, 0.0, 1.0]),
-        machine=SimpleNamespace(robot="robot"),
+        machine=SimpleNamespace(robot=SimpleNamespace(enclose=lambda *given: told(*given))),
     )
 
     def told(*given):
         seen.append(given)
         return np.ones((2, 1)), np.zeros(2)
 
-    monkeypatch.setattr("pentapod.verify.replay.clearance_bounds.roaming", told)
     found = stray_of(replay, np.array([0, 64]), 64, np.zeros(1))
     assert (found.line.tolist(), found.turn.tolist()) == ([[1.0], [1.0]], [0.0, 0.0])
-    ((robot, position, direction, lengths, offsets),) = seen
-    assert (robot, position[:, 0].tolist(), direction[:, 2].tolist()) == ("robot", [64.0, 133.0], [64.0, 133.0])
+    (((position, direction), lengths, offsets),) = seen
+    assert (position[:, 0].tolist(), direction[:, 2].tolist()) == ([64.0, 133.0], [64.0, 133.0])
     assert offsets.tolist() == [0.0]
     curve = CubicSpline(np.arange(70), legs, bc_type="clamped")
     for own, (first, last) in zip(lengths, ((0, 64), (64, 69)), strict=True):
