@@ -200,18 +200,19 @@ def test_a_search_ends_where_a_gap_is_met(monkeypatch):
 def test_stretches_are_seen_from_their_middle_by_all_their_legs(cubic, interpolation):
     """Seventy rows: two stretches of up to 64 intervals, the second one of five; the hull of each is of its curve."""
     legs, seen = cubic.program.legs[200:270], []
+
+    def told(*given):
+        seen.append(given)
+        return np.ones((2, 1)), np.zeros(2)
+
     replay = SimpleNamespace(
         program=SimpleNamespace(legs=legs),
         slopes=None
         if interpolation == "linear"
         else CubicSpline(np.arange(70), legs, bc_type="clamped").derivative()(np.arange(70)),
         pose=(np.arange(139.0)[:, None] * [1.0, 0.0, 0.0], np.arange(139.0)[:, None] * [0.0, 0.0, 1.0]),
-        machine=SimpleNamespace(robot=SimpleNamespace(enclose=lambda *given: told(*given))),
+        machine=SimpleNamespace(robot=SimpleNamespace(enclose=told)),
     )
-
-    def told(*given):
-        seen.append(given)
-        return np.ones((2, 1)), np.zeros(2)
 
     found = stray_of(replay, np.array([0, 64]), 64, np.zeros(1))
     assert (found.line.tolist(), found.turn.tolist()) == ([[1.0], [1.0]], [0.0, 0.0])
