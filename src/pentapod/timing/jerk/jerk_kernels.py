@@ -13,7 +13,14 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.numerics.kernels import kernel
-from pentapod.timing.jerk.spline_kernels import factor_banded, solve_banded, spline_values, spread, spread_matrix
+from pentapod.timing.jerk.spline_kernels import (
+    BEND_BEND,
+    factor_banded,
+    solve_banded,
+    spline_values,
+    spread,
+    spread_matrix,
+)
 
 _FLOOR = 1e-9
 """x is held above this share of x_k."""
@@ -116,7 +123,7 @@ def _assemble(
                 h[2] += w0 * p2
                 h[3] += w1 * p1
                 h[4] += w1 * p2
-                h[-1] += w * p2 * p2
+                h[BEND_BEND] += w * p2 * p2
                 sign = -1.0
         spread(basis, i, g, first[i], right)
         spread(basis, i, g2, first[i], down)

@@ -7,6 +7,9 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.numerics.kernels import kernel
 
+BEND_BEND = 6 - 1
+"""Index of x″x″, the last, in a packed Hessian."""
+
 
 @kernel
 def cubic_basis(knots: Floats, s: Floats, basis: Floats, first: Ints) -> None:
@@ -74,7 +77,7 @@ def spread_matrix(basis: Floats, i: int, h: Floats, b: int, band: Floats) -> Non
         u0, u1, u2 = basis[i, 0, k], basis[i, 1, k], basis[i, 2, k]
         h0 = h[0] * u0 + h[1] * u1 + h[2] * u2
         h1 = h[1] * u0 + h[3] * u1 + h[4] * u2
-        h2 = h[2] * u0 + h[4] * u1 + h[-1] * u2
+        h2 = h[2] * u0 + h[4] * u1 + h[BEND_BEND] * u2
         for m in range(k + 1):
             band[b + k, k - m] += basis[i, 0, m] * h0 + basis[i, 1, m] * h1 + basis[i, 2, m] * h2
 
