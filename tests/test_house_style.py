@@ -1,5 +1,6 @@
 """House rules that a linter does not know."""
 
+import ast
 import re
 import tomllib
 from pathlib import Path
@@ -32,3 +33,23 @@ def test_every_dependency_is_justified() -> None:
     wanted |= {re.split(r"[<>=~!\[ ]", d)[0] for d in project["optional-dependencies"]["dev"]}
     text = (ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8")
     assert wanted == set(re.findall(r"^\| `([\w-]+)` \|", text, re.M))
+
+
+def test_no_literal_number_of_legs_above_kinematics() -> None:
+    """Arrays have an entry for each leg of the robot: 5 stands in named constants alone, that mean something else."""
+    found: list[str] = []
+    for path in sorted((ROOT / "src" / "pentapod").rglob("*.py")):
+        if path.relative_to(ROOT / "src" / "pentapod").parts[0] in ("kinematics", "theory"):
+            continue
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        assigned = [node for node in tree.body if isinstance(node, ast.Assign | ast.AnnAssign)]
+        constants = {id(inner) for node in assigned for inner in ast.walk(node)}
+        for node in ast.walk(tree):
+            if (
+                isinstance(node, ast.Constant)
+                and type(node.value) is int
+                and node.value == 5
+                and id(node) not in constants
+            ):
+                found.append(f"{path.relative_to(ROOT)}:{node.lineno}")
+    assert found == []

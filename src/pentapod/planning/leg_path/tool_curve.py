@@ -155,7 +155,7 @@ def _parameter_over_length(curve: PPoly, pivot: float) -> PPoly:
         lengths = 0.5 * widths * (_speed(curve, at.ravel(), pivot, 0)[0].reshape(at.shape) @ _GAUSS_W)
         s = np.concatenate([[0.0], np.cumsum(lengths)])
         v, v1, v2 = _speed(curve, nodes, pivot, 2)
-        u_of_s = _septic(s, [nodes, 1.0 / v, -v1 / v**3, (3.0 * v1**2 - v * v2) / v**5])
+        u_of_s = _septic(s, [nodes, 1.0 / v, -v1 / v**3, (3.0 * v1**2 - v * v2) / v**5.0])
         between = (s[:-1, None] + np.diff(s)[:, None] * np.array([0.25, 0.5, 0.75])).ravel()
         error = (
             np.abs(u_of_s(between, 1) * _speed(curve, u_of_s(between), pivot, 0)[0] - 1.0).reshape(-1, 3).max(axis=1)

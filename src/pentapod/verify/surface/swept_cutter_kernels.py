@@ -28,6 +28,7 @@ _GOLDEN = 0.6180339887498949
 _ROUNDS = 12
 _MET = 1e-7  # metres: a ray that comes so near has entered
 _STEPS = 200
+_WAY_Z = 5  # of a stretch: the z of its way
 
 
 @kernel
@@ -64,7 +65,7 @@ def at_share(x: Floats, stretch: Floats, solid: Floats, share: float) -> float:
     ax, ay, az = ax / length, ay / length, az / length
     dx = x[0] - stretch[0] - share * stretch[3]
     dy = x[1] - stretch[1] - share * stretch[4]
-    dz = x[2] - stretch[2] - share * stretch[5]
+    dz = x[2] - stretch[2] - share * stretch[_WAY_Z]
     h = dx * ax + dy * ay + dz * az
     out = math.sqrt(max(dx * dx + dy * dy + dz * dz - h * h, 0.0))
     return _to_solid(h, out, solid)
@@ -78,7 +79,7 @@ def to_stretch(x: Floats, stretch: Floats, solid: Floats, is_ball: bool) -> tupl
     """
     if is_ball:
         dx, dy, dz = x[0] - stretch[0], x[1] - stretch[1], x[2] - stretch[2]
-        wx, wy, wz = stretch[3], stretch[4], stretch[5]
+        wx, wy, wz = stretch[3], stretch[4], stretch[_WAY_Z]
         square = wx * wx + wy * wy + wz * wz
         t = 0.0
         if square > 0.0:
