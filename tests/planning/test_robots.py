@@ -3,15 +3,21 @@
 import dataclasses
 from itertools import combinations
 
+import casadi as ca
 import numpy as np
 import pytest
+import trimesh
 from domes import dome
 from scipy.optimize import minimize
 
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.families.general import GeneralPentapod
+from pentapod.machine.clearance.collision_world import Obstacle, Surroundings
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning import PlacedPath, PlacementConstraints, leg_path, plan
+from pentapod.planning.limits.margins import Margins
 
 
 def general(desk):
@@ -114,3 +120,20 @@ def test_leg_path_derivatives_are_those_of_the_readings(machine, placed):
         difference = (piece(s + h, order - 1) - piece(s - h, order - 1)) / (2.0 * h)
         scale = np.abs(difference).max()
         np.testing.assert_allclose(piece(s, order), difference, atol=2e-4 * scale)
+
+
+def test_margins_and_their_formulas_agree_beside_an_obstacle(machine, placed):
+    post = trimesh.creation.cylinder(0.01, 0.2, sections=16)
+    post.apply_translation([0.06, 0.02, 0.1])
+    surface = MeshDistance.of(Mesh.of(np.asarray(post.vertices), np.asarray(post.faces)))
+    margins = Margins.of(machine, placed.component, Surroundings((Obstacle("fixture", surface, clamped=True),)))
+    here = placed.placement.transform
+    tip, axis, turn, shift = (ca.SX.sym("x", *size) for size in ((3,), (3,), (3, 3), (3,)))
+    numbers = ca.SX.sym("c", margins.contact_numbers)
+    formula = ca.Function("f", [tip, axis, turn, shift, numbers], [margins.symbolic(tip, axis, turn, shift, numbers)])
+    values = margins(placed.tips, placed.axes, here)
+    contacts = margins.contacts(placed.tips, placed.axes, here)
+    assert (values[:, -6:] < 1.19).any()
+    for row, (t, a, c) in enumerate(zip(placed.tips, placed.axes, contacts, strict=True)):
+        found = formula(t, a, here.rotation, here.translation, c)
+        np.testing.assert_allclose(np.asarray(found).ravel(), values[row], atol=1e-9)

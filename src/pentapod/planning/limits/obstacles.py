@@ -44,8 +44,10 @@ class ObstacleClearance(LengthLimit):
         normal, point, radius = rest[:3], rest[3:6], rest[6]
         tip, axis = pose.tip, pose.axis
         if self.body < len(pose.heights):
-            start, lever = [*pose.bases[self.body], 0.0][:3], pose.machine.tool_length - pose.heights[self.body]
-            x = [start[k] + s * (tip[k] + lever * axis[k] - start[k]) for k in range(3)]
+            start = [*pose.bases[self.body], 0.0][:3]
+            joints = pose.bases, [pose.machine.tool_length - z for z in pose.heights]  # heights from the tip
+            leg = pose.machine.robot.vectors_of(tip, axis, pose.xp, joints)[self.body]
+            x = [start[k] + s * leg[k] for k in range(3)]
         else:
             x = [tip[k] + s * axis[k] for k in range(3)]
         if self.clamped:
