@@ -101,8 +101,7 @@ def header_text(program: Program) -> str:
 
 def parse_header(lines: list[str], file: Path) -> Header:
     """Return the header from its lines, which all begin with "#". Raises ProgramError with file and line."""
-    values: dict[str, Any] = {}
-    places: dict[str, int] = {}
+    values, places = dict[str, Any](), dict[str, int]()
     unverified = lines[:1] == [f"# {UNVERIFIED}"]
     first = 2 if unverified else 1
     for number, line in enumerate(lines[first - 1 :], start=first):

@@ -100,10 +100,8 @@ def _program(message: Any, header: Header, file: Path) -> Program:
             value=times[row] / _NANO, expected=f"{row * header.period:.9g} s",
         )  # fmt: skip
     legs = np.array([point["positions"] for point in points], dtype=np.float64)
-    if legs.shape != (len(points), FiveLegs.n_legs):
-        raise ProgramError(
-            "not five positions a point", file=file, key="positions", value=legs.shape, expected="(points, 5)"
-        )
+    if legs.shape != (shape := (len(points), FiveLegs.n_legs)):
+        raise ProgramError("not a position for each leg", file=file, key="positions", value=legs.shape, expected=shape)
     return header.program(check_legs(legs, file))
 
 

@@ -24,7 +24,6 @@ from pentapod.timing.jerk.spline_kernels import (
 
 _FLOOR = 1e-9
 """x is held above this share of x_k."""
-
 _BREACH = 1e-7
 
 

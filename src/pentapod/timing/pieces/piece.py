@@ -22,8 +22,7 @@ from pentapod.timing.topp.stages import STANDS_BEYOND, Failure
 
 if TYPE_CHECKING:
     from pentapod.timing.jerk.limited import SmoothProfile
-    from pentapod.timing.jerk.options import USUAL, JerkOptions
-from pentapod.timing.jerk.rows import Measure
+    from pentapod.timing.jerk.rows import Measure
 
 _BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 _REFINEMENTS = 4
