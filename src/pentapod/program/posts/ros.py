@@ -101,7 +101,9 @@ def _program(message: Any, header: Header, file: Path) -> Program:
         )  # fmt: skip
     legs = np.array([point["positions"] for point in points], dtype=np.float64)
     if legs.shape != (shape := (len(points), FiveLegs.n_legs)):
-        raise ProgramError("not a position for each leg", file=file, key="positions", value=legs.shape, expected=shape)
+        raise ProgramError(
+            "not a position for each leg", file=file, key="positions", value=legs.shape, expected=str(shape)
+        )
     return header.program(check_legs(legs, file))
 
 
