@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -73,7 +72,7 @@ class Margins:
 
         surroundings: what must not be touched. kinds: of limits; all of `LIMITS` where none are given.
         """
-        kinds = (*LIMITS.own.values(), *_of_other_packages()) if kinds is None else tuple(kinds)
+        kinds = tuple(LIMITS.values()) if kinds is None else tuple(kinds)
         scene = Scene(machine, branch, surroundings)
         own = tuple(limit for kind in kinds for limit in kind.of(scene))
         return cls(scene, kinds, own, (*own, *ObstacleClearance.of(scene)))
@@ -158,8 +157,3 @@ class Margins:
         tip, axis = ca.vertsplit(tip), ca.vertsplit(axis)
         pose = ToolPose(self.machine, self.component, tip, axis, Arithmetic.casadi(), joints, touching)
         return ca.vertcat(*(limit.margin(pose) for limit in self.limits))
-
-
-@cache
-def _of_other_packages() -> tuple[LimitKind, ...]:
-    return tuple(LIMITS[name] for name in LIMITS if name not in LIMITS.own)

@@ -7,9 +7,7 @@ from scipy.linalg import block_diag
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import MachineError
-from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
-from pentapod.kinematics.robot import Robot
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.margins import Margins
 
@@ -20,15 +18,9 @@ STEP_M = 0.1
 
 
 def guides_of(machine: Machine) -> ReconfigurablePentapod:
-    """Return the guides of a machine. Raises MachineError: it has none, or its geometry is not of their family."""
-    if machine.guides is None or not _is_quadratic(machine.robot):
-        raise MachineError(
-            "only the base joints of a pentapod of the quadratic family are set on guides",
-            key="guides",
-            value=type(machine.robot).__name__,
-            expected="offsets proportional to the base coordinates x",
-            remedy="leave out [guides], and plan for the base as it stands",
-        )
+    """Return the guides of a machine. Raises MachineError: it has none."""
+    if machine.guides is None:
+        raise MachineError("this machine has no guides", key="guides", value=machine.name)
     return machine.guides
 
 
@@ -58,7 +50,3 @@ def with_travel(machine: Machine, room: tuple[Floats, Floats]) -> tuple[Floats, 
 def with_guides(by_step: Floats, by_guides: Floats) -> Floats:
     """Return the block diagonal matrix of what depends on the placement and what depends on the guides."""
     return np.asarray(block_diag(by_step, by_guides), dtype=np.float64)
-
-
-def _is_quadratic(robot: Robot) -> bool:
-    return isinstance(robot, LinearPentapod)
