@@ -24,7 +24,7 @@ _CHUNK = 50_000
 class Signals:
     """At the rows of a program (N): SI units, machine frame.
 
-    times (N,) s; legs, rates, accelerations (N, 5) m, m/s, m/s², as the controller moves between rows;
+    times (N,) s; legs, rates, accelerations (N, n_legs) m, m/s, m/s², as the controller moves between rows;
     tips, axes (N, 3); speeds (N,), m/s: of the tip, or, with a stand-off and off rapids, of the spot on the
     surface; speed_limits (N,): the feed that is asked for, or the rapid rate; segments (N,) of the toolpath; cutting
     (N,). causes (N,): what limits the motion, index into `cause_names`. margins (K, M) at rows `margin_rows` (K,),

@@ -1,4 +1,4 @@
-"""HDF5: datasets `time_s` (N,) and `legs_mm` (N, 5) with units, the header as an attribute. Needs h5py."""
+"""HDF5: datasets `time_s` (N,) and `legs_mm` (N, n_legs) with units, the header as an attribute. Needs h5py."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from pentapod.program.program import Program
 
 
 def velocities(program: Program) -> Floats:
-    """Return leg velocities (N, 5) in m/s at the rows: of the C2 cubic spline through them, from rest to rest.
+    """Return leg velocities (N, n_legs) in m/s at the rows: of the C2 cubic spline through them, from rest to rest.
 
     Drives that join positions and velocities by cubics follow that spline. Where the controller of the
     machine joins the rows by straight lines there is no velocity at a row; the spline is the smooth curve nearest by.
@@ -20,12 +20,12 @@ def velocities(program: Program) -> Floats:
 
 
 def accelerations(program: Program) -> Floats:
-    """Return leg accelerations (N, 5) in m/s² at the rows, of the same spline."""
+    """Return leg accelerations (N, n_legs) in m/s² at the rows, of the same spline."""
     return _spline(program).second
 
 
 def lengths_at(program: Program, times: ArrayLike) -> Floats:
-    """Return leg lengths (M, 5) in metres at any times (M,) in seconds, joined as the program says."""
+    """Return leg lengths (M, n_legs) in metres at any times (M,) in seconds, joined as the program says."""
     joined = Interpolant.through(program.legs, program.period, program.interpolation)
     exact = np.asarray(times, dtype=np.float64) / program.period
     k = np.clip(np.floor(exact).astype(np.intp), 0, len(program.legs) - 2)

@@ -1,4 +1,4 @@
-"""NumPy archive: `time_s` (N,), `legs_mm` (N, 5), and the header as text."""
+"""NumPy archive: `time_s` (N,), `legs_mm` (N, n_legs), and the header as text."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def platform_most(replay: Replay) -> Finding:
 
 
 def _finding(replay: Replay, where: Extreme, angles: Floats, limit: Floats, *, sign: int) -> Finding:
-    """Judge the extreme angles (5,) against limits (5,), the largest (sign 1) or the least ones (sign −1)."""
+    """Judge the extreme angles (n_legs,) against their limits, the largest (sign 1) or the least ones (sign −1)."""
     leg = int(np.argmax(sign * (angles - limit)))
     value, bound = float(angles[leg]), float(limit[leg])
     passed = sign * value <= sign * bound
@@ -43,7 +43,7 @@ def _finding(replay: Replay, where: Extreme, angles: Floats, limit: Floats, *, s
 
 
 def _angles(cosines: Floats) -> Floats:
-    """Return the angles (5,) in radians that have these cosines, which bounds may push beyond ±1."""
+    """Return the angles (n_legs,) in radians that have these cosines, which bounds may push beyond ±1."""
     return np.arccos(np.clip(cosines, -1.0, 1.0))
 
 

@@ -56,7 +56,7 @@ def jerk(replay: Replay) -> Finding:
 
 
 def _below(replay: Replay, found: Extreme, limit: Floats, unit: str, method: str) -> Finding:
-    """Judge the largest of each leg against limits (5,), both SI."""
+    """Judge the largest of each leg against limits (n_legs,), both SI."""
     leg = int(np.argmax(found.values / limit))
     value, bound = float(found.values[leg]), float(limit[leg])
     allowed = with_allowance(bound)

@@ -78,7 +78,7 @@ class Replay(Value):
 
     @cached_property
     def slopes(self) -> Floats | None:
-        """Slopes (N, 5) of the legs at the rows, metres a period; None where they go straight from row to row."""
+        """Slopes (N, n_legs) of the legs at the rows, metres a period; None where they go straight from row to row."""
         return clamped_slopes(self.program.legs) if self.program.interpolation == "cubic" else None
 
     @cached_property
