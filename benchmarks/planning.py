@@ -163,7 +163,7 @@ def strict_fits(problem: PlacementProblem, at: Candidate) -> tuple[np.ndarray, n
     """Return where strict normals are within all limits: for each interval of waypoints, and each even place."""
     task = problem.samples
     fits = at.margins(*task.machine_poses(at.transform, task.nominal), at.transform).min(axis=1) >= NEEDED_MARGIN
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(task.pivots, axis=0), axis=1))])
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(task.tilt_centres, axis=0), axis=1))])
     between = fits[1:] & fits[:-1]
     even = np.linspace(0.0, way[-1], EVEN_PLACES)[1:-1]
     return between, between[np.clip(np.searchsorted(way, even) - 1, 0, len(between) - 1)]
@@ -180,12 +180,12 @@ def along_path(
     path = leg_path(placed, problem.machine, path_tolerance=20e-6, axis_tolerance=np.radians(0.5))
     if isinstance(path, Refusal):
         raise SystemExit(f"no leg path for {task.name}: {path}")
-    moved = np.linalg.norm(np.diff(problem.samples.pivots, axis=0), axis=1)
+    moved = np.linalg.norm(np.diff(problem.samples.tilt_centres, axis=0), axis=1)
     rate = np.linalg.norm(np.diff(axes, axis=0), axis=1) / np.maximum(moved, 1e-9)
     parameter = np.linspace(0.0, path.length, 20_000)
     tip, axis = path.pose(parameter)
     way = np.concatenate(
-        [[0.0], np.cumsum(np.linalg.norm(np.diff(tip + problem.samples.pivot * axis, axis=0), axis=1))]
+        [[0.0], np.cumsum(np.linalg.norm(np.diff(tip + problem.samples.tilt_centre * axis, axis=0), axis=1))]
     )
     even = np.linspace(0.0, way[-1], EVEN_PLACES)
     legs = np.stack([np.interp(even, way, leg) for leg in path(parameter).T], axis=1)
@@ -200,8 +200,8 @@ def visited(task: Instance, count: int, tilt: float) -> ToolpathSamples:
     share = (at - low)[:, None]
     axes = (1.0 - share) * path.axes[low] + share * path.axes[low + 1]
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    pivots = (1.0 - share) * path.pivots[low] + share * path.pivots[low + 1]
-    return ToolpathSamples(pivots, axes, path.pivot, tilt)
+    tilt_centres = (1.0 - share) * path.tilt_centres[low] + share * path.tilt_centres[low + 1]
+    return ToolpathSamples(tilt_centres, axes, path.tilt_centre, tilt)
 
 
 def dense_dome(count: int) -> ToolpathSamples:

@@ -23,7 +23,7 @@ from pentapod.geometry.interpolant import Interpolant
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.solids import Cone
 from pentapod.kinematics import Component, prove_tip_tube
-from pentapod.machine.clearance.collision_world import Obstacle, Surroundings, mounted
+from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle, mounted
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning.problem.constraints import FREE
@@ -79,7 +79,7 @@ def case(rows: int, waypoints: int) -> tuple[Machine, Toolpath, Program]:
     source = Provenance(machine.name, machine.digest, "bench", "0")
     program = Program(period, quantised(legs), machine.controller.interpolation, Component(1, 1), place, source)
     cut = Segment(SegmentKind.CUT, *curve(np.linspace(0.0, length, waypoints), length), FEED)
-    return machine, Toolpath((cut,), pivot=BALL), program
+    return machine, Toolpath((cut,), tilt_centre=BALL), program
 
 
 def hill(cells: int) -> Mesh:
@@ -110,8 +110,8 @@ def main() -> None:
     }
     surface = MeshDistance.of(hill(given.cells))
     tool = BallCutter(BALL, shank=(Cone(0.03, 2e-3, 2e-3),), holder=(Cone(0.02, 8e-3, 8e-3),))
-    around = Surroundings((Obstacle("part", surface, clamped=True, allowance=5e-5),), mounted(tool.solids, machine))
-    tolerances |= {"surroundings": around, "constraints": FREE, "cutting": Cutting(surface, tool.solids, 5e-5)}
+    around = CollisionWorld((Obstacle("part", surface, clamped=True, allowance=5e-5),), mounted(tool.solids, machine))
+    tolerances |= {"collision_world": around, "constraints": FREE, "cutting": Cutting(surface, tool.solids, 5e-5)}
     with tempfile.TemporaryDirectory() as folder:
         short, path = Path(folder, "short.csv"), Path(folder, "program.csv")
         # Kernels compile and load once on a machine, not for each program.

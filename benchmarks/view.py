@@ -43,7 +43,7 @@ def main() -> None:
     places: list[RigidTransform] = []
     for _ in range(PLACES):
         turn = Rotation.from_rotvec(rng.normal(0.0, np.radians(2.0), 3)).as_matrix()
-        about = run.placement.apply(study.task.pivots.mean(axis=0))
+        about = run.placement.apply(study.task.tilt_centres.mean(axis=0))
         moved = RigidTransform(turn, about - turn @ about + rng.normal(0.0, 3e-3, 3))
         places.append(moved @ run.placement)
 
@@ -65,7 +65,7 @@ def main() -> None:
     one = seconds(looped, places[:4]) / len(some)
     let_go = seconds(lambda place: study.at(place, thorough=True), places[:4])
     tilted = seconds(lambda place: study.at(place, tilted=True), places[:4])
-    count, total = len(study.shown), len(study.task.pivots)
+    count, total = len(study.shown), len(study.task.tilt_centres)
     print(f"{platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}")
     print(f"{run.folder}: {count:,} waypoints drawn of {total:,}, {len(study.margins.limits)} limits at each")
     print(

@@ -36,7 +36,7 @@ def placed_raster(machine: Machine) -> PlacedPath:
     )
     lean = 0.15 * np.sin(np.linspace(0.0, 9.0, len(tips)))
     axes = np.column_stack([np.sin(lean), 0.0 * lean, np.cos(lean)])
-    toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, FEED),), pivot=0.003)
+    toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, FEED),), tilt_centre=0.003)
     turn = RigidTransform(np.diag([1.0, -1.0, -1.0]), machine.work.centre)
     margins = np.ones((len(tips), 1))
     limits = ()

@@ -55,7 +55,7 @@ def draw(toolpath: Toolpath, refusal: Refusal, out: Path) -> None:
     x, y = 1e3 * toolpath.tips[:, 0], 1e3 * toolpath.tips[:, 1]
     axes.plot(x, y, color="#8a8f98", linewidth=0.8, label="within all limits")
     free = np.ones(len(x), dtype=bool)
-    for colour, blame in zip(COLOURS, refusal.blames, strict=False):  # the worst first
+    for colour, blame in zip(COLOURS, refusal.diagnosis, strict=False):  # the worst first
         short = np.concatenate([np.arange(a, b + 1) for a, b in blame.waypoints])
         short = short[free[short]]
         free[short] = False

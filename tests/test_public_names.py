@@ -7,6 +7,7 @@ import pytest
 
 from pentapod import (
     BullNose,
+    CollisionWorld,
     Component,
     Cone,
     Coverage,
@@ -23,7 +24,6 @@ from pentapod import (
     RasterOptions,
     Remedy,
     RigidTransform,
-    Surroundings,
     leg_path,
     load_mesh,
     make_toolpath,
@@ -84,11 +84,11 @@ def test_a_part_with_tool_body_and_fixture(kind, tmp_path):
     assert report.left == 0
 
     here = RigidTransform(np.diag([1.0, -1.0, -1.0]), machine.work.centre)
-    bodies = Surroundings.of(machine, tool, part, fixture=vise)
+    bodies = CollisionWorld.of(machine, tool, part, fixture=vise)
     asked = {
         "constraints": PlacementConstraints.fixture([here]),
         "component": Component.parse("++"),
-        "surroundings": bodies,
+        "collision_world": bodies,
     }
     limits = {"path_tolerance": 50e-6, "axis_tolerance": np.radians(0.5)}
     placed = plan(toolpath, machine, **asked)
@@ -107,7 +107,7 @@ def test_a_part_with_tool_body_and_fixture(kind, tmp_path):
 
     # A vise that stands where the holder goes is found, and what was not told does not pass.
     high = block((-0.06, -0.01, -0.03), (0.06, 0.01, 0.06))
-    told["surroundings"] = Surroundings.of(machine, tool, part, fixture=high)
+    told["collision_world"] = CollisionWorld.of(machine, tool, part, fixture=high)
     assert not verify(program, machine, toolpath, **told).passed
     del told["cutting"]
     assert {entry.claim for entry in verify(program, machine, toolpath, **told).not_judged} >= {

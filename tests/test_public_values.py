@@ -89,7 +89,7 @@ def values(reached):
     """Values of every class that a planned job gives, and some by hand: one of each class, the first that is met."""
     part, tool = pentapod.load_mesh(reached.job.mesh_path, "mm"), pentapod.BallCutter(5e-3)
     coverage = pentapod.Coverage.of(part, tool, OPTIONS, path_tolerance=50e-6)
-    bodies = pentapod.Surroundings.of(reached.machine, tool, part)
+    bodies = pentapod.CollisionWorld.of(reached.machine, tool, part)
     by_hand = [*BY_HAND, *played(reached), coverage, bodies, pentapod.Cutting.of(part, tool, coverage=coverage)]
     found: dict[type, Value] = {}
     for value in values_in([reached, by_hand], {}):
@@ -186,7 +186,7 @@ def test_values_that_differ_are_not_equal(reached):
     legs = program.legs.copy()
     legs[-1, 3] += 1e-11
     assert replace(program, legs=legs) != program
-    assert replace(toolpath, pivot=1e-3) != toolpath
+    assert replace(toolpath, tilt_centre=1e-3) != toolpath
     assert replace(toolpath) == toolpath
 
 

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from pentapod.job import run as run
     from pentapod.kinematics import Component as Component
     from pentapod.kinematics import LinearPentapod as LinearPentapod
+    from pentapod.machine import CollisionWorld as CollisionWorld
     from pentapod.machine import Machine as Machine
-    from pentapod.machine import Surroundings as Surroundings
     from pentapod.mesh import Mesh as Mesh
     from pentapod.mesh import Region as Region
     from pentapod.mesh import load_mesh as load_mesh
@@ -106,7 +106,7 @@ _ROOMS = {
     "mesh": "Mesh Region load_mesh write_stl",
     "cutters": "BallCutter BullNose FlatEnd Lollipop StandOff",
     "kinematics": "Component LinearPentapod",
-    "machine": "Machine Surroundings",
+    "machine": "Machine CollisionWorld",
     "toolpath": "Cone RasterOptions CrossHatchOptions WaterlineOptions OffsetOptions SpiralOptions EdgeOptions "
     "CurveOptions DrawingOptions TextOptions PolylineOptions ImageOptions lettering read_lines read_points "
     "read_darkness make_toolpath toolpath_with_report Orientation Normal Fixed Pointed Between oriented stepped "

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 import pytest
 
-from pentapod.base import Blame, Refusal, RefusalError, Result, stage
+from pentapod.base import Refusal, RefusalError, Result, Shortfall, stage
 
-REFUSED = Refusal("placement", "it does not fit", (Blame("leg 2 too long", ((3, 5),), 1.5, "mm"),), "a smaller part")
+REFUSED = Refusal(
+    "placement", "it does not fit", (Shortfall("leg 2 too long", ((3, 5),), 1.5, "mm"),), "a smaller part"
+)
 
 
 @dataclass(frozen=True)

@@ -77,18 +77,18 @@ def test_a_beam_keeps_its_distance_along_the_axis():
     tool = StandOff(0.01, shank=SHANK)
     tip = tool.tips(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]), axis)
     np.testing.assert_allclose(tip, 0.01 * axis)
-    np.testing.assert_allclose(tip + tool.pivot * axis, 0.0, atol=1e-18)
+    np.testing.assert_allclose(tip + tool.tilt_centre * axis, 0.0, atol=1e-18)
 
 
 @pytest.mark.parametrize("tool", [BallCutter(3e-3), Lollipop(4e-3, 1.5e-3, 0.02), StandOff(5e-3)])
-def test_what_leans_keeps_its_pivot(tool):
+def test_what_leans_keeps_its_tilt_centre(tool):
     rng = np.random.default_rng(3)
     axes = rng.normal(size=(50, 3))
     axes /= np.linalg.norm(axes, axis=1)[:, None]
     normals = np.tile([0.0, 0.0, 1.0], (50, 1))
-    pivots = tool.tips(np.zeros((50, 3)), normals, axes) + tool.pivot * axes
+    tilt_centres = tool.tips(np.zeros((50, 3)), normals, axes) + tool.tilt_centre * axes
     assert tool.leans
-    np.testing.assert_allclose(pivots, pivots[:1].repeat(50, axis=0), atol=1e-15)
+    np.testing.assert_allclose(tilt_centres, tilt_centres[:1].repeat(50, axis=0), atol=1e-15)
 
 
 def test_shank_and_holder_are_stacked_on_the_cutter():

@@ -43,24 +43,26 @@ def verdict_of(job, program):
 def test_guides_from_the_plan_to_the_verdict(job, tmp_path):
     outcome = run(job, tmp_path, writers={"report.html": write_report})
     assert outcome.passed
-    slides = outcome.find(PlacedPath).placement.slides
-    assert any(slides)
+    rail_positions = outcome.find(PlacedPath).placement.rail_positions
+    assert any(rail_positions)
     program = read_csv(tmp_path / "program.csv")
-    assert program.slides == slides
+    assert program.rail_positions == rail_positions
     assert program.provenance.machine_digest == outcome.machine.digest != job_machine(job).digest
-    np.testing.assert_array_equal(outcome.machine.slides, slides)
+    np.testing.assert_array_equal(outcome.machine.rail_positions, rail_positions)
     claims = json.loads((tmp_path / "verdict.json").read_text())["certificates"]
     room = next(c for c in claims if c["claim"] == "guides within their travel")
     least, greatest = job_machine(job).guides.travel.T
-    assert room["value"] == pytest.approx(1e3 * float(np.minimum(slides - least, greatest - slides).min()), abs=1e-9)
+    assert room["value"] == pytest.approx(
+        1e3 * float(np.minimum(rail_positions - least, greatest - rail_positions).min()), abs=1e-9
+    )
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert f"<dt>guides 1 to 5</dt><dd>set to {1e3 * slides[0]:.3f}".replace("-", "−") in page
-    assert f"guides 1 to 5 at {1e3 * slides[0]:.3f}" in outcome.stages[2].said
+    assert f"<dt>guides 1 to 5</dt><dd>set to {1e3 * rail_positions[0]:.3f}".replace("-", "−") in page
+    assert f"guides 1 to 5 at {1e3 * rail_positions[0]:.3f}" in outcome.stages[2].said
     # Other programs that need the machine get it with its guides there.
-    np.testing.assert_array_equal(PostInput(program, job_machine(job)).the_machine().slides, slides)
+    np.testing.assert_array_equal(PostInput(program, job_machine(job)).the_machine().rail_positions, rail_positions)
 
     opened = open_run(tmp_path)
-    np.testing.assert_array_equal(opened.machine.slides, slides)
+    np.testing.assert_array_equal(opened.machine.rail_positions, rail_positions)
     stance = Motion.of(opened).stance(program.times[40], opened.machine, opened.placement)
     assert stance.legs == pytest.approx(program.legs[40], abs=1e-9)
 
@@ -89,11 +91,11 @@ def test_where_guides_were_to_stand_is_kept_of_a_job_without_a_program(job, tmp_
     outcome = run(job, tmp_path)
     assert outcome.refusal.cause == "no law"
     assert not (tmp_path / "program.csv").exists()
-    slides = outcome.find(PlacedPath).placement.slides
-    assert any(slides)
+    rail_positions = outcome.find(PlacedPath).placement.rail_positions
+    assert any(rail_positions)
     with np.load(tmp_path / "plan.npz") as archive:
-        np.testing.assert_allclose(archive["placed.guides_mm"], 1e3 * np.array(slides), atol=1e-9)
-    np.testing.assert_array_equal(open_run(tmp_path).machine.slides, slides)
+        np.testing.assert_allclose(archive["placed.guides_mm"], 1e3 * np.array(rail_positions), atol=1e-9)
+    np.testing.assert_array_equal(open_run(tmp_path).machine.rail_positions, rail_positions)
 
 
 def test_machine_files_with_guides(machine_file):

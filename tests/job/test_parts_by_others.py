@@ -74,7 +74,7 @@ def test_a_part_with_upright_walls_keeps_what_the_raster_left_out(planned):
     place = 1e-3 * np.array([float(text) for text in found.groups()])
     toolpath = outcome.find(Toolpath)
     assert toolpath is not None
-    chords = np.stack([toolpath.pivots[:-1], toolpath.pivots[1:]], axis=1)
+    chords = np.stack([toolpath.tilt_centres[:-1], toolpath.tilt_centres[1:]], axis=1)
     along = np.clip(np.einsum("ij,ij->i", place - chords[:, 0], np.diff(chords, axis=1)[:, 0]), 0.0, None)
     along /= np.maximum((np.diff(chords, axis=1)[:, 0] ** 2).sum(axis=1), 1e-30)
     nearest = chords[:, 0] + np.minimum(along, 1.0)[:, None] * np.diff(chords, axis=1)[:, 0]
@@ -92,5 +92,5 @@ def test_a_part_with_upright_walls_keeps_what_the_raster_left_out(planned):
 def test_a_part_too_large_for_the_machine(planned, tmp_path):
     outcome = planned("wavy_vase_open_low_res.stl", 'unit = "mm"', 25)
     assert outcome.refusal is not None
-    assert outcome.refusal.blames
+    assert outcome.refusal.diagnosis
     assert not (tmp_path / "out" / "program.csv").exists()

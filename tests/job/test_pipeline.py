@@ -74,8 +74,8 @@ def check_shipped(job, folder):
         refusal = outcome.refusal
         assert refusal is not None
         assert refusal.stage == "placement"
-        assert any("too long" in blame.constraint for blame in refusal.blames)
-        assert all(blame.shortfall > 0 and blame.waypoints for blame in refusal.blames)
+        assert any("too long" in blame.constraint for blame in refusal.diagnosis)
+        assert all(blame.shortfall > 0 and blame.waypoints for blame in refusal.diagnosis)
         assert names(folder) == WHOLE - {"program.csv"}
     elif name == "rail":
         setups = outcome.find(SetUps)
@@ -159,7 +159,7 @@ def test_a_refused_job_leaves_no_program_not_even_an_old_one(usual, make_job, tm
     verdict = json.loads((out / "verdict.json").read_text())
     assert verdict["passed"] is False
     assert verdict["refusal"]["cause"]
-    assert verdict["refusal"]["blames"][0]["shortfall"] > 0
+    assert verdict["refusal"]["diagnosis"][0]["shortfall"] > 0
     assert all(c["passed"] is False for c in verdict["certificates"])
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from pentapod import (
+    CollisionWorld,
     Cutting,
     Job,
     Machine,
     RasterOptions,
     RigidTransform,
-    Surroundings,
     judge,
     load_mesh,
     read_csv,
@@ -47,7 +47,7 @@ def from_python(job, program, sink=0.0):
     return verify(
         program, machine, toolpath.transformed(RigidTransform(np.eye(3), np.array([0.0, 0.0, -sink]))),
         tilt=0.0, constraints=job_constraints(job, machine, part), component=Component.parse("++"),
-        surroundings=Surroundings.of(machine, tool, part),
+        collision_world=CollisionWorld.of(machine, tool, part),
         path_tolerance=50e-6, axis_tolerance=np.radians(0.5), job_digest=job.digest,
         cutting=Cutting.of(part, tool, coverage=coverage),
     )  # fmt: skip

@@ -182,9 +182,9 @@ def test_too_few_set_ups_are_a_refusal_that_names_what_is_left(job, tmp_path):
     (old / "program.csv").write_text("")
     outcome = run(Job.load(large), tmp_path)
     assert outcome.refusal.stage == "placement"
-    assert outcome.refusal.blames[0].constraint == "beyond 2 set-ups"
-    assert outcome.refusal.blames[0].waypoints
-    assert any("leg" in blame.constraint and blame.shortfall > 0 for blame in outcome.refusal.blames)
+    assert outcome.refusal.diagnosis[0].constraint == "beyond 2 set-ups"
+    assert outcome.refusal.diagnosis[0].waypoints
+    assert any("leg" in blame.constraint and blame.shortfall > 0 for blame in outcome.refusal.diagnosis)
     assert {p.name for p in tmp_path.iterdir()} == {"plan.npz", "verdict.json", "manifest.json"}
     assert json.loads((tmp_path / "verdict.json").read_text())["refusal"]["cause"].startswith("2 set-ups are not")
 

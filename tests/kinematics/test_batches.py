@@ -21,7 +21,7 @@ from pentapod.kinematics import (
     tip_compliance,
     tip_stiffness,
 )
-from pentapod.theory import cell_of, choose_slides, conditioning_criterion, singularity_free_sphere
+from pentapod.theory import cell_of, choose_rail_positions, conditioning_criterion, singularity_free_sphere
 
 BASE = 0.2 * np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)])
 ROBOT = LinearPentapod.quadratic(BASE, 0.5)
@@ -51,7 +51,7 @@ OF_POSES = {
     "leg_force_map": lambda p, i: leg_force_map(ROBOT, p, i, 0.1),
     "tip_stiffness": lambda p, i: tip_stiffness(ROBOT, p, i, SPRINGS, 0.1),
     "tip_compliance": lambda p, i: tip_compliance(ROBOT, p, i, SPRINGS, 0.1),
-    "choose_slides": lambda p, i: choose_slides(GUIDED, p, i, conditioning_criterion(1.0)),
+    "choose_rail_positions": lambda p, i: choose_rail_positions(GUIDED, p, i, conditioning_criterion(1.0)),
 }
 
 
@@ -82,11 +82,11 @@ def test_batches_of_positions_and_directions_that_do_not_fit(name: str) -> None:
         (lambda legs: ROBOT.pose([[1, 2], [1]], (1, 1)), "legs is not an array of numbers"),
         (lambda legs: forbidden_conic(BASE, 5), r"there is no such leg \(got 5\); expected 0 … 4"),
         (lambda legs: forbidden_conic(BASE, -1), r"there is no such leg \(got -1\)"),
-        (lambda legs: GUIDED.forbidden_slides(7, np.zeros(5)), r"there is no such leg \(got 7\)"),
+        (lambda legs: GUIDED.forbidden_rail_positions(7, np.zeros(5)), r"there is no such leg \(got 7\)"),
         (lambda legs: leg_force_map(ROBOT, np.ones(3), np.ones(3), np.nan), "tool_length is not finite"),
         (lambda legs: tip_stiffness(ROBOT, np.ones(3), np.ones(3), SPRINGS, "long"), "tool_length is not an array"),
         (
-            lambda legs: choose_slides(GUIDED, legs[:0, :3], legs[:0, :3], conditioning_criterion(1.0)),
+            lambda legs: choose_rail_positions(GUIDED, legs[:0, :3], legs[:0, :3], conditioning_criterion(1.0)),
             "nothing to choose",
         ),
     ],

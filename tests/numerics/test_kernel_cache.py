@@ -77,9 +77,11 @@ def package(tmp_path: Path) -> Package:
 
 
 def test_the_first_run_says_that_it_compiles_and_the_second_does_not(tmp_path):
-    surroundings = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    collision_world = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     said = [
-        subprocess.run([sys.executable, "-c", RUN], env=surroundings, capture_output=True, text=True, check=True).stderr
+        subprocess.run(
+            [sys.executable, "-c", RUN], env=collision_world, capture_output=True, text=True, check=True
+        ).stderr
         for _ in range(2)
     ]
     assert said[0].count("compiling") == 1

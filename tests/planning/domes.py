@@ -7,7 +7,7 @@ import numpy as np
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 
-def dome(size: float, slope_deg: float, waypoints: int = 400, pivot: float = 0.003) -> Toolpath:
+def dome(size: float, slope_deg: float, waypoints: int = 400, tilt_centre: float = 0.003) -> Toolpath:
     """A zigzag over a spherical cap `size` metres wide with slopes to slope_deg at its rim."""
     half = 0.5 * size
     rows = max(6, int(np.sqrt(waypoints) / 2))
@@ -21,5 +21,5 @@ def dome(size: float, slope_deg: float, waypoints: int = 400, pivot: float = 0.0
     z = np.sqrt(radius**2 - (xy**2).sum(axis=1))
     return Toolpath(
         (Segment(SegmentKind.CUT, np.c_[xy, z - radius], np.c_[xy, z] / radius, 0.02),),
-        pivot,
+        tilt_centre,
     )

@@ -39,8 +39,8 @@ def check(instance: Instance, samples: int, folder: Path) -> bool:
     robot = machine(instance.machine)
     answer = plan(instance.toolpath, robot, tilt=instance.tilt)
     if isinstance(answer, Refusal):
-        assert answer.blames
-        assert all(blame.waypoints and blame.shortfall > 0.0 for blame in answer.blames)
+        assert answer.diagnosis
+        assert all(blame.waypoints and blame.shortfall > 0.0 for blame in answer.diagnosis)
         return brute_force(instance, robot, samples) < CLEARLY_FEASIBLE
     assert isinstance(answer, PlacedPath)
     p, i = answer.tips + robot.tool_length * answer.axes, -answer.axes
@@ -62,7 +62,7 @@ def certified(placed: PlacedPath, robot: Machine, instance: Instance, folder: Pa
     file = folder / "program.csv"
     write_csv(sample(trajectory, robot, placed.placement.transform, placed.component, source), file)
     tolerances = {"path_tolerance": 20e-6, "axis_tolerance": AXIS_TOLERANCE}
-    asked = {"tilt": instance.tilt, "job_digest": "test", "constraints": FREE, "surroundings": NOTHING}
+    asked = {"tilt": instance.tilt, "job_digest": "test", "constraints": FREE, "collision_world": NOTHING}
     of_a_part = ("gouge on cuts and links", "gouge on rapids", "surface left on the region")  # there is none
     verdict = verify(file, robot, instance.toolpath, **asked, **tolerances, waived=of_a_part)
     return verdict.passed

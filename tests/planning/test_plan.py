@@ -38,15 +38,15 @@ def test_every_waypoint_keeps_every_limit(desk, placed):
     assert placed.smallest_margin >= NEEDED_MARGIN - 1e-3
 
 
-def test_axes_stay_in_the_cone_and_the_pivot_on_the_part(cap, placed):
+def test_axes_stay_in_the_cone_and_the_tilt_centre_on_the_part(cap, placed):
     nominal = placed.placement.transform.rotate(cap.axes)
     assert angle_between(placed.axes, nominal).max() <= TILT
-    np.testing.assert_allclose(placed.pivots, placed.placement.transform.apply(cap.pivots), atol=1e-12)
+    np.testing.assert_allclose(placed.tilt_centres, placed.placement.transform.apply(cap.tilt_centres), atol=1e-12)
 
 
 def test_axis_is_smooth_along_the_path(cap, placed):
     """Along a pass the axis turns hardly faster than the nominal one anywhere."""
-    step = np.linalg.norm(np.diff(cap.pivots, axis=0), axis=1)
+    step = np.linalg.norm(np.diff(cap.tilt_centres, axis=0), axis=1)
     rate = angle_between(placed.axes[1:], placed.axes[:-1]) / step
     nominal = angle_between(cap.axes[1:], cap.axes[:-1]) / step
     assert rate.max() <= 1.5 * nominal.max()
@@ -56,7 +56,7 @@ def test_placement_is_not_beaten_by_small_moves(desk, cap, placed):
     """Random small placement moves, each with the best tilt at each waypoint alone, gain little."""
     rng = np.random.default_rng(5)
     rows = np.arange(0, len(cap), 4)
-    few = ToolpathSamples(cap.pivots[rows], cap.axes[rows], cap.pivot, TILT)
+    few = ToolpathSamples(cap.tilt_centres[rows], cap.axes[rows], cap.tilt_centre, TILT)
     margins = Margins.of(desk, placed.component)
     t = placed.placement.transform
     here = best_tilted_margins(few, margins, t)[0].min()
@@ -99,7 +99,7 @@ def test_wrong_component_is_refused(desk, cap, placed):
     given = PlacementConstraints.fixture([placed.placement.transform])
     answer = plan(cap, desk, tilt=TILT, constraints=given, component=Component(1, -1))
     assert isinstance(answer, Refusal)
-    assert any("S = 0" in blame.constraint for blame in answer.blames)
+    assert any("S = 0" in blame.constraint for blame in answer.diagnosis)
 
 
 def test_placement_out_of_reach_is_refused_with_the_true_shortfall(desk, cap, placed):
@@ -110,7 +110,7 @@ def test_placement_out_of_reach_is_refused_with_the_true_shortfall(desk, cap, pl
     assert isinstance(answer, Refusal)
     tips, axes = far.apply(cap.tips), far.rotate(cap.axes)
     legs = desk.robot.leg_lengths(tips + desk.tool_length * axes, -axes)
-    for blame in answer.blames:
+    for blame in answer.diagnosis:
         if "too long" in blame.constraint:
             k = int(blame.constraint.split()[1]) - 1
             missing_mm = (legs[:, k].max() - desk.legs.max_length[k]) * 1e3
@@ -132,9 +132,9 @@ def test_oversize_part_is_refused(desk):
     flat = Toolpath((Segment(SegmentKind.CUT, tips, np.tile([0.0, 0.0, 1.0], (len(tips), 1)), 0.02),), 0.003)
     answer = plan(flat, desk, tilt=TILT)
     assert isinstance(answer, Refusal)
-    assert answer.blames
-    assert answer.blames[0].shortfall > 1.0
-    assert all(0 <= a <= b < len(tips) for blame in answer.blames for a, b in blame.waypoints)
+    assert answer.diagnosis
+    assert answer.diagnosis[0].shortfall > 1.0
+    assert all(0 <= a <= b < len(tips) for blame in answer.diagnosis for a, b in blame.waypoints)
 
 
 def test_the_region_that_a_refusal_names_fits(desk, wide):
@@ -144,9 +144,9 @@ def test_the_region_that_a_refusal_names_fits(desk, wide):
     numbers = re.search(r"one of (\d+) × (\d+) × (\d+) mm about \((-?\d+), (-?\d+), (-?\d+)\) mm", answer.remedy)
     assert numbers is not None, answer.remedy
     size, middle = np.array(numbers.groups(), dtype=float).reshape(2, 3) * 1e-3
-    inside = (np.abs(wide.pivots - middle) <= 0.5 * size + 1e-3).all(axis=1)
+    inside = (np.abs(wide.tilt_centres - middle) <= 0.5 * size + 1e-3).all(axis=1)
     assert 0 < inside.sum() < len(wide)
-    part = Toolpath((Segment(SegmentKind.CUT, wide.tips[inside], wide.axes[inside], 0.02),), wide.pivot)
+    part = Toolpath((Segment(SegmentKind.CUT, wide.tips[inside], wide.axes[inside], 0.02),), wide.tilt_centre)
     assert isinstance(plan(part, desk, tilt=TILT), PlacedPath)
 
 

@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.families.general import GeneralPentapod
-from pentapod.machine.clearance.collision_world import Obstacle, Surroundings
+from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning import PlacedPath, PlacementConstraints, leg_path, plan
@@ -126,7 +126,7 @@ def test_margins_and_their_formulas_agree_beside_an_obstacle(machine, placed):
     post = trimesh.creation.cylinder(0.01, 0.2, sections=16)
     post.apply_translation([0.06, 0.02, 0.1])
     surface = MeshDistance.of(Mesh.of(np.asarray(post.vertices), np.asarray(post.faces)))
-    margins = Margins.of(machine, placed.component, Surroundings((Obstacle("fixture", surface, clamped=True),)))
+    margins = Margins.of(machine, placed.component, CollisionWorld((Obstacle("fixture", surface, clamped=True),)))
     here = placed.placement.transform
     tip, axis, turn, shift = (ca.SX.sym("x", *size) for size in ((3,), (3,), (3, 3), (3,)))
     numbers = ca.SX.sym("c", margins.contact_numbers)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from pentapod.base.refusal import Blame, Refusal
+from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.planning.setups import setups
 from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.linking.partition import Piece, cutting_intervals, part_of, pass_ends
@@ -15,7 +15,9 @@ from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 UP = np.array([0.0, 0.0, 1.0])
 STYLE = LinkStyle(UP, level=0.05, approach=0.003, spacing=0.1, feed=0.02)
-WHOLE = Refusal("placement", "it is too large", (Blame("leg 1 too long", ((0, 3),), 2.0, "mm"),), "Try a smaller one")
+WHOLE = Refusal(
+    "placement", "it is too large", (Shortfall("leg 1 too long", ((0, 3),), 2.0, "mm"),), "Try a smaller one"
+)
 
 
 def passes(places: list[float], points: int = 9, length: float = 1.0) -> Toolpath:
@@ -107,13 +109,13 @@ def test_too_few_set_ups_are_a_refusal():
     assert isinstance(answer, Refusal)
     assert answer.cause.startswith("2 set-ups are not enough: ")
     assert answer.cause.endswith(WHOLE.cause)
-    over, *others = answer.blames
+    over, *others = answer.diagnosis
     assert over.constraint == "beyond 2 set-ups"
-    assert tuple(others) == WHOLE.blames
+    assert tuple(others) == WHOLE.diagnosis
     assert WHOLE.remedy in answer.remedy
     nothing = setups(path, lambda _: False, STYLE, 5, WHOLE)
     assert isinstance(nothing, Refusal)
-    assert nothing.blames[0].waypoints == ((0, 2), (3, 5), (6, 8))  # every cut, from its first waypoint to its last
+    assert nothing.diagnosis[0].waypoints == ((0, 2), (3, 5), (6, 8))  # every cut, from its first waypoint to its last
     assert " 0 %" in nothing.cause
 
 

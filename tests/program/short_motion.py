@@ -77,7 +77,7 @@ def round_trip(what: PostInput, name: str, folder: Path):
         assert [s.kind for s in back.segments] == [s.kind for s in what.toolpath.segments]
         assert np.allclose([s.feed for s in back.segments], [s.feed for s in what.toolpath.segments], rtol=1e-9)
         return back
-    for field in ("interpolation", "component", "provenance", "slides"):
+    for field in ("interpolation", "component", "provenance", "rail_positions"):
         assert getattr(back, field) == getattr(what.program, field)
     assert back.placement.matrix.tobytes() == what.program.placement.matrix.tobytes()
     assert abs(back.duration - what.program.duration) < 1e-9

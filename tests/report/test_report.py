@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from pentapod.cli.commands.new import dome_stl
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job, Outcome, run
-from pentapod.job.build.collision_world import job_surroundings
+from pentapod.job.build.collision_world import job_collision_world
 from pentapod.job.build.placement import job_constraints, rotation_angles_deg
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.planning import PlacedPath
@@ -117,8 +117,8 @@ def test_signals_are_those_of_the_program(make_job, tmp_path):
     assert toolpath is not None
     mesh = outcome.find(Mesh)
     assert mesh is not None
-    surroundings = job_surroundings(outcome.job, outcome.machine, mesh)
-    signals = Signals.of(program, outcome.machine, trajectory, toolpath, surroundings)
+    collision_world = job_collision_world(outcome.job, outcome.machine, mesh)
+    signals = Signals.of(program, outcome.machine, trajectory, toolpath, collision_world)
     by_claim = {c.claim: c for c in outcome.verdict.certificates}
     rate = by_claim["leg rates"].value
     assert rate is not None
@@ -146,7 +146,7 @@ def test_report_of_a_refused_job(make_job, tmp_path):
     refusal = outcome.refusal
     assert refusal is not None
     assert page.text.index("cannot be done") < page.text.index("Why not")
-    for blame in refusal.blames:
+    for blame in refusal.diagnosis:
         assert blame.constraint in page.text
     assert "time" not in data(text, "figures")
     assert data(text, "poses") == {"poses": []}
@@ -159,7 +159,7 @@ def test_a_refusal_is_drawn_in_the_machine_where_it_came_nearest(make_job, tmp_p
     attempt, machine = outcome.refusal.attempt, outcome.machine
     assert attempt.smallest_margin < 0.0
     # The blamed waypoints lie on the path where it was tried, in the machine; lifted a little off the surface.
-    for blame in outcome.refusal.blames:
+    for blame in outcome.refusal.diagnosis:
         points = np.stack([unpacked(traces[blame.constraint][axis]) for axis in "xyz"], axis=1)
         chosen = np.concatenate([np.arange(a, b + 1) for a, b in blame.waypoints])
         np.testing.assert_allclose(points, 1e3 * attempt.tips[chosen], atol=0.51)

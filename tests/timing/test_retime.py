@@ -340,7 +340,7 @@ def test_a_path_that_is_not_finite_is_refused_with_the_place(order):
     assert "not finite" in result.cause
     assert "60 mm along the path" in result.cause
     assert "segment 0" in result.cause
-    assert result.blames[0].waypoints == ((2, 2),)
+    assert result.diagnosis[0].waypoints == ((2, 2),)
 
 
 def test_a_jump_at_a_stop_is_refused():
@@ -349,7 +349,7 @@ def test_a_jump_at_a_stop_is_refused():
     assert isinstance(result, Refusal)
     assert "jump by 150 mm" in result.cause
     assert "legs move by (1, 0, 0, 0, 0) m for each metre" in result.cause
-    (blame,) = result.blames
+    (blame,) = result.diagnosis
     assert str(blame) == "leg 2 jumps by 150 mm at waypoints 0"
 
 
@@ -377,10 +377,10 @@ def test_a_failing_solver_is_a_refusal_that_names_the_gridpoint(monkeypatch):
     assert "not controllable" in result.cause
     assert "in conflict: leg 2 acceleration and leg 4 acceleration" in result.cause
     assert "m for each metre there" in result.cause
-    assert [blame.constraint for blame in result.blames] == ["leg 2 acceleration", "leg 4 acceleration"]
-    (pair,) = result.blames[0].waypoints
+    assert [blame.constraint for blame in result.diagnosis] == ["leg 2 acceleration", "leg 4 acceleration"]
+    (pair,) = result.diagnosis[0].waypoints
     assert 0 <= pair[0] <= pair[1] <= pair[0] + 1
-    assert str(result.blames[0]).startswith("leg 2 acceleration at waypoints ")
+    assert str(result.diagnosis[0]).startswith("leg 2 acceleration at waypoints ")
 
 
 @pytest.mark.parametrize("margin", [0.0, -0.1, 0.5, np.nan])

@@ -86,13 +86,13 @@ def test_parts_of_the_jobs_are_covered(parts, name, tool):
     toolpath, report = toolpath_with_report(mesh, tool, RasterOptions(stepover=3e-3, region=region))
     cuts = [s for s in toolpath.segments if s.kind is SegmentKind.CUT]
     axes = np.concatenate([s.axes for s in cuts])
-    contacts = np.concatenate([s.tips for s in cuts]) + min(tool.pivot, 0.0) * axes
+    contacts = np.concatenate([s.tips for s in cuts]) + min(tool.tilt_centre, 0.0) * axes
     assert surfaces.surface_distance(mesh, contacts).max() < 1e-9
     assert np.degrees(np.arccos(axes @ region.direction)).max() <= np.degrees(region.angle) + 1e-6
     # Nine hundred and ninety-nine of a thousand points of the region lie within half a stepover of a cut.
     points, normals = surfaces.random_points(mesh, 20_000, region)
     seen = ~HeightField(mesh, region.direction).hides(points, 1e-6)
-    lines = [s.tips + min(tool.pivot, 0.0) * s.axes for s in cuts]
+    lines = [s.tips + min(tool.tilt_centre, 0.0) * s.axes for s in cuts]
     distance = surfaces.distance_to_lines(points[seen], normals[seen], lines, [s.axes for s in cuts])
     assert (distance <= 1.05 * 0.5 * 3e-3).mean() >= 0.999
     assert report.stepover == 3e-3

@@ -26,7 +26,7 @@ RAPID = 0.08
 TILT = np.radians(5.0)
 TOLERANCES = {"tilt": TILT, "path_tolerance": 20e-6, "axis_tolerance": np.radians(0.1), "lowest_share": 0.0}
 """The quintic time law is slower than it has to be: no lowest feed is asked for."""
-ASKED = {**TOLERANCES, "job_digest": "job-1", "constraints": FREE, "surroundings": NOTHING}
+ASKED = {**TOLERANCES, "job_digest": "job-1", "constraints": FREE, "collision_world": NOTHING}
 """All that a verdict asks of a program, but for what is cut: the part may stand anywhere, with nothing around it."""
 PERIOD = 1e-3
 TURN_RATE = 0.5
@@ -92,13 +92,13 @@ def straight(kind, feed, start, stop, axis, axis_end=None, count=2):
     return Stroke(kind, feed, lambda f: (start + f[:, None] * (stop - start), slerp(axis, axis_end, f)), count)
 
 
-def turn(pivot_tip, axis, axis_end, count):
+def turn(tilt_centre_tip, axis, axis_end, count):
     """Turn about the ball's centre, which stands."""
-    pivot = pivot_tip + BALL * axis
+    tilt_centre = tilt_centre_tip + BALL * axis
 
     def pose(f):
         axes = slerp(axis, axis_end, f)
-        return pivot - BALL * axes, axes
+        return tilt_centre - BALL * axes, axes
 
     return Stroke(SegmentKind.LINK, LINK_FEED, pose, count)
 
@@ -130,7 +130,9 @@ def strokes():
 
 
 def toolpath_of(parts):
-    return Toolpath(tuple(Segment(p.kind, *p.pose(np.linspace(0, 1, p.count)), p.feed) for p in parts), pivot=BALL)
+    return Toolpath(
+        tuple(Segment(p.kind, *p.pose(np.linspace(0, 1, p.count)), p.feed) for p in parts), tilt_centre=BALL
+    )
 
 
 def quintic(f):
@@ -171,7 +173,7 @@ def tilted_axes(axes, angle, azimuth=0.7):
 
 
 def program_of(machine, tips, axes, *, lean=0.0, interpolation="cubic"):
-    """A program whose tool leans by a constant angle about the pivot."""
+    """A program whose tool leans by a constant angle about the tilt_centre."""
     leaned = tilted_axes(axes, lean)
     leaned_tips = tips + BALL * (axes - leaned)
     place = placement(machine)

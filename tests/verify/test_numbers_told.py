@@ -93,7 +93,7 @@ def path_of(*pieces):
     for kind, length, feed in pieces:
         segments.append(Segment(kind, np.array([[x, 0.0, 0.0], [x + length, 0.0, 0.0]]), axis, feed))
         x += length
-    return Toolpath(tuple(segments), pivot=0.0)
+    return Toolpath(tuple(segments), tilt_centre=0.0)
 
 
 def test_which_segment_sets_the_limit():

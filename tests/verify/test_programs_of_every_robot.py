@@ -59,9 +59,9 @@ def test_shipped_job_is_planned_timed_written_and_judged_on_every_robot(changed,
     machine, toolpath = changed(nominal), job_toolpath(job, mesh)[0]
     asked = job_specification(job, machine, mesh, lambda: toolpath)
     assert asked.constraints is not None
-    assert asked.surroundings is not None
+    assert asked.collision_world is not None
     placed = plan(
-        toolpath, machine, tilt=asked.tilt, constraints=asked.constraints, surroundings=asked.surroundings
+        toolpath, machine, tilt=asked.tilt, constraints=asked.constraints, collision_world=asked.surroundings
     ).unwrap()
     legs = leg_path(placed, machine, path_tolerance=asked.path_tolerance, axis_tolerance=asked.axis_tolerance).unwrap()
     trajectory = retime(legs, machine).unwrap()

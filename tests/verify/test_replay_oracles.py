@@ -74,20 +74,20 @@ def test_poses_and_deviation_by_newton(good, found):
     times = np.sort(random.uniform(0.0, good.program.duration, 150))
     legs = interpolant(good.program)(times)
     inverse = np.linalg.inv(good.program.placement.matrix)
-    pivots = []
+    tilt_centres = []
     for t, lengths in zip(times, legs, strict=True):
         sample = int(t / good.program.period * 2)
         guess = np.concatenate([replay.pose[0][sample], replay.pose[1][sample]])
         x = newton_pose(good.machine, lengths, guess)
         axis = -x[3:]
-        pivot = x[:3] - good.machine.tool_length * axis + good.toolpath.pivot * axis
-        pivots.append((inverse @ np.append(pivot, 1.0))[:3])
-        near = 0.5 * (replay.pivots[sample] + replay.pivots[sample + 1])
-        assert np.linalg.norm(pivots[-1] - near) < 1e-4
-    pivots, way = np.array(pivots), good.toolpath.pivots
+        tilt_centre = x[:3] - good.machine.tool_length * axis + good.toolpath.tilt_centre * axis
+        tilt_centres.append((inverse @ np.append(tilt_centre, 1.0))[:3])
+        near = 0.5 * (replay.tilt_centres[sample] + replay.tilt_centres[sample + 1])
+        assert np.linalg.norm(tilt_centres[-1] - near) < 1e-4
+    tilt_centres, way = np.array(tilt_centres), good.toolpath.tilt_centres
     step = np.diff(way, axis=0)
     square = np.maximum(np.einsum("ij,ij->i", step, step), 1e-300)
-    off = pivots[:, None] - way[:-1]
+    off = tilt_centres[:, None] - way[:-1]
     t = np.clip(np.einsum("nij,ij->ni", off, step) / square, 0.0, 1.0)
     distance = np.linalg.norm(off - t[..., None] * step, axis=2).min(axis=1)
     assert distance.max() <= 1e-3 * found["tip deviation"].value + 1e-12
@@ -98,12 +98,12 @@ def test_tip_deviation_is_tight(good, found):
     fine = [part.pose(np.linspace(0, 1, 50 * (part.count - 1) + 1)) for part in cases.strokes()]
     sagitta = 0.0
     for part, (tips, axes) in zip(cases.strokes(), fine, strict=True):
-        pivots = tips + cases.BALL * axes
-        chords = pivots[::50]
+        tilt_centres = tips + cases.BALL * axes
+        chords = tilt_centres[::50]
         f = np.linspace(0, 1, 51)[None, :, None]
         lines = chords[:-1, None] * (1 - f) + chords[1:, None] * f
         for k in range(part.count - 1):
-            sagitta = max(sagitta, np.linalg.norm(pivots[50 * k : 50 * k + 51] - lines[k], axis=1).max())
+            sagitta = max(sagitta, np.linalg.norm(tilt_centres[50 * k : 50 * k + 51] - lines[k], axis=1).max())
     assert 1e-3 * found["tip deviation"].value <= sagitta + 3e-6
 
 
@@ -114,7 +114,7 @@ def test_axis_deviation_is_the_lean(found):
 def test_fastest_moment_by_finite_differences(good, found):
     """The proven speeds are no less than any momentary speed, and little more than the largest."""
     replay = cases.replay_of(good)
-    bounds = replay.survey.speeds[:, 0]
+    bounds = replay.interval_bounds.speeds[:, 0]
     spline, step = interpolant(good.program), 1e-6
     moments = (np.arange(len(bounds)) + np.linspace(0.01, 0.99, 7)[:, None]) * 0.5 * good.program.period
     tips = []

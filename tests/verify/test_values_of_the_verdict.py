@@ -25,7 +25,7 @@ WITHOUT_POSES = {
     *("starts at rest", "ends at rest", "legs, spindle and tool clear of the surroundings"),
     *("placement as the job asks", "component as asked", "controller", "every cut is made in one set-up"),
 }
-BEING_FILLED = {"Survey", "ComponentFindings"}  # while the walk along the program goes on
+BEING_FILLED = {"IntervalBounds", "ComponentFindings"}  # while the walk along the program goes on
 
 
 def values():
@@ -62,7 +62,7 @@ def test_values_are_frozen_and_those_with_arrays_compare_by_identity_or_as_publi
     else:
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(empty, name, 0)
-    heavy = ("Floats", "Ints", "Bools", "Extreme", "MeshDistance", "Program", "Machine")
+    heavy = ("Floats", "Ints", "Bools", "RunningMaximum", "MeshDistance", "Program", "Machine")
     holds_arrays = any(part in str(field.type) for field in dataclasses.fields(value) for part in heavy)
     assert (value.__eq__ in (object.__eq__, Value.__eq__)) == holds_arrays or issubclass(value, Value)
 

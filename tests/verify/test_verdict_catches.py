@@ -161,7 +161,7 @@ def test_program_without_a_job_is_asked_for_none(good):
     [
         ({"cutting": None}, {"gouge on cuts and links", "gouge on rapids", "surface left on the region"}),
         ({"constraints": None}, {"placement as the job asks"}),
-        ({"surroundings": None}, {"legs, spindle and tool clear of the surroundings"}),
+        ({"collision_world": None}, {"legs, spindle and tool clear of the surroundings"}),
     ],
 )
 def test_what_was_not_told_is_not_judged_and_does_not_pass(good, untold, claims):
@@ -185,7 +185,7 @@ def test_waiving_a_claim_that_does_not_exist_is_bad_input(good):
 
 
 def test_guides_for_a_machine_that_has_none(good):
-    guided = replace(good.program, slides=(0.0, 0.0, 0.0, 0.0, 0.0))
+    guided = replace(good.program, rail_positions=(0.0, 0.0, 0.0, 0.0, 0.0))
     assert failed(judge(replace(good, program=guided))) == {"guides within their travel"}
 
 
@@ -219,13 +219,13 @@ def test_tilt_beyond_the_cone(good):
 
 
 def test_turn_on_the_spot_left_out(good):
-    """The toolpath nods by 20° while the pivot stands; the program does not."""
+    """The toolpath nods by 20° while the tilt centre stands; the program does not."""
     k = int(good.toolpath.starts[1])
     tip, axis = good.toolpath.tips[k], good.toolpath.axes[k]
     nod = cases.turn(tip, axis, cases.tilted_axes(axis[None], np.radians(20.0))[0], 9).pose(np.linspace(0, 1, 9))
     link = Segment(SegmentKind.LINK, *(np.concatenate([x, x[-2::-1]]) for x in nod), cases.LINK_FEED)
     first, *others = good.toolpath.segments
-    nodding = Toolpath((first, link, *others), good.toolpath.pivot)
+    nodding = Toolpath((first, link, *others), good.toolpath.tilt_centre)
     assert failed(judge(replace(good, toolpath=nodding))) == {"axis deviation"}
 
 

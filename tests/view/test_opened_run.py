@@ -24,7 +24,7 @@ def test_a_run_is_what_was_planned(planned, opened):
     assert opened.component == placed.component
     assert np.abs(opened.placement.matrix - placed.placement.transform.matrix).max() < 1e-12
     assert np.abs(opened.placement.rotate(opened.axes) - placed.axes).max() < 1e-12
-    assert np.abs(opened.placement.apply(opened.toolpath.pivots) - placed.pivots).max() < 1e-9
+    assert np.abs(opened.placement.apply(opened.toolpath.tilt_centres) - placed.tilt_centres).max() < 1e-9
     assert np.array_equal(opened.program.legs, program.legs)
 
 

@@ -44,7 +44,7 @@ def test_strokes_are_told_in_millimetres(opened, study, shift):
     placement = shifted(opened, shift)
     reach = study.at(placement, thorough=True)
     machine = opened.machine
-    tips = opened.toolpath.pivots - opened.toolpath.pivot * opened.axes
+    tips = opened.toolpath.tilt_centres - opened.toolpath.tilt_centre * opened.axes
     tips, axes = tips @ placement.rotation.T + placement.translation, opened.axes @ placement.rotation.T
     joints = tips[:, None] + (machine.tool_length - machine.robot.offsets)[:, None] * axes[:, None]
     lengths = np.linalg.norm(joints - np.column_stack([machine.robot.base, np.zeros(5)]), axis=2)

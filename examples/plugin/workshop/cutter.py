@@ -19,7 +19,7 @@ class Engraver(Mounted):
     radius: Annotated[float, Key("mm", "of the cone's upper end", name="diameter", share=0.5, gt=0.0, le=50.0)]
     height: Annotated[float, Key("mm", "of the cone", gt=0.0, le=100.0)] = 0.01
 
-    pivot = 0.0
+    tilt_centre = 0.0
     leans = False
     scallop_radius = None
 

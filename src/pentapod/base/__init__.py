@@ -11,13 +11,12 @@ from pentapod.base.errors import (
     ToolpathError,
 )
 from pentapod.base.progress import Progress
-from pentapod.base.refusal import Blame, Refusal, RefusalError, stage
+from pentapod.base.refusal import Refusal, RefusalError, Shortfall, stage
 from pentapod.base.registry import Registry
 from pentapod.base.values import Result, Value
 
 __all__ = [
     "ArrayError",
-    "Blame",
     "InputError",
     "JobError",
     "MachineError",
@@ -29,6 +28,7 @@ __all__ = [
     "RefusalError",
     "Registry",
     "Result",
+    "Shortfall",
     "ToolpathError",
     "Value",
     "stage",

@@ -16,7 +16,7 @@ Options = ParamSpec("Options")
 
 
 @dataclass(frozen=True)
-class Blame(Value):
+class Shortfall(Value):
     """One constraint that cannot be met, the waypoints where, and the shortfall.
 
     constraint: a name a user knows, "leg 2 too long". waypoints: inclusive index ranges into the
@@ -45,14 +45,14 @@ class Refusal(Value):
 
     stage: str
     cause: str
-    blames: tuple[Blame, ...] = ()
+    diagnosis: tuple[Shortfall, ...] = ()
     remedy: str = ""
 
     def __str__(self) -> str:
         text = f"{self.stage}: {self.cause}"
-        if self.blames:
-            text += ": " + "; ".join(str(blame) for blame in self.blames[:3])
-            text += f"; and {len(self.blames) - 3} more limits" if len(self.blames) > 3 else ""
+        if self.diagnosis:
+            text += ": " + "; ".join(str(blame) for blame in self.diagnosis[:3])
+            text += f"; and {len(self.diagnosis) - 3} more limits" if len(self.diagnosis) > 3 else ""
         return text + (f". {self.remedy}" if self.remedy else "")
 
     def unwrap(self) -> Never:

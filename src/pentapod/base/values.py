@@ -15,9 +15,9 @@ LONGEST = 300
 
 _LONGEST_FIELD, _LONGEST_TEXT, _MOST_ITEMS = 120, 80, 6
 _UNITS = {
-    "m": "tips legs pivots points vertices stations knots pivot length radius stepover scallop spacing chordal"
-    " clearance approach hop closest shortest flute corner neck_radius height path_tolerance translation tool_length"
-    " offsets depth min_length max_length",
+    "m": "tips legs tilt_centres points vertices stations knots tilt_centre length radius stepover scallop spacing"
+    " chordal clearance approach hop closest shortest flute corner neck_radius height path_tolerance translation"
+    " tool_length offsets depth min_length max_length",
     "s": "times period duration seconds dwells dwell wait",
     "m/s": "speeds feed link_feed max_velocity rapid",
     "m/s²": "max_acceleration",

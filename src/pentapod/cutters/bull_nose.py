@@ -37,7 +37,7 @@ class BullNose(Mounted):
         check_flute(self.flute, self.corner)
 
     @property
-    def pivot(self) -> float:
+    def tilt_centre(self) -> float:
         """The tip."""
         return 0.0
 

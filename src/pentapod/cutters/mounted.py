@@ -48,7 +48,7 @@ class Balled(Mounted):
     ]
 
     @property
-    def pivot(self) -> float:
+    def tilt_centre(self) -> float:
         """The ball's centre, a radius above the tip."""
         return self.radius
 

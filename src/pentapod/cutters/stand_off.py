@@ -28,7 +28,7 @@ class StandOff(Mounted):
             raise ToolpathError("the stand-off must not be negative", key="distance", value=self.distance)
 
     @property
-    def pivot(self) -> float:
+    def tilt_centre(self) -> float:
         """The spot on the surface, the stand-off below the tip."""
         return -self.distance
 

@@ -14,16 +14,16 @@ from pentapod.geometry.solids import Solid
 
 
 class Tool(Protocol):
-    """What meets the surface. `pivot` is as in `Toolpath`."""
+    """What meets the surface. `tilt_centre` is as in `Toolpath`."""
 
     @property
-    def pivot(self) -> float:
+    def tilt_centre(self) -> float:
         """Distance in metres from the tip along the axis to the point about which the tool may tilt."""
         ...
 
     @property
     def leans(self) -> bool:
-        """Whether the tool may tilt about its pivot and still meet the surface where it did."""
+        """Whether the tool may tilt about its tilt centre and still meet the surface where it did."""
         ...
 
     @property

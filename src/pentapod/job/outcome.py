@@ -188,7 +188,7 @@ def refusal_verdict(refusal: Refusal, sources: Sources) -> Verdict:
             where=Place(),
             method=f"{refusal.stage}: shortfall of the best attempt",
         )
-        for blame in refusal.blames
+        for blame in refusal.diagnosis
     ]
     whole = Certificate("the job can be done", False, None, None, "", Place(), str(refusal))
     return Verdict((whole, *blames), sources=sources)
@@ -200,13 +200,13 @@ def refusal_dict(refusal: Refusal) -> dict[str, Any]:
         "stage": refusal.stage,
         "cause": refusal.cause,
         "remedy": refusal.remedy,
-        "blames": [
+        "diagnosis": [
             {
                 "constraint": blame.constraint,
                 "shortfall": blame.shortfall,
                 "unit": blame.unit,
                 "waypoints": [list(pair) for pair in blame.waypoints],
             }
-            for blame in refusal.blames
+            for blame in refusal.diagnosis
         ],
     }

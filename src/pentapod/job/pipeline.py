@@ -162,9 +162,9 @@ class _Task:
 
     def on(self, placement: Placement) -> _Task:
         """Return the task with the machine's guides where a placement wants them."""
-        if placement.slides is None:
+        if placement.rail_positions is None:
             return self
-        machine = self.machine.at(placement.slides)
+        machine = self.machine.at(placement.rail_positions)
         return dataclasses.replace(self, asked=dataclasses.replace(self.asked, machine=machine))
 
     def written(self, placed: PlacedPath, file: Path) -> Program | Refusal:
@@ -193,7 +193,7 @@ class _Task:
             "tilt": self.asked.tilt,
             "constraints": self.asked.constraints or FREE,
             "component": self.asked.component,
-            "surroundings": self.asked.surroundings or NOTHING,
+            "collision_world": self.asked.collision_world or NOTHING,
             "weights": job_weights(self.job),
             "solver": self.job.placement.solver,
         }
@@ -218,9 +218,9 @@ class _Task:
         position, direction = self.machine.robot.pose(program.legs, program.component)
         tips = position + self.machine.tool_length * direction
         # A beam or a spray needs constant speed on the surface; a cutter only has an upper bound.
-        beam, period = self.toolpath.pivot < 0.0, self.machine.controller.period
+        beam, period = self.toolpath.tilt_centre < 0.0, self.machine.controller.period
         slow = unheld(trajectory, period, path.surface_rate) if beam else ()
-        spot = self.toolpath.pivot if beam else 0.0
+        spot = self.toolpath.tilt_centre if beam else 0.0
         uses = certify(trajectory, self.machine, legs=program.legs, tips=tips, axes=-direction, spot=spot)
         return explain(trajectory, self.machine, uses, slow)
 

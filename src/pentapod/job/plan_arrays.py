@@ -98,14 +98,14 @@ def _set_up(piece: Piece) -> Arrays:
 
 
 def _placed(placed: PlacedPath) -> Arrays:
-    slides = placed.placement.slides
+    rail_positions = placed.placement.rail_positions
     arrays = {
         "placed.component": np.array(placed.component, dtype=np.int8),
         "placed.tips_mm": placed.tips,
         "placed.axes": placed.axes,
         "placed.margins": placed.margins,
         "placed.margin_names": np.array(placed.margin_names),
-        **({} if slides is None else {GUIDES: np.array(slides)}),
+        **({} if rail_positions is None else {GUIDES: np.array(rail_positions)}),
     }
     return {"placed.placement_mm": matrix_mm(placed.placement.transform), **_in_units(arrays)}
 

@@ -37,7 +37,7 @@ from pentapod.kinematics.mode import MODES, Mode
 from pentapod.kinematics.proofs.certificate import ComponentProof, certify_component
 from pentapod.kinematics.proofs.chords import prove_chords
 from pentapod.kinematics.proofs.motion import MotionProof, certify_motion
-from pentapod.kinematics.proofs.pose_enclosure import roaming
+from pentapod.kinematics.proofs.pose_enclosure import pose_enclosure
 from pentapod.kinematics.proofs.tip_tube import TipTube, prove_tip_tube
 from pentapod.kinematics.robot import Branch, Robot, SingularSurface
 from pentapod.kinematics.stiffness import tip_compliance, tip_stiffness
@@ -79,11 +79,11 @@ __all__ = [
     "leg_moment_map",
     "orientation_distance",
     "platform_obstacles",
+    "pose_enclosure",
     "pose_jacobian",
     "position_distance",
     "prove_chords",
     "prove_tip_tube",
-    "roaming",
     "singular_plane",
     "singularity_cofactors",
     "singularity_polynomial",

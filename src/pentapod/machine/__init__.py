@@ -1,7 +1,7 @@
 """Machines that were built: geometry with limits and bodies, their files, and what can be said about them."""
 
 from pentapod.machine.calibration.calibration import Calibration, calibrate
-from pentapod.machine.clearance.collision_world import NOTHING, Obstacle, Surroundings
+from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld, Obstacle
 from pentapod.machine.clearance.leg_clearance import clearances, pair_names
 from pentapod.machine.clearance.segments import segment_distance
 from pentapod.machine.drives import Drives, Masses
@@ -19,6 +19,7 @@ __all__ = [
     "NOTHING",
     "Bodies",
     "Calibration",
+    "CollisionWorld",
     "ControllerSettings",
     "Drives",
     "Finding",
@@ -28,7 +29,6 @@ __all__ = [
     "MachineReport",
     "Masses",
     "Obstacle",
-    "Surroundings",
     "ToolLimits",
     "WorkVolume",
     "calibrate",

@@ -58,12 +58,12 @@ class Machine(Value):
     masses: Masses = field(default_factory=Masses)
     tool_limits: ToolLimits = field(default_factory=ToolLimits)
     guides: ReconfigurablePentapod | None = None
-    slides: Floats = field(default_factory=lambda: np.zeros(FiveLegs.n_legs))
+    rail_positions: Floats = field(default_factory=lambda: np.zeros(FiveLegs.n_legs))
     architecture: float = field(init=False)
 
     def __post_init__(self) -> None:
         positive(self, "tool_length", "rapid_velocity")
-        set_frozen(self, slides=frozen(self.slides, "slides", (self.robot.n_legs,)))
+        set_frozen(self, rail_positions=frozen(self.rail_positions, "rail_positions", (self.robot.n_legs,)))
         self._check_legs()
         measure = self.robot.conditioning
         set_frozen(self, architecture=measure)
@@ -120,14 +120,16 @@ class Machine(Value):
         """Return this machine with another tool: metres from p to the tip. Raises MachineError."""
         return dataclasses.replace(self, tool_length=tool_length)
 
-    def at(self, slides: ArrayLike) -> Machine:
+    def at(self, rail_positions: ArrayLike) -> Machine:
         """Return this machine with its guides at slides (n_legs,), metres.
 
         Raises MachineError: it has no guides, or is architecturally singular there. Their travel is not looked at.
         """
         if self.guides is None:
-            raise MachineError("this machine has no guides", key="guides", value=np.asarray(slides).tolist())
-        return dataclasses.replace(self, robot=self.guides.at(slides), slides=np.asarray(slides, dtype=np.float64))
+            raise MachineError("this machine has no guides", key="guides", value=np.asarray(rail_positions).tolist())
+        return dataclasses.replace(
+            self, robot=self.guides.at(rail_positions), rail_positions=np.asarray(rail_positions, dtype=np.float64)
+        )
 
 
 def load_machine(name_or_path: str | Path) -> Machine:

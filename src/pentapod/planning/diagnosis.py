@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from pentapod.base.arrays import Bools, Floats
-from pentapod.base.refusal import Blame
+from pentapod.base.refusal import Shortfall
 from pentapod.geometry.runs import marked_runs
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.placed_path import PlacedPath, UnplacedPath
 
 
-def diagnose(values: Floats, margins: Margins, needed: float) -> tuple[Blame, ...]:
+def diagnose(values: Floats, margins: Margins, needed: float) -> tuple[Shortfall, ...]:
     """Return what falls short of the `needed` margin, worst first. values (N, M): each waypoint's margins."""
-    blames: list[tuple[float, Blame]] = []
+    blames: list[tuple[float, Shortfall]] = []
     for column, limit in zip((values - needed).T, margins.limits, strict=True):
         if (short := column < 0.0).any():
             worst = float(column.min())
-            blames.append((worst, Blame(limit.name, ranges(short), limit.shortfall(worst), limit.unit)))
+            blames.append((worst, Shortfall(limit.name, ranges(short), limit.shortfall(worst), limit.unit)))
     return tuple(b for _, b in sorted(blames, key=lambda pair: pair[0]))
 
 

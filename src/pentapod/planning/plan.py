@@ -9,7 +9,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal
 from pentapod.kinematics.robot import Branch
-from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
+from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.machine import Machine
 from pentapod.numerics.one_thread import on_one_thread
 from pentapod.planning.diagnosis import refusal
@@ -40,7 +40,7 @@ class PlacementOptions(TypedDict):
     tilt: float
     constraints: PlacementConstraints
     component: Branch | None
-    surroundings: Surroundings
+    collision_world: CollisionWorld
     weights: Weights
     solver: SolverName
 
@@ -53,7 +53,7 @@ def plan(
     tilt: float = 0.0,
     constraints: PlacementConstraints = FREE,
     component: Branch | None = None,
-    surroundings: Surroundings = NOTHING,
+    collision_world: CollisionWorld = NOTHING,
     weights: Weights = EVEN,
     secondary_objective: SecondaryObjective | None = None,
     limits: Sequence[LimitKind] | None = None,
@@ -65,8 +65,8 @@ def plan(
 
     tilt: half angle in radians of the cone around the nominal axis within which the tool may lean.
     constraints: the allowed placements; of them, and of all components where none is given, the one with the largest
-    smallest margin is kept, the margins weighed by `weights`; a machine's guides are chosen with it. surroundings: what
-    legs, spindle and tool must not touch.
+    smallest margin is kept, the margins weighed by `weights`; a machine's guides are chosen with it. collision_world:
+    what legs, spindle and tool must not touch.
     secondary_objective: a tenth of that margin may be given up for it. limits: the kinds of limits, all of `LIMITS` by
     default. Deterministic for a seed. Returns a Refusal that names limits, waypoints and shortfalls where the part does
     not fit. An interruption (Ctrl-C) of the search ends it with the best placement found so far, if that fits; else
@@ -74,7 +74,7 @@ def plan(
     """
     problem = PlacementProblem.of(
         ToolpathSamples.of(toolpath, tilt), machine, constraints, weights,
-        component=component, surroundings=surroundings, limits=limits,
+        component=component, collision_world=collision_world, limits=limits,
     )  # fmt: skip
     problem, found = _searched(problem, seed, solver, progress)
     best = found.best
@@ -102,7 +102,7 @@ def fits(toolpath: Toolpath, machine: Machine, **options: Unpack[PlacementOption
     """
     problem = PlacementProblem.of(
         ToolpathSamples.of(toolpath, options["tilt"]), machine, options["constraints"], options["weights"],
-        component=options["component"], surroundings=options["surroundings"],
+        component=options["component"], collision_world=options["collision_world"],
     )  # fmt: skip
     _, found = _searched(problem, 0, options["solver"], silent)
     if found.interrupted:
@@ -122,9 +122,9 @@ def _searched(
 def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: Floats, chosen_by: str) -> PlacedPath:
     """Return the path at a candidate's placement with leans (N, 3), workpiece frame."""
     tips, axes = problem.samples.machine_poses(at.transform, lean(problem.samples.nominal, leans))
-    slides = None if problem.machine.guides is None else tuple(problem.machine.slides.tolist())
+    rail_positions = None if problem.machine.guides is None else tuple(problem.machine.rail_positions.tolist())
     values = at.margins(tips, axes, at.transform)
-    placement = Placement(at.transform, chosen_by, slides)
+    placement = Placement(at.transform, chosen_by, rail_positions)
     return PlacedPath(toolpath, placement, at.margins.component, tips, axes, values, at.margins.limits)
 
 

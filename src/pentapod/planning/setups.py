@@ -10,7 +10,7 @@ import numpy as np
 
 from pentapod.base.arrays import Bools, Floats
 from pentapod.base.progress import Progress, silent
-from pentapod.base.refusal import Blame, Refusal
+from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.geometry.runs import marked_runs
 from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.linking.partition import Piece, cutting_intervals, part_of, pass_ends
@@ -170,5 +170,5 @@ def _refusal(search: _Search, most: int, whole: Refusal) -> Refusal:
     share = 100.0 * float(search.reached.sum() / search.cutting.sum())
     reached = f"the best split found reaches {share:.0f} % of the cuts"
     cause = f"{most} set-ups are not enough: {reached}; in one set-up {whole.cause}"
-    over = Blame(f"beyond {most} set-ups", left, 0.0, "")
-    return replace(whole, cause=cause, blames=(over, *whole.blames), remedy=f"Try more set-ups. {whole.remedy}")
+    over = Shortfall(f"beyond {most} set-ups", left, 0.0, "")
+    return replace(whole, cause=cause, blames=(over, *whole.diagnosis), remedy=f"Try more set-ups. {whole.remedy}")

@@ -74,12 +74,12 @@ def _cone(problem: PlacementProblem, best: Candidate, improve: Raise, needed: fl
 
 def _region(problem: PlacementProblem, best: Candidate, improve: Raise, needed: float) -> str:
     """Return the largest box about the path's middle, in proportion to its extents, that was found to fit."""
-    low, high = problem.samples.pivots.min(axis=0), problem.samples.pivots.max(axis=0)
+    low, high = problem.samples.tilt_centres.min(axis=0), problem.samples.tilt_centres.max(axis=0)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     fits, too_large, start = 0.0, 1.0, best
     share = 0.6
     for _ in range(_OPTIONS.halvings):
-        inside = np.flatnonzero((np.abs(problem.samples.pivots - middle) <= share * half + 1e-9).all(axis=1))
+        inside = np.flatnonzero((np.abs(problem.samples.tilt_centres - middle) <= share * half + 1e-9).all(axis=1))
         found = None
         if len(inside) > 0:
             part = problem.along(problem.samples.at(inside))

@@ -58,7 +58,7 @@ class Header:
     placement: RigidTransform
     provenance: Provenance
     rows: int
-    slides: tuple[float, ...] | None = None
+    rail_positions: tuple[float, ...] | None = None
 
     def program(self, legs: Floats) -> Program:
         """Return the program of this header and its rows (N, n_legs), metres."""
@@ -69,7 +69,7 @@ class Header:
             component=self.component,
             placement=self.placement,
             provenance=self.provenance,
-            slides=self.slides,
+            rail_positions=self.rail_positions,
         )
 
 
@@ -90,8 +90,8 @@ def header_text(program: Program) -> str:
     )
     lines = [f"# {UNVERIFIED}\n"] if source.unverified else []
     lines += [f"# {key} = {value}\n" for key, value in zip(KEYS, values, strict=True)]
-    if program.slides is not None:
-        lines.append(f"# {GUIDES} = [{', '.join(_decimal(x, 3) for x in program.slides)}]\n")
+    if program.rail_positions is not None:
+        lines.append(f"# {GUIDES} = [{', '.join(_decimal(x, 3) for x in program.rail_positions)}]\n")
     if source.piece is not None:
         lines += [f"# {WAYPOINTS} = [{source.piece.first}, {source.piece.last}]\n", f"# {BOX} = {_box(source.piece)}\n"]
     made_on = zip(MADE_ON, (source.processor, source.libraries), strict=True)
@@ -168,7 +168,7 @@ class _Reader:
                 **{key: self._text(key) for key in MADE_ON if key in self.values},
             ),
             rows=self._rows(),
-            slides=self._slides(),
+            rail_positions=self._rail_positions(),
         )
 
     def _wrong(self, key: str, expected: str) -> ProgramError:
@@ -192,14 +192,16 @@ class _Reader:
             raise self._wrong("period_s", "a positive number of seconds")
         return period
 
-    def _slides(self) -> tuple[float, ...] | None:
+    def _rail_positions(self) -> tuple[float, ...] | None:
         if GUIDES not in self.values:
             return None
         given = self.values[GUIDES]
-        slides = [_number(entry, shift=-3) for entry in cast("list[Any]", given)] if isinstance(given, list) else []
-        if len(slides) != FiveLegs.n_legs or not all(map(math.isfinite, slides)):
+        rail_positions = (
+            [_number(entry, shift=-3) for entry in cast("list[Any]", given)] if isinstance(given, list) else []
+        )
+        if len(rail_positions) != FiveLegs.n_legs or not all(map(math.isfinite, rail_positions)):
             raise self._wrong(GUIDES, "five numbers of mm, one for each guide")
-        return tuple(slides)
+        return tuple(rail_positions)
 
     def _piece(self) -> Piece | None:
         present = [key for key in SETUP_KEYS if key in self.values]

@@ -46,8 +46,8 @@ class Program(Result):
 
     legs (N, n_legs): lengths in metres, row k is due at k · period seconds. interpolation: how the controller
     moves between rows: "linear", or "cubic": the C2 cubic spline through the rows with zero end
-    velocities. component: in which the motion must stay. placement: workpiece → machine. slides: where the guides of a
-    reconfigurable machine stand, metres; None for other machines.
+    velocities. component: in which the motion must stay. placement: workpiece → machine. rail_positions: where the
+    guides of a reconfigurable machine stand, metres; None for other machines.
     """
 
     summary = ("duration",)
@@ -58,7 +58,7 @@ class Program(Result):
     component: Branch
     placement: RigidTransform
     provenance: Provenance
-    slides: tuple[float, ...] | None = None
+    rail_positions: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         set_frozen(self, legs=frozen(self.legs, "legs", (None, None)))
@@ -69,7 +69,7 @@ class Program(Result):
 
     def machine(self, machine: Machine) -> Machine:
         """Return a machine as the program wants it: its guides where they are to stand. Raises MachineError."""
-        return machine if self.slides is None or machine.guides is None else machine.at(self.slides)
+        return machine if self.rail_positions is None or machine.guides is None else machine.at(self.rail_positions)
 
     @cached_property
     def times(self) -> Floats:

@@ -54,5 +54,5 @@ def sample(
         component=component,
         placement=placement,
         provenance=provenance or Provenance(machine.name, machine.digest, "", __version__, None, *made_on),
-        slides=None if machine.guides is None else tuple(machine.slides.tolist()),
+        rail_positions=None if machine.guides is None else tuple(machine.rail_positions.tolist()),
     )

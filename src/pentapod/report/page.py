@@ -12,12 +12,12 @@ import numpy as np
 from pentapod.base.files import atomic_write
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job.build.collision_world import job_surroundings
+from pentapod.job.build.collision_world import job_collision_world
 from pentapod.job.build.placement import job_at, placement_toml
 from pentapod.job.outcome import Outcome, SetUps
 from pentapod.job.plan_arrays import matrix_mm
 from pentapod.job.schema.job import Job
-from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
+from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.leg_ends import leg_ends
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.placed_path import PlacedPath, UnplacedPath
@@ -70,7 +70,7 @@ def _context(outcome: Outcome) -> dict[str, Any]:
     trajectory, toolpath = outcome.find(Trajectory), outcome.find(Toolpath)
     signals = None
     if program is not None and trajectory is not None and toolpath is not None:
-        signals = Signals.of(program, outcome.machine, trajectory, toolpath, _surroundings(outcome))
+        signals = Signals.of(program, outcome.machine, trajectory, toolpath, _collision_world(outcome))
     figures: dict[str, Figure] = {"scene": _scene(outcome, signals)}
     if signals is not None:
         figures["time"] = plots.time_figure(signals, outcome.machine)
@@ -102,10 +102,10 @@ def _context(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _surroundings(outcome: Outcome) -> Surroundings:
+def _collision_world(outcome: Outcome) -> CollisionWorld:
     """Return what the planner kept clear of."""
     mesh = outcome.find(Mesh)
-    return NOTHING if mesh is None else job_surroundings(outcome.job, outcome.machine, mesh)
+    return NOTHING if mesh is None else job_collision_world(outcome.job, outcome.machine, mesh)
 
 
 def _facts(outcome: Outcome, signals: Signals | None) -> list[tuple[str, str]]:
@@ -146,8 +146,8 @@ def _scene(outcome: Outcome, signals: Signals | None) -> Figure:
         shown = toolpath if placed is None else placed
         traces += scene.blamed_traces(shown.tips, shown.axes, refusal)
         if placed is not None:
-            worst, slides = int(placed.margins.min(axis=1).argmin()), placed.placement.slides
-            machine = outcome.machine if slides is None else outcome.machine.at(slides)
+            worst, rail_positions = int(placed.margins.min(axis=1).argmin()), placed.placement.rail_positions
+            machine = outcome.machine if rail_positions is None else outcome.machine.at(rail_positions)
             traces += scene.machine_traces(machine, placed.tips[worst], placed.axes[worst])
     elif toolpath is not None and (setups := outcome.find(SetUps)) is not None:
         traces += scene.piece_traces(toolpath, [part.piece for part in setups.parts])

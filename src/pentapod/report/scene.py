@@ -139,7 +139,7 @@ def blamed_traces(tips: Floats, axes: Floats, refusal: Refusal) -> list[dict[str
     path = _line3d(tips[keep_extremes(tips[:, 2], _BUCKETS)], "toolpath", QUIET_COLOUR, 1.5)
     traces = [path]
     colours = (LIMIT_COLOUR, *LEG_COLOURS)
-    for k, blame in enumerate(refusal.blames):
+    for k, blame in enumerate(refusal.diagnosis):
         chosen = np.concatenate([np.arange(a, b + 1) for a, b in blame.waypoints] or [np.zeros(0, dtype=np.intp)])
         chosen = chosen[: len(tips)][:: max(1, len(chosen) // 3000)]
         points = _line3d(tips[np.minimum(chosen, len(tips) - 1)], blame.constraint, colours[k % len(colours)], 1.0)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pentapod.base.arrays import Floats, Ints, set_frozen
 from pentapod.geometry.interpolant import Interpolant
-from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
+from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.margins import Margins
 from pentapod.program.program import Program
@@ -54,24 +54,24 @@ class Signals:
         machine: Machine,
         trajectory: Trajectory,
         toolpath: Toolpath,
-        surroundings: Surroundings = NOTHING,
+        collision_world: CollisionWorld = NOTHING,
     ) -> Signals:
         """Compute the signals of a program. The trajectory tells which segment is due when, and what limits it.
 
-        surroundings: what legs, spindle and tool must not touch; the gaps to it are margins, too.
+        collision_world: what legs, spindle and tool must not touch; the gaps to it are margins, too.
         """
         times = program.times
         joined = Interpolant.through(program.legs, program.period, program.interpolation)
         tips, axes = _poses(program, machine)
         segments = trajectory.segment(np.minimum(times, trajectory.duration))
         speeds = np.linalg.norm(np.gradient(tips, program.period, axis=0), axis=1)
-        if toolpath.pivot < 0.0:
-            spots = tips + toolpath.pivot * axes
+        if toolpath.tilt_centre < 0.0:
+            spots = tips + toolpath.tilt_centre * axes
             rapid = np.array([s.kind == SegmentKind.RAPID for s in toolpath.segments])[segments]
             speeds = np.where(rapid, speeds, np.linalg.norm(np.gradient(spots, program.period, axis=0), axis=1))
         feeds = np.array([min(s.feed, machine.rapid_velocity) for s in toolpath.segments])
         kinds = np.array([s.kind == SegmentKind.CUT for s in toolpath.segments])
-        margins = Margins.of(machine, program.component, surroundings)
+        margins = Margins.of(machine, program.component, collision_world)
         step = max(1, -(-len(times) // MOST_MARGIN_ROWS))
         rows = np.unique(np.append(np.arange(0, len(times), step), len(times) - 1)).astype(np.intp)
         blocks = np.array_split(rows, -(-len(rows) // _CHUNK))

@@ -87,7 +87,10 @@ class Tracking(Value):
             Measure("tip error", "mm", _MM * off, "tip to where it is due at that moment"),
             Measure("axis error", "deg", np.degrees(twist), "axis to the one due at that moment"),
             Measure(
-                "toolpath deviation", "mm", _MM * self._match.distances, "tip (or pivot) to the toolpath, as verified"
+                "toolpath deviation",
+                "mm",
+                _MM * self._match.distances,
+                "tip (or tilt centre) to the toolpath, as verified",
             ),
             Measure("leg error", "mm", _MM * np.abs(played.legs - reference.program.legs).max(axis=1), "of any leg"),
             *self.more,
@@ -129,5 +132,5 @@ class Tracking(Value):
     def _match(self) -> PathMatch:
         home = self.reference.program.placement.inverse()
         axes = home.rotate(-self.played.directions)
-        course = PosedPolyline(home.apply(self.played.tips) + self.toolpath.pivot * axes, axes)
-        return match(course, PosedPolyline(self.toolpath.pivots, self.toolpath.axes), self.tolerance)
+        course = PosedPolyline(home.apply(self.played.tips) + self.toolpath.tilt_centre * axes, axes)
+        return match(course, PosedPolyline(self.toolpath.tilt_centres, self.toolpath.axes), self.tolerance)

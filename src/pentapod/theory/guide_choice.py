@@ -66,15 +66,15 @@ def stiffness_criterion(leg_stiffness: ArrayLike, tool_length: float) -> Criteri
 class GuideChoice(Value):
     """Slides (5,) in metres, the criterion's least value over the poses there, and at the start."""
 
-    slides: Floats
+    rail_positions: Floats
     value: float
     start_value: float
 
     def __post_init__(self) -> None:
-        set_frozen(self, slides=frozen(self.slides, "slides", (5,)))
+        set_frozen(self, rail_positions=frozen(self.rail_positions, "rail_positions", (5,)))
 
 
-def choose_slides(
+def choose_rail_positions(
     robot: ReconfigurablePentapod,
     position: ArrayLike,
     direction: ArrayLike,
@@ -104,16 +104,16 @@ def choose_slides(
     if reciprocal_condition(robot.base_at(here), robot.pentapod.delta) < least_measure:
         raise ArrayError("the machine is too near to architectural singularity at the start", expected="another start")
 
-    def values(slides: Floats) -> Floats:
-        worst = np.empty(len(slides))
-        for k in range(0, len(slides), 64):
-            base, offsets = robot.base_at(slides[k : k + 64]), robot.offsets_at(slides[k : k + 64])
+    def values(rail_positions: Floats) -> Floats:
+        worst = np.empty(len(rail_positions))
+        for k in range(0, len(rail_positions), 64):
+            base, offsets = robot.base_at(rail_positions[k : k + 64]), robot.offsets_at(rail_positions[k : k + 64])
             worst[k : k + 64] = criterion(base, offsets, p, i).min(axis=1)
         return worst
 
-    def allowed(slides: Floats) -> bool:
-        measure = reciprocal_condition(robot.base_at(slides), robot.pentapod.delta)
-        return measure >= least_measure and robot.stays_regular(here, slides)
+    def allowed(rail_positions: Floats) -> bool:
+        measure = reciprocal_condition(robot.base_at(rail_positions), robot.pentapod.delta)
+        return measure >= least_measure and robot.stays_regular(here, rail_positions)
 
     start_value = float(values(here[None])[0])
     tried = _spread(low, high, candidates, seed)
@@ -124,9 +124,9 @@ def choose_slides(
         if len(starts) < 4 and scores[k] > 0.0 and allowed(tried[k]):
             starts.append(tried[k])
     for near in starts:
-        slides, score = _refine(near, low, high, values, allowed)
+        rail_positions, score = _refine(near, low, high, values, allowed)
         if score > value:
-            best, value = slides, score
+            best, value = rail_positions, score
     return GuideChoice(best, value, start_value)
 
 
@@ -160,16 +160,16 @@ def _refine(
     free = high > low
 
     def whole(part: Floats) -> Floats:
-        slides = start.copy()
-        slides[free] = np.clip(part, low[free], high[free])
-        return slides
+        rail_positions = start.copy()
+        rail_positions[free] = np.clip(part, low[free], high[free])
+        return rail_positions
 
     def cost(part: Floats) -> float:
-        slides = whole(part)
-        return -float(values(slides[None])[0]) if allowed(slides) else 0.0
+        rail_positions = whole(part)
+        return -float(values(rail_positions[None])[0]) if allowed(rail_positions) else 0.0
 
     if not free.any():
         return start, float(values(start[None])[0])
     found = minimize(cost, start[free], method="Nelder-Mead", options={"maxfev": 300, "xatol": 1e-6, "fatol": 1e-12})
-    slides = whole(found.x)
-    return slides, -cost(slides[free])
+    rail_positions = whole(found.x)
+    return rail_positions, -cost(rail_positions[free])

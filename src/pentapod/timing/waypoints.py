@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, as_floats, frozen, set_frozen
 from pentapod.base.errors import InputError
-from pentapod.base.refusal import Blame, Refusal
+from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.base.values import Result
 from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.topp.engine import Engine, fastest
@@ -63,7 +63,7 @@ def through_waypoints(
     x = fastest(s, *spline.rows(fast, push), engine=engine)
     if isinstance(x, Failure):
         k = max(x.gridpoint, 0)
-        return Refusal("timing", f"{x.reason}; waypoint {k}", (Blame("time law", ((k, k),), 0.0, ""),))
+        return Refusal("timing", f"{x.reason}; waypoint {k}", (Shortfall("time law", ((k, k),), 0.0, ""),))
     law = MotionLaw.from_profile(s, x)
     count = int(np.ceil(law.duration / period - 1e-9)) + 1
     return WaypointMotion(spline.along(law, period, count), period, law)

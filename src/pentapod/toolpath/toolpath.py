@@ -77,7 +77,7 @@ class Segment(Value):
 class Toolpath(Value):
     """One continuous motion in the workpiece frame: each segment begins where the one before ends.
 
-    pivot: distance in metres from the tip along the axis to the point about which the tool may tilt
+    tilt_centre: distance in metres from the tip along the axis to the point about which the tool may tilt
     without leaving the surface: the ball's radius for a ball cutter, −stand-off for a beam or spray
     (the spot on the surface), 0 for a fixed tip. wait: seconds for which the tool stands at the first waypoint before
     it sets off. Waypoints are the poses of all segments, joints once. Raises ToolpathError where two segments do not
@@ -87,7 +87,7 @@ class Toolpath(Value):
     summary = ("waypoints", "cut_length")
 
     segments: tuple[Segment, ...]
-    pivot: float = 0.0
+    tilt_centre: float = 0.0
     wait: float = 0.0
 
     def __post_init__(self) -> None:
@@ -111,9 +111,9 @@ class Toolpath(Value):
         return self._joined("axes")
 
     @cached_property
-    def pivots(self) -> Floats:
-        """The points (N, 3) about which the axis may tilt: tips + pivot · axes, metres."""
-        return self.tips + self.pivot * self.axes
+    def tilt_centres(self) -> Floats:
+        """The points (N, 3) about which the axis may tilt: tips + tilt_centre · axes, metres."""
+        return self.tips + self.tilt_centre * self.axes
 
     @cached_property
     def starts(self) -> Ints:

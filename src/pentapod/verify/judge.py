@@ -58,7 +58,7 @@ CLAIMS: tuple[Claim, ...] = (
 )
 """Every claim that a verdict makes, in its order; "readable" comes before them where a file is judged.
 
-After them come those about the surroundings, where there are any (`collisions`). A file of its own for each subject,
+After them come those about the collision_world, where there are any (`collisions`). A file of its own for each subject,
 with its claims in CLAIMS: a new one is added here and nowhere else.
 """
 
@@ -80,10 +80,10 @@ def verify(
     """Return the verdict on a program, or on a program file, from its rows alone.
 
     asked: the other fields of `Specification`, which says what they mean: tilt, path_tolerance and axis_tolerance, and
-    what else the program is judged against: freedom, component, surroundings, cutting, job_digest. A claim that needs
-    what was not told is listed as "not judged"; the verdict fails then, unless the claim's name is among `waived`.
-    strict: claims that do not apply are listed too, with the reason. claims: further ones, which stand after all others
-    and may be waived as they may. A malformed file gives a failed verdict with the
+    what else the program is judged against: freedom, component, collision_world, cutting, job_digest. A claim that
+    needs what was not told is listed as "not judged"; the verdict fails then, unless the claim's name is among
+    `waived`. strict: claims that do not apply are listed too, with the reason. claims: further ones, which stand after
+    all others and may be waived as they may. A malformed file gives a failed verdict with the
     one claim "readable". Raises ProgramError where there is no such file, ArrayError where a tolerance is not a
     sensible number, InputError where a waived claim is not known.
     """
@@ -123,8 +123,8 @@ def judged(
             (*read, Certificate(provenance.GUIDES, False, None, None, "", Place(), str(error))), sources=sources
         )
     replay, unjudged = Replay(program, specification, progress), list[NotJudged]()
-    _ = replay.survey
-    around = collisions.claims(specification.surroundings, specification.machine.robot.n_legs)
+    _ = replay.interval_bounds
+    around = collisions.claims(specification.collision_world, specification.machine.robot.n_legs)
     claims = (*CLAIMS, *around, *claims)
     for k, claim in enumerate(claims):
         progress("verify", SURVEY_SHARE + (1.0 - SURVEY_SHARE) * k / len(claims), claim.name)

@@ -18,7 +18,7 @@ from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.artefacts import ARRAYS, PROGRAM
-from pentapod.job.build.collision_world import job_surroundings
+from pentapod.job.build.collision_world import job_collision_world
 from pentapod.job.build.tool import job_tool
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.outcome import Outcome, SetUp
@@ -27,7 +27,7 @@ from pentapod.job.run_folder import check_run
 from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.robot import Branch
-from pentapod.machine.clearance.collision_world import Surroundings
+from pentapod.machine.clearance.collision_world import CollisionWorld
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning import PlacedPath
@@ -64,7 +64,7 @@ class Opened(Value):
     mesh: Mesh
     tool: Tool
     toolpath: Toolpath
-    surroundings: Surroundings
+    collision_world: CollisionWorld
     placement: RigidTransform
     component: Branch
     axes: Floats
@@ -96,14 +96,14 @@ def open_run(folder: str | Path, job: str | Path | None = None, progress: Progre
     machine, mesh = job_machine(loaded), job_mesh(loaded)
     progress("open", 0.7, "program")
     program = read_csv(folder / PROGRAM) if (folder / PROGRAM).is_file() else None
-    slides = guides_in(arrays) if program is None else program.slides
-    machine = machine if slides is None or machine.guides is None else machine.at(slides)
+    rail_positions = guides_in(arrays) if program is None else program.rail_positions
+    machine = machine if rail_positions is None or machine.guides is None else machine.at(rail_positions)
     wanted = loaded.placement.component
     asked = COMPONENTS[0] if wanted is None else Component.parse(wanted)
     placement, component, axes = _placed(arrays, toolpath, machine, asked)
     return Opened(
-        folder, loaded, machine, mesh, job_tool(loaded), toolpath, job_surroundings(loaded, machine, mesh), placement,
-        component, axes, program, program is None or program.provenance.job_digest == loaded.digest,
+        folder, loaded, machine, mesh, job_tool(loaded), toolpath, job_collision_world(loaded, machine, mesh),
+        placement, component, axes, program, program is None or program.provenance.job_digest == loaded.digest,
         piece_in(arrays),
     )  # fmt: skip
 
@@ -116,7 +116,7 @@ def run_of(outcome: Outcome, folder: Path) -> Opened | None:
         return None
     job, machine, placement = outcome.job, outcome.machine, placed.placement.transform
     return Opened(
-        folder, job, machine, mesh, job_tool(job), toolpath, job_surroundings(job, machine, mesh), placement,
+        folder, job, machine, mesh, job_tool(job), toolpath, job_collision_world(job, machine, mesh), placement,
         placed.component, placement.inverse().rotate(placed.axes), program, same_job=True, piece=outcome.find(Piece),
     )  # fmt: skip
 

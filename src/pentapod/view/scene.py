@@ -124,8 +124,8 @@ class Scene:
             if solids:
                 vertices, faces = tool_mesh(solids)
                 api.add_mesh_simple(f"/tool/{name}", vertices, faces, color=colour)
-        if run.tool.pivot < 0.0:
-            self._cylinder("/tool/beam", 0.4e-3, _BEAM, run.tool.pivot, 0.0)
+        if run.tool.tilt_centre < 0.0:
+            self._cylinder("/tool/beam", 0.4e-3, _BEAM, run.tool.tilt_centre, 0.0)
 
     def _cylinder(self, name: str, radius: float, colour: Rgb, low: float = 0.0, high: float = 1.0) -> viser.MeshHandle:
         profile: Floats = np.array([[0.0, low], [radius, low], [radius, high], [0.0, high]])

@@ -73,7 +73,7 @@ class Study(Value):
     def of(cls, run: Opened) -> Study:
         """Return the study of a run."""
         samples = ToolpathSamples.of(run.toolpath, float(np.radians(run.job.axis.tilt_deg)))
-        margins = Margins.of(run.machine, run.component, run.surroundings)
+        margins = Margins.of(run.machine, run.component, run.collision_world)
         return cls(samples, run.axes, margins, drawn_waypoints(run.toolpath.starts))
 
     def at(self, placement: RigidTransform, *, tilted: bool = False, thorough: bool = False) -> Reach:
@@ -97,7 +97,7 @@ class Study(Value):
 
     @property
     def _thorough_rows(self) -> Ints:
-        count = len(self.samples.pivots)
+        count = len(self.samples.tilt_centres)
         return np.unique(np.linspace(0, count - 1, min(count, _THOROUGH)).astype(np.intp))
 
 

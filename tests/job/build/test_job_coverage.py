@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pentapod.job import Job, run
-from pentapod.job.build.collision_world import job_surroundings
+from pentapod.job.build.collision_world import job_collision_world
 from pentapod.job.build.coverage import job_coverage
 from pentapod.job.build.cutting import job_cutting
 from pentapod.job.build.values import job_machine, job_mesh, job_toolpath
@@ -104,7 +104,7 @@ def test_the_block_is_sound_and_its_region_is_what_faces_up(block_job):
     region = coverage(job).region
     assert region is not None
     assert region.areas.sum() == pytest.approx(80e-3 * 60e-3, rel=1e-9)
-    cutting = job_cutting(job, job_surroundings(job, job_machine(job), mesh))
+    cutting = job_cutting(job, job_collision_world(job, job_machine(job), mesh))
     assert cutting is not None
     assert cutting.coverage is not None
 

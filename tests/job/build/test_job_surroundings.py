@@ -7,7 +7,7 @@ import trimesh
 
 from pentapod.base.errors import JobError, MeshError
 from pentapod.job import Job, judge, run
-from pentapod.job.build.collision_world import job_surroundings
+from pentapod.job.build.collision_world import job_collision_world
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.mesh.io.stl import write_stl
 
@@ -54,7 +54,7 @@ def test_a_job_with_holder_and_vise_is_done_and_judged(make_job, meshes):
 def test_a_fixture_in_the_way_is_refused_by_name(make_job, meshes):
     outcome = run(Job.load(make_job(*with_fixture("plate"))), meshes / "out")
     assert outcome.refusal is not None
-    blamed = [b for b in outcome.refusal.blames if b.constraint == "spindle touches the fixture"]
+    blamed = [b for b in outcome.refusal.diagnosis if b.constraint == "spindle touches the fixture"]
     assert blamed
     assert blamed[0].unit == "mm"
     assert blamed[0].shortfall > 0.0
@@ -63,7 +63,7 @@ def test_a_fixture_in_the_way_is_refused_by_name(make_job, meshes):
 def test_what_stays_in_the_machine_is_called_table(make_job, meshes):
     text = FIXTURE.format("plate").replace('unit = "mm"', 'unit = "mm"\nframe = "machine"')
     job = Job.load(make_job(("[feed]", text)))
-    made = job_surroundings(job, job_machine(job), job_mesh(job))
+    made = job_collision_world(job, job_machine(job), job_mesh(job))
     assert [(o.name, o.clamped) for o in made.obstacles] == [("part", True), ("table", False)]
     assert not made.tool
 
@@ -71,11 +71,11 @@ def test_what_stays_in_the_machine_is_called_table(make_job, meshes):
 def test_a_holder_above_the_joints_is_an_error(make_job):
     job = Job.load(make_job(("diameter_mm = 10", "diameter_mm = 10\nholder_mm = [[95, 40, 40]]")))
     with pytest.raises(JobError, match="lowest platform joint"):
-        job_surroundings(job, job_machine(job), job_mesh(job))
+        job_collision_world(job, job_machine(job), job_mesh(job))
 
 
 def test_a_broken_fixture_mesh_is_an_error(make_job, tmp_path):
     (tmp_path / "vise.stl").write_text("no mesh")
     job = Job.load(make_job(*with_fixture("vise")))
     with pytest.raises(MeshError):
-        job_surroundings(job, job_machine(job), job_mesh(job))
+        job_collision_world(job, job_machine(job), job_mesh(job))

@@ -29,9 +29,9 @@ def test_toolpath_writes_by_suffix_and_a_job_reads_it(make_job, tmp_path, name):
     made = job_toolpath(Job.load(job), job_mesh(Job.load(job)))[0]
     again = make_job((STRATEGY, f'strategy = "file"\nfile = "{name}"'), name="again.toml")
     path, report = job_toolpath(Job.load(again), job_mesh(Job.load(again)))
-    np.testing.assert_allclose(path.pivots, made.pivots, atol=1e-9)
+    np.testing.assert_allclose(path.tilt_centres, made.tilt_centres, atol=1e-9)
     np.testing.assert_allclose(path.axes, made.axes, atol=1e-9)
-    assert path.pivot == 5e-3
+    assert path.tilt_centre == 5e-3
     assert f"{name}: " in str(report)
     assert "gouge check" in str(report)
 
@@ -70,7 +70,7 @@ def test_long_work_on_a_toolpath_shows_its_progress(make_job, tmp_path, monkeypa
 
 
 @pytest.mark.parametrize(
-    ("tool", "pivot"),
+    ("tool", "tilt_centre"),
     [
         ('type = "bull"\ndiameter_mm = 10\ncorner_mm = 2\nflute_mm = 15', 0.0),
         ('type = "flat"\ndiameter_mm = 6\nshank_mm = [[20, 6, 6]]\nholder_mm = [[10, 12, 20], [30, 20, 20]]', 0.0),
@@ -78,10 +78,10 @@ def test_long_work_on_a_toolpath_shows_its_progress(make_job, tmp_path, monkeypa
         ('type = "standoff"\nstandoff_mm = 5\nshank_mm = [[20, 1, 10]]', -5e-3),
     ],
 )
-def test_every_tool_makes_a_toolpath(make_job, tool, pivot):
+def test_every_tool_makes_a_toolpath(make_job, tool, tilt_centre):
     job = Job.load(make_job((BALL, tool)))
     path, report = job_toolpath(job, job_mesh(job))
-    assert path.pivot == pivot
+    assert path.tilt_centre == tilt_centre
     assert "gouge check" in str(report)
 
 

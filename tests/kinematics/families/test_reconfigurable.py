@@ -8,7 +8,7 @@ import pytest
 
 from pentapod.base.errors import ArrayError, MachineError
 from pentapod.kinematics import LinearPentapod, ReconfigurablePentapod, square_jacobian, tip_compliance
-from pentapod.theory import choose_slides, conditioning_criterion, stiffness_criterion
+from pentapod.theory import choose_rail_positions, conditioning_criterion, stiffness_criterion
 
 TRAVEL = np.tile((-0.6, 0.6), (5, 1))
 
@@ -24,13 +24,13 @@ def machines(pentapod: LinearPentapod) -> list[ReconfigurablePentapod]:
 
 
 def test_the_singular_locus_stays(pentapod: LinearPentapod, random_poses, leg_determinant, conic_determinant) -> None:
-    """The leg determinant at any slides is that at no slides times a constant, the ratio of the F."""
+    """The leg determinant at any rail_positions is that at no slides times a constant, the ratio of the F."""
     rng = np.random.default_rng(51)
     p, i = random_poses(pentapod, 300, seed=52)
     before = leg_determinant(pentapod, p, i)
     for robot in machines(pentapod):
-        for slides in rng.uniform(robot.travel[:, 0], robot.travel[:, 1], size=(6, 5)):
-            moved = robot.at(slides)
+        for rail_positions in rng.uniform(robot.travel[:, 0], robot.travel[:, 1], size=(6, 5)):
+            moved = robot.at(rail_positions)
             assert moved.lever == pytest.approx(pentapod.lever, abs=1e-12)
             ratio = conic_determinant(moved) / conic_determinant(pentapod)
             after = leg_determinant(moved, p, i)
@@ -39,7 +39,8 @@ def test_the_singular_locus_stays(pentapod: LinearPentapod, random_poses, leg_de
 
 
 def test_the_identity_behind_it_over_the_rationals() -> None:
-    """det = δ² w F S for rational designs, poses and slides, without rounding: an identity, not a coincidence."""
+    """det = δ² w F S for rational designs, poses and rail_positions, without rounding: an identity, not a
+    coincidence."""
     rng = np.random.default_rng(53)
 
     def det(rows):
@@ -67,14 +68,14 @@ def test_the_identity_behind_it_over_the_rationals() -> None:
         assert det(rows) == delta**2 * w * f * (delta * w * px + (1 - delta * u) * pz) * scale
 
 
-def test_f_vanishes_at_the_forbidden_slides_and_nowhere_else(pentapod: LinearPentapod) -> None:
+def test_f_vanishes_at_the_forbidden_rail_positions_and_nowhere_else(pentapod: LinearPentapod) -> None:
     rng = np.random.default_rng(54)
     for robot in machines(pentapod):
-        slides = rng.uniform(robot.travel[:, 0], robot.travel[:, 1])
+        rail_positions = rng.uniform(robot.travel[:, 0], robot.travel[:, 1])
         for leg in range(5):
-            found = robot.forbidden_slides(leg, slides)
+            found = robot.forbidden_rail_positions(leg, rail_positions)
             reach = 10.0 * np.abs(robot.travel).max()
-            walk = np.repeat(slides[None], 40_001, axis=0)
+            walk = np.repeat(rail_positions[None], 40_001, axis=0)
             walk[:, leg] = np.linspace(-reach, reach, len(walk))
             if not robot.guides[leg].any():
                 assert found.size == 0
@@ -88,7 +89,7 @@ def test_f_vanishes_at_the_forbidden_slides_and_nowhere_else(pentapod: LinearPen
 
 def test_the_way_there_is_watched(paper: LinearPentapod) -> None:
     robot = ReconfigurablePentapod.along_y(paper, np.tile((-20.0, 20.0), (5, 1)))
-    forbidden = robot.forbidden_slides(0, np.zeros(5))[0]
+    forbidden = robot.forbidden_rail_positions(0, np.zeros(5))[0]
     beyond, before = np.zeros(5), np.zeros(5)
     beyond[0], before[0] = 1.2 * forbidden, 0.99 * forbidden
     assert robot.stays_regular(np.zeros(5), before)
@@ -123,24 +124,24 @@ def test_the_choice_is_as_good_as_a_fine_grid(paper: LinearPentapod, name: str, 
     travel = np.zeros((5, 2))
     travel[[0, 4]] = (-1.5, 1.5)
     robot = ReconfigurablePentapod.along_y(paper, travel)
-    choice = choose_slides(robot, *POSES, criterion, candidates=128)
+    choice = choose_rail_positions(robot, *POSES, criterion, candidates=128)
     i = POSES[1] / np.linalg.norm(POSES[1], axis=1)[:, None]
     best = 0.0
     for a, b in itertools.product(np.linspace(-1.5, 1.5, cells), repeat=2):
-        slides = np.array([a, 0.0, 0.0, 0.0, b])
-        if robot.stays_regular(np.zeros(5), slides):
+        rail_positions = np.array([a, 0.0, 0.0, 0.0, b])
+        if robot.stays_regular(np.zeros(5), rail_positions):
             try:
-                moved = robot.at(slides)
+                moved = robot.at(rail_positions)
             except MachineError:
                 continue
             best = max(best, criterion(moved.base[None], moved.offsets[None], POSES[0], i).min())
     assert choice.value >= best * (1 - 1e-6)
     assert choice.value > choice.start_value
-    assert ((choice.slides >= travel[:, 0]) & (choice.slides <= travel[:, 1])).all()
-    assert robot.stays_regular(np.zeros(5), choice.slides)
-    assert criterion(robot.at(choice.slides).base[None], robot.at(choice.slides).offsets[None], POSES[0], i).min() == (
-        pytest.approx(choice.value, rel=1e-9)
-    )
+    assert ((choice.rail_positions >= travel[:, 0]) & (choice.rail_positions <= travel[:, 1])).all()
+    assert robot.stays_regular(np.zeros(5), choice.rail_positions)
+    assert criterion(
+        robot.at(choice.rail_positions).base[None], robot.at(choice.rail_positions).offsets[None], POSES[0], i
+    ).min() == (pytest.approx(choice.value, rel=1e-9))
 
 
 def test_bad_guides(paper: LinearPentapod) -> None:
@@ -150,11 +151,13 @@ def test_bad_guides(paper: LinearPentapod) -> None:
         ReconfigurablePentapod.along_x(paper, -TRAVEL)
     robot = ReconfigurablePentapod.along_y(paper, TRAVEL)
     with pytest.raises(ArrayError, match="outside the travel"):
-        choose_slides(robot, *POSES, conditioning_criterion(1.0), start=np.ones(5))
+        choose_rail_positions(robot, *POSES, conditioning_criterion(1.0), start=np.ones(5))
     with pytest.raises(ArrayError, match="shape"):
         robot.base_at([1.0, 2.0])
     with pytest.raises(MachineError, match="singular"):
-        ReconfigurablePentapod.along_y(paper, 50.0 * TRAVEL).at([robot.forbidden_slides(0, np.zeros(5))[0], 0, 0, 0, 0])
+        ReconfigurablePentapod.along_y(paper, 50.0 * TRAVEL).at(
+            [robot.forbidden_rail_positions(0, np.zeros(5))[0], 0, 0, 0, 0]
+        )
     with pytest.raises(ArrayError, match="positive"):
         conditioning_criterion(0.0)
     with pytest.raises(ArrayError, match="positive"):

@@ -4,7 +4,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from pentapod.kinematics import LinearPentapod, roaming
+from pentapod.kinematics import LinearPentapod, pose_enclosure
 
 
 def well_posed(pentapod, random_poses, leg_determinant):
@@ -23,7 +23,7 @@ def test_no_lengths_in_the_hull_lead_further(pentapod, random_poses, leg_determi
     corners = legs[:, None] + half * size * rng.uniform(-1.0, 1.0, (len(p), 12, 5))
     corners[:, 0] = legs
     offsets = np.array([-0.3, 0.0, 0.7]) * size
-    points, turn = roaming(pentapod, p, i, corners, offsets)
+    points, turn = pose_enclosure(pentapod, p, i, corners, offsets)
     proven = np.isfinite(turn)
     assert proven.mean() > {1e-6: 0.99, 1e-4: 0.9, 1e-3: 0.3}[half]
     reached = np.zeros(points.shape)
@@ -40,14 +40,14 @@ def test_no_lengths_in_the_hull_lead_further(pentapod, random_poses, leg_determi
 def test_lengths_that_change_too_much_prove_nothing(pentapod, random_poses):
     p, i = random_poses(pentapod, 20, seed=3)
     legs = pentapod.leg_lengths(p, i)
-    points, turn = roaming(pentapod, p, i, np.stack([0.3 * legs, 2.0 * legs], axis=1), np.zeros(1))
+    points, turn = pose_enclosure(pentapod, p, i, np.stack([0.3 * legs, 2.0 * legs], axis=1), np.zeros(1))
     assert np.isinf(points).all()
     assert np.isinf(turn).all()
 
 
 def test_no_pose_is_no_proof(pentapod):
     nowhere = np.full((1, 3), np.nan)
-    points, turn = roaming(pentapod, nowhere, nowhere, np.ones((1, 2, 5)), np.zeros(2))
+    points, turn = pose_enclosure(pentapod, nowhere, nowhere, np.ones((1, 2, 5)), np.zeros(2))
     assert np.isinf(points).all()
     assert np.isinf(turn).all()
 
@@ -62,7 +62,7 @@ def test_rounding_is_counted_however_far_off_the_base_is(far):
     i = np.c_[rng.uniform(-0.6, 0.6, (24, 2)), np.ones(24)]
     i /= np.linalg.norm(i, axis=1)[:, None]
     legs = np.linalg.norm(robot.leg_vectors(p, i), axis=2)
-    points, turn = roaming(robot, p, i, np.stack([legs, legs * (1.0 + 1e-15)], axis=1), arms)
+    points, turn = pose_enclosure(robot, p, i, np.stack([legs, legs * (1.0 + 1e-15)], axis=1), arms)
     assert np.isfinite(turn).all()
     assert points.max() < 1e-12 + 5e-14 * far, "and not much more is counted"
     base = [[*row, 0.0] for row in robot.base.tolist()]

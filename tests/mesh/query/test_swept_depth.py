@@ -131,14 +131,14 @@ def sampled(mesh, tool, tips, axes, count=800, steps=21):
     weights = np.concatenate([np.eye(3), rng.dirichlet([0.7] * 3, max(4, count // len(mesh.faces)))])
     points = (weights @ mesh.vertices[mesh.faces]).reshape(-1, 3)
     depth = np.full(3, -np.inf)
-    start, end = tips + tool.pivot * axes
+    start, end = tips + tool.tilt_centre * axes
     angle = np.arctan2(np.linalg.norm(np.cross(*axes)), axes[0] @ axes[1])
     for t in np.linspace(0, 1, steps):
         if angle > 1e-9:
             axis = (np.sin((1 - t) * angle) * axes[0] + np.sin(t * angle) * axes[1]) / np.sin(angle)
         else:
             axis = axes[0]
-        w = points - (start + t * (end - start)) + tool.pivot * axis
+        w = points - (start + t * (end - start)) + tool.tilt_centre * axis
         z = w @ axis
         r = np.linalg.norm(w - z[:, None] * axis, axis=1)
         for solid in tool.solids:

@@ -122,19 +122,19 @@ def test_waypoints_have_stations(mixed):
         assert len(piece.waypoints) == len(piece.waypoint_stations)
         assert piece.waypoint_stations[[0, -1]] == pytest.approx([0.0, piece.length], abs=1e-15)
         tips, axes = piece.pose(piece.waypoint_stations)
-        pivots = tips + placed.toolpath.pivot * axes
-        assert np.linalg.norm(pivots - placed.pivots[piece.waypoints], axis=1).max() <= TOLERANCE
+        tilt_centres = tips + placed.toolpath.tilt_centre * axes
+        assert np.linalg.norm(tilt_centres - placed.tilt_centres[piece.waypoints], axis=1).max() <= TOLERANCE
 
 
-def test_pivot_and_axis_stay_within_their_tolerances(mixed):
+def test_tilt_centre_and_axis_stay_within_their_tolerances(mixed):
     placed, path = mixed
     s = np.linspace(0.0, path.length, 20_000)
     tips, axes = path.pose(s)
-    pivots = tips + placed.toolpath.pivot * axes
-    a, b = placed.pivots[:-1], placed.pivots[1:]
-    share = np.einsum("nkj,kj->nk", pivots[:, None] - a, b - a) / np.maximum(np.square(b - a).sum(axis=1), 1e-30)
+    tilt_centres = tips + placed.toolpath.tilt_centre * axes
+    a, b = placed.tilt_centres[:-1], placed.tilt_centres[1:]
+    share = np.einsum("nkj,kj->nk", tilt_centres[:, None] - a, b - a) / np.maximum(np.square(b - a).sum(axis=1), 1e-30)
     foot = a + np.clip(share, 0.0, 1.0)[..., None] * (b - a)
-    distance = np.linalg.norm(pivots[:, None] - foot, axis=2)
+    distance = np.linalg.norm(tilt_centres[:, None] - foot, axis=2)
     assert distance.min(axis=1).max() <= TOLERANCE
     assert distance.min(axis=1).max() >= 0.3 * TOLERANCE  # corners use the tolerance: else needlessly slow
     nearest = distance.argmin(axis=1)
@@ -157,10 +157,11 @@ def test_it_rests_between_rapids_and_feeds_and_nowhere_else(mixed):
 
 
 def test_a_turn_on_the_spot_that_sends_the_tip_back_stops(desk):
-    """The pivot stands while the axis turns, and the tip reverses although the pivot's path has no sharp corner."""
+    """The tilt centre stands while the axis turns, and the tip reverses although the tilt centre's path has no sharp
+    corner."""
     tips, axes = fan([[0, 0, 0], [0.02, 0, 0], [0.02, 0, 0], [0.02, 0.02, 0]], [0.0, 0.0, 0.2, 0.2])
-    pivot = 0.003
-    toolpath = Toolpath((Segment(SegmentKind.CUT, tips - pivot * axes, axes, 0.01),), pivot)
+    tilt_centre = 0.003
+    toolpath = Toolpath((Segment(SegmentKind.CUT, tips - tilt_centre * axes, axes, 0.01),), tilt_centre)
     path = leg_path(placed_on(desk, toolpath), desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
     assert isinstance(path, LegPath)
     assert len(path.pieces) == 2
@@ -204,17 +205,17 @@ def test_the_way_of_the_tip_alone_is_kept(desk):
     assert way[-1] < piece.length - 1e-4  # the turn on the spot
 
 
-def test_the_pivots_way_is_its_derivative(mixed):
+def test_the_tilt_centres_way_is_its_derivative(mixed):
     placed, path = mixed
     s = np.linspace(0.001, path.length - 0.001, 400)
     h = 1e-7
 
-    def pivots(at):
+    def tilt_centres(at):
         tips, axes = path.pose(at)
-        return tips + placed.toolpath.pivot * axes
+        return tips + placed.toolpath.tilt_centre * axes
 
     inside = np.abs(s[:, None] - path.starts).min(axis=1) > 1e-5
-    fd = np.linalg.norm(pivots(s + h) - pivots(s - h), axis=1) / (2 * h)
+    fd = np.linalg.norm(tilt_centres(s + h) - tilt_centres(s - h), axis=1) / (2 * h)
     np.testing.assert_allclose(path.surface_rate(s)[inside], fd[inside], rtol=1e-5)
 
 

@@ -8,7 +8,7 @@ import trimesh
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.solids import Solid
 from pentapod.kinematics.component import Component
-from pentapod.machine.clearance.collision_world import Obstacle, Surroundings
+from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
 from pentapod.machine.clearance.leg_clearance import clearances
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
@@ -51,7 +51,7 @@ def crowd():
     """A post that moves with the part and a fence that does not, with shank and holder on the tool."""
     fence = trimesh.creation.box((0.02, 0.3, 0.2))
     fence.apply_translation([0.25, 0.0, 0.35])
-    return Surroundings(
+    return CollisionWorld(
         (
             Obstacle("fixture", surface_of(post(0.06, 0.02, -0.02, 0.06)), clamped=True),
             Obstacle("table", surface_of(fence), clamped=False),
@@ -135,7 +135,7 @@ def test_the_formula_equals_the_margins_and_their_slopes(desk, crowd, place):
 
 
 def test_without_obstacles_nothing_changes(desk, cap):
-    plain, empty = Margins.of(desk, PLUS), Margins.of(desk, PLUS, Surroundings())
+    plain, empty = Margins.of(desk, PLUS), Margins.of(desk, PLUS, CollisionWorld())
     tips, axes = poses(desk, 20)
     np.testing.assert_array_equal(plain(tips, axes), empty(tips, axes))
     assert plain.contacts(tips, axes, RigidTransform(np.eye(3), np.zeros(3))).shape == (20, 0)
@@ -155,7 +155,7 @@ def free(desk, problem):
 
 def beside(desk, problem, free, leg, away):
     """A post of the workpiece frame, its middle `away` metres across from a leg in the middle of the path."""
-    row = len(problem.samples.pivots) // 2
+    row = len(problem.samples.tilt_centres) // 2
     tip, axis = (
         x[0] for x in problem.samples.machine_poses(free.transform, problem.axes(free.coefficients, [row]), [row])
     )
@@ -171,7 +171,7 @@ def beside(desk, problem, free, leg, away):
 def grazing(desk, problem, free):
     """Margins with a post that a leg runs through, a little, somewhere on the path."""
     for away in np.arange(-0.05, -0.3, -0.004):
-        margins = Margins.of(desk, PLUS, Surroundings((beside(desk, problem, free, 1, away),)))
+        margins = Margins.of(desk, PLUS, CollisionWorld((beside(desk, problem, free, 1, away),)))
         if problem.values(margins, free.transform, free.coefficients)[:, -6:].min() > -0.15:
             return margins
     raise AssertionError("the post is never out of the way")
@@ -194,7 +194,7 @@ def test_the_reference_moves_away_from_a_fixture(desk, cap, free, grazing):
 
 
 def test_the_linear_model_knows_contacts(desk, cap, problem, free):
-    crowded = Surroundings((beside(desk, problem, free, 1, -0.09),), TOOL)
+    crowded = CollisionWorld((beside(desk, problem, free, 1, -0.09),), TOOL)
     margins = Margins.of(desk, PLUS, crowded)
     rows = np.arange(0, len(cap), 8)
     slopes = step_slopes(problem, margins)(margins, free.transform, free.coefficients, rows)
@@ -210,7 +210,7 @@ def test_the_linear_model_knows_contacts(desk, cap, problem, free):
 
 
 def test_smoothing_keeps_clear_of_a_fixture(desk, problem, free):
-    margins = Margins.of(desk, PLUS, Surroundings((beside(desk, problem, free, 1, -0.09),)))
+    margins = Margins.of(desk, PLUS, CollisionWorld((beside(desk, problem, free, 1, -0.09),)))
     start = problem.candidate(margins, free.transform, free.coefficients)
     keep = start.smallest - 0.05
     smooth = SequentialSolver(problem, False).smooth(start, keep)
@@ -225,7 +225,7 @@ def test_a_refusal_names_the_fixture(desk, problem, free):
     """A wide plate across the legs."""
     plate = trimesh.creation.box((0.5, 0.5, 0.01))
     plate.apply_translation([0.0, 0.0, 0.16])
-    margins = Margins.of(desk, PLUS, Surroundings((Obstacle("fixture", surface_of(plate), clamped=True),)))
+    margins = Margins.of(desk, PLUS, CollisionWorld((Obstacle("fixture", surface_of(plate), clamped=True),)))
     values = problem.values(margins, free.transform, free.coefficients)
     blamed = {b.constraint: b for b in diagnose(values, margins, 0.02) if b.constraint.endswith("touches the fixture")}
     assert "spindle touches the fixture" in blamed
@@ -235,8 +235,8 @@ def test_a_refusal_names_the_fixture(desk, problem, free):
 
 
 def test_first_guesses_see_the_fixture(desk, problem, free):
-    crowded = Surroundings((beside(desk, problem, free, 1, 0.0),))
+    crowded = CollisionWorld((beside(desk, problem, free, 1, 0.0),))
     plain = first_guesses(problem, options=SamplingOptions(tries=1500))
-    there = PlacementProblem.of(problem.samples, desk, component=PLUS, surroundings=crowded)
+    there = PlacementProblem.of(problem.samples, desk, component=PLUS, collision_world=crowded)
     seen = first_guesses(there, options=SamplingOptions(tries=1500))
     assert seen[0].margin <= plain[0].margin

@@ -57,16 +57,16 @@ def test_derivatives_are_those_of_the_machine_with_its_guides_moved(sliding, her
     pair = problem.domain.lean_plane.T
 
     def values(x):
-        machine = sliding.at(problem.machine.slides + x[6:11])
+        machine = sliding.at(problem.machine.rail_positions + x[6:11])
         b = pair @ x[11:]
         axis = task.nominal[k] + b - (b @ task.nominal[k]) * task.nominal[k]
         place = stepped(here, x[:6])
         turned = place.rotate(axis / np.linalg.norm(axis))
-        return Margins.of(machine, COMPONENT)(place.apply(task.pivots[k]) - task.pivot * turned, turned)
+        return Margins.of(machine, COMPONENT)(place.apply(task.tilt_centres[k]) - task.tilt_centre * turned, turned)
 
     point = guide_function(problem, margins)
     x = np.concatenate([step, slid, a])
-    given = (slid, step, a, task.pivots[k], task.nominal[k], pair, here.rotation, here.translation, np.zeros(0))
+    given = (slid, step, a, task.tilt_centres[k], task.nominal[k], pair, here.rotation, here.translation, np.zeros(0))
     found, slopes = (output.full() for output in point.call(list(given)))
     rows = [j for j, limit in enumerate(margins.limits) if "spindle" not in limit.name]
     np.testing.assert_allclose(np.ravel(found)[rows], values(x)[rows], atol=1e-12)
@@ -81,7 +81,7 @@ def test_curvature_is_that_of_the_machine_with_its_guides_moved(sliding, here):
     machine = sliding.at([0.01, -0.02, 0.0, 0.015, -0.005])
     problem = start.on(machine)
     at = problem.candidate(Margins.of(machine, COMPONENT), here, problem.upright + 0.05)
-    rows, moves, none = np.arange(len(problem.samples.pivots)), 0.1 * np.eye(11), np.zeros(0, dtype=np.intp)
+    rows, moves, none = np.arange(len(problem.samples.tilt_centres)), 0.1 * np.eye(11), np.zeros(0, dtype=np.intp)
     slopes = step_slopes(start, Margins.of(sliding, COMPONENT), guides=True)
     model = LinearModel.of(problem, at, rows, np.inf, none, slopes, (np.zeros(0), np.zeros((0, 11))), moves)
     rng = np.random.default_rng(5)
@@ -93,7 +93,7 @@ def test_curvature_is_that_of_the_machine_with_its_guides_moved(sliding, here):
 
     def weighed(x):
         step, change = model.step_of(x)
-        there = sliding.at(machine.slides + step[6:])
+        there = sliding.at(machine.rail_positions + step[6:])
         found = problem.values(Margins.of(there, COMPONENT), stepped(here, step[:6]), at.coefficients + change)
         return multipliers[: len(model.values)] @ found[model.points, model.kinds]
 
@@ -111,8 +111,8 @@ def test_slides_as_good_as_those_of_another_method(sliding, here):
     few = task.at(task.representatives(30))
     poses = few.machine_poses(here, few.nominal)
 
-    def cost(slides):
-        there = at_rail_positions(problem.margins[0], slides)
+    def cost(rail_positions):
+        there = at_rail_positions(problem.margins[0], rail_positions)
         return 1.0 if there is None else -float(there(*poses).min())
 
     other = differential_evolution(
@@ -122,8 +122,8 @@ def test_slides_as_good_as_those_of_another_method(sliding, here):
     home = search(problem).best.smallest
     assert found.best.smallest >= -other.fun - 2e-3
     assert found.best.smallest > home + 0.01
-    slides = there.machine.slides
-    assert ((slides >= least) & (slides <= greatest)).all()
+    rail_positions = there.machine.rail_positions
+    assert ((rail_positions >= least) & (rail_positions <= greatest)).all()
     assert there.candidate(found.best.margins, here, found.best.coefficients).smallest == found.best.smallest
     assert found.best.margins.machine is there.machine
 
@@ -133,13 +133,13 @@ def test_a_plan_says_where_the_guides_stand(sliding, here, desk):
     options = {"constraints": PlacementConstraints.fixture([here]), "component": COMPONENT}
     placed = [plan(path, sliding, **options) for _ in range(2)]
     assert placed[0].placement == placed[1].placement  # the same again
-    slides = placed[0].placement.slides
-    np.testing.assert_array_equal(np.round(slides, 6), slides)
-    machine = sliding.at(slides)
+    rail_positions = placed[0].placement.rail_positions
+    np.testing.assert_array_equal(np.round(rail_positions, 6), rail_positions)
+    machine = sliding.at(rail_positions)
     again = Margins.of(machine, COMPONENT)(placed[0].tips, placed[0].axes)
     np.testing.assert_array_equal(again, placed[0].margins)
     fixed = plan(path, desk, **options)
-    assert fixed.placement.slides is None
+    assert fixed.placement.rail_positions is None
     assert placed[0].smallest_margin > fixed.smallest_margin
 
 
@@ -150,7 +150,7 @@ def test_slides_that_cannot_be_reached_are_not_taken(sliding, here):
         guides=ReconfigurablePentapod(sliding.robot, sliding.guides.guides, np.tile((-2.0, 2.0), (5, 1))),
     )
     problem = problem_of(wide, here)
-    forbidden = wide.guides.forbidden_slides(0, np.zeros(5))
+    forbidden = wide.guides.forbidden_rail_positions(0, np.zeros(5))
     assert len(forbidden) > 0
     beyond = np.zeros(5)
     beyond[0] = forbidden[np.abs(forbidden).argmin()] * 1.5

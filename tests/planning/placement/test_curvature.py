@@ -17,7 +17,7 @@ def test_curvature_against_differences(desk, cap):
     problem = PlacementProblem.of(ToolpathSamples.of(cap, np.radians(15.0)), desk, component=Component(1, 1))
     guess = first_guesses(problem, options=SamplingOptions(tries=2000))[0]
     at = first_candidate(problem, guess.margins, guess.transform)
-    rows = np.arange(len(problem.samples.pivots))
+    rows = np.arange(len(problem.samples.tilt_centres))
     model = SequentialSolver(problem, free=True).model(at, rows, at.smallest)
     rng = np.random.default_rng(5)
     strokes = np.flatnonzero(["too" in at.margins.limits[k].name for k in model.kinds])  # smooth everywhere

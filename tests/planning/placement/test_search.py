@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from pentapod.kinematics.component import Component
-from pentapod.machine.clearance.collision_world import Obstacle, Surroundings
+from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning.limits.margins import Margins
@@ -25,31 +25,31 @@ def surroundings():
     shape = trimesh.creation.cylinder(0.01, 0.04, sections=12)
     shape.apply_translation([0.1, 0.1, -0.2])
     surface = MeshDistance.of(Mesh.of(np.asarray(shape.vertices), np.asarray(shape.faces)))
-    return Surroundings((Obstacle("fixture", surface, clamped=True),))
+    return CollisionWorld((Obstacle("fixture", surface, clamped=True),))
 
 
 def names(margins):
     return [limit.name for limit in margins.limits]
 
 
-def test_what_does_not_fit_alone_is_answered_without_surroundings(desk, wide, surroundings):
-    problem = PlacementProblem.of(ToolpathSamples.of(wide, 0.2), desk, component=PLUS, surroundings=surroundings)
+def test_what_does_not_fit_alone_is_answered_without_collision_world(desk, wide, collision_world):
+    problem = PlacementProblem.of(ToolpathSamples.of(wide, 0.2), desk, component=PLUS, collision_world=collision_world)
     alone = search(problem.alone(), options=SearchOptions(tried=2))
     found = search(problem, options=SearchOptions(tried=2, hopeless=np.inf))
     assert found.best.smallest == alone.best.smallest < NEEDED_MARGIN
     assert names(found.best.margins) == names(Margins.of(desk, PLUS))
 
 
-def test_what_fits_alone_is_placed_among_its_surroundings(desk, cap, surroundings):
-    problem = PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk, component=PLUS, surroundings=surroundings)
+def test_what_fits_alone_is_placed_among_its_collision_world(desk, cap, collision_world):
+    problem = PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk, component=PLUS, collision_world=collision_world)
     promising = search(problem, options=SearchOptions(refined=1))
     found = search(problem, options=SearchOptions(refined=1, hopeless=np.inf))
-    assert names(found.best.margins) == names(Margins.of(desk, PLUS, surroundings))
+    assert names(found.best.margins) == names(Margins.of(desk, PLUS, collision_world))
     assert found.best.smallest == promising.best.smallest >= NEEDED_MARGIN
     assert np.array_equal(found.best.transform.matrix, promising.best.transform.matrix)
 
 
-def test_an_interruption_of_the_look_without_surroundings_ends_the_search(desk, cap, surroundings):
+def test_an_interruption_of_the_look_without_surroundings_ends_the_search(desk, cap, collision_world):
     improved = []
 
     def progress(stage: str, fraction: float, note: str = "") -> None:
@@ -59,7 +59,7 @@ def test_an_interruption_of_the_look_without_surroundings_ends_the_search(desk, 
 
     with pytest.raises(KeyboardInterrupt):
         search(
-            PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk, component=PLUS, surroundings=surroundings),
+            PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk, component=PLUS, collision_world=collision_world),
             progress=progress,
             options=SearchOptions(hopeless=np.inf),
         )

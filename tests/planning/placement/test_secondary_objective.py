@@ -24,7 +24,7 @@ AIMS = ("force", "time")
 @pytest.fixture(scope="module")
 def quick(cap) -> Toolpath:
     """So quick that the legs hold it back, not the feed."""
-    return Toolpath((Segment(SegmentKind.CUT, cap.tips, cap.axes, 0.4),), cap.pivot)
+    return Toolpath((Segment(SegmentKind.CUT, cap.tips, cap.axes, 0.4),), cap.tilt_centre)
 
 
 @pytest.fixture(scope="module")

@@ -89,7 +89,7 @@ def test_no_axes_keep_a_margin_beyond_reach(problem, raised):
 
 def test_the_linear_model_is_the_derivative(problem, raised):
     """Against central differences of the margins themselves, along random directions of all unknowns."""
-    rows = np.arange(len(problem.samples.pivots))
+    rows = np.arange(len(problem.samples.tilt_centres))
     model = SequentialSolver(problem, free=True).model(raised, rows, raised.smallest)
     rng = np.random.default_rng(3)
     for _ in range(5):

@@ -40,13 +40,21 @@ def test_margins_and_slopes_are_casadis(desk, cap, by):
     function = point_function(problem, Margins.of(desk, COMPONENTS[0]), range(20), by=by)
     task, rng = problem.samples, np.random.default_rng(1)
     transform = RigidTransform(np.eye(3), desk.work.centre)
-    count = len(task.pivots)
+    count = len(task.tilt_centres)
     leans, pair = 0.1 * rng.normal(size=(2, count)), problem.domain.lean_plane.T
     fixed = np.zeros((6, 1)), pair.T.reshape(-1, 1), transform.rotation.T.reshape(-1, 1), transform.translation[:, None]
     touching = np.zeros((0, count))  # there is nothing to touch
-    found = Vectorised(function)(fixed[0], leans, task.pivots.T, task.nominal.T, *fixed[1:], touching)
+    found = Vectorised(function)(fixed[0], leans, task.tilt_centres.T, task.nominal.T, *fixed[1:], touching)
     for k in range(0, count, 37):
-        row = [fixed[0], leans[:, k], task.pivots[k], task.nominal[k], pair, transform.rotation, transform.translation]
+        row = [
+            fixed[0],
+            leans[:, k],
+            task.tilt_centres[k],
+            task.nominal[k],
+            pair,
+            transform.rotation,
+            transform.translation,
+        ]
         for ours, theirs in zip(found, function(*row, touching[:, k]), strict=True):
             np.testing.assert_array_equal(ours[:, k], np.asarray(theirs).ravel(order="F"))
 

@@ -7,9 +7,9 @@ from pentapod.planning.problem.tilt_field import FieldDomain, TiltField, lean
 
 
 def test_no_coefficients_no_tilt(cap):
-    domain = FieldDomain.around(cap.pivots, cap.axes, 2)
+    domain = FieldDomain.around(cap.tilt_centres, cap.axes, 2)
     field = TiltField(domain, np.zeros((domain.size, 2)))
-    np.testing.assert_allclose(field.axes(cap.pivots, cap.axes), cap.axes, atol=1e-15)
+    np.testing.assert_allclose(field.axes(cap.tilt_centres, cap.axes), cap.axes, atol=1e-15)
 
 
 def test_axes_are_unit_and_lean_by_the_part_of_b_across(cap):
@@ -23,14 +23,14 @@ def test_axes_are_unit_and_lean_by_the_part_of_b_across(cap):
 
 
 def test_basis_is_a_partition_of_unity(cap):
-    domain = FieldDomain.around(cap.pivots, cap.axes, 3)
-    basis = domain.basis(cap.pivots)
+    domain = FieldDomain.around(cap.tilt_centres, cap.axes, 3)
+    basis = domain.basis(cap.tilt_centres)
     np.testing.assert_allclose(basis.sum(axis=1), 1.0, atol=1e-12)
     assert basis.min() >= 0.0
 
 
 def test_roughness_of_a_linear_field_is_zero(cap):
-    domain = FieldDomain.around(cap.pivots, cap.axes, 2)
+    domain = FieldDomain.around(cap.tilt_centres, cap.axes, 2)
     side = domain.cells + 3
     i, j = np.meshgrid(np.arange(side), np.arange(side), indexing="ij")
     assert np.abs(domain.roughness() @ (2.0 * i - 3.0 * j + 1.0).ravel()).max() < 1e-12
@@ -42,5 +42,5 @@ def test_representatives_are_distinct_deterministic_and_include_extremes(cap):
     rows = task.representatives(40)
     assert len(np.unique(rows)) == 40
     np.testing.assert_array_equal(rows, task.representatives(40))
-    gap = np.linalg.norm(cap.pivots[:, None] - cap.pivots[rows][None], axis=2).min(axis=1).max()
+    gap = np.linalg.norm(cap.tilt_centres[:, None] - cap.tilt_centres[rows][None], axis=2).min(axis=1).max()
     assert gap < 0.02  # no place of the 120 mm part is farther than that from a representative

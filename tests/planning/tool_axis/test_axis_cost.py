@@ -156,8 +156,8 @@ def accelerations(instance, problem, at, desk, axes):
     path = leg_path(placed, desk, path_tolerance=20e-6, axis_tolerance=np.radians(0.5))
     parameter = np.linspace(0.0, path.length, 20_000)
     tip, axis = path.pose(parameter)
-    pivots = tip + problem.samples.pivot * axis
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(pivots, axis=0), axis=1))])
+    tilt_centres = tip + problem.samples.tilt_centre * axis
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tilt_centres, axis=0), axis=1))])
     even = np.linspace(0.0, way[-1], 4_000)
     legs = np.stack([np.interp(even, way, leg) for leg in path(parameter).T], axis=1)
     return np.abs(np.diff(legs, 2, axis=0)).max(axis=1) / even[1] ** 2

@@ -41,7 +41,7 @@ def test_coefficients_in_the_disc_keep_the_cone(k, seed):
 @pytest.mark.parametrize("k", [0, 4, 8])
 def test_a_smooth_field_of_leans_is_fitted(k):
     task, spline = spline_of(k)
-    wave = 0.1 * np.sin(20.0 * task.pivots)
+    wave = 0.1 * np.sin(20.0 * task.tilt_centres)
     wanted = wave - (wave * task.nominal).sum(axis=1, keepdims=True) * task.nominal
     assert np.abs(spline.leans(spline.fitted(wanted)) - wanted).max() < 0.02 * np.abs(wanted).max()
 
@@ -76,7 +76,7 @@ def test_the_cost_is_a_quadratic_with_its_gradient(k):
 def test_the_banded_program_is_solved_as_ipopt_solves_it(seed):
     rng = np.random.default_rng(seed)
     task, spline = spline_of(seed)
-    point = np.sort(rng.integers(0, len(task.pivots), 150))
+    point = np.sort(rng.integers(0, len(task.tilt_centres), 150))
     slopes, upper = rng.normal(size=(len(point), 2)), rng.uniform(0.05, 0.5, len(point))
     centre = np.zeros((spline.hessian.shape[1] // 2, 2))
     scale = spline.cost_of(centre)
@@ -155,11 +155,11 @@ def test_a_program_without_interior_has_no_answer():
 )
 def test_short_paths_and_single_places_have_a_course(moved, desk):
     """Down to a tool that stands still: smooth axes at one place lean as little as the margin lets them."""
-    pivots = np.array(moved)[:, None] * [1.0, 0.0, 0.0]
-    task = ToolpathSamples(pivots, np.tile([0.0, 0.0, 1.0], (len(pivots), 1)), 0.003, 0.2)
+    tilt_centres = np.array(moved)[:, None] * [1.0, 0.0, 0.0]
+    task = ToolpathSamples(tilt_centres, np.tile([0.0, 0.0, 1.0], (len(tilt_centres), 1)), 0.003, 0.2)
     problem = PlacementProblem.of(task, desk)
     guess = first_guesses(problem, options=SamplingOptions(tries=500))[0]
     start = first_candidate(problem, guess.margins, guess.transform)
-    strict = problem.values_of(start.margins, start.transform, np.zeros_like(pivots)).min()
+    strict = problem.values_of(start.margins, start.transform, np.zeros_like(tilt_centres)).min()
     smooth = smoothed(problem, start, strict - 0.01)
     assert np.linalg.norm(AxisSpline.of(problem.samples, problem.cone).leans(smooth), axis=1).max() < 1e-3

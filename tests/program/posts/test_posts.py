@@ -47,7 +47,9 @@ def test_where_the_guides_stand_and_which_set_up_it_is_come_back(name, tmp_path)
     what = given(duration=0.1)
     piece = Piece(3, 17, (-np.inf, 0.1, -0.0123456789), (0.2, np.inf, 1.0 / 3.0))
     source = dataclasses.replace(what.program.provenance, piece=piece)
-    program = dataclasses.replace(what.program, slides=(0.0123456789, -1.0 / 300.0, 0.0, -0.0, 0.04), provenance=source)
+    program = dataclasses.replace(
+        what.program, rail_positions=(0.0123456789, -1.0 / 300.0, 0.0, -0.0, 0.04), provenance=source
+    )
     round_trip(dataclasses.replace(what, program=program), available(name), tmp_path)
 
 

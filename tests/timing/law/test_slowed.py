@@ -77,4 +77,4 @@ def test_a_piece_that_would_last_more_than_20_times_its_first_law_is_refused_wit
     place = float(refusal.cause.split(" mm along the path")[0].rsplit(" ", 1)[1])
     assert place == pytest.approx(150.0, abs=2.0)
     assert "segment 7" in refusal.cause
-    assert refusal.blames[0].waypoints[0] in ((0, 1), (1, 1), (1, 2))
+    assert refusal.diagnosis[0].waypoints[0] in ((0, 1), (1, 1), (1, 2))

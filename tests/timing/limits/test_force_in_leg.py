@@ -111,7 +111,7 @@ def test_a_force_that_the_weight_alone_exceeds_is_refused():
     assert isinstance(result, Refusal)
     assert "standing still there would exceed a limit: 1.41 times of it" in result.cause
     assert "force in leg" in result.cause
-    assert result.blames[0].constraint.startswith("force in leg")
+    assert result.diagnosis[0].constraint.startswith("force in leg")
 
 
 def test_an_override_keeps_a_limit_that_was_added():

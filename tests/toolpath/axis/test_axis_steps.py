@@ -17,18 +17,18 @@ def axis(lean, towards=0.0):
     return np.array([np.sin(lean) * np.cos(towards), np.sin(lean) * np.sin(towards), np.cos(lean)])
 
 
-def turning(pivot=3e-3):
+def turning(tilt_centre=3e-3):
     """A cut whose axis turns by 10° and then not at all, and a link that turns back; it waits, stands, and marks."""
     tips = np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0], [2e-3, 1e-3, 0.0]])
     axes = np.array([axis(0.0), axis(np.radians(10.0)), axis(np.radians(10.0))])
     cut = Segment(SegmentKind.CUT, tips, axes, 0.01, 0.6, 0.25)
     back = Segment(SegmentKind.LINK, tips[[2, 0]], axes[[2, 0]], 0.02, dwell=0.0)
-    return Toolpath((cut, back), pivot, wait=0.4)
+    return Toolpath((cut, back), tilt_centre, wait=0.4)
 
 
 def test_all_but_the_turns_stays_as_it_was():
     before, after = turning(), stepped(turning(), STEP)
-    assert (after.wait, after.pivot) == (before.wait, before.pivot)
+    assert (after.wait, after.tilt_centre) == (before.wait, before.tilt_centre)
     assert after.dwells == before.dwells == (0.4, 0.25, 0.0)
     for old, new in zip(before.segments, after.segments, strict=True):
         assert (new.kind, new.feed, new.power) == (old.kind, old.feed, old.power)
@@ -48,15 +48,15 @@ def test_a_toolpath_that_keeps_the_step_is_the_same():
     st.floats(0.02, 1.0),
     st.sampled_from([-5e-3, 0.0, 3e-3]),
 )
-def test_turns_are_divided_evenly_about_a_pivot_that_goes_straight(leans, step, pivot):
+def test_turns_are_divided_evenly_about_a_tilt_centre_that_goes_straight(leans, step, tilt_centre):
     axes = np.array([axis(*lean) for lean in leans])
     tips = np.linspace([0.0, 0.0, 0.0], [0.05, 0.02, 0.01], len(axes))
-    path = stepped(Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),), pivot), step)
+    path = stepped(Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),), tilt_centre), step)
     at = [int(np.abs(path.tips - tip).max(axis=1).argmin()) for tip in tips]
     for a, b in pairwise(at):
         turns = np.arccos(np.clip((path.axes[a:b] * path.axes[a + 1 : b + 1]).sum(axis=1), -1.0, 1.0))
         assert turns.max() <= step * (1.0 + 1e-6) + 1e-7
         assert turns == pytest.approx(turns.mean(), abs=1e-6)
         share = np.linspace(0.0, 1.0, b - a + 1)[:, None]
-        straight = path.pivots[a] + share * (path.pivots[b] - path.pivots[a])
-        np.testing.assert_allclose(path.pivots[a : b + 1], straight, atol=1e-12)
+        straight = path.tilt_centres[a] + share * (path.tilt_centres[b] - path.tilt_centres[a])
+        np.testing.assert_allclose(path.tilt_centres[a : b + 1], straight, atol=1e-12)

@@ -144,9 +144,9 @@ def test_nonsense_is_refused(bad):
 
 
 @settings(max_examples=30, deadline=None)
-@given(seed=st.integers(0, 10_000), pivot=st.sampled_from([3e-3, 0.0, -5e-3]), degrees=st.floats(0.5, 30.0))
-def test_the_cap_on_steps_holds_and_the_pivot_keeps_its_way(seed, pivot, degrees):
-    """Waypoints stay; what comes between lies evenly on the straight way of the pivot."""
+@given(seed=st.integers(0, 10_000), tilt_centre=st.sampled_from([3e-3, 0.0, -5e-3]), degrees=st.floats(0.5, 30.0))
+def test_the_cap_on_steps_holds_and_the_tilt_centre_keeps_its_way(seed, tilt_centre, degrees):
+    """Waypoints stay; what comes between lies evenly on the straight way of the tilt_centre."""
     rng = np.random.default_rng(seed)
     tips = np.cumsum(rng.normal(size=(9, 3)), axis=0) * 1e-3
     axes = rng.normal(size=(9, 3))
@@ -154,7 +154,7 @@ def test_the_cap_on_steps_holds_and_the_pivot_keeps_its_way(seed, pivot, degrees
     axes /= np.linalg.norm(axes, axis=1)[:, None]
     cut, rapid = (SegmentKind.CUT, 0.01), (SegmentKind.RAPID, np.inf)
     pieces = [(cut, slice(0, 5)), (rapid, slice(4, 9))]
-    path = Toolpath(tuple(Segment(kind, tips[r], axes[r], feed) for (kind, feed), r in pieces), pivot)
+    path = Toolpath(tuple(Segment(kind, tips[r], axes[r], feed) for (kind, feed), r in pieces), tilt_centre)
     step = np.radians(degrees)
     found = stepped(path, step)
     turns = angle_between(found.axes[1:], found.axes[:-1])
@@ -165,8 +165,10 @@ def test_the_cap_on_steps_holds_and_the_pivot_keeps_its_way(seed, pivot, degrees
         whole = float(angle_between(axes[k], axes[k + 1]))
         assert b - a == max(np.ceil(whole / step - 1e-9), 1)
         np.testing.assert_allclose(turns[a:b], whole / (b - a), atol=1e-7)
-        straight = path.pivots[k] + np.linspace(0, 1, b - a + 1)[:, None] * (path.pivots[k + 1] - path.pivots[k])
-        np.testing.assert_allclose(found.pivots[a : b + 1], straight, atol=1e-15)
+        straight = path.tilt_centres[k] + np.linspace(0, 1, b - a + 1)[:, None] * (
+            path.tilt_centres[k + 1] - path.tilt_centres[k]
+        )
+        np.testing.assert_allclose(found.tilt_centres[a : b + 1], straight, atol=1e-15)
     assert stepped(found, step * (1 + 1e-6)) is found
 
 
@@ -184,7 +186,7 @@ def test_a_finished_toolpath_is_turned_and_stays_whole():
         turned = oriented(path, tool, Orientation(Fixed((0.1, 0, 1))))
         np.testing.assert_allclose(turned.axes, np.tile([0.1, 0, 1], (len(path), 1)) / np.hypot(0.1, 1), atol=1e-12)
         cut = np.concatenate([[s.kind == "cut"] * (len(s.tips) - 1) for s in path.segments] + [[False]])
-        np.testing.assert_allclose(turned.pivots[cut], path.pivots[cut], atol=1e-15)
+        np.testing.assert_allclose(turned.tilt_centres[cut], path.tilt_centres[cut], atol=1e-15)
         leaned_path = oriented(path, tool, Orientation(lead=np.radians(10)))
         leads = angle_between(leaned_path.axes, path.axes)[cut]
         np.testing.assert_allclose(np.sort(leads)[len(leads) // 10 :], np.radians(10), atol=1e-9)

@@ -14,7 +14,7 @@ from pentapod.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.toolpath.formats import FORMATS, format_of, read_toolpath, write_toolpath
 
 
-def some_toolpath(seed=0, pivot=3e-3):
+def some_toolpath(seed=0, tilt_centre=3e-3):
     """Rapids, links and cuts at different feeds, axes that wander over a pole."""
     rng = np.random.default_rng(seed)
     count = 41
@@ -32,7 +32,7 @@ def some_toolpath(seed=0, pivot=3e-3):
             Segment(SegmentKind(kind), tips[a : b + 1], axes[a : b + 1], feed, power, dwell)
             for kind, feed, power, dwell, a, b in zip(kinds, feeds, powers, dwells, cuts, cuts[1:], strict=False)
         ),
-        pivot,
+        tilt_centre,
         wait=0.5,
     )
 
@@ -46,10 +46,10 @@ def round_trip(format_name: str, toolpath: Toolpath, folder: Path) -> Toolpath:
     """Write, read, compare what the format can tell; writing again gives the same bytes."""
     form = FORMATS[format_name]
     file = write_toolpath(toolpath, folder / f"path{form.suffixes[0] if form.suffixes else '.txt'}", format_name)
-    again = read_toolpath(file, format_name, pivot=toolpath.pivot, feed=1.0)
+    again = read_toolpath(file, format_name, tilt_centre=toolpath.tilt_centre, feed=1.0)
     np.testing.assert_allclose(again.tips, toolpath.tips, atol=1.1e-10, rtol=0)
     np.testing.assert_allclose(again.axes, toolpath.axes, atol=3e-12, rtol=0)
-    assert again.pivot == pytest.approx(toolpath.pivot, abs=1e-15)
+    assert again.tilt_centre == pytest.approx(toolpath.tilt_centre, abs=1e-15)
     owners = [path.segment_of_interval for path in (toolpath, again)]
     kinds = [np.array([path.segments[k].kind for k in o]) for path, o in zip((toolpath, again), owners, strict=True)]
     feeds = [np.array([path.segments[k].feed for k in o]) for path, o in zip((toolpath, again), owners, strict=True)]
@@ -131,7 +131,7 @@ def test_apt_as_others_write_it(tmp_path):
     np.testing.assert_allclose(path.axes[2], [0, 0.6, 0.8])
     assert [s.kind for s in path.segments] == ["cut"]  # RAPID was the first GOTO's alone
     assert path.segments[0].feed == pytest.approx(10 * 0.0254 / 60)
-    assert path.pivot == pytest.approx(0.25 * 0.0254)
+    assert path.tilt_centre == pytest.approx(0.25 * 0.0254)
     (tmp_path / "small.apt").write_text(APT.lower())
     np.testing.assert_array_equal(read_toolpath(tmp_path / "small.apt").tips, path.tips)
 

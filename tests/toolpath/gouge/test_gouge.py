@@ -81,7 +81,7 @@ def test_a_holder_is_tilted_clear_about_the_balls_centre():
     assert report.left == 0
     assert report.tilted > 0
     assert cut_depth(found, BALL, tree) <= options.tolerance
-    np.testing.assert_allclose(found.pivots, path.pivots, atol=1e-15)
+    np.testing.assert_allclose(found.tilt_centres, path.tilt_centres, atol=1e-15)
     turned = angle_between(found.axes, path.axes)
     assert turned.max() <= options.cone * (1 + 1e-9)
     assert (turned == 0).any()
@@ -141,12 +141,12 @@ def test_links_and_rapids_that_meet_the_part_are_told():
     down = path.segments[0].tips[0] - [0.0, 0.0, 0.1]
     up = path.segments[0].axes[:1].repeat(2, axis=0)
     dive = Segment(SegmentKind.RAPID, np.stack([down, path.segments[0].tips[0]]), up, np.inf)
-    _, report = checked(Toolpath((dive, *path.segments), path.pivot), BALL, tree, GougeOptions())
+    _, report = checked(Toolpath((dive, *path.segments), path.tilt_centre), BALL, tree, GougeOptions())
     assert report.unclear == 1
     assert report.unclear_places == (0,)
     assert "rapids meet the part" in str(report)
     style = LinkStyle(np.array([0.0, 0.0, 1.0]), level=0.05, approach=3e-3, spacing=2e-3, feed=0.05)
-    through = Toolpath((dive, *path.segments), path.pivot)
+    through = Toolpath((dive, *path.segments), path.tilt_centre)
     found, report = checked(through, BALL, tree, GougeOptions(links=style))
     assert (report.relinked, report.unclear) == (1, 0)
     assert [s.kind for s in found.segments] == ["rapid", "link", "cut", "link"]

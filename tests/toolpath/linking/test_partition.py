@@ -32,7 +32,7 @@ def path() -> Toolpath:
         segment(link, (0, 2, 1), (0, 2, 0)),
         segment(cut, (0, 2, 0), (1, 2, 0), (2, 2, 0)),
         segment(link, (2, 2, 0), (2, 2, 1)),
-    ), pivot=0.003)  # fmt: skip
+    ), tilt_centre=0.003)  # fmt: skip
 
 
 def cut_chords(path: Toolpath) -> list[tuple]:
@@ -54,7 +54,7 @@ def test_two_pieces_in_a_row_cut_what_the_whole_does(path, at):
     parts = [part_of(path, Piece(*ends), STYLE) for ends in ((0, at), (at, len(path) - 1))]
     assert cut_chords(parts[0]) + cut_chords(parts[1]) == cut_chords(path)
     first, second = parts
-    assert first.pivot == second.pivot == path.pivot
+    assert first.tilt_centre == second.tilt_centre == path.tilt_centre
     # The way up from the first and down to the second: along the axis on feed, then to the clearance level.
     up, away = first.segments[-2:]
     assert (up.kind, away.kind, up.feed) == ("link", "rapid", 0.03)

@@ -184,21 +184,21 @@ def test_what_the_part_itself_hides_is_left_out():
     assert (np.abs(cuts[cuts[:, 2] > 0.02]).max(axis=0)[:2] <= 0.02 + 1e-9).all()
 
 
-def test_stand_off_keeps_its_distance_and_pivots_on_the_surface():
+def test_stand_off_keeps_its_distance_and_tilt_centres_on_the_surface():
     mesh = Mesh.of(*surfaces.grid(waves))
     options = RasterOptions(stepover=2e-3)
     toolpath = make_toolpath(mesh, StandOff(5e-3), options)
-    assert toolpath.pivot == -5e-3
+    assert toolpath.tilt_centre == -5e-3
     tips, axes = of_kind(toolpath, SegmentKind.CUT)
     assert surfaces.surface_distance(mesh, tips - 5e-3 * axes).max() < 1e-6
     np.testing.assert_allclose(surfaces.surface_distance(mesh, tips), 5e-3, rtol=5e-3)
 
 
-def test_ball_pivots_about_its_centre():
+def test_ball_tilts_about_its_centre():
     toolpath = make_toolpath(Mesh.of(*surfaces.sphere()), BALL, RasterOptions(stepover=5e-3, region=UPPER))
-    assert toolpath.pivot == 3e-3
+    assert toolpath.tilt_centre == 3e-3
     cuts = np.concatenate([[s.kind is SegmentKind.CUT] * (len(s.tips) - 1) for s in toolpath.segments])
-    centres = toolpath.pivots[1:][cuts]
+    centres = toolpath.tilt_centres[1:][cuts]
     np.testing.assert_allclose(np.linalg.norm(centres, axis=1), 0.053, atol=7e-5)  # facets sag by 60 um
 
 

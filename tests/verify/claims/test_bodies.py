@@ -24,7 +24,7 @@ def judged(monkeypatch, gaps, chords):
             machine=None,
             pose=(position, position),
             program=SimpleNamespace(period=PERIOD),
-            survey=SimpleNamespace(speeds=speeds),
+            interval_bounds=SimpleNamespace(speeds=speeds),
             place=lambda sample: sample,
         )
     )

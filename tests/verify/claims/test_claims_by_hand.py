@@ -14,7 +14,7 @@ from pentapod.verify import CLAIMS, Certificate, Claim, NotJudged, Place, Verdic
 from pentapod.verify.claims.provenance import guides
 from pentapod.verify.claims.tracking import angle_bound, at_samples
 from pentapod.verify.replay.claim import Finding, Idle
-from pentapod.verify.replay.interval_bounds import ComponentFindings, Extreme
+from pentapod.verify.replay.interval_bounds import ComponentFindings, RunningMaximum
 
 
 @pytest.fixture(scope="module")
@@ -100,14 +100,14 @@ def test_rest_at_both_ends(linear, found):
 
 def test_ends_of_the_path(linear, found, replay):
     for claim, k in (("starts at the toolpath's start", 0), ("ends at the toolpath's end", -1)):
-        distance = np.linalg.norm(replay.pivots[k] - linear.toolpath.pivots[k])
+        distance = np.linalg.norm(replay.tilt_centres[k] - linear.toolpath.tilt_centres[k])
         assert found[claim].value == pytest.approx(1e3 * distance, rel=1e-6, abs=1e-12)
         assert found[claim].bound == pytest.approx(1e3 * cases.TOLERANCES["path_tolerance"])
         assert found[claim].where.row == (0 if k == 0 else len(linear.program.legs) - 1)
 
 
 def test_deviations_by_their_parts(linear, found, replay):
-    match, away = replay.match, replay.survey.away
+    match, away = replay.match, replay.interval_bounds.away
     around = np.maximum(np.append(away, 0.0), np.append(0.0, away))
     deviation = match.distances + around
     tip = found["tip deviation"]
@@ -131,7 +131,7 @@ def test_waypoints_that_are_missed_are_counted(linear):
     """The whole toolpath 0.1 mm higher."""
     up = np.array([0.0, 0.0, 1e-4])
     segments = tuple(replace(segment, tips=segment.tips + up) for segment in linear.toolpath.segments)
-    toolpath = type(linear.toolpath)(segments, linear.toolpath.pivot)
+    toolpath = type(linear.toolpath)(segments, linear.toolpath.tilt_centre)
     verdict = verify(linear.program, linear.machine, toolpath, **cases.TOLERANCES)
     (cover,) = (c for c in verdict.certificates if c.claim == "toolpath covered")
     assert cover.method.endswith(" waypoints are not reached")
@@ -251,7 +251,7 @@ def test_component_findings_keep_the_first(linear):
     legs = linear.program.legs[:40].copy()
     legs[30] = 0.02
     rows = np.stack([legs[:-1], legs[1:]], axis=-1)
-    found, robot = ComponentFindings(Extreme(2)), linear.machine.robot
+    found, robot = ComponentFindings(RunningMaximum(2)), linear.machine.robot
     for first in (0, 20):
         ends = robot.pose(legs[first : first + 21], (1, 1))
         found.see(robot.prove(rows[first : first + 20], ends, (1, 1)), first)
@@ -264,7 +264,7 @@ def test_component_findings_keep_the_first(linear):
 
 
 def test_extremes_over_blocks():
-    extreme, values = Extreme(2), np.random.default_rng(1).integers(0, 9, (30, 2)).astype(float)
+    extreme, values = RunningMaximum(2), np.random.default_rng(1).integers(0, 9, (30, 2)).astype(float)
     for first in range(0, 30, 7):
         extreme.see(values[first : first + 7], first)
     assert extreme.values.tolist() == values.max(axis=0).tolist()
@@ -301,7 +301,9 @@ def judged(replay, name, machine=None, **changes):
     """Whether a claim holds on the same motion, judged on another machine or with other tolerances."""
     other = cases.asked_anew(replay, machine=machine or replay.machine, **changes)
     _ = replay.match
-    other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"survey", "match", "pivots", "axes"}})
+    other.__dict__.update(
+        {k: v for k, v in replay.__dict__.items() if k in {"interval_bounds", "match", "tilt_centres", "axes"}}
+    )
     (claim,) = (claim for claim in CLAIMS if claim.name == name)
     certificate = claim(other)
     assert certificate is not None
@@ -358,21 +360,21 @@ def test_nothing_is_allowed_beyond_a_joint(replay, found, claim, name, side):
 )
 def test_each_leg_is_held_to_its_own_limit(replay, claim, name, extreme, leg):
     """All legs have room but one, whose limit is 8 % too tight; that one is named, with its own numbers."""
-    needed = np.abs(getattr(replay.survey, extreme).values)
+    needed = np.abs(getattr(replay.interval_bounds, extreme).values)
     least = name == "min_length"
     limit = needed * (0.5 if least else 2.0)
     limit[leg] = needed[leg] * (1.08 if least else 1.0 / 1.08)
     machine = replace(replay.machine, legs=replace(replay.machine.legs, **{name: limit}))
     other = cases.asked_anew(replay, machine=machine)
     _ = replay.match
-    other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"survey", "match"}})
+    other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"interval_bounds", "match"}})
     (found,) = (claim_ for claim_ in CLAIMS if claim_.name == claim)
     certificate = found(other)
     assert not certificate.passed
     assert certificate.method.startswith(f"leg {leg + 1} is closest to its limit; ")
     assert certificate.value == pytest.approx(1e3 * needed[leg])
     assert certificate.bound == pytest.approx(1e3 * limit[leg])
-    assert certificate.where.row == int(getattr(replay.survey, extreme).at[leg])
+    assert certificate.where.row == int(getattr(replay.interval_bounds, extreme).at[leg])
 
 
 @pytest.mark.parametrize("claim", ["tip deviation", "toolpath covered"])
@@ -392,12 +394,12 @@ def test_allowance_on_the_axis_tolerance(replay, found):
 
 def test_bounds_for_all_times_are_undecided_where_the_motion_is_not_proven(replay):
     """One chord of which nothing is proven: every claim that speaks of the time between samples fails."""
-    other, partly = replace(replay), copy(replay.survey)
+    other, partly = replace(replay), copy(replay.interval_bounds)
     _ = replay.match
     partly.away = partly.away.copy()
     partly.away[7] = np.inf
-    other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"match", "pivots", "axes"}})
-    other.__dict__["survey"] = partly
+    other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"match", "tilt_centres", "axes"}})
+    other.__dict__["interval_bounds"] = partly
     answers = [answer for claim in CLAIMS if isinstance(answer := claim(other), Certificate)]
     undecided = {answer.claim for answer in answers if answer.method.startswith("undecided")}
     assert undecided == {answer.claim for answer in answers if not answer.passed}
@@ -447,7 +449,7 @@ def test_speeds_say_how_they_were_bounded(linear, cubic):
 
 
 def test_a_header_that_does_not_say_where_the_guides_stand():
-    silent = SimpleNamespace(machine=SimpleNamespace(guides=object()), program=SimpleNamespace(slides=None))
+    silent = SimpleNamespace(machine=SimpleNamespace(guides=object()), program=SimpleNamespace(rail_positions=None))
     found = guides(silent)
     assert (found.passed, found.value, found.bound, found.unit) == (False, None, 0.0, "mm")
     assert "does not say" in found.method
@@ -460,7 +462,7 @@ def test_guides_stand_within_their_travel(third, room, passed):
     travel = np.tile([-0.1, 0.15], (5, 1))
     replay = SimpleNamespace(
         machine=SimpleNamespace(guides=SimpleNamespace(travel=travel)),
-        program=SimpleNamespace(slides=(0.0, 0.02, third, -0.03, 0.1)),
+        program=SimpleNamespace(rail_positions=(0.0, 0.02, third, -0.03, 0.1)),
     )
     found = guides(replay)
     assert found.passed == passed

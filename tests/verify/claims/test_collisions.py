@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import BPoly, CubicSpline
 
 from pentapod.geometry.solids import Solid
-from pentapod.machine.clearance.collision_world import Obstacle, Surroundings
+from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.program.program import Program
@@ -40,15 +40,20 @@ def fixture(shape):
     return Obstacle("fixture", surface_of(shape), clamped=False)
 
 
-def certificates(case, surroundings):
+def certificates(case, world):
     found = verify(
-        case.program, case.machine, case.toolpath, job_digest="job-1", **cases.TOLERANCES, surroundings=surroundings
+        case.program,
+        case.machine,
+        case.toolpath,
+        job_digest="job-1",
+        **cases.TOLERANCES,
+        collision_world=world,
     )
     return {c.claim: c for c in found.certificates}
 
 
-def failed(case, surroundings):
-    return {name for name, c in certificates(case, surroundings).items() if not c.passed}
+def failed(case, collision_world):
+    return {name for name, c in certificates(case, collision_world).items() if not c.passed}
 
 
 def dense_gaps(case, shape, every=40, samples=200):
@@ -86,7 +91,7 @@ def beside_leg(case, leg, share, away):
 
 
 def test_a_good_program_is_clear_of_its_part(good):
-    found = certificates(good, Surroundings((PART,), TOOL))
+    found = certificates(good, CollisionWorld((PART,), TOOL))
     names = {"legs clear of the part", "spindle clear of the part", "tool body clear of the part"}
     names.add("legs clear of the tool body")
     assert names <= found.keys()
@@ -112,7 +117,7 @@ def test_without_surroundings_nothing_is_claimed(cubic):
 def test_the_gap_to_a_post_is_proven_and_close(short, leg):
     shape = post(beside_leg(short, leg, 0.7, 0.04), height=0.05)
     sampled = dense_gaps(short, shape, every=10)
-    found = certificates(short, Surroundings((fixture(shape),)))
+    found = certificates(short, CollisionWorld((fixture(shape),)))
     legs, spindle = found["legs clear of the fixture"], found["spindle clear of the fixture"]
     assert legs.passed
     assert legs.value <= 1e3 * sampled[:5].min() + 1e-6
@@ -124,7 +129,7 @@ def test_the_gap_to_a_post_is_proven_and_close(short, leg):
 @pytest.mark.parametrize("leg", range(5))
 def test_a_post_moved_into_a_leg_is_caught(cubic, leg):
     shape = post(beside_leg(cubic, leg, 0.7, 0.012), height=0.05)
-    found = certificates(cubic, Surroundings((fixture(shape),)))
+    found = certificates(cubic, CollisionWorld((fixture(shape),)))
     assert "legs clear of the fixture" in {name for name, c in found.items() if not c.passed}
     assert found["legs clear of the fixture"].where.row is not None
     assert found["legs clear of the fixture"].value <= 0.0
@@ -152,7 +157,7 @@ def test_a_clamped_fixture_moves_with_the_part(short):
     told.apply_transform(short.program.placement.inverse().matrix)
     held = Obstacle("fixture", surface_of(told), clamped=True)
     values = [
-        certificates(short, Surroundings((obstacle,)))["legs clear of the fixture"].value
+        certificates(short, CollisionWorld((obstacle,)))["legs clear of the fixture"].value
         for obstacle in (fixture(shape), held)
     ]
     assert values[0] == pytest.approx(values[1], abs=1e-6)
@@ -162,7 +167,7 @@ def test_a_plate_in_the_spindles_way_is_caught(cubic):
     tip = cubic.program.placement.apply(cubic.toolpath.tips[:1])[0]
     plate = trimesh.creation.box((0.02, 0.02, 0.004))
     plate.apply_translation(tip - [0.0, 0.0, 0.09])
-    assert "spindle clear of the fixture" in failed(cubic, Surroundings((fixture(plate),)))
+    assert "spindle clear of the fixture" in failed(cubic, CollisionWorld((fixture(plate),)))
 
 
 @pytest.mark.parametrize(
@@ -179,7 +184,7 @@ def test_a_longer_holder_is_caught(cubic, holder, caught):
     wall = trimesh.creation.box((0.01, 0.02, 0.02))
     wall.apply_translation([0.025, 0.0, 0.01])
     part = Obstacle("part", surface_of(wall), clamped=True, allowance=5e-5)
-    wrong = failed(cubic, Surroundings((part,), (TOOL[0], holder)))
+    wrong = failed(cubic, CollisionWorld((part,), (TOOL[0], holder)))
     assert wrong == caught
 
 
@@ -187,7 +192,7 @@ def test_a_holder_up_to_the_joints_is_caught(cubic):
     machine = cubic.machine
     lowest = machine.tool_length - machine.robot.offsets.max()
     tall = Solid("holder", 0.03, lowest - 0.002, 0.06, 0.06)
-    assert "legs clear of the tool body" in failed(cubic, Surroundings((), (tall,)))
+    assert "legs clear of the tool body" in failed(cubic, CollisionWorld((), (tall,)))
 
 
 def test_the_gap_of_legs_and_tool_is_proven_and_close(cubic):
@@ -195,7 +200,7 @@ def test_the_gap_of_legs_and_tool_is_proven_and_close(cubic):
     machine = cubic.machine
     lowest = machine.tool_length - machine.robot.offsets.max()
     holder = Solid("holder", 0.5 * lowest, lowest - 0.03, 0.02, 0.03)
-    value = certificates(cubic, Surroundings((), (holder,)))["legs clear of the tool body"].value * 1e-3
+    value = certificates(cubic, CollisionWorld((), (holder,)))["legs clear of the tool body"].value * 1e-3
     position, direction = machine.robot.pose(cubic.program.legs[::100], cubic.program.component)
     turn = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
     share = np.linspace(0.0, 1.0, 40)
@@ -219,7 +224,7 @@ def test_the_gap_of_legs_and_tool_is_proven_and_close(cubic):
 def test_a_program_inside_a_solid_is_caught(cubic):
     """Bodies that never touch the surface, since all of it is around them."""
     box = trimesh.creation.box((6.0, 6.0, 6.0))
-    wrong = failed(cubic, Surroundings((fixture(box),), TOOL))
+    wrong = failed(cubic, CollisionWorld((fixture(box),), TOOL))
     assert {"legs clear of the fixture", "spindle clear of the fixture", "tool body clear of the fixture"} <= wrong
 
 
@@ -245,7 +250,7 @@ def short(cubic):
 def test_no_proof_of_clearance_where_samples_touch(short, leg, share, away, radius):
     shape = post(beside_leg(short, leg, share, away), radius=radius, height=0.04)
     sampled = dense_gaps(short, shape, every=60, samples=400)
-    found = certificates(short, Surroundings((fixture(shape),)))
+    found = certificates(short, CollisionWorld((fixture(shape),)))
     for name, least in (("legs", sampled[:5].min()), ("spindle", sampled[5])):
         certificate = found[f"{name} clear of the fixture"]
         if least <= 0.0:

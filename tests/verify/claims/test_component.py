@@ -10,7 +10,7 @@ from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify.claims.component import kept
 from pentapod.verify.claims.speed import feed, rest
 from pentapod.verify.claims.stops_and_dwells import dwells
-from pentapod.verify.replay.interval_bounds import ComponentFindings, Extreme
+from pentapod.verify.replay.interval_bounds import ComponentFindings, RunningMaximum
 
 PERIOD = 0.002
 UP = [0.0, 0.0, 1.0]
@@ -20,13 +20,13 @@ BASE = [[-0.552, -0.229], [-0.312, 0.510], [0.155, 0.577], [0.429, -0.417], [-0.
 
 
 def replay_of(upright=-0.5, away=-0.3, delta=1.0, **found):
-    component = ComponentFindings(Extreme(2))
+    component = ComponentFindings(RunningMaximum(2))
     component.lower.see(np.array([[upright, -np.inf]]), 7)
     component.lower.see(np.array([[-np.inf, away]]), 9)
     for name, value in found.items():
         setattr(component, name, value)
     return SimpleNamespace(
-        survey=SimpleNamespace(component=component),
+        interval_bounds=SimpleNamespace(component=component),
         machine=SimpleNamespace(robot=LinearPentapod.quadratic(BASE, delta)),
         program=SimpleNamespace(component=Component.parse("+-"), period=PERIOD),
         path_tolerance=2e-5,
@@ -108,7 +108,7 @@ def feeds_of(speeds, arcs, feeds=(0.01, 0.04), rapid=0.1):
         match=SimpleNamespace(arcs=np.array(arcs)),
         machine=SimpleNamespace(rapid_velocity=rapid),
         program=SimpleNamespace(interpolation="cubic"),
-        survey=SimpleNamespace(speeds=np.array(speeds)[:, None] * [1.0, 9.0, 9.0]),
+        interval_bounds=SimpleNamespace(speeds=np.array(speeds)[:, None] * [1.0, 9.0, 9.0]),
         path_tolerance=1e-4,
         place=lambda sample: sample,
     )
@@ -133,12 +133,12 @@ def test_no_feed_is_faster_than_rapids():
 
 
 @pytest.mark.parametrize(
-    ("pivot", "words"), [(0.003, "where the matched place is on a rapid"), (-0.1, "on every segment")]
+    ("tilt_centre", "words"), [(0.003, "where the matched place is on a rapid"), (-0.1, "on every segment")]
 )
-def test_rapids_are_judged_everywhere_only_where_feeds_are_of_a_spot(pivot, words):
+def test_rapids_are_judged_everywhere_only_where_feeds_are_of_a_spot(tilt_centre, words):
     replay = feeds_of([0.02], [0.012, 0.018])
     way = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]])
-    replay.toolpath = Toolpath((Segment(SegmentKind.RAPID, way, np.array([UP, UP]), np.inf),), pivot)
+    replay.toolpath = Toolpath((Segment(SegmentKind.RAPID, way, np.array([UP, UP]), np.inf),), tilt_centre)
     finding = feed(replay, SegmentKind.RAPID)
     assert (finding.value, finding.bound) == (pytest.approx(1200.0), pytest.approx(6000.0))
     assert f", {words}; within" in finding.method

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
 
 from pentapod.geometry.solids import Solid
-from pentapod.machine.clearance.collision_world import Obstacle, Surroundings
+from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
 from pentapod.machine.clearance.leg_clearance import pair_names
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
@@ -46,8 +46,8 @@ def corner(at, outwards, clamped=None, allowance=0.0):
 
 
 def judged(replay, obstacle=None, tool=()):
-    surroundings = Surroundings(() if obstacle is None else (obstacle,), tool)
-    return {claim.name: claim(replay) for claim in claims(surroundings, 5)}
+    collision_world = CollisionWorld(() if obstacle is None else (obstacle,), tool)
+    return {claim.name: claim(replay) for claim in claims(collision_world, 5)}
 
 
 def across(direction):
@@ -252,7 +252,7 @@ def test_what_is_not_looked_into_is_not_the_closest(cubic, rows):
 
     program = replace(cubic.program, legs=cubic.program.legs[:rows])
     replay = cases.replay_of(cubic, program)
-    ways = 0.5 * cases.PERIOD * replay.survey.speeds.max(axis=1)
+    ways = 0.5 * cases.PERIOD * replay.interval_bounds.speeds.max(axis=1)
     gaps = clearances(cubic.machine, *replay.pose) - np.maximum([0.0, *ways], [*ways, 0.0])[:, None]
     found = clearance(replay)
     assert found.value == pytest.approx(1e3 * gaps.min(), rel=1e-9)

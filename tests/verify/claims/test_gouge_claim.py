@@ -256,7 +256,7 @@ def replay(cubic):
 def test_rapids_are_the_chords_that_meet_rapids_alone(replay):
     """Each chord against each segment, on the arc length of the toolpath."""
     path, tolerance = replay.toolpath, replay.path_tolerance
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path.pivots, axis=0), axis=1))])
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path.tilt_centres, axis=0), axis=1))])
     marked = rapid_chords(replay)
     chords = range(0, len(marked), 3)
     expected = []
@@ -279,7 +279,7 @@ def test_a_kind_that_is_missing_is_not_judged(replay, kind, missing):
     segments = tuple(replace(s, kind=kind, feed=cases.FEED) for s in replay.toolpath.segments)
     other = cases.asked_anew(replay, toolpath=replace(replay.toolpath, segments=segments))
     _ = replay.match
-    other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"survey", "match"}})
+    other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"interval_bounds", "match"}})
     assert gouge(other, rapid=kind is SegmentKind.CUT) == Idle(f"no moment belongs to {missing}")
     assert rapid_chords(other).all() == (kind is SegmentKind.RAPID)
 
@@ -292,19 +292,19 @@ def test_what_the_claims_say_is_allowed(cubic):
 
 @pytest.mark.parametrize("lever", [0.0, 0.03])
 def test_strays_are_never_less_than_at_dense_moments(replay, cubic, lever):
-    """Each moment against the nearest of many places of the straight stretch, tool and pivot together."""
+    """Each moment against the nearest of many places of the straight stretch, tool and tilt centre together."""
     parts = 6
     tips, axes = moments(cubic, parts=parts)
-    pivots = tips + cases.BALL * axes
-    ends = len(replay.pivots) - 1
+    tilt_centres = tips + cases.BALL * axes
+    ends = len(replay.tilt_centres) - 1
     starts = np.array([200, 2600, 6900, 7060, 7400, 7700, 8200, ends - 64])
     counts = np.array([64, 8, 64, 300, 1, 64, 64, 64])
     found = strays(replay, Stretches(starts, starts + counts), lever)
     for k, (first, last) in enumerate(zip(starts, starts + counts, strict=True)):
         own = slice(first * parts // 2, last * parts // 2)
-        start, end = (replay.pivots[first], replay.axes[first]), (replay.pivots[last], replay.axes[last])
+        start, end = (replay.tilt_centres[first], replay.axes[first]), (replay.tilt_centres[last], replay.axes[last])
         worst = 0.0
-        for p, u in zip(pivots[own], axes[own], strict=True):
+        for p, u in zip(tilt_centres[own], axes[own], strict=True):
             share = np.linspace(0.0, 1.0, 101)
             for _ in range(3):
                 place = start[0] + share[:, None] * (end[0] - start[0])
@@ -325,7 +325,7 @@ def test_an_axis_that_swings_out_and_back_is_bounded_or_said_not_to_be(swing, bo
     lean = swing * np.array([0.0, 0.5, 1.0, 0.5, 0.0])
     axes = np.stack([np.sin(lean), 0.0 * lean, np.cos(lean)], axis=1)
     survey = SimpleNamespace(away=np.zeros(4), turned=np.zeros(4))
-    swung = SimpleNamespace(pivots=np.zeros((5, 3)), axes=axes, survey=survey)
+    swung = SimpleNamespace(tilt_centres=np.zeros((5, 3)), axes=axes, interval_bounds=survey)
     found = strays(swung, Stretches(np.array([0]), np.array([4])), 0.03)[0]
     assert np.isfinite(found) == bounded
     assert found >= 0.06 * np.sin(0.5 * swing)

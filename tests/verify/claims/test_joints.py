@@ -12,11 +12,12 @@ ANGLES = np.radians([10.0, 20.0, 30.0, 40.0, 50.0])
 
 
 def replay(limits, closed=False):
-    """Extreme angles (5,) of the legs, seen at the samples 2, 4, … 10, and limits (5,) in degrees on one side."""
+    """RunningMaximum angles (5,) of the legs, seen at the samples 2, 4, … 10, and limits (5,) in degrees on one
+    side."""
     limits, at = np.radians(limits), 2 * np.arange(1, 6)
     widest = SimpleNamespace(values=-np.cos(ANGLES), at=at)
     return SimpleNamespace(
-        survey=SimpleNamespace(
+        interval_bounds=SimpleNamespace(
             base_widest=widest, platform_open=widest, platform_closed=SimpleNamespace(values=np.cos(ANGLES), at=at)
         ),
         machine=SimpleNamespace(
@@ -45,9 +46,9 @@ def test_each_joint_has_a_limit_of_its_own(judge, sign, room, leg):
 def test_a_bound_beyond_a_cosine_is_the_straight_angle():
     """What is proven of a cosine may be beyond ±1 by a little."""
     over = replay(np.full(5, 90.0))
-    over.survey.base_widest.values[2] = 1.0 + 1e-9
+    over.interval_bounds.base_widest.values[2] = 1.0 + 1e-9
     assert base_cones(over).value == pytest.approx(180.0)
-    over.survey.platform_closed.values[3] = 1.0 + 1e-9
+    over.interval_bounds.platform_closed.values[3] = 1.0 + 1e-9
     assert platform_least(over).value == 0.0
 
 

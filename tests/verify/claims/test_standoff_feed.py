@@ -28,7 +28,7 @@ def judged(good, nod, share, rapid=cases.RAPID):
     rows = round(1.875 * LENGTH / (share * cases.FEED) / cases.PERIOD)
     machine = replace(good.machine, rapid_velocity=rapid)
     cut = Segment(SegmentKind.CUT, *poses(np.linspace(0.0, 1.0, 241)), cases.FEED)
-    toolpath = Toolpath((cut,), pivot=-STANDOFF)
+    toolpath = Toolpath((cut,), tilt_centre=-STANDOFF)
     program = cases.program_of(
         machine, *poses(cases.quintic(np.arange(rows + 1) / rows)), interpolation=good.program.interpolation
     )

@@ -114,7 +114,7 @@ def along(arcs=ARCS, turned=(0.0,) * 11, ends=(0.0, 1.0, 2.0, 3.0), leans=(0.0,)
     legs = np.cumsum(np.arange(11.0))[:, None] * np.array([1.0, 2.0, 1.0, 1.0, 1.0]) * 1e-3
     match = SimpleNamespace(arcs=np.repeat(arcs, 2)[:-1], turned=np.repeat(turned, 2)[:-1])
     return SimpleNamespace(
-        toolpath=Toolpath(segments, pivot=0.0, wait=wait),
+        toolpath=Toolpath(segments, tilt_centre=0.0, wait=wait),
         match=match,
         program=SimpleNamespace(legs=legs, period=0.1),
         machine=SimpleNamespace(legs=SimpleNamespace(max_acceleration=np.array([1.0, 10.0, 1.0, 1.0, 1.0]))),

@@ -32,7 +32,7 @@ def poses(f):
 
 def judged(good, **limits):
     machine = replace(good.machine, tool_limits=ToolLimits(**limits))
-    toolpath = Toolpath((Segment(SegmentKind.CUT, *poses(np.linspace(0.0, 1.0, 241)), 1.0),), pivot=0.0)
+    toolpath = Toolpath((Segment(SegmentKind.CUT, *poses(np.linspace(0.0, 1.0, 241)), 1.0),), tilt_centre=0.0)
     rows = poses(cases.quintic(np.arange(ROWS + 1) / ROWS))
     program = cases.program_of(machine, *rows, interpolation=good.program.interpolation)
     return {c.claim: c for c in verify(program, machine, toolpath, **cases.TOLERANCES, job_digest="job-1").certificates}

@@ -23,14 +23,16 @@ def replay(lean=(0.0, 0.0, 0.0, 0.0), **changes):
     }
     given = {
         "match": SimpleNamespace(**{**match, **{k: changes.pop(k) for k in list(changes) if k in match}}),
-        "survey": SimpleNamespace(away=1e-6 * np.array([1.0, 9.0, 3.0]), turned=np.array([0.01, 0.02, 0.03])),
+        "interval_bounds": SimpleNamespace(away=1e-6 * np.array([1.0, 9.0, 3.0]), turned=np.array([0.01, 0.02, 0.03])),
         "axes": np.stack([np.sin(lean), 0.0 * lean, np.cos(lean)], axis=1),
         "chord_arcs": np.zeros(3),
         "path_tolerance": TOLERANCE,
         "tilt": 0.1,
         "axis_tolerance": 0.01,
-        "toolpath": SimpleNamespace(pivot=3e-3, segment_of_interval=np.array([4, 7]), pivots=np.zeros((3, 3))),
-        "pivots": np.zeros((4, 3)),
+        "toolpath": SimpleNamespace(
+            tilt_centre=3e-3, segment_of_interval=np.array([4, 7]), tilt_centres=np.zeros((3, 3))
+        ),
+        "tilt_centres": np.zeros((4, 3)),
         "place": lambda sample: Place(sample, int(sample), 99),
     }
     return SimpleNamespace(**{**given, **changes})
@@ -96,9 +98,9 @@ def test_the_axis_at_a_waypoint_counts_where_it_is_worse(angles, value):
 
 
 def test_ends_are_compared_with_ends():
-    pivots, way = np.zeros((4, 3)), np.zeros((3, 3))
-    pivots[0, 0], way[-1, 1] = 1e-5, 3e-5
-    pair = replay(pivots=pivots, toolpath=SimpleNamespace(pivots=way))
+    tilt_centres, way = np.zeros((4, 3)), np.zeros((3, 3))
+    tilt_centres[0, 0], way[-1, 1] = 1e-5, 3e-5
+    pair = replay(tilt_centres=tilt_centres, toolpath=SimpleNamespace(tilt_centres=way))
     first, last = start(pair), end(pair)
     assert (first.value, last.value) == (pytest.approx(0.01), pytest.approx(0.03))
     assert (first.passed, last.passed) == (True, False)

@@ -31,14 +31,14 @@ def corner(x, z):
     return MeshDistance.of(Mesh.of(points, np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])))
 
 
-def moving(pivot=RADIUS, away=0.0, turned=0.0, height=0.0):
+def moving(tilt_centre=RADIUS, away=0.0, turned=0.0, height=0.0):
     """Along x from −15 mm to 15 mm, upright, with so much that each chord may stray."""
     x = np.linspace(-0.015, 0.015, CHORDS + 1)
     return SimpleNamespace(
-        pivots=np.stack([x, 0.0 * x, height + 0.0 * x], axis=1),
+        tilt_centres=np.stack([x, 0.0 * x, height + 0.0 * x], axis=1),
         axes=np.broadcast_to([0.0, 0.0, 1.0], (CHORDS + 1, 3)),
-        survey=SimpleNamespace(away=np.full(CHORDS, away), turned=np.full(CHORDS, turned)),
-        toolpath=SimpleNamespace(pivot=pivot),
+        interval_bounds=SimpleNamespace(away=np.full(CHORDS, away), turned=np.full(CHORDS, turned)),
+        toolpath=SimpleNamespace(tilt_centre=tilt_centre),
     )
 
 
@@ -77,8 +77,8 @@ def test_one_that_only_the_sweep_meets():
     """Slightly too deep, halfway between two samples of a coarse motion, at which it is not."""
     depth = 1.2e-4
     coarse = moving()
-    coarse.pivots, coarse.axes = coarse.pivots[::50], coarse.axes[::50]
-    coarse.survey.away, coarse.survey.turned = np.zeros(6), np.zeros(6)
+    coarse.tilt_centres, coarse.axes = coarse.tilt_centres[::50], coarse.axes[::50]
+    coarse.interval_bounds.away, coarse.interval_bounds.turned = np.zeros(6), np.zeros(6)
     surface = corner(-2.5e-3, -RADIUS + depth)
     found = immersion(coarse, surface, BallCutter(RADIUS).solids, np.ones(6, dtype=bool), bound=BOUND)
     assert found.met
@@ -144,21 +144,23 @@ def test_a_rounded_solid_reaches_as_far_as_its_rounding():
 
 def test_a_stray_is_that_from_the_nearest_place():
     """Five samples on a line but one that is aside, one that lags, one that leans; and what is proven between."""
-    pivots = np.array([[0.0, 0, 0], [1.0, 2e-3, 0], [1.5, 0, 0], [3.0, 0, 0], [4.0, 0, 0]])
+    tilt_centres = np.array([[0.0, 0, 0], [1.0, 2e-3, 0], [1.5, 0, 0], [3.0, 0, 0], [4.0, 0, 0]])
     still = SimpleNamespace(
-        pivots=pivots,
+        tilt_centres=tilt_centres,
         axes=np.broadcast_to([0.0, 0.0, 1.0], (5, 3)),
-        survey=SimpleNamespace(away=np.array([1e-5, 2e-5, 4e-5, 3e-5]), turned=np.array([1e-3, 4e-3, 2e-3, 1e-3])),
+        interval_bounds=SimpleNamespace(
+            away=np.array([1e-5, 2e-5, 4e-5, 3e-5]), turned=np.array([1e-3, 4e-3, 2e-3, 1e-3])
+        ),
     )
     stretches = Stretches(np.array([0, 2]), np.array([4, 4]))
     np.testing.assert_allclose(strays(still, stretches, 0.0), [2e-3 + 4e-5, 4e-5], atol=1e-15)
     np.testing.assert_allclose(strays(still, stretches, 0.5), [2e-3 + 4e-5 + 2e-3, 4e-5 + 1e-3], atol=1e-15)
-    still.pivots = pivots - np.array([0.0, 2e-3, 0.0]) * (np.arange(5) == 1)[:, None]
-    still.pivots[1, 0], still.pivots[2, 0] = -0.25, 4.5
+    still.tilt_centres = tilt_centres - np.array([0.0, 2e-3, 0.0]) * (np.arange(5) == 1)[:, None]
+    still.tilt_centres[1, 0], still.tilt_centres[2, 0] = -0.25, 4.5
     np.testing.assert_allclose(strays(still, Stretches(np.array([0]), np.array([4])), 0.0), [0.5 + 4e-5], atol=1e-15)
-    still.pivots[2, 0] = 2.0
+    still.tilt_centres[2, 0] = 2.0
     np.testing.assert_allclose(strays(still, Stretches(np.array([0]), np.array([4])), 0.0), [0.25 + 4e-5], atol=1e-15)
-    leaning = SimpleNamespace(**{**vars(still), "axes": still.axes.copy(), "pivots": np.zeros((5, 3))})
+    leaning = SimpleNamespace(**{**vars(still), "axes": still.axes.copy(), "tilt_centres": np.zeros((5, 3))})
     leaning.axes[1] = [0.0, np.sin(0.1), np.cos(0.1)]
     found = strays(leaning, stretches, 0.5)
     # The chord of that lean is as long as the sine of an angle that is a little larger.
@@ -166,13 +168,13 @@ def test_a_stray_is_that_from_the_nearest_place():
     assert found[1] == pytest.approx(4e-5 + 1e-3)
 
 
-def test_the_nearest_place_weighs_pivot_and_axis():
+def test_the_nearest_place_weighs_tilt_centre_and_axis():
     """20 mm of way and 0.02 rad on a lever of 0.5 m: at 0.6 of the one and 0.4 of the other it is 0.56 of both."""
     lean = np.array([0.0, 0.4, 1.0]) * 0.02
     moment = SimpleNamespace(
-        pivots=np.array([[0.0, 0.0, 0.0], [0.012, 0.0, 0.0], [0.02, 0.0, 0.0]]),
+        tilt_centres=np.array([[0.0, 0.0, 0.0], [0.012, 0.0, 0.0], [0.02, 0.0, 0.0]]),
         axes=np.stack([0.0 * lean, np.sin(lean), np.cos(lean)], axis=1),
-        survey=SimpleNamespace(away=np.zeros(2), turned=np.zeros(2)),
+        interval_bounds=SimpleNamespace(away=np.zeros(2), turned=np.zeros(2)),
     )
     found = strays(moment, Stretches(np.array([0]), np.array([2])), 0.5)
     height = 0.02**2 / 8.0
@@ -183,9 +185,9 @@ def test_the_nearest_place_weighs_pivot_and_axis():
 def test_an_arc_beyond_a_radian_is_too_long(turn, bounded):
     lean = turn * np.linspace(0.0, 1.0, 5)
     turning = SimpleNamespace(
-        pivots=np.zeros((5, 3)),
+        tilt_centres=np.zeros((5, 3)),
         axes=np.stack([np.sin(lean), 0.0 * lean, np.cos(lean)], axis=1),
-        survey=SimpleNamespace(away=np.zeros(4), turned=np.zeros(4)),
+        interval_bounds=SimpleNamespace(away=np.zeros(4), turned=np.zeros(4)),
     )
     assert np.isfinite(strays(turning, Stretches(np.array([0]), np.array([4])), 0.1)[0]) == bounded
     assert strays(turning, Stretches(np.array([0]), np.array([4])), 0.0)[0] == 0.0
@@ -208,7 +210,7 @@ def gouging(depth, *kinds):
         for kind, a, b in zip(kinds, ends, ends[1:], strict=False)
     )
     replay = moving()
-    replay.toolpath = Toolpath(segments, pivot=RADIUS)
+    replay.toolpath = Toolpath(segments, tilt_centre=RADIUS)
     replay.match = SimpleNamespace(arcs=np.linspace(0.0, 0.03, CHORDS + 1))
     replay.path_tolerance = 2e-5
     cutting = Cutting(corner(5e-3, -RADIUS + depth), BallCutter(RADIUS).solids, 5e-5)
@@ -243,7 +245,7 @@ def test_cuts_may_gouge_by_what_counts_as_none_and_rapids_may_not():
 def test_a_cutter_whose_top_is_inside_begins_inside(top, passed):
     """A block about the middle of a ball with its flute, open to nobody: only the top of the flute is looked at."""
     replay = gouging(-1.0, SegmentKind.CUT)
-    first = replay.pivots[0] - [0.0, 0.0, RADIUS]
+    first = replay.tilt_centres[0] - [0.0, 0.0, RADIUS]
     block = np.array(
         [[-1.0, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]
     )

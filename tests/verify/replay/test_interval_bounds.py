@@ -8,9 +8,9 @@ import pytest
 import replay_cases as cases
 
 from pentapod.geometry.interpolant import Interpolant
-from pentapod.verify.replay.interval_bounds import ComponentFindings, Extreme, survey
+from pentapod.verify.replay.interval_bounds import ComponentFindings, RunningMaximum, interval_bounds
 
-PIVOT, EVERY = 0.1, 5
+TILT_CENTRE, EVERY = 0.1, 5
 
 
 @pytest.fixture(scope="module", params=["cubic", "linear"])
@@ -21,11 +21,11 @@ def turning(request):
     middle = int(np.argmax(turn))
     legs = case.program.legs[middle - 30 * EVERY : middle + 30 * EVERY : EVERY]
     program = replace(case.program, legs=legs, period=EVERY * cases.PERIOD)
-    return program, case.machine, survey(program, case.machine, PIVOT, 1e-6, lambda _: None)
+    return program, case.machine, interval_bounds(program, case.machine, TILT_CENTRE, 1e-6, lambda _: None)
 
 
 def same(a, b):
-    if isinstance(a, Extreme):
+    if isinstance(a, RunningMaximum):
         return np.allclose(a.values, b.values, rtol=1e-4, atol=0.0) and (np.abs(a.at - b.at) <= 1).all()
     if isinstance(a, ComponentFindings):
         return all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
@@ -37,14 +37,14 @@ def test_in_blocks_as_in_one_piece(turning, block, monkeypatch):
     program, machine, whole = turning
     monkeypatch.setattr("pentapod.verify.replay.interval_bounds._BLOCK", block)
     told = []
-    parts = survey(program, machine, PIVOT, 1e-6, told.append)
+    parts = interval_bounds(program, machine, TILT_CENTRE, 1e-6, told.append)
     for field in fields(whole):
         assert same(getattr(whole, field.name), getattr(parts, field.name)), field.name
     np.testing.assert_allclose(told, np.arange(0, 59, block) / 59)
 
 
 def test_what_is_proven_of_chords_holds_at_dense_moments(turning):
-    """Speeds and strays of the tip, of the pivot and of the ends of what the platform's line carries."""
+    """Speeds and strays of the tip, of the tilt centre and of the ends of what the platform's line carries."""
     program, machine, found = turning
     b = Interpolant.through(program.legs, program.period, program.interpolation).bernstein
     degree, t = b.shape[-1] - 1, np.linspace(0.0, 1.0, 41)
@@ -64,13 +64,15 @@ def test_what_is_proven_of_chords_holds_at_dense_moments(turning):
 
     far = max(offsets.max(), tip)
     for column, speed in enumerate(
-        (fastest(tip), fastest(tip - PIVOT), np.maximum(fastest(offsets.min()), fastest(far)))
+        (fastest(tip), fastest(tip - TILT_CENTRE), np.maximum(fastest(offsets.min()), fastest(far)))
     ):
         assert (found.speeds[:, column] >= speed * (1.0 - 1e-6)).all()
         # A spline clamped at both ends rings there, where the program is cut out of its motion.
         assert (found.speeds[20:-20, column] <= speed[20:-20] * 1.01 + 2e-5).all()
-    pivots, share = halves(tip - PIVOT), np.linspace(0.0, 1.0, 21)[:, None]
-    off = np.linalg.norm(pivots - (1 - share) * pivots[:, :1] - share * pivots[:, -1:], axis=2).max(axis=1)
+    tilt_centres, share = halves(tip - TILT_CENTRE), np.linspace(0.0, 1.0, 21)[:, None]
+    off = np.linalg.norm(tilt_centres - (1 - share) * tilt_centres[:, :1] - share * tilt_centres[:, -1:], axis=2).max(
+        axis=1
+    )
     assert (found.away >= off - 1e-13).all()
     assert found.away.max() <= 2.2 * off.max()
     axes = halves(1.0) - halves(0.0)
@@ -107,7 +109,7 @@ def test_a_program_that_ends_at_speed_has_its_largest_acceleration_there(linear)
     legs = np.repeat(linear.program.legs[:1], 6, axis=0)
     legs[:, 2] += 1e-5 * np.array([0.0, 1.0, 4.0, 9.0, 16.0, 25.0])
     program = replace(linear.program, legs=legs)
-    found = survey(program, linear.machine, 0.0, 0.0, lambda _: None)
+    found = interval_bounds(program, linear.machine, 0.0, 0.0, lambda _: None)
     assert found.accelerations.values[2] == pytest.approx(9e-5 / cases.PERIOD**2)
     assert found.accelerations.at[2] == 5
     assert found.rates.values[2] == pytest.approx(9e-5 / cases.PERIOD)
@@ -116,7 +118,7 @@ def test_a_program_that_ends_at_speed_has_its_largest_acceleration_there(linear)
 
 
 def test_what_is_undecided_is_counted_and_the_first_is_kept():
-    findings, none = ComponentFindings(Extreme(2)), np.zeros(3, dtype=bool)
+    findings, none = ComponentFindings(RunningMaximum(2)), np.zeros(3, dtype=bool)
     doubt = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])
     for first, undecided, refuted in (
         (0, none, none),

@@ -27,19 +27,22 @@ def test_where_the_axis_counts():
     assert turns_on_spot(path, 1e-3).tolist() == [True, False, True, False, True, False, True]
 
 
-def test_shares_of_an_interval_by_pivot_and_by_axis():
-    """On the spot a share by the pivot weighs (length / tolerance)², one by the axis (turn / 0.05 rad)²."""
+def test_shares_of_an_interval_by_tilt_centre_and_by_axis():
+    """On the spot a share by the tilt centre weighs (length / tolerance)², one by the axis (turn / 0.05 rad)²."""
     path = course([0.0, 4e-4, 2.0], [0.0, 0.1, 0.1])
     moments = course([1e-4, 3e-4, -1e-4, 9e-4, 0.5004, -1.0, 3.0], [0.075, 0.0, -0.1, 0.2, 0.0, 0.0, 0.0])
     interval = np.array([0, 0, 0, 0, 1, 1, 1])
     found = interval_fractions(moments, path, np.array([True, False]), 1e-3, interval)
-    by_pivot, by_axis = 0.4**2, 2.0**2
-    both = [(by_pivot * a + by_axis * b) / (by_pivot + by_axis) for a, b in ((0.25, 0.75), (0.75, 0.0), (0, 0), (1, 1))]
+    by_tilt_centre, by_axis = 0.4**2, 2.0**2
+    both = [
+        (by_tilt_centre * a + by_axis * b) / (by_tilt_centre + by_axis)
+        for a, b in ((0.25, 0.75), (0.75, 0.0), (0, 0), (1, 1))
+    ]
     np.testing.assert_allclose(found, [*both, 0.5 / 1.9996, 0.0, 1.0], atol=1e-12)
 
 
-def test_the_axis_does_not_count_where_the_pivot_goes_on():
-    """The motion's axis lags behind by a tenth of a metre: it visits each waypoint where its pivot is there."""
+def test_the_axis_does_not_count_where_the_tilt_centre_goes_on():
+    """The motion's axis lags behind by a tenth of a metre: it visits each waypoint where its tilt centre is there."""
     path = course(np.linspace(0.0, 1.0, 6), np.linspace(0.0, 0.5, 6))
     x = np.linspace(0.0, 1.0, 101)
     found = match(course(x, 0.5 * np.maximum(x - 0.1, 0.0)), path, 0.15)
@@ -61,13 +64,13 @@ def test_before_and_after_a_turn_on_the_spot_the_axis_does_not_count():
     found = match(course(way, axis), path, 0.02)
     assert found.times[1] == pytest.approx(10.0, abs=1e-6)
     assert found.times[4] == pytest.approx(41.0, abs=1e-6)
-    # While the pivot stands: 20 to 31, with the axis from 0 to 0.24 at the samples 21 to 30.
+    # While the tilt centre stands: 20 to 31, with the axis from 0 to 0.24 at the samples 21 to 30.
     assert found.times[2] == pytest.approx(21.0 + 9.0 * 0.02 / 0.24, abs=0.05)
     assert found.times[3] == pytest.approx(21.0 + 9.0 * 0.22 / 0.24, abs=0.05)
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-2])
-def test_the_closest_moment_of_a_turn_weighs_pivot_and_axis(tolerance):
+def test_the_closest_moment_of_a_turn_weighs_tilt_centre_and_axis(tolerance):
     """A motion that creeps on as it turns, early by 0.02 rad: 0.05 rad weigh as much as the tolerance."""
     creep, turn, early = 0.8 * tolerance, 0.04, 0.02
     path = course([-1.0, 0.0, 0.0, 1.0], [0.0, 0.0, turn, turn])

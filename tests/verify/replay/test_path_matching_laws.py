@@ -168,7 +168,7 @@ def test_what_the_motion_is_off_its_chords_counts():
 
 
 def test_axes_keep_order_where_a_matching_keeps_both():
-    """The pivot stands; the axis trembles there and back: within the bound of the axes there is an order."""
+    """The tilt centre stands; the axis trembles there and back: within the bound of the axes there is an order."""
     rng = np.random.default_rng(1)
     angle = np.radians(2.0) * np.cumsum(np.where(rng.random(60) < 0.4, -1.0, 1.0))
     moved = np.interp(np.linspace(0.0, 59.0, 600), np.arange(60), angle) + np.radians(1.5) * rng.uniform(-1, 1, 600)
@@ -241,7 +241,7 @@ def test_motion_on_the_path_is_matched_to_the_noise(path, per_interval, toleranc
 
 @pytest.mark.parametrize("pause", [2, 500])
 def test_turn_on_the_spot_is_matched_by_the_axis(pause):
-    """The pivot stands at x = 1 while the axis turns there and back; both wait there, too."""
+    """The tilt centre stands at x = 1 while the axis turns there and back; both wait there, too."""
     turn = np.radians(40.0) * np.sin(np.linspace(0, np.pi, 11))
     there = np.stack([np.sin(turn), 0 * turn, np.cos(turn)], axis=1)
     up = np.array([[0.0, 0.0, 1.0]])

@@ -60,14 +60,14 @@ def along(*lines, tool, axes=None):
     axes = np.tile(UP, (len(tips), 1)) if axes is None else np.concatenate(axes)
     kinds = [kind for line in lines for kind in [SegmentKind.CUT] * (len(line) - 1) + [SegmentKind.RAPID]][:-1]
     segments = [Segment(kind, tips[k : k + 2], axes[k : k + 2], 0.02) for k, kind in enumerate(kinds)]
-    path = Toolpath(tuple(segments), tool.pivot)
+    path = Toolpath(tuple(segments), tool.tilt_centre)
     chords = len(tips) - 1
     return SimpleNamespace(
-        pivots=path.pivots,
+        tilt_centres=path.tilt_centres,
         axes=axes,
         toolpath=path,
-        survey=SimpleNamespace(away=np.zeros(chords), turned=np.zeros(chords)),
-        match=SimpleNamespace(arcs=arc_length(path.pivots)),
+        interval_bounds=SimpleNamespace(away=np.zeros(chords), turned=np.zeros(chords)),
+        match=SimpleNamespace(arcs=arc_length(path.tilt_centres)),
         program=SimpleNamespace(provenance=SimpleNamespace(piece=None)),
         place=lambda sample: Place(None, int(sample), None),
     )
@@ -229,7 +229,9 @@ def test_dense_samples_agree_on_a_wavy_sheet_with_a_leaning_tool():
     w = rng.dirichlet([1, 1, 1], 3000)
     q, n = np.einsum("ni,nij->nj", w, patch.vertices[patch.faces[facet]]), patch.facet_normals[facet]
     share = np.linspace(0, 1, 60, endpoint=False)[:, None]
-    c = np.concatenate([a + share * (b - a) for a, b in zip(replay.pivots[:-1], replay.pivots[1:], strict=True)])
+    c = np.concatenate(
+        [a + share * (b - a) for a, b in zip(replay.tilt_centres[:-1], replay.tilt_centres[1:], strict=True)]
+    )
     heights = np.full(len(q), np.inf)
     for part in np.array_split(np.arange(len(q)), 60):
         d = c[None] - q[part, None]
@@ -251,7 +253,7 @@ def test_motion_that_is_not_known_exactly_counts_for_less():
     tool, step = BallCutter(R), 2e-3
     scallop = R - np.sqrt(R**2 - step**2 / 4)
     replay = along(*raster(step), tool=tool)
-    replay.survey.away[:] = 5e-5
+    replay.interval_bounds.away[:] = 5e-5
     assert not judged(replay, plate(), tool, 1.02 * scallop).passed
     assert judged(replay, plate(), tool, scallop + 6e-5).value == 0.0
 

@@ -30,7 +30,7 @@ def limits_text(found: Sequence[ActiveLimit]) -> str:
 def blames_text(refusal: Refusal) -> str:
     """Return the table of a refusal: every limit in the way, the worst first."""
     lines = [f"{'limit in the way':<46} {'beyond it by':>14}  waypoints"]
-    for blame in refusal.blames:
+    for blame in refusal.diagnosis:
         amount = f"{blame.shortfall:.3g} {blame.unit}" if blame.shortfall else "–"
         lines.append(f"{blame.constraint:<46} {amount:>14}  {_ranges(blame.waypoints)}".rstrip())
     return "\n".join([*lines, refusal.remedy])

@@ -78,7 +78,7 @@ def _explained(outcome: Outcome) -> str:
 
     if (setups := outcome.find(SetUps)) is not None:
         return "\n\n".join(f"{part.folder}\n{_explained(part.outcome)}" for part in setups.parts)
-    if outcome.refusal is not None and outcome.refusal.blames:
+    if outcome.refusal is not None and outcome.refusal.diagnosis:
         return blames_text(outcome.refusal)
     placed = outcome.find(PlacedPath)
     return "" if placed is None else limits_text(active_limits(placed))

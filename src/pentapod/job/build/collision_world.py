@@ -5,14 +5,14 @@ from __future__ import annotations
 from pentapod.base.errors import MachineError
 from pentapod.job.build.tool import job_tool
 from pentapod.job.schema.job import Job
-from pentapod.machine.clearance.collision_world import Surroundings
+from pentapod.machine.clearance.collision_world import CollisionWorld
 from pentapod.machine.machine import Machine
 from pentapod.mesh.io.load import load_mesh
 from pentapod.mesh.mesh import Mesh
 
 
-def job_surroundings(job: Job, machine: Machine, mesh: Mesh) -> Surroundings:
-    """Return the surroundings of a job; mesh: the part's.
+def job_collision_world(job: Job, machine: Machine, mesh: Mesh) -> CollisionWorld:
+    """Return the collision world of a job; mesh: the part's.
 
     Raises JobError where the tool does not go with the machine.
     """
@@ -20,7 +20,7 @@ def job_surroundings(job: Job, machine: Machine, mesh: Mesh) -> Surroundings:
     name = "fixture" if job.fixture.frame == "part" else "table"
     around = {} if held is None else {name: held}
     try:
-        return Surroundings.of(machine, job_tool(job), mesh, **around, allowance=job.gouge.si.tolerance)
+        return CollisionWorld.of(machine, job_tool(job), mesh, **around, allowance=job.gouge.si.tolerance)
     except MachineError as error:
         remedy = "a longer tool.length_mm, or a shorter holder"
         raise job.error("tool", "holder_mm", error.what, expected=error.expected, remedy=remedy) from error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pentapod.job.build.collision_world import job_surroundings
+from pentapod.job.build.collision_world import job_collision_world
 from pentapod.job.build.cutting import job_cutting
 from pentapod.job.build.placement import job_constraints
 from pentapod.job.build.sources import job_sources
@@ -22,8 +22,8 @@ def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Cal
     make_toolpath: called last, so that errors of the job's tables are told before the long work.
     Raises JobError where tables of the job do not go with the machine or the mesh.
     """
-    surroundings, constraints = job_surroundings(job, machine, mesh), job_constraints(job, machine, mesh)
-    cutting, component = job_cutting(job, surroundings), job.placement.component
+    collision_world, constraints = job_collision_world(job, machine, mesh), job_constraints(job, machine, mesh)
+    cutting, component = job_cutting(job, collision_world), job.placement.component
     return Specification(
         machine,
         make_toolpath(),
@@ -31,7 +31,7 @@ def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Cal
         path_tolerance=job.tolerance.si.path,
         axis_tolerance=job.tolerance.si.axis,
         job_digest=job.digest,
-        surroundings=surroundings,
+        collision_world=collision_world,
         cutting=cutting,
         constraints=constraints,
         component=None if component is None else Component.parse(component),

@@ -30,7 +30,7 @@ from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.toolpath import Toolpath
 
 _SLACK = 1.05
-"""The cap holds along the contact points; the path of the pivot is a little longer or shorter."""
+"""The cap holds along the contact points; the path of the tilt centre is a little longer or shorter."""
 _FILE_STYLE = PathOptions()
 """Clearance, approach and spacing where the path comes from a file."""
 

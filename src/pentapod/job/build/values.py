@@ -81,8 +81,8 @@ def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
     """Return the toolpath of the strategy or of the file, and its report."""
     if isinstance(job.toolpath, FileTable):
         file = job.file("file")
-        read = read_toolpath(file, job.toolpath.format, pivot=tool.pivot, feed=job.feed.si.cut)
+        read = read_toolpath(file, job.toolpath.format, tilt_centre=tool.tilt_centre, feed=job.feed.si.cut)
         # Whatever the file says of its tool, this job's is the one that moves.
-        read = dataclasses.replace(read, pivot=tool.pivot)
+        read = dataclasses.replace(read, tilt_centre=tool.tilt_centre)
         return read, FileReport(file.name, len(read), len(read.segments))
     return toolpath_with_report(mesh, tool, job_options(job))

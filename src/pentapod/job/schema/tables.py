@@ -174,7 +174,7 @@ class ToleranceTable(Table):
     chordal_mm: Positive = Field(default=0.01, description="between the waypoints' chords and the mesh")
     path_mm: Positive = Field(
         default=0.02,
-        description="between the motion of the tool's pivot (a ball's centre, a beam's spot) and the toolpath",
+        description="between the motion of the tool's tilt centre (a ball's centre, a beam's spot) and the toolpath",
     )
     axis_deg: float = Field(
         default=0.5,

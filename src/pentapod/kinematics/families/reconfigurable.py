@@ -56,39 +56,39 @@ class ReconfigurablePentapod(Value):
         """Return the machine with all guides parallel to x, and offsets that move with them."""
         return cls(pentapod, np.tile((1.0, 0.0), (5, 1)), as_floats(travel, "travel"))
 
-    def base_at(self, slides: ArrayLike) -> Floats:
+    def base_at(self, rail_positions: ArrayLike) -> Floats:
         """Return the base attachments (..., 5, 2), metres."""
-        return self.pentapod.base + as_floats(slides, "slides", (5,))[..., None] * self.guides
+        return self.pentapod.base + as_floats(rail_positions, "rail_positions", (5,))[..., None] * self.guides
 
-    def offsets_at(self, slides: ArrayLike) -> Floats:
+    def offsets_at(self, rail_positions: ArrayLike) -> Floats:
         """Return the platform offsets (..., 5), metres."""
-        moved = as_floats(slides, "slides", (5,)) * self.guides[:, 0]
+        moved = as_floats(rail_positions, "rail_positions", (5,)) * self.guides[:, 0]
         return self.pentapod.offsets + self.pentapod.delta * moved
 
-    def moved(self, joints: Joints, slides: Sequence[Any]) -> Joints:
+    def moved(self, joints: Joints, rail_positions: Sequence[Any]) -> Joints:
         """Return joints of this machine after its guides moved on by slides (5), numbers or expressions."""
-        both = list(zip(slides, self.guides.tolist(), strict=True))
+        both = list(zip(rail_positions, self.guides.tolist(), strict=True))
         bases = [[x + slide * gx, y + slide * gy] for (x, y), (slide, (gx, gy)) in zip(joints[0], both, strict=True)]
         return bases, [
             z + self.pentapod.delta * slide * gx for z, (slide, (gx, _)) in zip(joints[1], both, strict=True)
         ]
 
-    def at(self, slides: ArrayLike) -> LinearPentapod:
+    def at(self, rail_positions: ArrayLike) -> LinearPentapod:
         """Return the pentapod with its guides at slides (5,). Raises MachineError where that one is singular."""
-        return LinearPentapod(self.base_at(slides), self.offsets_at(slides), self.pentapod.delta)
+        return LinearPentapod(self.base_at(rail_positions), self.offsets_at(rail_positions), self.pentapod.delta)
 
-    def determinant(self, slides: ArrayLike) -> Floats:
+    def determinant(self, rail_positions: ArrayLike) -> Floats:
         """Return F (...), paper's (13), at slides (..., 5): metres to the 6th power."""
-        return conic_determinant(self.base_at(slides))
+        return conic_determinant(self.base_at(rail_positions))
 
-    def forbidden_slides(self, leg: int, slides: ArrayLike) -> Floats:
+    def forbidden_rail_positions(self, leg: int, rail_positions: ArrayLike) -> Floats:
         """Return the positions (k,), metres, of guide `leg` (0 … 4) at which F = 0, the others staying at slides (5,).
 
         They are where the guide meets the conic through the other four attachments: none, one or two, in rising order,
         whether within the travel or not. A guide along y meets it once at most. Empty too for a fixed joint, or where F
         is 0 all along the guide: `determinant` tells which.
         """
-        conic = forbidden_conic(self.base_at(slides), leg)
+        conic = forbidden_conic(self.base_at(rail_positions), leg)
         x, y = self.pentapod.base[leg] - conic.origin
         gx, gy = self.guides[leg]
         a, b, _, d, e, g = conic.coefficients

@@ -10,7 +10,7 @@ from pentapod.base.arrays import Floats
 from pentapod.kinematics.answers import BranchProof, Chords
 from pentapod.kinematics.proofs.chords import Pose, prove_chords
 from pentapod.kinematics.proofs.motion import MOTION_MEASURES, motion_in_branch
-from pentapod.kinematics.proofs.pose_enclosure import roaming
+from pentapod.kinematics.proofs.pose_enclosure import pose_enclosure
 from pentapod.kinematics.tubes.leg_equations import PosedLegs
 
 
@@ -30,5 +30,5 @@ class ProvenByLegEquations:
         return prove_chords(cast("PosedLegs", self), leg_coefficients, start, end, branch, arms=arms, towards=towards)
 
     def enclose(self, ends: Pose, readings: Floats, heights: Floats) -> tuple[Floats, Floats]:
-        """Return how far points of the line get, and how far the direction: `roaming`."""
-        return roaming(cast("PosedLegs", self), *ends, readings, heights)
+        """Return how far points of the line get, and how far the direction: `pose_enclosure`."""
+        return pose_enclosure(cast("PosedLegs", self), *ends, readings, heights)

@@ -30,7 +30,7 @@ _U = 2.0**-53
 _UP = 1.0 + 1e-9  # for what rounding takes from sums of positive terms
 
 
-def roaming(
+def pose_enclosure(
     robot: BuiltLegs, position: ArrayLike, direction: ArrayLike, lengths: ArrayLike, offsets: ArrayLike
 ) -> tuple[Floats, Floats]:
     """Return how far (N, K) points of the platform line get from where they are, at most, and how far (N,) i does.

@@ -1,4 +1,4 @@
-"""Surroundings: what legs, spindle and tool must not touch: the part, its fixture, the machine's table."""
+"""CollisionWorld: what legs, spindle and tool must not touch: the part, its fixture, the machine's table."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Obstacle(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings(Value):
+class CollisionWorld(Value):
     """obstacles, and the tool's solids above its cutting part (shank and holder; none where the spindle is all)."""
 
     obstacles: tuple[Obstacle, ...] = ()
@@ -52,7 +52,7 @@ class Surroundings(Value):
         fixture: Mesh | None = None,
         table: Mesh | None = None,
         allowance: float = 50e-6,
-    ) -> Surroundings:
+    ) -> CollisionWorld:
         """Return what is in the way on a machine: the part, what holds it, what stands in the machine.
 
         part, fixture: workpiece frame; table: machine frame. allowance: metres by which the tool's shank and holder may
@@ -79,7 +79,7 @@ class Surroundings(Value):
         return (*legs, "spindle", *((TOOL_BODY,) if self.tool else ()))
 
 
-NOTHING = Surroundings()
+NOTHING = CollisionWorld()
 """Nothing in the way, and a tool without shank and holder."""
 
 
@@ -124,7 +124,7 @@ class MovingBodies:
         return Gap(np.minimum(distance, within), axes.place, axes.normal)
 
     def gaps(self, obstacle: Obstacle, tool: Sequence[Solid], within: float) -> Floats:
-        """Return the gaps (N, K) of all that moves, in the order of `Surroundings.names`; none above `within`.
+        """Return the gaps (N, K) of all that moves, in the order of `CollisionWorld.names`; none above `within`.
 
         What runs through an open sheet is at most as deep in it as it is thick. The tool's allowance is added.
         """

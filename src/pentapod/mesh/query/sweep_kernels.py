@@ -6,9 +6,9 @@ with centre c and offsets δ, and over the times s ± τ,
 
     f ≥ f(c, s) + min g·δ − |∂f/∂t| τ − ½ τ² (θ² W + 2 θ V) − θ τ max|δ|
 
-with θ the angle that the axis turns, V the way that the pivot goes, and W the distance of points from the
-pivot: the last two terms bound how far the motion, seen from the body, leaves a straight line. Pieces that cannot hold
-a point deeper than what is known are dropped; the others are halved in space or in time, whichever bounds worse.
+with θ the angle that the axis turns, V the way that the tilt centre goes, and W the distance of points from the
+tilt_centre: the last two terms bound how far the motion, seen from the body, leaves a straight line. Pieces that cannot
+hold a point deeper than what is known are dropped; the others are halved in space or in time, whichever bounds worse.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def meridian_distance(solid: Floats, r: float, z: float) -> tuple[float, float, 
 
 @kernel
 def _place(motion: Floats, t: float, pose: Floats) -> None:
-    """Write pivot and axis at time t into pose (6,). motion: see `deepest`."""
+    """Write tilt_centre and axis at time t into pose (6,). motion: see `deepest`."""
     angle = motion[16]
     for k in range(3):
         pose[k] = motion[k] + t * motion[6 + k]
@@ -189,9 +189,9 @@ def deepest(
 ) -> int:
     """Lower best (5,): f, time and point, over a whole tree; return the leaf-order facet, −1 where nothing is lower.
 
-    solid (5,). motion (18,): pivot and axis at the start (3 + 3), the pivot's way (3), the axis a quarter turn on
-    (3), the angular velocity (3), the way's length, the angle, and the pivot's height over the tip. best[0] on entry
-    is the f of interest: only what lies deeper is looked for. nodes, work: room.
+    solid (5,). motion (18,): tilt_centre and axis at the start (3 + 3), the tilt centre's way (3), the axis a quarter
+    turn on (3), the angular velocity (3), the way's length, the angle, and the tilt centre's height over the tip.
+    best[0] on entry is the f of interest: only what lies deeper is looked for. nodes, work: room.
     """
     pose, g = np.empty(6), np.empty(6)
     leaves = len(starts) - 1

@@ -21,10 +21,10 @@ _CHUNK = 5_000
 
 
 class Body(Protocol):
-    """What is swept: a tool, or part of one. pivot: metres from the tip to the point that moves straight."""
+    """What is swept: a tool, or part of one. tilt_centre: metres from the tip to the point that moves straight."""
 
     @property
-    def pivot(self) -> float:
+    def tilt_centre(self) -> float:
         """Distance in metres from the tip along the axis to the point about which the body turns."""
         ...
 
@@ -36,10 +36,10 @@ class Body(Protocol):
 
 @dataclass(frozen=True)
 class TouchingBody:
-    """Solids alone, standing: their pivot does not matter."""
+    """Solids alone, standing: their tilt centre does not matter."""
 
     solids: tuple[Solid, ...]
-    pivot: float = 0.0
+    tilt_centre: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ def sweep(
 
     every: 2 takes the poses as pairs, a motion each, and leaves the ways between pairs out.
 
-    On a motion the pivot goes straight and the axis turns evenly about it. Looked for is what lies deeper than
+    On a motion the tilt centre goes straight and the axis turns evenly about it. Looked for is what lies deeper than
     `threshold`, metres; a negative one asks for a gap. Every point of every facet and every time between is
     covered; depths are exact to `RESOLUTION_M` and 1 %. Raises ToolpathError for fewer than two poses.
     """
@@ -132,9 +132,9 @@ def _swept(
     count, parts = len(tips0), len(solids)
     depths, where = np.full((parts, count), -np.inf), np.full((parts, count, 4), np.nan)
     facets = np.full((parts, count), -1, dtype=np.intp)
-    motions = _motions(tips0, axes0, tips1, axes1, tool.pivot)
+    motions = _motions(tips0, axes0, tips1, axes1, tool.tilt_centre)
     for k, solid in enumerate(solids):
-        ball = solid.is_ball and solid.low == tool.pivot
+        ball = solid.is_ball and solid.low == tool.tilt_centre
         numbers = np.array(solid.numbers)
         for first in range(0, count, _CHUNK):
             rows = slice(first, first + _CHUNK)
@@ -153,9 +153,9 @@ def _swept(
     return _by_kind(depths, where, np.where(facets < 0, -1, tree.facets[facets]), kinds)
 
 
-def _motions(tips0: Floats, axes0: Floats, tips1: Floats, axes1: Floats, pivot: float) -> Floats:
+def _motions(tips0: Floats, axes0: Floats, tips1: Floats, axes1: Floats, tilt_centre: float) -> Floats:
     """Return the motions (M, 18) as the kernels take them."""
-    start, end = tips0 + pivot * axes0, tips1 + pivot * axes1
+    start, end = tips0 + tilt_centre * axes0, tips1 + tilt_centre * axes1
     way = end - start
     angle = angle_between(axes0, axes1)
     # The direction a quarter turn on; where the axes are opposite every way round is as good.
@@ -165,7 +165,7 @@ def _motions(tips0: Floats, axes0: Floats, tips1: Floats, axes1: Floats, pivot: 
     angle = np.where((length[:, 0] > 1e-12) | (angle > 1.0), angle, 0.0)
     spin = angle[:, None] * np.cross(axes0, ahead)
     size = np.linalg.norm(way, axis=1)
-    tall = np.full((len(start), 1), pivot)
+    tall = np.full((len(start), 1), tilt_centre)
     return np.ascontiguousarray(np.hstack([start, axes0, way, ahead, spin, size[:, None], angle[:, None], tall]))
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats, Ints, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
-from pentapod.base.refusal import Blame, Refusal, stage
+from pentapod.base.refusal import Refusal, Shortfall, stage
 from pentapod.base.values import Result, Value
 from pentapod.geometry.fillet import TooFar, blended
 from pentapod.kinematics.robot import Robot
@@ -69,9 +69,9 @@ class LegPiece(Value):
         return self.curve.tip_length(np.asarray(s, dtype=np.float64))
 
     def surface_rate(self, s: ArrayLike) -> Floats:
-        """Return how far (n,) the pivot (a beam's spot) moves for each metre of s, at stations s (n,)."""
+        """Return how far (n,) the tilt centre (a beam's spot) moves for each metre of s, at stations s (n,)."""
         tip, axis = self.pose(s, 1)
-        return np.linalg.norm(tip + self.curve.pivot * axis, axis=1)
+        return np.linalg.norm(tip + self.curve.tilt_centre * axis, axis=1)
 
     def feed_rate(self, s: ArrayLike) -> Floats:
         """Return how far (n,) the point whose speed the feed is moves for each metre of s, at stations s (n,).
@@ -79,7 +79,7 @@ class LegPiece(Value):
         With a stand-off (a beam, a spray) it is the spot on the surface. Otherwise, and on rapids, it is the tip, taken
         as s itself: it is never faster.
         """
-        spot = self.curve.pivot < 0.0 and bool(np.isfinite(self.section_feeds).all())
+        spot = self.curve.tilt_centre < 0.0 and bool(np.isfinite(self.section_feeds).all())
         return self.surface_rate(s) if spot else np.ones(np.shape(s))
 
     def __call__(self, s: ArrayLike, order: int = 0) -> Floats:
@@ -124,7 +124,7 @@ class LegPath(Result):
         return both[:, :3], both[:, 3:]
 
     def surface_rate(self, s: ArrayLike) -> Floats:
-        """Return how far (n,) the pivot (a beam's spot) moves for each metre of s, at stations s (n,)."""
+        """Return how far (n,) the tilt centre (a beam's spot) moves for each metre of s, at stations s (n,)."""
         return self._each(s, lambda piece, local: piece.surface_rate(local)[:, None], 1)[:, 0]
 
     def piece_at(self, s: ArrayLike) -> Ints:
@@ -153,18 +153,18 @@ def leg_path(
 ) -> LegPath | Refusal:
     """Return the smooth leg path through the placed tool poses.
 
-    path_tolerance: how far in metres the pivot (the cutter's ball centre, the beam's spot) may leave the toolpath;
-    axis_tolerance: how far in radians the axis may leave the planned one. Corners are rounded within both. The machine
-    stops where a rapid meets another kind of motion, where the toolpath asks for it, and at corners that turn by more
-    than `stop_angle` radians. Raises ToolpathError for numbers that are not positive. Returns a Refusal where the tool
-    would have to stand still.
+    path_tolerance: how far in metres the tilt centre (the cutter's ball centre, the beam's spot) may leave the
+    toolpath; axis_tolerance: how far in radians the axis may leave the planned one. Corners are rounded within both.
+    The machine stops where a rapid meets another kind of motion, where the toolpath asks for it, and at corners that
+    turn by more than `stop_angle` radians. Raises ToolpathError for numbers that are not positive. Returns a Refusal
+    where the tool would have to stand still.
     """
     given = {"path_tolerance": path_tolerance, "axis_tolerance": axis_tolerance, "stop_angle": stop_angle}
     for name, value in given.items():
         if not value > 0.0:
             raise ToolpathError("must be positive", key=name, value=value)
     toolpath = placed.toolpath
-    points = np.hstack([placed.pivots, placed.axes])
+    points = np.hstack([placed.tilt_centres, placed.axes])
     steps = np.sqrt(
         np.square(np.diff(points[:, :3], axis=0)).sum(axis=1)
         + np.square(_AXIS_LEVER_M * np.diff(points[:, 3:], axis=0)).sum(axis=1)
@@ -173,12 +173,12 @@ def leg_path(
     keep = np.concatenate([[True], moving])
     if keep.sum() < 2:
         return Refusal(
-            "leg path", "the toolpath does not move", (Blame("motion", ((0, len(toolpath) - 1),), 0.0, "mm"),)
+            "leg path", "the toolpath does not move", (Shortfall("motion", ((0, len(toolpath) - 1),), 0.0, "mm"),)
         )
     points, u = points[keep], np.concatenate([[0.0], np.cumsum(steps[moving])])
     segment = toolpath.segment_of_interval[moving]
     stops = np.zeros(len(points), dtype=np.bool_)
-    stops[1:-1] = _stops(points, toolpath.pivot, segment, toolpath.segments, stop_angle)
+    stops[1:-1] = _stops(points, toolpath.tilt_centre, segment, toolpath.segments, stop_angle)
     dwells = np.zeros(len(points))
     for waypoint, seconds in zip(toolpath.starts, toolpath.dwells, strict=True):
         if seconds is not None:
@@ -193,7 +193,7 @@ def leg_path(
             points[a : b + 1],
             _tolerance(TOLERANCE_SHARE * path_tolerance, TOLERANCE_SHARE * axis_tolerance),
         )
-        curve = ToolCurve.of(spline, toolpath.pivot)
+        curve = ToolCurve.of(spline, toolpath.tilt_centre)
         ends = np.flatnonzero(np.diff(segment[a:b], append=-1)) + 1
         which = segment[a:b][ends - 1]
         pieces.append(
@@ -213,7 +213,7 @@ def leg_path(
 
 
 def _tolerance(path: float, axis: float) -> TooFar:
-    """Return the test of a rounded path: pivots within `path` metres, axes within `axis` radians, proven.
+    """Return the test of a rounded path: tilt_centres within `path` metres, axes within `axis` radians, proven.
 
     Both are read off the Bernstein coefficients of curve minus polyline, which enclose it. An axis that ends within
     ε of a vector of length n is at most asin(ε / n) from it.
@@ -234,14 +234,14 @@ def _distance_to_origin(a: Floats, b: Floats) -> Floats:
     return np.linalg.norm(a + np.clip(foot, 0.0, 1.0)[:, None] * step, axis=1)
 
 
-def _stops(points: Floats, pivot: float, segment: Ints, segments: tuple[Segment, ...], angle: float) -> Bools:
+def _stops(points: Floats, tilt_centre: float, segment: Ints, segments: tuple[Segment, ...], angle: float) -> Bools:
     """Return for each inner waypoint (N − 2,) whether the motion itself asks for a stop there.
 
-    points (N, 6): pivots and axes. angle: radians, of the corners at which it does.
+    points (N, 6): tilt_centres and axes. angle: radians, of the corners at which it does.
     """
     rapid = np.array([s.kind is SegmentKind.RAPID for s in segments])[segment]
-    pivots, tips = points[:, :3], points[:, :3] - pivot * points[:, 3:]
-    return (rapid[1:] != rapid[:-1]) | _turns(pivots, angle) | _turns(tips, angle)
+    tilt_centres, tips = points[:, :3], points[:, :3] - tilt_centre * points[:, 3:]
+    return (rapid[1:] != rapid[:-1]) | _turns(tilt_centres, angle) | _turns(tips, angle)
 
 
 def _turns(points: Floats, angle: float) -> Bools:

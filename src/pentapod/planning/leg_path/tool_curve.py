@@ -1,4 +1,4 @@
-"""ToolCurve: a C3 motion of pivot and tool axis, over the tip's path length and the axis's turn."""
+"""ToolCurve: a C3 motion of tilt_centre and tool axis, over the tip's path length and the axis's turn."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(6)
 class ToolCurve:
     """Tip and axis as C3 functions of s in metres, ds² = |d tip|² + (REORIENTATION_LEVER_M |d axis|)².
 
-    curve: pivot and un-normalised axis (6 columns) over the spline's own parameter u; parameter: u over s.
-    pivot: metres from the tip along the axis to the pivot. The tip is never faster than ds/dt, and where it
+    curve: tilt_centre and un-normalised axis (6 columns) over the spline's own parameter u; parameter: u over s.
+    tilt_centre: metres from the tip along the axis to the tilt centre. The tip is never faster than ds/dt, and where it
     turns on the spot s still moves on.
     """
 
     curve: PPoly
     parameter: PPoly
-    pivot: float
+    tilt_centre: float
 
     @classmethod
-    def of(cls, spline: BSpline, pivot: float) -> ToolCurve:
-        """Build it from a C3 spline of pivots and axes (6 columns). Raises ToolpathError where they stand still."""
+    def of(cls, spline: BSpline, tilt_centre: float) -> ToolCurve:
+        """Build it from a C3 spline of tilt centres and axes (6 columns). Raises ToolpathError if they stand still."""
         knots = np.unique(spline.t)
         powers = [spline(knots[:-1], k) / factorial(k) for k in range(spline.k, -1, -1)]
         curve = PPoly(np.stack(powers), knots)
-        return cls(curve, _parameter_over_length(curve, pivot), pivot)
+        return cls(curve, _parameter_over_length(curve, tilt_centre), tilt_centre)
 
     @property
     def length(self) -> float:
@@ -69,7 +69,7 @@ class ToolCurve:
         """Return tip and axis (n, 3) and their derivatives with respect to s, up to `order` ≤ 3."""
         s = np.clip(np.asarray(s, dtype=np.float64), 0.0, self.length)
         u = np.clip(self.parameter(s), self.curve.x[0], self.curve.x[-1])
-        tip, axis = _tip_and_axis(self.curve, u, self.pivot, order)
+        tip, axis = _tip_and_axis(self.curve, u, self.tilt_centre, order)
         by_u = [self.parameter(s, k)[:, None] for k in range(1, order + 1)]
         return list(zip(_chain(tip, by_u), _chain(axis, by_u), strict=True))
 
@@ -94,12 +94,12 @@ def _chain(values: list[Floats], by_u: list[Floats]) -> list[Floats]:
     return [derivative() for derivative in by_s[: len(values)]]
 
 
-def _tip_and_axis(curve: PPoly, u: Floats, pivot: float, order: int) -> tuple[list[Floats], list[Floats]]:
+def _tip_and_axis(curve: PPoly, u: Floats, tilt_centre: float, order: int) -> tuple[list[Floats], list[Floats]]:
     """Return tip and unit axis and their derivatives up to `order` (≤ 3) with respect to u."""
     values = [curve(u, k) for k in range(order + 1)]
     r = [v[:, 3:] for v in values]
     axis = _directions(r)
-    return [v[:, :3] - pivot * a for v, a in zip(values, axis, strict=True)], axis
+    return [v[:, :3] - tilt_centre * a for v, a in zip(values, axis, strict=True)], axis
 
 
 def _directions(r: list[Floats]) -> list[Floats]:
@@ -124,9 +124,9 @@ def _directions(r: list[Floats]) -> list[Floats]:
     return a
 
 
-def _speed(curve: PPoly, u: Floats, pivot: float, order: int) -> list[Floats]:
+def _speed(curve: PPoly, u: Floats, tilt_centre: float, order: int) -> list[Floats]:
     """Return ds/du and its derivatives up to `order` (≤ 2) with respect to u."""
-    tip, axis = _tip_and_axis(curve, u, pivot, order + 1)
+    tip, axis = _tip_and_axis(curve, u, tilt_centre, order + 1)
 
     def product(j: int, k: int) -> Floats:
         return (_dot(tip[j], tip[k]) + REORIENTATION_LEVER_M**2 * _dot(axis[j], axis[k]))[:, 0]
@@ -139,10 +139,10 @@ def _speed(curve: PPoly, u: Floats, pivot: float, order: int) -> list[Floats]:
     return speeds
 
 
-def _parameter_over_length(curve: PPoly, pivot: float) -> PPoly:
+def _parameter_over_length(curve: PPoly, tilt_centre: float) -> PPoly:
     """Return u(s): pieces of degree 7, exact u, u′, u″, u‴ at nodes dense enough for ARC_LENGTH_ERROR."""
     nodes = curve.x
-    slowest = float(_speed(curve, nodes, pivot, 0)[0].min())
+    slowest = float(_speed(curve, nodes, tilt_centre, 0)[0].min())
     if slowest < 1e-6:
         raise ToolpathError(
             "the tool stands still somewhere on the path",
@@ -152,13 +152,15 @@ def _parameter_over_length(curve: PPoly, pivot: float) -> PPoly:
     for _ in range(12):
         widths = np.diff(nodes)
         at = nodes[:-1, None] + 0.5 * widths[:, None] * (1.0 + _GAUSS_X)
-        lengths = 0.5 * widths * (_speed(curve, at.ravel(), pivot, 0)[0].reshape(at.shape) @ _GAUSS_W)
+        lengths = 0.5 * widths * (_speed(curve, at.ravel(), tilt_centre, 0)[0].reshape(at.shape) @ _GAUSS_W)
         s = np.concatenate([[0.0], np.cumsum(lengths)])
-        v, v1, v2 = _speed(curve, nodes, pivot, 2)
+        v, v1, v2 = _speed(curve, nodes, tilt_centre, 2)
         u_of_s = _septic(s, [nodes, 1.0 / v, -v1 / v**3, (3.0 * v1**2 - v * v2) / v**5.0])
         between = (s[:-1, None] + np.diff(s)[:, None] * np.array([0.25, 0.5, 0.75])).ravel()
         error = (
-            np.abs(u_of_s(between, 1) * _speed(curve, u_of_s(between), pivot, 0)[0] - 1.0).reshape(-1, 3).max(axis=1)
+            np.abs(u_of_s(between, 1) * _speed(curve, u_of_s(between), tilt_centre, 0)[0] - 1.0)
+            .reshape(-1, 3)
+            .max(axis=1)
         )
         if error.max() <= ARC_LENGTH_ERROR:
             return u_of_s

@@ -40,15 +40,15 @@ class Contacts:
 
 
 def body_comforts(scene: Scene) -> tuple[float, ...]:
-    """Return the gaps (K,) in metres that count as margin 1, in the order of `Surroundings.names`."""
+    """Return the gaps (K,) in metres that count as margin 1, in the order of `CollisionWorld.names`."""
     comforts = scene.comforts
-    tool = (comforts.tool_obstacle,) if scene.surroundings.tool else ()
+    tool = (comforts.tool_obstacle,) if scene.collision_world.tool else ()
     return (*[comforts.leg_obstacle] * scene.machine.robot.n_legs, comforts.spindle_obstacle, *tool)
 
 
 def contacts(scene: Scene, tips: Floats, axes: Floats, placement: RigidTransform) -> Contacts:
     """Return the contacts of tool poses (N, 3), machine frame, with the workpiece placed."""
-    machine, tool, obstacles = scene.machine, scene.surroundings.tool, scene.surroundings.obstacles
+    machine, tool, obstacles = scene.machine, scene.collision_world.tool, scene.collision_world.obstacles
     position, direction = tips + machine.tool_length * axes, -axes
     comforts = body_comforts(scene)
     comfortable, moving = np.tile(comforts, len(obstacles)), len(comforts)
@@ -96,7 +96,7 @@ def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts:
 
 def _near(scene: Scene, obstacle: Obstacle, tips: Floats, axes: Floats, frame: RigidTransform | None) -> Ints:
     """Return the poses (N, 3) in which the box around any body comes near the obstacle's box: most do not."""
-    machine, tool, comforts = scene.machine, scene.surroundings.tool, scene.comforts
+    machine, tool, comforts = scene.machine, scene.collision_world.tool, scene.comforts
     robot, bodies = machine.robot, machine.bodies
     base, heights = robot.base_joints, robot.line_heights
     if frame is not None:

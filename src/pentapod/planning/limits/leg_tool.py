@@ -22,7 +22,7 @@ class LegToolClearance(LengthLimit):
     @classmethod
     def of(cls, scene: Scene) -> list[LegToolClearance]:
         """Return the gaps of all legs; none where the spindle is all there is."""
-        solids = scene.surroundings.tool
+        solids = scene.collision_world.tool
         return [
             cls(name=f"leg {k + 1} touches the {TOOL_BODY}", leg=k, comfort=scene.comforts.tool, solids=solids)
             for k in range(scene.machine.robot.n_legs if solids else 0)

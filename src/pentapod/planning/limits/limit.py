@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from pentapod.kinematics.robot import Branch
-from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
+from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.tool_pose import ToolPose
 
@@ -69,7 +69,7 @@ class Scene:
 
     machine: Machine
     branch: Branch
-    surroundings: Surroundings = NOTHING
+    collision_world: CollisionWorld = NOTHING
     comforts: Comforts = Comforts()
 
 

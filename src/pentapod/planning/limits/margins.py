@@ -18,7 +18,7 @@ from pentapod.base.registry import Registry
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.arithmetic import NUMPY, Arithmetic, Joints
 from pentapod.kinematics.robot import Branch
-from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
+from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.base_joints import BaseJointCone
 from pentapod.planning.limits.contacts import NUMBERS, contacts
@@ -65,24 +65,24 @@ class Margins:
         cls,
         machine: Machine,
         branch: Branch,
-        surroundings: Surroundings = NOTHING,
+        collision_world: CollisionWorld = NOTHING,
         kinds: Sequence[LimitKind] | None = None,
     ) -> Margins:
         """Build the margins of `machine` in a branch.
 
-        surroundings: what must not be touched. kinds: of limits; all of `LIMITS` where none are given.
+        collision_world: what must not be touched. kinds: of limits; all of `LIMITS` where none are given.
         """
         kinds = tuple(LIMITS.values()) if kinds is None else tuple(kinds)
-        scene = Scene(machine, branch, surroundings)
+        scene = Scene(machine, branch, collision_world)
         own = tuple(limit for kind in kinds for limit in kind.of(scene))
         return cls(scene, kinds, own, (*own, *ObstacleClearance.of(scene)))
 
     def on(self, machine: Machine) -> Margins:
         """Return the same margins of another machine."""
-        return Margins.of(machine, self.component, self.surroundings, self.kinds)
+        return Margins.of(machine, self.component, self.collision_world, self.kinds)
 
     def alone(self) -> Margins:
-        """Return the same margins without surroundings."""
+        """Return the same margins without collision_world."""
         return Margins.of(self.machine, self.component, NOTHING, self.kinds)
 
     @property
@@ -96,9 +96,9 @@ class Margins:
         return self.scene.branch
 
     @property
-    def surroundings(self) -> Surroundings:
+    def collision_world(self) -> CollisionWorld:
         """What must not be touched."""
-        return self.scene.surroundings
+        return self.scene.collision_world
 
     def __call__(self, tips: Floats, axes: Floats, placement: RigidTransform | None = None) -> Floats:
         """Return margins (..., M) of tool tips and axes (tip → spindle), both (..., 3), machine frame.
@@ -106,7 +106,7 @@ class Margins:
         placement: of the workpiece; needed where there are obstacles.
         """
         own = self.own(tips, axes)
-        if not self.surroundings.obstacles:
+        if not self.collision_world.obstacles:
             return own
         if placement is None:
             raise ArrayError("gaps to the part depend on the placement", key="placement", expected="a RigidTransform")
@@ -124,7 +124,7 @@ class Margins:
 
     def contacts(self, tips: Floats, axes: Floats, placement: RigidTransform) -> Floats:
         """Return the contacts (n, contact_numbers) that the formulas need, of poses (n, 3); none without obstacles."""
-        if not self.surroundings.obstacles:
+        if not self.collision_world.obstacles:
             return np.zeros((len(tips), 0))
         return contacts(self.scene, tips, axes, placement).numbers
 
@@ -152,7 +152,7 @@ class Margins:
         import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
         touching = None
-        if self.surroundings.obstacles:
+        if self.collision_world.obstacles:
             touching = WorkpieceContacts(turn, ca.vertsplit(shift), ca.vertsplit(numbers))
         tip, axis = ca.vertsplit(tip), ca.vertsplit(axis)
         pose = ToolPose(self.machine, self.component, tip, axis, Arithmetic.casadi(), joints, touching)

@@ -24,14 +24,14 @@ class ObstacleClearance(LengthLimit):
     @classmethod
     def of(cls, scene: Scene) -> list[ObstacleClearance]:
         """Return the gaps of all bodies to the first obstacle, then to the next."""
-        surroundings = scene.surroundings
-        bodies = list(zip(surroundings.names(scene.machine.robot.n_legs), body_comforts(scene), strict=True))
+        collision_world = scene.collision_world
+        bodies = list(zip(collision_world.names(scene.machine.robot.n_legs), body_comforts(scene), strict=True))
         return [
             cls(
                 name=f"{name} touches the {obstacle.name}", comfort=comfort,
                 body=k, column=k + row * len(bodies), clamped=obstacle.clamped,
             )
-            for row, obstacle in enumerate(surroundings.obstacles)
+            for row, obstacle in enumerate(collision_world.obstacles)
             for k, (name, comfort) in enumerate(bodies)
         ]  # fmt: skip
 

@@ -71,11 +71,11 @@ class Curvature:
             return total
         leans = problem.basis[rows] @ at.coefficients if size else np.zeros((len(rows), 2))
         touching = problem.contacts(at.margins, at.transform, problem.leans(at.coefficients, rows), rows)
-        slid = [at.margins.machine.slides - self.margins.machine.slides] if self.guides else []
+        slid = [at.margins.machine.rail_positions - self.margins.machine.rail_positions] if self.guides else []
         for k, row in enumerate(rows):
             bent = np.asarray(
                 function(
-                    *slid, np.zeros(6), leans[k], samples.pivots[row], samples.nominal[row],
+                    *slid, np.zeros(6), leans[k], samples.tilt_centres[row], samples.nominal[row],
                     problem.domain.lean_plane.T, at.transform.rotation, at.transform.translation,
                     touching[k], weights[k],
                 )

@@ -73,7 +73,7 @@ class IpoptSolver:
     def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
         """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one."""
         best, (rows, kinds), reach = start, self._first(start), 1.0
-        touching = bool(start.margins.surroundings.obstacles)
+        touching = bool(start.margins.collision_world.obstacles)
         for _ in range(self.options.rounds):
             transform, raw = self._solve(best, rows, kinds, reach)
             coefficients = self.problem.within_cone(raw)
@@ -102,13 +102,13 @@ class IpoptSolver:
 
         problem, samples = self.problem, self.problem.samples
         spline = AxisSpline.of(samples, problem.cone)
-        count, first = len(samples.pivots), spline.fitted(problem.leans(start.coefficients))
+        count, first = len(samples.tilt_centres), spline.fitted(problem.leans(start.coefficients))
         margins = problem.values_of(start.margins, start.transform, spline.leans(first))
         kinds = [int(k) for k in np.flatnonzero((margins.min(axis=0) < keep + self.options.near) | self.whole)]
         c = ca.MX.sym("c", 2, len(first))
         margins, _ = point_function(problem, start.margins, kinds).map(count)(
             ca.DM.zeros(6, count), spline.cone * ca.mtimes(c, ca.DM(spline.basis.T)),
-            samples.pivots.T, samples.nominal.T, spline.frames.transpose(2, 0, 1).reshape(3, -1),
+            samples.tilt_centres.T, samples.nominal.T, spline.frames.transpose(2, 0, 1).reshape(3, -1),
             np.tile(start.transform.rotation, (1, count)),
             np.tile(start.transform.translation[:, None], (1, count)),
             problem.contacts(start.margins, start.transform, spline.leans(first), np.arange(count)).T,
@@ -133,7 +133,7 @@ class IpoptSolver:
 
     def _first(self, start: Candidate) -> tuple[Ints, Ints]:
         if self.whole:
-            return np.arange(len(self.problem.samples.pivots)), np.arange(len(start.margins.limits))
+            return np.arange(len(self.problem.samples.tilt_centres)), np.arange(len(start.margins.limits))
         rows = self.problem.samples.representatives(self.options.waypoints)
         values = self.problem.values(start.margins, start.transform, start.coefficients, rows).min(axis=0)
         return np.sort(rows), np.flatnonzero(values < values.min() + self.options.near)
@@ -170,7 +170,7 @@ class IpoptSolver:
         result = solver(
             x0=start,
             p=np.concatenate([
-                np.hstack([samples.pivots[rows], samples.nominal[rows]]).ravel(),
+                np.hstack([samples.tilt_centres[rows], samples.nominal[rows]]).ravel(),
                 basis.ravel(),
                 at.transform.rotation.T.ravel(),
                 at.transform.translation,

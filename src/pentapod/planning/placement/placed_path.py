@@ -55,9 +55,9 @@ class PlacedPath(Result):
         return self.margin_names[int(self.margins.min(axis=0).argmin())]
 
     @property
-    def pivots(self) -> Floats:
+    def tilt_centres(self) -> Floats:
         """The points (N, 3) about which the tool is tilted, machine frame, metres."""
-        return self.tips + self.toolpath.pivot * self.axes
+        return self.tips + self.toolpath.tilt_centre * self.axes
 
     def plot(self, axes: Any = None, most: int = 6) -> Any:
         """Draw the margins of the `most` tightest limits along the waypoints into matplotlib axes, and return them.

@@ -19,9 +19,13 @@ class Placement(Value):
 
     transform: RigidTransform
     chosen_by: str
-    slides: tuple[float, ...] | None = None
+    rail_positions: tuple[float, ...] | None = None
 
     @property
     def guides(self) -> str:
         """Where the guides are to stand, in words; nothing for a machine that has none."""
-        return "" if self.slides is None else ", ".join(f"{1e3 * slide:.3f}" for slide in self.slides) + " mm"
+        return (
+            ""
+            if self.rail_positions is None
+            else ", ".join(f"{1e3 * slide:.3f}" for slide in self.rail_positions) + " mm"
+        )

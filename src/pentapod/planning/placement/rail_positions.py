@@ -41,7 +41,7 @@ def at_rail_positions(margins: Margins, positions: Floats) -> Margins | None:
 
 def with_travel(machine: Machine, room: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
     """Return the room (L,) of a placement and its derivatives (L, 6), with the room of the guides' travel added."""
-    positions, (least, greatest) = machine.slides, guides_of(machine).travel.T
+    positions, (least, greatest) = machine.rail_positions, guides_of(machine).travel.T
     each = np.eye(len(positions))
     left = np.concatenate([room[0], positions - least, greatest - positions])
     return left, with_guides(room[1], np.vstack([each, -each]))

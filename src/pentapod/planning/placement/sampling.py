@@ -52,16 +52,16 @@ def first_guesses(
 
     The same for a seed, on one kind of processor and with one set of libraries.
     Each placement is judged on a dozen representatives with their nominal axes, the best again with a cone of tilts and
-    with the surroundings.
+    with the collision_world.
     """
     samples, machine, constraints, tries = problem.samples, problem.machine, problem.constraints, options.tries
     rng = np.random.default_rng(seed)
     rows = samples.representatives(12)
-    centre, mean_axis = samples.pivots.mean(axis=0), samples.nominal.mean(axis=0)
+    centre, mean_axis = samples.tilt_centres.mean(axis=0), samples.nominal.mean(axis=0)
     mean_axis = mean_axis / max(float(np.linalg.norm(mean_axis)), 1e-9)
     guesses: list[Guess] = []
     for margins in problem.margins:
-        simple = samples.tilt == 0.0 and not margins.surroundings.obstacles
+        simple = samples.tilt == 0.0 and not margins.collision_world.obstacles
         rotations = _rotations(mean_axis, -float(margins.component.w), tries, options.largest_slope, rng)
         places = _places(machine, tries, rng)
         if constraints.is_bounded:
@@ -116,7 +116,7 @@ def best_tilted_margins(
 ) -> tuple[Floats, Floats]:
     """Return margins (N, M) at the best tilt of a grid over the cone, each waypoint by itself, and the lean (N, 3)."""
     grid = tilts(samples.tilt) if samples.tilt > 0.0 else np.zeros((1, 2))
-    out, leans = np.empty((len(samples.pivots), len(margins.limits))), np.empty((len(samples.pivots), 3))
+    out, leans = np.empty((len(samples.tilt_centres), len(margins.limits))), np.empty((len(samples.tilt_centres), 3))
     for start in range(0, len(out), block):
         rows = np.arange(start, min(start + block, len(out)))
         t1, t2 = tangent_frame(samples.nominal[rows])
@@ -151,7 +151,7 @@ def _different(guesses: list[Guess], centre: Floats, options: SamplingOptions) -
 
 def _score(samples: ToolpathSamples, margins: Margins, r: Floats, t: Floats, rows: Ints) -> Floats:
     turned = np.einsum("sij,nj->sni", r, samples.nominal[rows])
-    tips = np.einsum("sij,nj->sni", r, samples.pivots[rows]) + t[:, None, :] - samples.pivot * turned
+    tips = np.einsum("sij,nj->sni", r, samples.tilt_centres[rows]) + t[:, None, :] - samples.tilt_centre * turned
     return margins.own(tips, turned).min(axis=(-1, -2))
 
 

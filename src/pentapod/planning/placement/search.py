@@ -28,8 +28,8 @@ class SearchOptions:
     """How many first guesses are improved.
 
     refined: so many in any case. tried: so many at most, while none is good enough. hopeless: where all guesses are
-    below this margin, whether the part fits without surroundings is found out first. beyond_reach: a best margin, after
-    the first few, below which no other start is expected to lead to a placement that fits.
+    below this margin, whether the part fits without obstacles is found out first. beyond_reach: a best margin,
+    after the first few, below which no other start is expected to lead to a placement that fits.
     """
 
     refined: int = 4
@@ -99,7 +99,7 @@ def search(
     constraints, best, tried, count, interrupted = problem.constraints, None, 0, 1, False
     try:
         starts, promise = _starts(problem, seed, progress)
-        if promise < options.hopeless and problem.surroundings is not NOTHING:
+        if promise < options.hopeless and problem.collision_world is not NOTHING:
             # What does not fit with nothing around does not fit; that is found much sooner.
             alone = search(problem.alone(), seed=seed, solver=solver, progress=progress, options=options)
             if alone.best.smallest < NEEDED_MARGIN:

@@ -156,7 +156,7 @@ def improved(
     options: ObjectiveOptions = ObjectiveOptions(),
 ) -> Candidate:
     """Return a candidate near `start`, with the smallest margin `keep` at least, that is better by the objective."""
-    problem, rows = solver.problem, np.arange(len(solver.problem.samples.pivots))
+    problem, rows = solver.problem, np.arange(len(solver.problem.samples.tilt_centres))
     best, reach, extra = start, 0.3, _NO_ROWS
     value = objective.value(best)
     model = solver.model(best, rows, keep)

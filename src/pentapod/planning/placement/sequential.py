@@ -68,7 +68,7 @@ class SequentialSolver:
         return smoothed(self.problem, start, keep)
 
     def _waypoints(self) -> Ints:
-        count = len(self.problem.samples.pivots)
+        count = len(self.problem.samples.tilt_centres)
         return np.unique(np.linspace(0, count - 1, min(count, self.options.waypoints)).astype(np.intp))
 
     def _climb(self, start: Candidate, rows: Ints, enough: float) -> Candidate:
@@ -107,7 +107,7 @@ class SequentialSolver:
         if self.free:
             transform = self.problem.constraints.nearest_to(stepped(transform, step[:6]))
         if self.guides:
-            there = at_rail_positions(margins, margins.machine.slides + step[6:])
+            there = at_rail_positions(margins, margins.machine.rail_positions + step[6:])
             return None if there is None else (there, transform)
         return margins, transform
 
@@ -128,7 +128,7 @@ class SequentialSolver:
     def _moves(self) -> Floats:
         moves = REACH[:, None] * self.problem.constraints.motion
         moves = moves if self.free else moves[:, :0]
-        return with_guides(moves, STEP_M * np.eye(len(self.problem.machine.slides))) if self.guides else moves
+        return with_guides(moves, STEP_M * np.eye(len(self.problem.machine.rail_positions))) if self.guides else moves
 
     @cached_property
     def _room(self) -> Room:

@@ -37,9 +37,9 @@ _MADE: WeakKeyDictionary[Margins, dict[tuple[Any, ...], Any]] = WeakKeyDictionar
 def point_function(problem: PlacementProblem, margins: Margins, kinds: Sequence[int], *, by: By = "nothing") -> Any:
     """Return the casadi function of one waypoint: margins K, and the square of the lean (of the tangent of its angle).
 
-    Of step 6, lean a 2, pivot 3, nominal 3, pair 3×2, R 3×3, t 3, contacts. The margins are weighed; kinds: which.
-    pair: columns, the directions of the lean's two numbers; only their components across the nominal axis are used.
-    by: also return the margins' derivatives by a, K × 2, or by (step, a), K × 8.
+    Of step 6, lean a 2, tilt_centre 3, nominal 3, pair 3×2, R 3×3, t 3, contacts. The margins are weighed; kinds:
+    which. pair: columns, the directions of the lean's two numbers; only their components across the nominal axis are
+    used. by: also return the margins' derivatives by a, K × 2, or by (step, a), K × 8.
     """
     import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
@@ -54,25 +54,25 @@ def guide_function(problem: PlacementProblem, margins: Margins) -> Any:
     """Return the casadi function of one waypoint with the guides free: all margins, and their derivatives M × 13.
 
     Of the slides from where the guides of the margins' machine stand, and then as `point_function`; the derivatives are
-    by (step, slides, a).
+    by (step, rail_positions, a).
     """
     import casadi as ca  # noqa: PLC0415
 
-    slides = ca.SX.sym("slides", len(problem.machine.slides))
-    inputs, values, _ = _point(problem, margins, range(len(margins.limits)), slides)
-    slopes = ca.densify(ca.jacobian(values, ca.vertcat(inputs[0], slides, inputs[1])))
-    return ca.Function("guides", [slides, *inputs], [values, slopes], {"cse": True})
+    rail_positions = ca.SX.sym("rail_positions", len(problem.machine.rail_positions))
+    inputs, values, _ = _point(problem, margins, range(len(margins.limits)), rail_positions)
+    slopes = ca.densify(ca.jacobian(values, ca.vertcat(inputs[0], rail_positions, inputs[1])))
+    return ca.Function("guides", [rail_positions, *inputs], [values, slopes], {"cse": True})
 
 
 def _point(
-    problem: PlacementProblem, margins: Margins, kinds: Sequence[int], slides: Any
+    problem: PlacementProblem, margins: Margins, kinds: Sequence[int], rail_positions: Any
 ) -> tuple[list[Any], Any, Any]:
     """Return the symbols of a waypoint, its weighed margins, and the square of the lean; see above."""
     import casadi as ca  # noqa: PLC0415
 
     (step, a, *given), (tip, turned, turn, square) = _pose(problem)
     numbers = ca.SX.sym("contacts", margins.contact_numbers)
-    joints = None if slides is None else _slid(problem, margins, slides)
+    joints = None if rail_positions is None else _slid(problem, margins, rail_positions)
     values = margins.symbolic(tip, turned, turn, given[-1] + step[:3], numbers, joints)[list(kinds)]
     if not problem.weights.are_even:
         values = weighed(values, ca.DM(problem.weights.of(margins.limits)[list(kinds)]))
@@ -80,25 +80,25 @@ def _point(
 
 
 def _pose(problem: PlacementProblem) -> tuple[list[Any], tuple[Any, Any, Any, Any]]:
-    """Return the symbols step, a, pivot, nominal, pair, R, t of a waypoint; its tip, axis, turn, square of the lean."""
+    """Return a waypoint's symbols step, a, tilt centre, nominal, pair, R, t; its tip, axis, turn, squared lean."""
     import casadi as ca  # noqa: PLC0415
 
     step, a = ca.SX.sym("step", 6), ca.SX.sym("a", 2)
-    pivot, nominal = ca.SX.sym("pivot", 3), ca.SX.sym("nominal", 3)
+    tilt_centre, nominal = ca.SX.sym("tilt_centre", 3), ca.SX.sym("nominal", 3)
     pair, rotation, translation = ca.SX.sym("pair", 3, 2), ca.SX.sym("R", 3, 3), ca.SX.sym("t", 3)
     b = ca.mtimes(pair, a)
     across = b - ca.dot(b, nominal) * nominal
     square = ca.dot(across, across)
     turn = ca.mtimes(rotation, _cayley(step[3:]))
     turned = ca.mtimes(turn, (nominal + across) / ca.sqrt(1.0 + square))
-    tip = ca.mtimes(turn, pivot) + translation + step[:3] - problem.samples.pivot * turned
-    return [step, a, pivot, nominal, pair, rotation, translation], (tip, turned, turn, square)
+    tip = ca.mtimes(turn, tilt_centre) + translation + step[:3] - problem.samples.tilt_centre * turned
+    return [step, a, tilt_centre, nominal, pair, rotation, translation], (tip, turned, turn, square)
 
 
 def leg_function(problem: PlacementProblem, margins: Margins, *, slopes: bool = False) -> Any:
     """Return the casadi function of one waypoint: its leg readings n, metres, for the machine of the margins.
 
-    Of a, pivot, nominal, pair, R, t as in `point_function`. slopes: also return their derivatives by a, n × 2.
+    Of a, tilt_centre, nominal, pair, R, t as in `point_function`. slopes: also return their derivatives by a, n × 2.
     """
     return _once(margins, ("legs", slopes), problem, lambda: _legs(problem, margins, slopes))
 
@@ -119,26 +119,26 @@ def _legs(problem: PlacementProblem, margins: Margins, slopes: bool) -> Any:
 
 
 def _once(margins: Margins, name: tuple[Any, ...], problem: PlacementProblem, make: Callable[[], Any]) -> Any:
-    """Return what `make` returned for these margins, pivot and weights before, or returns now."""
-    made, key = _MADE.setdefault(margins, {}), (*name, problem.samples.pivot, problem.weights)
+    """Return what `make` returned for these margins, tilt_centre and weights before, or returns now."""
+    made, key = _MADE.setdefault(margins, {}), (*name, problem.samples.tilt_centre, problem.weights)
     if key not in made:
         made[key] = make()
     return made[key]
 
 
-def _slid(problem: PlacementProblem, margins: Margins, slides: Any) -> Joints:
+def _slid(problem: PlacementProblem, margins: Margins, rail_positions: Any) -> Joints:
     """Return the joints with the guides moved on by slides."""
     import casadi as ca  # noqa: PLC0415
 
     guides, joints = problem.machine.guides, joints_of(margins.machine.robot)
-    return joints if guides is None else guides.moved(joints, ca.vertsplit(slides))
+    return joints if guides is None else guides.moved(joints, ca.vertsplit(rail_positions))
 
 
 def curvature_function(problem: PlacementProblem, margins: Margins, *, guides: bool = False) -> Any:
     """Return the casadi function of one waypoint: second derivatives, 8 × 8 by (step, a), of weights · margins.
 
     Of the arguments of `point_function`, and the weights M, one for each margin. With the guides free: of the arguments
-    of `guide_function` and the weights, 13 × 13 by (step, slides, a).
+    of `guide_function` and the weights, 13 × 13 by (step, rail_positions, a).
     """
     return _once(margins, ("curvature", guides), problem, lambda: _curvature(problem, margins, guides))
 
@@ -146,9 +146,12 @@ def curvature_function(problem: PlacementProblem, margins: Margins, *, guides: b
 def _curvature(problem: PlacementProblem, margins: Margins, guides: bool) -> Any:
     import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
-    slides, weights = ca.SX.sym("slides", len(problem.machine.slides)), ca.SX.sym("weights", len(margins.limits))
-    inputs, values, _ = _point(problem, margins, range(len(margins.limits)), slides if guides else None)
-    free = [slides] if guides else []
+    rail_positions, weights = (
+        ca.SX.sym("rail_positions", len(problem.machine.rail_positions)),
+        ca.SX.sym("weights", len(margins.limits)),
+    )
+    inputs, values, _ = _point(problem, margins, range(len(margins.limits)), rail_positions if guides else None)
+    free = [rail_positions] if guides else []
     bent, _ = ca.hessian(ca.dot(weights, values), ca.vertcat(inputs[0], *free, inputs[1]))
     return ca.Function("curvature", [*free, *inputs, weights], [ca.densify(bent)], {"cse": True})
 
@@ -189,7 +192,7 @@ def lean_slopes(problem: PlacementProblem, margins: Margins, transform: RigidTra
         _, _, found = point(
             np.zeros((6, 1)),
             leans.T,
-            samples.pivots[rows].T,
+            samples.tilt_centres[rows].T,
             samples.nominal[rows].T,
             frames.reshape(-1, 6).T,
             rotation,
@@ -217,14 +220,14 @@ def step_slopes(problem: PlacementProblem, margins: Margins, *, guides: bool = F
     point = _once(margins, ("slopes", guides), problem, made)
 
     def slopes(there: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints) -> Floats:
-        slid = [(there.machine.slides - margins.machine.slides)[:, None]] if guides else []
+        slid = [(there.machine.rail_positions - margins.machine.rail_positions)[:, None]] if guides else []
         leans = (problem.basis[rows] @ coefficients).T if samples.tilt > 0.0 else np.zeros((2, 1))
         touching = problem.contacts(there, transform, problem.leans(coefficients, rows), rows)
         found = point(
             *slid,
             np.zeros((6, 1)),
             leans,
-            samples.pivots[rows].T,
+            samples.tilt_centres[rows].T,
             samples.nominal[rows].T,
             problem.domain.lean_plane.reshape(-1, 1),
             transform.rotation.T.reshape(-1, 1),

@@ -73,8 +73,8 @@ class LinearModel:
     ) -> LinearModel:
         """Return the model of the margins near `level` at waypoints `rows`, and of rows[extra] in any case.
 
-        room (L,) of the placement and the slides, with its derivatives (L, p). slopes: the margins' (n, M, p + 2) by
-        step, slides and lean.
+        room (L,) of the placement and the rail_positions, with its derivatives (L, p). slopes: the margins' (n, M, p +
+        2) by step, slides and lean.
         """
         length, count = moves.shape
         values = problem.values(at.margins, at.transform, at.coefficients, rows)

@@ -10,7 +10,7 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.robot import Branch
-from pentapod.machine.clearance.collision_world import NOTHING, Surroundings
+from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.limits.margins import Margins
@@ -60,16 +60,16 @@ class PlacementProblem:
         weights: Weights = EVEN,
         *,
         component: Branch | None = None,
-        surroundings: Surroundings = NOTHING,
+        collision_world: CollisionWorld = NOTHING,
         limits: Sequence[LimitKind] | None = None,
     ) -> PlacementProblem:
         """Return the problem of samples on a machine, with the allowed placements and the weights of the margins.
 
-        component: the branch to work in, any where none is given. surroundings: what must not be touched. limits: the
-        kinds of limits, all where none are given.
+        component: the branch to work in, any where none is given. collision_world: what must not be touched. limits:
+        the kinds of limits, all where none are given.
         """
         branches = machine.robot.branches if component is None else (component,)
-        margins = tuple(Margins.of(machine, branch, surroundings, limits) for branch in branches)
+        margins = tuple(Margins.of(machine, branch, collision_world, limits) for branch in branches)
         return cls(samples, machine, margins, *_field(samples), constraints, weights)
 
     def along(self, samples: ToolpathSamples) -> PlacementProblem:
@@ -82,13 +82,13 @@ class PlacementProblem:
         return replace(self, machine=machine, margins=tuple(margins.on(machine) for margins in self.margins))
 
     def alone(self) -> PlacementProblem:
-        """Return the same problem without surroundings."""
+        """Return the same problem without collision_world."""
         return replace(self, margins=tuple(margins.alone() for margins in self.margins))
 
     @property
-    def surroundings(self) -> Surroundings:
+    def collision_world(self) -> CollisionWorld:
         """What must not be touched."""
-        return self.margins[0].surroundings
+        return self.margins[0].collision_world
 
     @property
     def cone(self) -> float:
@@ -149,5 +149,7 @@ class PlacementProblem:
 
 def _field(samples: ToolpathSamples) -> tuple[FieldDomain, Floats]:
     """Return the domain of the tilt field of a path, and its basis (N, size) at the waypoints."""
-    domain = FieldDomain.around(samples.pivots, samples.nominal, _CELLS)
-    return domain, domain.basis(samples.pivots) if samples.tilt > 0.0 else np.zeros((len(samples.pivots), 0))
+    domain = FieldDomain.around(samples.tilt_centres, samples.nominal, _CELLS)
+    return domain, domain.basis(samples.tilt_centres) if samples.tilt > 0.0 else np.zeros(
+        (len(samples.tilt_centres), 0)
+    )

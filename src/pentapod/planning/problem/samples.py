@@ -16,39 +16,42 @@ AXIS_LEVER_M = 0.1
 
 @dataclass(frozen=True, eq=False)
 class ToolpathSamples:
-    """Pivots and nominal axes (N, 3), workpiece frame; pivot: metres from tip to pivot; tilt: radians of the cone."""
+    """Tilt centres and nominal axes (N, 3), workpiece frame.
 
-    pivots: Floats
+    tilt_centre: metres from the tip along the axis. tilt: half angle of the cone of axes, radians.
+    """
+
+    tilt_centres: Floats
     nominal: Floats
-    pivot: float
+    tilt_centre: float
     tilt: float
 
     def __post_init__(self) -> None:
         set_frozen(
             self,
-            pivots=frozen(self.pivots, "pivots", (None, 3)),
+            tilt_centres=frozen(self.tilt_centres, "tilt_centres", (None, 3)),
             nominal=frozen(self.nominal, "nominal", (None, 3)),
         )
 
     @classmethod
     def of(cls, toolpath: Toolpath, tilt: float) -> ToolpathSamples:
         """Return the samples that a toolpath and a tilt cone (half angle, radians) pose."""
-        return cls(toolpath.pivots, toolpath.axes, toolpath.pivot, tilt)
+        return cls(toolpath.tilt_centres, toolpath.axes, toolpath.tilt_centre, tilt)
 
     def at(self, rows: Ints) -> ToolpathSamples:
         """Return the samples of the waypoints `rows` only."""
-        return ToolpathSamples(self.pivots[rows], self.nominal[rows], self.pivot, self.tilt)
+        return ToolpathSamples(self.tilt_centres[rows], self.nominal[rows], self.tilt_centre, self.tilt)
 
     def machine_poses(
         self, placement: RigidTransform, axes: Floats, rows: Ints | slice = slice(None)
     ) -> tuple[Floats, Floats]:
         """Return tips and axes (..., 3) in the machine frame for axes of the workpiece frame at waypoints `rows`."""
         turned = placement.rotate(axes)
-        return placement.apply(self.pivots[rows]) - self.pivot * turned, turned
+        return placement.apply(self.tilt_centres[rows]) - self.tilt_centre * turned, turned
 
     def representatives(self, count: int) -> Ints:
         """Return indices of `count` waypoints spread evenly over places and axes (farthest-point sampling)."""
-        features = np.hstack([self.pivots, AXIS_LEVER_M * self.nominal])
+        features = np.hstack([self.tilt_centres, AXIS_LEVER_M * self.nominal])
         if len(features) > 20_000:  # a stride first: the choice costs count × N
             stride = np.linspace(0, len(features) - 1, 20_000).astype(np.intp)
         else:

@@ -21,7 +21,7 @@ DEGREE = 3
 
 @dataclass(frozen=True, eq=False)
 class FieldDomain:
-    """The rectangle over which a tilt field is spread: the two widest directions of the pivots.
+    """The rectangle over which a tilt field is spread: the two widest directions of the tilt_centres.
 
     origin (3,), directions (2, 3) unit rows, lengths (2,) in metres, workpiece frame; cells: spline cells a side.
     lean_plane (2, 3): unit rows, the plane in which the lean lies.
@@ -34,15 +34,15 @@ class FieldDomain:
     lean_plane: Floats
 
     @classmethod
-    def around(cls, pivots: Floats, nominal: Floats, cells: int) -> FieldDomain:
-        """Return the domain that covers pivots (N, 3) with nominal axes (N, 3)."""
-        centred = pivots - pivots.mean(axis=0)
+    def around(cls, tilt_centres: Floats, nominal: Floats, cells: int) -> FieldDomain:
+        """Return the domain that covers tilt_centres (N, 3) with nominal axes (N, 3)."""
+        centred = tilt_centres - tilt_centres.mean(axis=0)
         # Directions of largest spread; the sign is fixed so that the same part gives the same field.
         _, _, rows = np.linalg.svd(centred.T @ centred)
         directions = rows[:2] * np.where(rows[:2][range(2), np.abs(rows[:2]).argmax(axis=1)] < 0.0, -1.0, 1.0)[:, None]
-        along = pivots @ directions.T
+        along = tilt_centres @ directions.T
         low, high = along.min(axis=0), along.max(axis=0)
-        origin = pivots.mean(axis=0)
+        origin = tilt_centres.mean(axis=0)
         origin = origin + (low - origin @ directions.T) @ directions
         mean = nominal.mean(axis=0)
         length = float(np.linalg.norm(mean))
@@ -54,9 +54,9 @@ class FieldDomain:
         """Number of spline coefficients."""
         return (self.cells + DEGREE) ** 2
 
-    def basis(self, pivots: Floats) -> Floats:
-        """Return the spline basis (N, size) at pivots (N, 3)."""
-        along = np.clip((pivots - self.origin) @ self.directions.T / self.lengths, 0.0, 1.0)
+    def basis(self, tilt_centres: Floats) -> Floats:
+        """Return the spline basis (N, size) at tilt_centres (N, 3)."""
+        along = np.clip((tilt_centres - self.origin) @ self.directions.T / self.lengths, 0.0, 1.0)
         knots = np.concatenate([np.zeros(DEGREE), np.linspace(0.0, 1.0, self.cells + 1), np.ones(DEGREE)])
         first, second = (BSpline.design_matrix(x, knots, DEGREE).toarray() for x in along.T)
         return (first[:, :, None] * second[:, None, :]).reshape(len(along), self.size)
@@ -79,9 +79,9 @@ class TiltField:
     def __post_init__(self) -> None:
         set_frozen(self, coefficients=frozen(self.coefficients, "coefficients", (self.domain.size, 2)))
 
-    def axes(self, pivots: Floats, nominal: Floats) -> Floats:
-        """Return tool axes (N, 3), unit, workpiece frame, of pivots and nominal axes (N, 3)."""
-        return lean(nominal, self.domain.basis(pivots) @ self.coefficients @ self.domain.lean_plane)
+    def axes(self, tilt_centres: Floats, nominal: Floats) -> Floats:
+        """Return tool axes (N, 3), unit, workpiece frame, of tilt_centres and nominal axes (N, 3)."""
+        return lean(nominal, self.domain.basis(tilt_centres) @ self.coefficients @ self.domain.lean_plane)
 
 
 def lean(nominal: Floats, b: Floats) -> Floats:

@@ -102,7 +102,7 @@ class AxisCost:
         self.weights, self.first = self.basis.data.reshape(-1, 4), self.basis.indices[::4].astype(np.intp)
         self.frames = self.spline.frames[nodes]
         self.given = (
-            samples.pivots[nodes].T,
+            samples.tilt_centres[nodes].T,
             samples.nominal[nodes].T,
             self.frames.reshape(-1, 6).T,
             at.transform.rotation.T.reshape(-1, 1),
@@ -133,9 +133,14 @@ class AxisCost:
         import casadi as ca  # noqa: PLC0415  heavy: only for the reference
 
         leans = self.spline.cone * ca.mtimes(c, ca.DM(self.basis.T))
-        pivots, nominal, _, rotation, translation = self.given
+        tilt_centres, nominal, _, rotation, translation = self.given
         legs = self.lengths.map(len(self.frames))(
-            leans, pivots, nominal, self.frames.transpose(2, 0, 1).reshape(3, -1), rotation.reshape(3, 3).T, translation
+            leans,
+            tilt_centres,
+            nominal,
+            self.frames.transpose(2, 0, 1).reshape(3, -1),
+            rotation.reshape(3, 3).T,
+            translation,
         )
         rates = self.nominal_rates.T + ca.mtimes(leans, ca.DM(as_matrix(self.rate, len(self.frames)).T))
         bends = ca.mtimes(legs, ca.DM(as_matrix(self.bend, len(self.frames)).T))

@@ -1,7 +1,7 @@
 """AxisSpline: the lean of the tool along a path as a cubic B-spline, and its quadratic smoothness cost.
 
 The lean is a vector across the nominal axis, given in a frame that is transported in parallel along the path; its two
-numbers are a cubic spline over the path length of the pivot, with knots at waypoints. The spline stays within the
+numbers are a cubic spline over the path length of the tilt centre, with knots at waypoints. The spline stays within the
 convex hull of its coefficients, so a spline whose coefficients keep the cone keeps it everywhere, and turns nowhere
 faster than they do.
 """
@@ -65,7 +65,7 @@ class AxisSpline:
     def of(cls, samples: ToolpathSamples, cone: float) -> AxisSpline:
         """Return the spline of a samples. cone: the longest lean (tangent of the angle)."""
         way = _way(samples)
-        extent = float(np.linalg.norm(np.ptp(samples.pivots, axis=0)))
+        extent = float(np.linalg.norm(np.ptp(samples.tilt_centres, axis=0)))
         spacing = min(KNOT_SPACING_M, max(extent, LEVER_M) / _INTERVALS_PER_EXTENT)
         # Between waypoints the tool moves straight on, so derivatives are differences of waypoints. Two nodes for
         # each knot where there are as many: at the knots alone the cost hardly sees coefficients that alternate.
@@ -107,8 +107,8 @@ def within_discs(c: Floats) -> Floats:
 
 
 def _way(samples: ToolpathSamples) -> Floats:
-    """Return the way (N,) in metres to each waypoint: of the pivot, and of the axis by its lever."""
-    moved = np.linalg.norm(np.diff(samples.pivots, axis=0), axis=1)
+    """Return the way (N,) in metres to each waypoint: of the tilt centre, and of the axis by its lever."""
+    moved = np.linalg.norm(np.diff(samples.tilt_centres, axis=0), axis=1)
     turned = np.linalg.norm(np.diff(samples.nominal, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(moved + LEVER_M * turned)])
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pentapod.base.refusal import Blame, Refusal
+from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.timing.path.paths import LegPathLike, PieceLike
 from pentapod.timing.topp.stages import Failure
 
@@ -59,7 +59,7 @@ def refusal(path: LegPathLike, k: int, failure: Failure, short: tuple[str, float
         cause += f"; legs move by ({', '.join(f'{rate:.3g}' for rate in tangent)}) m for each metre there"
     limits = [short] if short else [(name, 0.0, "") for name in failure.limits or ["time law"]]
     waypoints = (waypoints_at(piece, s),)
-    return Refusal("timing", cause, tuple(Blame(name, waypoints, amount, unit) for name, amount, unit in limits))
+    return Refusal("timing", cause, tuple(Shortfall(name, waypoints, amount, unit) for name, amount, unit in limits))
 
 
 def segment_at(piece: PieceLike, s: float) -> int:

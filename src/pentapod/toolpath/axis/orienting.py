@@ -26,7 +26,7 @@ def oriented(toolpath: Toolpath, tool: Tool, orientation: Orientation) -> Toolpa
     if orientation == Orientation() or not cuts:
         return toolpath
     # With the axis along the normal, every cutter's tip is its contact; a beam's lies the stand-off below.
-    drop = min(tool.pivot, 0.0)
+    drop = min(tool.tilt_centre, 0.0)
     chosen = [toolpath.segments[k] for k in cuts]
     runs = [(segment.tips + drop * segment.axes, segment.axes) for segment in chosen]
     tips, axes = toolpath.tips.copy(), toolpath.axes.copy()

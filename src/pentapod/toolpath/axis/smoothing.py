@@ -19,7 +19,7 @@ _BISECTIONS = 20
 
 
 def smoothed(points: Floats, axes: Floats, reach: float, tolerance: float) -> Floats:
-    """Return axes (N, 3) smoothed over their surroundings, none turned by more than `tolerance` radians.
+    """Return axes (N, 3) smoothed over their collision_world, none turned by more than `tolerance` radians.
 
     points (N, 3): where they stand, of all passes, metres. Each becomes the Gaussian mean of those within `reach`
     metres, on its own pass and the passes beside it, whose axes differ by less than 60°; what leaves the tolerance

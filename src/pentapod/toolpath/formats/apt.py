@@ -17,7 +17,7 @@ from pentapod.base.errors import nearest
 from pentapod.toolpath.formats.moves import plain, poses, stands
 from pentapod.toolpath.formats.reading import number, read_lines, seconds
 from pentapod.toolpath.formats.registry import Defaults, Format, register
-from pentapod.toolpath.formats.remarks import StatementReader, kind_remark, pivot_remark
+from pentapod.toolpath.formats.remarks import StatementReader, kind_remark, tilt_centre_remark
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 _MM = {"MM": 1.0, "INCHES": 25.4, "INCH": 25.4}
@@ -115,7 +115,7 @@ class _Reader(StatementReader):
             raise self.wrong("the unit is missing", line, "CUTTER", expected="UNITS/MM or UNITS/INCHES before it")
         ball = len(numbers) > 1 and abs(numbers[1] - 0.5 * numbers[0]) <= 1e-6 * numbers[0]
         # Of CUTTER and a remark the one that comes last counts.
-        self.remarks.pivot = numbers[1] * self.unit * 1e-3 if ball else 0.0
+        self.remarks.tilt_centre = numbers[1] * self.unit * 1e-3 if ball else 0.0
 
     def _delay(self, words: list[str], line: int) -> None:
         if len(words) != 1:
@@ -161,7 +161,7 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
 def _write(toolpath: Toolpath) -> bytes:
     tips, axes, kinds, feeds = poses(toolpath)
     dwells = stands(toolpath)
-    lines = ["PARTNO PENTAPOD", "UNITS/MM", f"$$ {pivot_remark(toolpath.pivot)}", "MULTAX/ON"]
+    lines = ["PARTNO PENTAPOD", "UNITS/MM", f"$$ {tilt_centre_remark(toolpath.tilt_centre)}", "MULTAX/ON"]
     kind, feed = SegmentKind.CUT, np.nan
     for k in range(len(tips)):
         move = kinds[k - 1] if k else SegmentKind.RAPID

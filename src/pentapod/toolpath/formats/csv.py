@@ -53,10 +53,12 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
                 "the number of rows is not that of the header: the file was cut off or rows were added",
                 file=file, line=len(lines), key="waypoints", value=len(moves.tips), expected=text,
             )  # fmt: skip
-    pivot = defaults.pivot
-    if "pivot_mm" in header:
-        pivot = 1e-3 * number(*(header["pivot_mm"][0], file, header["pivot_mm"][1], "pivot_mm"))
-    return moves.toolpath(pivot)
+    tilt_centre = defaults.tilt_centre
+    for name in ("pivot_mm", "tilt_centre_mm"):  # the first is how files of earlier versions call it
+        if name in header:
+            text, line = header[name]
+            tilt_centre = 1e-3 * number(text, file, line, name)
+    return moves.toolpath(tilt_centre)
 
 
 def _unit(file: Path, line: int, names: str) -> float:
@@ -92,7 +94,12 @@ def _write(toolpath: Toolpath) -> bytes:
     tips, axes, kinds, feeds = poses(toolpath)
     dwells = stands(toolpath)
     powers = [toolpath.segments[k].power for k in toolpath.segment_of_interval]
-    lines = [f"# {_MAGIC} = 1", f"# pivot_mm = {1e3 * toolpath.pivot!r}", f"# waypoints = {len(tips)}", _COLUMNS]
+    lines = [
+        f"# {_MAGIC} = 1",
+        f"# tilt_centre_mm = {1e3 * toolpath.tilt_centre!r}",
+        f"# waypoints = {len(tips)}",
+        _COLUMNS,
+    ]
     for k in range(len(tips)):
         cells = [*(plain(v, 7) for v in tips[k]), *(plain(v, 12) for v in axes[k])]
         kind = str(kinds[k - 1]) if k else _START

@@ -22,7 +22,7 @@ import numpy as np
 from pentapod.toolpath.formats.moves import plain, poses, stands
 from pentapod.toolpath.formats.reading import read_lines
 from pentapod.toolpath.formats.registry import Defaults, Format, register
-from pentapod.toolpath.formats.remarks import StatementReader, kind_remark, pivot_remark
+from pentapod.toolpath.formats.remarks import StatementReader, kind_remark, tilt_centre_remark
 from pentapod.toolpath.formats.rotary import AB, BC, Rotary
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
@@ -203,7 +203,7 @@ def _write(toolpath: Toolpath, rotary: Rotary, *, needs_tcp: bool, inverse_time:
     tips, axes, kinds, feeds = poses(toolpath)
     dwells = stands(toolpath)
     angles = rotary.angles(axes)
-    lines = ["%", f"({pivot_remark(toolpath.pivot)})", f"G21 G90 G{93 if inverse_time else 94}"]
+    lines = ["%", f"({tilt_centre_remark(toolpath.tilt_centre)})", f"G21 G90 G{93 if inverse_time else 94}"]
     lines += ["G43.4 H1"] if needs_tcp else []
     kind, feed, motion = SegmentKind.CUT, np.nan, ""
     letters = (*_LINEAR, *rotary.words)

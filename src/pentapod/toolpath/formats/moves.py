@@ -67,10 +67,10 @@ class Moves:
         else:
             self.wait += seconds
 
-    def toolpath(self, pivot: float) -> Toolpath:
+    def toolpath(self, tilt_centre: float) -> Toolpath:
         """Return the toolpath: neighbours of one kind, feed and power make a segment; poses that repeat are left out.
 
-        Where the tool stands a segment ends. pivot: metres. Raises ToolpathError for fewer than two poses.
+        Where the tool stands a segment ends. tilt_centre: metres. Raises ToolpathError for fewer than two poses.
         """
         tips, axes = np.array(self.tips).reshape(-1, 3) * 1e-3, np.array(self.axes).reshape(-1, 3)
         moved = np.ones(len(tips), dtype=np.bool_)
@@ -93,7 +93,7 @@ class Moves:
             )
             for a, b in pairwise([*breaks, len(rows)])
         ]
-        return Toolpath(tuple(segments), pivot, self.wait + (dwells[0] or 0.0))
+        return Toolpath(tuple(segments), tilt_centre, self.wait + (dwells[0] or 0.0))
 
     def _dwells(self, owner: Ints, count: int) -> list[float | None]:
         """Return the dwells of the poses that stay; owner: for each pose the one that it repeats, or itself."""

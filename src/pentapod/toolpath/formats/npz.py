@@ -20,7 +20,7 @@ _MM, _MM_MIN = 1e3, 6e4
 _FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
     "tips_mm": ("fi", (None, 3)),
     "axes": ("fi", (None, 3)),
-    "pivot_mm": ("fi", ()),
+    "tilt_centre_mm": ("fi", ()),
     "segment_starts": ("iu", (None,)),
     "segment_kinds": ("U", (None,)),
     "segment_feeds_mm_min": ("fi", (None,)),
@@ -38,7 +38,7 @@ def toolpath_arrays(toolpath: Toolpath) -> dict[str, NDArray[Any]]:
     values = (
         toolpath.tips * _MM,
         toolpath.axes,
-        np.array(toolpath.pivot * _MM),
+        np.array(toolpath.tilt_centre * _MM),
         toolpath.starts,
         np.array([str(s.kind) for s in toolpath.segments]),
         np.array([s.feed for s in toolpath.segments]) * _MM_MIN,
@@ -75,7 +75,7 @@ def _toolpath(arrays: dict[str, NDArray[Any]]) -> Toolpath:
         Segment(SegmentKind(str(kind)), tips[a : b + 1], axes[a : b + 1], float(feed), float(power), dwell)
         for kind, feed, power, dwell, (a, b) in zip(kinds, feeds, powers, dwells[1:], pairwise(starts), strict=True)
     ]
-    return Toolpath(tuple(segments), float(arrays["pivot_mm"].item()) / _MM, dwells[0] or 0.0)
+    return Toolpath(tuple(segments), float(arrays["tilt_centre_mm"].item()) / _MM, dwells[0] or 0.0)
 
 
 def _write(toolpath: Toolpath) -> bytes:

@@ -14,9 +14,9 @@ from pentapod.toolpath.toolpath import Toolpath
 
 @dataclass(frozen=True)
 class Defaults:
-    """What a reader takes where its format has no place for it: pivot in metres, feed in m/s."""
+    """What a reader takes where its format has no place for it: tilt_centre in metres, feed in m/s."""
 
-    pivot: float = 0.0
+    tilt_centre: float = 0.0
     feed: float | None = None
 
 
@@ -60,16 +60,16 @@ def format_of(path: str | Path, name: str | None = None) -> Format:
 
 
 def read_toolpath(
-    path: str | Path, format_name: str | None = None, *, pivot: float = 0.0, feed: float | None = None
+    path: str | Path, format_name: str | None = None, *, tilt_centre: float = 0.0, feed: float | None = None
 ) -> Toolpath:
     """Return the toolpath of a file, workpiece frame, metres. The suffix tells the format where no name is given.
 
-    pivot: metres, for formats that do not carry it (see `Toolpath`); feed: m/s, of moves to which the file gives none.
-    Raises ToolpathError, one line with file, line and word, for whatever is not understood: nothing is guessed,
+    tilt_centre: metres, for formats that do not carry it (see `Toolpath`); feed: m/s, of moves to which the file gives
+    none. Raises ToolpathError, one line with file, line and word, for whatever is not understood: nothing is guessed,
     and there are no partial results.
     """
     file = Path(path)
-    return format_of(file, format_name).read(file, Defaults(pivot, feed))
+    return format_of(file, format_name).read(file, Defaults(tilt_centre, feed))
 
 
 def write_toolpath(toolpath: Toolpath, path: str | Path, format_name: str | None = None) -> Path:

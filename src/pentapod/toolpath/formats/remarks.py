@@ -12,17 +12,17 @@ from pentapod.toolpath.formats.registry import Defaults
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 _MARK = "pentapod "
-_PIVOT = "pivot_mm"
+_TILT_CENTRE = "tilt_centre_mm"
 _KINDS = (SegmentKind.CUT, SegmentKind.LINK)
 
 
 @dataclass
 class Remarks:
-    """What a file's remarks have said so far. kind: of moves on feed from here on; pivot: metres, None if not told."""
+    """What a file's remarks have said so far. kind: of moves on feed from here on; tilt_centre: metres or None."""
 
     file: Path
     kind: SegmentKind = SegmentKind.CUT
-    pivot: float | None = None
+    tilt_centre: float | None = None
 
     def read(self, comment: str, line: int) -> None:
         """Take in a comment; most are of no account. Raises ToolpathError where ours holds no number."""
@@ -32,8 +32,8 @@ class Remarks:
         name, _, value = text.removeprefix(_MARK).partition(" ")
         if name in _KINDS:
             self.kind = SegmentKind(name)
-        elif name == _PIVOT:
-            self.pivot = 1e-3 * number(value, self.file, line, name)
+        elif name in {_TILT_CENTRE, "pivot_mm"}:  # the second is how files of earlier versions call it
+            self.tilt_centre = 1e-3 * number(value, self.file, line, name)
 
 
 @dataclass
@@ -53,8 +53,10 @@ class StatementReader:
         return ToolpathError(what, file=self.file, line=line, key=word, **details)  # type: ignore[arg-type]
 
     def gathered(self) -> Toolpath:
-        """Return the toolpath of all moves, with the pivot that remarks or defaults tell."""
-        return self.moves.toolpath(self.defaults.pivot if self.remarks.pivot is None else self.remarks.pivot)
+        """Return the toolpath of all moves, with the tilt centre that remarks or defaults tell."""
+        return self.moves.toolpath(
+            self.defaults.tilt_centre if self.remarks.tilt_centre is None else self.remarks.tilt_centre
+        )
 
 
 def kind_remark(kind: SegmentKind) -> str:
@@ -62,6 +64,6 @@ def kind_remark(kind: SegmentKind) -> str:
     return f"{_MARK}{kind}"
 
 
-def pivot_remark(pivot: float) -> str:
-    """Return the comment that tells the pivot, metres."""
-    return f"{_MARK}{_PIVOT} {1e3 * pivot!r}"
+def tilt_centre_remark(tilt_centre: float) -> str:
+    """Return the comment that tells the tilt centre, metres."""
+    return f"{_MARK}{_TILT_CENTRE} {1e3 * tilt_centre!r}"

@@ -1,7 +1,7 @@
 """RoboDK's CSV of points with normals: X,Y,Z,NX,NY,NZ[,speed] in mm and mm/s, with or without names atop.
 
 N points from the tip to the spindle. A row's speed is that of the move to it; a rapid's is left empty, which
-RoboDK takes as the robot's own. The format cannot tell links from cuts, and carries no pivot.
+RoboDK takes as the robot's own. The format cannot tell links from cuts, and carries no tilt centre.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
         if feed is None:
             raise ToolpathError("the speed is missing", file=file, line=line, key="SPEED", expected="a seventh column")
         moves.add(values[:3], values[3:], kind, 6e4 * feed, line, "NX,NY,NZ")
-    return moves.toolpath(defaults.pivot)
+    return moves.toolpath(defaults.tilt_centre)
 
 
 def _write(toolpath: Toolpath) -> bytes:
@@ -61,6 +61,6 @@ ROBODK = register(
         "RoboDK: X,Y,Z,NX,NY,NZ,speed",
         _read,
         _write,
-        loses=frozenset({"links", "pivot", "end", "power", "dwell"}),
+        loses=frozenset({"links", "tilt_centre", "end", "power", "dwell"}),
     )
 )

@@ -131,11 +131,11 @@ class _Work:
         return met.beyond(self.options.tolerance)
 
     def tilt(self, bad: Bools) -> int:
-        """Turn the axes at gouging waypoints, the least that clears them, about the pivot; return how many turned.
+        """Turn the axes at gouging waypoints, the least that clears them, about the tilt centre; return their number.
 
         The turn fades out over the neighbours on either side, so that the axis does not jump.
         """
-        pivots = self.tips + self.tool.pivot * self.axes
+        tilt_centres = self.tips + self.tool.tilt_centre * self.axes
         original = self.axes.copy()
         turn = np.zeros((len(self.tips), 2))
         t1, t2 = tangent_frame(original)
@@ -151,14 +151,16 @@ class _Work:
                     way = 2.0 * np.pi * spoke / search.spokes
                     trial = np.tile([angle * np.cos(way), angle * np.sin(way)], (len(open_rows), 1))
                     axes = _leaned(original[open_rows], t1[open_rows], t2[open_rows], trial)
-                    tips = pivots[open_rows] - self.tool.pivot * axes
+                    tips = tilt_centres[open_rows] - self.tool.tilt_centre * axes
                     met = touch(self.tree, self.tool, tips, axes, threshold=0.5 * self.options.tolerance)
                     clear = met.deepest == -np.inf
                     turn[open_rows[clear]] = trial[clear]
                     open_rows = open_rows[~clear]
             faded = _faded(turn, search.fade)
             self.axes = _leaned(original, t1, t2, faded)
-            self.tips = np.where((faded != 0.0).any(axis=1)[:, None], pivots - self.tool.pivot * self.axes, self.tips)
+            self.tips = np.where(
+                (faded != 0.0).any(axis=1)[:, None], tilt_centres - self.tool.tilt_centre * self.axes, self.tips
+            )
             bad = bad | self.bad(self.found())
             if not self.bad(self.found()).any():
                 break

@@ -134,4 +134,4 @@ def _turns(passes: Passes, drawing: Drawing, reach: float) -> list[ordering.Turn
 def _tight(passes: Passes, tool: Tool) -> int:
     """Return how many steps of the passes run through a hollow narrower than the ball or the stand-off."""
     closing = -(np.diff(passes.points, axis=0) * np.diff(passes.normals, axis=0)).sum(axis=1)
-    return int((passes.within & (closing * abs(tool.pivot) > passes.steps**2)).sum())
+    return int((passes.within & (closing * abs(tool.tilt_centre) > passes.steps**2)).sum())

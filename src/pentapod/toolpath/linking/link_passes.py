@@ -68,7 +68,7 @@ class _Linker:
         self.counts = Counts()
         view = options.up
         highest = max(float((tips @ view).max()) for tips in self.tips)
-        top = max(float((mesh.vertices @ view).max()) + max(-tool.pivot, 0.0), highest)
+        top = max(float((mesh.vertices @ view).max()) + max(-tool.tilt_centre, 0.0), highest)
         # A rapid's knee is two approaches off the surface; no knee may reach above the level.
         level = top + max(options.clearance, 2.0 * options.approach)
         self.style = links.LinkStyle(
@@ -92,7 +92,7 @@ class _Linker:
         away = self._retract(len(self.runs) - 1)
         segments.append(away)
         segments.append(self._proven(links.leave(away.tips[-1], away.axes[-1], self.style)))
-        return Toolpath(tuple(segments), self.tool.pivot), self.counts
+        return Toolpath(tuple(segments), self.tool.tilt_centre), self.counts
 
     def _way_to(self, k: int) -> list[Segment]:
         """Return the segments from the end of the run before to the start of run k."""

@@ -22,7 +22,7 @@ def clearance(replay: Replay) -> Finding:
     samples whose middle is farther apart than this bound can use up are never looked into.
     """
     machine, (position, direction) = replay.machine, replay.pose
-    chords = 0.5 * replay.program.period * replay.survey.speeds[:, 2]
+    chords = 0.5 * replay.program.period * replay.interval_bounds.speeds[:, 2]
     way = np.concatenate([[0.0], np.cumsum(chords)])
 
     starts = np.arange(0, len(way), _BLOCK)

@@ -11,9 +11,9 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.solids import Solid
 from pentapod.machine.clearance.collision_world import (
     TOOL_BODY,
+    CollisionWorld,
     MovingBodies,
     Obstacle,
-    Surroundings,
     spindle_ends,
 )
 from pentapod.machine.clearance.tool_clearance import leg_tool_gaps
@@ -31,36 +31,36 @@ _PROVEN = (
 )
 
 
-def claims(surroundings: Surroundings | None, legs: int) -> tuple[Claim, ...]:
+def claims(collision_world: CollisionWorld | None, legs: int) -> tuple[Claim, ...]:
     """Return the claims about these surroundings of a machine with so many legs, in the order of a verdict; or none."""
-    if surroundings is None:
+    if collision_world is None:
         return ()
     made: list[Claim] = []
-    if surroundings.tool:
-        made.append(Claim(f"legs clear of the {TOOL_BODY}", partial(_legs_and_tool, tool=surroundings.tool)))
-    for obstacle in surroundings.obstacles:
-        for title, columns in _groups(surroundings, legs):
-            judge = partial(_clear, obstacle=obstacle, surroundings=surroundings, columns=columns)
+    if collision_world.tool:
+        made.append(Claim(f"legs clear of the {TOOL_BODY}", partial(_legs_and_tool, tool=collision_world.tool)))
+    for obstacle in collision_world.obstacles:
+        for title, columns in _groups(collision_world, legs):
+            judge = partial(_clear, obstacle=obstacle, collision_world=collision_world, columns=columns)
             made.append(Claim(f"{title} clear of the {obstacle.name}", judge))
     return tuple(made)
 
 
 def told(replay: Replay) -> Idle:
     """Judge nothing but whether the surroundings are known: each of them has claims of its own."""
-    known = replay.specification.surroundings is not None
+    known = replay.specification.collision_world is not None
     return Idle("there is nothing more") if known else Idle("nobody told what is there", unknown=True)
 
 
-def _groups(surroundings: Surroundings, legs: int) -> tuple[tuple[str, list[int]], ...]:
-    tool = ((TOOL_BODY, [legs + 1]),) if surroundings.tool else ()
+def _groups(collision_world: CollisionWorld, legs: int) -> tuple[tuple[str, list[int]], ...]:
+    tool = ((TOOL_BODY, [legs + 1]),) if collision_world.tool else ()
     return (("legs", list(range(legs))), ("spindle", [legs]), *tool)
 
 
-def _clear(replay: Replay, *, obstacle: Obstacle, surroundings: Surroundings, columns: list[int]) -> Finding:
+def _clear(replay: Replay, *, obstacle: Obstacle, collision_world: CollisionWorld, columns: list[int]) -> Finding:
     """Judge that some of what moves keeps clear of one obstacle."""
     machine, legs = replay.machine, replay.machine.robot.n_legs
     frame = replay.program.placement if obstacle.clamped else None
-    tool = surroundings.tool if legs + 1 in columns else ()
+    tool = collision_world.tool if legs + 1 in columns else ()
     bound = -obstacle.allowance if tool else 0.0
 
     def gaps(samples: Ints) -> Floats:
@@ -73,11 +73,11 @@ def _clear(replay: Replay, *, obstacle: Obstacle, surroundings: Surroundings, co
         )
         return chosen.segments(obstacle.surface, _FAR_M).distance.reshape(-1, len(columns))
 
-    offsets = line_offsets(machine, surroundings.tool)
+    offsets = line_offsets(machine, collision_world.tool)
     found = approach(
-        replay, gaps, lambda stray: body_moves(stray, surroundings.tool, legs)[:, columns], offsets, bound=bound
+        replay, gaps, lambda stray: body_moves(stray, collision_world.tool, legs)[:, columns], offsets, bound=bound
     )
-    name, most = surroundings.names(legs)[columns[found.column]], _TOOL_FAR_M if tool else _FAR_M
+    name, most = collision_world.names(legs)[columns[found.column]], _TOOL_FAR_M if tool else _FAR_M
     if found.least > bound and _enclosed(replay, obstacle, frame, columns):
         return Finding(False, None, MM * bound, "mm", replay.place(0), f"{name} is inside the {obstacle.name}")
     method = f"{name} comes closest; exact distance of its body from the mesh's facets, {_PROVEN}"

@@ -26,7 +26,7 @@ def kept(replay: Replay, *, measure: str) -> Finding | Idle:
 
 
 def _finding(replay: Replay, measure: ProvenMeasure, column: int) -> Finding:
-    found = replay.survey.component
+    found = replay.interval_bounds.component
     least, interval = -float(found.lower.values[column]), int(found.lower.at[column])
     least = math.degrees(math.asin(min(least, 1.0))) if measure.unit == "deg" else measure.scale * least
     answer, passed = "held", least > 0.0

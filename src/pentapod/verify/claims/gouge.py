@@ -65,7 +65,7 @@ def _method(found: Immersion, rise: float) -> str:
 def rapid_chords(replay: Replay) -> Bools:
     """Return which chords (M − 1,) are rapids; within the path tolerance of a cut or a link they are not."""
     toolpath, arcs = replay.toolpath, replay.match.arcs
-    ends = arc_length(toolpath.pivots)[toolpath.starts]
+    ends = arc_length(toolpath.tilt_centres)[toolpath.starts]
     other = np.array([segment.kind is not SegmentKind.RAPID for segment in toolpath.segments])
     before = np.concatenate([[0], np.cumsum(other)])
     first = np.searchsorted(ends[1:], arcs[:-1] - replay.path_tolerance, side="left")
@@ -75,8 +75,8 @@ def rapid_chords(replay: Replay) -> Bools:
 
 def begins_inside(replay: Replay, surface: MeshDistance, cutter: tuple[Solid, ...]) -> bool:
     """Return whether the cutter begins wholly inside: what never meets the surface stays on its side."""
-    top = max(solid.top for solid in cutter) - replay.toolpath.pivot
-    return bool(surface.contains(replay.pivots[:1] + top * replay.axes[:1]).any())
+    top = max(solid.top for solid in cutter) - replay.toolpath.tilt_centre
+    return bool(surface.contains(replay.tilt_centres[:1] + top * replay.axes[:1]).any())
 
 
 CLAIMS = (

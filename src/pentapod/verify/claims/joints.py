@@ -6,7 +6,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.verify.replay.claim import Claim, Finding
-from pentapod.verify.replay.interval_bounds import Extreme
+from pentapod.verify.replay.interval_bounds import RunningMaximum
 from pentapod.verify.replay.replay import Replay
 
 _METHOD = (
@@ -17,23 +17,23 @@ _METHOD = (
 
 def base_cones(replay: Replay) -> Finding:
     """Judge the angle between each leg and the axis of its base joint's cone."""
-    widest = replay.survey.base_widest
+    widest = replay.interval_bounds.base_widest
     return _finding(replay, widest, _angles(-widest.values), replay.machine.joints.base_cone, sign=1)
 
 
 def platform_least(replay: Replay) -> Finding:
     """Judge that no leg folds too close to the tool axis."""
-    closed = replay.survey.platform_closed
+    closed = replay.interval_bounds.platform_closed
     return _finding(replay, closed, _angles(closed.values), replay.machine.joints.platform_range[:, 0], sign=-1)
 
 
 def platform_most(replay: Replay) -> Finding:
     """Judge that no leg opens too far from the tool axis."""
-    widest = replay.survey.platform_open
+    widest = replay.interval_bounds.platform_open
     return _finding(replay, widest, _angles(-widest.values), replay.machine.joints.platform_range[:, 1], sign=1)
 
 
-def _finding(replay: Replay, where: Extreme, angles: Floats, limit: Floats, *, sign: int) -> Finding:
+def _finding(replay: Replay, where: RunningMaximum, angles: Floats, limit: Floats, *, sign: int) -> Finding:
     """Judge the extreme angles (n_legs,) against their limits, the largest (sign 1) or the least ones (sign −1)."""
     leg = int(np.argmax(sign * (angles - limit)))
     value, bound = float(angles[leg]), float(limit[leg])

@@ -6,7 +6,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.verify.replay.claim import ALLOWANCE, MM, Claim, Finding, with_allowance
-from pentapod.verify.replay.interval_bounds import Extreme
+from pentapod.verify.replay.interval_bounds import RunningMaximum
 from pentapod.verify.replay.replay import Replay
 
 _EXACT = "exact extrema of the controller's polynomials, rows and between"
@@ -14,7 +14,7 @@ _EXACT = "exact extrema of the controller's polynomials, rows and between"
 
 def shortest(replay: Replay) -> Finding:
     """Judge that no leg gets shorter than its stroke allows."""
-    found, limit = replay.survey.shortest, replay.machine.legs.min_length
+    found, limit = replay.interval_bounds.shortest, replay.machine.legs.min_length
     leg = int(np.argmin(-found.values - limit))
     value, bound = -float(found.values[leg]), float(limit[leg])
     return _finding(replay, value >= bound, (value, bound, "mm"), (int(found.at[leg]), leg), _EXACT)
@@ -22,7 +22,7 @@ def shortest(replay: Replay) -> Finding:
 
 def longest(replay: Replay) -> Finding:
     """Judge that no leg gets longer than its stroke allows."""
-    found, limit = replay.survey.longest, replay.machine.legs.max_length
+    found, limit = replay.interval_bounds.longest, replay.machine.legs.max_length
     leg = int(np.argmax(found.values - limit))
     value, bound = float(found.values[leg]), float(limit[leg])
     return _finding(replay, value <= bound, (value, bound, "mm"), (int(found.at[leg]), leg), _EXACT)
@@ -30,7 +30,7 @@ def longest(replay: Replay) -> Finding:
 
 def rate(replay: Replay) -> Finding:
     """Judge the speed of every leg."""
-    return _below(replay, replay.survey.rates, replay.machine.legs.max_velocity, "mm/s", _EXACT)
+    return _below(replay, replay.interval_bounds.rates, replay.machine.legs.max_velocity, "mm/s", _EXACT)
 
 
 def acceleration(replay: Replay) -> Finding:
@@ -41,7 +41,7 @@ def acceleration(replay: Replay) -> Finding:
         else "second derivative of the spline, linear between the rows: exact"
     )
     limit = replay.machine.legs.max_acceleration
-    return _below(replay, replay.survey.accelerations, limit, "mm/s²", method)
+    return _below(replay, replay.interval_bounds.accelerations, limit, "mm/s²", method)
 
 
 def jerk(replay: Replay) -> Finding:
@@ -52,10 +52,10 @@ def jerk(replay: Replay) -> Finding:
         else "third derivative of the spline, constant between the rows: exact; "
     )
     method += "a step of acceleration at either end counts over one period"
-    return _below(replay, replay.survey.jerks, replay.machine.legs.max_jerk, "mm/s³", method)
+    return _below(replay, replay.interval_bounds.jerks, replay.machine.legs.max_jerk, "mm/s³", method)
 
 
-def _below(replay: Replay, found: Extreme, limit: Floats, unit: str, method: str) -> Finding:
+def _below(replay: Replay, found: RunningMaximum, limit: Floats, unit: str, method: str) -> Finding:
     """Judge the largest of each leg against limits (n_legs,), both SI."""
     leg = int(np.argmax(found.values / limit))
     value, bound = float(found.values[leg]), float(limit[leg])

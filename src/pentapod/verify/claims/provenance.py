@@ -34,16 +34,16 @@ def job(replay: Replay) -> Finding | Idle:
 
 def guides(replay: Replay) -> Finding | Idle:
     """Judge that the guides of a reconfigurable machine stand within their travel; not asked of other machines."""
-    machine, slides = replay.machine, replay.program.slides
-    if machine.guides is None and slides is not None:
+    machine, rail_positions = replay.machine, replay.program.rail_positions
+    if machine.guides is None and rail_positions is not None:
         return Finding(False, None, None, "", Place(), "the header tells where guides stand; this machine has none")
     if machine.guides is None:
         return Idle("the machine has no guides")
-    if slides is None:
+    if rail_positions is None:
         return Finding(False, None, 0.0, "mm", Place(), "the header does not say where the guides stand")
     least, greatest = machine.guides.travel.T
-    rooms = MM * np.minimum(np.array(slides) - least, greatest - np.array(slides))
-    stand = ", ".join(f"{MM * slide:.6g}" for slide in slides)
+    rooms = MM * np.minimum(np.array(rail_positions) - least, greatest - np.array(rail_positions))
+    stand = ", ".join(f"{MM * slide:.6g}" for slide in rail_positions)
     method = f"header: guides at {stand} mm; the least room to an end of their travel"
     return Finding(bool(rooms.min() >= 0.0), float(rooms.min()), 0.0, "mm", Place(), method)
 

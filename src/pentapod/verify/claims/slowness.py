@@ -41,7 +41,7 @@ _CREEP = 0.01
 
 def lowest_feed(replay: Replay) -> Finding | Idle:
     """Judge that cuts and links are not slower than the feed where no limit asks for it."""
-    standoff, bound = replay.toolpath.pivot < 0.0, replay.specification.lowest_share
+    standoff, bound = replay.toolpath.tilt_centre < 0.0, replay.specification.lowest_share
     if bound is None:
         bound = LOWEST_SHARE_STANDOFF if standoff else LOWEST_SHARE
     if bound == 0.0:
@@ -52,7 +52,7 @@ def lowest_feed(replay: Replay) -> Finding | Idle:
         return Idle("no moment belongs to a cut or a link alone")
     period = replay.program.period
     tip = _speeds(replay, 0.0)
-    share = (_speeds(replay, replay.toolpath.pivot) if standoff else tip) / feeds
+    share = (_speeds(replay, replay.toolpath.tilt_centre) if standoff else tip) / feeds
     used = np.maximum(_used(replay), tip / replay.machine.rapid_velocity if standoff else 0.0)
     around = max(math.ceil(_AROUND_S / period), _AROUND_ROWS)
     judged &= maximum_filter1d(used, 2 * around + 1) < _USED
@@ -99,7 +99,7 @@ def unasked_stop(replay: Replay) -> Finding:
 def _feeds(replay: Replay) -> Floats:
     """Return the feed (N − 1,) from row to row, m/s; infinite where it is not a cut's or a link's alone."""
     toolpath, arcs = replay.toolpath, replay.match.arcs[::2]
-    ends, rapid = arc_length(toolpath.pivots)[toolpath.starts], replay.machine.rapid_velocity
+    ends, rapid = arc_length(toolpath.tilt_centres)[toolpath.starts], replay.machine.rapid_velocity
     first = np.searchsorted(ends, arcs[:-1] - replay.path_tolerance, side="right")
     behind = np.searchsorted(ends, arcs[1:] + replay.path_tolerance, side="left")
     feeds = [np.inf if s.kind is SegmentKind.RAPID else min(s.feed, rapid) for s in toolpath.segments]
@@ -108,10 +108,10 @@ def _feeds(replay: Replay) -> Floats:
     return np.where(first == behind, of_gap[first], np.inf)
 
 
-def _speeds(replay: Replay, pivot: float) -> Floats:
+def _speeds(replay: Replay, tilt_centre: float) -> Floats:
     """Return the mean speed (N − 1,) from row to row of the point that far from the tip along the axis, m/s."""
     position, direction = replay.pose
-    points = (position + (replay.machine.tool_length - pivot) * direction)[::2]
+    points = (position + (replay.machine.tool_length - tilt_centre) * direction)[::2]
     return np.linalg.norm(np.diff(points, axis=0), axis=1) / replay.program.period
 
 
@@ -153,13 +153,13 @@ def _reasons(replay: Replay, runs: Ints, least: float) -> tuple[Bools, Floats]:
     least: corners of more radians are a reason.
     """
     path, match = replay.toolpath, replay.match
-    way = arc_length(path.pivots)
+    way = arc_length(path.tilt_centres)
     arcs, within = match.arcs[::2], replay.path_tolerance
     low, high = arcs[runs[:, 0]] - within, arcs[np.minimum(runs[:, 1], len(arcs) - 1)] + within
     ends = way[path.starts]
     reasons = np.searchsorted(ends, high, "right") > np.searchsorted(ends, low, "left")
     # How far the path turns between its waypoints, by direction and by axis, summed up to each of them.
-    step = np.diff(path.pivots, axis=0)
+    step = np.diff(path.tilt_centres, axis=0)
     moving = np.linalg.norm(step, axis=1) > 0.0
     corner = np.zeros(len(way))
     at = np.flatnonzero(moving)

@@ -18,11 +18,11 @@ _MM_MIN = 60e3  # mm/min in 1 m/s
 def feed(replay: Replay, kind: SegmentKind) -> Finding | Idle:
     """Judge the speed on the segments of one kind; idle where the program has no such motion.
 
-    A cutter's feed is the speed of its tip. What works from a stand-off meets the surface at the pivot: there the
+    A cutter's feed is the speed of its tip. What works from a stand-off meets the surface at the tilt centre: there the
     feed is the speed of that spot, while the tip may go as fast as on rapids, and has to keep to that everywhere.
     """
     limit, governing = speed_limits(replay)
-    standoff, rapid = replay.toolpath.pivot < 0.0, kind == SegmentKind.RAPID
+    standoff, rapid = replay.toolpath.tilt_centre < 0.0, kind == SegmentKind.RAPID
     kinds = np.array([segment.kind == kind for segment in replay.toolpath.segments])
     chords = np.flatnonzero(kinds[governing])
     if standoff and rapid:
@@ -31,7 +31,7 @@ def feed(replay: Replay, kind: SegmentKind) -> Finding | Idle:
         return Idle(f"no moment belongs to a {kind}")
     spot = standoff and not rapid
     linear = replay.program.interpolation == "linear"
-    speed = (_between_rows(replay, spot=spot) if linear else replay.survey.speeds[:, 1 if spot else 0])[chords]
+    speed = (_between_rows(replay, spot=spot) if linear else replay.interval_bounds.speeds[:, 1 if spot else 0])[chords]
     worst = int(np.argmax(speed / limit[chords]))
     value, bound = float(speed[worst]), float(limit[chords[worst]])
     whose = "the spot that the program's tool meets on the surface" if spot else "the program's own tip"
@@ -52,7 +52,7 @@ def _between_rows(replay: Replay, *, spot: bool) -> Floats:
     that is the controller's doing, at its own pace, and no feed that anybody set.
     """
     position, direction = replay.pose
-    arm = replay.machine.tool_length - (replay.toolpath.pivot if spot else 0.0)
+    arm = replay.machine.tool_length - (replay.toolpath.tilt_centre if spot else 0.0)
     points = (position + arm * direction)[::2]
     return np.repeat(np.linalg.norm(np.diff(points, axis=0), axis=1) / replay.program.period, 2)
 
@@ -66,7 +66,7 @@ def speed_limits(replay: Replay) -> tuple[Floats, Ints]:
     segments, arcs = replay.toolpath.segments, replay.match.arcs
     rapid = replay.machine.rapid_velocity
     limits = np.array([rapid if s.kind == SegmentKind.RAPID else min(s.feed, rapid) for s in segments])
-    bounds = arc_length(replay.toolpath.pivots)[replay.toolpath.starts]
+    bounds = arc_length(replay.toolpath.tilt_centres)[replay.toolpath.starts]
     low = np.searchsorted(bounds[1:], arcs[:-1] - replay.path_tolerance, side="left")
     high = np.searchsorted(bounds[1:-1], arcs[1:] + replay.path_tolerance, side="right")
     governing = low.copy()

@@ -60,7 +60,7 @@ def asked_stops(replay: Replay) -> list[tuple[int, int, float]]:
     # Where the tool turns on the spot its way does not tell one waypoint from the next.
     turns = np.append(0.0, np.cumsum(angle_between(path.axes[:-1], path.axes[1:])))
     courses = (
-        (match.arcs[::2], arc_length(path.pivots)[path.starts], replay.path_tolerance),
+        (match.arcs[::2], arc_length(path.tilt_centres)[path.starts], replay.path_tolerance),
         (match.turned[::2], turns[path.starts], replay.axis_tolerance),
     )
     low = np.maximum(*(np.searchsorted(course, places - within, "left") for course, places, within in courses))

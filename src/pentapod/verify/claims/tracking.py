@@ -24,10 +24,10 @@ _BLOCK = 1 << 15  # samples
 def tip_deviation(replay: Replay) -> Finding:
     """Judge how far the program strays from the toolpath.
 
-    The tool may tilt about the pivot, which stays on its own path then. So it is the pivot that is compared:
-    its deviation is that of the tip once the tool is turned back to the nominal axis.
+    The tool may tilt about the tilt centre, which stays on its own path then. So it is the tilt centre that is
+    compared: its deviation is that of the tip once the tool is turned back to the nominal axis.
     """
-    stray = at_samples(replay.survey.away)
+    stray = at_samples(replay.interval_bounds.away)
     deviation, offset = replay.match.distances + stray, None
     if deviation.max() > with_allowance(replay.path_tolerance):
         offset = constant_offset(replay)
@@ -36,7 +36,7 @@ def tip_deviation(replay: Replay) -> Finding:
     worst = int(np.argmax(deviation))
     method = (
         "proven bound for all times, of the point "
-        f"{MM * replay.toolpath.pivot:g} mm from the tip along the axis, about which the tool may tilt: the "
+        f"{MM * replay.toolpath.tilt_centre:g} mm from the tip along the axis, about which the tool may tilt: the "
         "tip's deviation once the tool is turned back to the nominal axis; closed-form forward kinematics at the rows "
         "and halfway between, against the matched place of the toolpath, in order; how far the motion strays from the "
         f"chord in between is proven by Krawczyk's operator (here {1e6 * stray[worst]:.2g} µm); at the toolpath's "
@@ -49,14 +49,14 @@ def tip_deviation(replay: Replay) -> Finding:
 
 def coverage(replay: Replay) -> Finding:
     """Judge that the program passes every waypoint, in the order of the toolpath."""
-    match, away = replay.match, replay.survey.away
+    match, away = replay.match, replay.interval_bounds.away
     chord = np.minimum(match.times.astype(np.intp), len(away) - 1)
     distance = match.waypoint_distances + away[chord]
     worst = int(np.argmax(distance))
     far = int((distance > with_allowance(replay.path_tolerance)).sum())
     method = (
-        f"proven bound of the distance of each of the {len(distance)} waypoints' pivots to the program at the time it "
-        f"is visited, times in order; farthest: waypoint {worst}"
+        f"proven bound of the distance of each of the {len(distance)} waypoints' tilt centres to the program at the "
+        f"time it is visited, times in order; farthest: waypoint {worst}"
     )
     if far:
         method += f"; {far} waypoints are not reached"
@@ -75,7 +75,7 @@ def axis_deviation(replay: Replay) -> Finding:
     # it is high: an eighth of the angle squared. At a waypoint's visit the motion's own is off the arc already.
     # Along the arc they lag behind by less than a fiftieth of the angle cubed (lemma 14 of docs/proofs.md).
     rise = 0.25 * own**2 + 0.125 * replay.chord_arcs**2 + replay.chord_arcs**3 / 50.0
-    stray = replay.survey.turned
+    stray = replay.interval_bounds.turned
     at_sample = angle_bound(match.angles, at_samples(rise), at_samples(stray))
     chord = np.minimum(match.times.astype(np.intp), len(stray) - 1)
     at_waypoint = angle_bound(match.waypoint_angles, rise[chord], stray[chord])
@@ -96,14 +96,16 @@ def axis_deviation(replay: Replay) -> Finding:
 
 def start(replay: Replay) -> Finding:
     """Judge that the program begins where the toolpath begins."""
-    distance = float(np.linalg.norm(replay.pivots[0] - replay.toolpath.pivots[0]))
-    return _within(replay, distance, 0, "pivot of the first row to that of the first waypoint")
+    distance = float(np.linalg.norm(replay.tilt_centres[0] - replay.toolpath.tilt_centres[0]))
+    return _within(replay, distance, 0, "tilt centre of the first row to that of the first waypoint")
 
 
 def end(replay: Replay) -> Finding:
     """Judge that the program ends where the toolpath ends."""
-    distance = float(np.linalg.norm(replay.pivots[-1] - replay.toolpath.pivots[-1]))
-    return _within(replay, distance, len(replay.pivots) - 1, "pivot of the last row to that of the last waypoint")
+    distance = float(np.linalg.norm(replay.tilt_centres[-1] - replay.toolpath.tilt_centres[-1]))
+    return _within(
+        replay, distance, len(replay.tilt_centres) - 1, "tilt centre of the last row to that of the last waypoint"
+    )
 
 
 def at_samples(chords: Floats) -> Floats:

@@ -66,7 +66,7 @@ class Claim(Value):
             first = int(replay.unposed[0])
             method = f"not judged: the leg lengths have no pose at {len(replay.unposed)} of the samples"
             return Certificate(self.name, False, None, None, "", replay.place(first), method)
-        if self.needs_proof and len(unproven := replay.survey.unproven):
+        if self.needs_proof and len(unproven := replay.interval_bounds.unproven):
             first, count = int(unproven[0]), len(unproven)
             method = f"undecided: too near a singularity to prove where the motion goes on {count} half periods"
             return Certificate(self.name, False, None, None, "", replay.place(first), method)

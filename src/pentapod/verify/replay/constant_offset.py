@@ -18,7 +18,7 @@ _LEAST = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Offset:
-    """cause: in words. distances (M,): of the samples' pivots from their places on the toolpath, metres."""
+    """cause: in words. distances (M,): of the samples' tilt centres from their places on the toolpath, metres."""
 
     cause: str
     distances: Floats
@@ -29,7 +29,7 @@ def constant_offset(replay: Replay) -> Offset | None:
 
     Along the tool, or of the part. It is taken from the first row, where every program should be on the toolpath.
     """
-    first = replay.pivots[0] - replay.toolpath.pivots[0]
+    first = replay.tilt_centres[0] - replay.toolpath.tilt_centres[0]
     if np.linalg.norm(first) < _LEAST * replay.path_tolerance:
         return None
     along = float(first @ replay.axes[0])
@@ -45,13 +45,13 @@ def constant_offset(replay: Replay) -> Offset | None:
 
 
 def _without(replay: Replay, offset: Floats) -> PathMatch | None:
-    """Return the matching of the pivots without an offset, (3,) or (M, 3) metres; None where it is not within."""
-    toolpath, away = replay.toolpath, replay.survey.away
-    pivots, allowed = replay.pivots - offset, with_allowance(replay.path_tolerance)
-    if np.linalg.norm(pivots[-1] - toolpath.pivots[-1]) > allowed:
+    """Return the matching of the tilt centres without an offset, (3,) or (M, 3) metres; None where it is not within."""
+    toolpath, away = replay.toolpath, replay.interval_bounds.away
+    tilt_centres, allowed = replay.tilt_centres - offset, with_allowance(replay.path_tolerance)
+    if np.linalg.norm(tilt_centres[-1] - toolpath.tilt_centres[-1]) > allowed:
         return None  # the long work is spared
-    program = PosedPolyline(pivots, replay.axes)
-    path = PosedPolyline(toolpath.pivots, toolpath.axes)
+    program = PosedPolyline(tilt_centres, replay.axes)
+    path = PosedPolyline(toolpath.tilt_centres, toolpath.axes)
     bound = replay.tilt + replay.axis_tolerance
     found = match(program, path, replay.path_tolerance, axis_bound=bound, away=away)
     within = found.distances.max() <= allowed and found.waypoint_distances.max() <= allowed
@@ -59,8 +59,8 @@ def _without(replay: Replay, offset: Floats) -> PathMatch | None:
 
 
 def _distances(replay: Replay, found: PathMatch) -> Floats:
-    """Return how far (M,) the pivots are from their places by a matching, metres."""
-    points = replay.toolpath.pivots
+    """Return how far (M,) the tilt centres are from their places by a matching, metres."""
+    points = replay.toolpath.tilt_centres
     k = np.minimum(found.places.astype(np.intp), len(points) - 2)
     share = (found.places - k)[:, None]
-    return np.linalg.norm(replay.pivots - ((1.0 - share) * points[k] + share * points[k + 1]), axis=1)
+    return np.linalg.norm(replay.tilt_centres - ((1.0 - share) * points[k] + share * points[k + 1]), axis=1)

@@ -1,7 +1,7 @@
 """How deep a tool goes into a mesh at any time: swept along straight stretches, and how far the motion is off those.
 
-A stretch is some chords between samples. On it the tool is swept as if its pivot went straight and its axis turned
-evenly: exactly, between the samples too. Where the motion really is differs from that by what is measured at the
+A stretch is some chords between samples. On it the tool is swept as if its tilt centre went straight and its axis
+turned evenly: exactly, between the samples too. Where the motion really is differs from that by what is measured at the
 samples and what is proven of the chords between them (lemmas 12 and 13 of docs/proofs.md). Stretches that may hold
 something deeper than what is
 known are cut into eight, down to single chords; most programs are decided long before.
@@ -48,9 +48,9 @@ def immersion(
 
     Ends early where a depth that is met is above `bound`, metres.
     """
-    body = TouchingBody(solids, replay.toolpath.pivot)
-    lever = max(max(abs(s.low - body.pivot), abs(s.high - body.pivot)) + _width(s) for s in solids)
-    if all(solid.is_ball and solid.low == body.pivot for solid in solids):
+    body = TouchingBody(solids, replay.toolpath.tilt_centre)
+    lever = max(max(abs(s.low - body.tilt_centre), abs(s.high - body.tilt_centre)) + _width(s) for s in solids)
+    if all(solid.is_ball and solid.low == body.tilt_centre for solid in solids):
         lever = 0.0  # the ball's path does not know how the tool turns about its centre
     met = _met(replay, surface, body, chords)
     if met.most > bound:
@@ -104,7 +104,7 @@ def _met(replay: Replay, surface: MeshDistance, body: TouchingBody, chords: Bool
     own = np.flatnonzero(chords)
     samples = own[:: max(1, len(own) // _LOOKED_AT)]
     axes = replay.axes[samples]
-    tips = replay.pivots[samples] - body.pivot * axes
+    tips = replay.tilt_centres[samples] - body.tilt_centre * axes
     depths = touch(surface.tree, body, tips, axes, threshold=-_FAR_M).deepest
     deepest = int(np.argmax(depths))
     return Immersion(max(float(depths[deepest]), -_FAR_M), int(samples[deepest]), met=True)
@@ -116,6 +116,6 @@ def _swept(
     """Return depths (n,) on straight stretches, none below `threshold`, and whether (n,) they are above it."""
     both = np.stack([of.starts, of.ends], axis=1).ravel()
     axes = replay.axes[both]
-    tips = replay.pivots[both] - body.pivot * axes
+    tips = replay.tilt_centres[both] - body.tilt_centre * axes
     depth = sweep(surface.tree, body, tips, axes, threshold=threshold, every=2).deepest
     return np.maximum(depth, threshold), depth > threshold

@@ -1,4 +1,4 @@
-"""Survey: one walk along the program, block by block, for all that needs the controller's polynomials.
+"""IntervalBounds: one walk along the program, block by block, for all that needs the controller's polynomials.
 
 The polynomials of a long program would fill the memory; a block of them fits the processor's cache. What stays is the
 worst value of each leg and its place, and for each sample and each chord between samples a few numbers.
@@ -21,7 +21,7 @@ from pentapod.program.program import Program
 _BLOCK = 4096  # intervals
 
 
-class Extreme:
+class RunningMaximum:
     """The largest of a measure over the program, for each column: values (d,), and the places (d,) where they are."""
 
     def __init__(self, columns: int) -> None:
@@ -40,11 +40,11 @@ class Extreme:
 class ComponentFindings:
     """What is proven of the component, over all intervals.
 
-    lower: the least values that are proven of the robot's `proven_measures`, as −`Extreme`. refuted, undecided: how
-    many intervals; their first ones, and the doubtful part of those in [0, 1].
+    lower: the least values that are proven of the robot's `proven_measures`, as −`RunningMaximum`. refuted, undecided:
+    how many intervals; their first ones, and the doubtful part of those in [0, 1].
     """
 
-    lower: Extreme
+    lower: RunningMaximum
     refuted: int = 0
     undecided: int = 0
     first_refuted: tuple[int, float, float] | None = None
@@ -68,33 +68,33 @@ def _first(proof: BranchProof, which: Bools, first: int) -> tuple[int, float, fl
 
 
 @dataclass(eq=False)
-class Survey:
+class IntervalBounds:
     """What the walk found.
 
-    shortest: −`Extreme` of the legs' least lengths on each interval; longest, rates, jerks: `Extreme` on each
-    interval; accelerations: at each row. Metres and seconds; exact on the controller's polynomials.
+    shortest: −`RunningMaximum` of the legs' least lengths on each interval; longest, rates, jerks: `RunningMaximum` on
+    each interval; accelerations: at each row. Metres and seconds; exact on the controller's polynomials.
     component: see there. position, direction (M, 3): the poses at the samples, NaN where there are none.
     away (M − 1,) metres, turned (M − 1,) radians, speeds (M − 1, 3) m/s: proven of each chord between samples: how far
-    the pivot strays from it, how far the axis turns off it, how fast are the tip, the pivot and the faster end
-    of the platform's line with the tool. Infinite where not proven.
+    the tilt centre strays from it, how far the axis turns off it, how fast are the tip, the tilt centre and the faster
+    end of the platform's line with the tool. Infinite where not proven.
     base_widest, platform_closed, platform_open: proven of each chord: −cos of the largest angle at the base joint, cos
     of the least and −cos of the largest one at the platform joint.
     """
 
-    shortest: Extreme
-    longest: Extreme
-    rates: Extreme
-    accelerations: Extreme
-    jerks: Extreme
+    shortest: RunningMaximum
+    longest: RunningMaximum
+    rates: RunningMaximum
+    accelerations: RunningMaximum
+    jerks: RunningMaximum
     component: ComponentFindings
     position: Floats
     direction: Floats
     away: Floats
     turned: Floats
     speeds: Floats
-    base_widest: Extreme
-    platform_closed: Extreme
-    platform_open: Extreme
+    base_widest: RunningMaximum
+    platform_closed: RunningMaximum
+    platform_open: RunningMaximum
 
     @property
     def unproven(self) -> Ints:
@@ -102,13 +102,14 @@ class Survey:
         return np.flatnonzero(~np.isfinite(self.away))
 
 
-def survey(
-    program: Program, machine: Machine, pivot: float, leg_error: float, progress: Callable[[float], None]
-) -> Survey:
+def interval_bounds(
+    program: Program, machine: Machine, tilt_centre: float, leg_error: float, progress: Callable[[float], None]
+) -> IntervalBounds:
     """Walk along a program.
 
-    pivot: metres from the tip along the tool axis. leg_error: metres by which each leg may be off for the component to
-    be kept all the same: legs that pass through a singularity look like legs that turn back just before it.
+    tilt_centre: metres from the tip along the tool axis. leg_error: metres by which each leg may be off for the
+    component to be kept all the same: legs that pass through a singularity look like legs that turn back just before
+    it.
     """
     count = len(program.legs) - 1
     slopes = clamped_slopes(program.legs) if program.interpolation == "cubic" else None
@@ -127,7 +128,7 @@ def survey(
         ends = found.position[samples][::2], found.direction[samples][::2]
         found.component.see(machine.robot.prove(part.bernstein, ends, program.component, leg_error=leg_error), first)
         between = slice(2 * first, 2 * last)
-        chords = _chords(found, machine, program, part, between, pivot)
+        chords = _chords(found, machine, program, part, between, tilt_centre)
         found.away[between], found.turned[between] = chords.away[:, 1], chords.turned
         found.speeds[between, :2] = chords.speeds[:, :2]
         found.speeds[between, 2] = chords.speeds[:, 2:].max(axis=1)
@@ -138,27 +139,27 @@ def survey(
     return found
 
 
-def _empty(count: int, legs: int, measures: int) -> Survey:
+def _empty(count: int, legs: int, measures: int) -> IntervalBounds:
     """Return a survey of `count` intervals of which nothing is known yet."""
-    return Survey(
-        shortest=Extreme(legs),
-        longest=Extreme(legs),
-        rates=Extreme(legs),
-        accelerations=Extreme(legs),
-        jerks=Extreme(legs),
-        component=ComponentFindings(Extreme(measures)),
+    return IntervalBounds(
+        shortest=RunningMaximum(legs),
+        longest=RunningMaximum(legs),
+        rates=RunningMaximum(legs),
+        accelerations=RunningMaximum(legs),
+        jerks=RunningMaximum(legs),
+        component=ComponentFindings(RunningMaximum(measures)),
         position=np.empty((2 * count + 1, 3)),
         direction=np.empty((2 * count + 1, 3)),
         away=np.empty(2 * count),
         turned=np.empty(2 * count),
         speeds=np.empty((2 * count, 3)),
-        base_widest=Extreme(legs),
-        platform_closed=Extreme(legs),
-        platform_open=Extreme(legs),
+        base_widest=RunningMaximum(legs),
+        platform_closed=RunningMaximum(legs),
+        platform_open=RunningMaximum(legs),
     )
 
 
-def _legs(found: Survey, wide: Interpolant, first: int, inner: slice) -> None:
+def _legs(found: IntervalBounds, wide: Interpolant, first: int, inner: slice) -> None:
     """Take in the legs of the inner intervals of a block, which begin at the interval `first`."""
     low, high = wide.ranges
     found.shortest.see(-low[inner], first)
@@ -169,11 +170,11 @@ def _legs(found: Survey, wide: Interpolant, first: int, inner: slice) -> None:
 
 
 def _chords(
-    found: Survey, machine: Machine, program: Program, part: Interpolant, between: slice, pivot: float
+    found: IntervalBounds, machine: Machine, program: Program, part: Interpolant, between: slice, tilt_centre: float
 ) -> Chords:
     """Return what is proven of the two chords of each interval, between poses that are known already.
 
-    Of the tip, the pivot, and both ends of what the platform's line carries.
+    Of the tip, the tilt centre, and both ends of what the platform's line carries.
     """
     tip, heights = machine.tool_length, machine.robot.line_heights
     halves = split(part.bernstein)
@@ -184,6 +185,6 @@ def _chords(
         (found.position[start], found.direction[start]),
         (found.position[end], found.direction[end]),
         program.component,
-        arms=np.array([tip, tip - pivot, heights.min(), max(heights.max(), tip)]),
+        arms=np.array([tip, tip - tilt_centre, heights.min(), max(heights.max(), tip)]),
         towards=machine.joints.base_axes,
     )

@@ -1,7 +1,7 @@
 """Which place of the toolpath each moment of the program belongs to.
 
-The program's pivot and axis, sampled, and the polyline of the toolpath's waypoints are matched by a monotone relation:
-each waypoint gets a time, each sample a place on the interval whose waypoints enclose it in time. Between two
+The program's tilt centre and axis, sampled, and the polyline of the toolpath's waypoints are matched by a monotone
+relation: each waypoint gets a time, each sample a place on the interval whose waypoints enclose it in time. Between two
 neighbouring events (a sample, or a waypoint's time) both sides move along straight lines, so the distance there is
 at most the larger of its values at the two events. Hence the largest distance over all events bounds the Fréchet
 distance of the two polylines from above, whatever the matching: soundness does not rest on the search.
@@ -26,7 +26,7 @@ from pentapod.verify.replay.free_space import FreeSpace, Pairing, PosedPolyline
 _BLOCK = 1 << 15  # samples that are measured at once
 
 _AXIS_SCALE_RAD = 0.05
-"""Where the path turns on the spot, an axis this far off counts as much as a pivot off by the tolerance."""
+"""Where the path turns on the spot, an axis this far off counts as much as a tilt centre off by the tolerance."""
 
 _ALLOWED = 1.0 + 0.999e-3
 """Up to this share of the tolerance a matching is as good as within: claims allow a little more."""
@@ -44,9 +44,9 @@ class PathMatch:
 
     times (n,): when each waypoint is passed, in samples (2.25 is a quarter of the way from sample 2 to 3),
     non-decreasing. places (M,): the place of each sample, in waypoints, non-decreasing. arcs (M,): the same as arc
-    length of the pivot's polyline, metres. turned (M,): how far the path's axis has turned up to there in all, radians.
-    distances (M,), waypoint_distances (n,) in metres and angles (M,), waypoint_angles (n,) in radians:
-    between the matched pivots and axes.
+    length of the tilt centre's polyline, metres. turned (M,): how far the path's axis has turned up to there in all,
+    radians. distances (M,), waypoint_distances (n,) in metres and angles (M,), waypoint_angles (n,) in radians:
+    between the matched tilt centres and axes.
     """
 
     times: Floats
@@ -122,7 +122,7 @@ def _places(motion: PosedPolyline, path: PosedPolyline, turning: Bools, toleranc
 
 
 def turns_on_spot(path: PosedPolyline, tolerance: float) -> Bools:
-    """Return the intervals (n − 1,) on which the axis turns while the pivot (as good as) stands."""
+    """Return the intervals (n − 1,) on which the axis turns while the tilt centre (as good as) stands."""
     length = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
     turn = np.linalg.norm(np.diff(path.axes, axis=0), axis=1)
     return (length <= tolerance) & (turn * tolerance >= _AXIS_SCALE_RAD * length) & (turn > 1e-12)
@@ -157,7 +157,7 @@ def _measure(motion: PosedPolyline, path: PosedPolyline, pairing: Pairing, place
 def interval_fractions(
     motion: PosedPolyline, path: PosedPolyline, turning: Bools, tolerance: float, interval: Ints
 ) -> Floats:
-    """Return how far along its interval, in [0, 1], each sample is: by its pivot, or its axis on the spot."""
+    """Return how far along its interval, in [0, 1], each sample is: by its tilt centre, or its axis on the spot."""
     step = np.diff(path.points, axis=0)
     square = np.einsum("ij,ij->i", step, step)
     off = motion.points - path.points[interval]
@@ -167,8 +167,8 @@ def interval_fractions(
     if len(spot):
         k = interval[spot]
         turned, turn = _arc_fraction(motion.axes[spot], path.axes[k], path.axes[k + 1])
-        by_pivot, by_axis = square[k] / tolerance**2, (turn / _AXIS_SCALE_RAD) ** 2
-        along[spot] = (by_pivot * along[spot] + by_axis * turned) / (by_pivot + by_axis)
+        by_tilt_centre, by_axis = square[k] / tolerance**2, (turn / _AXIS_SCALE_RAD) ** 2
+        along[spot] = (by_tilt_centre * along[spot] + by_axis * turned) / (by_tilt_centre + by_axis)
     return along
 
 

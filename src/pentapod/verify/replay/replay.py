@@ -18,7 +18,7 @@ from pentapod.numerics.blocks import blocks
 from pentapod.program.program import Program
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify.replay.free_space import PosedPolyline
-from pentapod.verify.replay.interval_bounds import Survey, survey
+from pentapod.verify.replay.interval_bounds import IntervalBounds, interval_bounds
 from pentapod.verify.replay.path_matching import PathMatch, match
 from pentapod.verify.verdict.specification import Specification
 from pentapod.verify.verdict.verdict import Place
@@ -68,13 +68,13 @@ class Replay(Value):
         return self.specification.axis_tolerance
 
     @cached_property
-    def survey(self) -> Survey:
+    def interval_bounds(self) -> IntervalBounds:
         """What the walk along the controller's polynomials measures and proves."""
 
         def told(share: float) -> None:
             self.progress("verify", SURVEY_SHARE * share, "between the rows")
 
-        return survey(self.program, self.machine, self.toolpath.pivot, self.path_tolerance, told)
+        return interval_bounds(self.program, self.machine, self.toolpath.tilt_centre, self.path_tolerance, told)
 
     @cached_property
     def slopes(self) -> Floats | None:
@@ -92,7 +92,7 @@ class Replay(Value):
 
         By the closed-form forward kinematics; NaN where these leg lengths have no pose.
         """
-        return self.survey.position, self.survey.direction
+        return self.interval_bounds.position, self.interval_bounds.direction
 
     @cached_property
     def unposed(self) -> Ints:
@@ -106,9 +106,9 @@ class Replay(Value):
         return self._in_work(lambda inverse, _, direction: inverse.rotate(-direction))
 
     @cached_property
-    def pivots(self) -> Floats:
+    def tilt_centres(self) -> Floats:
         """The points (M, 3) about which the tool may tilt, workpiece frame, metres."""
-        along = self.machine.tool_length - self.toolpath.pivot
+        along = self.machine.tool_length - self.toolpath.tilt_centre
         return self._in_work(lambda inverse, position, direction: inverse.apply(position + along * direction))
 
     def _in_work(self, of: Callable[[RigidTransform, Floats, Floats], Floats]) -> Floats:
@@ -127,9 +127,12 @@ class Replay(Value):
     @cached_property
     def match(self) -> PathMatch:
         """Which place of the toolpath each sample belongs to. Needs a pose at every sample."""
-        program, path = PosedPolyline(self.pivots, self.axes), PosedPolyline(self.toolpath.pivots, self.toolpath.axes)
+        program, path = (
+            PosedPolyline(self.tilt_centres, self.axes),
+            PosedPolyline(self.toolpath.tilt_centres, self.toolpath.axes),
+        )
         bound = self.tilt + self.axis_tolerance
-        return match(program, path, self.path_tolerance, axis_bound=bound, away=self.survey.away)
+        return match(program, path, self.path_tolerance, axis_bound=bound, away=self.interval_bounds.away)
 
     def place(self, sample: float) -> Place:
         """Return the place of a sample (or of a moment between samples)."""

@@ -46,7 +46,7 @@ class Stretches:
 def strays(replay: Replay, stretches: Stretches, lever: float) -> Floats:
     """Return by how much (n,) points of the tool are at most off the straight stretch, at any time, metres.
 
-    Infinite where the tool turns too far for that to be said. lever: how far they are from the pivot at most.
+    Infinite where the tool turns too far for that to be said. lever: how far they are from the tilt centre at most.
 
     A moment is compared with the place of the stretch that is nearest to it. Between two samples that place goes
     evenly, and unit vectors on an arc θ are off the line through two of them by no more than θ²/8.
@@ -62,23 +62,23 @@ def _stray(replay: Replay, of: Stretches, lever: float) -> Floats:
     counts = of.ends - of.starts
     begins = np.cumsum(counts) - counts
     sample = np.repeat(of.starts - begins, counts) + np.arange(counts.sum())
-    start, end = replay.pivots[of.starts], replay.pivots[of.ends]
+    start, end = replay.tilt_centres[of.starts], replay.tilt_centres[of.ends]
     first, last = replay.axes[of.starts], replay.axes[of.ends]
     way, turn = end - start, last - first
     square = np.einsum("ij,ij->i", way, way) + lever**2 * np.einsum("ij,ij->i", turn, turn)
     owner = np.repeat(np.arange(len(counts)), counts)
-    off, turned = replay.pivots[sample] - start[owner], replay.axes[sample] - first[owner]
+    off, turned = replay.tilt_centres[sample] - start[owner], replay.axes[sample] - first[owner]
     along = np.einsum("ij,ij->i", off, way[owner]) + lever**2 * np.einsum("ij,ij->i", turned, turn[owner])
     share = np.divide(along, square[owner], out=np.zeros_like(along), where=square[owner] > 0.0)
     share = np.clip(share, 0.0, 1.0)[:, None]
     aside = np.maximum.reduceat(np.linalg.norm(off - share * way[owner], axis=1), begins)
-    away = np.maximum.reduceat(replay.survey.away[sample], begins)
+    away = np.maximum.reduceat(replay.interval_bounds.away[sample], begins)
     if lever == 0.0:
         return aside + away
     angle = angle_between(first, last)
     a, b = arc_weights(angle[owner, None], share)
     swung = replay.axes[sample] - (a * first[owner] + b * last[owner])
     apart = np.maximum.reduceat(np.linalg.norm(swung, axis=1), begins) + 0.125 * angle**2
-    tilt = np.arcsin(np.minimum(apart, 1.0)) + np.maximum.reduceat(replay.survey.turned[sample], begins)
+    tilt = np.arcsin(np.minimum(apart, 1.0)) + np.maximum.reduceat(replay.interval_bounds.turned[sample], begins)
     # An axis as far as a radius from the arc may point anywhere.
     return np.where((angle < _WIDEST) & (apart < 1.0), aside + away + lever * tilt, np.inf)

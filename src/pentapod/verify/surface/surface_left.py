@@ -80,7 +80,7 @@ def surface_left(replay: Replay) -> Finding | Idle:
 
 def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting) -> _Left:
     solids, height = cutting.cutter, coverage.left
-    chords = np.ones(len(replay.pivots) - 1, dtype=np.bool_)
+    chords = np.ones(len(replay.tilt_centres) - 1, dtype=np.bool_)
     reach = max((_width(solid) for solid in solids), default=height)
     # A ball holds a disc of this radius at that height over a plane.
     disc = float(np.sqrt(height * max(2.0 * reach - height, height)))
@@ -88,7 +88,7 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
     coarse, fine = max(_COARSE * disc, least), max(_COARSE * disc / _HALVINGS, least)
     if not solids:
         # What is within a ball about the spot, on cuts, is done.
-        spot = replay.toolpath.pivot
+        spot = replay.toolpath.tilt_centre
         solids, chords, height = (Solid("cutter", spot, spot, 0.0, 0.0, coverage.left),), _on_cuts(replay), 0.0
     corners, normals = np.ascontiguousarray(region.vertices[region.faces]), np.ascontiguousarray(region.facet_normals)
     highest, swept = np.array([0.0, *corners[0].mean(axis=0)]), list[SweptSolid]()
@@ -156,8 +156,8 @@ def _could(replay: Replay, coverage: Coverage, cutting: Cutting, points: Floats,
 
 
 def _is_end(replay: Replay, solid: Solid) -> bool:
-    """Return whether a solid is the ball about the pivot."""
-    return solid.is_ball and solid.low == replay.toolpath.pivot
+    """Return whether a solid is the ball about the tilt_centre."""
+    return solid.is_ball and solid.low == replay.toolpath.tilt_centre
 
 
 def _width(solid: Solid) -> float:
@@ -167,15 +167,15 @@ def _width(solid: Solid) -> float:
 def _on_cuts(replay: Replay) -> Bools:
     """Return which chords (M − 1,) belong to a cut with its beam on, by their middle."""
     toolpath, arcs = replay.toolpath, replay.match.arcs
-    ends = arc_length(toolpath.pivots)[toolpath.starts]
+    ends = arc_length(toolpath.tilt_centres)[toolpath.starts]
     segment = np.searchsorted(ends, 0.5 * (arcs[:-1] + arcs[1:]), side="right") - 1
     cutting = np.array([s.kind is SegmentKind.CUT and s.power > 0.0 for s in toolpath.segments])
     return np.asarray(cutting[np.clip(segment, 0, len(cutting) - 1)])
 
 
 def _nearest_samples(replay: Replay, points: Floats) -> Ints:
-    """Return the samples (N,) whose pivots are nearest to points (N, 3)."""
-    return np.asarray(KDTree(replay.pivots).query(points)[1], dtype=np.intp)
+    """Return the samples (N,) whose tilt_centres are nearest to points (N, 3)."""
+    return np.asarray(KDTree(replay.tilt_centres).query(points)[1], dtype=np.intp)
 
 
 def _method(found: _Left, coverage: Coverage, area: float, *, beam: bool) -> str:

@@ -41,18 +41,18 @@ class SweptSolid:
 
         near: stretches are cut until the motion is no farther off them, metres, or they are single chords.
         """
-        pivot, wide = replay.toolpath.pivot, max(solid.low_radius, solid.high_radius) + solid.rounding
-        # The path of a ball about the pivot does not know how the tool turns.
-        at_pivot = solid.is_ball and solid.low == pivot
-        lever = 0.0 if at_pivot else max(abs(solid.low - pivot), abs(solid.high - pivot)) + wide
+        tilt_centre, wide = replay.toolpath.tilt_centre, max(solid.low_radius, solid.high_radius) + solid.rounding
+        # The path of a ball about the tilt centre does not know how the tool turns.
+        at_tilt_centre = solid.is_ball and solid.low == tilt_centre
+        lever = 0.0 if at_tilt_centre else max(abs(solid.low - tilt_centre), abs(solid.high - tilt_centre)) + wide
         of, off = _stretches(replay, chords, lever, near)
         known = off < wide
         of, off = of.where(known), off[known]
         if not len(off):
             return None
         first, last = replay.axes[of.starts], replay.axes[of.ends]
-        drop = solid.low - pivot if solid.is_ball else -pivot
-        start, end = replay.pivots[of.starts] + drop * first, replay.pivots[of.ends] + drop * last
+        drop = solid.low - tilt_centre if solid.is_ball else -tilt_centre
+        start, end = replay.tilt_centres[of.starts] + drop * first, replay.tilt_centres[of.ends] + drop * last
         low, high = (0.0, 0.0) if solid.is_ball else (solid.low, solid.high)
         ends = np.stack([start + low * first, start + high * first, end + low * last, end + high * last])
         middles = ends.mean(axis=0)

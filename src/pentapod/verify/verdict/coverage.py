@@ -100,13 +100,13 @@ class Coverage(Value):
         whole = self.whole()
         mine, size = piece.cuts(whole), max(0.5 * self.left, float(np.sqrt(self.region.areas.sum() / _MOST_FACETS)))
         cutting = np.flatnonzero(cutting_intervals(whole))
-        start, end = whole.pivots[cutting], whole.pivots[cutting + 1]
+        start, end = whole.tilt_centres[cutting], whole.tilt_centres[cutting + 1]
         counts = np.ceil(np.linalg.norm(end - start, axis=1) / size).astype(np.intp) + 1
         owner = np.repeat(np.arange(len(cutting)), counts)
         number = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
         share = ((number + 0.5) / counts[owner])[:, None]
         fine = self.region.refined(size)
-        middles = fine.vertices[fine.faces].mean(axis=1) + max(whole.pivot, 0.0) * fine.facet_normals
+        middles = fine.vertices[fine.faces].mean(axis=1) + max(whole.tilt_centre, 0.0) * fine.facet_normals
         nearest = KDTree(start[owner] + share * (end - start)[owner]).query(middles)[1]
         own = mine[cutting[owner[np.asarray(nearest)]]]
         return replace(self, region=Patch(fine.vertices, fine.faces[own], fine.normals[own]))

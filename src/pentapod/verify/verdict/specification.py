@@ -16,7 +16,7 @@ from pentapod.verify.verdict.sources import UNTOLD, Sources
 
 if TYPE_CHECKING:
     from pentapod.kinematics.component import Component
-    from pentapod.machine.clearance.collision_world import Surroundings
+    from pentapod.machine.clearance.collision_world import CollisionWorld
     from pentapod.planning.problem.constraints import PlacementConstraints
 
 
@@ -26,7 +26,7 @@ class Specification(Value):
 
     machine: with its tool length and controller. toolpath: in the workpiece frame, as the job asks for it.
     tilt: half angle in radians of the cone about the nominal axis in which the tool may stand; axis_tolerance:
-    radians beyond that; path_tolerance: metres. job_digest: of the job that the header must name. surroundings: what
+    radians beyond that; path_tolerance: metres. job_digest: of the job that the header must name. collision_world: what
     legs, spindle and tool must not touch. cutting: what cuts, and into which part. constraints: where the part may be
     placed. component: in which the program must be, None where any will do. lowest_share: of the feed, that cuts and
     links must reach where no limit is used; None for the default of the tool, 0 where it does not matter.
@@ -44,7 +44,7 @@ class Specification(Value):
     path_tolerance: float
     axis_tolerance: float
     job_digest: str | None = None
-    surroundings: Surroundings | None = None
+    collision_world: CollisionWorld | None = None
     cutting: Cutting | None = None
     constraints: PlacementConstraints | None = None
     component: Component | None = None
@@ -73,7 +73,7 @@ class Asked(TypedDict, total=False):
     path_tolerance: Required[float]
     axis_tolerance: Required[float]
     job_digest: str | None
-    surroundings: Surroundings | None
+    collision_world: CollisionWorld | None
     cutting: Cutting | None
     constraints: PlacementConstraints | None
     component: Component | None
