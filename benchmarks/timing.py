@@ -26,7 +26,7 @@ from pentapod.timing.jerk.options import USUAL, JerkOptions
 from pentapod.timing.jerk.part import Part
 from pentapod.timing.jerk.problem import Problem as Pass
 from pentapod.timing.jerk.rows import JerkRows
-from pentapod.timing.law.time_law import MotionLaw
+from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.topp.engine import fastest
 from pentapod.timing.topp.reference import solve as solve_by_toppra
 from pentapod.timing.topp.stages import Failure, Stages

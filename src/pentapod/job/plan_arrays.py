@@ -17,7 +17,7 @@ from pentapod.job.outcome import Outcome
 from pentapod.planning.leg_path.leg_path import LegPath
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.program.program import Program
-from pentapod.timing.law.trajectory import Trajectory
+from pentapod.timing.time_law.trajectory import Trajectory
 from pentapod.toolpath.formats.npz import toolpath_arrays
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.toolpath.toolpath import Toolpath

@@ -16,7 +16,7 @@ from pentapod.machine.machine import Machine
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.program.program import Program, Provenance
 from pentapod.program.resolution import quantised
-from pentapod.timing.law.trajectory import Trajectory
+from pentapod.timing.time_law.trajectory import Trajectory
 
 _CHUNK = 100_000
 

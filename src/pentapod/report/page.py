@@ -29,7 +29,7 @@ from pentapod.report.setup_sheet import setup_sheet
 from pentapod.report.signals import Signals
 from pentapod.report.worst import worst_places
 from pentapod.timing.explain import Explanation
-from pentapod.timing.law.trajectory import Trajectory
+from pentapod.timing.time_law.trajectory import Trajectory
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 

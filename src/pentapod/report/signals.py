@@ -13,7 +13,7 @@ from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.margins import Margins
 from pentapod.program.program import Program
-from pentapod.timing.law.trajectory import Trajectory
+from pentapod.timing.time_law.trajectory import Trajectory
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 MOST_MARGIN_ROWS = 40_000

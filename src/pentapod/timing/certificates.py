@@ -10,11 +10,11 @@ from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
 from pentapod.geometry.interpolant import largest_length
 from pentapod.machine.machine import Machine
-from pentapod.timing.law.trajectory import Trajectory
 from pentapod.timing.limits.feed import Feed
 from pentapod.timing.limits.limit import Limit, Reading
 from pentapod.timing.limits.limits import machine_limits
-from pentapod.timing.path.joined import Joined, Rows, spline_padding
+from pentapod.timing.path.setpoints import InterpolatedSetpoints, SetpointRows, spline_padding
+from pentapod.timing.time_law.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
@@ -78,10 +78,12 @@ def certify(
         tips, axes = posed[0] if tips is None else tips, posed[1] if axes is None else axes
     # A motion that starts or ends at a speed is part of a longer one, which the controller's spline goes through.
     before, after = _paddings(trajectory, period, tool=tips is not None)
-    rows = Rows(trajectory(times) if legs is None else legs, stations, tips, axes)
-    rows = Rows.concatenated([part for part in (before, rows, after) if part is not None])
+    rows = SetpointRows(trajectory(times) if legs is None else legs, stations, tips, axes)
+    rows = SetpointRows.concatenated([part for part in (before, rows, after) if part is not None])
     first = 0 if before is None else len(before)
-    joined = Joined(rows, trajectory.path.pieces[trajectory.indices[0]], period, interpolation, first, count)
+    joined = InterpolatedSetpoints(
+        rows, trajectory.path.pieces[trajectory.indices[0]], period, interpolation, first, count
+    )
     uses: list[LimitUse] = []
     for limit in limits:
         if isinstance(limit, Feed):
@@ -96,7 +98,7 @@ def certify(
     return tuple(uses)
 
 
-def _paddings(trajectory: Trajectory, period: float, *, tool: bool) -> tuple[Rows | None, Rows | None]:
+def _paddings(trajectory: Trajectory, period: float, *, tool: bool) -> tuple[SetpointRows | None, SetpointRows | None]:
     """Return the rows before the start and after the end, None where these are rests."""
     first, last = (trajectory.path.pieces[k] for k in (trajectory.indices[0], trajectory.indices[-1]))
     start, end = trajectory.laws[0].speeds[0], trajectory.laws[-1].speeds[-1]
@@ -106,7 +108,7 @@ def _paddings(trajectory: Trajectory, period: float, *, tool: bool) -> tuple[Row
 
 
 def _feed(
-    trajectory: Trajectory, machine: Machine, joined: Joined, times: Floats, spot: float, *, of_tip: bool
+    trajectory: Trajectory, machine: Machine, joined: InterpolatedSetpoints, times: Floats, spot: float, *, of_tip: bool
 ) -> Reading:
     """Return the largest share of the feed, or of the rapid rate on rapids."""
     feeds, own = trajectory.feeds(times), joined.own_intervals
@@ -125,7 +127,7 @@ def _feed(
     return Reading(share * float(slower[row]), float(slower[row]), row, 0)
 
 
-def _piecewise(limit: Limit, trajectory: Trajectory, joined: Joined) -> Reading | None:
+def _piecewise(limit: Limit, trajectory: Trajectory, joined: InterpolatedSetpoints) -> Reading | None:
     """Return the largest share of a limit that asks for the path, piece by piece."""
     found: list[Reading] = []
     starts = np.minimum(np.rint(trajectory.starts / joined.period).astype(int), joined.count)

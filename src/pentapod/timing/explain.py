@@ -12,10 +12,10 @@ from pentapod.base.refusal import stage
 from pentapod.base.values import Value
 from pentapod.machine.machine import Machine
 from pentapod.timing.certificates import LimitUse
-from pentapod.timing.law.slowed import Slowed
-from pentapod.timing.law.trajectory import Trajectory
 from pentapod.timing.limits.limit import Constraint
 from pentapod.timing.process import Unheld
+from pentapod.timing.time_law.slowed import Slowed
+from pentapod.timing.time_law.trajectory import Trajectory
 
 STANDING = "standing still"
 MOST_PLACES = 10

@@ -10,7 +10,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
 from pentapod.geometry.runs import equal_runs, marked_runs
-from pentapod.timing.law.trajectory import Trajectory
+from pentapod.timing.time_law.trajectory import Trajectory
 from pentapod.toolpath.toolpath import SegmentKind
 
 HELD = 0.98

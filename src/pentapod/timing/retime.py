@@ -12,16 +12,16 @@ from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal, stage
 from pentapod.machine.machine import Machine
 from pentapod.timing.jerk.options import USUAL, JerkOptions
-from pentapod.timing.law.refusals import STILL_M, refusal, unfit
-from pentapod.timing.law.slowed import slowed
-from pentapod.timing.law.time_law import MotionLaw
-from pentapod.timing.law.trajectory import Profile, Trajectory
 from pentapod.timing.limits.limit import Limit
 from pentapod.timing.limits.limits import Limits
-from pentapod.timing.path.paths import LegPathLike
+from pentapod.timing.path.path import LegPathLike
 from pentapod.timing.pieces.boundary_speeds import whole_periods
 from pentapod.timing.pieces.piece import PieceProfile, time_piece
 from pentapod.timing.pieces.sampled import WINDOW_PERIODS, Unmended, sampled_laws
+from pentapod.timing.time_law.motion_law import MotionLaw
+from pentapod.timing.time_law.refusals import STILL_M, refusal, unfit
+from pentapod.timing.time_law.slowed import slowed
+from pentapod.timing.time_law.trajectory import Profile, Trajectory
 from pentapod.timing.topp.engine import Engine
 from pentapod.timing.topp.stages import Failure
 

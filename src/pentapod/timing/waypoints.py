@@ -16,7 +16,7 @@ from pentapod.base.arrays import Floats, as_floats, frozen, set_frozen
 from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.base.values import Result
-from pentapod.timing.law.time_law import MotionLaw
+from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.topp.engine import Engine, fastest
 from pentapod.timing.topp.stages import Failure
 

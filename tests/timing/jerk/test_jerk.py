@@ -11,7 +11,7 @@ from pentapod.timing import Trajectory, certify, retime
 from pentapod.timing.jerk.limited import jerk_limited
 from pentapod.timing.jerk.options import JerkOptions
 from pentapod.timing.jerk.rows import JerkRows
-from pentapod.timing.law.time_law import MotionLaw
+from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.topp.engine import fastest
 
 FINE = 2.5e-4

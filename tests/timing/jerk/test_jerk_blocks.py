@@ -1,18 +1,14 @@
-"""Jerk limits block by block: near the law of the whole, within its limits, the same bits from disk, by processes."""
+"""Jerk limits block by block: near the law of the whole, and within its limits."""
 
-import tracemalloc
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
-from pentapod.base.errors import InputError
 from pentapod.timing.jerk import limited as jerk
 from pentapod.timing.jerk.limited import jerk_limited
-from pentapod.timing.jerk.options import JerkOptions
 from pentapod.timing.jerk.rows import JerkRows
-from pentapod.timing.law.time_law import MotionLaw
-from pentapod.timing.stored import StoredProfile, limit_stored
+from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.topp.engine import fastest
 from pentapod.timing.topp.stages import Failure
 
@@ -22,7 +18,7 @@ SPEED, PUSH, JERK = 0.5, 5.0, 200.0
 
 @dataclass
 class Waves:
-    """Rows of five legs that are sums of waves of their own, with a feed; can be pickled."""
+    """Rows of five legs that are sums of waves of their own, with a feed."""
 
     jerk: float = JERK
 
@@ -92,40 +88,6 @@ def test_blocks_find_the_law_of_the_whole(whole, small):
         assert np.quantile(np.abs(push[1] - push[0]).max(axis=1) / (2 * h) / JERK, 0.999) < 1.03
 
 
-@pytest.mark.parametrize("processes", [1, 2])
-def test_from_disk_and_by_processes_the_same_bits(whole, small, tmp_path, processes):
-    """Six blocks; where they are cut is said to the processes, which know nothing of a block made smaller here."""
-    s, x, _ = whole
-    law = jerk_limited(s, x, Waves(), NO_MARKS)
-    np.save(tmp_path / "s.npy", s)
-    np.save(tmp_path / "x.npy", x)
-    out = tmp_path / "law.npy"
-    assert len(jerk.blocks(len(s), law.lead)) == 6
-    assert limit_stored(StoredProfile(tmp_path), Waves(), NO_MARKS, out, processes=processes) is None
-    assert np.array_equal(np.load(out), np.column_stack([law.s, law.x, law.slope]))
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["law.npy", "s.npy", "x.npy"]
-
-
-def test_an_interruption_leaves_no_part_of_a_law(tmp_path, monkeypatch):
-    s, x = profile(0.5)
-    np.save(tmp_path / "s.npy", s)
-    np.save(tmp_path / "x.npy", x)
-    (tmp_path / "law.npy").write_bytes(b"the law before")
-    load = np.lib.format.open_memmap
-
-    def interrupted(file, mode="r+", *rest, **options):
-        table = load(file, mode, *rest, **options)
-        if mode == "w+":
-            raise KeyboardInterrupt
-        return table
-
-    monkeypatch.setattr(np.lib.format, "open_memmap", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        limit_stored(StoredProfile(tmp_path), Waves(), NO_MARKS, tmp_path / "law.npy")
-    assert (tmp_path / "law.npy").read_bytes() == b"the law before"
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["law.npy", "s.npy", "x.npy"]
-
-
 @pytest.mark.parametrize("answer", ["none", "another"])
 def test_where_blocks_do_not_agree_leads_get_longer(whole, monkeypatch, answer):
     """Blocks that know too little of what is beyond their cuts, here by decree: no law, or one that is slower."""
@@ -150,29 +112,6 @@ def test_where_blocks_do_not_agree_leads_get_longer(whole, monkeypatch, answer):
 def test_blocks_that_never_agree_have_no_law(whole, small, monkeypatch):
     monkeypatch.setattr(jerk, "_AGREED", 0.0)
     assert jerk_limited(*whole[:2], Waves(), NO_MARKS) == Failure(-1, jerk.APART)
-
-
-def test_memory_does_not_grow_with_the_path(small, tmp_path):
-    peaks = []
-    for k, length in enumerate((3.0, 9.0)):
-        folder = tmp_path / str(k)
-        folder.mkdir()
-        s, x = profile(length)
-        np.save(folder / "s.npy", s)
-        np.save(folder / "x.npy", x)
-        tracemalloc.start()
-        assert (
-            limit_stored(StoredProfile(folder), Waves(), NO_MARKS, folder / "law.npy", options=JerkOptions(passes=1))
-            is None
-        )
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-    assert peaks[1] < 1.3 * peaks[0]
-
-
-def test_no_process_is_no_number_of_processes(tmp_path):
-    with pytest.raises(InputError):
-        limit_stored(StoredProfile(tmp_path), Waves(), NO_MARKS, tmp_path / "law.npy", processes=0)
 
 
 @pytest.mark.parametrize(("v", "w"), [(0.02, 0.0), (0.0, 0.03), (0.04, 0.02)])

@@ -6,7 +6,7 @@ import pytest
 
 from pentapod.timing.limits.leg_acceleration import LegAcceleration
 from pentapod.timing.limits.leg_velocity import LegVelocity
-from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.path import PathDerivatives
 from pentapod.timing.topp.engine import fastest
 from pentapod.timing.topp.stages import Failure
 

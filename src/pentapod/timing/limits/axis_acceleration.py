@@ -10,8 +10,8 @@ from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.limits.limit import AccelerationRows, MachineLimit, Motion, Reserve
 from pentapod.timing.limits.polytopes import across_path, polygon
-from pentapod.timing.path.joined import Joined
-from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.path import PathDerivatives
+from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +43,6 @@ class AxisAcceleration(MachineLimit):
         pushes = path.turn[0] * motion.u[:, None] + path.turn[1] * motion.x[:, None]
         return np.linalg.norm(pushes, axis=1, keepdims=True) / self.limit
 
-    def measured(self, joined: Joined) -> Floats:
+    def measured(self, joined: InterpolatedSetpoints) -> Floats:
         """Return the angular accelerations (rows, 1)."""
         return joined.axis.turn_accelerations[joined.own_rows, None]

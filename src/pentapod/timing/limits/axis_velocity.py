@@ -10,8 +10,8 @@ from pentapod.base.arrays import Floats
 from pentapod.geometry.interpolant import largest_length
 from pentapod.machine.machine import Machine
 from pentapod.timing.limits.limit import MachineLimit, Motion, Reading, Reserve
-from pentapod.timing.path.joined import Joined
-from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.path import PathDerivatives
+from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +38,11 @@ class AxisVelocity(MachineLimit):
         """Return the shares (n, 1)."""
         return np.linalg.norm(path.turn[0], axis=1, keepdims=True) * motion.v[:, None] / self.limit
 
-    def measured(self, joined: Joined) -> Floats:
+    def measured(self, joined: InterpolatedSetpoints) -> Floats:
         """Return bounds of the rates (intervals, 1), by the hull of the polynomials' coefficients."""
         return np.linalg.norm(joined.axis.steps[joined.own_intervals], axis=1).max(axis=1, keepdims=True)
 
-    def largest(self, joined: Joined) -> Reading:
+    def largest(self, joined: InterpolatedSetpoints) -> Reading:
         """Return the largest rate, exactly."""
         value, row = largest_length(joined.axis.steps[joined.own_intervals])
         return Reading(value, self.bound.item(), row, 0)

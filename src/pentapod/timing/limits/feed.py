@@ -9,9 +9,8 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.limits.limit import MachineLimit, Reserve
-from pentapod.timing.path.joined import Joined
-from pentapod.timing.path.path_derivatives import PathDerivatives
-from pentapod.timing.path.paths import PieceLike
+from pentapod.timing.path.path import PathDerivatives, PieceLike
+from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +62,7 @@ class Feed(MachineLimit):
         """Return the largest ṡ (n, 1)."""
         return self.speeds(path.piece, path.s)[:, None]
 
-    def measured(self, joined: Joined) -> Floats:
+    def measured(self, joined: InterpolatedSetpoints) -> Floats:
         """Return the shares (intervals, 1) of the feeds themselves: a plan's reserve is there to be used up."""
         speed = self.speeds(joined.piece, joined.rows.stations[joined.own_rows]) / self.limit
         return (joined.station.rates[joined.own_intervals, 0] / np.minimum(speed[:-1], speed[1:]))[:, None]

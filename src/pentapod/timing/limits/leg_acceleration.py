@@ -18,8 +18,8 @@ from pentapod.machine.machine import Machine
 from pentapod.timing.limits.leg_jerk import LegJerk
 from pentapod.timing.limits.limit import AccelerationRows, MachineLimit, Motion, Reserve
 from pentapod.timing.limits.polytopes import common_push
-from pentapod.timing.path.joined import Joined
-from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.path import PathDerivatives
+from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
 _ROUNDS = 2
 _MOST_CELLS = 400_000
@@ -61,7 +61,7 @@ class LegAcceleration(MachineLimit):
         """Return the shares (n, legs)."""
         return np.abs(path.legs[0] * motion.u[:, None] + path.legs[1] * motion.x[:, None]) / self.limit
 
-    def measured(self, joined: Joined) -> Floats:
+    def measured(self, joined: InterpolatedSetpoints) -> Floats:
         """Return the accelerations (rows, legs)."""
         return joined.legs.accelerations[joined.own_rows]
 

@@ -9,8 +9,8 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.limits.limit import MachineLimit, Motion, Reserve
-from pentapod.timing.path.joined import Joined
-from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.path import PathDerivatives
+from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
 RINGS = "the spline through the setpoints overshoots where the law's jerk steps"
 
@@ -42,7 +42,7 @@ class LegJerk(MachineLimit):
             return np.zeros((len(path.s), len(self.limit)))
         return np.abs(vector_jerk(path.legs, motion)) / self.limit
 
-    def measured(self, joined: Joined) -> Floats:
+    def measured(self, joined: InterpolatedSetpoints) -> Floats:
         """Return the jerks (intervals, legs)."""
         return joined.legs.jerks[joined.own_intervals]
 

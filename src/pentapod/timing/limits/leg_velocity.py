@@ -9,8 +9,8 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.limits.limit import MachineLimit, Motion, Reserve
-from pentapod.timing.path.joined import Joined
-from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.path import PathDerivatives
+from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +36,6 @@ class LegVelocity(MachineLimit):
         """Return the shares (n, legs)."""
         return np.abs(path.legs[0]) * motion.v[:, None] / self.limit
 
-    def measured(self, joined: Joined) -> Floats:
+    def measured(self, joined: InterpolatedSetpoints) -> Floats:
         """Return the largest rates (intervals, legs)."""
         return joined.legs.rates[joined.own_intervals]

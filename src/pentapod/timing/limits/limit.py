@@ -16,8 +16,8 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
 from pentapod.timing.limits.polytopes import common_push
-from pentapod.timing.path.joined import Joined
-from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.path import PathDerivatives
+from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
 if TYPE_CHECKING:
     from pentapod.machine.machine import Machine
@@ -198,7 +198,7 @@ class Limit(Protocol):
         one_each = (y if y.shape[1] == len(self.names) else y.max(axis=1, keepdims=True) for y in shares)
         return np.max([np.zeros((len(path.s), len(self.names))), *one_each], axis=0)
 
-    def measured(self, joined: Joined) -> Floats:
+    def measured(self, joined: InterpolatedSetpoints) -> Floats:
         """Return the quantity (rows or intervals, names) of setpoints as the controller joins them.
 
         By default the share, at their stations.
@@ -212,11 +212,11 @@ class Limit(Protocol):
         path = PathDerivatives(joined.piece, joined.rows.stations[rows], 2 if jerk is None else 3)
         return self.share(path, Motion(v * v, v, u, jerk))
 
-    def used(self, joined: Joined) -> Floats:
+    def used(self, joined: InterpolatedSetpoints) -> Floats:
         """Return the largest share (rows or intervals,) that setpoints use."""
         return (self.measured(joined) / self.bounds).max(axis=1)
 
-    def largest(self, joined: Joined) -> Reading | None:
+    def largest(self, joined: InterpolatedSetpoints) -> Reading | None:
         """Return the largest share's value and place, None where it is not told in certificates."""
         values = self.measured(joined)
         row, index = np.unravel_index(int(np.argmax(values / self.bounds)), values.shape)

@@ -30,7 +30,7 @@ from pentapod.timing.limits.limit import (
 from pentapod.timing.limits.rapid_rate import RapidRate
 from pentapod.timing.limits.tip_acceleration import TipAcceleration
 from pentapod.timing.limits.tip_jerk import TipJerk
-from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.path import PathDerivatives
 
 LIMITS: tuple[type[MachineLimit], ...] = (
     LegVelocity,

@@ -9,8 +9,8 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.limits.limit import MachineLimit, Reserve
-from pentapod.timing.path.joined import Joined
-from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.path import PathDerivatives
+from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +32,10 @@ class RapidRate(MachineLimit):
         """Return the largest ṡ (n, 1): the tip is never faster than s."""
         return np.broadcast_to(self.limit, (len(path.s), 1))
 
-    def measured(self, joined: Joined) -> Floats:
+    def measured(self, joined: InterpolatedSetpoints) -> Floats:
         """Return the largest rates (intervals, 1) of the station."""
         return joined.station.rates[joined.own_intervals]
 
-    def largest(self, joined: Joined) -> None:
+    def largest(self, joined: InterpolatedSetpoints) -> None:
         """Return nothing: certificates tell of it with the feed."""
         return

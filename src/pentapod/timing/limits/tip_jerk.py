@@ -12,8 +12,8 @@ from pentapod.machine.rounding import TIP_ROUNDING
 from pentapod.timing.limits.leg_jerk import RINGS, vector_jerk
 from pentapod.timing.limits.limit import MachineLimit, Motion, Reserve
 from pentapod.timing.limits.polytopes import polyhedron
-from pentapod.timing.path.joined import Joined
-from pentapod.timing.path.path_derivatives import PathDerivatives
+from pentapod.timing.path.path import PathDerivatives
+from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +42,6 @@ class TipJerk(MachineLimit):
             return np.zeros((len(path.s), 1))
         return np.linalg.norm(vector_jerk(path.tip, motion), axis=1, keepdims=True) / self.limit
 
-    def measured(self, joined: Joined) -> Floats:
+    def measured(self, joined: InterpolatedSetpoints) -> Floats:
         """Return the jerks (intervals, 1)."""
         return joined.tip.jerk_lengths[joined.own_intervals, None]

@@ -17,15 +17,15 @@ from pentapod.base.arrays import Ints
 from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal, stage
 from pentapod.machine.machine import Machine
-from pentapod.timing.law.refusals import STILL_M
-from pentapod.timing.law.splice import Nodes, joined
-from pentapod.timing.law.time_law import MotionLaw
-from pentapod.timing.law.trajectory import Profile, Trajectory
 from pentapod.timing.limits.limit import Constraint
 from pentapod.timing.online.piece_part import PathParts, PiecePart
+from pentapod.timing.online.splice import Nodes, joined
 from pentapod.timing.online.transition import Turn, passage, stop
-from pentapod.timing.path.paths import LegPathLike
+from pentapod.timing.path.path import LegPathLike
 from pentapod.timing.retime import retime
+from pentapod.timing.time_law.motion_law import MotionLaw
+from pentapod.timing.time_law.refusals import STILL_M
+from pentapod.timing.time_law.trajectory import Profile, Trajectory
 
 LEAST_SHARE, LARGEST_SHARE = 0.01, 1.5
 TRANSITION = Constraint("feed override", "feed override")

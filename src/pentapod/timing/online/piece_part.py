@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.timing.path.paths import PieceLike
+from pentapod.timing.path.path import PieceLike
 from pentapod.toolpath.toolpath import SegmentKind
 
 

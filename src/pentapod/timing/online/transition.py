@@ -13,11 +13,11 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.certificates import certify
-from pentapod.timing.law.splice import Nodes, joined, times_at
-from pentapod.timing.law.time_law import MotionLaw
-from pentapod.timing.law.trajectory import Trajectory
 from pentapod.timing.limits.limits import machine_limits
-from pentapod.timing.path.joined import Joined, Rows
+from pentapod.timing.online.splice import Nodes, joined, times_at
+from pentapod.timing.path.setpoints import InterpolatedSetpoints, SetpointRows
+from pentapod.timing.time_law.motion_law import MotionLaw
+from pentapod.timing.time_law.trajectory import Trajectory
 
 _LENGTHS = (8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 1024)
 _DELAYS = (0, 4, 8, 16, 32, 64, 128)
@@ -148,10 +148,10 @@ def _keeps(trajectory: Trajectory, machine: Machine, k: int, turn: Turn, allowed
     first, last = round(turn.leave / period) - 2 * _EDGE, int(np.ceil(turn.arrival / period)) + 2 * _EDGE
     limits = [limit for limit in (*machine_limits(machine), *trajectory.limits) if not limit.sectional]
     # The law stands before its start and after its end, as the machine does.
-    rows = Rows.at(piece, law(np.arange(first, last + 1) * period), tool=any(limit.of_tool for limit in limits))
+    rows = SetpointRows.at(piece, law(np.arange(first, last + 1) * period), tool=any(limit.of_tool for limit in limits))
     if not np.isfinite(rows.legs).all():
         return False
-    setpoints = Joined(rows, piece, period, interpolation, _EDGE, len(rows) - 1 - 2 * _EDGE)
+    setpoints = InterpolatedSetpoints(rows, piece, period, interpolation, _EDGE, len(rows) - 1 - 2 * _EDGE)
     return all((limit.used(setpoints) <= allowed.get(limit.quantity, 1.0)).all() for limit in limits)
 
 

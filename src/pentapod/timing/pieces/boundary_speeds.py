@@ -7,8 +7,8 @@ from typing import cast
 import numpy as np
 from scipy.optimize import brentq
 
-from pentapod.timing.law.time_law import MotionLaw, Stretchable
 from pentapod.timing.pieces.piece import PieceProfile
+from pentapod.timing.time_law.motion_law import MotionLaw, Stretchable
 from pentapod.timing.topp.stages import Failure
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.jerk.rows import Over, Run
-from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.pieces.boundary_speeds import whole_periods
 from pentapod.timing.pieces.piece import PieceProfile
 from pentapod.timing.pieces.setpoints import EDGE, GOAL, Setpoints, Use
+from pentapod.timing.time_law.motion_law import MotionLaw
 
 _PHASES = (0.0, 0.25, 0.5, 0.75)
 """Of the setpoints, in periods: what is slower at one place shifts all later ones against the path."""

@@ -6,8 +6,7 @@ import numpy as np
 
 from pentapod.base.arrays import Bools, Floats
 from pentapod.timing.limits.limits import Limits
-from pentapod.timing.path.path_derivatives import PathDerivatives
-from pentapod.timing.path.paths import PieceLike
+from pentapod.timing.path.path import PathDerivatives, PieceLike
 
 LEAST_STAGES = 24
 """Stages of a piece at least."""

@@ -8,9 +8,9 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
-from pentapod.timing.law.time_law import MotionLaw, Stretchable
 from pentapod.timing.pieces.exceeding import exceeding, law_times
 from pentapod.timing.pieces.piece import PieceProfile
+from pentapod.timing.time_law.motion_law import MotionLaw, Stretchable
 
 if TYPE_CHECKING:
     from pentapod.timing.jerk.limited import SmoothProfile

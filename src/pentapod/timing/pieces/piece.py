@@ -11,12 +11,11 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.timing.jerk.options import USUAL, JerkOptions
 from pentapod.timing.jerk.rows import JerkRows
-from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.limits.limit import AccelerationRows, Motion, share_of_room
 from pentapod.timing.limits.limits import Limits
-from pentapod.timing.path.path_derivatives import PathDerivatives
-from pentapod.timing.path.paths import PieceLike
+from pentapod.timing.path.path import PathDerivatives, PieceLike
 from pentapod.timing.pieces.grid import first_grid, parts
+from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.topp.engine import Engine, fastest
 from pentapod.timing.topp.stages import STANDS_BEYOND, Failure
 

@@ -19,13 +19,13 @@ from scipy.ndimage import maximum_filter1d
 
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
-from pentapod.timing.law.slowed import most_lost
-from pentapod.timing.law.time_law import MotionLaw, Stretchable
 from pentapod.timing.pieces.boundary_speeds import law_between, whole_periods
 from pentapod.timing.pieces.exceeding import over_limits
 from pentapod.timing.pieces.mended import about, mended, worst_places
 from pentapod.timing.pieces.piece import PieceProfile
 from pentapod.timing.pieces.setpoints import EDGE, GOAL, Setpoints, Use, measured, untouched
+from pentapod.timing.time_law.motion_law import MotionLaw, Stretchable
+from pentapod.timing.time_law.slowed import most_lost
 from pentapod.timing.topp.stages import Failure
 
 WINDOW_PERIODS = 4

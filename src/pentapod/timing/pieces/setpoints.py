@@ -11,10 +11,10 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.machine.machine import Machine
-from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.limits.limit import Group
-from pentapod.timing.path.joined import Joined, Rows, spline_padding
+from pentapod.timing.path.setpoints import InterpolatedSetpoints, SetpointRows, spline_padding
 from pentapod.timing.pieces.piece import PieceProfile
+from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.topp.stages import Failure
 
 GOAL = 0.999
@@ -94,23 +94,25 @@ class Setpoints:
         """Intervals between its rows."""
         return self.before + round(self.law.duration / self.period) + self.after
 
-    def rows(self, low: int, high: int, phase: float = 0.0) -> Rows:
+    def rows(self, low: int, high: int, phase: float = 0.0) -> SetpointRows:
         """Return the rows from `low` to `high`, both included, as if they came `phase` periods later."""
         s = self.law((np.arange(low, high + 1) - self.before + phase) * self.period)
         if high == self.count and phase == 0.0:
             s[-1] = self.law.length
-        return Rows.at(self.profile.piece, s, tool=self.profile.limits.of_tool)
+        return SetpointRows.at(self.profile.piece, s, tool=self.profile.limits.of_tool)
 
-    def spline_padding(self, *, start: bool) -> Rows:
+    def spline_padding(self, *, start: bool) -> SetpointRows:
         """Return rows that come to the start, or leave the end, at the speed that is given there."""
         profile = self.profile
         speed = (profile.x_start if start else profile.x_end) ** 0.5
         return spline_padding(profile.piece, speed, self.period, start=start, tool=profile.limits.of_tool)
 
-    def use(self, rows: Rows, machine: Machine, first: int, count: int) -> Use:
+    def use(self, rows: SetpointRows, machine: Machine, first: int, count: int) -> Use:
         """Return what the piece uses of the limits in `count` intervals from `first` on of rows."""
         controller = machine.controller
-        joined = Joined(rows, self.profile.piece, controller.period, controller.interpolation, first, count)
+        joined = InterpolatedSetpoints(
+            rows, self.profile.piece, controller.period, controller.interpolation, first, count
+        )
         at_rows: dict[Group, Floats] = {group: np.zeros(count + 1) for group in ("speed", "acceleration", "jerk")}
         between: dict[Group, Floats] = {group: np.zeros(count) for group in at_rows}
         for limit in self.profile.limits.all:
@@ -154,18 +156,18 @@ def _measured(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, k
         first_row = low - first
         if first == 0 and pieces[0].profile.x_start > 0.0:
             ahead = pieces[0].spline_padding(start=True)[:-1]
-            rows, first_row = Rows.concatenated([ahead, rows]), first_row + len(ahead)
+            rows, first_row = SetpointRows.concatenated([ahead, rows]), first_row + len(ahead)
         if last == begins[-1] and pieces[-1].profile.x_end > 0.0:
             behind = pieces[-1].spline_padding(start=False)[1:]
-            rows = Rows.concatenated([rows, behind.shifted(lengths[-2])])
+            rows = SetpointRows.concatenated([rows, behind.shifted(lengths[-2])])
         use = pieces[k].use(rows.shifted(-lengths[k]), machine, first_row, count)
         parts.append(use if low + count == begins[k + 1] else use.at(np.arange(count)))
     return Use.joined(parts)
 
 
-def _rows(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, first: int, last: int) -> Rows:
+def _rows(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, first: int, last: int) -> SetpointRows:
     """Return the rows from `first` to `last`, both included, of all pieces one after the other."""
-    parts: list[Rows] = []
+    parts: list[SetpointRows] = []
     begin = max(int(np.searchsorted(begins, first, "right")) - 1, 0)
     for k in range(min(begin, len(pieces) - 1), len(pieces)):
         low, high = max(first - begins[k], 0), min(last, begins[k + 1]) - begins[k]
@@ -175,4 +177,4 @@ def _rows(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, first
         goes_on = last > begins[k + 1]
         rows = pieces[k].rows(low, high).shifted(lengths[k])
         parts.append(rows[:-1] if goes_on else rows)
-    return Rows.concatenated(parts)
+    return SetpointRows.concatenated(parts)

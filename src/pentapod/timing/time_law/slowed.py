@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.values import Value
-from pentapod.timing.law.refusals import segment_at, waypoints_at
-from pentapod.timing.law.time_law import MotionLaw
-from pentapod.timing.path.paths import LegPathLike
+from pentapod.timing.path.path import LegPathLike
+from pentapod.timing.time_law.motion_law import MotionLaw
+from pentapod.timing.time_law.refusals import segment_at, waypoints_at
 
 TOLD = 1.02
 """A piece that lasts longer than so many times its first law, and a period, is told."""

@@ -1,4 +1,4 @@
-"""Interpolated setpoints: legs, station, tip and tool axis over time, as polynomials of the controller."""
+"""Interpolated setpoints: legs, station, tip and tool axis over time, as the controller's polynomials."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.geometry.interpolant import Interpolant
-from pentapod.timing.path.paths import PieceLike
+from pentapod.timing.path.path import PieceLike
 
-ROWS = 16
-"""Rows that the spline through all rows needs to forget where they begin: 0.27 of a row's say is left in the next."""
+PADDING_ROWS = 16
+"""Rows after which the spline no longer depends on where they begin: an influence falls to 0.27 from row to row."""
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Setpoints at equal periods: legs (N, legs) and stations (N,) in metres; tips, axes (N, 3) where they count."""
+class SetpointRows:
+    """Setpoints at equal periods: legs (N, legs), stations (N,) in metres; tips, axes (N, 3) if limited."""
 
     legs: Floats
     stations: Floats
@@ -28,12 +28,12 @@ class Rows:
     axes: Floats | None = None
 
     @classmethod
-    def at(cls, piece: PieceLike, s: Floats, *, tool: bool) -> Rows:
+    def at(cls, piece: PieceLike, s: Floats, *, tool: bool) -> SetpointRows:
         """Return the rows of a piece at stations s (N,); tool: with tips and axes."""
         return cls(piece(s, 0), s, *(piece.pose(s) if tool else ()))
 
     @classmethod
-    def concatenated(cls, parts: Sequence[Rows]) -> Rows:
+    def concatenated(cls, parts: Sequence[SetpointRows]) -> SetpointRows:
         """Return the rows of one part after the other; tips and axes where all parts have them."""
         if len(parts) == 1:
             return parts[0]
@@ -46,27 +46,27 @@ class Rows:
             np.concatenate(axes) if len(axes) == len(parts) else None,
         )
 
-    def __getitem__(self, rows: slice) -> Rows:
+    def __getitem__(self, rows: slice) -> SetpointRows:
         """Return some of the rows."""
         tips, axes = (None if y is None else y[rows] for y in (self.tips, self.axes))
-        return Rows(self.legs[rows], self.stations[rows], tips, axes)
+        return SetpointRows(self.legs[rows], self.stations[rows], tips, axes)
 
     def __len__(self) -> int:
         return len(self.stations)
 
-    def shifted(self, way: float) -> Rows:
-        """Return the rows with stations `way` metres further on."""
-        return Rows(self.legs, self.stations + way, self.tips, self.axes)
+    def shifted(self, distance: float) -> SetpointRows:
+        """Return the rows with stations `distance` metres further on."""
+        return SetpointRows(self.legs, self.stations + distance, self.tips, self.axes)
 
 
 @dataclass(frozen=True, eq=False)
-class Joined:
-    """Rows as the controller joins them, of which `count` intervals from row `first` on are looked at.
+class InterpolatedSetpoints:
+    """Setpoints as the controller interpolates them; `count` intervals from row `first` on are judged.
 
-    piece: the one to which these rows belong; stations are its own.
+    piece: the one to which these rows belong; stations are counted from its start.
     """
 
-    rows: Rows
+    rows: SetpointRows
     piece: PieceLike
     period: float
     interpolation: Literal["linear", "cubic"]
@@ -75,7 +75,7 @@ class Joined:
 
     @property
     def own_rows(self) -> slice:
-        """The rows that are looked at."""
+        """The rows that are judged."""
         return slice(self.first, self.first + self.count + 1)
 
     @property
@@ -107,20 +107,20 @@ class Joined:
         return Interpolant.through(rows, self.period, self.interpolation)
 
 
-def spline_padding(piece: PieceLike, speed: float, period: float, *, start: bool, tool: bool = False) -> Rows:
-    """Return ROWS + 1 rows that come to a piece's start, or leave its end, at constant speed.
+def spline_padding(piece: PieceLike, speed: float, period: float, *, start: bool, tool: bool = False) -> SetpointRows:
+    """Return PADDING_ROWS + 1 rows that come to a piece's start, or leave its end, at constant speed.
 
-    Legs, station and, where `tool` asks for them, tip and axis: by the Taylor polynomials of degree 3 there, through
-    which the spline of a controller goes on without a step of acceleration or jerk. The piece's own row is among them.
+    By Taylor polynomials of degree 3: the controller's spline continues through them without a step of acceleration or
+    jerk. tool: with tips and axes. The piece's own row is included.
     """
     station = 0.0 if start else piece.length
-    way = speed * period * np.arange(ROWS + 1)
-    way = np.asarray(-way[::-1] if start else way, dtype=np.float64)
+    distance = speed * period * np.arange(PADDING_ROWS + 1)
+    distance = np.asarray(-distance[::-1] if start else distance, dtype=np.float64)
     at = np.array([station])
 
     def beyond(of: Callable[[int], Floats]) -> Floats:
-        rows = [of(order) * way[:, None] ** order / factorial(order) for order in range(4)]
+        rows = [of(order) * distance[:, None] ** order / factorial(order) for order in range(4)]
         return np.asarray(np.sum(rows, axis=0), dtype=np.float64)
 
     poses = (beyond(lambda order, k=k: piece.pose(at, order)[k]) for k in (0, 1)) if tool else ()
-    return Rows(beyond(lambda order: piece(at, order)), station + way, *poses)
+    return SetpointRows(beyond(lambda order: piece(at, order)), station + distance, *poses)

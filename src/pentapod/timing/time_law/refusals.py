@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pentapod.base.refusal import Refusal, Shortfall
-from pentapod.timing.path.paths import LegPathLike, PieceLike
+from pentapod.timing.path.path import LegPathLike, PieceLike
 from pentapod.timing.topp.stages import Failure
 
 STILL_M = 1e-12

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.timing.law.time_law import MotionLaw
+from pentapod.timing.time_law.motion_law import MotionLaw
 
 
 @dataclass(frozen=True, eq=False)

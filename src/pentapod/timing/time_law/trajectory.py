@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Bools, Floats, Ints, as_floats, frozen, set_frozen
 from pentapod.base.display import plot_axes
 from pentapod.base.values import Result, Value
-from pentapod.timing.law.slowed import Slowed
-from pentapod.timing.law.time_law import MotionLaw
 from pentapod.timing.limits.limit import Constraint, Limit
-from pentapod.timing.path.paths import LegPathLike, PieceLike
+from pentapod.timing.path.path import LegPathLike, PieceLike
+from pentapod.timing.time_law.motion_law import MotionLaw
+from pentapod.timing.time_law.slowed import Slowed
 
 _PLOTTED = 2000
 
