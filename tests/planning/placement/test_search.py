@@ -20,7 +20,7 @@ PLUS = Component(1, 1)
 
 
 @pytest.fixture(scope="module")
-def surroundings():
+def collision_world():
     """A small post beside the part, far below the path."""
     shape = trimesh.creation.cylinder(0.01, 0.04, sections=12)
     shape.apply_translation([0.1, 0.1, -0.2])
@@ -32,7 +32,7 @@ def names(margins):
     return [limit.name for limit in margins.limits]
 
 
-def test_what_does_not_fit_alone_is_answered_without_collision_world(desk, wide, collision_world):
+def test_what_does_not_fit_alone_is_answered_without_obstacles(desk, wide, collision_world):
     problem = PlacementProblem.of(ToolpathSamples.of(wide, 0.2), desk, component=PLUS, collision_world=collision_world)
     alone = search(problem.alone(), options=SearchOptions(tried=2))
     found = search(problem, options=SearchOptions(tried=2, hopeless=np.inf))
@@ -40,7 +40,7 @@ def test_what_does_not_fit_alone_is_answered_without_collision_world(desk, wide,
     assert names(found.best.margins) == names(Margins.of(desk, PLUS))
 
 
-def test_what_fits_alone_is_placed_among_its_collision_world(desk, cap, collision_world):
+def test_what_fits_alone_is_placed_among_its_obstacles(desk, cap, collision_world):
     problem = PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk, component=PLUS, collision_world=collision_world)
     promising = search(problem, options=SearchOptions(refined=1))
     found = search(problem, options=SearchOptions(refined=1, hopeless=np.inf))
@@ -49,7 +49,7 @@ def test_what_fits_alone_is_placed_among_its_collision_world(desk, cap, collisio
     assert np.array_equal(found.best.transform.matrix, promising.best.transform.matrix)
 
 
-def test_an_interruption_of_the_look_without_surroundings_ends_the_search(desk, cap, collision_world):
+def test_an_interruption_of_the_look_without_obstacles_ends_the_search(desk, cap, collision_world):
     improved = []
 
     def progress(stage: str, fraction: float, note: str = "") -> None:
