@@ -13,7 +13,7 @@ from pentapod.kinematics import AsBuiltPentapod, GeneralPentapod, Robot
 from pentapod.kinematics.arithmetic import NUMPY, Arithmetic
 
 DESK = Machine.load("desk")
-GENERAL = GeneralPentapod(DESK.robot.base_joints[:, :2], DESK.robot.line_heights + 1e-3 * np.array([4, -3, 2, 5, -4]))
+GENERAL = GeneralPentapod(DESK.robot.base_joints[:, :2], DESK.robot.offsets + 1e-3 * np.array([4, -3, 2, 5, -4]))
 ROBOTS: dict[str, Robot] = {
     "quadratic": DESK.robot,
     "general": GENERAL,
@@ -98,7 +98,7 @@ def test_one_formula_gives_the_leg_vectors_for_numbers_and_symbols(robot: Robot)
 
 def joints(robot: Robot, p: np.ndarray, i: np.ndarray) -> np.ndarray:
     """The platform joints from p: on the line, or beside it by the ring's radius, towards the base joint."""
-    found = robot.line_heights[:, None] * i[:, None, :]
+    found = robot.offsets[:, None] * i[:, None, :]
     if isinstance(robot, AsBuiltPentapod):
         across = robot.base - p[:, None] - np.einsum("nkc,nc->nk", robot.base - p[:, None], i)[..., None] * i[:, None]
         found = found + robot.radii[:, None] * across / np.linalg.norm(across, axis=-1, keepdims=True)
@@ -139,6 +139,6 @@ def test_conditioning_and_numbers_tell_robots_apart() -> None:
 
 def test_machine_as_built_without_a_nominal_one_has_no_branches() -> None:
     built = ROBOTS["as built"]
-    alone = AsBuiltPentapod(built.base_joints, built.line_heights, np.zeros(5), np.zeros(5))
+    alone = AsBuiltPentapod(built.base_joints, built.offsets, np.zeros(5), np.zeros(5))
     with pytest.raises(MachineError, match="only beside its nominal geometry"):
         alone.pose(np.ones(5), (1, 1))

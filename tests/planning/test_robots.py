@@ -23,7 +23,7 @@ from pentapod.planning.limits.margins import Margins
 def general(desk):
     """Offsets that are not proportional to any coordinate of the base."""
     off = np.array([0.004, -0.006, 0.0, 0.005, -0.003])
-    return GeneralPentapod(desk.robot.base, desk.robot.line_heights + off)
+    return GeneralPentapod(desk.robot.base, desk.robot.offsets + off)
 
 
 def as_built(desk):
@@ -60,7 +60,7 @@ def placed(machine):
 def joints(machine, tip, axis):
     """Base and platform joints (5, 3), from positions alone: a ring's joint is its point nearest to the base joint."""
     robot = machine.robot
-    base, line = robot.base_joints, tip + np.outer(machine.tool_length - robot.line_heights, axis)
+    base, line = robot.base_joints, tip + np.outer(machine.tool_length - robot.offsets, axis)
     off = base - line
     off = off - np.outer(off @ axis, axis)
     radii = getattr(robot, "radii", np.zeros(5))

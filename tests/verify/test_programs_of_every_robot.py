@@ -19,7 +19,7 @@ JOBS = Path(__file__).parents[2] / "toolpaths"
 def general(machine: Machine) -> Machine:
     """Offsets that are not proportional to anything."""
     off = 1e-3 * np.array([4.0, -6.0, 0.0, 5.0, -3.0])
-    robot = GeneralPentapod(machine.robot.base_joints[:, :2], machine.robot.line_heights + off)
+    robot = GeneralPentapod(machine.robot.base_joints[:, :2], machine.robot.offsets + off)
     return dataclasses.replace(machine, robot=robot)
 
 

@@ -1,6 +1,5 @@
 """The robot as mathematics: leg lengths, assembly modes, singularities, Jacobian, forces, certificates."""
 
-from pentapod.kinematics.answers import Chords
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.families.as_built_forward import ProvenPoses, as_built_pose
@@ -34,6 +33,7 @@ from pentapod.kinematics.forces import (
 from pentapod.kinematics.forward.singularity_polynomial import singularity_cofactors, singularity_polynomial
 from pentapod.kinematics.jacobian import pose_jacobian, square_jacobian
 from pentapod.kinematics.mode import MODES, Mode
+from pentapod.kinematics.proof_results import Chords
 from pentapod.kinematics.proofs.certificate import ComponentProof, certify_component
 from pentapod.kinematics.proofs.chords import prove_chords
 from pentapod.kinematics.proofs.motion import MotionProof, certify_motion

@@ -1,4 +1,4 @@
-"""FiveLegs: what every linear pentapod has, whatever its offsets: joints, leg vectors, lengths and their slopes."""
+"""FiveLegs: joints, leg vectors, leg lengths and their derivatives of a linear pentapod with any offsets."""
 
 from __future__ import annotations
 
@@ -36,29 +36,18 @@ class FiveLegs:
         return frozen(np.column_stack([self.base, np.zeros(5)]), "base_joints")
 
     @property
-    def line_heights(self) -> Floats:
-        """The offsets (5,)."""
-        return self.offsets
-
-    @property
     def radii(self) -> Floats:
-        """No rings: (5,) zeros, metres."""
+        """Radii of the rings on which legs end (5,), metres: there are none."""
         return np.zeros(5)
 
     @property
     def zeros(self) -> Floats:
-        """What the scales read is the lengths: (5,) zeros, metres."""
+        """Zero errors of the legs' scales (5,), metres: there are none."""
         return np.zeros(5)
-
-    @property
-    def scale(self) -> float:
-        """The power of two nearest to the largest distance of a base joint from their centre: metres per radian."""
-        return length_scale(self.base_joints)
 
     def leg_vectors(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return b_i − a_i (..., 5, 3) in metres for positions p and unit directions i (..., 3)."""
-        p, i = as_poses(position, direction)
-        legs = p[..., None, :] + self.offsets[:, None] * i[..., None, :]
+        legs = self.platform_joints(position, direction)
         legs[..., :2] -= self.base
         return legs
 
@@ -106,10 +95,6 @@ class FiveLegs:
         """Return the lengths of vectors."""
         return [do.sqrt(dot(d, d)) for d in vectors]
 
-    def levers(self, tool_length: float) -> Floats:
-        """Return z_i − h (5,): the platform joints from the tip, along the line; metres. Raises ArrayError."""
-        return self.offsets - as_floats(tool_length, "tool_length")
-
     def leg_lengths(self, position: ArrayLike, direction: ArrayLike, *, out: Floats | None = None) -> Floats:
         """Return leg lengths (..., 5), metres, of positions p and unit directions i (..., 3).
 
@@ -136,12 +121,6 @@ class FiveLegs:
 
 def _dot(a: Floats, b: Floats) -> Floats:
     return np.einsum("nij,nij->ni", a, b)
-
-
-def length_scale(base_joints: Floats) -> float:
-    """Return the power of two nearest to the largest distance of a joint (n, 3) from their centre, metres."""
-    size = np.linalg.norm(base_joints - base_joints.mean(axis=0), axis=1).max()
-    return float(2.0 ** np.round(np.log2(size)))
 
 
 def outputs(out: tuple[Floats, ...] | None, batch: tuple[int, ...], *tails: tuple[int, ...]) -> tuple[Floats, ...]:

@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
-from pentapod.kinematics.answers import BranchProof, Chords, ProvenMeasure
 from pentapod.kinematics.arithmetic import Arithmetic, Joints, Vector
 from pentapod.kinematics.component import Component
 from pentapod.kinematics.mode import Mode
+from pentapod.kinematics.proof_results import BranchProof, Chords, ProvenMeasure
 
 Branch: TypeAlias = Component | Mode
 """Which of the poses with the same leg lengths is meant: two signs, and `w`, the sign of the direction's z."""
@@ -56,8 +56,8 @@ class Robot(Protocol):
         ...
 
     @property
-    def line_heights(self) -> Floats:
-        """The heights (n_legs,) of the platform joints along the line, from p towards the tip."""
+    def offsets(self) -> Floats:
+        """The platform offsets (n_legs,): positions of the platform joints on the line, from p towards the tip."""
         ...
 
     @property
@@ -143,15 +143,15 @@ class Robot(Protocol):
         ...
 
     def prove_chords(
-        self, leg_coefficients: Floats, start: Poses, end: Poses, branch: ArrayLike, *, arms: Floats, towards: Floats
+        self, legs: Floats, start: Poses, end: Poses, branch: ArrayLike, *, offsets: Floats, base_axes: Floats
     ) -> Chords:
-        """Return what is proven of how far a motion is from straight lines between poses, and how fast: `Chords`."""
+        """Return bounds of a motion's deviation from the straight lines between poses, and of its speed: `Chords`."""
         ...
 
-    def enclose(self, ends: Poses, readings: Floats, heights: Floats) -> tuple[Floats, Floats]:
-        """Return how far points of the line get from where they are in N poses, at most (N, K), and the direction (N,).
+    def enclose(self, poses: Poses, legs: Floats, offsets: Floats) -> tuple[Floats, Floats]:
+        """Return bounds of how far points of the line (N, K) and the direction (N,) get from where they are in N poses.
 
-        readings (N, M, n_legs): in whose convex hull the legs are at all times. heights (K,): of the points along the
-        line. Infinite where nothing is proven.
+        legs (N, M, n_legs): readings in whose convex hull those of the legs are at all times. offsets (K,): of the
+        points along the line from p. Infinite where nothing is proven.
         """
         ...

@@ -15,4 +15,4 @@ def leg_ends(machine: Machine, tips: Floats, axes: Floats) -> tuple[Floats, Floa
 
 def line_top(machine: Machine, tip: Floats, axis: Floats) -> Floats:
     """Return the end (3,) of the platform line that is farther from the tip: the highest platform joint, metres."""
-    return tip + (machine.tool_length - float(machine.robot.line_heights.min())) * axis
+    return tip + (machine.tool_length - float(machine.robot.offsets.min())) * axis

@@ -75,7 +75,7 @@ class Machine(Value):
                 expected=f"a reciprocal condition number of at least {ARCHITECTURAL_LIMIT:g}",
                 remedy="spread the base joints: no four near one line, no x or y shared by many",
             )
-        room = self.tool_length - float(self.robot.line_heights.max()) - self.bodies.shaft_end
+        room = self.tool_length - float(self.robot.offsets.max()) - self.bodies.shaft_end
         if room < 0.0:
             raise MachineError(
                 f"the tool is {-room * 1e3:.4g} mm too short: the spindle would end above a platform joint",

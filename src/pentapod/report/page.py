@@ -189,7 +189,7 @@ def _poses(outcome: Outcome, signals: Signals | None) -> dict[str, Any]:
         "moving": scene.moving_traces(machine),
         "colours": scene.CUTS_BY,
         "base": np.round(1e3 * base, 3).tolist(),
-        "line_top": 1e3 * (machine.tool_length - float(machine.robot.line_heights.min())),
+        "line_top": 1e3 * (machine.tool_length - float(machine.robot.offsets.min())),
         "shaft_end": 1e3 * machine.bodies.shaft_end,
     }
 

@@ -52,7 +52,7 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
     loads = np.zeros((len(rows) - 2, robot.n_legs))
     # On the line: at offsets z that go with the platform. On the legs: across, as a share of the joint's way.
     at_p, at_i = np.zeros((2, len(loads), 3))
-    for mass, z in _masses(spindle(machine, float(robot.line_heights.min()))):
+    for mass, z in _masses(spindle(machine, float(robot.offsets.min()))):
         force = needed(mass, position + z * direction)
         at_p, at_i = at_p + force, at_i + z * force
     for leg in range(robot.n_legs):
@@ -64,7 +64,7 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
                 push = np.einsum("ni,ni->n", force, u[middle])
                 loads[:, leg] += push * float(slides)
                 across = (out / length)[middle] * (force - push[:, None] * u[middle])
-                at_p, at_i = at_p + across, at_i + robot.line_heights[leg] * across
+                at_p, at_i = at_p + across, at_i + robot.offsets[leg] * across
     ways = pose_jacobian(robot, position[middle], direction[middle])
     return loads + np.einsum("ni,nil->nl", at_p, ways[:, :3]) + np.einsum("ni,nil->nl", at_i, ways[:, 3:])
 

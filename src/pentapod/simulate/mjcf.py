@@ -32,7 +32,7 @@ def mjcf(machine: Machine, real: AsBuiltPentapod, position: Floats, direction: F
     real: the geometry that stands there, as it was measured or as it is wrong; a slide's position, and a drive's
     control, is the leg's length in metres. step: seconds. Lengths in metres, masses in kilograms.
     """
-    joints = position + real.line_heights[:, None] * direction
+    joints = position + real.offsets[:, None] * direction
     vectors = joints - real.base_joints
     lengths = np.linalg.norm(vectors, axis=1)
     root = Xml.Element("mujoco", model=machine.name)
@@ -79,7 +79,7 @@ def _leg(world: Xml.Element, machine: Machine, leg: int, base: Floats, along: Fl
 
 def _platform(world: Xml.Element, machine: Machine, real: AsBuiltPentapod, position: Floats, direction: Floats) -> None:
     """Add the platform: a free body whose z axis is the platform line, its origin p."""
-    shaft, tool = spindle(machine, float(real.line_heights.min())), machine.tool_length
+    shaft, tool = spindle(machine, float(real.offsets.min())), machine.tool_length
     body = _add(world, "body", name="platform", pos=position, quat=_turn_from_z(direction))
     _add(body, "freejoint", name="platform")
     _capsule(body, shaft, _SPINDLE)
@@ -87,7 +87,7 @@ def _platform(world: Xml.Element, machine: Machine, real: AsBuiltPentapod, posit
     _add(body, "site", name="origin")
     _add(body, "site", name="tip", pos=[0.0, 0.0, tool])
     for leg in range(real.n_legs):
-        _add(body, "site", name=f"platform{leg + 1}", pos=[0.0, 0.0, real.line_heights[leg]])
+        _add(body, "site", name=f"platform{leg + 1}", pos=[0.0, 0.0, real.offsets[leg]])
 
 
 def _capsule(body: Xml.Element, capsule: Capsule, colour: str) -> None:

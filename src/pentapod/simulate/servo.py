@@ -51,7 +51,7 @@ def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False
     lengths[:rest, :, 0], lengths[:rest, :, 1:], accelerations[:rest] = program.legs[0], 0.0, 0.0
     legs, efforts = np.empty((2, len(lengths) + 1, robot.n_legs))
     limits = np.array([NEAR_W_SQUARED, robot.linear_part.near_s_squared])
-    origin = np.append(robot.base_joints[2, :2], robot.line_heights[2])
+    origin = np.append(robot.base_joints[2, :2], robot.offsets[2])
     with np.errstate(all="ignore"):  # legs that run away, told below
         drive(
             lengths,
@@ -71,7 +71,7 @@ def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False
                 np.concatenate([[robot.delta], origin, limits, [machine.tool_length]]),
                 np.array([program.component], dtype=np.float64),
                 robot.base_joints,
-                robot.line_heights,
+                robot.offsets,
                 _after_rest(reference.tips, 2 * rest),
                 _after_rest(reference.directions, 2 * rest),
             ),

@@ -63,7 +63,7 @@ class Workspace(Value):
         −∞ everywhere when the cone of directions crosses w = 0.
         """
         t = as_batch(tips, "tips", (3,))
-        robot, delta, reach = self.pentapod, self.pentapod.delta, self.pentapod.levers(self.tool_length)
+        robot, delta, reach = self.pentapod, self.pentapod.delta, self.pentapod.offsets - self.tool_length
         flat = np.zeros((5, 3))
         flat[:, :2] = robot.base
         to_tip = t[..., None, :] - flat
@@ -86,7 +86,7 @@ class Workspace(Value):
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Return the lowest and the highest corner (3,) of a box that holds all tips that can be reached."""
-        reach = self.longest + np.abs(self.pentapod.levers(self.tool_length))
+        reach = self.longest + np.abs(self.pentapod.offsets - self.tool_length)
         flat = np.zeros((5, 3))
         flat[:, :2] = self.pentapod.base
         return (flat - reach[:, None]).max(axis=0), (flat + reach[:, None]).min(axis=0)

@@ -112,7 +112,7 @@ class Scene:
         """Everything that is fixed to the tool: spindle, platform joints, shank and cutter, beam."""
         run, api = self._run, self._server.scene
         machine = run.machine
-        heights = machine.tool_length - machine.robot.line_heights
+        heights = machine.tool_length - machine.robot.offsets
         top, nose = float(heights.max()), machine.bodies.shaft_end
         self._cylinder("/tool/spindle", machine.bodies.shaft_radius, _STEEL, nose, top)
         self._cylinder("/tool/shaft", _SHAFT_SHARE * machine.bodies.shaft_radius, _DARK, 0.0, nose)

@@ -13,8 +13,8 @@ from pentapod.kinematics.proofs.krawczyk_kernels import angle_within
 BASE = np.array([[-0.552, -0.229], [-0.312, 0.510], [0.155, 0.577], [0.429, -0.417], [-0.078, -0.563]])
 ROBOT = LinearPentapod.quadratic(BASE, 0.2125)
 POSE = np.array([0.08, 0.01, 0.45, 0.1, -0.15])
-ARMS = np.array([0.0, 0.19])
-TOWARDS = np.tile([0.0, 0.0, 1.0], (5, 1))
+OFFSETS = np.array([0.0, 0.19])
+BASE_AXES = np.tile([0.0, 0.0, 1.0], (5, 1))
 
 
 def direction(u, v, sign=1.0):
@@ -34,14 +34,14 @@ def motions(seed, count, degree, step=1e-3):
 
 def prove(legs, component, **options):
     start, end = ROBOT.pose(legs[..., 0], component), ROBOT.pose(legs[..., -1], component)
-    return prove_chords(ROBOT, legs, start, end, component, arms=ARMS, towards=TOWARDS, **options)
+    return prove_chords(ROBOT, legs, start, end, component, offsets=OFFSETS, base_axes=BASE_AXES, **options)
 
 
 def along(legs, component, times):
     """Points (T, H, A, 3), directions and leg vectors of the motion at these times; legs by scipy."""
     lengths = np.array([[BPoly(c[:, None], [0.0, 1.0])(times) for c in interval] for interval in legs])
     position, i = ROBOT.pose(np.moveaxis(lengths, -1, 0), component)
-    return position[:, :, None] + ARMS[:, None] * i[:, :, None], i, ROBOT.leg_vectors(position, i)
+    return position[:, :, None] + OFFSETS[:, None] * i[:, :, None], i, ROBOT.leg_vectors(position, i)
 
 
 def largest_angle(a, b):
@@ -59,11 +59,11 @@ def test_no_moment_leaves_the_bounds(degree, step):
     share = times[:, None, None]
     chord = points[0] * (1.0 - share[..., None]) + points[-1] * share[..., None]
     off = np.linalg.norm(points - chord, axis=-1).max(axis=0)
-    assert (off <= found.away).all()
+    assert (off <= found.deviations).all()
     # The middle coefficient of a quadratic that vanishes at both ends is twice its largest value.
-    assert (found.away <= 3.2 * off + 1e-11 + step**2).all()
+    assert (found.deviations <= 3.2 * off + 1e-11 + step**2).all()
     turned = largest_angle(i, i[0] * (1.0 - share) + i[-1] * share)
-    assert (turned <= found.turned).all()
+    assert (turned <= found.angles).all()
     speeds = (np.linalg.norm(np.diff(points, axis=0), axis=-1) * 40.0).max(axis=0)
     assert (speeds <= found.speeds).all()
     assert (found.speeds <= 1.6 * speeds + 1e-9).all()
@@ -83,10 +83,10 @@ def test_agrees_with_the_tube_of_ball_arithmetic(degree):
     legs, component = motions(7, 30, degree, 3e-3)
     found = prove(legs, component)
     (p0, i0), (p1, i1) = ROBOT.pose(legs[..., 0], component), ROBOT.pose(legs[..., -1], component)
-    chord = np.stack([p0 + ARMS[1] * i0, p1 + ARMS[1] * i1], axis=-1)
-    tube = prove_tip_tube(ROBOT, legs, component).tip_deviation(chord, ARMS[1])
-    assert (found.away[:, 1] >= 0.9 * tube).all()
-    assert (found.away[:, 1] <= 3.2 * tube + 1e-10).all()
+    chord = np.stack([p0 + OFFSETS[1] * i0, p1 + OFFSETS[1] * i1], axis=-1)
+    tube = prove_tip_tube(ROBOT, legs, component).tip_deviation(chord, OFFSETS[1])
+    assert (found.deviations[:, 1] >= 0.9 * tube).all()
+    assert (found.deviations[:, 1] <= 3.2 * tube + 1e-10).all()
 
 
 def test_wrong_end_poses_are_told():
@@ -94,9 +94,9 @@ def test_wrong_end_poses_are_told():
     legs, component = motions(3, 20, 3, 1e-4)
     (p0, i0), end = ROBOT.pose(legs[..., 0], component), ROBOT.pose(legs[..., -1], component)
     shifted = p0 + np.array([0.0, 0.0, 1e-4])
-    found = prove_chords(ROBOT, legs, (shifted, i0), end, component, arms=ARMS, towards=TOWARDS, depth=0)
+    found = prove_chords(ROBOT, legs, (shifted, i0), end, component, offsets=OFFSETS, base_axes=BASE_AXES, depth=0)
     assert found.proven.all()
-    assert (found.away >= 1e-4 - 1e-9).all()
+    assert (found.deviations >= 1e-4 - 1e-9).all()
 
 
 def test_another_component_is_not_proven():
@@ -104,7 +104,7 @@ def test_another_component_is_not_proven():
     start, end = ROBOT.pose(legs[..., 0], component), ROBOT.pose(legs[..., -1], component)
     for name in ("+-", "-+", "--"):
         other = Component.parse(name)
-        found = prove_chords(ROBOT, legs, start, end, other, arms=ARMS, towards=TOWARDS, depth=0)
+        found = prove_chords(ROBOT, legs, start, end, other, offsets=OFFSETS, base_axes=BASE_AXES, depth=0)
         assert not found.proven.any()
 
 
@@ -133,11 +133,11 @@ def test_near_a_singularity_halving_helps():
     points, i, _ = along(legs, component, times)
     share = times[:, None, None, None]
     off = np.linalg.norm(points - points[0] * (1.0 - share) - points[-1] * share, axis=-1).max(axis=0)
-    assert (off <= found.away).all()
-    assert (found.away <= 1.5 * off).all()
+    assert (off <= found.deviations).all()
+    assert (found.deviations <= 1.5 * off).all()
     assert (np.linalg.norm(np.diff(points, axis=0), axis=-1) * 200.0 <= found.speeds).all()
     share = share[..., 0]
-    assert (largest_angle(i, i[0] * (1.0 - share) + i[-1] * share) <= found.turned).all()
+    assert (largest_angle(i, i[0] * (1.0 - share) + i[-1] * share) <= found.angles).all()
 
 
 @settings(max_examples=30)
@@ -158,8 +158,8 @@ def test_a_chord_is_no_worse_than_its_halves_say(seed, degree, step):
 @pytest.mark.parametrize(
     ("change", "key"),
     [
-        ({"arms": [[0.1]]}, "arms"),
-        ({"towards": np.zeros((4, 3))}, "towards"),
+        ({"offsets": [[0.1]]}, "offsets"),
+        ({"base_axes": np.zeros((4, 3))}, "base_axes"),
         ({"depth": -1}, "depth"),
         ({"component": (1, 0)}, "component"),
         ({"leg_coefficients": np.ones((2, 5, 1))}, "leg_coefficients"),
@@ -174,8 +174,8 @@ def test_bad_input(change, key):
         "start": pose,
         "end": pose,
         "component": component,
-        "arms": ARMS,
-        "towards": TOWARDS,
+        "offsets": OFFSETS,
+        "base_axes": BASE_AXES,
         **change,
     }
     with pytest.raises(ArrayError, match=key):
@@ -185,9 +185,11 @@ def test_bad_input(change, key):
 def test_no_pose_no_proof():
     legs = np.full((1, 5, 2), 0.02)
     nowhere = np.full((1, 3), np.nan)
-    found = prove_chords(ROBOT, legs, (nowhere, nowhere), (nowhere, nowhere), (1, 1), arms=ARMS, towards=TOWARDS)
+    found = prove_chords(
+        ROBOT, legs, (nowhere, nowhere), (nowhere, nowhere), (1, 1), offsets=OFFSETS, base_axes=BASE_AXES
+    )
     assert not found.proven[0]
-    assert np.isinf(found.away).all()
+    assert np.isinf(found.deviations).all()
     assert np.isinf(found.speeds).all()
     assert (found.base_cosines == -1.0).all()
     assert (found.platform_cosines == [-1.0, 1.0]).all()

@@ -18,8 +18,8 @@ ROBOTS: dict[str, Robot] = {
     ),
     "as built, general": AsBuiltPentapod.of(GENERAL, base_errors=ERRORS, radii=0.004, zeros=5e-4),
 }
-ARMS = np.array([-0.1, 0.0, 0.19])
-TOWARDS = np.tile([0.0, 0.6, 0.8], (5, 1))
+OFFSETS = np.array([-0.1, 0.0, 0.19])
+BASE_AXES = np.tile([0.0, 0.6, 0.8], (5, 1))
 TIMES = np.linspace(0.0, 1.0, 17)
 
 
@@ -51,22 +51,22 @@ def along(robot: Robot, legs: np.ndarray, branch: tuple[int, ...]):
 def test_no_moment_leaves_what_is_proven_of_chords(robot: Robot, degree: int, step: float) -> None:
     legs, branch = motions(robot, 4, degree, step)
     p, i = along(robot, legs, branch)
-    found = robot.prove_chords(legs, (p[0], i[0]), (p[-1], i[-1]), branch, arms=ARMS, towards=TOWARDS)
+    found = robot.prove_chords(legs, (p[0], i[0]), (p[-1], i[-1]), branch, offsets=OFFSETS, base_axes=BASE_AXES)
     assert found.proven.all()
-    points = p[:, :, None] + ARMS[:, None] * i[:, :, None]
+    points = p[:, :, None] + OFFSETS[:, None] * i[:, :, None]
     share = TIMES[:, None, None]
     off = np.linalg.norm(points - (1 - share[..., None]) * points[0] - share[..., None] * points[-1], axis=-1).max(0)
-    assert (off <= found.away).all()
-    assert (found.away <= 3.2 * off + 1e-11 + 2.0 * step**2).all()
+    assert (off <= found.deviations).all()
+    assert (found.deviations <= 3.2 * off + 1e-11 + 2.0 * step**2).all()
     speeds = (np.linalg.norm(np.diff(points, axis=0), axis=-1) * 16.0).max(axis=0)
     assert (speeds <= found.speeds).all()
     assert (found.speeds <= 1.6 * speeds + 1e-9).all()
     chord = (1 - share) * i[0] + share * i[-1]
     turned = np.arctan2(np.linalg.norm(np.cross(i, chord), axis=-1), (i * chord).sum(axis=-1)).max(axis=0)
-    assert (turned <= found.turned).all()
+    assert (turned <= found.angles).all()
     vectors = robot.leg_vectors(p, i)
     vectors /= np.linalg.norm(vectors, axis=-1, keepdims=True)
-    base, platform = (vectors * TOWARDS).sum(axis=-1), np.einsum("thjk,thk->thj", vectors, i)
+    base, platform = (vectors * BASE_AXES).sum(axis=-1), np.einsum("thjk,thk->thj", vectors, i)
     assert (found.base_cosines <= base.min(axis=0)).all()
     assert (found.base_cosines >= base.min(axis=0) - 8.0 * step - 1e-10).all()
     assert (found.platform_cosines[..., 0] <= platform.min(axis=0)).all()
@@ -78,13 +78,13 @@ def test_no_moment_leaves_what_is_proven_of_chords(robot: Robot, degree: int, st
 def test_no_lengths_in_the_hull_lead_further_than_the_enclosure(robot: Robot, step: float) -> None:
     legs, branch = motions(robot, 6, 3, step)
     p, i = robot.pose(legs[..., 0], branch)
-    points, turn = robot.enclose((p, i), legs.swapaxes(1, 2), ARMS)
+    points, turn = robot.enclose((p, i), legs.swapaxes(1, 2), OFFSETS)
     assert np.isfinite(turn).all()
     reached, random = np.zeros(points.shape), np.random.default_rng(2)
     for k in range(12):
         shares = np.eye(4)[k] if k < 4 else random.dirichlet(np.full(4, 0.3))
         q, j = robot.pose(legs @ shares, branch)
-        reached = np.fmax(reached, np.linalg.norm((q - p)[:, None] + ARMS[:, None] * (j - i)[:, None], axis=2))
+        reached = np.fmax(reached, np.linalg.norm((q - p)[:, None] + OFFSETS[:, None] * (j - i)[:, None], axis=2))
         assert (np.linalg.norm(j - i, axis=1) <= turn * (1.0 + 1e-9) + 1e-12).all()
     assert (reached <= points * (1.0 + 1e-9) + 1e-12).all()
     assert np.median(points / reached) < 2.0
@@ -110,5 +110,5 @@ def test_motion_that_turns_back_at_a_singularity_is_not_proven(robot: Robot) -> 
     motion = np.stack([here, 2.0 * beyond - here, here], axis=-1)[None]
     p, i = robot.pose(np.stack([here, here]), branch)
     assert not robot.prove(motion, (p, i), branch).proven.any()
-    found = robot.prove_chords(motion, (p[:1], i[:1]), (p[1:], i[1:]), branch, arms=ARMS, towards=TOWARDS)
+    found = robot.prove_chords(motion, (p[:1], i[:1]), (p[1:], i[1:]), branch, offsets=OFFSETS, base_axes=BASE_AXES)
     assert not found.proven.any()

@@ -17,7 +17,7 @@ from pentapod.kinematics.batches import as_poses
 from pentapod.kinematics.families.as_built_forward import as_built_pose
 from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
-from pentapod.kinematics.five_legs import FiveLegs, length_scale
+from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.leibniz import cross_products, root, scalar_products
 from pentapod.kinematics.proofs.by_leg_equations import ProvenByLegEquations
 from pentapod.kinematics.robot import Branch, SingularSurface
@@ -85,16 +85,6 @@ class AsBuiltPentapod(Value, ProvenByLegEquations):
     def base_joints(self) -> Floats:
         """The base joints (5, 3)."""
         return self.base
-
-    @property
-    def line_heights(self) -> Floats:
-        """The offsets (5,)."""
-        return self.offsets
-
-    @property
-    def scale(self) -> float:
-        """The power of two nearest to the largest distance of a base joint from their centre: metres per radian."""
-        return length_scale(self.base)
 
     @property
     def branches(self) -> tuple[Branch, ...]:

@@ -22,7 +22,7 @@ from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.tubes.continuation import Pose, carry
 from pentapod.kinematics.tubes.jacobian_sign import determinant_sign
-from pentapod.kinematics.tubes.leg_equations import BuiltLegs, Legs
+from pentapod.kinematics.tubes.leg_equations import BuiltLegs, Legs, length_scale
 from pentapod.kinematics.tubes.tube import LegFamily, Tube
 from pentapod.numerics.balls import Ball
 from pentapod.numerics.blocks import blocks
@@ -94,14 +94,14 @@ class _Way:
 
     def __init__(self, machine: BuiltLegs, nominal: LinearPentapod | GeneralPentapod, readings: Floats) -> None:
         self.nominal, self.readings = nominal, readings
-        self.scale = machine.scale
+        self.scale = length_scale(machine)
         self.rings = (machine.radii != 0.0)[:, None]
         offsets = Ball.exact(nominal.offsets)
         if isinstance(nominal, LinearPentapod):
             x = nominal.base[:, 0]
             offsets = (Ball.exact(x) - x[2]) * nominal.delta + nominal.offsets[2]
         self.start = (Ball.exact(nominal.base_joints.T[..., None]), offsets[:, None], Ball.exact(np.zeros((5, 1))))
-        end = (machine.base_joints.T[..., None], machine.line_heights[:, None], machine.radii[:, None])
+        end = (machine.base_joints.T[..., None], machine.offsets[:, None], machine.radii[:, None])
         self.end = tuple(Ball.exact(array) for array in end)
         self.shift = tuple(b - a for a, b in zip(self.start, self.end, strict=True))
         self.zeros = machine.zeros[:, None]

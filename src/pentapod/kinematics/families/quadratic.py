@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from pentapod.base.arrays import Floats, Ints, as_batch, frozen, set_frozen
 from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
-from pentapod.kinematics.answers import BranchProof, ProvenMeasure
 from pentapod.kinematics.arithmetic import Arithmetic, Vector
 from pentapod.kinematics.batches import as_poses, broadcast
 from pentapod.kinematics.component import COMPONENTS, Component
@@ -28,6 +27,7 @@ from pentapod.kinematics.forward.quadratic import (
 )
 from pentapod.kinematics.forward.quadratic_near import solve_near
 from pentapod.kinematics.mode import as_labels
+from pentapod.kinematics.proof_results import BranchProof, ProvenMeasure
 from pentapod.kinematics.proofs.by_leg_equations import ProvenByLegEquations
 from pentapod.kinematics.proofs.certificate import METHOD, certify_component
 from pentapod.kinematics.robot import Branch, Poses, Robot, SingularSurface

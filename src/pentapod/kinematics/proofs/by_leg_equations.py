@@ -7,7 +7,7 @@ from typing import cast
 from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats
-from pentapod.kinematics.answers import BranchProof, Chords
+from pentapod.kinematics.proof_results import BranchProof, Chords
 from pentapod.kinematics.proofs.chords import Pose, prove_chords
 from pentapod.kinematics.proofs.motion import MOTION_MEASURES, motion_in_branch
 from pentapod.kinematics.proofs.pose_enclosure import pose_enclosure
@@ -24,11 +24,12 @@ class ProvenByLegEquations:
         return motion_in_branch(cast("PosedLegs", self), leg_coefficients, *ends, leg_error)
 
     def prove_chords(
-        self, leg_coefficients: Floats, start: Pose, end: Pose, branch: ArrayLike, *, arms: Floats, towards: Floats
+        self, legs: Floats, start: Pose, end: Pose, branch: ArrayLike, *, offsets: Floats, base_axes: Floats
     ) -> Chords:
-        """Return what `prove_chords` says of a motion beside its chords."""
-        return prove_chords(cast("PosedLegs", self), leg_coefficients, start, end, branch, arms=arms, towards=towards)
+        """Return bounds of deviation and speed beside the chords: `prove_chords`."""
+        robot = cast("PosedLegs", self)
+        return prove_chords(robot, legs, start, end, branch, offsets=offsets, base_axes=base_axes)
 
-    def enclose(self, ends: Pose, readings: Floats, heights: Floats) -> tuple[Floats, Floats]:
-        """Return how far points of the line get, and how far the direction: `pose_enclosure`."""
-        return pose_enclosure(cast("PosedLegs", self), *ends, readings, heights)
+    def enclose(self, poses: Pose, legs: Floats, offsets: Floats) -> tuple[Floats, Floats]:
+        """Return bounds of how far points of the line and the direction get: `pose_enclosure`."""
+        return pose_enclosure(cast("PosedLegs", self), *poses, legs, offsets)

@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Bools, Floats, as_batch, set_frozen
 from pentapod.base.errors import ArrayError
 from pentapod.base.values import Value
-from pentapod.kinematics.answers import Answers
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.component import Component, as_component
+from pentapod.kinematics.proof_results import ProofResult
 from pentapod.kinematics.proofs.discriminants import Discriminants
 from pentapod.kinematics.tubes.leg_equations import QuadraticLegs
 from pentapod.numerics.blocks import blocks
@@ -33,7 +33,7 @@ _SANE = (1e-40, 1e40)  # metres; within these nothing below can underflow or ove
 
 
 @dataclass(frozen=True, eq=False)
-class ComponentProof(Value, Answers):
+class ComponentProof(Value, ProofResult):
     """What is proven of N intervals, each of a motion of the legs given by polynomials.
 
     proven (N,): from the pose of `component` at the start of the interval (and from no other: lengths alone

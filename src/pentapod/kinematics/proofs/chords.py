@@ -1,26 +1,25 @@
-"""How far a motion of the legs strays from straight lines between its poses: proven for all times, for long programs.
+"""Chord errors of a motion of the legs, proven for all times by Krawczyk's operator, for long programs.
 
 Between two samples the legs are polynomials in time, and x̃(t) is the straight line from the one pose to the other.
-As in `tip_tube` Krawczyk's operator proves, component by component, that there is exactly one pose within a box around
-x̃(t) at each time, and how large the box is; here with the line in place of a fitted polynomial and with floating
-point and explicit allowances for rounding in place of ball arithmetic, which takes microseconds for each chord. To
-first order the motion is x̃ − C G(x̃(t), t), and this polynomial is what the bounds are taken of: of second order in
-the
-chord, like the deviation itself (lemmas 7, 8 and 12 of docs/proofs.md). The speed follows from the derivative in the
-same way. Where the proof fails, the
-chord is halved.
+As in `tip_tube`, Krawczyk's operator proves that there is exactly one pose within a box around x̃(t) at each time; here
+with the line in place of a fitted polynomial, and with floating point and an allowance for rounding in place of ball
+arithmetic, which takes microseconds for each chord. To first order the motion is x̃ − C G(x̃(t), t). This polynomial is
+what the bounds are taken of; like the deviation itself it is of second order in the chord (lemmas 7, 8, 12 and 15 of
+docs/proofs.md). The speed follows from the derivative in the same way. Where the proof fails, the chord is halved.
 """
 
 from __future__ import annotations
+
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, as_batch, as_floats
 from pentapod.base.errors import ArrayError
-from pentapod.kinematics.answers import Chords
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.component import as_component
+from pentapod.kinematics.proof_results import Chords
 from pentapod.kinematics.tubes.leg_equations import PosedLegs, QuadraticLegs
 from pentapod.numerics.bernstein import elevate, multiply, split
 
@@ -34,97 +33,71 @@ def prove_chords(
     end: Pose,
     component: ArrayLike,
     *,
-    arms: ArrayLike,
-    towards: ArrayLike,
+    offsets: ArrayLike,
+    base_axes: ArrayLike,
     depth: int = 8,
 ) -> Chords:
     """Return what can be proven of the motion beside each chord.
 
     leg_coefficients (H, 5, k + 1): Bernstein coefficients in metres of the legs' readings on the chord, k ≥ 1. start,
     end: positions and directions (H, 3) each, the poses of the component at both ends, to rounding; whatever they are,
-    the bounds hold. arms (A,): metres along the line from p. towards (5, 3): unit vectors, machine frame, from which
-    the angles of the legs are asked. depth: how often a chord may be halved.
+    the bounds hold. offsets (A,): of points along the line from p, metres. base_axes (5, 3): unit vectors, machine
+    frame, from which the angles of the legs are measured. depth: how often a chord may be halved.
     Raises ArrayError for a wrong shape, numbers that are not finite, signs other than ±1, a negative depth.
     """
     legs = as_motion(as_floats(leg_coefficients, "leg_coefficients"), least=1)
     signs = np.array(as_component(component), dtype=np.float64)
-    points = as_floats(arms, "arms", (None,))
+    points = as_floats(offsets, "offsets", (None,))
     if points.ndim != 1:
-        raise ArrayError(f"arms has shape {points.shape}", expected="shape (A,)")
+        raise ArrayError(f"offsets has shape {points.shape}", expected="shape (A,)")
     if depth < 0:
         raise ArrayError("depth must not be negative", value=depth)
-    ends = [np.concatenate([as_batch(x, name, (3,)) for x in pose], axis=-1) for name, pose in _named(start, end)]
-    for name, x in (("start", ends[0]), ("end", ends[1])):
-        if x.shape != (len(legs), 6):
-            raise ArrayError(f"{name} has shape {x.shape}", expected=f"positions and directions ({len(legs)}, 3)")
-    prover = _Prover(robot, signs, points, as_floats(towards, "towards", (5, 3)), legs.shape[-1] - 1)
+    ends: list[Floats] = []
+    for name, pose in (("start", start), ("end", end)):
+        ends.append(np.concatenate([as_batch(x, name, (3,)) for x in pose], axis=-1))
+        if ends[-1].shape != (len(legs), 6):
+            raise ArrayError(
+                f"{name} has shape {ends[-1].shape}", expected=f"positions and directions ({len(legs)}, 3)"
+            )
+    prover = _Prover(robot, signs, points, as_floats(base_axes, "base_axes", (5, 3)), legs.shape[-1] - 1)
     return prover.prove(legs - robot.zeros[:, None], ends[0], ends[1], depth)
 
 
-def _named(start: Pose, end: Pose) -> tuple[tuple[str, Pose], tuple[str, Pose]]:
-    return ("start", start), ("end", end)
-
-
 class _Prover:
-    """The machine and the questions, as the kernel takes them."""
+    """The robot and the questions, as the kernel takes them."""
 
-    def __init__(self, robot: PosedLegs, signs: Floats, arms: Floats, towards: Floats, degree: int) -> None:
-        self.robot, self.signs, self.arms, self.towards = robot, signs, arms, np.ascontiguousarray(towards)
-        one = np.eye(degree + 1)
-        self.products = np.array([[multiply(a, b)[m + n] for n, b in enumerate(one)] for m, a in enumerate(one)])
-        top = max(degree, 2)
-        self.elevations = (
-            _elevation(2, 2 * degree),
-            _elevation(1, degree),
-            np.ascontiguousarray(np.concatenate([_elevation(2, top), _elevation(degree, top)])),
-        )
+    def __init__(self, robot: PosedLegs, signs: Floats, offsets: Floats, base_axes: Floats, degree: int) -> None:
+        self.robot, self.signs, self.offsets, self.base_axes = robot, signs, offsets, np.ascontiguousarray(base_axes)
+        self.rings = np.column_stack([np.zeros((5, 8)), robot.radii]) if robot.radii.any() else None
+        self.bases = _bases(degree)
 
     def prove(self, legs: Floats, start: Floats, end: Floats, depth: int) -> Chords:
         """As `prove_chords`; start, end (H, 6)."""
         from pentapod.kinematics.proofs.chords_kernels import chords  # noqa: PLC0415 - loads numba
 
-        count, points = len(legs), len(self.arms)
-        found = Chords(
-            np.empty(count, dtype=np.bool_),
-            np.empty((count, points)),
-            np.empty(count),
-            np.empty((count, points)),
-            np.empty((count, 5)),
-            np.empty((count, 5, 2)),
-        )
-        chords(
-            np.ascontiguousarray(legs),
-            start,
-            end,
-            self._geometry(legs),
-            self.signs,
-            self.arms,
-            self.towards,
-            self.products,
-            self.elevations,
-            found.proven,
-            found.away,
-            found.turned,
-            found.speeds,
-            found.base_cosines,
-            found.platform_cosines,
-        )
+        count, points = len(legs), len(self.offsets)
+        proven, angles = np.empty(count, dtype=np.bool_), np.empty(count)
+        deviations, speeds = np.empty((count, points)), np.empty((count, points))
+        found = (proven, deviations, angles, speeds, np.empty((count, 5)), np.empty((count, 5, 2)))
+        geometry, asked = self._geometry(legs), (self.signs, self.offsets, self.base_axes, self.bases)
+        chords(np.ascontiguousarray(legs), start, end, geometry, self.rings, *asked, found)
+        answer = Chords(*found)
         if depth > 0:
-            self._halve(found, legs, start, end, depth)
-        return found
+            self._halve(answer, legs, start, end, depth)
+        return answer
 
     def _geometry(self, legs: Floats) -> Floats:
-        """Return what the kernels take of the machine; its size is a length that no sum of lengths here exceeds."""
+        """Return the robot's numbers (6, 4) as the kernels take them."""
         robot, last = self.robot, [0.0, 0.0, 0.0]
         if isinstance(robot, QuadraticLegs):
             last = [robot.delta, robot.lever, 1.0]
         reach = float(np.abs(legs).max(initial=0.0)) + 2.0 * float(np.abs(robot.base_joints).sum(axis=1).max())
-        size = 2.0 * (reach + 2.0 * float(np.abs(robot.line_heights).max()) + 4.0 * float(robot.radii.max()))
-        rows = np.column_stack([robot.base_joints, robot.line_heights, robot.radii])
-        return np.vstack([rows, [*last[:2], size, last[2], robot.radii.max()]])
+        size = 2.0 * (reach + 2.0 * float(np.abs(robot.offsets).max()) + 4.0 * float(robot.radii.max()))
+        rows = np.column_stack([robot.base_joints, robot.offsets])
+        return np.vstack([rows, [*last[:2], size, last[2]]])
 
     def _halve(self, found: Chords, legs: Floats, start: Floats, end: Floats, depth: int) -> None:
-        """Fill in what two halves prove where the whole chord was not, or its speed was not."""
+        """Fill in what two halves prove where the whole chord was not proven, or its speed was not."""
         failed = ~found.proven | ~np.isfinite(found.speeds).all(axis=1)
         failed &= np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
         which = np.flatnonzero(failed)
@@ -137,21 +110,33 @@ class _Prover:
             np.concatenate(halves), np.concatenate([first, middle]), np.concatenate([middle, last]), depth - 1
         )
         off = middle - 0.5 * (first + last)
-        aside = np.linalg.norm(off[:, None, :3] + self.arms[:, None] * off[:, None, 3:], axis=2)
+        aside = np.linalg.norm(off[:, None, :3] + self.offsets[:, None] * off[:, None, 3:], axis=2)
 
         def largest(values: Floats) -> Floats:
             return np.maximum(values[:half], values[half:])
 
         found.proven[which] = parts.proven[:half] & parts.proven[half:]
-        found.away[which] = largest(parts.away) + aside
+        found.deviations[which] = largest(parts.deviations) + aside
         # Where the middle of the line between unit vectors is longer than 5/6, an offset turns it by no more than this.
-        short = np.linalg.norm(0.5 * (first + last)[:, 3:], axis=1) > 5.0 / 6.0
-        aside_turned = np.where(short, 1.2 * np.linalg.norm(off[:, 3:], axis=1), np.inf)
-        found.turned[which] = largest(parts.turned) + 1.001 * aside_turned
+        long_enough = np.linalg.norm(0.5 * (first + last)[:, 3:], axis=1) > 5.0 / 6.0
+        turned_aside = np.where(long_enough, 1.2 * np.linalg.norm(off[:, 3:], axis=1), np.inf)
+        found.angles[which] = largest(parts.angles) + 1.001 * turned_aside
         found.speeds[which] = 2.0 * largest(parts.speeds)
         found.base_cosines[which] = -largest(-parts.base_cosines)
         found.platform_cosines[which, :, 0] = -largest(-parts.platform_cosines[..., 0])
         found.platform_cosines[which, :, 1] = largest(parts.platform_cosines[..., 1])
+
+
+@cache
+def _bases(degree: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return what `chords` of the kernels takes as bases."""
+    one, top = np.eye(degree + 1), max(degree, 2)
+    return (
+        np.array([[multiply(a, b)[m + n] for n, b in enumerate(one)] for m, a in enumerate(one)]),
+        _elevation(2, 2 * degree),
+        _elevation(1, degree),
+        np.ascontiguousarray(np.concatenate([_elevation(2, top), _elevation(degree, top)])),
+    )
 
 
 def _elevation(low: int, high: int) -> Floats:

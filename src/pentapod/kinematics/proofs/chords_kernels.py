@@ -1,6 +1,6 @@
 """The proof of `pentapod.kinematics.proofs.chords`, one chord after the other, compiled.
 
-Its bounds are computed in ordinary floating point, and to each is added more than rounding can have taken (`ROUND`).
+Its bounds are computed in ordinary floating point; an allowance that exceeds the rounding (`ROUND`) is added to each.
 """
 
 from __future__ import annotations
@@ -10,19 +10,18 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats
 from pentapod.kinematics.proofs.krawczyk_kernels import (
     ROUND,
-    about,
     angle_within,
-    defect,
+    contracted,
     enclosed,
+    fill_defect,
+    fill_line,
+    fill_spread,
     inflated,
     invert,
-    line,
-    mapped,
-    norm,
+    ring_region,
     sided,
-    spreads,
 )
-from pentapod.kinematics.proofs.ring_kernels import ring_bend, ring_swing
+from pentapod.kinematics.proofs.ring_kernels import norm, ring_bend, ring_swing
 from pentapod.numerics.kernels import kernel
 
 
@@ -32,77 +31,74 @@ def chords(
     start: Floats,
     end: Floats,
     geometry: Floats,
+    rings: Floats | None,
     signs: Floats,
-    arms: Floats,
-    towards: Floats,
-    products: Floats,
-    elevations: tuple[Floats, Floats, Floats],
-    proven: Bools,
-    away: Floats,
-    turned: Floats,
-    speeds: Floats,
-    base_cosines: Floats,
-    platform_cosines: Floats,
+    offsets: Floats,
+    base_axes: Floats,
+    bases: tuple[Floats, Floats, Floats, Floats],
+    found: tuple[Bools, Floats, Floats, Floats, Floats, Floats],
 ) -> None:
-    """Fill what `Chords` holds for legs (H, 5, k + 1) and poses `start`, `end` (H, 6).
+    """Fill what `Chords` holds, in its order, for legs (H, 5, k + 1) and poses `start`, `end` (H, 6).
 
-    geometry (6, 5): as in `krawczyk_kernels`. products (k + 1,
-    k + 1): what l_a l_b counts in coefficient a + b of l². elevations: matrices from degree 2 to 2k, from 1 to
-    max(k, 1) and from 2 to max(k, 2), and in its last rows from k to max(k, 2).
+    geometry (6, 4), rings: as in `krawczyk_kernels`. bases: products (k + 1, k + 1), what l_a l_b contributes to
+    coefficient a + b of l²; matrices that elevate from degree 2 to 2k, from 1 to k, and from 2 to max(k, 2), the last
+    with further rows for k to max(k, 2).
     """
-    squares_up, lines_up, cosines_up = elevations
+    products, squares_up, lines_up, cosines_up = bases
+    proven, deviations, angles, speeds, base_cosines, platform_cosines = found
     k = legs.shape[2] - 1
-    size = geometry[5, 2]
     first, second, change, step = np.empty((5, 3)), np.empty((5, 3)), np.empty((5, 3)), np.empty(6)
-    jacobian, inverse, work, rest = np.zeros((6, 6)), np.empty((6, 6)), np.empty((6, 12)), np.empty((6, 6))
+    jacobian, inverse, work, defect = np.zeros((6, 6)), np.empty((6, 6)), np.empty((6, 12)), np.empty((6, 6))
+    spread, spread_i = np.empty((5, 3)), np.empty(3)
     residual, e, de = np.empty((6, 2 * k + 1)), np.empty((6, 2 * k + 1)), np.empty((6, 2 * k))
-    slack, y, z, bound = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
-    spread, spread_i, off = np.empty((5, 3)), np.empty(3), np.empty(6)
-    rings = np.zeros((5, 8))
+    slack, y, z, bound, off = np.empty(6), np.empty(6), np.empty(6), np.empty(6), np.empty(6)
     for h in range(len(legs)):
-        proven[h], turned[h], away[h], speeds[h] = False, np.inf, np.inf, np.inf
+        proven[h], angles[h], deviations[h], speeds[h] = False, np.inf, np.inf, np.inf
         base_cosines[h], platform_cosines[h, :, 0], platform_cosines[h, :, 1] = -1.0, -1.0, 1.0
         if not _sane(legs[h], start[h], end[h]):
             continue
-        line(start[h], end[h], geometry, first, second, change, step, jacobian, rings)
+        fill_line(start[h], end[h], geometry, first, second, change, step, jacobian, rings)
         if not invert(jacobian, work, inverse):
             continue
-        defect(inverse, jacobian, rest)
-        _residuals(legs[h], start[h], end[h], first, second, geometry, rings, squares_up, products, residual)
-        _corrections(inverse, residual, ROUND * size * size, geometry, rings, e, slack, y)
-        if not enclosed(y, rest, inverse, geometry, rings, change, step, spread, spread_i, z, bound):
+        fill_defect(inverse, jacobian, defect)
+        _residuals(legs[h], start[h], end[h], first, second, rings, squares_up, products, residual)
+        _corrections(inverse, residual, geometry[5, 2], rings, e, slack, y)
+        if not enclosed(y, inverse, defect, geometry, rings, change, step, spread, spread_i, z, bound):
             continue
-        if not sided(start[h], end[h], bound, geometry[5, 0], geometry[5, 1], signs, size, geometry[5, 3]):
+        if not sided(start[h], end[h], bound, signs, geometry):
             continue
         proven[h] = True
-        # Now that the solution is known to be this near, once more: closer.
-        spreads(geometry, change, step, bound, ROUND * size, spread, spread_i)
-        mapped(rest, inverse, geometry, rings, spread, spread_i, bound, z)
-        bounded = _derived(e, slack, bound, rest, inverse, geometry, rings, change, step, spread, spread_i, de, off)
+        # The solution is known to be this near: with the smaller box the bounds become closer.
+        fill_spread(geometry, change, step, bound, spread, spread_i)
+        contracted(inverse, defect, geometry, rings, spread, spread_i, bound, z)
+        bounded = _derivatives(
+            e, slack, bound, inverse, defect, geometry, rings, change, step, spread, spread_i, de, off
+        )
         z += slack
-        for a in range(len(arms)):
-            away[h, a] = _farthest(e, step, 0.0, arms[a]) + _joined(z, abs(arms[a]))
+        for a in range(len(offsets)):
+            deviations[h, a] = _farthest(e, step, 0.0, offsets[a]) + _joined(z, abs(offsets[a]))
             if bounded:
-                speeds[h, a] = _farthest(de, step, 1.0, arms[a]) + _joined(off, abs(arms[a]))
-        sine = 0.0
+                speeds[h, a] = _farthest(de, step, 1.0, offsets[a]) + _joined(off, abs(offsets[a]))
+        largest = 0.0
         for m in range(2 * k + 1):
-            sine = max(sine, np.sqrt(e[3, m] ** 2 + e[4, m] ** 2 + e[5, m] ** 2))
-        sine += np.sqrt(z[3] ** 2 + z[4] ** 2 + z[5] ** 2)
-        turned[h] = angle_within(sine)
+            largest = max(largest, e[3, m] ** 2 + e[4, m] ** 2 + e[5, m] ** 2)
+        angles[h] = angle_within(np.sqrt(largest) + np.sqrt(z[3] ** 2 + z[4] ** 2 + z[5] ** 2))
         swing = np.sqrt(bound[3] ** 2 + bound[4] ** 2 + bound[5] ** 2)
         start_i, end_i = start[h, 3:], end[h, 3:]
         for j in range(5):
             own, one, two = legs[h, j], first[j], second[j]
             shortest = own.min()
-            shift, rounding = _joined(bound, abs(geometry[j, 3])), 4.0 * ROUND * size / shortest
-            aside, off_ring, radius = 0.0, 0.0, geometry[j, 4]
-            if radius > 0.0:
-                off_ring = radius * _dot(rings[j, 5:], towards[j])
-                aside = radius * ring_swing(rings[j], about(spread[j], spread_i, abs(geometry[j, 3])))
-            base = _base_cosine(one, two, off_ring, towards[j], own, lines_up)
+            shift, rounding = _joined(bound, abs(geometry[j, 3])), 4.0 * ROUND * geometry[5, 2] / shortest
+            aside, off_ring, radius = 0.0, 0.0, 0.0
+            if rings is not None:
+                radius = rings[j, 8]
+                if radius > 0.0:
+                    off_ring = radius * _dot(rings[j, 5:], base_axes[j])
+                    aside = radius * ring_swing(rings[j], ring_region(spread[j], spread_i, abs(geometry[j, 3])))
+            base = _base_cosine(one, two, off_ring, base_axes[j], own, lines_up)
             base_cosines[h, j] = base - (shift + aside) / shortest - rounding
-            # A ring's vector has the same part along the line as that to its centre, and is no longer than the leg, its
-            # shift and the ring's radius.
+            # The vector to a ring has the same component along the line as that to its centre, and is no longer than
+            # the leg, its shift and the ring's radius together.
             least, most = _platform_cosine(one, two, start_i, end_i, own, cosines_up)
             loose = ((own.max() + shift + radius) * swing + shift) / shortest + rounding
             platform_cosines[h, j, 0], platform_cosines[h, j, 1] = least - loose, most + loose
@@ -128,15 +124,14 @@ def _residuals(
     end: Floats,
     first: Floats,
     second: Floats,
-    geometry: Floats,
-    rings: Floats,
+    rings: Floats | None,
     squares_up: Floats,
     products: Floats,
     residual: Floats,
 ) -> None:
     """Fill G along the line (6, 2k + 1): ½ (|D|² − l²) of each leg and ½ (|i|² − 1), as Bernstein coefficients.
 
-    With a ring ½ r² − r ρ besides, ρ taken straight from start to end.
+    For a ring ½ r² − r ρ is added, with ρ interpolated linearly from start to end.
     """
     for j in range(5):
         _square(first[j], second[j], squares_up, residual[j])
@@ -145,11 +140,12 @@ def _residuals(
                 residual[j, a + b] -= 0.5 * products[a, b] * legs[j, a] * legs[j, b]
     _square(start[3:], end[3:], squares_up, residual[5])
     residual[5] -= 0.5
-    last = residual.shape[1] - 1
-    for j in range(5 if geometry[5, 4] > 0.0 else 0):
-        for m in range(last + 1):
-            far = rings[j, 0] + m / last * (rings[j, 1] - rings[j, 0])
-            residual[j, m] += geometry[j, 4] * (0.5 * geometry[j, 4] - far)
+    if rings is not None:
+        last = residual.shape[1] - 1
+        for j in range(5):
+            for m in range(last + 1):
+                far = rings[j, 0] + m / last * (rings[j, 1] - rings[j, 0])
+                residual[j, m] += rings[j, 8] * (0.5 * rings[j, 8] - far)
 
 
 @kernel
@@ -162,23 +158,17 @@ def _square(first: Floats, second: Floats, squares_up: Floats, out: Floats) -> N
 
 @kernel
 def _corrections(
-    inverse: Floats,
-    residual: Floats,
-    rounding: float,
-    geometry: Floats,
-    rings: Floats,
-    e: Floats,
-    slack: Floats,
-    y: Floats,
+    inverse: Floats, residual: Floats, size: float, rings: Floats | None, e: Floats, slack: Floats, y: Floats
 ) -> None:
-    """Fill C G (6, 2k + 1), what rounding and bent ρ take from it (6,), and bounds (6,) of both at all times."""
+    """Fill e = C G (6, 2k + 1), the error of it by rounding and curved ρ (6,), and bounds (6,) of both at all times."""
+    rounding = ROUND * size * size
     for r in range(6):
         slack[r] = 4.0 * ROUND * abs(inverse[r, 5])
         for n in range(5):
             slack[r] += rounding * abs(inverse[r, n])
-        if geometry[5, 4] > 0.0:
+        if rings is not None:
             for n in range(5):
-                slack[r] += 0.125 * geometry[n, 4] * rings[n, 4] * abs(inverse[r, n])
+                slack[r] += 0.125 * rings[n, 8] * rings[n, 4] * abs(inverse[r, n])
         y[r] = 0.0
         for m in range(e.shape[1]):
             e[r, m] = 0.0
@@ -189,14 +179,14 @@ def _corrections(
 
 
 @kernel
-def _derived(
+def _derivatives(
     e: Floats,
     slack: Floats,
     bound: Floats,
-    rest: Floats,
     inverse: Floats,
+    defect: Floats,
     geometry: Floats,
-    rings: Floats,
+    rings: Floats | None,
     change: Floats,
     step: Floats,
     spread: Floats,
@@ -206,9 +196,8 @@ def _derived(
 ) -> bool:
     """Fill e' (6, 2k) and by how much (6,) the solution's derivative may differ from x̃' − e'; False where unbounded.
 
-    J x' = (l l', 0) and C (J(x̃) x̃' − (l l', 0)) = e'. So f = x' − x̃' solves C J f = −e' − q, q = C (J(x) − J(x̃))
-    x̃',
-    and |f + e'| ≤ |q| + |1 − C J| |f|.
+    J x' = (l l', 0) and C (J(x̃) x̃' − (l l', 0)) = e'. So f = x' − x̃' solves C J f = −e' − q with
+    q = C (J(x) − J(x̃)) x̃', and |f + e'| ≤ |q| + |1 − C J| |f|.
     """
     size, degree = geometry[5, 2], de.shape[1]
     least, q, moved = np.empty(6), np.empty(6), np.zeros(6)
@@ -217,10 +206,11 @@ def _derived(
         for j in range(5):
             reach = bound[n] + abs(geometry[j, 3]) * bound[3 + n]
             moved[j] += reach * (abs(change[j, n]) + ROUND * size)
-    for j in range(5 if geometry[5, 4] > 0.0 else 0):
-        if geometry[j, 4] > 0.0:
-            region, way = about(spread[j], spread_i, abs(geometry[j, 3])), (norm(step[:3]), norm(step[3:]))
-            moved[j] += geometry[j, 4] * ring_bend(rings[j], region, (norm(bound[:3]), norm(bound[3:])), way)
+    if rings is not None:
+        for j in range(5):
+            if rings[j, 8] > 0.0:
+                region, length = ring_region(spread[j], spread_i, abs(geometry[j, 3])), (norm(step[:3]), norm(step[3:]))
+                moved[j] += rings[j, 8] * ring_bend(rings[j], region, (norm(bound[:3]), norm(bound[3:])), length)
     for r in range(6):
         q[r] = 4.0 * degree * slack[r]  # ρ' is within |ρ''| / 2 of its mean: four times what slack counts of it
         for j in range(6):
@@ -231,7 +221,7 @@ def _derived(
             largest = max(largest, abs(de[r, m]))
         least[r] = largest + q[r]
     growth = inflated(least, size)
-    mapped(rest, inverse, geometry, rings, spread, spread_i, growth, off)
+    contracted(inverse, defect, geometry, rings, spread, spread_i, growth, off)
     bounded = True
     for r in range(6):
         bounded = bounded and least[r] + off[r] < growth[r]
@@ -240,12 +230,12 @@ def _derived(
 
 
 @kernel
-def _base_cosine(first: Floats, second: Floats, off: float, towards: Floats, legs: Floats, lines_up: Floats) -> float:
-    """Return the least (v · towards − off) / l, v on the line from first to second (3,), l of coefficients (k + 1,).
+def _base_cosine(first: Floats, second: Floats, off: float, axis: Floats, legs: Floats, lines_up: Floats) -> float:
+    """Return the least (v · axis − off) / l, v on the line from first to second (3,), l of coefficients (k + 1,).
 
     A quotient of polynomials lies between the quotients of their coefficients.
     """
-    b0, b1 = _dot(first, towards) - off, _dot(second, towards) - off
+    b0, b1 = _dot(first, axis) - off, _dot(second, axis) - off
     least = np.inf
     for m in range(len(legs)):
         least = min(least, (lines_up[0, m] * b0 + lines_up[1, m] * b1) / legs[m])
@@ -275,20 +265,20 @@ def _dot(a: Floats, b: Floats) -> float:
 
 
 @kernel
-def _joined(bound: Floats, arm: float) -> float:
-    """Return the largest |p + arm · i| of p and i that `bound` (6,) bounds."""
-    x, y, z = bound[0] + arm * bound[3], bound[1] + arm * bound[4], bound[2] + arm * bound[5]
+def _joined(bound: Floats, offset: float) -> float:
+    """Return the largest |p + offset · i| of p and i that `bound` (6,) bounds."""
+    x, y, z = bound[0] + offset * bound[3], bound[1] + offset * bound[4], bound[2] + offset * bound[5]
     return np.sqrt(x * x + y * y + z * z) * (1.0 + ROUND)
 
 
 @kernel
-def _farthest(e: Floats, step: Floats, moving: float, arm: float) -> float:
-    """Return the largest |moving · step − e| of the point at `arm` over the coefficients e (6, n)."""
+def _farthest(e: Floats, step: Floats, moving: float, offset: float) -> float:
+    """Return the largest |moving · step − e| of the point p + offset · i over the coefficients e (6, n)."""
     worst = 0.0
     for m in range(e.shape[1]):
         total = 0.0
         for n in range(3):
-            part = moving * (step[n] + arm * step[3 + n]) - e[n, m] - arm * e[3 + n, m]
+            part = moving * (step[n] + offset * step[3 + n]) - e[n, m] - offset * e[3 + n, m]
             total += part * part
         worst = max(worst, total)
     return np.sqrt(worst) * (1.0 + ROUND)

@@ -1,9 +1,14 @@
-"""Krawczyk's operator on the leg equations, beside a straight line of poses: pieces of `chords_kernels`, compiled.
+"""Krawczyk's operator for the leg equations around a straight line of poses, compiled; `chords_kernels` uses it.
 
 G(x) = (½ (|p + z_j i − a_j|² − l_j²), ½ (|i|² − 1)) of x = (p, i), J its Jacobian, C ≈ J⁻¹ in the middle of the line.
-Legs may end on rings (`ring_kernels`). Poses and boxes are (6,), p in metres first. geometry (6, 5): base joints (3),
-offset and radius of the ring of each leg; then δ, the lever, a length that no sum of lengths exceeds, 1 where the
-machine is of the quadratic family, 0 where it is not, and the largest radius.
+Poses and boxes are arrays (6,), p in metres first. geometry (6, 4): for each leg the base joint (3) and the platform
+offset; then δ, z_3 − δ x_3, a length that no sum of lengths exceeds, and 1 for a robot of the quadratic family, else 0.
+rings (5, 9): see `ring_kernels`; None where no leg ends on a ring. numba compiles a variant for None without the
+branches that ask for rings. Arrays are passed one by one: tuples of them cost a tenth of the time.
+
+first, second, change (5, 3), step (6,): the legs' vectors at both ends of the line, their change, that of the pose.
+inverse, defect (6, 6): C, and bounds of |1 − C J| in the middle. spread (5, 3), spread_i (3,): by how much the legs'
+vectors and i may differ from those in the middle.
 """
 
 from __future__ import annotations
@@ -11,16 +16,16 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.kinematics.proofs.ring_kernels import ring_bend, ring_line
+from pentapod.kinematics.proofs.ring_kernels import norm, ring_bend, ring_line
 from pentapod.numerics.kernels import kernel
 
 ROUND = 2.0**-46
-"""Lemma 4 of docs/proofs.md: a result of fewer than 100 operations on products of size A is off by less than this
+"""Lemma 4 of docs/proofs.md: a result of fewer than 100 operations on products of size A has a smaller error than this
 times A."""
 
 
 @kernel
-def line(
+def fill_line(
     start: Floats,
     end: Floats,
     geometry: Floats,
@@ -29,12 +34,9 @@ def line(
     change: Floats,
     step: Floats,
     jacobian: Floats,
-    rings: Floats,
+    rings: Floats | None,
 ) -> None:
-    """Fill the vectors of the legs at both ends and their change (5, 3), the poses' (6,), the middle's Jacobian.
-
-    rings (5, 8): filled for legs that end on rings, by `ring_line`; their vectors lead to the rings' centres.
-    """
+    """Fill the line from start to end, the Jacobian (6, 6) in its middle, and rings: vectors lead to their centres."""
     for r in range(6):
         step[r] = end[r] - start[r]
     for j in range(5):
@@ -48,15 +50,15 @@ def line(
             jacobian[j, 3 + n] = offset * jacobian[j, n]
     for n in range(3):
         jacobian[5, 3 + n] = 0.5 * (start[3 + n] + end[3 + n])
-    if geometry[5, 4] > 0.0:
+    if rings is not None:
         for j in range(5):
-            if geometry[j, 4] > 0.0:
-                ring_line(first[j], second[j], start, end, geometry[j, 3], geometry[j, 4], jacobian[j], rings[j])
+            if rings[j, 8] > 0.0:
+                ring_line(first[j], second[j], start, end, geometry[j, 3], jacobian[j], rings[j])
 
 
 @kernel
 def invert(matrix: Floats, work: Floats, inverse: Floats) -> bool:
-    """Fill the inverse of matrix (6, 6) by elimination; False where there is none. What it is worth, `rest` tells."""
+    """Fill the inverse of matrix (6, 6) by elimination; False where it is singular. `defect` bounds its error."""
     work[:, :6], work[:, 6:] = matrix, 0.0
     for r in range(6):
         work[r, 6 + r] = 1.0
@@ -81,8 +83,8 @@ def invert(matrix: Floats, work: Floats, inverse: Floats) -> bool:
 
 
 @kernel
-def defect(inverse: Floats, jacobian: Floats, rest: Floats) -> None:
-    """Fill upper bounds (6, 6) of |1 − C J| in the middle."""
+def fill_defect(inverse: Floats, jacobian: Floats, defect: Floats) -> None:
+    """Fill upper bounds of |1 − C J| in the middle."""
     for r in range(6):
         for c in range(6):
             total = 1.0 if r == c else 0.0
@@ -90,16 +92,16 @@ def defect(inverse: Floats, jacobian: Floats, rest: Floats) -> None:
             for n in range(6):
                 total -= inverse[r, n] * jacobian[n, c]
                 large += abs(inverse[r, n] * jacobian[n, c])
-            rest[r, c] = abs(total) + ROUND * large
+            defect[r, c] = abs(total) + ROUND * large
 
 
 @kernel
 def enclosed(
     y: Floats,
-    rest: Floats,
     inverse: Floats,
+    defect: Floats,
     geometry: Floats,
-    rings: Floats,
+    rings: Floats | None,
     change: Floats,
     step: Floats,
     spread: Floats,
@@ -107,10 +109,14 @@ def enclosed(
     z: Floats,
     bound: Floats,
 ) -> bool:
-    """Return whether Krawczyk's operator maps a box around the line into itself; bound (6,): its distance."""
+    """Return whether Krawczyk's operator maps a box around the line into itself.
+
+    y (6,): bounds of |C G| on the line. Filled are z (6,), |1 − C J| times the box, and bound (6,), the solution's
+    distance.
+    """
     radius = inflated(y, geometry[5, 2])
-    spreads(geometry, change, step, radius, ROUND * geometry[5, 2], spread, spread_i)
-    mapped(rest, inverse, geometry, rings, spread, spread_i, radius, z)
+    fill_spread(geometry, change, step, radius, spread, spread_i)
+    contracted(inverse, defect, geometry, rings, spread, spread_i, radius, z)
     for r in range(6):
         bound[r] = y[r] + z[r]
         if not bound[r] < radius[r]:
@@ -120,7 +126,7 @@ def enclosed(
 
 @kernel
 def inflated(bound: Floats, size: float) -> Floats:
-    """Return a box (6,) larger than this one, in every direction."""
+    """Return a box (6,) that is larger than this one in every direction."""
     largest = 2.0**-50
     for r in range(6):
         largest = max(largest, bound[r] / (size if r < 3 else 1.0))
@@ -131,10 +137,11 @@ def inflated(bound: Floats, size: float) -> Floats:
 
 
 @kernel
-def spreads(
-    geometry: Floats, change: Floats, step: Floats, radius: Floats, rounding: float, spread: Floats, spread_i: Floats
+def fill_spread(
+    geometry: Floats, change: Floats, step: Floats, radius: Floats, spread: Floats, spread_i: Floats
 ) -> None:
-    """Fill how far each leg's vector (5, 3) and i (3,) may be from those in the middle, within the radius."""
+    """Fill by how much the legs' vectors and i may differ from those in the middle, in boxes of this radius."""
+    rounding = ROUND * geometry[5, 2]
     for n in range(3):
         spread_i[n] = 0.5 * abs(step[3 + n]) + radius[3 + n] + ROUND
         for j in range(5):
@@ -143,11 +150,11 @@ def spreads(
 
 
 @kernel
-def mapped(
-    rest: Floats,
+def contracted(
     inverse: Floats,
+    defect: Floats,
     geometry: Floats,
-    rings: Floats,
+    rings: Floats | None,
     spread: Floats,
     spread_i: Floats,
     v: Floats,
@@ -158,48 +165,34 @@ def mapped(
     for r in range(6):
         out[r] = abs(inverse[r, 5]) * across_i
         for c in range(6):
-            out[r] += rest[r, c] * v[c]
+            out[r] += defect[r, c] * v[c]
     for j in range(5):
         across, offset = 0.0, abs(geometry[j, 3])
         for n in range(3):
             across += spread[j, n] * (v[n] + offset * v[3 + n])
         for r in range(6):
             out[r] += abs(inverse[r, j]) * across
-    if geometry[5, 4] > 0.0:
-        _add_rings(inverse, geometry, rings, spread, spread_i, v, out)
+    if rings is not None:
+        for j in range(5):
+            if rings[j, 8] > 0.0:
+                region = ring_region(spread[j], spread_i, abs(geometry[j, 3]))
+                across = rings[j, 8] * ring_bend(rings[j], region, region, (norm(v[:3]), norm(v[3:])))
+                for r in range(6):
+                    out[r] += abs(inverse[r, j]) * across
     for r in range(6):
         out[r] *= 1.0 + ROUND
 
 
 @kernel
-def _add_rings(
-    inverse: Floats, geometry: Floats, rings: Floats, spread: Floats, spread_i: Floats, v: Floats, out: Floats
-) -> None:
-    """Add to `mapped` what the bend of ρ makes of v."""
-    for j in range(5):
-        if geometry[j, 4] > 0.0:
-            region = about(spread[j], spread_i, abs(geometry[j, 3]))
-            across = geometry[j, 4] * ring_bend(rings[j], region, region, (norm(v[:3]), norm(v[3:])))
-            for r in range(6):
-                out[r] += abs(inverse[r, j]) * across
-
-
-@kernel
-def about(spread: Floats, spread_i: Floats, offset: float) -> tuple[float, float]:
-    """Return by how much d = p − a and i differ from those in the middle, at most, where leg's vector and i do so."""
+def ring_region(spread: Floats, spread_i: Floats, offset: float) -> tuple[float, float]:
+    """Return by how much d = p − a and i may differ from those in the middle, where the leg's vector and i do so."""
     turn = norm(spread_i)
     return norm(spread) + offset * turn, turn
 
 
 @kernel
-def norm(a: Floats) -> float:
-    """Return the length of a vector (3,)."""
-    return np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-
-
-@kernel
 def angle_within(distance: float) -> float:
-    """Return the largest angle, radians, between a unit vector and one whose tip is no farther from its tip than this.
+    """Return the largest angle, radians, between a unit vector and a vector whose tip is at most this far from its tip.
 
     Lemma 8 of docs/proofs.md: the sine is at most the distance, and from a distance of 1 on any angle is possible.
     """
@@ -208,13 +201,12 @@ def angle_within(distance: float) -> float:
 
 
 @kernel
-def sided(
-    start: Floats, end: Floats, bound: Floats, delta: float, lever: float, signs: Floats, size: float, quadratic: float
-) -> bool:
+def sided(start: Floats, end: Floats, bound: Floats, signs: Floats, geometry: Floats) -> bool:
     """Return whether w and S have these signs all over the tube of this radius around the line.
 
     Outside the quadratic family there is no S, and w has the sign that it has at the start.
     """
+    delta, lever, size, quadratic = geometry[5, 0], geometry[5, 1], geometry[5, 2], geometry[5, 3]
     if quadratic == 0.0:
         side = 1.0 if start[5] > 0.0 else -1.0
         return min(side * start[5], side * end[5]) - bound[5] > 4.0 * ROUND

@@ -19,11 +19,11 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Bools, Floats, Ints, as_batch, as_floats
 from pentapod.base.errors import ArrayError
 from pentapod.base.values import Value
-from pentapod.kinematics.answers import Answers, BranchProof, ProvenMeasure
 from pentapod.kinematics.batches import as_motion
+from pentapod.kinematics.proof_results import BranchProof, ProofResult, ProvenMeasure
 from pentapod.kinematics.tubes.continuation import carry
 from pentapod.kinematics.tubes.jacobian_sign import proven_sides
-from pentapod.kinematics.tubes.leg_equations import BuiltLegs, Legs, mids
+from pentapod.kinematics.tubes.leg_equations import BuiltLegs, Legs, length_scale, mids
 from pentapod.kinematics.tubes.newton import newton
 from pentapod.kinematics.tubes.tube import LegFamily
 from pentapod.numerics.ball_bernstein import blossom, hull, restricted, stack
@@ -32,7 +32,7 @@ from pentapod.numerics.blocks import blocks
 
 
 @dataclass(frozen=True, eq=False)
-class MotionProof(Value, Answers):
+class MotionProof(Value, ProofResult):
     """What is proven of N intervals of a motion of the legs.
 
     proven (N,): from the exact pose next to the interval's first one in `position` and `direction` the motion is
@@ -92,7 +92,7 @@ def certify_motion(
     if n == 0:
         nothing = np.zeros(0, dtype=bool)
         return MotionProof(nothing, nothing, p.copy(), i.copy(), *(np.ones(0) for _ in range(4)))
-    scale, out = machine.scale, np.full((4, n), np.nan)
+    scale, out = length_scale(machine), np.full((4, n), np.nan)
     ends = np.concatenate([coefficients[:, :, 0], coefficients[-1:, :, -1]]).T - machine.zeros[:, None]
     with np.errstate(all="ignore"):
         route = _Motion(machine, np.moveaxis(coefficients, 0, -1), leg_error)
@@ -157,7 +157,7 @@ class _Motion:
 
     def __init__(self, machine: BuiltLegs, coefficients: Floats, leg_error: float) -> None:
         self.base = Ball.exact(machine.base_joints.T[..., None])
-        self.offsets, self.radii = Ball.exact(machine.line_heights[:, None]), Ball.exact(machine.radii[:, None])
+        self.offsets, self.radii = Ball.exact(machine.offsets[:, None]), Ball.exact(machine.radii[:, None])
         self.rings = (machine.radii != 0.0)[:, None]
         readings = np.moveaxis(coefficients, 1, 0)  # (k + 1, 5, N)
         self.coefficients = Ball.exact(readings) - machine.zeros[:, None]

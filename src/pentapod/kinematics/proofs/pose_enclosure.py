@@ -43,7 +43,7 @@ def pose_enclosure(
     p, i = as_batch(position, "position", (None, 3)), as_batch(direction, "direction", (None, 3))
     legs, along = as_batch(lengths, "lengths", (None, None, 5)), as_batch(offsets, "offsets", (None,))
     with np.errstate(all="ignore"):
-        z, legs = robot.line_heights, legs - robot.zeros
+        z, legs = robot.offsets, legs - robot.zeros
         d = p[..., None, :] + z[:, None] * i[..., None, :] - robot.base_joints
         # Where the base is far off, d has lost digits: by so many metres each vector may be wrong (N, 5).
         far = np.linalg.norm(p, axis=1)[:, None] + np.linalg.norm(robot.base_joints, axis=1) + 2.0 * np.abs(z)

@@ -146,7 +146,7 @@ def _prove(
     """
     k, count = len(legs.mid) - 1, legs.mid.shape[-1]
     p, i = _fitted(pentapod, legs, signs, k + 3)
-    offsets = pentapod.line_heights[:, None, None]
+    offsets = pentapod.offsets[:, None, None]
     attachments = pentapod.base_joints[..., None]
     joints = Ball.exact(p)[:, None] + Ball.exact(i)[:, None] * offsets - attachments  # (m + 1, 5, 3, N)
     squares = multiply(joints, joints)
@@ -155,7 +155,7 @@ def _prove(
     unit = (_sum(multiply(Ball.exact(i), Ball.exact(i)), 1) - 1.0) * 0.5
 
     middle = [blossom(x, [np.full(count, 0.5)] * (len(p) - 1)).mid for x in (joints, Ball.exact(i))]
-    inverse = invert(_jacobian(middle[0], middle[1], pentapod.line_heights), np.nan)  # (N, 6, 6)
+    inverse = invert(_jacobian(middle[0], middle[1], pentapod.offsets), np.nan)  # (N, 6, 6)
     columns = Ball(
         np.concatenate([g.mid, unit.mid[:, None]], axis=1).transpose(2, 1, 0),
         np.concatenate([g.rad, unit.rad[:, None]], axis=1).transpose(2, 1, 0),
@@ -174,7 +174,7 @@ def _prove(
     rough = hull(joints).widened((radius[:, :3].T + np.abs(offsets) * radius[:, 3:].T) * _UP)
     narrow = rough.rad < rows.rad  # both enclose the same; their own curves are narrower where p and i move together
     rows = Ball(np.where(narrow, rough.mid, rows.mid), np.where(narrow, rough.rad, rows.rad))
-    z = (np.eye(6) - inverse @ _ball_jacobian(rows, i_hull, pentapod.line_heights)).magnitude
+    z = (np.eye(6) - inverse @ _ball_jacobian(rows, i_hull, pentapod.offsets)).magnitude
     error = (y + np.einsum("nij,nj->ni", z, radius) * _UP) * _UP
     w, s = i_hull[2], _s(pentapod, p_hull, i_hull)
     sided = ((w * signs[0]).lower > 0.0) & ((s * signs[1]).lower > 0.0)
@@ -215,7 +215,7 @@ def _ball_jacobian(rows: Ball, i: Ball, offsets: Floats) -> Ball:
 def _s(pentapod: PosedQuadraticLegs, p: Ball, i: Ball) -> Ball:
     """Return S (N,) of p and i (3, N): see `quadratic.w_and_s`, with z_3 − δ x_3 rounded outwards."""
     delta = pentapod.delta
-    lever = Ball.exact(pentapod.line_heights[2]) - Ball.exact(pentapod.base_joints[2, 0]) * delta
+    lever = Ball.exact(pentapod.offsets[2]) - Ball.exact(pentapod.base_joints[2, 0]) * delta
     return i[2] * p[0] * delta + (1.0 - i[0] * delta) * p[2] + lever * i[2]
 
 

@@ -37,7 +37,7 @@ class BuiltLegs(Protocol):
         ...
 
     @property
-    def line_heights(self) -> Floats:
+    def offsets(self) -> Floats:
         """The heights of the platform joints along the line (5,)."""
         ...
 
@@ -49,11 +49,6 @@ class BuiltLegs(Protocol):
     @property
     def zeros(self) -> Floats:
         """What the readings are more than the lengths (5,)."""
-        ...
-
-    @property
-    def scale(self) -> float:
-        """Metres that count as much as a radian."""
         ...
 
 
@@ -111,6 +106,13 @@ class Rows(Generic[Q]):
     by_direction: Q
     e: Q
     rho: Q
+
+
+def length_scale(robot: BuiltLegs) -> float:
+    """Return the metres that count as much as a radian: the base's radius, rounded to a power of two."""
+    joints = robot.base_joints
+    size = np.linalg.norm(joints - joints.mean(axis=0), axis=1).max()
+    return float(2.0 ** np.round(np.log2(size)))
 
 
 def dot(a: Q, b: Q) -> Q:

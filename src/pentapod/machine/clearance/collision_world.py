@@ -59,7 +59,7 @@ class CollisionWorld(Value):
         be in the part and still count as clear. Raises MachineError where the tool is too long for the machine.
         """
         body = mounted(tool.solids, machine)
-        room = machine.tool_length - float(machine.robot.line_heights.max())
+        room = machine.tool_length - float(machine.robot.offsets.max())
         if body and max(solid.high for solid in body) > room:
             raise MachineError(
                 "the tool stands above the lowest platform joint",
@@ -137,7 +137,7 @@ class MovingBodies:
 
 def spindle_ends(machine: Machine) -> tuple[float, float]:
     """Return the offsets along the platform line of the spindle's top and of its nose, metres."""
-    return float(machine.robot.line_heights.min()), machine.tool_length - machine.bodies.shaft_end
+    return float(machine.robot.offsets.min()), machine.tool_length - machine.bodies.shaft_end
 
 
 def mounted(solids: Sequence[Solid], machine: Machine) -> tuple[Solid, ...]:

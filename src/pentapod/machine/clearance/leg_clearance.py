@@ -36,7 +36,7 @@ def clearances(machine: Machine, position: ArrayLike, direction: ArrayLike) -> F
 
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     short = base + vectors * np.maximum(1.0 - bodies.joint_radius / length, 0.0)
-    top = p + robot.line_heights.min() * i
+    top = p + robot.offsets.min() * i
     nose = p + (machine.tool_length - bodies.shaft_end) * i
     shaft = segment_distance(base, short, top[..., None, :], nose[..., None, :])
     return np.concatenate([legs, shaft - bodies.leg_radius - bodies.shaft_radius], axis=-1)

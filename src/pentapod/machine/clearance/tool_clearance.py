@@ -32,8 +32,8 @@ def leg_spindle_gap(machine: Machine, leg: int, cosine: Any, do: Arithmetic) -> 
     """
     bodies, robot = machine.bodies, machine.robot
     sine = _sine(cosine, do)
-    height = machine.tool_length - float(robot.line_heights[leg]) + bodies.joint_radius * cosine
-    top = machine.tool_length - float(robot.line_heights.min())
+    height = machine.tool_length - float(robot.offsets[leg]) + bodies.joint_radius * cosine
+    top = machine.tool_length - float(robot.offsets.min())
     beyond = do.most(do.most(height - top, bodies.shaft_end - height), 0.0)
     aside = bodies.joint_radius * sine
     return do.sqrt(aside * aside + beyond * beyond + _TINY) - bodies.shaft_radius - bodies.leg_radius
@@ -45,7 +45,7 @@ def leg_tool_gap(machine: Machine, solids: Sequence[Solid], leg: int, cosine: An
     cosine: of θ; length: of the leg, metres. Negative: by how much the leg runs below a rim of the solid, or the
     solid stands above the platform joint.
     """
-    joint = machine.tool_length - float(machine.robot.line_heights[leg])
+    joint = machine.tool_length - float(machine.robot.offsets[leg])
     sine = _sine(cosine, do)
     end_r, end_h = length * sine, joint + length * cosine
     gaps: list[Any] = []

@@ -19,7 +19,7 @@ def explain(report: MachineReport) -> str:
         f"{1e3 * work.height:.0f} mm height",
         f"    around ({centre}) mm; tool axes within {np.degrees(work.tilt):.3g}° of -z",
         f"  tool {1e3 * m.tool_length:.1f} mm from the line's origin, "
-        f"{1e3 * (m.tool_length - m.robot.line_heights.max()):.1f} mm beyond the lowest platform joint; "
+        f"{1e3 * (m.tool_length - m.robot.offsets.max()):.1f} mm beyond the lowest platform joint; "
         f"delta {as_quadratic(m.robot, 'this report').delta:.6g}",
         f"  rapids {6e4 * m.rapid_velocity:.0f} mm/min; a setpoint every {1e3 * m.controller.period:g} ms, "
         f"{m.controller.interpolation} between them",

@@ -98,7 +98,7 @@ def _near(scene: Scene, obstacle: Obstacle, tips: Floats, axes: Floats, frame: R
     """Return the poses (N, 3) in which the box around any body comes near the obstacle's box: most do not."""
     machine, tool, comforts = scene.machine, scene.collision_world.tool, scene.comforts
     robot, bodies = machine.robot, machine.bodies
-    base, heights = robot.base_joints, robot.line_heights
+    base, heights = robot.base_joints, robot.offsets
     if frame is not None:
         back = frame.inverse()
         tips, axes, base = back.apply(tips), back.rotate(axes), back.apply(base)

@@ -93,4 +93,4 @@ class ToolPose:
 def joints_of(robot: Robot) -> Joints:
     """Return where a robot's joints are; without their z where the base joints lie in the base plane."""
     base = robot.base_joints
-    return (base if np.any(base[:, 2]) else base[:, :2]).tolist(), robot.line_heights.tolist()
+    return (base if np.any(base[:, 2]) else base[:, :2]).tolist(), robot.offsets.tolist()

@@ -114,7 +114,7 @@ def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
 def line_offsets(machine: Machine, tool: tuple[Solid, ...]) -> Floats:
     """Return the offsets along the platform line that bodies move by: joints, spindle's ends, tool body's ends."""
     ends = [machine.tool_length - height for solid in tool for height in (solid.low, solid.high)]
-    return np.array([*machine.robot.line_heights, *spindle_ends(machine), *([min(ends), max(ends)] if ends else [])])
+    return np.array([*machine.robot.offsets, *spindle_ends(machine), *([min(ends), max(ends)] if ends else [])])
 
 
 def body_moves(stray: Stray, tool: tuple[Solid, ...], legs: int) -> Floats:

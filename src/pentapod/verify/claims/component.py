@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from functools import partial
 
-from pentapod.kinematics.answers import ProvenMeasure
+from pentapod.kinematics.proof_results import ProvenMeasure
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.interpolant import Interpolant, clamped_slopes
-from pentapod.kinematics.answers import BranchProof, Chords
+from pentapod.kinematics.proof_results import BranchProof, Chords
 from pentapod.machine.machine import Machine
 from pentapod.numerics.bernstein import split
 from pentapod.program.program import Program
@@ -129,7 +129,7 @@ def interval_bounds(
         found.component.see(machine.robot.prove(part.bernstein, ends, program.component, leg_error=leg_error), first)
         between = slice(2 * first, 2 * last)
         chords = _chords(found, machine, program, part, between, tilt_centre)
-        found.away[between], found.turned[between] = chords.away[:, 1], chords.turned
+        found.away[between], found.turned[between] = chords.deviations[:, 1], chords.angles
         found.speeds[between, :2] = chords.speeds[:, :2]
         found.speeds[between, 2] = chords.speeds[:, 2:].max(axis=1)
         found.speeds[between] /= 0.5 * program.period
@@ -176,7 +176,7 @@ def _chords(
 
     Of the tip, the tilt centre, and both ends of what the platform's line carries.
     """
-    tip, heights = machine.tool_length, machine.robot.line_heights
+    tip, heights = machine.tool_length, machine.robot.offsets
     halves = split(part.bernstein)
     legs = np.stack(halves, axis=1).reshape(-1, *part.bernstein.shape[1:])
     start, end = between, slice(between.start + 1, between.stop + 1)
@@ -185,6 +185,6 @@ def _chords(
         (found.position[start], found.direction[start]),
         (found.position[end], found.direction[end]),
         program.component,
-        arms=np.array([tip, tip - tilt_centre, heights.min(), max(heights.max(), tip)]),
-        towards=machine.joints.base_axes,
+        offsets=np.array([tip, tip - tilt_centre, heights.min(), max(heights.max(), tip)]),
+        base_axes=machine.joints.base_axes,
     )

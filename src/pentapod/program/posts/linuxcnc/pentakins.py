@@ -99,7 +99,7 @@ def parameters(machine: Machine, frame: RigidTransform) -> dict[str, float]:
             expected="a linear pentapod whose scales read the lengths of the legs", remedy="play the setpoints instead",
         )  # fmt: skip
     base = 1e3 * frame.apply(robot.base_joints)
-    joints = 1e3 * (machine.tool_length - robot.line_heights)
+    joints = 1e3 * (machine.tool_length - robot.offsets)
     found: dict[str, float] = {}
     for k in range(robot.n_legs):
         found |= {f"pentakins.base.{k}.{letter}": float(base[k, j]) for j, letter in enumerate("xyz")}
