@@ -20,18 +20,18 @@ from scipy.interpolate import make_interp_spline
 from timing_peers import copp_robot, highs, our_chain, socp, toppra_chain
 from timing_robots import drake_solver, ruckig_line
 
-from pentapod.timing.jerk.knots import law_knots
-from pentapod.timing.jerk.limited import jerk_limited
-from pentapod.timing.jerk.options import USUAL, JerkOptions
-from pentapod.timing.jerk.part import Part
-from pentapod.timing.jerk.problem import Problem as Pass
+from pentapod.timing.jerk.interval import Interval
+from pentapod.timing.jerk.jerk_limited import JerkProblem, jerk_limited
+from pentapod.timing.jerk.knots import place_knots
+from pentapod.timing.jerk.options import DEFAULTS, JerkOptions
 from pentapod.timing.jerk.rows import JerkRows
+from pentapod.timing.jerk.subproblem import Subproblem
 from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.topp.engine import fastest
 from pentapod.timing.topp.reference import solve as solve_by_toppra
 from pentapod.timing.topp.stages import Failure, Stages
 
-NO_MARKS = np.empty(0)
+NO_KINKS = np.empty(0)
 VELOCITY, ACCELERATION, JERK, FEED = 0.5, 5.0, 200.0, 0.1
 
 
@@ -148,13 +148,13 @@ def core(sizes: list[int]) -> None:
                 print(f"{'':28s} copp-py {1e6 * theirs / n:.2f} µs: {theirs / ours:.1f} times; durations {same:.1e}")
 
 
-def one_pass(p: Problem, x: np.ndarray) -> tuple[Pass, float, float]:
+def one_pass(p: Problem, x: np.ndarray) -> tuple[Subproblem, float, float]:
     """Return a pass as the product makes it, and its seconds: as the first one, and as the next."""
-    part = Part.of(p.s, x, p.jerk_rows, NO_MARKS, (False, False), 0.0)
-    problem = Pass.on(part, law_knots(part, x, 1.0))
-    start, around = problem.start(), np.minimum(problem.top, problem.ramps)
-    problem.improved(start, around, 0)
-    first, y = best(lambda: problem.improved(start, around, 0), 3)
+    interval = Interval.of(p.s, x, p.jerk_rows, NO_KINKS, (False, False), 0.0)
+    problem = Subproblem.on(interval, place_knots(interval, x, 1.0))
+    start, x_k = problem.start(), np.minimum(problem.top, problem.ramps)
+    problem.improved(start, x_k, 0)
+    first, y = best(lambda: problem.improved(start, x_k, 0), 3)
     if not isinstance(y, np.ndarray):
         raise SystemExit("the first pass finds no law")
     inside = np.maximum(problem.values(y)[:, 0], 1e-9 * x.max())
@@ -169,15 +169,15 @@ def jerk(n: int) -> None:
         x = p.solved("core")
         problem, first, later = one_pass(p, x)
         count, durations, used = len(problem.s), [], 0.0
-        for passes in (1, 2, USUAL.passes):
+        for passes in (1, 2, DEFAULTS.passes):
             used, profile = best(
-                lambda k=passes, p=p, x=x: jerk_limited(p.s, x, p.jerk_rows, NO_MARKS, options=JerkOptions(k)), 2
+                lambda k=passes, p=p, x=x: jerk_limited(JerkProblem(p.s, x, p.jerk_rows, NO_KINKS, JerkOptions(k))), 2
             )
             durations.append(MotionLaw.through(profile.s, profile.x, profile.slope).duration)
         print(
             f"{kind:7s} {count:8d} gridpoints, jerk: first pass {1e6 * first / count:.1f} µs, the next "
             f"{1e6 * later / count:.1f} µs; the whole law {1e6 * used / n:.1f} µs for each of {n} gridpoints given; "
-            f"durations with at most 1, 2, {USUAL.passes} passes: " + ", ".join(f"{d:.4f}" for d in durations)
+            f"durations with at most 1, 2, {DEFAULTS.passes} passes: " + ", ".join(f"{d:.4f}" for d in durations)
             + f" s (without jerk limits {p.duration(x):.4f} s)",
             flush=True,
         )  # fmt: skip
@@ -197,7 +197,7 @@ def jerk_peers(n: int) -> None:
         if peer := copp_robot(p.s, p.q, (VELOCITY, ACCELERATION, JERK), p.feed):
             solves, durations = socp(peer, x, p.s, 6)
             used, _ = best(solves[0], 1)
-            profile = jerk_limited(p.s, x, p.jerk_rows, NO_MARKS)
+            profile = jerk_limited(JerkProblem(p.s, x, p.jerk_rows, NO_KINKS))
             ours = MotionLaw.through(profile.s, profile.x, profile.slope).duration
             line += f"; TOPP3-SOCP {1e6 * used / len(p.s):.0f} µs: {used / len(p.s) / (first / count):.0f} times; "
             line += f"durations {ours:.4f} s, SOCP's " + ", ".join(f"{d:.4f}" for d in durations)
@@ -268,7 +268,7 @@ def line(n: int) -> None:
         jerks = np.stack([0.0 * q1, 0.0 * q1, 0.5 * q1], axis=-1) / JERK
         return JerkRows(q1 / ACCELERATION, 0.0 * q1, np.zeros((1, 5)), jerks, np.full(len(s), bound[0]))
 
-    ours, profile = best(lambda: jerk_limited(s, x, rows, NO_MARKS), 3)
+    ours, profile = best(lambda: jerk_limited(JerkProblem(s, x, rows, NO_KINKS)), 3)
     seconds = MotionLaw.through(profile.s, profile.x, profile.slope).duration
     print(
         f"line    {len(profile.s):8d} gridpoints with jerk limits, from rest to rest: {seconds:.5f} s in "
@@ -283,7 +283,7 @@ def million(n: int) -> None:
     x = p.solved("core")
     s, base = p.s, p.s[-1]
     start, wall = time.process_time(), time.perf_counter()
-    profile = jerk_limited(s, x, p.jerk_rows, NO_MARKS)
+    profile = jerk_limited(s, x, p.jerk_rows, NO_KINKS)
     MotionLaw.through(profile.s, profile.x, profile.slope)
     count = len(profile.s)
     used = time.process_time() - start

@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_array, vstack
 
 from pentapod.base.refusal import Refusal
-from pentapod.timing.jerk.problem import Problem
+from pentapod.timing.jerk.subproblem import Subproblem
 from pentapod.timing.waypoints import through_waypoints
 
 FAR = 1e3
@@ -60,7 +60,7 @@ def socp(peer, x: np.ndarray, s: np.ndarray, rounds: int) -> tuple[list[Callable
     return solves, durations
 
 
-def highs(problem: Problem) -> Callable[[], object]:
+def highs(problem: Subproblem) -> Callable[[], object]:
     """Return how HiGHS takes a first pass of a problem; the objective is linear about the same x."""
     y, rows = problem.start(), problem.rows
     around = np.minimum(problem.top, problem.ramps)

@@ -11,13 +11,14 @@ from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal, stage
 from pentapod.machine.machine import Machine
-from pentapod.timing.jerk.options import USUAL, JerkOptions
+from pentapod.timing.jerk.options import DEFAULTS, JerkOptions
 from pentapod.timing.limits.limit import Limit
 from pentapod.timing.limits.limits import Limits
 from pentapod.timing.path.path import LegPathLike
 from pentapod.timing.pieces.boundary_speeds import whole_periods
-from pentapod.timing.pieces.piece import PieceProfile, time_piece
-from pentapod.timing.pieces.sampled import WINDOW_PERIODS, Unmended, sampled_laws
+from pentapod.timing.pieces.piece import PieceProfile
+from pentapod.timing.pieces.refinement import time_piece
+from pentapod.timing.pieces.repair import WINDOW_PERIODS, NotRepaired, repaired_laws
 from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.time_law.refusals import STILL_M, refusal, unfit
 from pentapod.timing.time_law.slowed import slowed
@@ -39,7 +40,7 @@ def retime(
     start_speed: float = 0.0,
     end_speed: float = 0.0,
     limits: Sequence[Limit] = (),
-    jerk_options: JerkOptions = USUAL,
+    jerk_options: JerkOptions = DEFAULTS,
 ) -> Trajectory | Refusal:
     """Return the fastest trajectory along a path, or the named cause why there is none.
 
@@ -91,15 +92,15 @@ def retime(
     for k in indices:
         speeds = (start_speed if k == indices[0] else 0.0, end_speed if k == indices[-1] else 0.0)
         slacks = (0.5 * velocity_margin, 0.7 * acceleration_margin)
-        profile = time_piece(path.pieces[k], kept, *slacks, engine, speeds, jerk_options)
+        profile = time_piece(path.pieces[k], kept, *slacks, engine, speeds)
         if isinstance(profile, Failure):
             return refusal(path, k, profile)
         profiles.append(profile)
         done += path.pieces[k].length
         progress("timing", done / total, f"piece {len(profiles)} of {len(indices)}")
     if cubic or limit_jerk or goes_on:
-        smoothed = sampled_laws(profiles, machine, dwells, smooth=limit_jerk)
-        if isinstance(smoothed, Unmended):
+        smoothed = repaired_laws(profiles, machine, dwells, jerk_options if limit_jerk else None)
+        if isinstance(smoothed, NotRepaired):
             return refusal(path, indices[smoothed.index], smoothed.failure)
         profiles, laws, firsts = smoothed.profiles, smoothed.laws, smoothed.firsts
     else:

@@ -8,7 +8,7 @@ from test_retime import PATHS
 from timing_paths import Path, machine, straight
 
 from pentapod.timing import Trajectory, certify, retime
-from pentapod.timing.jerk.limited import jerk_limited
+from pentapod.timing.jerk.jerk_limited import JerkProblem, jerk_limited
 from pentapod.timing.jerk.options import JerkOptions
 from pentapod.timing.jerk.rows import JerkRows
 from pentapod.timing.time_law.motion_law import MotionLaw
@@ -97,7 +97,7 @@ def test_passes_improve_and_two_come_close(name):
     x = fastest(s, here.first, here.second, here.ceiling)
     laws = []
     for passes in (1, 2, 3, 8):
-        p = jerk_limited(s, x, rows, piece.knots, options=JerkOptions(passes=passes))
+        p = jerk_limited(JerkProblem(s, x, rows, piece.knots, JerkOptions(passes=passes)))
         law = MotionLaw.through(p.s, p.x, p.slope)
         laws.append(law)
         at = rows(p.s[1:-1])

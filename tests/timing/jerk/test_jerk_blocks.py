@@ -1,18 +1,17 @@
 """Jerk limits block by block: near the law of the whole, and within its limits."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
-from pentapod.timing.jerk import limited as jerk
-from pentapod.timing.jerk.limited import jerk_limited
+from pentapod.timing.jerk.jerk_limited import NO_AGREEMENT, JerkProblem, jerk_limited
+from pentapod.timing.jerk.options import BlockOptions, JerkOptions
 from pentapod.timing.jerk.rows import JerkRows
 from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.topp.engine import fastest
 from pentapod.timing.topp.stages import Failure
 
-NO_MARKS = np.empty(0)
 SPEED, PUSH, JERK = 0.5, 5.0, 200.0
 
 
@@ -50,22 +49,20 @@ def duration(law):
     return MotionLaw.through(law.s, law.x, law.slope).duration
 
 
+def limited(s, x, **blocks):
+    """The jerk-limited law; blocks: options of the decomposition into blocks."""
+    return jerk_limited(JerkProblem(s, x, Waves(), np.empty(0), JerkOptions(blocks=BlockOptions(**blocks))))
+
+
 @pytest.fixture(scope="module")
 def whole():
     s, x = profile()
-    return s, x, jerk_limited(s, x, Waves(), NO_MARKS)
+    return s, x, limited(s, x)
 
 
-@pytest.fixture
-def small(monkeypatch):
-    monkeypatch.setattr(jerk, "BLOCK", 2500)
-    monkeypatch.setattr(jerk, "LEAD", 512)
-
-
-def test_blocks_find_the_law_of_the_whole(whole, small):
+def test_blocks_find_the_law_of_the_whole(whole):
     s, x, law = whole
-    blocked = jerk_limited(s, x, Waves(), NO_MARKS)
-    assert len(jerk.blocks(len(s), blocked.lead)) == 6
+    blocked = limited(s, x, size=2500, overlap=512)
     assert not np.array_equal(blocked.x, law.x)
     assert duration(blocked) == pytest.approx(duration(law), rel=1e-3)
     assert (np.diff(blocked.s) > 0.0).all()
@@ -88,42 +85,27 @@ def test_blocks_find_the_law_of_the_whole(whole, small):
         assert np.quantile(np.abs(push[1] - push[0]).max(axis=1) / (2 * h) / JERK, 0.999) < 1.03
 
 
-@pytest.mark.parametrize("answer", ["none", "another"])
-def test_where_blocks_do_not_agree_leads_get_longer(whole, monkeypatch, answer):
-    """Blocks that know too little of what is beyond their cuts, here by decree: no law, or one that is slower."""
+def test_overlap_of_blocks_grows_until_they_agree(whole):
     s, x, law = whole
-    monkeypatch.setattr(jerk, "BLOCK", 2500)
-    monkeypatch.setattr(jerk, "LEAD", 8)
-    monkeypatch.setattr(jerk, "_PASSAGE", 4)
-    solved = jerk.solved
-
-    def short_sighted(*arguments):
-        block, found = arguments[-1], solved(*arguments)
-        if block.low == 0 or block.begin - block.low >= 32:
-            return found
-        return replace(found, y=0.99 * found.y) if answer == "another" else Failure(-1, jerk.NOT_LIMITED)
-
-    monkeypatch.setattr(jerk, "solved", short_sighted)
-    blocked = jerk_limited(s, x, Waves(), NO_MARKS)
-    assert blocked.lead == 32
+    blocked = limited(s, x, size=2500, overlap=8, blend=4, agreement=2e-6)
+    assert blocked.overlap == 64
     assert duration(blocked) == pytest.approx(duration(law), rel=1e-3)
 
 
-def test_blocks_that_never_agree_have_no_law(whole, small, monkeypatch):
-    monkeypatch.setattr(jerk, "_AGREED", 0.0)
-    assert jerk_limited(*whole[:2], Waves(), NO_MARKS) == Failure(-1, jerk.APART)
+def test_blocks_that_never_agree_have_no_law(whole):
+    assert limited(*whole[:2], size=2500, overlap=512, agreement=0.0) == NO_AGREEMENT
 
 
 @pytest.mark.parametrize(("v", "w"), [(0.02, 0.0), (0.0, 0.03), (0.04, 0.02)])
 def test_given_speeds_at_the_ends(v, w):
     """Where the rest would be there is the given speed, and no acceleration."""
     s, x = profile(0.4, x_start=v * v, x_end=w * w)
-    law = jerk_limited(s, x, Waves(), NO_MARKS)
+    law = limited(s, x)
     assert not isinstance(law, Failure)
     assert law.s[0] == 0.0
     assert law.s[-1] == s[-1]
     for end, speed in ((0, v), (-1, w)):
         assert law.x[end] == pytest.approx(speed**2, rel=1e-9, abs=1e-300)
         assert abs(law.slope[end]) < 1e-9
-    resting = jerk_limited(*profile(0.4), Waves(), NO_MARKS)
+    resting = limited(*profile(0.4))
     assert duration(law) < duration(resting)

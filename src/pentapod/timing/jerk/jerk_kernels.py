@@ -1,7 +1,7 @@
-"""One convex pass below a jerk limit, compiled: a banded interior point method.
+"""Banded interior-point method for one convex subproblem of the jerk limits, compiled.
 
-x(s) = ṡ² is a cubic B-spline with coefficients y. At each gridpoint all that the rows ask is v = (x, x′, x″), three
-numbers of four coefficients; so a gridpoint's rows are summed into a 3×3 matrix before they meet the basis. Rows:
+x(s) = ṡ² is a cubic B-spline with coefficients y. At each gridpoint the rows depend on v = (x, x′, x″), three numbers
+of four coefficients; so a gridpoint's rows are summed into a 3×3 matrix before they meet the basis. Rows:
 |A₁ x′ + A₀ x − c| ≤ 1 (accelerations), r |J₂ x″ + J₁ x′ + J₀ x| + x / (2 x_k) ≤ 3/2 with r = √x_k (jerks, 1/√x
 replaced by its tangent at x_k, which lies below it), x ≤ top and x ≥ 0. Objective: the duration Σ w / √x itself.
 Mehrotra's predictor and corrector, from a start that need not be feasible.
@@ -9,93 +9,107 @@ Mehrotra's predictor and corrector, from a start that need not be feasible.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.numerics.kernels import kernel
 from pentapod.timing.jerk.spline_kernels import (
     BEND_BEND,
+    add_gradient,
+    add_hessian,
     factor_banded,
     solve_banded,
     spline_values,
-    spread,
-    spread_matrix,
 )
 
-_FLOOR = 1e-9
+LEAST_SHARE = 1e-9
 """x is held above this share of x_k."""
-_BREACH = 1e-7
+
+LARGEST_RESIDUAL = 1e-7
+"""Residual of a row below which the method may stop."""
+
+
+class Rows(NamedTuple):
+    """Rows ±p·v + lean x ≤ bound: p (N, P, 3), lean (N, P), bound (N, P, 2)."""
+
+    p: Floats
+    lean: Floats
+    bound: Floats
+
+
+class Iterate(NamedTuple):
+    """Slacks s and multipliers z (N, P, 2); off: residuals of the rows, then Δs; rest: of complementarity, then Δz."""
+
+    s: Floats
+    z: Floats
+    off: Floats
+    rest: Floats
 
 
 @kernel
-def _set_up(
-    a0: Floats,
-    a1: Floats,
-    c: Floats,
-    moves: int,
-    jerks: Floats,
-    around: Floats,
-    top: Floats,
-    p: Floats,
-    lean: Floats,
-    bound: Floats,
-) -> None:
-    """Fill the rows: ±p·v + lean x ≤ bound, p (N, P, 3), lean (N, P), bound (N, P, 2)."""
+def _rows(a0: Floats, a1: Floats, c: Floats, moves: int, jerks: Floats, x_k: Floats, top: Floats) -> Rows:
+    """Return all rows; arguments as for `minimise_duration`."""
     count, rows = a0.shape
     more = jerks.shape[1]
+    pairs = rows + more + 1
+    p, lean, bound = np.empty((count, pairs, 3)), np.empty((count, pairs)), np.empty((count, pairs, 2))
     for i in range(count):
         for j in range(rows):
             p[i, j, 0], p[i, j, 1], p[i, j, 2], lean[i, j] = a0[i, j], a1[i, j], 0.0, 0.0
             bound[i, j, 0], bound[i, j, 1] = 1.0 + c[i * moves, j], 1.0 - c[i * moves, j]
-        root = np.sqrt(around[i])
+        root = np.sqrt(x_k[i])
         for j in range(rows, rows + more):
             for d in range(3):
                 p[i, j, d] = root * jerks[i, j - rows, d]
-            lean[i, j] = 0.5 / around[i]
+            lean[i, j] = 0.5 / x_k[i]
             bound[i, j, 0], bound[i, j, 1] = 1.5, 1.5
         j = rows + more
         p[i, j, 0], p[i, j, 1], p[i, j, 2], lean[i, j] = 1.0 / top[i], 0.0, 0.0, 0.0
-        bound[i, j, 0], bound[i, j, 1] = 1.0, -_FLOOR * around[i] / top[i]
+        bound[i, j, 0], bound[i, j, 1] = 1.0, -LEAST_SHARE * x_k[i] / top[i]
+    return Rows(p, lean, bound)
 
 
 @kernel
-def _begin(p: Floats, lean: Floats, bound: Floats, v: Floats, warm: float, s: Floats, z: Floats) -> None:
-    """Fill slacks s and multipliers z (N, P, 2) to start from."""
+def _start(rows: Rows, v: Floats, level: float) -> Iterate:
+    """Return slacks and multipliers to start from, on a level, and room for the rest."""
+    p, lean, bound = rows
+    s, z, off, rest = np.empty_like(bound), np.empty_like(bound), np.empty_like(bound), np.empty_like(bound)
     for i in range(len(v)):
         for j in range(p.shape[1]):
             q = p[i, j, 0] * v[i, 0] + p[i, j, 1] * v[i, 1] + p[i, j, 2] * v[i, 2]
             e = lean[i, j] * v[i, 0]
-            s[i, j, 0] = max(bound[i, j, 0] - q - e, warm)
-            s[i, j, 1] = max(bound[i, j, 1] + q - e, warm)
-            z[i, j, 0], z[i, j, 1] = warm * 0.1 / s[i, j, 0], warm * 0.1 / s[i, j, 1]
+            s[i, j, 0] = max(bound[i, j, 0] - q - e, level)
+            s[i, j, 1] = max(bound[i, j, 1] + q - e, level)
+            z[i, j, 0], z[i, j, 1] = level * 0.1 / s[i, j, 0], level * 0.1 / s[i, j, 1]
+    return Iterate(s, z, off, rest)
 
 
 @kernel
 def _assemble(
     basis: Floats,
     first: Ints,
-    p: Floats,
-    lean: Floats,
-    bound: Floats,
+    rows: Rows,
     weight: Floats,
-    around: Floats,
+    x_k: Floats,
     v: Floats,
-    s: Floats,
-    z: Floats,
-    off: Floats,
+    iterate: Iterate,
     band: Floats,
     right: Floats,
     down: Floats,
 ) -> tuple[float, float, float]:
-    """Fill the Newton matrix, the dual residual `right`, the predictor's `down` and the rows' residuals `off`.
+    """Fill the Newton matrix `band`, the dual residual `right`, the predictor's `down` and the rows' residuals.
 
     Returns Σ s z, the objective and the largest residual.
     """
+    p, lean, bound = rows
+    s, z, off, _ = iterate
     band[:], right[:], down[:] = 0.0, 0.0, 0.0
     g, g2, h = np.empty(3), np.empty(3), np.empty(6)
-    total, breach, objective = 0.0, 0.0, 0.0
+    total, largest, objective = 0.0, 0.0, 0.0
     for i in range(len(first)):
-        x = max(v[i, 0], 1e-6 * around[i])
+        x = max(v[i, 0], 1e-6 * x_k[i])
         power = weight[i] / (x * np.sqrt(x))
         objective += power * x
         g[0], g[1], g[2] = -0.5 * power, 0.0, 0.0
@@ -110,7 +124,7 @@ def _assemble(
                 si, zi = s[i, j, side], z[i, j, side]
                 rp = sign * q + e + si - bound[i, j, side]
                 off[i, j, side] = rp
-                breach = max(breach, abs(rp))
+                largest = max(largest, abs(rp))
                 total += si * zi
                 w = zi / si
                 t = w * rp - zi
@@ -124,14 +138,14 @@ def _assemble(
                 h[4] += w1 * p2
                 h[BEND_BEND] += w * p2 * p2
                 sign = -1.0
-        spread(basis, i, g, first[i], right)
-        spread(basis, i, g2, first[i], down)
-        spread_matrix(basis, i, h, first[i], band)
-    return total, objective, breach
+        add_gradient(basis, i, g, first[i], right)
+        add_gradient(basis, i, g2, first[i], down)
+        add_hessian(basis, i, h, first[i], band)
+    return total, objective, largest
 
 
 @kernel
-def _hold(band: Floats, fixed: Ints) -> None:
+def _fix(band: Floats, fixed: Ints) -> None:
     """Take the fixed coefficients out of the matrix, and keep its factor from breaking down by rounding."""
     n = len(fixed)
     for k in range(n):
@@ -146,10 +160,10 @@ def _hold(band: Floats, fixed: Ints) -> None:
 
 
 @kernel
-def _predict(
-    p: Floats, lean: Floats, dv: Floats, s: Floats, z: Floats, off: Floats, product: Floats
-) -> tuple[float, float]:
+def _predict(rows: Rows, dv: Floats, iterate: Iterate) -> tuple[float, float]:
     """Fill Δs Δz of the step to the boundary; return Σ s z now and after that step."""
+    p, lean, _ = rows
+    s, z, off, product = iterate
     primal, dual = 1.0, 1.0
     sz, szd, sdz, dd = 0.0, 0.0, 0.0, 0.0
     for i in range(len(dv)):
@@ -175,19 +189,10 @@ def _predict(
 
 
 @kernel
-def _correct(
-    basis: Floats,
-    first: Ints,
-    p: Floats,
-    lean: Floats,
-    s: Floats,
-    z: Floats,
-    off: Floats,
-    product: Floats,
-    aim: float,
-    down: Floats,
-) -> None:
-    """Fill the corrector's `down`; product becomes the complementarity residual s z − aim + Δs Δz."""
+def _correct(basis: Floats, first: Ints, rows: Rows, iterate: Iterate, aim: float, down: Floats) -> None:
+    """Fill the corrector's `down`, and the complementarity residual s z − aim + Δs Δz."""
+    p, lean, _ = rows
+    s, z, off, product = iterate
     down[:] = 0.0
     g = np.empty(3)
     for i in range(len(first)):
@@ -203,12 +208,14 @@ def _correct(
                 g[1] += t * sign * p[i, j, 1]
                 g[2] += t * sign * p[i, j, 2]
                 sign = -1.0
-        spread(basis, i, g, first[i], down)
+        add_gradient(basis, i, g, first[i], down)
 
 
 @kernel
-def _step(p: Floats, lean: Floats, dv: Floats, s: Floats, z: Floats, off: Floats, rest: Floats) -> tuple[float, float]:
-    """Turn `off` into Δs and `rest` into Δz; return how far each may go."""
+def _step(rows: Rows, dv: Floats, iterate: Iterate) -> tuple[float, float]:
+    """Turn the residuals into Δs and Δz; return how far each may go."""
+    p, lean, _ = rows
+    s, z, off, rest = iterate
     primal, dual = 1e300, 1e300
     for i in range(len(dv)):
         for j in range(p.shape[1]):
@@ -236,7 +243,7 @@ def _newton(band: Floats, right: Floats, down: Floats, fixed: Ints, step: Floats
 
 
 @kernel
-def convex_pass(
+def minimise_duration(
     basis: Floats,
     first: Ints,
     a0: Floats,
@@ -244,57 +251,48 @@ def convex_pass(
     c: Floats,
     moves: int,
     jerks: Floats,
-    around: Floats,
+    x_k: Floats,
     top: Floats,
     weight: Floats,
     fixed: Ints,
-    warm: float,
-    most: int,
+    level: float,
+    iterations: int,
     tolerance: float,
     y: Floats,
-) -> tuple[int, float, float]:
+) -> tuple[bool, float, float]:
     """Improve the coefficients y (n,) in their place; those marked 1 in `fixed` (n,) stay.
 
-    a0, a1 (N, R): A₀ and A₁; c (N, R), or (1, R) where `moves` is 0; jerks (N, K, 3): J₀, J₁, J₂; around (N,): x_k;
-    top, weight (N,). warm: slacks and multipliers start on that level. Returns the iterations, or −1 where `most` did
-    not converge, the gap over the objective, and the largest breach of a row.
+    a0, a1 (N, R): A₀ and A₁; c (N, R), or (1, R) where `moves` is 0; jerks (N, K, 3): J₀, J₁, J₂; x_k, top, weight
+    (N,). level: where slacks and multipliers start. Returns whether the method converged, the duality gap over the
+    objective, and the largest residual of a row.
     """
     count, n = len(first), len(y)
-    pairs = a0.shape[1] + jerks.shape[1] + 1
-    p, lean, bound = np.empty((count, pairs, 3)), np.empty((count, pairs)), np.empty((count, pairs, 2))
-    s, z = np.empty((count, pairs, 2)), np.empty((count, pairs, 2))
-    off, rest = np.empty((count, pairs, 2)), np.empty((count, pairs, 2))
     v, dv, band = np.empty((count, 3)), np.empty((count, 3)), np.empty((n, 4))
     right, down, step = np.empty(n), np.empty(n), np.empty(n)
-    _set_up(a0, a1, c, moves, jerks, around, top, p, lean, bound)
+    rows = _rows(a0, a1, c, moves, jerks, x_k, top)
     spline_values(basis, first, y, v)
-    _begin(p, lean, bound, v, warm, s, z)
-    gap, breach = np.inf, np.inf
-    for attempt in range(most):
-        total, objective, breach = _assemble(
-            basis, first, p, lean, bound, weight, around, v, s, z, off, band, right, down
-        )
+    iterate = _start(rows, v, level)
+    s, z, off, rest = iterate
+    gap, residual = np.inf, np.inf
+    for _ in range(iterations):
+        total, objective, residual = _assemble(basis, first, rows, weight, x_k, v, iterate, band, right, down)
         gap = total / objective
-        if gap < tolerance and breach < _BREACH:
-            return attempt, gap, breach
+        if gap < tolerance and residual < LARGEST_RESIDUAL:
+            return True, gap, residual
         if not np.isfinite(gap):
             break
-        _hold(band, fixed)
+        _fix(band, fixed)
         factor_banded(band, n)
         _newton(band, right, down, fixed, step)
         spline_values(basis, first, step, dv)
-        before, after = _predict(p, lean, dv, s, z, off, rest)
-        aim = total / (2.0 * count * pairs) * (after / before) ** 3
-        _correct(basis, first, p, lean, s, z, off, rest, aim, down)
+        before, after = _predict(rows, dv, iterate)
+        aim = total / s.size * (after / before) ** 3
+        _correct(basis, first, rows, iterate, aim, down)
         _newton(band, right, down, fixed, step)
         spline_values(basis, first, step, dv)
-        primal, dual = _step(p, lean, dv, s, z, off, rest)
-        for i in range(count):
-            for j in range(pairs):
-                for side in range(2):
-                    s[i, j, side] += primal * off[i, j, side]
-                    z[i, j, side] += dual * rest[i, j, side]
-        for k in range(n):
-            y[k] += primal * step[k]
+        primal, dual = _step(rows, dv, iterate)
+        s += primal * off
+        z += dual * rest
+        y += primal * step
         spline_values(basis, first, y, v)
-    return -1, gap, breach
+    return False, gap, residual

@@ -1,116 +1,134 @@
-"""Sequential convex programming over one part: knots follow the last law; passes go on until they gain nothing."""
+"""Sequential convex programming over one interval: knots follow the last law; passes go on until they gain little."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats
-from pentapod.timing.jerk.about import about, tangents
-from pentapod.timing.jerk.knots import law_knots
-from pentapod.timing.jerk.part import Part
-from pentapod.timing.jerk.problem import GRIDPOINTS_PER_KNOT, Answer, Problem
-
-_SPARE = 1.1
-_LEAST = 1e-9
-_REACHED = 0.995
+from pentapod.timing.jerk.interval import Interval
+from pentapod.timing.jerk.knots import place_knots
+from pentapod.timing.jerk.subproblem import Answer, Subproblem
 
 
-def answer_of(part: Part) -> Answer | None:
-    """Return the fastest law of a part, None where none is found; ramps out of rests are shorter where they must be."""
-    for _ in range(part.options.ramps + 1):
-        answer = _answer_of(part)
+def fastest_law(interval: Interval) -> Answer | None:
+    """Return the fastest law of an interval, with shorter ramps out of rests where none is found; None after that."""
+    for _ in range(interval.options.ramps.retries + 1):
+        answer = _with_ramps(interval)
         if answer is not None:
             return answer
-        part = part.shorter()
+        interval = interval.shorter_ramps()
     return None
 
 
-def _answer_of(part: Part) -> Answer | None:
-    options, found = part.options, _first(part)
-    if found is None:
-        inner = law_knots(part, part.x, 1.0)
-        problem = Problem.on(part, inner)
-        y, around = problem.start(), np.minimum(problem.top, problem.ramps)
+def _with_ramps(interval: Interval) -> Answer | None:
+    """Return the fastest law with the interval's own ramps, None where none is found."""
+    options = interval.options
+    problem = Subproblem.on(interval, place_knots(interval, interval.x, 1.0, options.knots.rough_share))
+    rough = _converged(problem, problem.start(), np.minimum(problem.top, problem.ramps), options.rough_passes)
+    if rough is None:
+        problem = Subproblem.on(interval, place_knots(interval, interval.x, 1.0))
+        y, x_k = problem.start(), np.minimum(problem.top, problem.ramps)
     else:
-        coarse, rough = found
-        problem = Problem.on(part, law_knots(part, _law_at(part, coarse, rough), _pushed(coarse, rough)))
-        y, around = _carried(coarse, rough, problem)
-    better = _settled(problem, y, around, options.passes)
+        coarse, x = problem, _law_at_stations(interval, problem, rough)
+        used = float(coarse.rows.acceleration_shares(coarse.values(rough)).max())
+        problem = Subproblem.on(interval, place_knots(interval, x, min(1.0, options.knots.spare * used)))
+        y, x_k = _transferred(coarse, rough, problem)
+    better = _converged(problem, y, x_k, options.passes)
     if better is None:
         return None
     answer = problem, better
     for _ in range(options.halvings):
-        bad = _exceeding(part, *answer)
-        if not bad.any():
+        violated = _violated(interval, *answer)
+        if not violated.any():
             break
-        answer = _halved(part, *answer, bad)
+        answer = _halved(interval, *answer, violated)
     return answer
 
 
-def _first(part: Part) -> Answer | None:
-    """Return a rough answer with few knots, even in the time of the law without jerk limits."""
-    problem = Problem.on(part, law_knots(part, part.x, 1.0, part.options.rough_knots))
-    better = _settled(problem, problem.start(), np.minimum(problem.top, problem.ramps), part.options.rough_passes)
-    return None if better is None else (problem, better)
+def solve_locally(problem: Subproblem, y: Floats, x_k: Floats, stations: Floats) -> tuple[Floats, Floats]:
+    """Return coefficients solved again about sorted stations (n,), and between which stations (2, k) they changed.
+
+    x_k (N,): tangent points to begin with. Where nothing is found the window grows, up to the whole interval.
+    """
+    n, options, changed = len(y), problem.options, [np.zeros((2, 0))]
+    reach = options.solver.seam_overlap // 2
+    while len(stations):
+        windows, last, failed = problem.windows_about(stations, reach), np.inf, np.zeros(len(stations), dtype=bool)
+        for number in range(options.passes):
+            solved: list[tuple[int, int]] = []
+            for low, high in windows:
+                better = problem.solved(y, x_k, 1, low, high, (3, 3))
+                if better is not None:
+                    y = better
+                    solved.append((low, high))
+                elif number == 0:
+                    failed |= (stations >= problem.knots[low + 3]) & (stations <= problem.knots[high])
+            windows, x_k = solved, problem.tangent_points(y)
+            parts = [problem.gridpoints(low, high) for low, high in windows]
+            seconds = sum(float((problem.weight[part] / np.sqrt(x_k[part])).sum()) for part in parts)
+            if number == 0:
+                changed.append(np.array([problem.knots[[low, high + 3]] for low, high in solved]).reshape(-1, 2).T)
+            if last - seconds < options.min_gain * seconds or not windows:
+                break
+            last = seconds
+        if reach >= n:
+            break
+        stations, reach = stations[failed], reach * options.local_growth
+    return y, np.concatenate(changed, axis=1)
 
 
-def _settled(problem: Problem, y: Floats, around: Floats, passes: int) -> Floats | None:
-    """Return coefficients improved by passes until these gain next to nothing; None where the first finds nothing."""
-    gains, last = None, np.zeros(0)
+def _converged(problem: Subproblem, y: Floats, x_k: Floats, passes: int) -> Floats | None:
+    """Return coefficients improved by passes until these gain little; None where the first finds nothing."""
+    gains, last, min_gain = None, np.zeros(0), problem.options.min_gain
     for number in range(passes):
-        better = problem.improved(y, around, number, gains)
+        better = problem.improved(y, x_k, number, gains)
         if better is None:
             return None if number == 0 else y
-        y, around = better, tangents(problem, better)
-        taken = problem.weight / np.sqrt(around)
+        y, x_k = better, problem.tangent_points(better)
+        seconds = problem.weight / np.sqrt(x_k)
         if number > 0:
-            gains = last - (1.0 + problem.options.settled) * taken
-            if (last - taken).sum() <= problem.options.settled * taken.sum():
+            gains = last - (1.0 + min_gain) * seconds
+            if (last - seconds).sum() <= min_gain * seconds.sum():
                 break
-        last = taken
+        last = seconds
     return y
 
 
-def _halved(part: Part, problem: Problem, y: Floats, bad: Bools) -> Answer:
-    """Return the answer with knots twice as close where it is bad (K − 1,) and beside; solved anew about there."""
-    near = bad | np.append(bad[1:], False) | np.append(False, bad[:-1])
+def _halved(interval: Interval, problem: Subproblem, y: Floats, violated: Bools) -> Answer:
+    """Return the answer with knots halved where limits are violated (K − 1,) and beside, solved again about there."""
+    near = violated | np.append(violated[1:], False) | np.append(False, violated[:-1])
     middles = ((problem.inner[1:] + problem.inner[:-1]) / 2.0)[near]
-    finer = Problem.on(part, np.sort(np.concatenate([problem.inner, middles])), problem)
-    return finer, about(finer, *_carried(problem, y, finer), middles)[0]
+    finer = Subproblem.on(interval, np.sort(np.concatenate([problem.inner, middles])), problem)
+    return finer, solve_locally(finer, *_transferred(problem, y, finer), middles)[0]
 
 
-def _exceeding(part: Part, problem: Problem, y: Floats) -> Bools:
-    """Return between which inner knots (K − 1,) the spline exceeds a limit, or all but stops, between gridpoints."""
+def _violated(interval: Interval, problem: Subproblem, y: Floats) -> Bools:
+    """Return between which inner knots (K − 1,) the spline violates a limit, or nearly stops, between gridpoints."""
     s = (problem.s[1:] + problem.s[:-1]) / 2.0
-    rows, v = part.rows_at(s), problem.at(y, s)
-    x, ends, options = v[:, 0], problem.values(y)[:, 0], part.options
-    bad = (
-        (rows.jerk_uses(v) > options.over_jerk)
-        | (rows.pushes(v) > options.over_push)
+    rows, v = interval.rows_at(s), problem.at(y, s)
+    x, ends, options = v[:, 0], problem.values(y)[:, 0], interval.options
+    violated = (
+        (rows.jerk_shares(v) > options.over_jerk)
+        | (rows.acceleration_shares(v) > options.over_acceleration)
         | (x > options.over_speed * rows.ceiling)
+        | (x < options.under_speed * np.minimum(ends[:-1], ends[1:]))
     )
-    bad |= x < options.under_speed * np.minimum(ends[:-1], ends[1:])
-    return np.asarray(bad.reshape(-1, GRIDPOINTS_PER_KNOT).any(axis=1))
+    return np.asarray(violated.reshape(-1, options.solver.gridpoints_per_knot).any(axis=1))
 
 
-def _pushed(problem: Problem, y: Floats) -> float:
-    """Return the share of an acceleration limit that a law uses, a little more than at its gridpoints, at most 1."""
-    return min(1.0, _SPARE * float(problem.rows.pushes(problem.values(y)).max()))
-
-
-def _law_at(part: Part, problem: Problem, y: Floats) -> Floats:
-    """Return x (N + 1,) of a law at the part's stations; the bound itself where it is all but reached."""
-    s, x = problem.s, np.maximum(problem.values(y)[:, 0], _LEAST * problem.top)
+def _law_at_stations(interval: Interval, problem: Subproblem, y: Floats) -> Floats:
+    """Return x (N,) of a law at the interval's stations; the upper bound itself where it is nearly reached."""
+    s, x = problem.s, problem.tangent_points(y)
     if problem.begin.join > 0.0:
-        s, x = np.append(0.0, s), np.append(part.x[0], x)
+        s, x = np.append(0.0, s), np.append(interval.x[0], x)
     if problem.end.join > 0.0:
-        s, x = np.append(s, part.length), np.append(x, part.x[-1])
-    x = np.interp(part.s, s, x)
-    return np.where(x > _REACHED * part.x, part.x, x)
+        s, x = np.append(s, interval.length), np.append(x, interval.x[-1])
+    x = np.interp(interval.s, s, x)
+    return np.where(x > interval.options.bound_share * interval.x, interval.x, x)
 
 
-def _carried(old: Problem, y: Floats, new: Problem) -> tuple[Floats, Floats]:
-    """Return coefficients (n,) and tangents (N,) to start another problem from, of a problem's answer.
+def _transferred(old: Subproblem, y: Floats, new: Subproblem) -> tuple[Floats, Floats]:
+    """Return coefficients (n,) and tangent points (N,) for a problem to start from, of another one's answer.
 
     A coefficient is the blossom, at the three knots inside its support, of the cubic between two of these knots: where
     the new problem has all knots of the old one this is the same spline.
@@ -130,9 +148,9 @@ def _carried(old: Problem, y: Floats, new: Problem) -> tuple[Floats, Floats]:
     blossom = (
         one[:, 0] + one[:, 1] * (a + b + c) / 3.0 + one[:, 2] * (a * b + b * c + c * a) / 6.0 + third * a * b * c / 6.0
     )
-    start, (begun, ended) = new.start(), new.held
+    start, (fixed_start, fixed_end) = new.start(), new.fixed
     blossom = np.maximum(blossom, 1e-12 * new.top.max())
-    blossom[:begun] = start[:begun]
-    blossom[n - ended :] = start[n - ended :]
+    blossom[:fixed_start] = start[:fixed_start]
+    blossom[n - fixed_end :] = start[n - fixed_end :]
     x = old.at(y, np.clip(new.s, old.knots[0], old.knots[-1]))[:, 0]
-    return blossom, np.maximum(np.minimum(x, new.top), _LEAST * new.top)
+    return blossom, np.maximum(np.minimum(x, new.top), new.options.solver.x_floor * new.top)

@@ -64,14 +64,14 @@ def spline_values(basis: Floats, first: Ints, y: Floats, v: Floats) -> None:
 
 
 @kernel
-def spread(basis: Floats, i: int, g: Floats, b: int, right: Floats) -> None:
+def add_gradient(basis: Floats, i: int, g: Floats, b: int, right: Floats) -> None:
     """Add gridpoint i's gradient g (3,), by x, x′ and x″, to that by the coefficients."""
     for k in range(4):
         right[b + k] += basis[i, 0, k] * g[0] + basis[i, 1, k] * g[1] + basis[i, 2, k] * g[2]
 
 
 @kernel
-def spread_matrix(basis: Floats, i: int, h: Floats, b: int, band: Floats) -> None:
+def add_hessian(basis: Floats, i: int, h: Floats, b: int, band: Floats) -> None:
     """Add gridpoint i's Hessian h (6,): xx, xx′, xx″, x′x′, x′x″, x″x″."""
     for k in range(4):
         u0, u1, u2 = basis[i, 0, k], basis[i, 1, k], basis[i, 2, k]

@@ -11,15 +11,18 @@ from pentapod.timing.pieces.piece import PieceProfile
 from pentapod.timing.time_law.motion_law import MotionLaw, Stretchable
 from pentapod.timing.topp.stages import Failure
 
+_MOST_LESS = 0.9
+"""Largest share of x that may be taken from the middle of the way."""
+
 
 def law_between(
     profile: PieceProfile, slower: float, period: float, nodes: Stretchable | None = None
 ) -> MotionLaw | Failure:
     """Return the law of a profile with given speeds at its ends, `slower` times slower, in whole periods.
 
-    What has to be slower is so by a share of x = ṡ² that rises from 0 at the ends that move, with two vanishing
-    derivatives: so these speeds stay, and no limit of speed is exceeded. nodes: of the law limited in jerk, instead. A
-    Failure where a tenth of x is still too fast.
+    x = ṡ² is reduced by a share that rises from 0 at the given ends with two vanishing derivatives: so these speeds
+    stay, and no limit of speed is exceeded. nodes: of the jerk-limited law, instead. A Failure where a tenth of x is
+    still too fast.
     """
     s, x = (profile.s, profile.x) if nodes is None else (nodes.s, nodes.x)
     far = np.minimum(
@@ -39,10 +42,9 @@ def law_between(
         return MotionLaw.through(s, x * kept, nodes.slope * kept - less * rise * x)
 
     goal = whole_periods(law(0.0).duration * slower, period)
-    most = 0.9
-    if law(most).duration < goal * (1.0 - 1e-12):
+    if law(_MOST_LESS).duration < goal * (1.0 - 1e-12):
         return Failure(-1, "no whole periods are filled without leaving the speeds that are given at the ends")
-    less = cast("float", brentq(lambda less: law(less).duration - goal, 0.0, most, xtol=1e-15))
+    less = cast("float", brentq(lambda less: law(less).duration - goal, 0.0, _MOST_LESS, xtol=1e-15))
     return law(less).stretched(goal)
 
 

@@ -1,35 +1,34 @@
-"""Setpoints of a time law, and the shares of the limits that the controller's interpolation uses."""
+"""Setpoints of a time law, and the shares of the limits that they use as the controller interpolates them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import cast
 
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.machine.machine import Machine
+from pentapod.numerics.blocks import blocks
 from pentapod.timing.limits.limit import Group
 from pentapod.timing.path.setpoints import InterpolatedSetpoints, SetpointRows, spline_padding
 from pentapod.timing.pieces.piece import PieceProfile
 from pentapod.timing.time_law.motion_law import MotionLaw
-from pentapod.timing.topp.stages import Failure
 
 GOAL = 0.999
-"""Share of each limit that a sampled program may use."""
-
-_AT_ONCE = 1 << 16
-"""Rows measured at once: memory does not grow with the piece by more than four numbers a row."""
+"""Share of each limit that setpoints may use."""
 
 EDGE = 32
-"""Rows beyond which the spline through all rows has forgotten a row: 0.27 of its say is left from each to the next."""
+"""Rows beyond which a row has no influence on the spline through all rows: it falls by the factor 0.27 with each."""
+
+ROWS_AT_ONCE = 1 << 16
+"""Rows measured together, so that memory grows by no more than four numbers a row."""
 
 
 @dataclass(frozen=True, eq=False)
-class Use:
-    """Shares (rows,) of the limits around the setpoints of a piece: of rates or feed, of accelerations, of jerks.
+class LimitShares:
+    """Shares (rows,) of the limits around the setpoints of a piece: of speeds, of accelerations, of jerks.
 
     reach (rows,): seconds over which a jerk at its limit changes the legs' velocities by what they are.
     """
@@ -41,57 +40,52 @@ class Use:
 
     @property
     def exceeds(self) -> bool:
-        """Whether a share is above what is aimed at."""
+        """Whether a share is above the goal."""
         return bool((self.slowing > 1.0).any())
 
     @cached_property
     def slowing(self) -> Floats:
-        """By which factor (rows,) the motion must be slower at each row to keep the goal."""
+        """Factor (rows,) by which the motion must be slower at each row to keep the goal."""
         return np.maximum(np.maximum(self.speed / GOAL, np.sqrt(self.acceleration / GOAL)), np.cbrt(self.jerk / GOAL))
 
-    def without_edges(self, start: int, end: int) -> Use:
-        """Return it with no shares in so many rows at the start and at the end."""
+    def without_edges(self, start: int, end: int) -> LimitShares:
+        """Return the shares, zero in so many rows at the start and at the end."""
         rows = np.arange(len(self.speed))
-        known = (rows >= start) & (rows < len(rows) - end)
-        speed, acceleration, jerk = (np.where(known, y, 0.0) for y in (self.speed, self.acceleration, self.jerk))
-        return Use(speed, acceleration, jerk, self.reach)
+        inside = (rows >= start) & (rows < len(rows) - end)
+        speed, acceleration, jerk = (np.where(inside, y, 0.0) for y in (self.speed, self.acceleration, self.jerk))
+        return LimitShares(speed, acceleration, jerk, self.reach)
 
-    def at(self, rows: Ints) -> Use:
-        """Return the shares of some of its rows (n,)."""
-        return Use(*(getattr(self, name)[rows] for name in _COLUMNS))
+    def at(self, rows: Ints) -> LimitShares:
+        """Return the shares of some of the rows (n,)."""
+        return LimitShares(*(getattr(self, name)[rows] for name in _COLUMNS))
 
     @classmethod
-    def joined(cls, uses: Sequence[Use]) -> Use:
+    def joined(cls, shares: Sequence[LimitShares]) -> LimitShares:
         """Return the shares of one after the other."""
-        return cls(*(np.concatenate([getattr(use, name) for use in uses]) for name in _COLUMNS))
+        return cls(*(np.concatenate([getattr(one, name) for one in shares]) for name in _COLUMNS))
 
 
-_COLUMNS = tuple(field.name for field in fields(Use))
+_COLUMNS = tuple(field.name for field in fields(LimitShares))
 
 
 @dataclass(frozen=True, eq=False)
 class Setpoints:
-    """A piece with its law, which lasts whole periods, or why there is none.
+    """A piece with its law, which lasts whole periods.
 
     before, after: periods for which the machine stands at its ends; between two pieces they count with the first.
     smooth: whether jerks are limited.
     """
 
     profile: PieceProfile
-    found: MotionLaw | Failure
+    law: MotionLaw
     smooth: bool
     period: float
     before: int
     after: int
 
     @property
-    def law(self) -> MotionLaw:
-        """The law, where it was found."""
-        return cast("MotionLaw", self.found)
-
-    @property
     def count(self) -> int:
-        """Intervals between its rows."""
+        """Number of intervals between rows."""
         return self.before + round(self.law.duration / self.period) + self.after
 
     def rows(self, low: int, high: int, phase: float = 0.0) -> SetpointRows:
@@ -107,8 +101,8 @@ class Setpoints:
         speed = (profile.x_start if start else profile.x_end) ** 0.5
         return spline_padding(profile.piece, speed, self.period, start=start, tool=profile.limits.of_tool)
 
-    def use(self, rows: SetpointRows, machine: Machine, first: int, count: int) -> Use:
-        """Return what the piece uses of the limits in `count` intervals from `first` on of rows."""
+    def shares(self, rows: SetpointRows, machine: Machine, first: int, count: int) -> LimitShares:
+        """Return the shares of the limits in `count` intervals of rows, from interval `first` on."""
         controller = machine.controller
         joined = InterpolatedSetpoints(
             rows, self.profile.piece, controller.period, controller.interpolation, first, count
@@ -122,7 +116,7 @@ class Setpoints:
                 kept[limit.group] = np.maximum(kept[limit.group], used)
         speed, acceleration, jerk = (np.maximum(at_rows[group], _at_rows(between[group])) for group in at_rows)
         reach = np.sqrt((joined.legs.rates[joined.own_intervals] / machine.legs.max_jerk).max(axis=1))
-        return Use(speed, acceleration, jerk, _at_rows(reach))
+        return LimitShares(speed, acceleration, jerk, _at_rows(reach))
 
 
 def _at_rows(shares: Floats) -> Floats:
@@ -130,28 +124,29 @@ def _at_rows(shares: Floats) -> Floats:
     return np.maximum(np.append(shares, 0.0), np.append(0.0, shares))
 
 
-def measured(pieces: Sequence[Setpoints], machine: Machine, known: Sequence[Use | None]) -> list[Use]:
-    """Return what each piece uses of the limits; what is known is not measured again."""
+def measured(pieces: Sequence[Setpoints], machine: Machine, known: Sequence[LimitShares | None]) -> list[LimitShares]:
+    """Return the shares of each piece; those that are known are not measured again."""
     begins = np.concatenate([[0], np.cumsum([piece.count for piece in pieces])]).tolist()
     lengths = np.concatenate([[0.0], np.cumsum([piece.law.length for piece in pieces])])
     return [_measured(pieces, begins, lengths, k, machine) if same is None else same for k, same in enumerate(known)]
 
 
-def untouched(pieces: Sequence[Setpoints], uses: list[Use], changed: list[int]) -> list[Use | None]:
-    """Return the uses of the pieces that are not changed and from which no changed one is within EDGE rows."""
+def unaffected(pieces: Sequence[Setpoints], shares: list[LimitShares], changed: list[int]) -> list[LimitShares | None]:
+    """Return the shares of the pieces from which no changed one is within EDGE rows; None for the others."""
     ends = np.cumsum([piece.count for piece in pieces])
     begins = np.concatenate([[0], ends[:-1]])
     near = np.zeros(len(pieces), dtype=bool)
     for k in changed:
         near |= (begins <= ends[k] + EDGE) & (ends >= begins[k] - EDGE)
-    return [None if touched else use for touched, use in zip(near.tolist(), uses, strict=True)]
+    return [None if touched else one for touched, one in zip(near.tolist(), shares, strict=True)]
 
 
-def _measured(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, k: int, machine: Machine) -> Use:
-    parts: list[Use] = []
-    for low in range(begins[k], begins[k + 1], _AT_ONCE):
-        count = min(_AT_ONCE, begins[k + 1] - low)
-        first, last = max(low - EDGE, 0), min(low + count + EDGE, begins[-1])
+def _measured(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, k: int, machine: Machine) -> LimitShares:
+    """Return the shares of piece k; the pieces begin at rows `begins` and at stations `lengths`."""
+    parts: list[LimitShares] = []
+    for block in blocks(begins[k + 1] - begins[k], ROWS_AT_ONCE):
+        low, high = begins[k] + block.start, begins[k] + block.stop
+        first, last = max(low - EDGE, 0), min(high + EDGE, begins[-1])
         rows = _rows(pieces, begins, lengths, first, last)
         first_row = low - first
         if first == 0 and pieces[0].profile.x_start > 0.0:
@@ -160,9 +155,9 @@ def _measured(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, k
         if last == begins[-1] and pieces[-1].profile.x_end > 0.0:
             behind = pieces[-1].spline_padding(start=False)[1:]
             rows = SetpointRows.concatenated([rows, behind.shifted(lengths[-2])])
-        use = pieces[k].use(rows.shifted(-lengths[k]), machine, first_row, count)
-        parts.append(use if low + count == begins[k + 1] else use.at(np.arange(count)))
-    return Use.joined(parts)
+        shares = pieces[k].shares(rows.shifted(-lengths[k]), machine, first_row, high - low)
+        parts.append(shares if high == begins[k + 1] else shares.at(np.arange(high - low)))
+    return LimitShares.joined(parts)
 
 
 def _rows(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, first: int, last: int) -> SetpointRows:
@@ -173,8 +168,7 @@ def _rows(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, first
         low, high = max(first - begins[k], 0), min(last, begins[k + 1]) - begins[k]
         if low > high:
             break
-        # Where a piece ends the next begins: that row is the next one's.
-        goes_on = last > begins[k + 1]
         rows = pieces[k].rows(low, high).shifted(lengths[k])
-        parts.append(rows[:-1] if goes_on else rows)
+        # The last row of a piece is the first row of the next one.
+        parts.append(rows[:-1] if last > begins[k + 1] else rows)
     return SetpointRows.concatenated(parts)

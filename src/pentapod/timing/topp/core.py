@@ -1,4 +1,4 @@
-"""The compiled TOPP-RA engine: both passes over one range of stages, and failures in words."""
+"""The compiled TOPP-RA engine: both passes over all stages, and the reasons why there is no profile."""
 
 from __future__ import annotations
 
@@ -6,47 +6,34 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.timing.topp.core_kernels import controllable, fastest_forward
-from pentapod.timing.topp.stages import NOT_CONTROLLABLE, TOO_FAST_END, UNBOUNDED, Failure, Stages, admitted
+from pentapod.timing.topp.stages import (
+    NOT_CONTROLLABLE,
+    TOO_FAST,
+    TOO_FAST_END,
+    TOO_SLOW,
+    UNBOUNDED,
+    Failure,
+    Stages,
+)
 
 
 def solve(stages: Stages, x_start: float, x_end: float) -> Floats | Failure:
     """Return the largest x (N + 1,), or why there is none."""
-    speeds = backward(stages, (x_end, x_end))
-    if isinstance(speeds, Failure):
-        return speeds
-    low, high = speeds
-    start = admitted(x_start, float(low[0]), float(high[0]))
-    return start if isinstance(start, Failure) else forward(stages, low, high, start)
-
-
-def backward(stages: Stages, end: tuple[float, float]) -> tuple[Floats, Floats] | Failure:
-    """Return the least and largest controllable x (N + 1,), from those at the last gridpoint."""
-    low, high = np.empty(len(stages)), np.empty(len(stages))
-    low[-1], high[-1] = end
-    if end[0] > stages.ceiling[-1]:
-        return Failure(len(stages) - 1, TOO_FAST_END)
-    conflict = np.zeros(2, np.int64)
-    at = controllable(
-        stages.s,
-        stages.first,
-        stages.second,
-        stages.middle,
-        int(len(stages.offset) > 1),
-        stages.ceiling,
-        low,
-        high,
-        conflict,
-    )
-    if at < 0:
-        return low, high
-    if conflict[0] == -2:
-        return Failure(at, UNBOUNDED)
-    return Failure(at, NOT_CONTROLLABLE, tuple(sorted({int(row) // 2 for row in conflict if row >= 0})))
-
-
-def forward(stages: Stages, low: Floats, high: Floats, x_start: float) -> Floats:
-    """Return the largest x (N + 1,) from x_start, within the controllable speeds."""
-    x = np.empty(len(stages))
-    x[0] = x_start
-    fastest_forward(stages.s, stages.first, stages.second, stages.middle, int(len(stages.offset) > 1), low, high, x)
+    low, high, x = (np.empty(len(stages.s)) for _ in range(3))
+    if x_end > stages.ceiling[-1]:
+        return Failure(len(x) - 1, TOO_FAST_END)
+    low[-1], high[-1], conflict = x_end, x_end, np.zeros(2, np.int64)
+    rows = stages.s, stages.first, stages.second, -stages.offset, int(len(stages.offset) > 1)
+    at = controllable(*rows, stages.ceiling, low, high, conflict)
+    if at >= 0:
+        if conflict[0] == -2:
+            return Failure(at, UNBOUNDED)
+        return Failure(at, NOT_CONTROLLABLE, tuple(sorted({int(row) // 2 for row in conflict if row >= 0})))
+    # The start's x may be outside the controllable ones by rounding alone.
+    if x_start > float(high[0]) * (1.0 + 1e-9):
+        return Failure(0, TOO_FAST)
+    if x_start < float(low[0]) * (1.0 - 1e-9):
+        return Failure(0, TOO_SLOW)
+    x[0] = min(max(x_start, float(low[0])), float(high[0]))
+    fastest_forward(*rows, low, high, x)
     return x

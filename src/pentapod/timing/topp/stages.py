@@ -69,26 +69,9 @@ class Stages:
         plain = {name: np.require(array, np.float64, ["C", "W"]) for name, array in arrays.items()}
         return cls(s=s, offset=np.require(offset, np.float64, ["C", "W"]), **plain)
 
-    @property
-    def middle(self) -> Floats:
-        """What the rows lie about, (N + 1, R) or (1, R)."""
-        return -self.offset
-
     def fault(self) -> Failure | None:
         """Return the first gridpoint whose coefficients are no numbers."""
         if np.isfinite(self.first).all() and np.isfinite(self.second).all() and (self.ceiling >= 0.0).all():
             return None
         unfit = ~(np.isfinite(self.first) & np.isfinite(self.second)).all(axis=1) | ~(self.ceiling >= 0.0)
         return Failure(int(np.argmax(unfit)), "a limit or a derivative of the path is not a number")
-
-    def __len__(self) -> int:
-        return len(self.s)
-
-
-def admitted(x_start: float, low: float, high: float) -> float | Failure:
-    """Return the start's x within the controllable speeds, past which it may be by rounding only."""
-    if x_start > high * (1.0 + 1e-9):
-        return Failure(0, TOO_FAST)
-    if x_start < low * (1.0 - 1e-9):
-        return Failure(0, TOO_SLOW)
-    return min(max(x_start, low), high)

@@ -1,0 +1,216 @@
+"""Convex subproblem of the jerk limits: a cubic B-spline x(s) with linear rows at gridpoints, solved in windows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.timing.jerk.interval import End, Interval
+from pentapod.timing.jerk.jerk_kernels import minimise_duration
+from pentapod.timing.jerk.options import JerkOptions
+from pentapod.timing.jerk.rows import ROW_NAMES, JerkRows, Run
+from pentapod.timing.jerk.spline_kernels import cubic_basis, spline_values
+
+
+@dataclass(frozen=True, eq=False)
+class Subproblem:
+    """Spline, rows and end conditions of one interval.
+
+    s (N,): gridpoints; knots (K + 6,); basis (N, 3, 4), first (N,): B-splines at gridpoints; top (N,): upper bound of
+    x; ramps (N,): bound by the ramps at the ends; weight (N,): of 1/√x in the objective.
+    """
+
+    s: Floats
+    knots: Floats
+    basis: Floats
+    first: Ints
+    rows: JerkRows
+    top: Floats
+    ramps: Floats
+    weight: Floats
+    begin: End
+    end: End
+    length: float
+    options: JerkOptions
+
+    @classmethod
+    def on(cls, interval: Interval, inner: Floats, before: Subproblem | None = None) -> Subproblem:
+        """Return the problem with inner knots (K,); rows of gridpoints that `before` has are taken from there."""
+        each = interval.options.solver.gridpoints_per_knot
+        steps = np.diff(inner)[:, None] * (np.arange(each) / each)
+        grid = np.append((inner[:-1, None] + steps).ravel(), inner[-1])
+        knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
+        basis, first = np.empty((len(grid), 3, 4)), np.empty(len(grid), dtype=np.int64)
+        cubic_basis(knots, grid, basis, first)
+        rows = interval.rows_at(grid) if before is None else _updated_rows(interval, grid, before)
+        top = np.minimum(np.interp(grid, interval.s, interval.x), rows.ceiling)
+        ramps = np.minimum(interval.begin.bound(grid), interval.end.bound(interval.length - grid))
+        weight = np.gradient(grid)
+        weight *= len(grid) / (weight / np.sqrt(np.minimum(top, ramps))).sum()
+        ends = interval.begin, interval.end, interval.length
+        return cls(grid, knots, basis, first, rows, top, ramps, weight, *ends, interval.options)
+
+    @property
+    def inner(self) -> Floats:
+        """Knots (K,), each once."""
+        return self.knots[3:-3]
+
+    @property
+    def fixed(self) -> tuple[int, int]:
+        """How many coefficients are given at either end."""
+        return len(self.begin.coefficients(1.0)), len(self.end.coefficients(1.0))
+
+    def windows_about(self, stations: Floats, reach: int) -> list[tuple[int, int]]:
+        """Return windows of coefficients, from and to before, about sorted stations (n,), `reach` to either side."""
+        n = len(self.knots) - 4
+        at = np.clip(np.searchsorted(self.knots, stations, "right") - 1, 3, n - 1)
+        lows, highs = np.maximum(at - 3 - reach, 0), np.minimum(at + 1 + reach, n)
+        apart = np.flatnonzero(lows[1:] > highs[:-1]) + 1
+        return [(int(lows[run[0]]), int(highs[run[-1]])) for run in np.split(np.arange(len(at)), apart)]
+
+    def start(self) -> Floats:
+        """Return coefficients to start from, with those that are given at the ends."""
+        places = (self.knots[1:-3] + self.knots[2:-2] + self.knots[3:-1]) / 3.0
+        y = 0.5 * np.interp(places, self.s, np.minimum(self.top, self.ramps))
+        for k, value in enumerate(self.begin.coefficients(float(self.inner[1] - self.inner[0]))):
+            y[k] = value
+        for k, value in enumerate(self.end.coefficients(float(self.inner[-1] - self.inner[-2]))):
+            y[-1 - k] = value
+        return y
+
+    def tangent_points(self, y: Floats) -> Floats:
+        """Return x (N,) at the gridpoints, about which the next subproblem is linearised."""
+        return np.maximum(self.values(y)[:, 0], self.options.solver.x_floor * self.top)
+
+    def improved(self, y: Floats, x_k: Floats, number: int, gains: Floats | None = None) -> Floats | None:
+        """Return the coefficients after pass `number`, linearised about x_k (N,); None where it finds nothing.
+
+        Long intervals are solved in windows between coefficients that stay. The first pass finds these in windows
+        of their own, which overlap each seam; the seams of each later pass lie halfway between the last ones, and keep
+        the last pass's values, so that every window has a solution. gains (N,): decrease of the duration by the pass
+        before at each gridpoint, less what is worth another one; a window that gained nothing is left as it is.
+        """
+        n, size, reach = len(y), self.options.solver.window, self.options.solver.seam_overlap
+        if n < 2 * size:
+            return self.solved(y, x_k, number, 0, n, (0, 0))
+        y = y.copy()
+        seams = list(range(size if number % 2 == 0 else size // 2, n - size // 2, size))
+        if number == 0:
+            for seam in seams:
+                found = self.solved(y, x_k, 0, max(seam - reach, 0), min(seam + reach, n), (0, 0))
+                if found is None:
+                    return self.solved(y, x_k, 0, 0, n, (0, 0))
+                y[seam - 1 : seam + 2] = found[seam - 1 : seam + 2]
+        better = y.copy()
+        for left, right in pairwise([0, *seams, n]):
+            low, high = max(left - 1, 0), min(right + 2, n)
+            if gains is not None and gains[self.gridpoints(low, high)].sum() <= 0.0:
+                continue
+            found = self.solved(y, x_k, number, low, high, (3, 3))
+            if found is None and number == 0:
+                return self.solved(y, x_k, 0, 0, n, (0, 0))
+            if found is not None:
+                better[low:high] = found[low:high]
+        return better
+
+    def gridpoints(self, low: int, high: int) -> slice:
+        """Return the gridpoints at which the spline depends on coefficients from low to before high alone."""
+        return slice(int(np.searchsorted(self.first, low)), int(np.searchsorted(self.first, high - 4, "right")))
+
+    def solved(
+        self, y: Floats, x_k: Floats, number: int, low: int, high: int, inside: tuple[int, int]
+    ) -> Floats | None:
+        """Return y with the coefficients from low to before high optimised; None where no start level converges.
+
+        inside: how many coefficients stay at an end of this window that is no end of the interval.
+        """
+        levels = self.options.solver.cold_levels if number == 0 else self.options.solver.warm_levels
+        fixed = self.fixed[0] if low == 0 else inside[0], self.fixed[1] if high == len(y) else inside[1]
+        answers = (self._solved(y, x_k, level, low, high, fixed) for level in levels)
+        return next((answer for answer in answers if answer is not None), None)
+
+    def _solved(
+        self, y: Floats, x_k: Floats, level: float, low: int, high: int, ends: tuple[int, int]
+    ) -> Floats | None:
+        here, options = self.gridpoints(low, high), self.options.solver
+        fixed = np.zeros(high - low, dtype=np.int64)
+        fixed[: ends[0]] = 1
+        fixed[len(fixed) - ends[1] :] = 1
+        rows, part = self.rows, y[low:high].copy()
+        moves = int(len(rows.offset) > 1)
+        converged, gap, residual = minimise_duration(
+            self.basis[here],
+            self.first[here] - low,
+            rows.second[here],
+            0.5 * rows.first[here],
+            -rows.offset[here] if moves else -rows.offset,
+            moves,
+            rows.jerks[here],
+            x_k[here],
+            self.top[here],
+            self.weight[here],
+            fixed,
+            level,
+            options.iterations,
+            options.gap,
+            part,
+        )
+        if not (residual < options.accepted_residual and (converged or gap < options.accepted_gap)):
+            return None
+        y = y.copy() if high - low < len(y) else part
+        y[low:high] = part
+        return y
+
+    def run(self, y: Floats) -> Run:
+        """Return the law at the gridpoints and halfway between, so that cubics through it follow the spline closely.
+
+        Rests are included.
+        """
+        v, s = np.empty((2 * len(self.s) - 1, 3)), np.empty(2 * len(self.s) - 1)
+        s[::2], s[1::2] = self.s, (self.s[1:] + self.s[:-1]) / 2.0
+        v[::2], v[1::2] = self.values(y), self.at(y, s[1::2])
+        x, slope = v[:, 0], v[:, 1]
+        if self.begin.join > 0.0:
+            s, x, slope = np.append(0.0, s), np.append(0.0, x), np.append(0.0, slope)
+        if self.end.join > 0.0:
+            s, x, slope = np.append(s, self.length), np.append(x, 0.0), np.append(slope, 0.0)
+        return s, x, slope
+
+    def seconds(self, y: Floats) -> float:
+        """Return about how long the law lasts."""
+        s, x, _ = self.run(y)
+        v = np.sqrt(x)
+        return float((2.0 * np.diff(s) / (v[:-1] + v[1:])).sum())
+
+    def values(self, y: Floats) -> Floats:
+        """Return x, x′, x″ (N, 3) at the gridpoints."""
+        return np.einsum("ndk,nk->nd", self.basis, y[self.first[:, None] + np.arange(4)])
+
+    def at(self, y: Floats, s: Floats) -> Floats:
+        """Return x, x′, x″ (n, 3) at sorted stations s (n,) of the spline."""
+        basis, first, v = np.empty((len(s), 3, 4)), np.empty(len(s), dtype=np.int64), np.empty((len(s), 3))
+        cubic_basis(self.knots, s, basis, first)
+        spline_values(basis, first, y, v)
+        return v
+
+
+Answer = tuple[Subproblem, Floats]
+"""A subproblem and the coefficients that solve it."""
+
+
+def _updated_rows(interval: Interval, grid: Floats, before: Subproblem) -> JerkRows:
+    """Return the rows at gridpoints (N,); those of gridpoints that another problem has are taken from there."""
+    near = np.minimum(np.searchsorted(before.s, grid), len(before.s) - 1)
+    new = before.s[near] != grid
+    fresh = interval.rows_at(grid[new])
+    columns: list[Floats] = []
+    for name in ROW_NAMES:
+        column = getattr(before.rows, name)
+        if len(column) == len(before.s):  # else one row for all
+            column = column[near]
+            column[new] = getattr(fresh, name)
+        columns.append(column)
+    return JerkRows(*columns)
