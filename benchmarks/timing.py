@@ -26,7 +26,6 @@ from pentapod.timing.jerk.knots import place_knots
 from pentapod.timing.jerk.options import DEFAULTS, JerkOptions
 from pentapod.timing.jerk.rows import JerkRows
 from pentapod.timing.jerk.subproblem import Subproblem
-from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.topp.engine import fastest
 from pentapod.timing.topp.reference import solve as solve_by_toppra
 from pentapod.timing.topp.stages import Failure, Stages
@@ -173,7 +172,7 @@ def jerk(n: int) -> None:
             used, profile = best(
                 lambda k=passes, p=p, x=x: jerk_limited(JerkProblem(p.s, x, p.jerk_rows, NO_KINKS, JerkOptions(k))), 2
             )
-            durations.append(MotionLaw.through(profile.s, profile.x, profile.slope).duration)
+            durations.append(profile.nodes.law().duration)
         print(
             f"{kind:7s} {count:8d} gridpoints, jerk: first pass {1e6 * first / count:.1f} µs, the next "
             f"{1e6 * later / count:.1f} µs; the whole law {1e6 * used / n:.1f} µs for each of {n} gridpoints given; "
@@ -198,7 +197,7 @@ def jerk_peers(n: int) -> None:
             solves, durations = socp(peer, x, p.s, 6)
             used, _ = best(solves[0], 1)
             profile = jerk_limited(JerkProblem(p.s, x, p.jerk_rows, NO_KINKS))
-            ours = MotionLaw.through(profile.s, profile.x, profile.slope).duration
+            ours = profile.nodes.law().duration
             line += f"; TOPP3-SOCP {1e6 * used / len(p.s):.0f} µs: {used / len(p.s) / (first / count):.0f} times; "
             line += f"durations {ours:.4f} s, SOCP's " + ", ".join(f"{d:.4f}" for d in durations)
         print(line, flush=True)
@@ -269,9 +268,9 @@ def line(n: int) -> None:
         return JerkRows(q1 / ACCELERATION, 0.0 * q1, np.zeros((1, 5)), jerks, np.full(len(s), bound[0]))
 
     ours, profile = best(lambda: jerk_limited(JerkProblem(s, x, rows, NO_KINKS)), 3)
-    seconds = MotionLaw.through(profile.s, profile.x, profile.slope).duration
+    seconds = profile.nodes.law().duration
     print(
-        f"line    {len(profile.s):8d} gridpoints with jerk limits, from rest to rest: {seconds:.5f} s in "
+        f"line    {len(profile.nodes.s):8d} gridpoints with jerk limits, from rest to rest: {seconds:.5f} s in "
         f"{1e3 * ours:.1f} ms; the optimum, by ruckig without a path: {optimum:.5f} s in {1e3 * theirs:.3f} ms; "
         f"ours is longer by {seconds / optimum - 1:.1e}"
     )
@@ -284,8 +283,8 @@ def million(n: int) -> None:
     s, base = p.s, p.s[-1]
     start, wall = time.process_time(), time.perf_counter()
     profile = jerk_limited(s, x, p.jerk_rows, NO_KINKS)
-    MotionLaw.through(profile.s, profile.x, profile.slope)
-    count = len(profile.s)
+    profile.nodes.law()
+    count = len(profile.nodes.s)
     used = time.process_time() - start
     print(
         f"long path: {n} gridpoints ({base:.0f} m), {count} with jerk limits, all passes and "

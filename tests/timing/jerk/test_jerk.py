@@ -97,8 +97,8 @@ def test_passes_improve_and_two_come_close(name):
     x = fastest(s, here.first, here.second, here.ceiling)
     laws = []
     for passes in (1, 2, 3, 8):
-        p = jerk_limited(JerkProblem(s, x, rows, piece.knots, JerkOptions(passes=passes)))
-        law = MotionLaw.through(p.s, p.x, p.slope)
+        p = jerk_limited(JerkProblem(s, x, rows, piece.knots, JerkOptions(passes=passes))).nodes
+        law = p.law()
         laws.append(law)
         at = rows(p.s[1:-1])
         bend = np.gradient(p.slope, p.s)[1:-1]

@@ -8,7 +8,6 @@ import pytest
 from pentapod.timing.jerk.jerk_limited import NO_AGREEMENT, JerkProblem, jerk_limited
 from pentapod.timing.jerk.options import BlockOptions, JerkOptions
 from pentapod.timing.jerk.rows import JerkRows
-from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.topp.engine import fastest
 from pentapod.timing.topp.stages import Failure
 
@@ -46,7 +45,7 @@ def profile(length=1.5, step=1e-4, x_start=0.0, x_end=0.0):
 
 
 def duration(law):
-    return MotionLaw.through(law.s, law.x, law.slope).duration
+    return law.nodes.law().duration
 
 
 def limited(s, x, **blocks):
@@ -63,18 +62,18 @@ def whole():
 def test_blocks_find_the_law_of_the_whole(whole):
     s, x, law = whole
     blocked = limited(s, x, size=2500, overlap=512)
-    assert not np.array_equal(blocked.x, law.x)
+    assert not np.array_equal(blocked.nodes.x, law.nodes.x)
     assert duration(blocked) == pytest.approx(duration(law), rel=1e-3)
-    assert (np.diff(blocked.s) > 0.0).all()
-    assert blocked.x[0] == blocked.x[-1] == 0.0
+    assert (np.diff(blocked.nodes.s) > 0.0).all()
+    assert blocked.nodes.x[0] == blocked.nodes.x[-1] == 0.0
     # Limits by differences of the legs along the law, which know nothing of rows.
-    for found in (law, blocked):
+    for found in (law.nodes, blocked.nodes):
         rows = Waves()(found.s)
         above = found.x / np.maximum(np.minimum(np.interp(found.s, s, x), rows.ceiling), 1e-300)
         assert np.quantile(above, 0.99) < 1 + 1e-6  # at the gridpoints, which are half of them
         assert above.max() < 1.006  # between them
         assert np.abs(rows.first * found.slope[:, None] / 2 + rows.second * found.x[:, None]).max() < 1.005
-        motion = MotionLaw.through(found.s, found.x, found.slope)
+        motion = found.law()
         t = np.linspace(0.01, motion.duration - 0.01, 100_001)
         h = 1e-6
         push = [
@@ -102,10 +101,11 @@ def test_given_speeds_at_the_ends(v, w):
     s, x = profile(0.4, x_start=v * v, x_end=w * w)
     law = limited(s, x)
     assert not isinstance(law, Failure)
-    assert law.s[0] == 0.0
-    assert law.s[-1] == s[-1]
+    nodes = law.nodes
+    assert nodes.s[0] == 0.0
+    assert nodes.s[-1] == s[-1]
     for end, speed in ((0, v), (-1, w)):
-        assert law.x[end] == pytest.approx(speed**2, rel=1e-9, abs=1e-300)
-        assert abs(law.slope[end]) < 1e-9
+        assert nodes.x[end] == pytest.approx(speed**2, rel=1e-9, abs=1e-300)
+        assert abs(nodes.slope[end]) < 1e-9
     resting = limited(*profile(0.4))
     assert duration(law) < duration(resting)

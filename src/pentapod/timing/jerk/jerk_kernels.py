@@ -291,8 +291,12 @@ def minimise_duration(
         _newton(band, right, down, fixed, step)
         spline_values(basis, first, step, dv)
         primal, dual = _step(rows, dv, iterate)
-        s += primal * off
-        z += dual * rest
-        y += primal * step
+        for i in range(count):
+            for j in range(s.shape[1]):
+                for side in range(2):
+                    s[i, j, side] += primal * off[i, j, side]
+                    z[i, j, side] += dual * rest[i, j, side]
+        for k in range(n):
+            y[k] += primal * step[k]
         spline_values(basis, first, y, v)
     return False, gap, residual

@@ -24,9 +24,10 @@ from pentapod.base.arrays import Floats
 from pentapod.timing.jerk.interval import Interval
 from pentapod.timing.jerk.options import DEFAULTS, JerkOptions
 from pentapod.timing.jerk.passes import fastest_law
-from pentapod.timing.jerk.rows import NO_ROWS, Excess, JerkRows, MeasureExcess, RowsAt, Run
+from pentapod.timing.jerk.rows import NO_ROWS, Excess, JerkRows, MeasureExcess, RowsAt
 from pentapod.timing.jerk.subproblem import Subproblem
-from pentapod.timing.jerk.tightening import Tightened, tightened
+from pentapod.timing.jerk.tightening import tightened
+from pentapod.timing.time_law.motion_law import SpeedNodes
 from pentapod.timing.topp.stages import Failure
 
 NO_LAW = Failure(-1, "no law below the fastest one keeps the jerk limits")
@@ -62,25 +63,23 @@ class BlockLaw:
         v = self.problem.at(self.y, np.clip(s - self.shift, knots[0], knots[-1]))
         return v[:, 0], v[:, 1]
 
-    def run(self, low: float, high: float) -> Run:
+    def nodes(self, low: float, high: float) -> SpeedNodes:
         """Return the law from `low` to before `high`, stations of the whole path; rests included."""
-        s, x, slope = self.problem.run(self.y)
-        s = s + self.shift
+        nodes = self.problem.nodes(self.y)
+        s = nodes.s + self.shift
         own = (s >= low) & (s < high)
-        return s[own], x[own], slope[own]
+        return SpeedNodes(s[own], nodes.x[own], nodes.slope[own])
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothProfile:
-    """x = ṡ² (N,) and its slope x′ = 2 s̈ (N,) at stations (N,); jerk about constant between.
+    """Nodes of a jerk-limited profile; the jerk is about constant between them.
 
     longer: seconds that tightening has added; exceeds: whether setpoints still exceed limits; overlap: gridpoints by
     which its blocks reached beyond their cuts.
     """
 
-    s: Floats
-    x: Floats
-    slope: Floats
+    nodes: SpeedNodes
     longer: float
     exceeds: bool
     overlap: int
@@ -130,15 +129,16 @@ class JerkProblem:
         answer = fastest_law(interval)
         if answer is None:
             return NO_LAW
-        final = Tightened(answer, 0.0, exceeds=True)
+        longer, exceeds = 0.0, True
         if self.measure is not None:
-            final = tightened(*answer, partial(_measured, self.measure, shift))
-        problem, y = final.answer
-        return BlockLaw(replace(problem, rows=NO_ROWS), y, shift, final.longer, final.exceeds)
+            answer, longer, exceeds = tightened(*answer, partial(_measured, self.measure, shift))
+        problem, y = answer
+        return BlockLaw(replace(problem, rows=NO_ROWS), y, shift, longer, exceeds)
 
-    def joined(self, overlap: int, laws: list[BlockLaw]) -> Run | None:
+    def joined(self, overlap: int, laws: list[BlockLaw]) -> SpeedNodes | None:
         """Return the law of the blocks' laws, None where two do not agree."""
-        options, runs, low = self.options.blocks, [], -np.inf
+        options, low = self.options.blocks, -np.inf
+        parts: list[SpeedNodes] = []
         for block, (before, after) in zip(self.blocks(overlap)[1:], pairwise(laws), strict=True):
             marks = self.s[block.begin - overlap // 2 : block.begin + overlap // 2 + 1 : options.blend]
             differences = [_difference(before, after, float(a), float(b), options.blend) for a, b in pairwise(marks)]
@@ -146,11 +146,10 @@ class JerkProblem:
             if not differences[best] <= options.agreement:
                 return None
             a, b = float(marks[best]), float(marks[best + 1])
-            runs += [before.run(low, a), _blended(before, after, a, b)]
+            parts += [before.nodes(low, a), _blended(before, after, a, b)]
             low = b
-        runs.append(laws[-1].run(low, np.inf))
-        s, x, slope = (np.concatenate(column) for column in zip(*runs, strict=True))
-        return s, x, slope
+        parts.append(laws[-1].nodes(low, np.inf))
+        return SpeedNodes(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("s", "x", "slope")))
 
 
 def jerk_limited(problem: JerkProblem) -> SmoothProfile | Failure:
@@ -159,10 +158,10 @@ def jerk_limited(problem: JerkProblem) -> SmoothProfile | Failure:
     for overlap in problem.overlaps():
         found = [problem.solved(block) for block in problem.blocks(overlap)]
         laws = [law for law in found if isinstance(law, BlockLaw)]
-        run = problem.joined(overlap, laws) if len(laws) == len(found) else None
-        if run is not None:
+        nodes = problem.joined(overlap, laws) if len(laws) == len(found) else None
+        if nodes is not None:
             longer, exceeds = sum(law.longer for law in laws), any(law.exceeds for law in laws)
-            return SmoothProfile(*run, longer, exceeds, overlap)
+            return SmoothProfile(nodes, longer, exceeds, overlap)
         reason = NO_LAW if len(laws) < len(found) else NO_AGREEMENT
     return reason
 
@@ -174,13 +173,13 @@ def _difference(left: BlockLaw, right: BlockLaw, low: float, high: float, count:
     return float((np.abs(other - x) / np.maximum(x, other)).max())
 
 
-def _blended(left: BlockLaw, right: BlockLaw, low: float, high: float) -> Run:
+def _blended(left: BlockLaw, right: BlockLaw, low: float, high: float) -> SpeedNodes:
     """Return the law from `low` to before `high`, where it passes from one block to the next."""
-    s = np.unique(np.concatenate([[low], left.run(low, high)[0], right.run(low, high)[0]]))
+    s = np.unique(np.concatenate([[low], left.nodes(low, high).s, right.nodes(low, high).s]))
     (x, slope), (other, other_slope) = left.at(s), right.at(s)
     u = (s - low) / (high - low)
     share, rise = u**3 * (10.0 - 15.0 * u + 6.0 * u**2), 30.0 * (u * (1.0 - u)) ** 2 / (high - low)
-    return s, x + share * (other - x), slope + share * (other_slope - slope) + rise * (other - x)
+    return SpeedNodes(s, x + share * (other - x), slope + share * (other_slope - slope) + rise * (other - x))
 
 
 def _shifted(rows_at: RowsAt, shift: float, s: Floats) -> JerkRows:
@@ -188,8 +187,7 @@ def _shifted(rows_at: RowsAt, shift: float, s: Floats) -> JerkRows:
     return rows_at(s + shift)
 
 
-def _measured(measure: MeasureExcess, shift: float, run: Run, between: Floats) -> Excess:
-    """Return where the law of a run exceeds limits whose stations begin `shift` metres on."""
-    s, x, slope = run
-    over = measure((s + shift, x, slope), between + shift)
+def _measured(measure: MeasureExcess, shift: float, nodes: SpeedNodes, between: Floats) -> Excess:
+    """Return where a law whose stations begin `shift` metres along the path exceeds limits."""
+    over = measure(SpeedNodes(nodes.s + shift, nodes.x, nodes.slope), between + shift)
     return replace(over, s=over.s - shift)

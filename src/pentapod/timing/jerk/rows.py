@@ -9,6 +9,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.timing.limits.limit import share_of_room
+from pentapod.timing.time_law.motion_law import SpeedNodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +41,6 @@ ROW_NAMES = tuple(field.name for field in fields(JerkRows))
 RowsAt = Callable[[Floats], JerkRows]
 """Gives the rows at sorted stations (N,)."""
 
-Run = tuple[Floats, Floats, Floats]
-"""Stations, x and x′ (n,) of a stretch of a law."""
-
 
 @dataclass(frozen=True, eq=False)
 class Excess:
@@ -58,5 +56,5 @@ class Excess:
     jerk: Floats
 
 
-MeasureExcess = Callable[[Run, Floats], Excess]
+MeasureExcess = Callable[[SpeedNodes, Floats], Excess]
 """Measures where the setpoints of a law exceed limits, between stations (2, m)."""

@@ -11,8 +11,9 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.timing.jerk.interval import End, Interval
 from pentapod.timing.jerk.jerk_kernels import minimise_duration
 from pentapod.timing.jerk.options import JerkOptions
-from pentapod.timing.jerk.rows import ROW_NAMES, JerkRows, Run
+from pentapod.timing.jerk.rows import ROW_NAMES, JerkRows
 from pentapod.timing.jerk.spline_kernels import cubic_basis, spline_values
+from pentapod.timing.time_law.motion_law import SpeedNodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,11 +165,8 @@ class Subproblem:
         y[low:high] = part
         return y
 
-    def run(self, y: Floats) -> Run:
-        """Return the law at the gridpoints and halfway between, so that cubics through it follow the spline closely.
-
-        Rests are included.
-        """
+    def nodes(self, y: Floats) -> SpeedNodes:
+        """Return the law at rests, at gridpoints and halfway between, so that cubics follow the spline closely."""
         v, s = np.empty((2 * len(self.s) - 1, 3)), np.empty(2 * len(self.s) - 1)
         s[::2], s[1::2] = self.s, (self.s[1:] + self.s[:-1]) / 2.0
         v[::2], v[1::2] = self.values(y), self.at(y, s[1::2])
@@ -177,13 +175,13 @@ class Subproblem:
             s, x, slope = np.append(0.0, s), np.append(0.0, x), np.append(0.0, slope)
         if self.end.join > 0.0:
             s, x, slope = np.append(s, self.length), np.append(x, 0.0), np.append(slope, 0.0)
-        return s, x, slope
+        return SpeedNodes(s, x, slope)
 
     def seconds(self, y: Floats) -> float:
         """Return about how long the law lasts."""
-        s, x, _ = self.run(y)
-        v = np.sqrt(x)
-        return float((2.0 * np.diff(s) / (v[:-1] + v[1:])).sum())
+        nodes = self.nodes(y)
+        v = np.sqrt(nodes.x)
+        return float((2.0 * np.diff(nodes.s) / (v[:-1] + v[1:])).sum())
 
     def values(self, y: Floats) -> Floats:
         """Return x, x′, x″ (N, 3) at the gridpoints."""

@@ -6,7 +6,7 @@ limit, that limit is lowered in the rows of the nearest gridpoints; the law chan
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,25 +16,19 @@ from pentapod.timing.jerk.rows import MeasureExcess
 from pentapod.timing.jerk.subproblem import Answer, Subproblem
 
 
-@dataclass(frozen=True, eq=False)
-class Tightened:
-    """An answer, the seconds by which it lasts longer than before, and whether setpoints still exceed limits."""
+def tightened(problem: Subproblem, y: Floats, measure: MeasureExcess) -> tuple[Answer, float, bool]:
+    """Return an answer whose setpoints keep the limits, as far as one is found.
 
-    answer: Answer
-    longer: float
-    exceeds: bool
-
-
-def tightened(problem: Subproblem, y: Floats, measure: MeasureExcess) -> Tightened:
-    """Return an answer whose setpoints keep the limits, as far as one is found."""
+    Also the seconds by which it lasts longer than before, and whether setpoints still exceed limits.
+    """
     options, given = problem.options.tightening, problem
     lowest = (0.0, options.least_left, options.least_left)
     factors = [np.ones(len(problem.s)) for _ in lowest]
     seconds, between = problem.seconds(y), _near_limits(problem, y)
     for attempt in range(options.rounds):
-        over = measure(problem.run(y), between)
+        over = measure(problem.nodes(y), between)
         if not len(over.s):
-            return Tightened((problem, y), problem.seconds(y) - seconds, False)
+            return (problem, y), problem.seconds(y) - seconds, False
         low = np.maximum(np.searchsorted(problem.s, over.s - over.reach) - 1, 0)
         high = np.minimum(np.searchsorted(problem.s, over.s + over.reach) + 1, len(problem.s))
         extra = 1.0 + (attempt + 1) * options.extra
@@ -47,7 +41,7 @@ def tightened(problem: Subproblem, y: Floats, measure: MeasureExcess) -> Tighten
         problem = _with_limits(given, *factors)
         y, changed = solve_locally(problem, y, problem.tangent_points(y), over.s)
         between = np.concatenate([changed, np.stack([over.s - over.reach, over.s + over.reach])], axis=1)
-    return Tightened((problem, y), problem.seconds(y) - seconds, True)
+    return (problem, y), problem.seconds(y) - seconds, True
 
 
 def _near_limits(problem: Subproblem, y: Floats) -> Floats:

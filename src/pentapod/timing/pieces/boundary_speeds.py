@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from pentapod.timing.pieces.piece import PieceProfile
-from pentapod.timing.time_law.motion_law import MotionLaw, Stretchable
+from pentapod.timing.time_law.motion_law import MotionLaw, SpeedNodes
 from pentapod.timing.topp.stages import Failure
 
 _MOST_LESS = 0.9
@@ -16,7 +16,7 @@ _MOST_LESS = 0.9
 
 
 def law_between(
-    profile: PieceProfile, slower: float, period: float, nodes: Stretchable | None = None
+    profile: PieceProfile, slower: float, period: float, nodes: SpeedNodes | None = None
 ) -> MotionLaw | Failure:
     """Return the law of a profile with given speeds at its ends, `slower` times slower, in whole periods.
 

@@ -25,7 +25,7 @@ from pentapod.timing.pieces.piece import PieceProfile
 from pentapod.timing.pieces.setpoints import EDGE, GOAL, LimitShares, Setpoints, measured, unaffected
 from pentapod.timing.pieces.slowdown import slowed_at, slowed_locally
 from pentapod.timing.pieces.violations import excess
-from pentapod.timing.time_law.motion_law import MotionLaw, Stretchable
+from pentapod.timing.time_law.motion_law import MotionLaw, SpeedNodes
 from pentapod.timing.time_law.slowed import most_lost
 from pentapod.timing.topp.stages import Failure
 
@@ -77,7 +77,7 @@ class _Plan:
     """
 
     profile: PieceProfile
-    nodes: Stretchable | None
+    nodes: SpeedNodes | None
     slower: float
     first: MotionLaw
     window: int
@@ -167,7 +167,7 @@ def _planned(
 
         found = smooth_profile(profile, partial(excess, profile, machine), jerk_options)
         if not isinstance(found, Failure):
-            first = MotionLaw.through(found.s, found.x, found.slope)
+            first = found.nodes.law()
             # The first law is the one before limits were lowered where setpoints exceeded them.
             first = first.stretched(max(first.duration - found.longer, 0.5 * first.duration))
             return _Plan(profile, slowed_locally(profile, found, machine), 1.0, first, window, options)

@@ -12,7 +12,7 @@ from pentapod.machine.machine import Machine
 from pentapod.timing.pieces.piece import PieceProfile
 from pentapod.timing.pieces.setpoints import LimitShares
 from pentapod.timing.pieces.violations import law_times, violations
-from pentapod.timing.time_law.motion_law import MotionLaw, Stretchable
+from pentapod.timing.time_law.motion_law import MotionLaw, SpeedNodes
 
 if TYPE_CHECKING:
     from pentapod.timing.jerk.jerk_limited import SmoothProfile
@@ -33,12 +33,12 @@ DEFAULTS = SlowdownOptions()
 
 def slowed_locally(
     profile: PieceProfile, smooth: SmoothProfile, machine: Machine, options: SlowdownOptions = DEFAULTS
-) -> Stretchable:
+) -> SpeedNodes:
     """Return the law of a piece whose setpoints keep the limits at any phase; given end speeds stay.
 
     Places that exceed limits are run slower, round after round. Running the whole slower is taken where it costs less.
     """
-    nodes, period = Stretchable(smooth.s, smooth.x, smooth.slope), machine.controller.period
+    nodes, period = smooth.nodes, machine.controller.period
     if not smooth.exceeds:
         return nodes
     law = first = nodes.law()
@@ -54,19 +54,20 @@ def slowed_locally(
         between = law_times(law, changed)
     if not profile.moving and law.duration > first.duration * uniform * (1.0 + options.extra):
         slower = 1.0 / (uniform * (1.0 + options.extra)) ** 2
-        return Stretchable(smooth.s, smooth.x * slower, smooth.slope * slower)
+        given = smooth.nodes
+        return SpeedNodes(given.s, given.x * slower, given.slope * slower)
     return nodes
 
 
 def slowed_at(
-    nodes: Stretchable,
+    nodes: SpeedNodes,
     law: MotionLaw,
     profile: PieceProfile,
     at: Floats,
     shares: LimitShares,
     period: float,
     options: SlowdownOptions = DEFAULTS,
-) -> tuple[Stretchable, Floats]:
+) -> tuple[SpeedNodes, Floats]:
     """Return a law slower about times (n,) of rows that exceed limits, and the stations (2, k) between which it is.
 
     Given end speeds stay.

@@ -9,11 +9,11 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
-from pentapod.timing.jerk.rows import Excess, Run
+from pentapod.timing.jerk.rows import Excess
 from pentapod.timing.pieces.boundary_speeds import whole_periods
 from pentapod.timing.pieces.piece import PieceProfile
 from pentapod.timing.pieces.setpoints import EDGE, GOAL, ROWS_AT_ONCE, LimitShares, Setpoints
-from pentapod.timing.time_law.motion_law import MotionLaw
+from pentapod.timing.time_law.motion_law import MotionLaw, SpeedNodes
 
 
 @dataclass(frozen=True)
@@ -29,9 +29,9 @@ class ViolationOptions:
 DEFAULTS = ViolationOptions()
 
 
-def excess(profile: PieceProfile, machine: Machine, run: Run, between: Floats) -> Excess:
-    """Return where a law through these stations, x and x′ exceeds limits between stations (2, m), and by how much."""
-    law = MotionLaw.through(*run)
+def excess(profile: PieceProfile, machine: Machine, nodes: SpeedNodes, between: Floats) -> Excess:
+    """Return where the law of some nodes exceeds limits between stations (2, m), and by how much."""
+    law = nodes.law()
     times, shares = violations(profile, law, machine, law_times(law, between))
     order = np.argsort(times, kind="stable")
     times, shares = times[order], shares.at(order)

@@ -128,8 +128,8 @@ class MotionLaw(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Stretchable:
-    """Squared speeds x (K,) in m²/s² and slopes x′ (K,) at stations s (K,): what a law limited in jerk is made of."""
+class SpeedNodes:
+    """Nodes of a jerk-limited law: x = ṡ² (K,) in m²/s² and its slope x′ = 2 s̈ (K,) at stations s (K,)."""
 
     s: Floats
     x: Floats
@@ -139,7 +139,7 @@ class Stretchable:
         """Return the law through them."""
         return MotionLaw.through(self.s, self.x, self.slope)
 
-    def slower(self, times: Floats, depths: Floats, widths: Floats) -> Stretchable:
+    def slower(self, times: Floats, depths: Floats, widths: Floats) -> SpeedNodes:
         """Return it slower about some of its times (n,): by the shares `depths` there, by less up to `widths` (n,).
 
         The speed is multiplied by f = 1 − depth (1 − u²)³, u = (t − time) / width, which has no step in the jerk; so x
@@ -156,4 +156,4 @@ class Stretchable:
             factor = 1.0 - depths[k] * left**3
             change[here] = change[here] * factor + share[here] * (6.0 * depths[k] / widths[k]) * u * left**2
             share[here] *= factor
-        return Stretchable(self.s, self.x * share**2, self.slope * share**2 + 2.0 * v * share * change)
+        return SpeedNodes(self.s, self.x * share**2, self.slope * share**2 + 2.0 * v * share * change)

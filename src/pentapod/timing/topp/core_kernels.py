@@ -16,13 +16,14 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.numerics.kernels import kernel
 
-_TOUCH = 1e-13
+CLOSED_GAP = 1e-13
 """A gap between the ends of an interval counts as closed below this share of them."""
 
-_VAIN = 1e-13
+NEGLIGIBLE_TERM = 1e-13
 """A row whose u-term can reach no more than this share of its limit bounds x alone."""
 
-_STEPS = 100
+NEWTON_STEPS = 100
+"""Largest number of Newton steps of a stage."""
 
 
 @kernel
@@ -37,7 +38,7 @@ def _fits(a: Floats, b: Floats, c: Floats, moves: int, i: int, u: float, here: f
 
 @kernel
 def _reach(a: Floats, b: Floats, c: Floats, moves: int, i: int, twice: float, there: float) -> float:
-    """Return a bound of x at stage i: that of the row that says most, for 0 ≤ x ≤ there at its end."""
+    """Return an upper bound of x at stage i, of the row steepest in x, for 0 ≤ x ≤ there at its end."""
     steepest, reach = 0.0, np.inf
     for j in range(a.shape[1]):
         tilt = abs(b[i, j] - a[i, j] / twice)
@@ -53,6 +54,17 @@ def _reach(a: Floats, b: Floats, c: Floats, moves: int, i: int, twice: float, th
 
 
 @kernel
+def _row(
+    a: Floats, b: Floats, c: Floats, moves: int, i: int, j: int, end: int, twice: float
+) -> tuple[float, float, float]:
+    """Return f ≥ 0, g, c of row j at the start (end 0) or end (1) of stage i: |f u + g x − c| ≤ 1, x at its start."""
+    g = b[i + end, j]
+    f = a[i + end, j] + end * twice * g
+    shift = c[(i + end) * moves, j]
+    return (-f, -g, -shift) if f < 0.0 else (f, g, shift)
+
+
+@kernel
 def _stage(
     a: Floats, b: Floats, c: Floats, moves: int, i: int, twice: float, x: float, there: float, rows: Floats, names: Ints
 ) -> tuple[int, float]:
@@ -61,16 +73,12 @@ def _stage(
     names: 2j for row j at the stage's start, 2j + 1 at its end. Returns how many there are, and x within the bounds of
     the rows in which u plays no part.
     """
-    vain = _VAIN * twice / max(x, there, 1e-300)
+    least = NEGLIGIBLE_TERM * twice / max(x, there, 1e-300)
     m = 1
     for j in range(a.shape[1]):
         for end in range(2):
-            g = b[i + end, j]
-            f = a[i + end, j] + end * twice * g
-            shift = c[(i + end) * moves, j]
-            if f < 0.0:
-                f, g, shift = -f, -g, -shift
-            if f > vain:
+            f, g, shift = _row(a, b, c, moves, i, j, end, twice)
+            if f > least:
                 r = 1.0 / f
                 rows[0, m], rows[1, m], rows[2, m], names[m] = (shift - 1.0) * r, (shift + 1.0) * r, g * r, 2 * j + end
                 m += 1
@@ -96,10 +104,10 @@ def _interval(x: float, rows: Floats, m: int) -> tuple[float, float, int, int]:
 def _right_root(x: float, rows: Floats, m: int) -> tuple[float, int, int]:
     """Return the largest x up to the given one that leaves an interval, −1 if none does, and the last two rows."""
     cap, below, above = x, 0, 0
-    for attempt in range(_STEPS):
+    for attempt in range(NEWTON_STEPS):
         least, most, below, above = _interval(x, rows, m)
         gap = least - most
-        close = _TOUCH * (abs(least) + abs(most))
+        close = CLOSED_GAP * (abs(least) + abs(most))
         if gap <= close and (attempt == 0 or gap >= -close):
             return x, below, above
         slope = rows[2, above] - rows[2, below]
@@ -108,7 +116,7 @@ def _right_root(x: float, rows: Floats, m: int) -> tuple[float, int, int]:
         new = min(x - gap / slope, cap)
         if new < 0.0:
             least, most, below, above = _interval(0.0, rows, m)
-            return (0.0 if least - most <= _TOUCH * (abs(least) + abs(most)) else -1.0), below, above
+            return (0.0 if least - most <= CLOSED_GAP * (abs(least) + abs(most)) else -1.0), below, above
         if new == x:
             return x, below, above
         x = new
@@ -119,10 +127,10 @@ def _right_root(x: float, rows: Floats, m: int) -> tuple[float, int, int]:
 def _left_root(top: float, rows: Floats, m: int) -> tuple[float, int, int]:
     """Return the least x up to `top` that leaves an interval, −1 if none does, and the last two rows."""
     x, below, above = 0.0, 0, 0
-    for _ in range(_STEPS):
+    for _ in range(NEWTON_STEPS):
         least, most, below, above = _interval(x, rows, m)
         gap = least - most
-        if gap <= _TOUCH * (abs(least) + abs(most)):
+        if gap <= CLOSED_GAP * (abs(least) + abs(most)):
             break
         slope = rows[2, above] - rows[2, below]
         new = x - gap / slope if slope < 0.0 else np.inf
@@ -192,14 +200,10 @@ def fastest_forward(
         if _fits(a, b, c, moves, i, u, here, top):
             x[i + 1] = top
             continue
-        vain = _VAIN * twice / max(here, top, 1e-300)
+        least = NEGLIGIBLE_TERM * twice / max(here, top, 1e-300)
         for j in range(a.shape[1]):
             for end in range(2):
-                g = b[i + end, j]
-                f = a[i + end, j] + end * twice * g
-                shift = c[(i + end) * moves, j]
-                if f < 0.0:
-                    f, g, shift = -f, -g, -shift
-                if f > vain:
+                f, g, shift = _row(a, b, c, moves, i, j, end, twice)
+                if f > least:
                     u = min(u, (shift + 1.0 - g * here) / f)
         x[i + 1] = min(max(here + twice * u, low[i + 1]), top)

@@ -1,8 +1,7 @@
 """The toppra engine: the reference solution of the largest ṡ² along a grid.
 
-toppra compares with absolute tolerances (1e-8 and the like), so what it is given has no units: squared
-speeds are of order one, and so are the path accelerations that the limits allow. Metres with
-micrometre-long motions fail every time otherwise.
+toppra compares with absolute tolerances (1e-8 and the like), so what it is given has no units: squared speeds are of
+order one, and so are the path accelerations that the limits allow. In metres, motions of micrometres fail every time.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import math
 import warnings
 from collections.abc import Generator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -28,15 +27,12 @@ def solve(stages: Stages, x_start: float, x_end: float) -> Floats | Failure:
     offset = stages.offset if len(stages.offset) == 1 else stages.offset[distinct]
     ceiling = np.minimum.reduceat(stages.ceiling, np.flatnonzero(distinct))
     x_unit, s_unit = _units(s, first, ceiling, max(x_start, x_end))
-    problem = _Problem(
+    x = _solve(
         s / s_unit,
-        first * (x_unit / s_unit),
-        second * x_unit,
-        np.broadcast_to(offset, first.shape),
+        (first * (x_unit / s_unit), second * x_unit, np.broadcast_to(offset, first.shape)),
         np.minimum(ceiling / x_unit, 1e4),
         (x_start / x_unit, x_end / x_unit),
     )
-    x = problem.solve()
     return x if isinstance(x, Failure) else x[np.cumsum(distinct) - 1] * x_unit
 
 
@@ -51,86 +47,54 @@ def _units(s: Floats, first: Floats, ceiling: Floats, ends: float) -> tuple[floa
     return x_unit, x_unit * typical
 
 
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    grid: Floats
-    first: Floats
-    second: Floats
-    offset: Floats
-    ceiling: Floats
-    ends: tuple[float, float]
+def _solve(
+    grid: Floats, rows: tuple[Floats, Floats, Floats], ceiling: Floats, ends: tuple[float, float]
+) -> Floats | Failure:
+    """Return toppra's x (N + 1,) for rows within ±1 (first, second, offset), all free of units."""
+    with _quiet():
+        from toppra.algorithm import TOPPRA  # noqa: PLC0415 (heavy: imported when needed)
 
-    def solve(self) -> Floats | Failure:
-        with _quiet():
-            from toppra.algorithm import TOPPRA  # noqa: PLC0415 (heavy: imported when needed)
-
-            instance: Any = TOPPRA(
-                [_constraint(self)], _Interval(self.grid, self.first.shape[1]), self.grid, solver_wrapper="seidel"
-            )
-            _, speeds, _, controllable = instance.compute_parameterization(
-                math.sqrt(self.ends[0]), math.sqrt(self.ends[1]), return_data=True
-            )
-        lost = np.isnan(controllable).any(axis=1)
-        if lost.any():
-            return Failure(int(np.argmax(lost)), NOT_CONTROLLABLE)
-        if speeds is None:
-            return Failure(0, "the speed at the start is not among the controllable ones")
-        x = np.square(np.asarray(speeds, dtype=np.float64))
-        if np.isnan(x).any():
-            return Failure(int(np.argmax(np.isnan(x))), "the forward pass found no speed (numerical)")
-        x[[0, -1]] = self.ends
-        return x
+        # All that toppra asks of a path when its constraints know their own coefficients.
+        path = SimpleNamespace(path_interval=(float(grid[0]), float(grid[-1])), dof=rows[0].shape[1])
+        instance: Any = TOPPRA([_constraint(rows, ceiling)], path, grid, solver_wrapper="seidel")
+        _, speeds, _, controllable = instance.compute_parameterization(*map(math.sqrt, ends), return_data=True)
+    lost = np.isnan(controllable).any(axis=1)
+    if lost.any():
+        return Failure(int(np.argmax(lost)), NOT_CONTROLLABLE)
+    if speeds is None:
+        return Failure(0, "the speed at the start is not among the controllable ones")
+    x = np.square(np.asarray(speeds, dtype=np.float64))
+    if np.isnan(x).any():
+        return Failure(int(np.argmax(np.isnan(x))), "the forward pass found no speed (numerical)")
+    x[[0, -1]] = ends
+    return x
 
 
-@dataclass(frozen=True, eq=False)
-class _Interval:
-    """All that toppra asks of a path when its constraints know their own coefficients."""
-
-    grid: Floats
-    dof: int
-
-    @property
-    def path_interval(self) -> tuple[float, float]:
-        return float(self.grid[0]), float(self.grid[-1])
-
-
-def _constraint(problem: _Problem) -> Any:
+def _constraint(rows: tuple[Floats, Floats, Floats], ceiling: Floats) -> Any:
+    """Return toppra's constraint: rows within ±1 at both ends of each stage, and an upper bound of x."""
     from toppra.constraint import LinearConstraint  # noqa: PLC0415
     from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate  # noqa: PLC0415
 
-    rows = problem.first.shape[1]
+    count = rows[0].shape[1]
+    unit, limits = np.concatenate([np.eye(count), -np.eye(count)]), np.ones(2 * count)
 
     class RowsAndCeiling(LinearConstraint):  # type: ignore[misc]
-        """Rows within ±1 at both ends of each stage, and an upper bound of x."""
-
         def __init__(self) -> None:
             super().__init__()
-            self.dof = rows
+            self.dof = count
             self.identical = True
             self._format_string = ""
 
         def compute_constraint_params(self, path: Any, gridpoints: Any, *args: Any, **kwargs: Any) -> Any:
-            x_bounds = np.stack([np.zeros_like(problem.ceiling), problem.ceiling], axis=1)
-            unit = np.concatenate([np.eye(rows), -np.eye(rows)])
-            found: Any = canlinear_colloc_to_interpolate(
-                problem.first,
-                problem.second,
-                problem.offset,
-                unit,
-                np.ones(2 * rows),
-                None,
-                None,
-                gridpoints,
-                identical=True,
-            )
-            return (*found[:-2], None, x_bounds)
+            found: Any = canlinear_colloc_to_interpolate(*rows, unit, limits, None, None, gridpoints, identical=True)
+            return (*found[:-2], None, np.stack([np.zeros_like(ceiling), ceiling], axis=1))
 
     return RowsAndCeiling()
 
 
 @contextmanager
 def _quiet() -> Generator[None]:
-    """Keep toppra's log records and its imports' warnings to ourselves: failures come back as values."""
+    """Silence toppra's log records and its imports' warnings: failures come back as values."""
     logger = logging.getLogger("toppra")
     level = logger.level
     logger.setLevel(logging.CRITICAL + 1)
