@@ -1,10 +1,9 @@
 """Banded interior-point method for one convex subproblem of the jerk limits, compiled.
 
-x(s) = ṡ² is a cubic B-spline with coefficients y. At each gridpoint the rows depend on v = (x, x′, x″), three numbers
-of four coefficients; so a gridpoint's rows are summed into a 3×3 matrix before they meet the basis. Rows:
-|A₁ x′ + A₀ x − c| ≤ 1 (accelerations), r |J₂ x″ + J₁ x′ + J₀ x| + x / (2 x_k) ≤ 3/2 with r = √x_k (jerks, 1/√x
-replaced by its tangent at x_k, which lies below it), x ≤ top and x ≥ 0. Objective: the duration Σ w / √x itself.
-Mehrotra's predictor and corrector, from a start that need not be feasible.
+x(s) = ṡ² is a cubic B-spline with coefficients y. At each gridpoint the rows depend on v = (x, x′, x″) alone; they are
+summed into a 3×3 matrix before they meet the basis. Rows: |A₁ x′ + A₀ x − c| ≤ 1 (accelerations),
+r |J₂ x″ + J₁ x′ + J₀ x| + x / (2 x_k) ≤ 3/2 with r = √x_k (jerks, 1/√x replaced by its tangent at x_k, which lies below
+it), x ≤ top and x ≥ 0. Objective: the duration Σ w / √x. Mehrotra's predictor and corrector, from any start.
 """
 
 from __future__ import annotations
@@ -296,7 +295,6 @@ def minimise_duration(
                 for side in range(2):
                     s[i, j, side] += primal * off[i, j, side]
                     z[i, j, side] += dual * rest[i, j, side]
-        for k in range(n):
-            y[k] += primal * step[k]
+        y += primal * step
         spline_values(basis, first, y, v)
     return False, gap, residual
