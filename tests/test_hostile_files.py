@@ -82,7 +82,7 @@ def test_a_row_without_end_is_refused_before_it_is_read(tmp_path):
 @pytest.mark.parametrize("index", ["18446744073709551616", "9223372036854775807", DIGITS, "-18446744073709551616"])
 def test_an_obj_index_beyond_64_bits_is_a_vertex_that_is_not_there(tmp_path, index):
     path = written(tmp_path, "a.obj", f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {index}\n")
-    with pytest.raises(MeshError, match=":4: f: a facet names a vertex that is not there"):
+    with pytest.raises(MeshError, match=":4: f: a facet uses a vertex that is not there"):
         load_mesh(path, "mm")
 
 
@@ -109,7 +109,7 @@ def test_bytes_that_slip_into_an_stl_are_an_error(tmp_path):
     ball = load_mesh(written(tmp_path, "a.stl", fuzzed_files._stl()), "mm")
     data = write_stl(1e3 * ball.vertices[ball.faces], "ball")
     middle = 84 + 50 * (len(ball.faces) // 2) + 7
-    with pytest.raises(MeshError, match="2 bytes stand after the last"):
+    with pytest.raises(MeshError, match="2 bytes follow after the last"):
         load_mesh(written(tmp_path, "b.stl", data[:middle] + b"xy" + data[middle:]), "mm")
 
 
@@ -128,7 +128,7 @@ def test_an_obj_cut_at_the_end_of_a_line_is_told_by_its_loose_vertices_or_its_re
     with pytest.raises(MeshError, match="belong to no facet"):
         load_mesh(written(tmp_path, "a.obj", cut), "mm")
     one_less = b"".join(whole.splitlines(keepends=True)[:-1])
-    with pytest.raises(MeshError, match="a remark tells of 18 faces, the file holds 17"):
+    with pytest.raises(MeshError, match="a remark announces 18 faces, the file holds 17"):
         load_mesh(written(tmp_path, "b.obj", b"# Vertices: 16\n# Faces: 18\n" + one_less), "mm")
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import toolpath_surfaces as surfaces
 from pentapod.base.errors import MeshError
-from pentapod.mesh.faults import faults
+from pentapod.mesh.diagnosis import fault_edges
 from pentapod.toolpath import Mesh
 
 
@@ -152,16 +152,20 @@ def test_slivers_are_counted_and_kept():
     np.testing.assert_allclose(np.sort(faults(mesh)["sliver"][0, :, 0]), [0.2, 0.3])
 
 
-def test_faults_show_where_they_are():
+def faults(mesh):
+    return fault_edges(mesh.vertices, mesh.topology)
+
+
+def test_fault_edges_lie_at_the_faults():
     vertices, faces = surfaces.sphere(subdivisions=2)
     assert faults(Mesh.of(vertices, faces)) == {}
     turned = faces.copy()
     turned[7] = turned[7, ::-1]
     mesh = Mesh.of(vertices, np.delete(turned, 100, axis=0))
     found = faults(mesh)
-    assert set(found) == {"border", "wound unlike"}
+    assert set(found) == {"border", "opposite winding"}
     corners = {tuple(p) for p in vertices[faces[7]]}
-    assert {tuple(p) for p in found["wound unlike"].reshape(-1, 3)} == corners
+    assert {tuple(p) for p in found["opposite winding"].reshape(-1, 3)} == corners
     assert mesh.diagnosis.inconsistent_edges == 3
     assert {tuple(p) for p in found["border"].reshape(-1, 3)} == {tuple(p) for p in vertices[faces[100]]}
     third = Mesh.of(

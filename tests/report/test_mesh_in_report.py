@@ -21,7 +21,7 @@ def drawn(trace):
 
 
 def test_faults_are_drawn_where_they_are():
-    """Two squares wound unlike, a fin on their common edge, and a splinter apart."""
+    """Two squares of opposite winding, a fin on their common edge, and a splinter apart."""
     vertices = np.array(
         [
             [0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0], [1, 0.5, 1],
@@ -46,5 +46,5 @@ def test_faults_are_drawn_where_they_are():
 def test_what_is_wound_unlike_is_drawn():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float) * 1e-2
     mesh = Mesh.of(vertices, np.array([[0, 1, 2], [0, 3, 2]]))
-    trace = {t["name"]: t for t in fault_traces(mesh, RigidTransform.identity())}["mesh: wound unlike (1)"]
+    trace = {t["name"]: t for t in fault_traces(mesh, RigidTransform.identity())}["mesh: opposite winding (1)"]
     np.testing.assert_allclose(np.sort(drawn(trace)[0], axis=0), [[0, 0, 0], [10, 10, 0]], atol=1e-5)

@@ -9,11 +9,10 @@ from pentapod.base.arrays import Bools, Ints
 
 
 def equal_runs(values: ArrayLike) -> Ints:
-    """Return the runs (R, 2) of equal neighbours in values (N,), first and end of each: together all of 0 … N."""
+    """Return the runs (R, 2) of equal neighbours in values (N,), first and end of each; together they cover 0 … N."""
     v = np.asarray(values)
     edges = np.concatenate([[True], v[1:] != v[:-1], [True]])
-    # Nothing has one edge only.
-    at = np.flatnonzero(edges[: len(v) + 1])
+    at = np.flatnonzero(edges[: len(v) + 1])  # an empty array has a single edge
     return np.stack([at[:-1], at[1:]], axis=1)
 
 
@@ -23,5 +22,11 @@ def marked_runs(marked: Bools) -> Ints:
 
 
 def run_starts(counts: ArrayLike) -> Ints:
-    """Return where (R + 1,) runs of `counts` (R,) members begin that lie one behind the other, and the last ends."""
+    """Return where (R + 1,) consecutive runs of `counts` (R,) members begin, and where the last ends."""
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+
+
+def members(counts: Ints) -> tuple[Ints, Ints]:
+    """Return for each member of consecutive runs of `counts` (R,) members its run, and its number within it."""
+    run = np.repeat(np.arange(len(counts)), counts)
+    return run, np.arange(len(run)) - np.repeat(np.cumsum(counts) - counts, counts)

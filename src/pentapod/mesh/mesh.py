@@ -1,4 +1,4 @@
-"""Mesh: a triangulated surface in metres, welded, with smooth normals and its diagnosis."""
+"""Mesh: a triangulated surface in metres, with welded vertices, smooth normals and its diagnosis."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.base.arrays import Bools, Floats, Ints, as_batch, frozen, set_frozen
+from pentapod.base.arrays import Floats, Ints, as_batch, frozen, set_frozen
 from pentapod.base.errors import MeshError
 from pentapod.base.progress import Progress, silent
 from pentapod.base.values import Value
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.mesh import normals
-from pentapod.mesh import repair as mending
-from pentapod.mesh.diagnosis import MeshDiagnosis
+from pentapod.mesh import repair as repairing
+from pentapod.mesh.diagnosis import MeshDiagnosis, diagnose
 from pentapod.mesh.topology import Topology
 
 if TYPE_CHECKING:
@@ -28,10 +28,10 @@ CREASE_ANGLE = np.radians(40.0)
 
 @dataclass(frozen=True, eq=False)
 class Mesh(Value):
-    """A surface of triangles. Make one with `Mesh.of` or `load_mesh`; the constructor takes what is sound.
+    """Triangle mesh. `Mesh.of` and `load_mesh` make one from unchecked data; the constructor checks nothing.
 
-    vertices (V, 3): metres, workpiece frame. faces (F, 3): vertex indices, counterclockwise seen from
-    outside. diagnosis: what was found and mended. crease_angle: radians, see `normals`.
+    vertices (V, 3): metres, workpiece frame. faces (F, 3): vertex indices, counterclockwise seen from outside.
+    diagnosis: faults found and repaired. crease_angle: radians, see `normals`.
     """
 
     vertices: Floats
@@ -56,39 +56,42 @@ class Mesh(Value):
         notes: tuple[str, ...] = (),
         progress: Progress = silent,
     ) -> Mesh:
-        """Return the mesh of vertices (V, 3) in metres and facets (F, 3).
+        """Return the mesh of vertices (V, 3) in metres and facets (F, 3), with equal vertices welded.
 
-        Equal vertices are welded. Doubled and degenerate facets are dropped and listed among the repairs:
-        nothing can be machined on them. With `repair`, facets are also wound alike, and a closed surface
-        outwards; without it, that is only diagnosed. Raises MeshError where there are no facets, no area,
-        indices beyond the vertices, or coordinates that are not finite.
+        Duplicated and degenerate facets are dropped and listed among the repairs. With `repair`, all facets are also
+        wound alike, and those of a closed surface outwards; without it, wrong winding is only diagnosed. Raises
+        MeshError for no facets, zero area, indices beyond the vertices, and coordinates that are not finite.
         """
         points, facets = _checked(vertices, faces, source)
         progress("mesh", 0.3, "welding")
-        points, facets = mending.weld(points, facets)
+        points, facets = repairing.weld(points, facets)
         repairs: list[str] = []
-        degenerate = mending.degenerate_facets(points, facets)
+        degenerate = repairing.degenerate_facets(points, facets)
         if degenerate.all():
             raise MeshError("the mesh has zero area: no facet spans a surface", file=source)
         if degenerate.any():
             repairs.append(f"{int(degenerate.sum()):,} degenerate facets dropped")
             facets = facets[~degenerate]
-        duplicated = mending.duplicated_facets(facets, len(points))
+        duplicated = repairing.duplicated_facets(facets, len(points))
         if duplicated.any():
             repairs.append(f"{int(duplicated.sum()):,} duplicated facets dropped")
             facets = facets[~duplicated]
         if repair:
-            facets, said = mending.wind(points, facets)
-            repairs.extend(said)
+            facets, done = repairing.wind(points, facets)
+            repairs.extend(done)
         if repairs:
-            points, facets = mending.weld(points, facets)
+            points, facets = repairing.weld(points, facets)
         progress("mesh", 0.6, "edges")
         topology = Topology(facets, len(points))
-        mended = (int(duplicated.sum()), int(degenerate.sum()))
-        diagnosis = _diagnose(points, topology, source=source, mended=mended, repairs=repairs, notes=notes)
+        dropped = (int(duplicated.sum()), int(degenerate.sum()))
+        diagnosis = diagnose(points, topology, source, dropped, tuple(repairs), notes)
         mesh = cls(points, facets, diagnosis, crease_angle)
         mesh.__dict__["topology"] = topology  # fills the cached property: sorting a million edges takes a second
         return mesh
+
+    def _derived(self, vertices: Floats, faces: Ints, source: str) -> Mesh:
+        notes = self.diagnosis.notes
+        return Mesh.of(vertices, faces, source=source, crease_angle=self.crease_angle, notes=notes)
 
     @cached_property
     def topology(self) -> Topology:
@@ -111,16 +114,11 @@ class Mesh(Value):
         return frozen(normals.vertex_normals(self.vertices, self.faces, self.facet_normals), "vertex_normals")
 
     @cached_property
-    def smooth_pairs(self) -> Bools:
-        """Which of `topology.side_pairs` (M,) join smoothly: alike wound and no crease between them."""
-        return normals.smooth_pairs(self.topology, self.facet_normals, self.crease_angle)
-
-    @cached_property
     def corner_normals(self) -> Floats:
         """Unit normals (F, 3, 3) at the facets' corners, equal across edges except at creases and borders."""
+        smooth = normals.smooth_pairs(self.topology, self.facet_normals, self.crease_angle)
         return frozen(
-            normals.corner_normals(self.vertices, self.topology, self.facet_normals, self.smooth_pairs),
-            "corner_normals",
+            normals.corner_normals(self.vertices, self.topology, self.facet_normals, smooth), "corner_normals"
         )
 
     @property
@@ -129,32 +127,26 @@ class Mesh(Value):
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     def transformed(self, transform: RigidTransform) -> Mesh:
-        """Return the mesh moved rigidly; its diagnosis follows."""
-        return Mesh.of(
-            transform.apply(self.vertices),
-            self.faces,
-            source=self.diagnosis.source,
-            crease_angle=self.crease_angle,
-            notes=self.diagnosis.notes,
-        )
+        """Return the mesh moved rigidly."""
+        return self._derived(transform.apply(self.vertices), self.faces, self.diagnosis.source)
+
+    def flipped(self) -> Mesh:
+        """Return the mesh with its other side out: for an open sheet that faces away from the tool."""
+        return self._derived(self.vertices, self.faces[:, ::-1], self.diagnosis.source)
 
     def body(self, number: int) -> Mesh:
-        """Return one of the bodies that `diagnosis.bodies` counts. Raises MeshError for a number beyond them."""
+        """Return one of the bodies that `diagnosis.bodies` counts, from 0. Raises MeshError for a larger number."""
         count, body_of_facet = self.topology.bodies
         if not 0 <= number < count:
             raise MeshError("no such body", value=number, expected=f"0 to {count - 1}")
-        return Mesh.of(
-            self.vertices,
-            self.faces[body_of_facet == number],
-            source=f"{self.diagnosis.source}, body {number}",
-            crease_angle=self.crease_angle,
-        )
+        source = f"{self.diagnosis.source}, body {number}"
+        return self._derived(self.vertices, self.faces[body_of_facet == number], source)
 
     @classmethod
     def from_trimesh(cls, shape: Trimesh, metres: float, *, repair: bool = False) -> Mesh:
-        """Return the mesh of a `trimesh.Trimesh`: of any format or shape that trimesh knows.
+        """Return the mesh of a `trimesh.Trimesh`, read from any format or made by any function of trimesh.
 
-        metres: in one unit of its numbers, 1e-3 for millimetres; trimesh has none. repair and errors: as `of`.
+        metres: length of one unit of its numbers, 1e-3 for millimetres. repair and errors: as `of`.
         """
         if not (np.isfinite(metres) and metres > 0.0):
             raise MeshError("the unit must be a positive number of metres", key="metres", value=metres)
@@ -165,16 +157,6 @@ class Mesh(Value):
         from trimesh import Trimesh  # noqa: PLC0415  heavy: only for those who ask
 
         return Trimesh(self.vertices, self.faces, process=False)
-
-    def flipped(self) -> Mesh:
-        """Return the mesh with its other side out: for an open sheet that faces away from the tool."""
-        return Mesh.of(
-            self.vertices,
-            self.faces[:, ::-1],
-            source=self.diagnosis.source,
-            crease_angle=self.crease_angle,
-            notes=self.diagnosis.notes,
-        )
 
 
 def _checked(vertices: ArrayLike, faces: ArrayLike, source: str) -> tuple[Floats, Ints]:
@@ -188,7 +170,7 @@ def _checked(vertices: ArrayLike, faces: ArrayLike, source: str) -> tuple[Floats
     facets = facets.astype(np.intp)
     if facets.min() < 0 or facets.max() >= len(points):
         raise MeshError(
-            f"a facet names a vertex that is not there; the mesh has {len(points):,} vertices",
+            f"a facet uses a vertex that is not there; the mesh has {len(points):,} vertices",
             file=source,
             value=int(facets.max() if facets.max() >= len(points) else facets.min()),
             remedy="the file may be truncated",
@@ -202,36 +184,3 @@ def _checked(vertices: ArrayLike, faces: ArrayLike, source: str) -> tuple[Floats
             remedy="export the mesh again",
         )
     return points, facets
-
-
-def _diagnose(
-    points: Floats,
-    topology: Topology,
-    *,
-    source: str,
-    mended: tuple[int, int],
-    repairs: list[str],
-    notes: tuple[str, ...],
-) -> MeshDiagnosis:
-    facets = topology.faces
-    closed = topology.watertight and topology.consistent
-    extents = points.max(axis=0) - points.min(axis=0)
-    return MeshDiagnosis(
-        source=source,
-        facets=len(facets),
-        vertices=len(points),
-        bodies=topology.bodies[0],
-        watertight=topology.watertight,
-        consistent=topology.consistent,
-        inverted=closed and mending.signed_volume(points, facets) < 0.0,
-        border_loops=topology.border_loops,
-        non_manifold_edges=int((topology.facets_at_edge > 2).sum()),
-        inconsistent_edges=int((~topology.pair_agrees).sum()),
-        slivers=int(mending.slivers(points, facets).sum()),
-        duplicated=mended[0],
-        degenerate=mended[1],
-        area=float(0.5 * np.linalg.norm(normals.facet_cross(points, facets), axis=1).sum()),
-        extents=(float(extents[0]), float(extents[1]), float(extents[2])),
-        repairs=tuple(repairs),
-        notes=notes,
-    )

@@ -1,10 +1,9 @@
-"""Normals: of facets, and smooth ones that keep sharp creases.
+"""Facet normals, and smooth corner normals that keep sharp creases.
 
-A smooth normal is the mean of the facet normals around a vertex, each weighted by the facet's angle there
-(Thürmer and Wüthrich 1998): it does not depend on how a polygon was cut into triangles. Across a *crease*, an
-edge where facets meet at more than the crease angle, nothing is averaged: facets around a vertex fall
-into groups that can be walked without crossing a crease, and each group has its own normal. So normals
-belong to facet corners, and a surface point's normal is interpolated over the corners of its facet.
+A smooth normal is the mean of the facet normals around a vertex, weighted by the facets' angles there (Thürmer and
+Wüthrich 1998), which does not depend on how a polygon is triangulated. A *crease* is an edge whose facets meet at more
+than the crease angle. The facets around a vertex form groups that are connected without crossing a crease, and each
+group has its own mean. So normals belong to facet corners and are interpolated within each facet.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.mesh.topology import Topology, components
 
 CHUNK = 500_000
-"""Facets that are worked on at once where a step needs much room for each."""
+"""Facets processed at once in steps that need much memory for each."""
 
 
 def facet_cross(vertices: Floats, faces: Ints) -> Floats:
@@ -25,7 +24,7 @@ def facet_cross(vertices: Floats, faces: Ints) -> Floats:
 
 
 def unit_or_zero(vectors: Floats) -> Floats:
-    """Return vectors (..., 3) at unit length, those without length as they are."""
+    """Return vectors (..., 3) scaled to unit length; zero vectors stay zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(length > 0.0, length, 1.0)
 
@@ -37,13 +36,13 @@ def corner_angles(vertices: Floats, faces: Ints) -> Floats:
         part = faces[first : first + CHUNK]
         sides = unit_or_zero(vertices[np.roll(part, -1, axis=1)] - vertices[part])
         back = -np.roll(sides, 1, axis=1)
-        apart, together = (np.linalg.norm(v, axis=-1) for v in (sides - back, sides + back))
-        angles[first : first + CHUNK] = 2.0 * np.arctan2(apart, together)
+        difference, total = (np.linalg.norm(v, axis=-1) for v in (sides - back, sides + back))
+        angles[first : first + CHUNK] = 2.0 * np.arctan2(difference, total)
     return angles
 
 
 def smooth_pairs(topology: Topology, facet_normals: Floats, crease_angle: float) -> Bools:
-    """Return whether (M,) the facets of each of `topology.side_pairs` join without crease, wound alike."""
+    """Return whether (M,) the facets of each of `topology.side_pairs` are wound alike and meet without a crease."""
     a, b = (side // 3 for side in topology.side_pairs)
     cosine = (facet_normals[a] * facet_normals[b]).sum(axis=1)
     return topology.pair_agrees & (cosine >= np.cos(crease_angle))
@@ -73,9 +72,9 @@ def _grouped_means(vertices: Floats, faces: Ints, normals: Floats, group: Ints, 
     total = np.zeros((number, 3))
     for k in range(3):
         total[:, k] = np.bincount(group, weights=weights * normals[facet, k], minlength=number)
-    # Where the normals around a vertex cancel, the facet's own is the only honest answer.
+    # Where the normals around a vertex cancel, each facet keeps its own.
     length = np.linalg.norm(total, axis=1)
     scale = np.bincount(group, weights=weights, minlength=number)
-    lost = (length <= 1e-9 * scale)[group]
-    means = np.where(lost[:, None], normals[facet], unit_or_zero(total)[group])
+    cancelled = (length <= 1e-9 * scale)[group]
+    means = np.where(cancelled[:, None], normals[facet], unit_or_zero(total)[group])
     return means.reshape(-1, 3, 3)

@@ -15,9 +15,9 @@ from pentapod.geometry.runs import run_starts
 class Passes:
     """P polylines: pass k holds the points starts[k] to starts[k + 1] − 1, at least two.
 
-    points (N, 3): metres, on the surface. normals (N, 3): such that linear interpolation between points
-    gives the surface's normal up to its length (not unit). starts (P + 1,). levels (P,): which line of the
-    strategy each belongs to, such as the slicing plane.
+    points (N, 3): metres, on the surface. normals (N, 3): of the surface, not of unit length; between two points the
+    direction is that of the linear interpolation. starts (P + 1,). levels (P,): the line of the strategy, such as the
+    slicing plane, that each pass belongs to.
     """
 
     points: Floats
@@ -63,22 +63,28 @@ class Passes:
 
     def where(self, keep: Bools) -> Passes:
         """Return the passes (P,) marked in `keep`."""
-        points = keep[self.pass_of_point]
-        counts = np.diff(self.starts)[keep]
-        starts = run_starts(counts)
-        return Passes(self.points[points], self.normals[points], starts, self.levels[keep])
+        return self.slices(self.starts[:-1][keep], self.starts[1:][keep] - 1)
+
+    def by_level(self) -> Passes:
+        """Return the passes ordered by level; those of one level keep their order."""
+        order = np.argsort(self.levels, kind="stable")
+        return self.slices(self.starts[order], self.starts[order + 1] - 1)
 
     def split(self, keep: Bools) -> Passes:
         """Return the runs of two or more consecutive points (N,) marked in `keep`, as passes of their own."""
-        begins = keep & ~np.concatenate([[False], keep[:-1] & self.within])
-        run = np.cumsum(begins) - 1
-        counts = np.bincount(run[keep], minlength=int(begins.sum()))
-        long = counts >= 2
-        points = keep.copy()
-        points[keep] = long[run[keep]]
-        starts = run_starts(counts[long])
-        levels = self.levels[self.pass_of_point[begins]][long]
-        return Passes(self.points[points], self.normals[points], starts, levels)
+        joined = keep[1:] & keep[:-1] & self.within
+        begins = np.flatnonzero(keep & ~np.append(False, joined))
+        ends = np.flatnonzero(keep & ~np.append(joined, False))
+        long = ends > begins
+        return self.slices(begins[long], ends[long])
+
+    def slices(self, begins: Ints, ends: Ints) -> Passes:
+        """Return the runs of points begins[k] to ends[k], both included, as passes; runs may share their ends."""
+        counts = ends - begins + 1
+        starts = run_starts(counts)
+        index = np.repeat(begins - starts[:-1], counts) + np.arange(int(counts.sum()))
+        levels = self.levels[self.pass_of_point[begins]]
+        return Passes(self.points[index], self.normals[index], starts, levels)
 
     def rows(self, k: int) -> slice:
         """Return where the points of pass k are."""
@@ -104,11 +110,3 @@ class Passes:
             first += int(part.levels.max(initial=-1)) + 1
         starts = run_starts(counts)
         return cls(points, normals, starts, np.concatenate(levels))
-
-    def slices(self, begins: Ints, ends: Ints) -> Passes:
-        """Return runs of points begins[k] to ends[k], both included, as passes; runs may share their ends."""
-        counts = ends - begins + 1
-        starts = run_starts(counts)
-        index = np.repeat(begins - starts[:-1], counts) + np.arange(int(counts.sum()))
-        levels = self.levels[self.pass_of_point[begins]]
-        return Passes(self.points[index], self.normals[index], starts, levels)

@@ -1,7 +1,8 @@
-"""Patch: the part of a surface that a strategy works on, with its normals; whole, trimmed to a region, or refined."""
+"""Patch: the part of a surface to machine, with its normals; whole, trimmed to a region, or refined."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,14 +11,18 @@ from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.base.errors import ToolpathError
+from pentapod.geometry.runs import members
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.normals import facet_cross
+from pentapod.mesh.normals import facet_cross, unit_or_zero
 from pentapod.mesh.region import Region
 from pentapod.mesh.topology import Topology
-from pentapod.mesh.trimming import Root, bisected, halves
+from pentapod.mesh.trimming import Root, compacted, linear_root, normal_root, trimmed
 
 MOST_FACETS = 8_000_000
-_SAME_NORMAL = 1e-9
+"""Facets beyond which a patch is not refined."""
+
+SAME_NORMAL = 1e-9
+"""Difference of unit normals on both sides of an edge up to which it is no crease."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +51,9 @@ class Patch:
         if region.box is not None:
             for axis in range(3):
                 for bound, side in zip(region.bounds[:, axis], (1.0, -1.0), strict=True):
-                    patch = patch._box_side(axis, float(bound), side)
-        return patch._facing(region)
+                    values = (side * (patch.vertices[:, axis] - float(bound)))[patch.faces]
+                    patch = patch._trimmed(values, linear_root(values))
+        return patch._where(region.faces)
 
     @cached_property
     def topology(self) -> Topology:
@@ -62,33 +68,20 @@ class Patch:
         a, b = topology.side_pairs
         flat = self.normals.reshape(-1, 3)
         after_a, after_b = (side - side % 3 + (side + 1) % 3 for side in (a, b))
-        same = np.abs(flat[a] - flat[after_b]).max(axis=1, initial=0.0) < _SAME_NORMAL
-        same &= np.abs(flat[after_a] - flat[b]).max(axis=1, initial=0.0) < _SAME_NORMAL
+        same = np.abs(flat[a] - flat[after_b]).max(axis=1, initial=0.0) < SAME_NORMAL
+        same &= np.abs(flat[after_a] - flat[b]).max(axis=1, initial=0.0) < SAME_NORMAL
         joins[topology.pair_edges] = topology.pair_agrees & same
         return joins
 
     @cached_property
     def facet_normals(self) -> Floats:
         """Unit normals (F, 3) of the facets; zero for facets without area."""
-        cross = facet_cross(self.vertices, self.faces)
-        length = np.linalg.norm(cross, axis=1, keepdims=True)
-        return cross / np.where(length > 0.0, length, 1.0)
+        return unit_or_zero(facet_cross(self.vertices, self.faces))
 
     @cached_property
     def areas(self) -> Floats:
         """Areas (F,) of the facets, square metres."""
         return 0.5 * np.linalg.norm(facet_cross(self.vertices, self.faces), axis=1)
-
-    @cached_property
-    def vertex_normals(self) -> Floats:
-        """Unit normals (V, 3), the mean over all corners at a vertex."""
-        total = np.zeros((len(self.vertices), 3))
-        for k in range(3):
-            total[:, k] = np.bincount(
-                self.faces.ravel(), weights=self.normals[..., k].ravel(), minlength=len(self.vertices)
-            )
-        length = np.linalg.norm(total, axis=1, keepdims=True)
-        return np.where(length > 0.0, total / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])
 
     def refined(self, longest: float) -> Patch:
         """Return the same surface in facets whose edges are no longer than `longest` metres.
@@ -112,19 +105,18 @@ class Patch:
         return patch
 
     def rim(self, width: float, longest: float) -> tuple[Patch, Bools]:
-        """Return the facets around borders and creases, with edges up to `longest`, and which vertices (V,) are near.
+        """Return the facets within 2 `width` metres of borders and creases, and which vertices (V,) are within `width`.
 
-        Near is within `width` metres; beyond that as much again is there too.
+        Their edges are no longer than `longest` metres.
         """
         border = self.topology.edges[~self.joins]
         if not len(border):
             return Patch(self.vertices[:0], self.faces[:0], self.normals[:0]), np.zeros(0, dtype=np.bool_)
         start, way = self.vertices[border[:, 0]], self.vertices[border[:, 1]] - self.vertices[border[:, 0]]
         counts = np.ceil(np.linalg.norm(way, axis=1) / longest).astype(np.intp) + 1
-        edge = np.repeat(np.arange(len(border)), counts)
-        number = np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
+        edge, number = members(counts)
         tree = KDTree(start[edge] + (number / np.maximum(counts - 1, 1)[edge])[:, None] * way[edge])
-        # Drop what is far and halve what is long, in turns: what is far need not become small.
+        # Drop distant facets and halve long edges in turns, so that distant facets are never refined.
         sides = self.vertices[np.roll(self.faces, -1, axis=1)] - self.vertices[self.faces]
         patch, size = self, max(float(np.linalg.norm(sides, axis=2).max()), longest)
         while True:
@@ -132,10 +124,7 @@ class Patch:
             centres = patch.vertices[patch.faces].mean(axis=1)
             bound = 2.0 * width + size
             close = np.isfinite(np.asarray(tree.query(centres, distance_upper_bound=bound)[0]))
-            used = np.zeros(len(patch.vertices), dtype=np.bool_)
-            used[patch.faces[close]] = True
-            faces = (np.cumsum(used) - 1)[patch.faces[close]]
-            patch = Patch(patch.vertices[used], faces, patch.normals[close])
+            patch = Patch(*compacted(patch.vertices, patch.faces[close]), patch.normals[close])
             if size <= longest:
                 break
             size = max(0.5 * size, longest)
@@ -168,53 +157,25 @@ class Patch:
 
     def steeper(self, upright: Floats, angle: float) -> Patch:
         """Return the part whose normals are more than `angle` radians from `upright` (3,) and from its opposite."""
-        length = np.linalg.norm(self.normals, axis=2)
-        values = np.cos(angle) * length - np.abs(self.normals @ upright)
-
-        def root(facet: Ints, a: Ints, b: Ints) -> Floats:
-            ends = self.normals[facet, a], self.normals[facet, b]
-            return bisected(lambda n: np.cos(angle) * np.linalg.norm(n, axis=1) - np.abs(n @ upright), *ends)
-
-        return self if (values >= 0.0).all() else self._kept(values, root)
+        return self._where(lambda n: np.cos(angle) * np.linalg.norm(n, axis=-1) - np.abs(n @ upright))
 
     def above(self, values: Floats, bound: float) -> tuple[Patch, Floats]:
         """Return the part where a quantity (V,) is at least `bound`, and the quantity at its vertices."""
         at = values[self.faces] - bound
-
-        def root(facet: Ints, a: Ints, b: Ints) -> Floats:
-            return at[facet, a] / (at[facet, a] - at[facet, b])
-
-        # The quantity comes along as a fourth coordinate.
+        # The quantity is interpolated as a fourth coordinate.
         points = np.concatenate([self.vertices, values[:, None]], axis=1)
-        vertices, faces, normals = halves(points, self.faces, self.normals, at, root)
+        vertices, faces, normals = trimmed(points, self.faces, self.normals, at, linear_root(at))
         return Patch(vertices[:, :3].copy(), faces, normals), vertices[:, 3].copy()
 
-    def _box_side(self, axis: int, bound: float, side: float) -> Patch:
-        """Return the part with side · (x_axis − bound) ≥ 0."""
-        values = side * (self.vertices[:, axis] - bound)
+    def _where(self, quantity: Callable[[Floats], Floats]) -> Patch:
+        """Return the part where a quantity of the normal, (..., 3) to (...), is not negative."""
+        return self._trimmed(quantity(self.normals), normal_root(quantity, self.normals))
+
+    def _trimmed(self, values: Floats, root: Root) -> Patch:
+        """Return the part where values (F, 3) are not negative."""
         if (values >= 0.0).all():
             return self
-
-        def root(facet: Ints, a: Ints, b: Ints) -> Floats:
-            start, end = values[self.faces[facet, a]], values[self.faces[facet, b]]
-            return start / (start - end)
-
-        return self._kept(values[self.faces], root)
-
-    def _facing(self, region: Region) -> Patch:
-        """Return the part whose normals are within the region's angle of its direction."""
-        values = region.faces(self.normals)
-        if (values >= 0.0).all():
-            return self
-
-        def root(facet: Ints, a: Ints, b: Ints) -> Floats:
-            return bisected(region.faces, self.normals[facet, a], self.normals[facet, b])
-
-        return self._kept(values, root)
-
-    def _kept(self, values: Floats, root: Root) -> Patch:
-        vertices, faces, normals = halves(self.vertices, self.faces, self.normals, values, root)
-        return Patch(vertices, faces, normals)
+        return Patch(*trimmed(self.vertices, self.faces, self.normals, values, root))
 
 
 _A, _B, _C, _AB, _BC, _CA = range(6)
@@ -225,4 +186,4 @@ _CUTS: dict[tuple[bool, bool, bool], tuple[tuple[int, int, int], ...]] = {
     (True, True, False): ((_AB, _B, _BC), (_A, _AB, _BC), (_A, _BC, _C)),
     (True, True, True): ((_A, _AB, _CA), (_AB, _B, _BC), (_CA, _BC, _C), (_AB, _BC, _CA)),
 }
-"""By which of its sides are halved: the triangles that a facet becomes."""
+"""Triangles that a facet becomes, by which of its sides are halved."""

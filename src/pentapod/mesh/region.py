@@ -16,11 +16,11 @@ from pentapod.geometry.directions import normalised
 
 @dataclass(frozen=True, eq=False)
 class Region(Value):
-    """Surface points within a box whose normal is within an angle of a direction.
+    """Surface points within a box whose normal is within an angle of a direction, all in the mesh's frame.
 
-    direction (3,): any length; angle: radians in (0, π/2], so that of a closed solid one side is
-    machined. box (2, 3): two opposite corners, metres, or None. All in the mesh's frame.
-    Raises ToolpathError for a direction of no length, an angle out of range, or a flat box.
+    direction (3,): any length; angle: radians in (0, π/2], so that only one side of a closed solid is machined.
+    box (2, 3): two opposite corners, metres, or None. Raises ToolpathError for a direction of no length, an angle out
+    of range, or a flat box.
     """
 
     box: Annotated[

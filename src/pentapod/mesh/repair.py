@@ -1,4 +1,4 @@
-"""Mesh repair: triangle soup to welded, indexed facets; every change is counted."""
+"""Mesh repair: vertex welding, degenerate and duplicated facets, consistent winding."""
 
 from __future__ import annotations
 
@@ -9,21 +9,17 @@ from pentapod.mesh.normals import CHUNK, facet_cross
 from pentapod.mesh.topology import Topology
 
 WELD = 1e-8
-"""Vertices closer than about this fraction of the largest extent are one."""
+"""Vertices closer than about this fraction of the largest extent are merged."""
 
-SLIVER = 1e-9
-"""A facet is degenerate when its height is below this fraction of its longest side."""
-
-
-NARROW = 1e-3
-"""A facet is a sliver when its height is below this fraction of its longest side."""
+DEGENERATE, SLIVER = 1e-9, 1e-3
+"""Height of a facet, as a fraction of its longest side, up to which it is degenerate, or a sliver."""
 
 
 def weld(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
-    """Return vertices at the same place merged, unused ones dropped, and the facets on them.
+    """Return the vertices with equal ones merged and unused ones dropped, and the facets on them.
 
-    Same means equal after rounding to `WELD` of the largest extent, finer than the 24 bits of an STL, so that
-    noise about zero is merged and nothing that a file tells apart is. The order follows the coordinates.
+    Equal means after rounding to `WELD` of the largest extent. That is finer than the 24 bits of an STL: rounding noise
+    about zero is merged, vertices that a file tells apart are not. The order follows the coordinates.
     """
     used = np.zeros(len(vertices), dtype=np.bool_)
     used[faces] = True
@@ -48,13 +44,13 @@ def _distinct(keys: Ints) -> tuple[Ints, Ints]:
 
 
 def degenerate_facets(vertices: Floats, faces: Ints) -> Bools:
-    """Return which facets (F,) have no area to speak of: corners that coincide or lie on a line."""
-    return _lower_than(SLIVER, vertices, faces)
+    """Return which facets (F,) have corners that coincide or lie on a line."""
+    return _lower_than(DEGENERATE, vertices, faces)
 
 
 def slivers(vertices: Floats, faces: Ints) -> Bools:
     """Return which facets (F,) are lower than a thousandth of their longest side."""
-    return _lower_than(NARROW, vertices, faces)
+    return _lower_than(SLIVER, vertices, faces)
 
 
 def _lower_than(share: float, vertices: Floats, faces: Ints) -> Bools:
@@ -85,17 +81,17 @@ def signed_volume(vertices: Floats, faces: Ints) -> float:
 
 
 def wind(vertices: Floats, faces: Ints) -> tuple[Ints, tuple[str, ...]]:
-    """Return the facets wound alike within each body, closed bodies outwards, and what was done for it."""
-    said: list[str] = []
+    """Return the facets wound alike within each body, closed bodies outwards, and a sentence for each change."""
+    changes: list[str] = []
     areas = np.linalg.norm(facet_cross(vertices, faces), axis=1)
     flip, possible = Topology(faces, len(vertices)).consistent_winding(areas)
     if flip.any():
-        said.append(f"{int(flip.sum()):,} facets turned so that neighbours are wound alike")
+        changes.append(f"{int(flip.sum()):,} facets turned so that neighbours are wound alike")
     if not possible:
-        said.append("a one-sided surface cannot be wound consistently and was left as it is")
+        changes.append("a one-sided surface cannot be wound consistently; it was left unchanged")
     wound = np.where(flip[:, None], faces[:, ::-1], faces)
     topology = Topology(wound, len(vertices))
     if topology.watertight and topology.consistent and signed_volume(vertices, wound) < 0.0:
         wound = wound[:, ::-1]
-        said.append("the closed surface was inside out and has been turned")
-    return np.ascontiguousarray(wound), tuple(said)
+        changes.append("the closed surface was inside out and has been turned")
+    return np.ascontiguousarray(wound), tuple(changes)

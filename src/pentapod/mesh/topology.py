@@ -1,4 +1,4 @@
-"""Topology: edges of a triangle mesh, with neighbours, borders and connected components."""
+"""Mesh topology: edges of a triangle mesh, neighbouring facets, borders and connected components."""
 
 from __future__ import annotations
 
@@ -109,11 +109,11 @@ class Topology:
         return components(len(vertices), ends[:, 0], ends[:, 1])[0]
 
     def consistent_winding(self, areas: Floats) -> tuple[Bools, bool]:
-        """Return which facets (F,) to turn so that bodies are wound alike, and whether that is possible.
+        """Return which facets (F,) to turn so that each body is wound alike, and whether that is possible for all.
 
-        Two-colouring as connected components of the double cover: each facet is there as it is and turned;
-        neighbours that agree join like with like. The part of a body with the smaller area is turned. A
-        one-sided surface (a Möbius strip) cannot be wound consistently; its facets are left alone.
+        Two-colouring by the connected components of the double cover: each facet is a node as it is and a node turned,
+        and neighbours that agree link nodes of the same kind. The part of a body with the smaller area is turned. A
+        one-sided surface (a Möbius strip) cannot be wound consistently; its facets are left unchanged.
         """
         count = len(self.faces)
         a, b = (side // 3 for side in self.side_pairs)

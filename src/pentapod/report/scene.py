@@ -12,7 +12,7 @@ from pentapod.base.refusal import Refusal
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.leg_ends import leg_ends, line_top
 from pentapod.machine.machine import Machine
-from pentapod.mesh.faults import faults
+from pentapod.mesh.diagnosis import fault_edges
 from pentapod.mesh.mesh import Mesh
 from pentapod.report.decimate import keep_extremes, thinned_mesh
 from pentapod.report.figure import HELD_COLOUR, LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR, Figure, leg_colour, packed
@@ -65,7 +65,7 @@ def _surface(vertices: Floats, faces: Ints, name: str, colour: str, *, down: boo
 def fault_traces(mesh: Mesh, placement: RigidTransform) -> list[dict[str, Any]]:
     """Return the edges of each fault that the mesh has, thinned for display."""
     traces: list[dict[str, Any]] = []
-    for k, (name, edges) in enumerate(faults(mesh).items()):
+    for k, (name, edges) in enumerate(fault_edges(mesh.vertices, mesh.topology).items()):
         shown = placement.apply(edges[:: max(1, len(edges) // _MOST_EDGES)])
         lines = np.concatenate([shown, np.full((len(shown), 1, 3), np.nan)], axis=1).reshape(-1, 3)
         trace = _line3d(1e3 * lines, f"mesh: {name} ({len(edges):,})", leg_colour(k), 4.0)

@@ -7,7 +7,7 @@ import pytest
 
 import toolpath_surfaces as surfaces
 from pentapod.base.errors import InputError, MeshError
-from pentapod.mesh.io.obj import read_obj
+from pentapod.mesh import MESH_FORMATS
 from pentapod.toolpath import UNITS, Mesh, load_mesh, write_stl
 from plugins import install
 
@@ -173,7 +173,7 @@ def test_missing_file_directory_and_bad_scale(tmp_path):
     with pytest.raises(MeshError, match="no such file"):
         load_mesh(tmp_path / "nowhere.stl", "mm")
     (tmp_path / "folder.stl").mkdir()
-    with pytest.raises(MeshError, match="a directory"):
+    with pytest.raises(MeshError, match="a folder"):
         load_mesh(tmp_path / "folder.stl", "mm")
     with pytest.raises(MeshError, match="scale"):
         load_mesh(tmp_path / "nowhere.stl", "mm", scale=-1.0)
@@ -220,7 +220,7 @@ def test_obj_as_others_write_it(tmp_path):
 def test_a_backslash_does_not_carry_a_comment_on(tmp_path):
     path = tmp_path / "a.obj"
     path.write_bytes(b"# from C:\\parts\\\nv 0 0 0\nv 1 0 0 # in D:\\\r\nv 0 1 0\nf 1 2 3\n")
-    vertices, faces, notes = read_obj(path, path.read_bytes())
+    vertices, faces, notes = MESH_FORMATS["obj"].read(path, path.read_bytes(), False)
     np.testing.assert_array_equal(vertices, [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
     np.testing.assert_array_equal(faces, [[0, 1, 2]])
     assert not notes
@@ -233,7 +233,7 @@ def test_obj_reads_what_another_reader_reads(tmp_path, ball):
     shape = trimesh.Trimesh(*surfaces.sphere(50.0, 2), process=False)
     shape.export(path)
     again = trimesh.load(path, force="mesh", process=False)
-    vertices, faces, notes = read_obj(path, path.read_bytes())
+    vertices, faces, notes = MESH_FORMATS["obj"].read(path, path.read_bytes(), False)
     np.testing.assert_array_equal(vertices, again.vertices)
     np.testing.assert_array_equal(faces, again.faces)
     assert not notes
@@ -257,7 +257,7 @@ def test_what_a_comment_of_a_ply_announces_is_not_counted(tmp_path, ball):
 def test_bytes_after_the_last_facet_are_refused(tmp_path, ball):
     path = tmp_path / "ball.stl"
     path.write_bytes(write_stl(ball, "ball") + b"\0\0")
-    with pytest.raises(MeshError, match="2 bytes stand after the last of 320 facets"):
+    with pytest.raises(MeshError, match="2 bytes follow after the last of 320 facets"):
         load_mesh(path, "mm")
 
 

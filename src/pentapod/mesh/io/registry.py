@@ -12,21 +12,21 @@ from pentapod.base.registry import Registry
 from pentapod.base.values import Value
 
 
-def _anything(_path: Path, _head: bytes, _size: int) -> None:
-    """Accept any first bytes."""
+def _accept(_path: Path, _head: bytes, _size: int) -> None:
+    """Accept any file."""
 
 
 @dataclass(frozen=True)
 class MeshFormat(Value):
     """A format of mesh files.
 
-    read: path, data and `loose` → vertices (V, 3) in the file's own numbers, facets (F, 3), and notes; loose: whether
-    facets and vertices of no use are left out however many they are. check: path, first bytes and size of the file,
-    before all of it is read. Both raise MeshError, with file and line.
+    read: path, data and `loose` → vertices (V, 3) in the file's own unit, facets (F, 3), and notes; loose: whether any
+    number of unused vertices is accepted. check: path, first bytes and size, called before the whole file is read.
+    Both raise MeshError with file and line.
     """
 
     read: Callable[[Path, bytes, bool], tuple[Floats, Ints, tuple[str, ...]]]
-    check: Callable[[Path, bytes, int], None] = _anything
+    check: Callable[[Path, bytes, int], None] = _accept
 
 
 _HOMES = {suffix: f"pentapod.mesh.io.{suffix}" for suffix in ("obj", "ply", "stl")}

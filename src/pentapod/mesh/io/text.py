@@ -1,4 +1,4 @@
-"""Shared parts of the readers of mesh files: numbers, lines, polygons, and marks of a truncated file."""
+"""Shared parts of the readers of mesh files: number patterns, line numbers, polygons, signs of a truncated file."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ import numpy as np
 
 from pentapod.base.arrays import Ints
 from pentapod.base.errors import MeshError
+from pentapod.geometry.runs import members
 
 NUMBER = rb"[-+]?(?:(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?|[nN][aA][nN]|[iI][nN][fF](?:[iI][nN][iI][tT][yY])?)"
-"""A number as a pattern; nan and inf are told from words, for the mesh says which facet has them.
+"""Pattern of a number; nan and inf match too, and are refused later with the number of their facet.
 
-No text matches it in two ways: else a line that is not understood could take for ever.
+No text matches it in two ways: otherwise a line that does not match could take exponential time.
 """
 
-AGAIN = "export the mesh again; the file may have been cut off on its way"
+EXPORT_AGAIN = "export the mesh again; the file may be incomplete"
 
 
 def line_of(data: bytes, position: int) -> int:
@@ -24,7 +25,7 @@ def line_of(data: bytes, position: int) -> int:
 
 
 def check_last_line(path: Path, data: bytes) -> None:
-    """Raise MeshError where the last line has no end: it was cut off."""
+    """Raise MeshError where the last line has no line feed: the file is truncated."""
     if data[-1:] not in (b"\n", b"\r"):
         raise MeshError(
             "the last line has no end: the file was cut off",
@@ -32,14 +33,13 @@ def check_last_line(path: Path, data: bytes) -> None:
         )  # fmt: skip
 
 
-def fans(corners: Ints, counts: Ints) -> Ints:
-    """Return triangles (T, 3) of polygons, each cut into a fan from its first corner.
+def triangle_fans(corners: Ints, counts: Ints) -> Ints:
+    """Return the triangles (T, 3) of polygons, each triangulated as a fan from its first corner.
 
     corners: vertex indices of all polygons, one after the other; counts (P,): how many each has.
     """
-    # Corner k and k + 1 of a polygon make a triangle with its first, for all k but the first and last.
-    first = np.cumsum(counts) - counts
-    owner = np.repeat(np.arange(len(counts)), counts)
-    place = np.arange(len(corners)) - first[owner]
+    # Corners k and k + 1 of a polygon make a triangle with its first, for all k but the first and last.
+    owner, place = members(counts)
+    first = (np.cumsum(counts) - counts)[owner]
     middle = np.flatnonzero((place > 0) & (place < counts[owner] - 1))
-    return np.stack([corners[first[owner[middle]]], corners[middle], corners[middle + 1]], axis=1)
+    return np.stack([corners[first[middle]], corners[middle], corners[middle + 1]], axis=1)

@@ -174,14 +174,4 @@ def _assembled(tails: list[Floats], heads: list[Floats], chain: Ints, level: Int
         array[at[first] - 1] = tail[first]
         arrays.append(array)
     starts = np.concatenate([at[first] - 1, [count + chains]]).astype(np.intp)
-    # By level first; within a level in the order of the facets, which is the mesh's.
-    passes = Passes(arrays[0], arrays[1], starts, level[first])
-    return _by_level(passes)
-
-
-def _by_level(passes: Passes) -> Passes:
-    order = np.argsort(passes.levels, kind="stable")
-    counts = np.diff(passes.starts)[order]
-    starts = run_starts(counts)
-    index = np.repeat(passes.starts[order] - starts[:-1], counts) + np.arange(len(passes.points))
-    return Passes(passes.points[index], passes.normals[index], starts, passes.levels[order])
+    return Passes(arrays[0], arrays[1], starts, level[first]).by_level()
