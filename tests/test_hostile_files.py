@@ -268,7 +268,7 @@ def laughs(depth: int) -> str:
         (laughs(9), "it unfolds to [0-9,]+ elements"),
         (SVG.format('<g id="a"><use href="#a"/></g>'), "repeat themselves"),
         (SVG.format("<g>" * 200 + "</g>" * 200), "nested too deep"),
-        (SVG.format('<use href="#nothing"/><circle r="3"/>'), "names nothing in this drawing"),
+        (SVG.format('<use href="#nothing"/><circle r="3"/>'), "refers to nothing in this drawing"),
         (SVG.format('<path d="M 0 0' + "C 1 2 3 4 5 6 " * 110_000 + '"/>'), "numbers and commands"),
         (SVG.format('<path d="M 0 0 L 1 1 L oops"/><circle r="3"/>'), "cannot be read as SVG"),
     ],

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pentapod.geometry.transport import carried_frames
+from pentapod.geometry.directions import rotation_minimising_frames
 
 
 def circle(angle, count=4001):
@@ -23,7 +23,7 @@ def walk(seed, step):
 @given(st.integers(0, 10_000), st.sampled_from([1e-3, 0.05, 0.5]))
 def test_pairs_are_right_handed_frames(seed, step):
     d = walk(seed, step)
-    pairs = carried_frames(d)
+    pairs = rotation_minimising_frames(d)
     whole = np.concatenate([pairs, d[:, None]], axis=1)
     np.testing.assert_allclose(whole @ whole.transpose(0, 2, 1), np.broadcast_to(np.eye(3), whole.shape), atol=1e-9)
     assert (np.linalg.det(whole) > 0.0).all()
@@ -33,7 +33,7 @@ def test_pairs_are_right_handed_frames(seed, step):
 def test_a_pair_turns_no_more_than_its_direction(seed, step):
     """What carries each pair to the next is the smallest rotation: about an axis across both directions."""
     d = walk(seed, step)
-    frames = np.concatenate([carried_frames(d), d[:, None]], axis=1)
+    frames = np.concatenate([rotation_minimising_frames(d), d[:, None]], axis=1)
     rotation = frames[1:].transpose(0, 2, 1) @ frames[:-1]
     angle = np.arccos(np.clip((np.trace(rotation, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0))
     between = np.arctan2(np.linalg.norm(np.cross(d[:-1], d[1:]), axis=1), (d[:-1] * d[1:]).sum(axis=1))
@@ -43,7 +43,7 @@ def test_a_pair_turns_no_more_than_its_direction(seed, step):
 @pytest.mark.parametrize("angle", [0.3, np.pi / 2, 2.0, 3.0])
 def test_a_closed_curve_turns_the_pair_by_the_area_it_encloses(angle):
     """Gauss and Bonnet: around a cone of half angle α the pair turns by 2π (1 − cos α)."""
-    pairs = carried_frames(circle(angle))
+    pairs = rotation_minimising_frames(circle(angle))
     cosine, sine = (pairs[-1, 0] * pairs[0, 0]).sum(), (pairs[-1, 0] * pairs[0, 1]).sum()
     area = 2.0 * np.pi * (1.0 - np.cos(angle))
     assert np.exp(1j * np.arctan2(sine, cosine)) == pytest.approx(np.exp(1j * area), abs=1e-4)

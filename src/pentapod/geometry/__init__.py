@@ -1,7 +1,6 @@
-"""Geometry without a robot in it: rigid transforms, directions, polylines, level sets."""
+"""Geometry: rigid transforms, directions, polylines, interpolants, solids of revolution."""
 
 from pentapod.geometry.directions import angle_between, arc_weights, normalised, partway, tangent_frame
-from pentapod.geometry.level_set import enclosed_volume, zero_surface
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.runs import equal_runs, marked_runs, run_starts
@@ -11,12 +10,10 @@ __all__ = [
     "angle_between",
     "arc_length",
     "arc_weights",
-    "enclosed_volume",
     "equal_runs",
     "marked_runs",
     "normalised",
     "partway",
     "run_starts",
     "tangent_frame",
-    "zero_surface",
 ]

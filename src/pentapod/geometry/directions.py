@@ -1,4 +1,4 @@
-"""Unit vectors: angles between them, tangent frames, cones."""
+"""Unit vectors: angles, interpolation on great circles, tangent frames, rotation-minimising frames."""
 
 from __future__ import annotations
 
@@ -28,26 +28,25 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> Floats:
 
 
 def partway(start: Floats, end: Floats, share: Floats) -> Floats:
-    """Return unit vectors (..., 3) that lie `share` (...), 0 to 1, of the way from unit start to unit end.
+    """Return the spherical interpolation (..., 3) at `share` (...), 0 to 1, from unit start to unit end.
 
-    On great circles, evenly. Between opposite vectors all ways are as short: one of them is taken.
+    Between opposite vectors, which no single great circle joins, one of them is taken.
     """
     angle = np.asarray(share * angle_between(start, end))[..., None]
     aside = end - np.einsum("...i,...i->...", start, end)[..., None] * start
     length = np.linalg.norm(aside, axis=-1, keepdims=True)
     any_way = tangent_frame(start)[0]
     aside = np.where(length > 1e-12, aside / np.where(length > 1e-12, length, 1.0), any_way)
-    # Near opposites the first difference keeps few digits: once more makes it square.
+    # For nearly opposite vectors the difference keeps few digits: orthogonalise once more.
     aside = normalised(aside - np.einsum("...i,...i->...", start, aside)[..., None] * start)
     mixed = np.cos(angle) * start + np.sin(angle) * aside
     return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
 
 
 def arc_weights(angle: Floats, share: Floats) -> tuple[Floats, Floats]:
-    """Return a and b, so that a·start + b·end lies `share`, 0 to 1, of the way on the arc of this angle between them.
+    """Return weights a, b of the spherical interpolation a·start + b·end at `share`, 0 to 1, of an arc of this angle.
 
-    angle, share: of one shape. The arc of two unit vectors, evenly; equal or opposite ones have none, and are joined by
-    the straight line.
+    angle, share: of one shape. Equal or opposite vectors are interpolated linearly.
     """
     sine = np.sin(angle)
     bent = sine > 1e-9
@@ -58,9 +57,8 @@ def arc_weights(angle: Floats, share: Floats) -> tuple[Floats, Floats]:
 def tangent_frame(directions: ArrayLike) -> tuple[Floats, Floats]:
     """Return unit t1, t2 (..., 3) with (t1, t2, direction) right-handed. Directions are unit.
 
-    In the upper half space they are e_x, e_y carried along the great circle from e_z to the direction; in the
-    lower one the same from −e_z (with e_x, −e_y). So they are smooth within each half space, at both poles
-    too, and jump at the equator.
+    In the upper half space they are e_x, e_y transported along the great circle from e_z to the direction; in the lower
+    one e_x, −e_y from −e_z. So they are smooth within each half space, also at the poles, and jump at the equator.
     """
     d = as_floats(directions, "directions", (3,))
     x, y, z = d[..., 0], d[..., 1], d[..., 2]
@@ -70,3 +68,20 @@ def tangent_frame(directions: ArrayLike) -> tuple[Floats, Floats]:
     t1 = np.stack([1.0 - x * x * k, -x * y * k, -side * x], axis=-1)
     t2 = np.stack([-x * y * k, 1.0 - y * y * k, -side * y], axis=-1)
     return t1, t2 * side[..., None]
+
+
+def rotation_minimising_frames(directions: ArrayLike) -> Floats:
+    """Return unit pairs (N, 2, 3) across unit directions (N, 3), by parallel transport along them (Bishop 1975).
+
+    Each pair is the one before, turned by the smallest rotation that takes its direction to the next; between opposite
+    directions one such rotation is chosen. The pairs are smooth at the equator and the poles too.
+    """
+    d = as_floats(directions, "directions", (3,))
+    t1, t2 = tangent_frame(d)
+    here, there = d[:-1], d[1:]
+    along = (t1[:-1] * there).sum(axis=1) / np.maximum(1.0 + (here * there).sum(axis=1), 1e-12)
+    moved = t1[:-1] - along[:, None] * (here + there)
+    # The angle from the tangent frames to the transported ones is a cumulative sum.
+    turn = np.arctan2((moved * t2[1:]).sum(axis=1), (moved * t1[1:]).sum(axis=1))
+    angle = np.concatenate([[0.0], np.cumsum(turn)])[:, None]
+    return np.stack([np.cos(angle) * t1 + np.sin(angle) * t2, np.cos(angle) * t2 - np.sin(angle) * t1], axis=1)

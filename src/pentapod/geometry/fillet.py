@@ -1,10 +1,9 @@
-"""A C3 curve through a polyline, its corners rounded within a tolerance, and that proven.
+"""Corner blending: a C3 spline along a polyline, within a proven tolerance.
 
-The curve is Schoenberg's variation-diminishing spline of degree 4 of the polyline: its control points are the
-polyline's own points at the knots' averages. It reproduces straight stretches exactly, never overshoots,
-and approaches the polyline as the knots get denser; so knots are halved wherever it is too far away. Every corner of
-the polyline is a knot, hence between two knots curve minus polyline is one polynomial, and its Bernstein
-coefficients enclose it: no place between samples is left to chance.
+The curve is Schoenberg's variation-diminishing spline of degree 4: its control points are the polyline's points at the
+averages of the knots. It reproduces straight parts exactly, never overshoots, and approaches the polyline as the knots
+get denser; so spans are halved wherever it is too far away. Every corner of the polyline is a knot, so that on each
+span curve minus polyline is one polynomial, which its Bernstein coefficients enclose.
 
 Sources: I. J. Schoenberg, "On spline functions", 1967; R. T. Farouki, CAGD 29 (2012), section 5 (convex hull).
 """
@@ -24,23 +23,24 @@ from pentapod.base.errors import ArrayError
 from pentapod.numerics.bernstein import from_power, split
 
 DEGREE = 4
+
 HALVINGS = 40
+"""Rounds of halving after which the spacing of numbers is reached."""
+
+PARTS = 8
+"""Parts of a span that are tested where its own coefficients are not within the tolerance."""
 
 TooFar: TypeAlias = Callable[[Floats, Floats], Bools]
-"""too_far(differences (K, D, 5), chords (K, D, 2)): on which of K stretches the curve may leave its tolerance.
+"""too_far(differences (K, D, 5), chords (K, D, 2)): on which of K spans the curve may exceed its tolerance.
 
 differences: Bernstein coefficients of curve minus polyline; chords: the polyline's points at both ends.
 """
 
-_PARTS = 8
-"""A stretch whose coefficients are too far out is cut into so many before it is called too far."""
-
 
 def blended(parameter: Floats, points: Floats, too_far: TooFar) -> BSpline:
-    """Return a clamped C3 spline of degree 4 near the polyline of points (N, D) at parameters (N,), ends exact.
+    """Return a clamped C3 spline of degree 4 near the polyline of points (N, D) at parameters (N,), with exact ends.
 
-    The polyline is linear between parameters, which must increase strictly. Raises ArrayError where they do
-    not, or where no number of halvings brings the curve near enough.
+    Raises ArrayError where the parameters do not increase strictly, and where `HALVINGS` rounds do not suffice.
     """
     if len(parameter) < 2 or not (np.diff(parameter) > 0.0).all():
         raise ArrayError("parameters must increase strictly", key="parameter", expected="two or more")
@@ -49,10 +49,10 @@ def blended(parameter: Floats, points: Floats, too_far: TooFar) -> BSpline:
         curve = schoenberg(knots, parameter, points)
         rows = np.flatnonzero(changed)
         far = np.zeros(len(changed), dtype=np.bool_)
-        far[rows] = _far(*_stretches(curve, knots, rows, parameter, points), too_far)
+        far[rows] = _far(*_spans(curve, knots, rows, parameter, points), too_far)
         if not far.any():
             return curve
-        # A new knot moves the curve on the DEGREE spans to either side, and nowhere else.
+        # A new knot changes the curve on DEGREE spans to either side only.
         changed = np.repeat(binary_dilation(far, iterations=DEGREE), 1 + far)
         knots = np.sort(np.concatenate([knots, 0.5 * (knots[:-1] + knots[1:])[far]]))
     raise ArrayError("the tolerance is too small for the spacing of numbers", value=float(np.diff(knots).min()))
@@ -62,7 +62,7 @@ def schoenberg(knots: Floats, parameter: Floats, points: Floats) -> BSpline:
     """Return Schoenberg's spline of the polyline (parameter, points) on clamped simple knots (K,)."""
     t = np.concatenate([np.full(DEGREE, knots[0]), knots, np.full(DEGREE, knots[-1])])
     averages = sum(t[1 + k : len(t) - DEGREE + k] for k in range(DEGREE)) / DEGREE
-    # Rounding must not carry the outermost averages beyond the polyline.
+    # Rounding must not move the outermost averages beyond the polyline.
     return BSpline(t, interpolated(np.clip(averages, knots[0], knots[-1]), parameter, points), DEGREE)
 
 
@@ -73,7 +73,7 @@ def interpolated(u: Floats, parameter: Floats, points: Floats) -> Floats:
     return points[k] + share * (points[k + 1] - points[k])
 
 
-def _stretches(curve: BSpline, knots: Floats, rows: Ints, parameter: Floats, points: Floats) -> tuple[Floats, Floats]:
+def _spans(curve: BSpline, knots: Floats, rows: Ints, parameter: Floats, points: Floats) -> tuple[Floats, Floats]:
     """Return differences (K, D, 5) and chords (K, D, 2), as `TooFar` takes them, of the spans `rows` (K,)."""
     width = np.diff(knots)[rows][:, None]
     powers = [curve(knots[rows], k) * width**k / factorial(k) for k in range(DEGREE + 1)]
@@ -82,15 +82,15 @@ def _stretches(curve: BSpline, knots: Floats, rows: Ints, parameter: Floats, poi
 
 
 def _far(differences: Floats, chords: Floats, too_far: TooFar) -> Bools:
-    """Return on which stretches (K,) the curve is too far, or so near to it that its parts do not tell."""
+    """Return on which spans (K,) the curve, tested in parts where necessary, may be too far."""
     far = too_far(differences, chords)
     doubtful = np.flatnonzero(far)
     if not len(doubtful):
         return far
     parts = [differences[doubtful]]
-    while len(parts) < _PARTS:
+    while len(parts) < PARTS:
         parts = [half for part in parts for half in split(part)]
-    ends = _along(chords[doubtful], _PARTS)
+    ends = _along(chords[doubtful], PARTS)
     far[doubtful] = np.any([too_far(part, ends[..., k : k + 2]) for k, part in enumerate(parts)], axis=0)
     return far
 

@@ -1,4 +1,4 @@
-"""Interpolant: what a controller makes of setpoints at equal periods, as polynomials with their exact extrema."""
+"""Interpolant: a controller's interpolation of setpoints at equal periods, as polynomials with exact extrema."""
 
 from __future__ import annotations
 
@@ -11,15 +11,18 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.numerics.bernstein import multiply, split
 
-_ROUNDS = 60
-_CLOSE = 1e-13
+BISECTION_ROUNDS = 60
+"""Rounds of `largest_length`; the precision of numbers is reached after about fifty."""
+
+RELATIVE_ERROR = 1e-13
+"""Of the length that `largest_length` returns."""
 
 
 @dataclass(frozen=True, eq=False)
 class Interpolant:
-    """One polynomial for each of d columns and each of the N − 1 intervals between rows, from rest to rest.
+    """One polynomial for each of d columns and each of the N − 1 intervals between rows; rest before and after.
 
-    bernstein (N − 1, d, k + 1): Bernstein coefficients, over the interval's own time in [0, 1]; k = 1 for linear
+    bernstein (N − 1, d, k + 1): Bernstein coefficients in the interval's own time in [0, 1]; k = 1 for linear
     interpolation, 3 for cubic. period in seconds.
     """
 
@@ -28,15 +31,14 @@ class Interpolant:
 
     @classmethod
     def through(cls, rows: Floats, period: float, interpolation: Literal["linear", "cubic"]) -> Interpolant:
-        """Return what joins rows (N, d): straight lines, or the C2 cubic spline with zero end velocities."""
+        """Return the interpolant of rows (N, d): straight lines, or the C2 cubic spline with zero end velocities."""
         return cls.along(rows, clamped_slopes(rows) if interpolation == "cubic" else None, period)
 
     @classmethod
     def along(cls, rows: Floats, slopes: Floats | None, period: float) -> Interpolant:
-        """Return what joins rows (N, d) with these slopes (N, d), per row: cubics; lines where they are None."""
+        """Return the cubic Hermite interpolant of rows (N, d) with slopes (N, d) per row; without slopes, lines."""
         if slopes is None:
             return cls(np.stack([rows[:-1], rows[1:]], axis=-1), period)
-        # In units of the period, so that knots are integers and the slopes have the size of the steps.
         third = slopes / 3.0
         inner = (rows[:-1], rows[:-1] + third[:-1], rows[1:] - third[1:], rows[1:])
         return cls(np.stack(inner, axis=-1), period)
@@ -72,7 +74,7 @@ class Interpolant:
         d = self._steps / self.period
         speed = np.abs(d[..., [0, -1]]).max(axis=-1)
         if self.degree == 3:
-            # Only a rate whose middle coefficient lies beyond both ends can be fastest in between.
+            # Only a rate whose middle coefficient is beyond both ends can have its maximum in between.
             inner = np.abs(d[..., 1]) > speed
             a, b, c = (d[..., k][inner] for k in range(3))
             bend = a - 2.0 * b + c
@@ -85,10 +87,7 @@ class Interpolant:
 
     @cached_property
     def first(self) -> Floats:
-        """Rates (N, d) at the rows with their signs, per second.
-
-        Linear: of the way that leads to the row, for at the row itself the rate jumps; none at the first row.
-        """
+        """Signed rates (N, d) at the rows, per second; for lines those of the interval before, and 0 at first."""
         if self.degree == 1:
             return np.concatenate([np.zeros((1, self.bernstein.shape[1])), self.steps[..., 0]])
         return np.concatenate([self.steps[..., 0], self.steps[-1:, :, -1]])
@@ -97,20 +96,20 @@ class Interpolant:
     def accelerations(self) -> Floats:
         """Largest |acceleration| (N, d) at each row, per s²; nothing between the rows exceeds it.
 
-        Linear: the second difference of the rows by the period squared, with the first and the last row
-        repeated: the robot stands before and after. Cubic: the second derivative, which is linear between the rows.
+        Linear: the second difference of the rows over the period squared, at rest before and after. Cubic: the second
+        derivative, which is linear between the rows.
         """
         return np.abs(self.second)
 
     @cached_property
     def second(self) -> Floats:
-        """Accelerations (N, d) at the rows with their signs, as `accelerations` says, per s²."""
+        """Signed accelerations (N, d) at the rows, see `accelerations`, per s²."""
         still = np.zeros((1, self.bernstein.shape[1]))
         if self.degree == 1:
             return np.diff(np.concatenate([still, self._steps[..., 0], still]), axis=0) / self.period**2
         bends = 2.0 * np.diff(self._steps, axis=-1) / self.period**2
         rows = np.concatenate([bends[..., 0], bends[-1:, :, 1]])
-        # From both sides they differ by rounding alone: the larger counts.
+        # The derivatives from both sides differ by rounding only: take the larger.
         before = bends[:-1, :, 1]
         rows[1:-1] = np.where(np.abs(before) > np.abs(rows[1:-1]), before, rows[1:-1])
         return rows
@@ -119,7 +118,7 @@ class Interpolant:
     def jerks(self) -> Floats:
         """|Jerk| (N − 1, d) on each interval, per s³: the change of the rows' accelerations over the period.
 
-        An acceleration from which or to which the motion starts or stops at once counts as a change over one period.
+        A step of the acceleration at the start or the end counts as a change over one period.
         """
         a = self.second
         jerk = np.abs(np.diff(a, axis=0))
@@ -128,7 +127,7 @@ class Interpolant:
 
     @cached_property
     def jerk_lengths(self) -> Floats:
-        """Length (N − 1,) of the jerk of a point with d coordinates on each interval, as `jerks` says, per s³."""
+        """Length (N − 1,) of the jerk vector of a point with d coordinates on each interval, see `jerks`, per s³."""
         a = self.second
         jerk = np.linalg.norm(np.diff(a, axis=0), axis=1)
         ends = np.linalg.norm(a[[0, -1]], axis=1)
@@ -137,7 +136,7 @@ class Interpolant:
 
     @cached_property
     def turn_accelerations(self) -> Floats:
-        """Angular acceleration (N,) at each row, rad/s², of a direction whose unit vectors the rows (N, 3) are."""
+        """Angular acceleration (N,) at each row, rad/s², where the rows (N, 3) are unit vectors."""
         axes = np.concatenate([self.bernstein[..., 0], self.bernstein[-1:, :, -1]])
         return np.linalg.norm(np.cross(axes, self.second), axis=1)
 
@@ -152,20 +151,20 @@ class Interpolant:
 
 
 def largest_length(vectors: Floats) -> tuple[float, int]:
-    """Return the largest |v(t)| over all of M vectors of polynomials, t in [0, 1], and in which of them it is.
+    """Return the maximum of |v(t)| over M vectors of polynomials, t in [0, 1], and the index of its vector.
 
-    vectors (M, d, n + 1): Bernstein coefficients. Branch and bound on |v|²: its coefficients enclose it, its end
-    coefficients are values; to 1e-13 of the largest.
+    vectors (M, d, n + 1): Bernstein coefficients. Branch and bound on |v|²: its coefficients enclose it, and its end
+    coefficients are values.
     """
     square = multiply(vectors, vectors).sum(axis=1)
     owners = np.arange(len(square))
     best, where = 0.0, 0
-    for _ in range(_ROUNDS):
+    for _ in range(BISECTION_ROUNDS):
         ends = np.maximum(square[:, 0], square[:, -1])
         k = int(np.argmax(ends))
         if ends[k] > best:
             best, where = float(ends[k]), int(owners[k])
-        open_ = square.max(axis=1) > best * (1.0 + _CLOSE)
+        open_ = square.max(axis=1) > best * (1.0 + RELATIVE_ERROR)
         if not open_.any():
             break
         square, owners = np.concatenate(split(square[open_])), np.tile(owners[open_], 2)
@@ -179,7 +178,7 @@ def clamped_slopes(rows: Floats) -> Floats:
 
     slopes = np.zeros(rows.shape)
     if len(rows) > 2:
-        # C2 at each inner row: the slopes before, at and after it, weighted 1, 4 and 1, make three times the rise.
+        # C2 at each inner row: the slopes before, at and after it, weighted 1, 4, 1, sum to three times the rise.
         bands = np.ones((3, len(rows) - 2))
         bands[1] = 4.0
         slopes[1:-1] = solve_banded((1, 1), bands, 3.0 * (rows[2:] - rows[:-2]), check_finite=False)
@@ -187,12 +186,12 @@ def clamped_slopes(rows: Floats) -> Floats:
 
 
 def _roots(quadratic: Floats) -> tuple[Floats, Floats]:
-    """Return both roots (...) in [0, 1] of quadratics in Bernstein form (..., 3); 0 where there is none."""
+    """Return both roots (...) in (0, 1) of quadratics in Bernstein form (..., 3); 0 where there is none."""
     a = quadratic[..., 0] - 2.0 * quadratic[..., 1] + quadratic[..., 2]
     half_b = quadratic[..., 1] - quadratic[..., 0]
     c = quadratic[..., 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        # The two quotients that do not cancel.
+        # The two quotients without cancellation.
         q = -(half_b + np.copysign(np.sqrt(half_b * half_b - a * c), half_b))
         roots = q / a, c / q
     first, second = (np.where((t > 0.0) & (t < 1.0), t, 0.0) for t in roots)

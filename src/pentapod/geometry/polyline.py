@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Floats, as_floats
+from pentapod.geometry.runs import members
 
 
 def arc_length(points: ArrayLike) -> Floats:
@@ -15,10 +16,9 @@ def arc_length(points: ArrayLike) -> Floats:
 
 
 def spaced(corners: Floats, spacing: float) -> Floats:
-    """Return the polyline (M, 3) with points added so that none are further apart than `spacing` metres."""
+    """Return the polyline (M, 3) with points added so that neighbours are at most `spacing` metres apart."""
     steps = np.linalg.norm(np.diff(corners, axis=0), axis=1)
     counts = np.maximum(np.ceil(steps / spacing - 1e-9), 1.0).astype(np.intp)
-    leg = np.repeat(np.arange(len(steps)), counts)
-    number = np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts, counts)
-    t = (number / counts[leg])[:, None]
-    return np.vstack([corners[leg] + t * (corners[leg + 1] - corners[leg]), corners[-1:]])
+    side, number = members(counts)
+    t = (number / counts[side])[:, None]
+    return np.vstack([corners[side] + t * (corners[side + 1] - corners[side]), corners[-1:]])

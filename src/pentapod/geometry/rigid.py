@@ -32,7 +32,7 @@ class RigidTransform(Value):
 
     @classmethod
     def identity(cls) -> RigidTransform:
-        """Return the transform that moves nothing."""
+        """Return the identity."""
         return cls(np.eye(3), np.zeros(3))
 
     @classmethod
@@ -55,13 +55,13 @@ class RigidTransform(Value):
         return np.asarray(points, dtype=np.float64) @ self.rotation.T + self.translation
 
     def rotate(self, vectors: ArrayLike) -> Floats:
-        """Return vectors or directions (..., 3) turned, not moved."""
+        """Return vectors or directions (..., 3) rotated, not translated."""
         return np.asarray(vectors, dtype=np.float64) @ self.rotation.T
 
     def inverse(self) -> RigidTransform:
-        """Return the transform that undoes this one."""
+        """Return the inverse transform."""
         return RigidTransform(self.rotation.T, -self.rotation.T @ self.translation)
 
     def __matmul__(self, other: RigidTransform) -> RigidTransform:
-        """Return the transform that does `other` first, then this one."""
+        """Return the composition: `other` first, then this one."""
         return RigidTransform(self.rotation @ other.rotation, self.apply(other.translation))

@@ -1,4 +1,4 @@
-"""Runs of equal or marked neighbours in an array, as half-open ranges."""
+"""Runs of consecutive members in arrays, as half-open ranges."""
 
 from __future__ import annotations
 

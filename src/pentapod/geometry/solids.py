@@ -1,7 +1,7 @@
-"""Convex solids of revolution that tools are made of, with one exact distance formula for all.
+"""Convex solids of revolution that tools are made of.
 
-A `Solid` is a frustum thickened by a ball: cylinders and cones have no thickening, a ball is a thickened point,
-the end of a bull-nose cutter a thickened disc, a ball's path a thickened line.
+A `Solid` is the Minkowski sum of a frustum and a ball: cylinders and cones have a ball of no radius, a ball has a point
+as its frustum, the end of a bull-nose cutter a disc.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from pentapod.base.errors import ToolpathError
 from pentapod.base.values import Value
 
 KINDS = ("cutter", "shank", "holder")
-"""What a solid is part of, in the order of reports."""
+"""Parts of a tool, in the order of reports."""
 
 
 @dataclass(frozen=True)
 class Solid:
-    """All points within `rounding` of a frustum about the tool's axis. Metres; heights from the tip.
+    """All points within `rounding` of a frustum about the tool's axis. Metres; heights above the tip.
 
     kind: one of `KINDS`. low, high: heights of the frustum's ends. low_radius, high_radius: its radii there.
-    Raises ToolpathError where the numbers make no body.
+    Raises ToolpathError for a negative radius, and for ends in the wrong order.
     """
 
     kind: str
@@ -47,23 +47,23 @@ class Solid:
 
     @property
     def thickness(self) -> float:
-        """A depth, metres, that no point within reaches: at least the radius of the largest ball that fits in."""
+        """Upper bound, metres, on the depth of a point inside: at least the radius of the largest ball that fits in."""
         return min(max(self.low_radius, self.high_radius), 0.5 * (self.high - self.low)) + self.rounding
 
     @property
     def is_ball(self) -> bool:
-        """Whether it is a point, thickened."""
+        """Whether it is a ball."""
         return self.low == self.high and self.low_radius == self.high_radius == 0.0
 
     @property
     def numbers(self) -> tuple[float, float, float, float, float]:
-        """What the kernels take: low, high, low_radius, high_radius, rounding."""
+        """Numbers for the kernels: low, high, low_radius, high_radius, rounding."""
         return (self.low, self.high, self.low_radius, self.high_radius, self.rounding)
 
 
 @dataclass(frozen=True)
 class Cone(Value):
-    """One piece of a shank or holder: a cylinder, or a frustum where the radii differ. Metres.
+    """Piece of a shank or holder: a cylinder, or a frustum where the radii differ. Metres.
 
     Raises ToolpathError unless the height and a radius are positive.
     """

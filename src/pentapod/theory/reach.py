@@ -9,9 +9,9 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints, set_frozen
 from pentapod.base.errors import ArrayError
 from pentapod.base.values import Value
-from pentapod.geometry.level_set import enclosed_volume, zero_surface
 from pentapod.numerics.blocks import blocks
 from pentapod.theory.cuboid import largest_cuboid
+from pentapod.theory.level_set import enclosed_volume, zero_surface
 from pentapod.theory.workspace import Workspace
 
 

@@ -1,7 +1,7 @@
-"""Least distance of a point that moves straight on from a box and from a facet, by tangents of convex functions.
+"""Minimum distance of a linearly moving point from a box and from a facet, by tangents of convex functions.
 
 Both distances are convex functions of time: two tangents bound them from below, and a few more find the minimum.
-Nothing has to be halved in space, so a ball that touches a smooth surface needs a dozen facets.
+No box has to be subdivided, so a ball that touches a smooth surface needs about a dozen facets.
 """
 
 from __future__ import annotations
@@ -11,11 +11,15 @@ import math
 from pentapod.base.arrays import Floats
 from pentapod.numerics.kernels import kernel
 
-_ROUNDS = 40
+ROUNDS = 40
+"""Evaluations after which the search for a minimum ends; rarely more than ten are needed."""
+
+EXACT_M = 1e-9
+"""Metres to which a minimum distance is exact."""
 
 
 @kernel
-def _to_box(box: Floats, x: float, y: float, z: float, g: Floats) -> float:
+def _box_distance(box: Floats, x: float, y: float, z: float, g: Floats) -> float:
     """Return the distance of a point from a box (15,); write the vector from the box to the point into g (3,)."""
     x, y, z = x - box[0], y - box[1], z - box[2]
     g[0] = g[1] = g[2] = 0.0
@@ -34,7 +38,7 @@ def _to_box(box: Floats, x: float, y: float, z: float, g: Floats) -> float:
 
 
 @kernel
-def to_facet(p: Floats, x: float, y: float, z: float, g: Floats) -> float:
+def facet_distance(p: Floats, x: float, y: float, z: float, g: Floats) -> float:
     """Return the distance of a point from a facet (3, 3); write the vector from the facet to the point into g (3,).
 
     Ericson, Real-Time Collision Detection, section 5.1.5.
@@ -71,8 +75,8 @@ def to_facet(p: Floats, x: float, y: float, z: float, g: Floats) -> float:
 
 
 @kernel
-def _slope(g: Floats, distance: float, way: Floats) -> float:
-    """Return the change of the distance with time where it is known; 0 inside, where it stays 0."""
+def slope(g: Floats, distance: float, way: Floats) -> float:
+    """Return the derivative of a distance by time, from the vector g (3,) to the point; 0 at distance 0."""
     if distance <= 0.0:
         return 0.0
     return (g[0] * way[0] + g[1] * way[1] + g[2] * way[2]) / distance
@@ -80,41 +84,41 @@ def _slope(g: Floats, distance: float, way: Floats) -> float:
 
 @kernel
 def lower_bound(box: Floats, start: Floats, way: Floats, enough: float, g: Floats) -> float:
-    """Return a lower bound, not below the minimum's tangents, on the distance of a moving point from a box."""
-    first = _to_box(box, start[0], start[1], start[2], g)
-    rising = _slope(g, first, way)
-    if rising >= 0.0 or first + rising >= enough:
-        return max(first + min(rising, 0.0), 0.0)
-    last = _to_box(box, start[0] + way[0], start[1] + way[1], start[2] + way[2], g)
-    falling = _slope(g, last, way)
-    if falling <= 0.0:
+    """Return the lower bound by the tangents at both ends of the distance of a moving point from a box (15,)."""
+    first = _box_distance(box, start[0], start[1], start[2], g)
+    start_slope = slope(g, first, way)
+    if start_slope >= 0.0 or first + start_slope >= enough:
+        return max(first + min(start_slope, 0.0), 0.0)
+    last = _box_distance(box, start[0] + way[0], start[1] + way[1], start[2] + way[2], g)
+    end_slope = slope(g, last, way)
+    if end_slope <= 0.0:
         return last
     # Where the tangents meet.
-    t = (last - falling - first) / (rising - falling)
-    return max(first + rising * t, 0.0)
+    t = (last - end_slope - first) / (start_slope - end_slope)
+    return max(first + start_slope * t, 0.0)
 
 
 @kernel
 def nearest_time(p: Floats, start: Floats, way: Floats, g: Floats) -> tuple[float, float]:
-    """Return the smallest distance of a moving point from a facet, and when. Leaves g (3,) as it is then."""
+    """Return the minimum distance of a moving point from a facet, and when; g (3,) is left as it is then."""
     t0, t1 = 0.0, 1.0
-    d0 = to_facet(p, start[0], start[1], start[2], g)
-    s0 = _slope(g, d0, way)
+    d0 = facet_distance(p, start[0], start[1], start[2], g)
+    s0 = slope(g, d0, way)
     if s0 >= 0.0:
         return d0, 0.0
-    d1 = to_facet(p, start[0] + way[0], start[1] + way[1], start[2] + way[2], g)
-    s1 = _slope(g, d1, way)
+    d1 = facet_distance(p, start[0] + way[0], start[1] + way[1], start[2] + way[2], g)
+    s1 = slope(g, d1, way)
     if s1 <= 0.0:
         return d1, 1.0
     best, when = (d0, 0.0) if d0 < d1 else (d1, 1.0)
-    for round_ in range(_ROUNDS):
+    for round_ in range(ROUNDS):
         meet = (d1 - s1 * t1 - d0 + s0 * t0) / (s0 - s1)
-        if d0 + s0 * (meet - t0) >= best - 1e-9:
+        if d0 + s0 * (meet - t0) >= best - EXACT_M:
             break
-        # Tangents creep towards a kink; every third time the middle is taken.
+        # At a kink tangents converge slowly: every third time the middle is taken.
         t = 0.5 * (t0 + t1) if round_ % 3 == 2 or not t0 < meet < t1 else meet
-        d = to_facet(p, start[0] + t * way[0], start[1] + t * way[1], start[2] + t * way[2], g)
-        s = _slope(g, d, way)
+        d = facet_distance(p, start[0] + t * way[0], start[1] + t * way[1], start[2] + t * way[2], g)
+        s = slope(g, d, way)
         if d < best:
             best, when = d, t
         if s < 0.0:
@@ -123,5 +127,5 @@ def nearest_time(p: Floats, start: Floats, way: Floats, g: Floats) -> tuple[floa
             t1, d1, s1 = t, d, s
         else:
             break
-    to_facet(p, start[0] + when * way[0], start[1] + when * way[1], start[2] + when * way[2], g)
+    facet_distance(p, start[0] + when * way[0], start[1] + when * way[1], start[2] + when * way[2], g)
     return best, when

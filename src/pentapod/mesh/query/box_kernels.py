@@ -1,4 +1,4 @@
-"""Trees of oriented bounding boxes, compiled: along the mean normals of runs of facets, and how they are searched."""
+"""Trees of oriented bounding boxes, compiled: boxes aligned with the mean normals of their facets, and tree search."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ def fit_boxes(corners: Floats, starts: Ints, boxes: Floats) -> None:
         while first < leaves:
             first, width = 2 * first, 2 * width
         begin, end = starts[first - leaves], starts[first - leaves + width]
-        _stand(corners[begin:end], boxes[node])
+        _orient(corners[begin:end], boxes[node])
         _fit(corners[begin:end], boxes[node])
 
 
 @kernel
-def _stand(corners: Floats, box: Floats) -> None:
-    """Write the axes of a box (15,): the last along the mean normal of the facets (F, 3, 3)."""
+def _orient(corners: Floats, box: Floats) -> None:
+    """Write the axes of a box (15,), the last along the mean normal of the facets (F, 3, 3)."""
     normal = np.zeros(3)
     for f in range(len(corners)):
         p = corners[f]
@@ -38,7 +38,7 @@ def _stand(corners: Floats, box: Floats) -> None:
     if length < 1e-300:
         normal[0], normal[1], normal[2], length = 0.0, 0.0, 1.0, 1.0
     normal /= length
-    # Across: from the coordinate axis that is least along the normal.
+    # The first axis comes from the coordinate axis that is least parallel to the normal.
     least = np.argmin(np.abs(normal))
     across = -normal[least] * normal
     across[least] += 1.0
@@ -52,7 +52,7 @@ def _stand(corners: Floats, box: Floats) -> None:
 
 @kernel
 def _fit(corners: Floats, box: Floats) -> None:
-    """Write centre and half sizes of a box (15,) with known axes, so that it holds the facets (F, 3, 3)."""
+    """Write centre and half sizes of a box (15,) with known axes, so that it contains the facets (F, 3, 3)."""
     box[0:3] = 0.0
     for k in range(3):
         low, high = math.inf, -math.inf
@@ -61,7 +61,7 @@ def _fit(corners: Floats, box: Floats) -> None:
                 p = corners[f, j]
                 along = p[0] * box[6 + 3 * k] + p[1] * box[7 + 3 * k] + p[2] * box[8 + 3 * k]
                 low, high = min(low, along), max(high, along)
-        # A hair's breadth more, for what rounding takes.
+        # A little more, to cover rounding errors.
         slack = 1e-12 * (high - low) + 1e-15 * max(abs(low), abs(high))
         box[3 + k] = 0.5 * (high - low) + slack
         for j in range(3):
@@ -70,7 +70,7 @@ def _fit(corners: Floats, box: Floats) -> None:
 
 @kernel
 def box_radius(box: Floats) -> float:
-    """Return the radius of the ball around a box (15,)."""
+    """Return the radius of the sphere around a box (15,)."""
     square = 0.0
     for k in range(3):
         square += box[3 + k] * box[3 + k]
@@ -79,9 +79,9 @@ def box_radius(box: Floats) -> float:
 
 @kernel
 def open_node(node: int, near: float, far: float, best: float, count: int, nodes: Ints, bounds: Floats) -> int:
-    """Put the children of a node on the stack that may hold what is nearer than `best`; return how many are on it.
+    """Push the children of a node that may hold something nearer than `best`; return how many nodes the stack holds.
 
-    near, far: lower bounds of the first and the second child. The nearer child is on top, and so looked at first.
+    near, far: lower bounds of the first and the second child. The nearer child is pushed last, and so searched first.
     """
     first, second = 2 * node + 1, 2 * node + 2
     if far < near:

@@ -1,4 +1,4 @@
-"""Closest point of a patch, by centroids in a k-d tree and exact distances to facets."""
+"""Closest point on a patch, from a k-d tree of facet centroids and exact distances to facets."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ from scipy.spatial import KDTree
 from pentapod.base.arrays import Floats, Ints
 from pentapod.mesh.patch import Patch
 
-_FIRST_TRY = 16
+FIRST_CANDIDATES = 16
+"""Facets tried at first for each point; four times as many wherever they do not suffice."""
 
 
 def closest(patch: Patch, points: Floats) -> tuple[Ints, Floats, Floats]:
-    """Return for points (N, 3) the facets (N,) that are nearest, the nearest points on them, and weights (N, 3).
+    """Return for points (N, 3) the nearest facets (N,), the nearest points (N, 3) on them, and their weights (N, 3).
 
-    Facets are tried in the order of their centroids' distance until none further away could be nearer.
+    Weights are barycentric. Facets are tried in the order of their centroids' distance until no other can be nearer.
     """
     centres = patch.vertices[patch.faces].mean(axis=1)
     radius = float(np.linalg.norm(patch.vertices[patch.faces] - centres[:, None], axis=2).max())
     tree = KDTree(centres)
     facet = np.zeros(len(points), dtype=np.intp)
     weights = np.zeros((len(points), 3))
-    open_rows, tries = np.arange(len(points)), min(_FIRST_TRY, len(centres))
+    open_rows, tries = np.arange(len(points)), min(FIRST_CANDIDATES, len(centres))
     while len(open_rows):
-        away, candidates = tree.query(points[open_rows], k=tries)
-        away, candidates = np.reshape(away, (-1, tries)), np.reshape(candidates, (-1, tries))
+        to_centre, candidates = (np.reshape(a, (-1, tries)) for a in tree.query(points[open_rows], k=tries))
         bary = _weights(patch, candidates, points[open_rows])
         found = np.einsum("nkc,nkcd->nkd", bary, patch.vertices[patch.faces[candidates]])
         distance = np.linalg.norm(found - points[open_rows, None], axis=2)
         best = distance.argmin(axis=1)
         rows = np.arange(len(open_rows))
         facet[open_rows], weights[open_rows] = candidates[rows, best], bary[rows, best]
-        unsure = (away[:, -1] - radius < distance[rows, best]) & (tries < len(centres))
+        unsure = (to_centre[:, -1] - radius < distance[rows, best]) & (tries < len(centres))
         open_rows, tries = open_rows[unsure], min(4 * tries, len(centres))
     on = (weights[:, :, None] * patch.vertices[patch.faces[facet]]).sum(axis=1)
     return facet, on, weights

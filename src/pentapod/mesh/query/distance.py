@@ -1,8 +1,7 @@
-"""MeshDistance: signed distance of points, segments and tools from a mesh, exact; negative inside a closed one.
+"""MeshDistance: exact signed distance of points, segments and tools from a mesh, negative inside a closed one.
 
-A closed, consistently wound mesh has an inside. Which side a point is on shows at the mesh point nearest to it: the
-angle-weighted normal there points to it from the inside out (Bærentzen and Aanæs 2005). An open sheet has no
-inside: nothing is nearer to it than 0, and touching it is all that counts.
+The sign is that of the angle-weighted normal at the nearest mesh point (Bærentzen and Aanæs 2005). Only a closed,
+consistently wound mesh has an inside; distances from an open sheet are never negative.
 """
 
 from __future__ import annotations
@@ -23,17 +22,29 @@ from pentapod.mesh.query.tree import FacetTree
 TOOL_RESOLUTION_M = 1e-5
 """Gaps of tools are exact to this."""
 
-_ON_FEATURE = 1e-7  # share of a facet that its nearest point may be off an edge and still lie on it
-_SAMPLED = 33  # points on a segment that runs through the mesh, and again around the deepest
-_ONE_POINT = 1e-12  # metres: what is shorter has no direction
+
+@dataclass(frozen=True)
+class DistanceOptions:
+    """on_feature: a nearest point whose barycentric weight is smaller than this lies on the opposite side of its facet.
+
+    samples: points tested on a segment that passes through the mesh, and again around the deepest of them.
+    contact: metres; at smaller distances the vector between the nearest points has no direction.
+    """
+
+    on_feature: float = 1e-7
+    samples: int = 33
+    contact: float = 1e-12
+
+
+OPTIONS = DistanceOptions()
 
 
 @dataclass(frozen=True, eq=False)
 class Gap:
-    """What separates M bodies from a mesh.
+    """Distances of M points or segments from a mesh.
 
-    distance (M,): metres, negative inside; capped at the distance asked for. place (M,): along the body, 0 to 1 of a
-    segment. normal (M, 3): unit, the direction in which the body's nearest point gets away fastest; 0 where unknown.
+    distance (M,): metres, negative inside; capped at the distance asked for. place (M,): of the nearest point, 0 to 1
+    along a segment. normal (M, 3): unit gradient of the distance at that point; 0 where unknown.
     """
 
     distance: Floats
@@ -56,7 +67,7 @@ class MeshDistance:
 
     @classmethod
     def of(cls, mesh: Mesh) -> MeshDistance:
-        """Return the distances to a mesh, which may be open."""
+        """Prepare the distances from a mesh, which may be open."""
         tree = FacetTree.of(mesh)
         found = mesh.diagnosis
         closed = found.watertight and found.consistent
@@ -69,59 +80,53 @@ class MeshDistance:
         return self.features is not None
 
     def points(self, points: ArrayLike, within: float = np.inf) -> Gap:
-        """Return the gaps of points (M, 3); what is further away than `within` counts as that far."""
+        """Return the distances of points (M, 3), capped at `within`."""
         at = as_floats(points, "points", (None, 3))
-        distance, _, away, facet = self._nearest(at, np.zeros_like(at), within)
-        inside = self._inside(at, away, facet)
+        distance, _, offset, facet = self._nearest(at, np.zeros_like(at), within)
+        inside = self._inside(at, offset, facet)
         distance = np.where(inside, -distance, distance)
-        return Gap(distance, np.zeros(len(at)), np.where(inside[:, None], -1.0, 1.0) * unit_or_zero(away))
+        return Gap(distance, np.zeros(len(at)), np.where(inside[:, None], -1.0, 1.0) * unit_or_zero(offset))
 
     def segments(self, starts: ArrayLike, ends: ArrayLike, within: float = np.inf) -> Gap:
-        """Return the gaps of straight segments (M, 3) to (M, 3): of their points nearest to, or deepest in, the mesh.
+        """Return the distances, capped at `within`, of segments from starts to ends (M, 3).
 
-        Exact where the segment stays outside. Inside a closed mesh the depth is that of the deepest of points sampled
-        closely: within a few hundredths of the mesh's size. What is further away than `within` counts as that far.
+        Exact where the segment stays outside. Inside, the depth is that of the deepest of dense samples: exact to a few
+        hundredths of the mesh's size.
         """
         a, b = as_floats(starts, "starts", (None, 3)), as_floats(ends, "ends", (None, 3))
-        distance, place, away, facet = self._nearest(a, b - a, within)
-        normal = unit_or_zero(away)
+        distance, place, offset, facet = self._nearest(a, b - a, within)
+        normal = unit_or_zero(offset)
         if self.closed:
             at = a + place[:, None] * (b - a)
-            through = np.flatnonzero((distance < _ONE_POINT) & (facet >= 0) | self._inside(at, away, facet))
+            through = np.flatnonzero((distance < OPTIONS.contact) & (facet >= 0) | self._inside(at, offset, facet))
             if len(through):
                 distance[through], place[through], normal[through] = self._deepest(a[through], b[through])
         return Gap(distance, place, normal)
 
     def bodies(self, solids: Sequence[Solid], tips: Floats, axes: Floats, within: float) -> tuple[Floats, Floats]:
-        """Return gaps (M,) of tools made of `solids`, with tips and unit axes (M, 3), and the mesh points (M, 3).
+        """Return distances (M,) of tools made of `solids`, with tips and unit axes (M, 3), and the mesh points (M, 3).
 
-        Exact to TOOL_RESOLUTION_M outside and 1 % more inside, erring to the smaller gap; negative where a mesh point
-        lies inside the tool. What is further away than `within` counts as that far, and its point is NaN.
+        Lower bounds, exact to TOOL_RESOLUTION_M outside and 1 % more inside; negative where a mesh point lies inside
+        the tool. They are capped at `within`; the point is NaN there.
         """
         low, high = min(s.low - s.rounding for s in solids), max(s.top for s in solids)
         wide = max(max(s.low_radius, s.high_radius) + s.rounding for s in solids)
         reach = within + wide
         gap, point = np.full(len(tips), within), np.full((len(tips), 3), np.nan)
-        # Most tools are seen to be far away by the cylinder around them.
+        # The cylinder around the tool shows that most tools are far away.
         near = np.flatnonzero(self._nearest(tips + low * axes, (high - low) * axes, reach)[0] < reach)
-        met = touch(
-            self.tree,
-            TouchingBody(tuple(solids)),
-            tips[near],
-            axes[near],
-            threshold=-within,
-            resolution=TOOL_RESOLUTION_M,
-        )
-        kind, rows = met.depths.argmax(axis=1), np.arange(len(near))
-        found = -met.depths[rows, kind]
+        body = TouchingBody(tuple(solids))
+        touched = touch(self.tree, body, tips[near], axes[near], threshold=-within, resolution=TOOL_RESOLUTION_M)
+        kind, rows = touched.depths.argmax(axis=1), np.arange(len(near))
+        found = -touched.depths[rows, kind]
         seen = np.isfinite(found)
         found = np.where(seen, found, within + TOOL_RESOLUTION_M)
         gap[near] = np.minimum(found - TOOL_RESOLUTION_M + 0.01 * np.minimum(found, 0.0), within)
-        point[near] = met.points[rows, kind]
+        point[near] = touched.points[rows, kind]
         return gap, point
 
     def contains(self, points: ArrayLike) -> Bools:
-        """Return which points (M, 3) a closed mesh encloses, by winding numbers: for few points."""
+        """Return which points (M, 3) a closed mesh encloses, by winding numbers; slow for many points."""
         at = as_floats(points, "points", (None, 3))
         if not self.closed:
             return np.zeros(len(at), dtype=np.bool_)
@@ -136,7 +141,7 @@ class MeshDistance:
         return np.abs(turns) > 0.5
 
     def _nearest(self, starts: Floats, ways: Floats, within: float) -> tuple[Floats, Floats, Floats, Ints]:
-        """Return distances, places on the ways, vectors from the mesh, and facets in tree order (−1: too far)."""
+        """Return distances, places on the ways, offsets from the mesh, and facets in tree order (−1: too far)."""
         from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415  loads numba
 
         count = len(starts)
@@ -145,26 +150,25 @@ class MeshDistance:
         tree = self.tree
         points, ways = np.ascontiguousarray(starts), np.ascontiguousarray(ways)
         nearest_all(points, ways, tree.corners, tree.boxes, tree.starts, within, True, distance, where, facet)
-        away = np.where(facet[:, None] >= 0, starts + where[:, :1] * ways - where[:, 1:], 0.0)
-        return distance, where[:, 0], away, facet
+        offset = np.where(facet[:, None] >= 0, starts + where[:, :1] * ways - where[:, 1:], 0.0)
+        return distance, where[:, 0], offset, facet
 
-    def _inside(self, points: Floats, away: Floats, facet: Ints) -> Bools:
-        """Return which points lie inside, from the vectors that lead to them from their nearest mesh points."""
+    def _inside(self, points: Floats, offset: Floats, facet: Ints) -> Bools:
+        """Return which points lie inside, from their offsets from the nearest mesh points."""
         inside = np.zeros(len(points), dtype=np.bool_)
         if self.features is None:
             return inside
-        # Only what lies in the mesh's box can be inside.
         boxed = (points >= self.bounds[0]).all(axis=1) & (points <= self.bounds[1]).all(axis=1)
         rows = np.flatnonzero(boxed & (facet >= 0))
-        on = _feature(self.tree.corners[facet[rows]], points[rows] - away[rows])
+        on = _feature(self.tree.corners[facet[rows]], points[rows] - offset[rows])
         outward = self.features[facet[rows], on]
-        inside[rows] = np.einsum("ij,ij->i", outward, away[rows]) < 0.0
+        inside[rows] = np.einsum("ij,ij->i", outward, offset[rows]) < 0.0
         return inside
 
     def _deepest(self, a: Floats, b: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return distance, place and normal of the deepest points of segments that run through the mesh."""
-        low, high = _stretch_in_box(a, b - a, self.bounds)
-        shares, rows = np.linspace(0.0, 1.0, _SAMPLED), np.arange(len(a))
+        """Return distance, place and normal of the deepest points of segments that pass through the mesh."""
+        low, high = _part_in_box(a, b - a, self.bounds)
+        shares, rows = np.linspace(0.0, 1.0, OPTIONS.samples), np.arange(len(a))
 
         def sampled() -> tuple[Gap, Floats, Ints]:
             places = low[:, None] + (high - low)[:, None] * shares
@@ -172,9 +176,9 @@ class MeshDistance:
             return gaps, places, gaps.distance.reshape(places.shape).argmin(axis=1)
 
         _, places, worst = sampled()
-        low, high = places[rows, np.maximum(worst - 1, 0)], places[rows, np.minimum(worst + 1, _SAMPLED - 1)]
+        low, high = places[rows, np.maximum(worst - 1, 0)], places[rows, np.minimum(worst + 1, OPTIONS.samples - 1)]
         gaps, places, worst = sampled()
-        flat = rows * _SAMPLED + worst
+        flat = rows * OPTIONS.samples + worst
         return np.minimum(gaps.distance[flat], 0.0), places[rows, worst], gaps.normal[flat]
 
 
@@ -191,20 +195,20 @@ def _features(mesh: Mesh) -> Floats:
 
 
 def _feature(corners: Floats, points: Floats) -> Ints:
-    """Return on which of its 7 features (as `_features`) each facet (M, 3, 3) has its point (M, 3)."""
+    """Return on which of its 7 features (see `_features`) each facet (M, 3, 3) has its point (M, 3)."""
     ab, ac, ap = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
     normal = np.cross(ab, ac)
     square = np.einsum("ij,ij->i", normal, normal)
     second = np.einsum("ij,ij->i", np.cross(ap, ac), normal) / square
     third = np.einsum("ij,ij->i", np.cross(ab, ap), normal) / square
     shares = np.stack([1.0 - second - third, second, third], axis=1)
-    zero = shares < _ON_FEATURE
+    zero = shares < OPTIONS.on_feature
     on_side, on_corner = zero.sum(axis=1) == 1, zero.sum(axis=1) >= 2
     return np.where(on_corner, 4 + shares.argmax(axis=1), np.where(on_side, 1 + shares.argmin(axis=1), 0))
 
 
-def _stretch_in_box(start: Floats, way: Floats, bounds: Floats) -> tuple[Floats, Floats]:
-    """Return between which shares (M,) of its way each segment is in the box; 0 and 1 where it never is."""
+def _part_in_box(start: Floats, way: Floats, bounds: Floats) -> tuple[Floats, Floats]:
+    """Return the shares (M,), (M,) between which each segment is in the box; 0 and 1 where it never is."""
     safe = np.where(way == 0.0, 1e-300, way)
     with np.errstate(over="ignore"):
         first, second = (bounds[0] - start) / safe, (bounds[1] - start) / safe

@@ -1,8 +1,7 @@
-"""Geodesic distance on a patch by fast marching, from vertices with given distances.
+"""Geodesic distance on a patch by fast marching (Kimmel and Sethian 1998), from vertices with given distances.
 
-Kimmel and Sethian (1998): a front crosses facets as a straight wave, each vertex settled in the order in which it
-is reached. Exact for straight fronts on flat ground; on curved ground the error is proportional to the edges'
-length. Where travel is slower, sides count for longer, so that the distance is in steps rather than in metres.
+Exact for straight fronts on a plane; on a curved surface the error is proportional to the length of the edges. A
+slowness, steps per metre, on each facet gives the distance in steps instead of metres.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from pentapod.mesh.query.slicing import LevelSet
 
 
 def distances(patch: Patch, seeds: Floats, slowness: Floats | None = None) -> Floats:
-    """Return the distance (V,) of each vertex from where seeds (V,) are finite, plus the seeds; inf beyond reach.
+    """Return the distances (V,) from seeds (V,): given distances at some vertices, infinite elsewhere.
 
     seeds: metres, or steps with a slowness (F,) in steps per metre of each facet.
     """
@@ -44,14 +43,14 @@ def border_vertices(patch: Patch) -> Bools:
 def seeds_at(patch: Patch, facets: Ints, points: Floats, slowness: Floats) -> Floats:
     """Return seeds (V,): the distance of corners of facets (N,) from points (N, 3) on them, times the slowness."""
     corners = patch.faces[facets]
-    away = np.linalg.norm(patch.vertices[corners] - points[:, None], axis=2) * slowness[facets][:, None]
+    distance = np.linalg.norm(patch.vertices[corners] - points[:, None], axis=2) * slowness[facets][:, None]
     seeds = np.full(len(patch.vertices), np.inf)
-    np.minimum.at(seeds, corners.ravel(), away.ravel())
+    np.minimum.at(seeds, corners.ravel(), distance.ravel())
     return seeds
 
 
 def seeds_along(level_set: LevelSet, slowness: Floats) -> Floats:
-    """Return seeds (V,): how far corners of facets that lines of a level set cross are from these lines."""
+    """Return seeds (V,): the distance from level lines of the corners of the facets that they cross."""
     patch = level_set.patch
     bins = level_set.corner_bins
     low, high = bins.min(axis=1), bins.max(axis=1)
@@ -64,6 +63,6 @@ def seeds_along(level_set: LevelSet, slowness: Floats) -> Floats:
     # The levels next to a corner's own value, as far as they cross the facet.
     for offset in (0, 1):
         level = np.clip(bins[crossed] + offset, low[crossed, None] + 1, high[crossed, None])
-        away = np.abs(values[crossed] - level_set.level_values(level)) / np.maximum(slope, 1e-300)[:, None]
-        np.minimum.at(seeds, patch.faces[crossed].ravel(), (away * slowness[crossed, None]).ravel())
+        distance = np.abs(values[crossed] - level_set.level_values(level)) / np.maximum(slope, 1e-300)[:, None]
+        np.minimum.at(seeds, patch.faces[crossed].ravel(), (distance * slowness[crossed, None]).ravel())
     return seeds

@@ -1,6 +1,5 @@
 """Fast marching of a front over triangles, compiled."""
 
-# Every name is a plain array or number here; numba compiles what it sees.
 from __future__ import annotations
 
 import heapq
@@ -16,8 +15,8 @@ def march(faces: Ints, sides: Floats, first: Ints, around: Ints, distance: Float
     """Lower distance (V,) in place from its finite entries on, over facets (F, 3) with sides (F, 3) as travelled.
 
     Side s runs from corner s to corner s + 1. around[first[v] : first[v + 1]] are the facets at vertex v. Vertices
-    are settled in the order of their distance; each facet with two settled corners offers its third the
-    straight front through both, where that comes from between them, else the way along a side.
+    are settled in the order of their distance. A facet with two settled corners proposes for its third the straight
+    front through both where that front arrives from between them, otherwise the distance along a side.
     """
     settled = np.zeros(len(distance), dtype=np.bool_)
     heap = [(0.0, 0)]
@@ -37,14 +36,14 @@ def march(faces: Ints, sides: Floats, first: Ints, around: Ints, distance: Float
             while faces[f, k] != v:
                 k += 1
             for turn in range(2):
-                # v is one known corner, `other` perhaps the second, `free` the one that is asked about.
+                # v is settled, `other` may be, `free` is the corner whose distance is proposed.
                 i = (k + 1 + turn) % 3
                 j = (k + 2 - turn) % 3
                 free, other = faces[f, i], faces[f, j]
                 if settled[free]:
                     continue
                 to_free = sides[f, k] if i == (k + 1) % 3 else sides[f, i]
-                offer = distance[v] + to_free
+                proposal = distance[v] + to_free
                 if settled[other]:
                     base = sides[f, k] if j == (k + 1) % 3 else sides[f, j]
                     across = sides[f, i] if j == (i + 1) % 3 else sides[f, j]
@@ -55,7 +54,7 @@ def march(faces: Ints, sides: Floats, first: Ints, around: Ints, distance: Float
                         rise = np.sqrt(1.0 - slope * slope)
                         foot = x - y * slope / rise
                         if foot >= 0.0 and foot <= base:
-                            offer = min(offer, distance[v] + slope * x + rise * y)
-                if offer < distance[free]:
-                    distance[free] = offer
-                    heapq.heappush(heap, (offer, free))
+                            proposal = min(proposal, distance[v] + slope * x + rise * y)
+                if proposal < distance[free]:
+                    distance[free] = proposal
+                    heapq.heappush(heap, (proposal, free))

@@ -1,7 +1,7 @@
-"""Geodesic tracing: straight lines over a surface, facet after facet as if it were unfolded; many rays at once.
+"""Geodesic tracing: straightest geodesics over a triangle mesh (Polthier and Schmies 1998), many rays at once.
 
-A straightest line enters each next facet at the angle at which it left the last (Polthier and Schmies 1998): the
-direction's part across the common edge is carried from one facet's plane into the other's.
+A ray crosses each edge as if both facets were unfolded into one plane: the component of its direction along the edge is
+kept, the one across it is rotated from the first facet's plane into the second's.
 """
 
 from __future__ import annotations
@@ -13,14 +13,15 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.mesh.patch import Patch
 
-_INSIDE = 1e-12
+SLOWEST_DECREASE = 1e-12
+"""Per metre: a barycentric weight that decreases more slowly counts as constant."""
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceRays:
     """N places on a patch, each with a direction in its facet. weights (N, 3): barycentric in facets (N,).
 
-    directions (N, 3): unit. landed (N,): false where the border came first.
+    directions (N, 3): unit. landed (N,): false where the ray left the patch.
     """
 
     facets: Ints
@@ -44,10 +45,7 @@ def neighbours(patch: Patch) -> Ints:
 
 
 def traced(patch: Patch, beside: Ints, start: SurfaceRays, lengths: Floats) -> SurfaceRays:
-    """Return where rays end that go `lengths` (N,) metres straight on over a patch. beside: its `neighbours`.
-
-    The loop is over the facets that the longest ray crosses, all rays at once.
-    """
+    """Return the ends of rays of `lengths` (N,) metres over a patch. beside: its `neighbours`."""
     facets, weights = start.facets.copy(), start.weights.copy()
     directions, landed = start.directions.copy(), start.landed.copy()
     left = np.where(landed, lengths, 0.0).astype(np.float64)
@@ -60,13 +58,12 @@ def traced(patch: Patch, beside: Ints, start: SurfaceRays, lengths: Floats) -> S
         corners = patch.vertices[patch.faces[f]]
         rate = _rates(corners, directions[going])
         w = weights[going]
-        # Side s lies opposite corner s + 2: there that weight runs out.
-        opposite = np.roll(w, 1, axis=1), np.roll(rate, 1, axis=1)
-        falls = opposite[1] < -_INSIDE
-        time = np.where(falls, -opposite[0] / np.where(falls, opposite[1], -1.0), np.inf)
-        time[np.arange(len(going)), from_side[going]] = np.where(
-            from_side[going] >= 0, np.inf, time[np.arange(len(going)), from_side[going]]
-        )
+        # Side s lies opposite corner s + 2, whose weight is zero there.
+        opposite, change = np.roll(w, 1, axis=1), np.roll(rate, 1, axis=1)
+        falls = change < -SLOWEST_DECREASE
+        time = np.where(falls, -opposite / np.where(falls, change, -1.0), np.inf)
+        entered = np.flatnonzero(from_side[going] >= 0)
+        time[entered, from_side[going[entered]]] = np.inf
         side = time.argmin(axis=1)
         until = np.maximum(time[np.arange(len(going)), side], 0.0)
         ends = left[going] <= until
@@ -75,16 +72,16 @@ def traced(patch: Patch, beside: Ints, start: SurfaceRays, lengths: Floats) -> S
         weights[going] = w / w.sum(axis=1, keepdims=True)
         left[going] -= advance
         going, side, f = going[~ends], side[~ends], f[~ends]
-        following = beside[f, side]
-        lost = following < 0
-        landed[going[lost]] = False
-        going, side, f, following = going[~lost], side[~lost], f[~lost], following[~lost]
-        _cross(patch, (facets, weights, directions, from_side), going, f, side, following)
+        after = beside[f, side]
+        left_patch = after < 0
+        landed[going[left_patch]] = False
+        going, side, f, after = going[~left_patch], side[~left_patch], f[~left_patch], after[~left_patch]
+        _cross(patch, (facets, weights, directions, from_side), going, f, side, after)
     return SurfaceRays(facets, weights, directions, landed)
 
 
 def _rates(corners: Floats, directions: Floats) -> Floats:
-    """Return by how much barycentric weights (N, 3) change per metre along directions (N, 3) in facets' planes."""
+    """Return the change per metre of barycentric weights (N, 3) along directions (N, 3) in the facets' planes."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     normal = np.cross(b - a, c - a)
     square = np.maximum((normal * normal).sum(axis=1, keepdims=True), 1e-300)
@@ -99,25 +96,25 @@ def _cross(
     going: Ints,
     f: Ints,
     side: Ints,
-    following: Ints,
+    after: Ints,
 ) -> None:
-    """Carry rays `going` from facets f over their sides into the following facets, in place."""
+    """Move rays `going` from facets f over their sides into the facets `after`, in place."""
     facets, weights, directions, from_side = state
     rows = np.arange(len(going))
     first = patch.faces[f, side]
     second = patch.faces[f, (side + 1) % 3]
     along = patch.vertices[second] - patch.vertices[first]
     along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
-    # Across the edge, outwards of the one facet and inwards of the other.
+    # Across the edge: out of the one facet and into the other.
     out = np.cross(along, patch.facet_normals[f])
-    inwards = np.cross(along, patch.facet_normals[following])
+    inwards = np.cross(along, patch.facet_normals[after])
     d = directions[going]
     d = (d * along).sum(axis=1, keepdims=True) * along + (d * out).sum(axis=1, keepdims=True) * inwards
     directions[going] = d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-300)
     share_first, share_second = weights[going, side], weights[going, (side + 1) % 3]
     # The neighbour runs along the edge the other way: its side from `second` to `first`.
-    corners = patch.faces[following]
+    corners = patch.faces[after]
     entered = np.argmax((corners == second[:, None]) & (np.roll(corners, -1, axis=1) == first[:, None]), axis=1)
     new = np.zeros((len(going), 3))
     new[rows, entered], new[rows, (entered + 1) % 3] = share_second, share_first
-    facets[going], weights[going], from_side[going] = following, new / new.sum(axis=1, keepdims=True), entered
+    facets[going], weights[going], from_side[going] = after, new / new.sum(axis=1, keepdims=True), entered

@@ -1,18 +1,31 @@
-"""HeightField: ray casting along one view direction through a uniform grid; exact on the facets."""
+"""HeightField: ray casting along one view direction with a uniform grid; exact on the facets."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import normalised, tangent_frame
+from pentapod.geometry.runs import members
 from pentapod.mesh.mesh import Mesh
 
-_FACETS_PER_CELL = 2.0
-_MOST_ENTRIES = 20_000_000
-_ASIDE_M = 1e-7
+
+@dataclass(frozen=True)
+class GridOptions:
+    """facets_per_cell: on average. most_entries: of facets in cells; a coarser grid is made where there were more.
+
+    aside: metres to both sides of a point at which `hides` looks.
+    """
+
+    facets_per_cell: float = 2.0
+    most_entries: int = 20_000_000
+    aside: float = 1e-7
+
+
+OPTIONS = GridOptions()
 
 
 class HeightField:
@@ -24,7 +37,7 @@ class HeightField:
         self._local = mesh.vertices @ self._frame.T
         corners = self._local[mesh.faces]
         self._doubled = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        # Facets seen edge on cover nothing.
+        # Facets parallel to the view cover nothing.
         self._seen = np.flatnonzero(np.abs(self._doubled) > 1e-9 * 2.0 * mesh.facet_areas)
         self._low = self._local[:, :2].min(axis=0)
         self._extent = np.maximum(np.ptp(self._local[:, :2], axis=0), 1e-9)
@@ -33,7 +46,7 @@ class HeightField:
     def _grid(self) -> tuple[Floats, Ints, Ints, Ints]:
         """Cell size (2,), cells (2,), where each cell's facets begin, and the facets of all cells."""
         flat = self._local[self.mesh.faces[self._seen]][:, :, :2] - self._low
-        cells = max(1.0, len(self._seen) / _FACETS_PER_CELL)
+        cells = max(1.0, len(self._seen) / OPTIONS.facets_per_cell)
         while True:
             size = np.sqrt(self._extent.prod() / cells)
             shape = np.clip(np.ceil(self._extent / size), 1, 4096).astype(np.intp)
@@ -42,11 +55,10 @@ class HeightField:
             high = np.clip((flat.max(axis=1) / cell).astype(np.intp), 0, shape - 1)
             span = high - low + 1
             count = span.prod(axis=1)
-            if count.sum() <= _MOST_ENTRIES or cells <= 1.0:
+            if count.sum() <= OPTIONS.most_entries or cells <= 1.0:
                 break
             cells /= 4.0
-        owner = np.repeat(np.arange(len(count)), count)
-        number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+        owner, number = members(count)
         x = low[owner, 0] + number // span[owner, 1]
         y = low[owner, 1] + number % span[owner, 1]
         key = x * shape[1] + y
@@ -55,11 +67,11 @@ class HeightField:
         return cell, shape, begins.astype(np.intp), self._seen[owner[order]]
 
     def topmost(self, points: Floats, margin: float = 1e-9) -> tuple[Floats, Floats, Floats]:
-        """Return the surface points (N, 3) on top over points (N, 3), normals (N, 3) there, and heights (N,).
+        """Return the topmost surface points (N, 3) on the view lines through points (N, 3), normals there, and heights.
 
-        Heights are metres along the view from the origin; −inf, with NaN points and normals, where nothing
-        lies below or above. margin: how far outside a facet (in barycentric coordinates) still counts as on
-        it; negative: only its interior.
+        Heights (N,) are metres along the view from the origin; −inf, with NaN points and normals, where the line meets
+        no facet. margin: barycentric tolerance up to which a point beside a facet counts as on it; where it is
+        negative, only the interior of facets counts.
         """
         local = points @ self._frame.T
         query, facet, weights = self._candidates(local[:, :2], margin)
@@ -77,10 +89,10 @@ class HeightField:
     def hides(self, points: Floats, slack: float) -> Bools:
         """Return whether the mesh lies above points (N, 3), along the view, by more than `slack` metres.
 
-        Looked up a hair's breadth to either side, and hidden only if so on both: what stands at the foot of a
-        wall is not hidden by it, what lies under a seam between two facets is.
+        Tested a little to either side, and true only if it is on both: a point at the foot of a wall is not hidden by
+        it, a point under a seam between two facets is.
         """
-        aside = _ASIDE_M * (0.83 * self._frame[0] + 0.56 * self._frame[1])
+        aside = OPTIONS.aside * (0.83 * self._frame[0] + 0.56 * self._frame[1])
         height = points @ self.view + slack
         return (self.topmost(points + aside)[2] > height) & (self.topmost(points - aside)[2] > height)
 
@@ -88,16 +100,15 @@ class HeightField:
         """Return pairs (M,), (M,) of points and facets over each other, and barycentric weights (M, 3)."""
         cell, shape, begins, facets = self._grid
         place = np.floor((points - self._low) / cell)
-        # The upper rim belongs to the last cell.
+        # Points on the upper edge of the grid belong to the last cell.
         rim = (points - self._low <= self._extent * (1.0 + 1e-9)) & (place >= shape)
         index = np.where(rim, shape - 1, place)
         index = np.where((index < 0) & (points - self._low >= -1e-9 * self._extent), 0, index)
         inside = ((index >= 0) & (index < shape)).all(axis=1)
         key = np.where(inside, index[:, 0] * shape[1] + index[:, 1], 0).astype(np.intp)
         count = np.where(inside, begins[key + 1] - begins[key], 0)
-        query = np.repeat(np.arange(len(points)), count)
-        entry = np.arange(len(query)) - np.repeat(np.cumsum(count) - count, count) + begins[key][query]
-        facet = facets[entry]
+        query, number = members(count)
+        facet = facets[number + begins[key][query]]
         a, b, c = (self._local[self.mesh.faces[facet, k]][:, :2] for k in range(3))
         p, doubled = points[query], self._doubled[facet]
         weights = np.stack([_cross(c - b, p - b), _cross(a - c, p - c), _cross(b - a, p - a)], axis=1)

@@ -1,9 +1,8 @@
-"""Level values of a quantity such that its level lines on a surface are nowhere further apart than asked for.
+"""Level values of a quantity whose level lines on a surface are nowhere farther apart than a stepover.
 
 On a facet where the quantity changes by s per metre, lines at levels d apart are d / s apart on the surface. So each
-facet asks for at least 1 / (s · stepover) levels per unit between its lowest corner and its highest; the most
-that any facet asks for at a value is what all get there. Levels are spread evenly over that density, half a
-step inside both ends: where the surface is steep across the lines they are closer together, elsewhere not.
+facet requires a density of 1 / (s · stepover) levels per unit between its lowest corner and its highest. The density at
+a value is the largest that any facet requires there. Levels are spread evenly over it, half a step inside both ends.
 """
 
 from __future__ import annotations
@@ -15,7 +14,10 @@ from pentapod.base.errors import ToolpathError
 from pentapod.mesh.patch import Patch
 
 BINS = 2048
+"""Intervals of values on which the density is constant; a power of two."""
+
 MOST_LEVELS = 1_000_000
+"""Level values beyond which the passes are refused as too dense."""
 
 
 def gradients(patch: Patch, values: Floats) -> Floats:
@@ -29,14 +31,14 @@ def gradients(patch: Patch, values: Floats) -> Floats:
 
 
 def spread(low: Floats, high: Floats, density: Floats) -> Floats:
-    """Return ascending levels (L,), at least as dense as each interval low to high (F,) asks: levels per unit.
+    """Return ascending levels (L,) with at least `density` (F,) levels per unit on each interval low to high (F,).
 
-    Raises ToolpathError where that would be more than a million.
+    Raises ToolpathError for more than `MOST_LEVELS`.
     """
     first, last = float(low.min()), float(high.max())
     if not last > first:
         return np.array([first])
-    bins, needed = _most(low, high, density, first, last)
+    bins, needed = _largest_density(low, high, density, first, last)
     total = np.concatenate([[0.0], np.cumsum(needed * np.diff(bins))])
     if not total[-1] <= MOST_LEVELS:
         raise ToolpathError(
@@ -49,11 +51,11 @@ def spread(low: Floats, high: Floats, density: Floats) -> Floats:
     return np.interp((np.arange(count) + 0.5) * (total[-1] / count), total, bins)
 
 
-def _most(low: Floats, high: Floats, density: Floats, first: float, last: float) -> tuple[Floats, Floats]:
-    """Return bins (B + 1,) from first to last, and the most (B,) that intervals over each ask for.
+def _largest_density(low: Floats, high: Floats, density: Floats, first: float, last: float) -> tuple[Floats, Floats]:
+    """Return bins (B + 1,) from first to last, and the largest density (B,) of the intervals over each.
 
-    Each interval of bins is the union of two of a power-of-two length, which overlap; the most over those is
-    handed down from the long to the short.
+    A sparse table: each interval of bins is the union of two overlapping ones of a power-of-two length; the maximum is
+    passed down from the long ones to the short.
     """
     scale = BINS / (last - first)
     start = np.clip(((low - first) * scale).astype(np.intp), 0, BINS - 1)
@@ -67,6 +69,6 @@ def _most(low: Floats, high: Floats, density: Floats, first: float, last: float)
         tables[k - 1] = np.maximum(tables[k - 1], tables[k])
         tables[k - 1, half:] = np.maximum(tables[k - 1, half:], tables[k, : BINS - half])
     least = tables[0][tables[0] > 0.0].min(initial=np.inf)
-    # Between bodies there may be nothing; a level there meets nothing.
+    # Values between two bodies are on no facet and need no level.
     needed = np.where(tables[0] > 0.0, tables[0], 0.0 if np.isfinite(least) else 1.0)
     return np.linspace(first, last, BINS + 1), needed

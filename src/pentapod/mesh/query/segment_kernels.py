@@ -1,8 +1,7 @@
-"""Nearest facets of a mesh to points that move straight on, short ways that touch it or long ones far away.
+"""Nearest facets of a mesh to linearly moving points, by branch and bound through the tree of boxes.
 
-A branch-and-bound search through the tree of boxes. Of short ways near the mesh the tangents at their ends bound the
-distance well (`ball_kernels`). Of others the distance of the segment from the ball around each box does, until the
-boxes are as small as they are far.
+For short motions near the mesh the tangents at their ends bound the distance well (`ball_kernels`). For long or distant
+ones the distance of the segment from the sphere around each box is the better bound, until boxes are small.
 """
 
 from __future__ import annotations
@@ -12,20 +11,19 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.mesh.query.ball_kernels import lower_bound, nearest_time, to_facet
+from pentapod.mesh.query.ball_kernels import EXACT_M, ROUNDS, facet_distance, lower_bound, nearest_time, slope
 from pentapod.mesh.query.box_kernels import box_radius, open_node
 from pentapod.numerics.kernels import kernel
 
-_STACK = 128
-_ROUNDS = 40
-_EXACT = 1e-9  # metres
+STACK = 128
+"""Nodes that wait to be searched: more than twice the depth of any tree."""
 
 
 @kernel
 def _bound(box: Floats, start: Floats, way: Floats, square: float, enough: float, g: Floats) -> float:
     """Return a lower bound on the distance of a segment, of squared length `square`, from a box (15,).
 
-    A negative square: tangents alone bound it, which is best for what is short and near.
+    Where the square is negative only tangents are used, which is best for short segments near the mesh.
     """
     if square < 0.0:
         return lower_bound(box, start, way, enough, g)
@@ -41,13 +39,15 @@ def _bound(box: Floats, start: Floats, way: Floats, square: float, enough: float
 
 
 @kernel
-def _to_facet(p: Floats, start: Floats, way: Floats, square: float, enough: float, g: Floats) -> tuple[float, float]:
-    """Return the distance of a segment from a facet (3, 3), and where on the way; some larger one if over `enough`.
+def _segment_distance(
+    p: Floats, start: Floats, way: Floats, square: float, enough: float, g: Floats
+) -> tuple[float, float]:
+    """Return the distance of a segment from a facet (3, 3), and where on it; any value above `enough` if it is larger.
 
-    The distance of a point that moves along the segment is a convex function of its place: tangents enclose the least.
+    The distance of a point is a convex function of its place on the segment; tangents enclose its minimum.
     """
     t0, t1 = 0.0, 1.0
-    # First the place nearest to the facet's middle: most facets are too far away to matter.
+    # Begin at the place nearest to the facet's middle: most facets are too far away to matter.
     mx = (p[0, 0] + p[1, 0] + p[2, 0]) / 3.0 - start[0]
     my = (p[0, 1] + p[1, 1] + p[2, 1]) / 3.0 - start[1]
     mz = (p[0, 2] + p[1, 2] + p[2, 2]) / 3.0 - start[2]
@@ -57,13 +57,11 @@ def _to_facet(p: Floats, start: Floats, way: Floats, square: float, enough: floa
     low0 = low1 = -math.inf
     s0, s1 = -1.0, 1.0
     best, when = math.inf, t
-    for round_ in range(_ROUNDS):
-        d = to_facet(p, start[0] + t * way[0], start[1] + t * way[1], start[2] + t * way[2], g)
+    for round_ in range(ROUNDS):
+        d = facet_distance(p, start[0] + t * way[0], start[1] + t * way[1], start[2] + t * way[2], g)
         if d < best:
             best, when = d, t
-        s = 0.0
-        if d > 0.0:
-            s = (g[0] * way[0] + g[1] * way[1] + g[2] * way[2]) / d
+        s = slope(g, d, way)
         if s < 0.0 and t < 1.0:
             t0, low0, s0 = t, d, s
         elif s > 0.0 and t > 0.0:
@@ -72,17 +70,17 @@ def _to_facet(p: Floats, start: Floats, way: Floats, square: float, enough: floa
             break
         if low0 == -math.inf or low1 == -math.inf:
             end = 1.0 if s < 0.0 else 0.0
-            if d + s * (end - t) >= min(enough, best - _EXACT):
+            if d + s * (end - t) >= min(enough, best - EXACT_M):
                 break
             t = end
             continue
         meet = (low1 - s1 * t1 - low0 + s0 * t0) / (s0 - s1)
-        if low0 + s0 * (meet - t0) >= min(enough, best - _EXACT):
+        if low0 + s0 * (meet - t0) >= min(enough, best - EXACT_M):
             break
-        # Tangents creep towards a kink; every third time the middle is taken.
+        # At a kink tangents converge slowly: every third time the middle is taken.
         t = 0.5 * (t0 + t1) if round_ % 3 == 2 or not t0 < meet < t1 else meet
     if best < enough:
-        to_facet(p, start[0] + when * way[0], start[1] + when * way[1], start[2] + when * way[2], g)
+        facet_distance(p, start[0] + when * way[0], start[1] + when * way[1], start[2] + when * way[2], g)
     return best, when
 
 
@@ -101,10 +99,10 @@ def nearest_all(
 ) -> None:
     """Fill distances (M,), where (M, 4): place on the way and mesh point, and facets (M,), −1 where none is nearer.
 
-    starts, ways (M, 3): each point goes straight from starts to starts + ways. within: only what is nearer is looked
-    for. far: ways may be long and far from the mesh; otherwise they are short and touch it.
+    starts, ways (M, 3): each point moves linearly from starts to starts + ways. within: only facets nearer than this
+    are searched. far: motions may be long and far from the mesh; otherwise they are short and near it.
     """
-    nodes, bounds, g = np.empty(_STACK, dtype=np.intp), np.empty(_STACK), np.empty(3)
+    nodes, bounds, g = np.empty(STACK, dtype=np.intp), np.empty(STACK), np.empty(3)
     leaves = len(leaf_starts) - 1
     for m in range(len(starts)):
         start, way, best = starts[m], ways[m], within
@@ -125,7 +123,7 @@ def nearest_all(
             else:
                 for k in range(leaf_starts[leaf], leaf_starts[leaf + 1]):
                     if far:
-                        distance, t = _to_facet(corners[k], start, way, square, best, g)
+                        distance, t = _segment_distance(corners[k], start, way, square, best, g)
                     else:
                         distance, t = nearest_time(corners[k], start, way, g)
                     if distance < best:

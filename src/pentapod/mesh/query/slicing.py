@@ -1,11 +1,10 @@
-"""Level lines (isolines) of a quantity on a surface, for many values at once.
+"""Level lines (isolines) of a quantity on a triangle mesh, for many values at once.
 
 The quantity (height along a direction, geodesic distance, a winding phase) is known at the vertices and linear on
-facets. Each vertex gets the number of levels at or below it, an integer; from these follow without any tolerance
-which levels cross which edge, and each crossing's own number. A facet crossed by a level gives one directed
-piece, from the side where its boundary comes down through the level to the side where it goes up, so that
-neighbours' pieces join head to tail. Pieces are then chained by pointer doubling. The time is proportional
-to the number of crossings (times the logarithm of the longest chain), whatever the number of levels.
+facets. Each vertex gets the number of levels at or below it, an integer; these tell without any tolerance which levels
+cross which edge. A facet crossed by a level gives one directed segment, from the side where its boundary falls through
+the level to the side where it rises, so that segments of neighbours join head to tail. They are chained by pointer
+doubling. The time is proportional to the number of crossings times the logarithm of the longest chain.
 """
 
 from __future__ import annotations
@@ -15,8 +14,8 @@ from functools import cached_property
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, Ints
-from pentapod.geometry.runs import run_starts
+from pentapod.base.arrays import Floats, Ints
+from pentapod.geometry.runs import members, run_starts
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.topology import components
@@ -24,11 +23,11 @@ from pentapod.mesh.topology import components
 
 @dataclass(frozen=True, eq=False)
 class LevelSet:
-    """A quantity on a patch and the values at which lines are wanted.
+    """A quantity on a patch, and the levels of its lines.
 
-    values (V,): at the vertices. levels (L,): ascending. turns (F, 3) or None: integers that each facet adds to
-    its corners' values, alike along an edge but for a constant, for a quantity that grows by one with
-    each turn about a point; the levels are then the integers, all of them, and `levels` is not looked at.
+    values (V,): at the vertices. levels (L,): ascending. turns (F, 3) or None: for a quantity that grows by one with
+    each turn about a point, integers that each facet adds to its corners' values; both facets at an edge add the same
+    but for a constant. The levels are then all integers, and `levels` is not used.
     """
 
     patch: Patch
@@ -51,7 +50,7 @@ class LevelSet:
 
     @property
     def crossings(self) -> int:
-        """How many times facets are crossed by levels: what slicing will cost."""
+        """Number of crossings of facets by levels: the cost of `lines`."""
         return int((self.corner_bins.max(axis=1, initial=-1) - self.corner_bins.min(axis=1, initial=1 << 40)).sum())
 
     def level_values(self, level: Ints) -> Floats:
@@ -60,11 +59,11 @@ class LevelSet:
 
     @cached_property
     def edge_bins(self) -> tuple[Ints, Ints]:
-        """Each edge's lower level (E,), as its first vertex counts; its first crossing's number (E + 1,)."""
+        """Each edge's lowest level (E,), in the count of its first vertex; number (E + 1,) of its first crossing."""
         edges = self.patch.topology.edges
         first, second = self._vertex_bins[edges[:, 0]], self._vertex_bins[edges[:, 1]]
         if self.turns is not None:
-            # What the second end counts more than the first, as any of the edge's facets sees it.
+            # The difference of the turns at both ends is the same in each of the edge's facets.
             side = np.empty(len(edges), dtype=np.intp)
             side[self.patch.topology.edge_of_side.ravel()] = np.arange(3 * len(self.patch.faces))
             here, after = side, side - side % 3 + (side + 1) % 3
@@ -77,32 +76,32 @@ class LevelSet:
     def lines(self) -> Passes:
         """Return the lines, ordered by level.
 
-        A line ends at the patch's border, at a crease, and where neighbouring facets disagree (winding, more than
-        two at an edge). Closed lines begin and end in the same point. Seen with the surface's outside up
-        and the quantity growing to the left, they run forward.
+        A line ends at the patch's border, at a crease, at an edge of opposite winding, and at an edge of more than two
+        facets. Closed lines begin and end in the same point. Seen from outside, the quantity grows to the left of a
+        line's direction.
         """
         patch, topology = self.patch, self.patch.topology
         bins = self.corner_bins
         low = bins.min(axis=1, initial=1 << 40)
         count = np.maximum(bins.max(axis=1, initial=-1) - low, 0)
-        facet = np.repeat(np.arange(len(patch.faces)), count)
-        level = np.arange(len(facet)) - np.repeat(np.cumsum(count) - count, count) + low[facet] + 1
-
+        facet, number = members(count)
+        level = number + low[facet] + 1
         above = bins[facet] >= level[:, None]
         after = np.roll(above, -1, axis=1)
-        sides = [np.argmax(above & ~after, axis=1), np.argmax(~above & after, axis=1)]  # coming down, going up
+        sides = [np.argmax(above & ~after, axis=1), np.argmax(~above & after, axis=1)]  # falling, rising
         ends = [self._crossing(facet, level, side) for side in sides]
         nodes, edges = [e[2] for e in ends], [topology.edge_of_side[facet, side] for side in sides]
         joins = [patch.joins[edge] for edge in edges]
-        total = int(self.edge_bins[1][-1])
-        order, chain = chained(_following(total, nodes, joins[0], joins[1]))
+        begins_at = np.full(int(self.edge_bins[1][-1]), -1, dtype=np.intp)
+        begins_at[nodes[0][joins[0]]] = np.flatnonzero(joins[0])
+        order, chain = chained(np.where(joins[1], begins_at[nodes[1]], -1))
         tails, heads = ([values[order] for values in end[:2]] for end in ends)
         return _assembled(tails, heads, chain, level[order])
 
     def _crossing(self, facet: Ints, level: Ints, side: Ints) -> tuple[Floats, Floats, Ints]:
         """Return where (R, 3) levels cross sides of facets, the normals (R, 3) there, and the crossing's number.
 
-        The side is taken from its lower vertex to its higher, so that both its facets get the same bits.
+        Computed from the side's lower vertex to its higher, so that both its facets get the same bits.
         """
         faces, edge = self.patch.faces, self.patch.topology.edge_of_side[facet, side]
         a, b = side, (side + 1) % 3
@@ -124,19 +123,11 @@ class LevelSet:
         return points, (1.0 - t) * normals[facet, a] + t * normals[facet, b], number
 
 
-def _following(node_count: int, nodes: list[Ints], open_start: Bools, open_end: Bools) -> Ints:
-    """Return for each piece (R,) the piece that goes on where it ends, or −1."""
-    begins_at = np.full(node_count, -1, dtype=np.intp)
-    starting = np.flatnonzero(open_start)
-    begins_at[nodes[0][starting]] = starting
-    return np.where(open_end, begins_at[nodes[1]], -1) if len(nodes[1]) else np.zeros(0, dtype=np.intp)
-
-
 def chained(after: Ints) -> tuple[Ints, Ints]:
-    """Return an order (K,) of items in which each stands right behind its predecessor, and its chain (K,).
+    """Return an order (K,) of items in which each follows its predecessor, and the chain (K,) of each.
 
-    after (K,): the item that follows each, or −1; no item follows two. Closed chains are cut before their
-    lowest item. Chains are ordered by their first items.
+    after (K,): the item after each, or −1; no item is after two. Closed chains are cut before their lowest item. Chains
+    are ordered by their first items.
     """
     count = len(after)
     before = np.full(count, -1, dtype=np.intp)
@@ -149,20 +140,20 @@ def chained(after: Ints) -> tuple[Ints, Ints]:
     np.minimum.at(lowest, label, np.arange(count))
     before[lowest[~headed]] = -1  # closed chains
 
-    # Pointer doubling: `jump` leads 2^k items back, `distance` is how far that was.
+    # Pointer doubling: `jump` is the item up to 2^k places before, `distance` the number of places.
     jump = np.where(before < 0, np.arange(count), before)
     distance = (before >= 0).astype(np.intp)
     while True:
-        further = distance[jump]
-        if not further.any():
+        farther = distance[jump]
+        if not farther.any():
             break
-        distance, jump = distance + further, jump[jump]
+        distance, jump = distance + farther, jump[jump]
     order = np.lexsort((distance, jump))
     return order, np.cumsum(distance[order] == 0) - 1
 
 
 def _assembled(tails: list[Floats], heads: list[Floats], chain: Ints, level: Ints) -> Passes:
-    """Return passes from pieces (K,) in order: each chain's first tail, then all its heads."""
+    """Return passes from segments (K,) in order: each chain's first tail, then all its heads."""
     count = len(chain)
     chains = int(chain[-1]) + 1 if count else 0
     at = np.arange(count) + chain + 1

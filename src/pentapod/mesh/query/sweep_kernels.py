@@ -1,14 +1,15 @@
 """Deepest point of a mesh in a moving convex body, by branch and bound, compiled.
 
-Let f(q, t) be the signed distance of a mesh point q to the body at time t in [0, 1]: negative inside. In the body's
+Let f(q, t) be the signed distance of a mesh point q from the body at time t in [0, 1], negative inside. In the body's
 own frame f is convex and its gradient g has length 1, so a tangent plane bounds it from below. Over a box or a triangle
 with centre c and offsets δ, and over the times s ± τ,
 
     f ≥ f(c, s) + min g·δ − |∂f/∂t| τ − ½ τ² (θ² W + 2 θ V) − θ τ max|δ|
 
-with θ the angle that the axis turns, V the way that the tilt centre goes, and W the distance of points from the
-tilt_centre: the last two terms bound how far the motion, seen from the body, leaves a straight line. Pieces that cannot
-hold a point deeper than what is known are dropped; the others are halved in space or in time, whichever bounds worse.
+with θ the angle that the axis turns, V the distance that the tilt centre moves, and W the distance of the point from
+the tilt centre: the last two terms bound the deviation of the motion, in the body's frame, from a straight line. Boxes
+and triangles that cannot contain a deeper point than the best known are dropped; the others are halved in space or in
+time, whichever makes the bound worse.
 """
 
 from __future__ import annotations
@@ -21,21 +22,22 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.mesh.query.box_kernels import box_radius
 from pentapod.numerics.kernels import kernel
 
-_STACK = 512
-"""Far more than the halvings between a kilometre and a tenth of a micrometre need."""
+STACK = 512
+"""Pieces that wait to be searched: far more than halving a kilometre down to a tenth of a micrometre needs."""
 
+RELATIVE_ERROR = 1e-2
+"""Share of a depth that may be missed, besides `eps`."""
 
-_AXIS = 3
-"""Where the axis begins in a pose."""
-_VALUE, _RATE, _FAR = range(3, 6)
-"""Places of f, ∂f/∂t and W in what `_slope` writes."""
-_SHARE = 1e-2
-"""Of a depth that may be missed, besides `eps`."""
+AXIS = 3
+"""Index of the axis in a pose."""
+
+VALUE, RATE, RADIUS = range(3, 6)
+"""Indices of f, ∂f/∂t and W in what `_derivatives` writes."""
 
 
 @kernel
 def meridian_distance(solid: Floats, r: float, z: float) -> tuple[float, float, float]:
-    """Return the signed distance of (r, z), radius and height, to a solid (5,), and its derivatives by r and z."""
+    """Return the signed distance of (r, z), radius and height, from a solid (5,), and its derivatives by r and z."""
     low, high, low_radius, high_radius, rounding = solid[0], solid[1], solid[2], solid[3], solid[4]
     side_r, side_z = high_radius - low_radius, high - low
     length = math.sqrt(side_r * side_r + side_z * side_z)
@@ -50,7 +52,7 @@ def meridian_distance(solid: Floats, r: float, z: float) -> tuple[float, float, 
         if below >= above:
             return below - rounding, 0.0, -1.0
         return above - rounding, 0.0, 1.0
-    # Outside: the nearest point of the outline, which is the lower disc, the slanted side and the upper disc.
+    # Outside: the nearest point of the outline: lower disc, slanted side, or upper disc.
     near_r, near_z = min(r, low_radius), low
     best = (r - near_r) ** 2 + (z - near_z) ** 2
     other_r = min(r, high_radius)
@@ -71,8 +73,8 @@ def meridian_distance(solid: Floats, r: float, z: float) -> tuple[float, float, 
 
 
 @kernel
-def _place(motion: Floats, t: float, pose: Floats) -> None:
-    """Write tilt_centre and axis at time t into pose (6,). motion: see `deepest`."""
+def _pose(motion: Floats, t: float, pose: Floats) -> None:
+    """Write tilt centre and axis at time t into pose (6,). motion: see `deepest`."""
     angle = motion[16]
     for k in range(3):
         pose[k] = motion[k] + t * motion[6 + k]
@@ -86,10 +88,10 @@ def _place(motion: Floats, t: float, pose: Floats) -> None:
 
 
 @kernel
-def _slope(solid: Floats, motion: Floats, pose: Floats, x: float, y: float, z: float, g: Floats) -> None:
+def _derivatives(solid: Floats, motion: Floats, pose: Floats, x: float, y: float, z: float, g: Floats) -> None:
     """Write into g (6,): the gradient in the mesh's frame, f, ∂f/∂t and W, at a mesh point and a pose."""
     wx, wy, wz = x - pose[0], y - pose[1], z - pose[2]
-    i, j, k = pose[_AXIS], pose[_AXIS + 1], pose[_AXIS + 2]
+    i, j, k = pose[AXIS], pose[AXIS + 1], pose[AXIS + 2]
     height = wx * i + wy * j + wz * k
     rx, ry, rz = wx - height * i, wy - height * j, wz - height * k
     r = math.sqrt(rx * rx + ry * ry + rz * rz)
@@ -98,21 +100,21 @@ def _slope(solid: Floats, motion: Floats, pose: Floats, x: float, y: float, z: f
     g[0] = scale * rx + by_z * i
     g[1] = scale * ry + by_z * j
     g[2] = scale * rz + by_z * k
-    g[_VALUE] = f
+    g[VALUE] = f
     # The body moves with velocity V + ω × w at the point; seen from it the point moves the other way.
     vx = motion[6] + motion[13] * wz - motion[14] * wy
     vy = motion[7] + motion[14] * wx - motion[12] * wz
     vz = motion[8] + motion[12] * wy - motion[13] * wx
-    g[_RATE] = -(g[0] * vx + g[1] * vy + g[2] * vz)
-    g[_FAR] = math.sqrt(wx * wx + wy * wy + wz * wz)
+    g[RATE] = -(g[0] * vx + g[1] * vy + g[2] * vz)
+    g[RADIUS] = math.sqrt(wx * wx + wy * wy + wz * wz)
 
 
 @kernel
-def _loss_in_time(motion: Floats, g: Floats, tau: float, size: float) -> float:
-    """Return how far f may fall below its tangent plane within ± tau, for offsets up to `size`."""
+def _deviation_bound(motion: Floats, g: Floats, tau: float, size: float) -> float:
+    """Return the bound on how far f falls below its tangent plane within ± tau, for offsets up to `size`."""
     angle, way = motion[16], motion[15]
-    bend = angle * angle * (g[_FAR] + way * tau + size) + 2.0 * angle * way
-    return abs(g[_RATE]) * tau + 0.5 * tau * tau * bend + angle * tau * size
+    bend = angle * angle * (g[RADIUS] + way * tau + size) + 2.0 * angle * way
+    return abs(g[RATE]) * tau + 0.5 * tau * tau * bend + angle * tau * size
 
 
 @kernel
@@ -128,7 +130,7 @@ def _deepest_in_facet(
     pose: Floats,
     g: Floats,
 ) -> bool:
-    """Lower best (5,): depth f, time and point, within one facet (3, 3) and the times s ± tau; whether it did."""
+    """Lower best (5,): f, time and point, within one facet (3, 3) and the times s ± tau; return whether it did."""
     found = False
     for k in range(9):
         work[0, k] = corners[k // 3, k % 3]
@@ -139,26 +141,26 @@ def _deepest_in_facet(
         a, b, c = work[count, 0:3].copy(), work[count, 3:6].copy(), work[count, 6:9].copy()
         s, tau = work[count, 9], work[count, 10]
         x, y, z = (a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0, (a[2] + b[2] + c[2]) / 3.0
-        _place(motion, s, pose)
-        _slope(solid, motion, pose, x, y, z, g)
-        if g[_VALUE] < best[0]:
-            best[0], best[1], best[2], best[3], best[4] = g[_VALUE], s, x, y, z
+        _pose(motion, s, pose)
+        _derivatives(solid, motion, pose, x, y, z, g)
+        if g[VALUE] < best[0]:
+            best[0], best[1], best[2], best[3], best[4] = g[VALUE], s, x, y, z
             found = True
         lowest, size = 0.0, 0.0
         for p in (a, b, c):
             dx, dy, dz = p[0] - x, p[1] - y, p[2] - z
             lowest = min(lowest, g[0] * dx + g[1] * dy + g[2] * dz)
             size = max(size, dx * dx + dy * dy + dz * dz)
-        loss = _loss_in_time(motion, g, tau, math.sqrt(size))
-        if g[_VALUE] + lowest - loss >= best[0] - eps + _SHARE * min(best[0], 0.0) or count + 2 > _STACK:
+        deviation = _deviation_bound(motion, g, tau, math.sqrt(size))
+        if g[VALUE] + lowest - deviation >= best[0] - eps + RELATIVE_ERROR * min(best[0], 0.0) or count + 2 > STACK:
             continue
-        if loss > -lowest:
+        if deviation > -lowest:
             for half in range(2):
                 work[count, 0:3], work[count, 3:6], work[count, 6:9] = a, b, c
                 work[count, 9], work[count, 10] = s + (half - 0.5) * tau, 0.5 * tau
                 count += 1
         else:
-            # The longest side is halved.
+            # Halve the longest side.
             ab = (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
             bc = (b[0] - c[0]) ** 2 + (b[1] - c[1]) ** 2 + (b[2] - c[2]) ** 2
             ca = (c[0] - a[0]) ** 2 + (c[1] - a[1]) ** 2 + (c[2] - a[2]) ** 2
@@ -187,11 +189,11 @@ def deepest(
     work: Floats,
     eps: float,
 ) -> int:
-    """Lower best (5,): f, time and point, over a whole tree; return the leaf-order facet, −1 where nothing is lower.
+    """Lower best (5,): f, time and point, over a whole tree; return the facet in tree order, −1 where nothing is lower.
 
-    solid (5,). motion (18,): tilt_centre and axis at the start (3 + 3), the tilt centre's way (3), the axis a quarter
-    turn on (3), the angular velocity (3), the way's length, the angle, and the tilt centre's height over the tip.
-    best[0] on entry is the f of interest: only what lies deeper is looked for. nodes, work: room.
+    solid (5,). motion (18,): tilt centre and axis at the start (3 + 3), displacement of the tilt centre (3), the axis a
+    quarter turn later (3), the angular velocity (3), the length of the displacement, the angle, and the height of the
+    tilt centre above the tip. best[0] on entry is the threshold: only deeper points are searched. nodes, work: buffers.
     """
     pose, g = np.empty(6), np.empty(6)
     leaves = len(starts) - 1
@@ -202,17 +204,17 @@ def deepest(
         count -= 1
         node, s, tau = int(nodes[count, 0]), nodes[count, 1], nodes[count, 2]
         box = boxes[node]
-        _place(motion, s, pose)
-        _slope(solid, motion, pose, box[0], box[1], box[2], g)
+        _pose(motion, s, pose)
+        _derivatives(solid, motion, pose, box[0], box[1], box[2], g)
         fall = 0.0
         for k in range(3):
             fall += box[3 + k] * abs(g[0] * box[6 + 3 * k] + g[1] * box[7 + 3 * k] + g[2] * box[8 + 3 * k])
-        loss = _loss_in_time(motion, g, tau, box_radius(box))
-        if g[_VALUE] - fall - loss >= best[0] - eps + _SHARE * min(best[0], 0.0) or count + 2 > _STACK:
+        deviation = _deviation_bound(motion, g, tau, box_radius(box))
+        if g[VALUE] - fall - deviation >= best[0] - eps + RELATIVE_ERROR * min(best[0], 0.0) or count + 2 > STACK:
             continue
         leaf = node - (leaves - 1)
-        if leaf < 0 and loss <= fall:
-            # The child whose centre lies deeper comes first: what it finds spares work in the other.
+        if leaf < 0 and deviation <= fall:
+            # Search the child with the deeper centre first: its result prunes the other.
             left, right = 2 * node + 1, 2 * node + 2
             ahead = 0.0
             for k in range(3):
@@ -246,8 +248,8 @@ def sweep_all(
     where: Floats,
     facets: Ints,
 ) -> None:
-    """Fill depths (M,), where (M, 4): time and point, and facets (M,), −1 where none is beyond the threshold."""
-    nodes, work, best = np.empty((_STACK, 3)), np.empty((_STACK, 11)), np.empty(2 + 3)
+    """Fill depths (M,), where (M, 4): time and point, and facets (M,), −1 where none is deeper than the threshold."""
+    nodes, work, best = np.empty((STACK, 3)), np.empty((STACK, 11)), np.empty(2 + 3)
     for m in range(len(motions)):
         best[0] = -threshold
         facets[m] = deepest(solid, motions[m], corners, boxes, starts, best, nodes, work, eps)

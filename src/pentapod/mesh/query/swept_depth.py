@@ -1,4 +1,4 @@
-"""Penetration depth of a mesh into a tool over a whole motion, and the gap between them."""
+"""Penetration depth of a mesh in a moving tool, or the gap between them, continuous in time."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ from pentapod.mesh.query.tree import FacetTree
 RESOLUTION_M = 5e-7
 """Depths are exact to this and one per cent."""
 
-_CHUNK = 5_000
+CHUNK = 5_000
+"""Motions between two reports of progress."""
 
 
 class Body(Protocol):
-    """What is swept: a tool, or part of one. tilt_centre: metres from the tip to the point that moves straight."""
+    """A tool, or part of one."""
 
     @property
     def tilt_centre(self) -> float:
-        """Distance in metres from the tip along the axis to the point about which the body turns."""
+        """Metres from the tip along the axis to the point that moves linearly, about which the body turns."""
         ...
 
     @property
@@ -36,7 +37,7 @@ class Body(Protocol):
 
 @dataclass(frozen=True)
 class TouchingBody:
-    """Solids alone, standing: their tilt centre does not matter."""
+    """Solids that do not move, so that their tilt centre does not matter."""
 
     solids: tuple[Solid, ...]
     tilt_centre: float = 0.0
@@ -44,11 +45,11 @@ class TouchingBody:
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """What a tool met on M motions. Columns are `KINDS`: cutter, shank, holder.
+    """Depths of a mesh in a tool on M motions, one column for each of `KINDS`: cutter, shank, holder.
 
-    depths (M, 3): metres by which the deepest mesh point lies inside that part of the tool: negative is the
-    gap that is left, −inf where it is not within the threshold that was asked for. times (M, 3): when, as a
-    fraction of the motion. points (M, 3, 3): the mesh point, metres. facets (M, 3): of the mesh, −1 for none.
+    depths (M, 3): metres by which the deepest mesh point lies inside that part of the tool; negative is a gap, −inf
+    where nothing is beyond the threshold. times (M, 3): when, as a fraction of the motion. points (M, 3, 3): the mesh
+    point, metres. facets (M, 3): of the mesh, −1 for none.
     """
 
     depths: Floats
@@ -64,7 +65,7 @@ class Sweep:
 
     @property
     def deepest(self) -> Floats:
-        """Depth (M,) of the part of the tool that is worst on each motion."""
+        """Largest depth (M,) of any part of the tool on each motion."""
         return self.depths.max(axis=1)
 
     def beyond(self, threshold: float) -> Bools:
@@ -82,13 +83,12 @@ def sweep(
     every: int = 1,
     progress: Progress = silent,
 ) -> Sweep:
-    """Return what a tool meets on the N − 1 motions between N poses: tips and unit axes (N, 3).
+    """Return the depths of a mesh in a tool on the N − 1 motions between N poses: tips and unit axes (N, 3).
 
-    every: 2 takes the poses as pairs, a motion each, and leaves the ways between pairs out.
-
-    On a motion the tilt centre goes straight and the axis turns evenly about it. Looked for is what lies deeper than
-    `threshold`, metres; a negative one asks for a gap. Every point of every facet and every time between is
-    covered; depths are exact to `RESOLUTION_M` and 1 %. Raises ToolpathError for fewer than two poses.
+    On a motion the tilt centre moves linearly and the axis turns evenly about it. Found are depths above `threshold`,
+    metres; a negative one asks for gaps too. Every point of every facet and every time is covered; depths are exact to
+    `RESOLUTION_M` and 1 %. every: 2 takes the poses as pairs, a motion each, and skips the motions between pairs.
+    Raises ToolpathError for fewer than two poses.
     """
     tips, axes = as_floats(tips, "tips", (None, 3)), as_floats(axes, "axes", (None, 3))
     if len(tips) < 2:
@@ -106,9 +106,9 @@ def touch(
     resolution: float = RESOLUTION_M,
     progress: Progress = silent,
 ) -> Sweep:
-    """Return what a tool meets that stands at N poses: tips and unit axes (N, 3). As `sweep`, without motion.
+    """Return the depths of a mesh in a tool at N poses: tips and unit axes (N, 3). As `sweep`, without motion.
 
-    resolution: to which depths are exact, metres, for those who have no time.
+    resolution: metres to which depths are exact; a coarser one is faster.
     """
     tips, axes = as_floats(tips, "tips", (None, 3)), as_floats(axes, "axes", (None, 3))
     return _swept(tree, tool, tips, axes, tips, axes, threshold, progress, resolution)
@@ -136,8 +136,8 @@ def _swept(
     for k, solid in enumerate(solids):
         ball = solid.is_ball and solid.low == tool.tilt_centre
         numbers = np.array(solid.numbers)
-        for first in range(0, count, _CHUNK):
-            rows = slice(first, first + _CHUNK)
+        for first in range(0, count, CHUNK):
+            rows = slice(first, first + CHUNK)
             progress("gouge", (k + first / count) / parts)
             found = (depths[k, rows], where[k, rows], facets[k, rows])
             place = (tree.corners, tree.boxes, tree.starts)
@@ -154,11 +154,11 @@ def _swept(
 
 
 def _motions(tips0: Floats, axes0: Floats, tips1: Floats, axes1: Floats, tilt_centre: float) -> Floats:
-    """Return the motions (M, 18) as the kernels take them."""
+    """Return the motions (M, 18) in the layout of `sweep_kernels.deepest`."""
     start, end = tips0 + tilt_centre * axes0, tips1 + tilt_centre * axes1
     way = end - start
     angle = angle_between(axes0, axes1)
-    # The direction a quarter turn on; where the axes are opposite every way round is as good.
+    # The axis a quarter turn later; between opposite axes any direction will do.
     ahead = axes1 - (axes0 * axes1).sum(axis=1, keepdims=True) * axes0
     length = np.linalg.norm(ahead, axis=1, keepdims=True)
     ahead = np.where(length > 1e-12, ahead / np.where(length > 1e-12, length, 1.0), tangent_frame(axes0)[0])
@@ -170,7 +170,7 @@ def _motions(tips0: Floats, axes0: Floats, tips1: Floats, axes1: Floats, tilt_ce
 
 
 def _by_kind(depths: Floats, where: Floats, facets: Ints, kinds: Ints) -> Sweep:
-    """Return for each motion and kind of part the solid that is worst."""
+    """Return for each motion and kind of part the solid with the largest depth."""
     count = depths.shape[1]
     rows = np.arange(count)
     out = (np.full((count, 3), -np.inf), np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan))

@@ -1,8 +1,8 @@
-"""FacetTree: bounding-volume hierarchy over the facets of a mesh.
+"""FacetTree: bounding-volume hierarchy of oriented boxes over the facets of a mesh.
 
-Facets are sorted along a Morton curve through their centres; the tree above them is complete, so that node k has
-the children 2k + 1 and 2k + 2 and needs no pointers. Each box stands along the mean normal of its facets: over a
-smooth surface it is as thin as the surface is flat, which is what a tool that touches it needs.
+Facets are sorted along a Morton curve through their centres. The tree above them is complete, so that node k has the
+children 2k + 1 and 2k + 2 without pointers. Each box is aligned with the mean normal of its facets: over a smooth
+surface it is thin, so that few boxes reach a tool that touches the surface.
 """
 
 from __future__ import annotations
@@ -14,13 +14,16 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.mesh.mesh import Mesh
 
-_FACETS_PER_LEAF = 4
-_BITS = 20
+FACETS_PER_LEAF = 4
+"""Facets below each leaf, about: few make the tree deep, many make leaves slow."""
+
+MORTON_BITS = 20
+"""Bits of each coordinate along the Morton curve; three times as many must fit into 64."""
 
 
 @dataclass(frozen=True, eq=False)
 class FacetTree:
-    """Boxes and facets. corners (F, 3, 3): of the facets in tree order, metres. facets (F,): their own numbers.
+    """Boxes and facets. corners (F, 3, 3): of the facets in tree order, metres. facets (F,): their indices in the mesh.
 
     boxes (2 L − 1, 15): centre, half sizes and the three axes of each node, the L leaves last. starts (L + 1,):
     where each leaf's facets begin.
@@ -38,7 +41,7 @@ class FacetTree:
 
         order = along_morton_curve(mesh.vertices[mesh.faces].mean(axis=1), mesh.bounds)
         corners = np.ascontiguousarray(mesh.vertices[mesh.faces[order]])
-        leaves = 1 << max(0, (len(order) // _FACETS_PER_LEAF).bit_length() - 1)
+        leaves = 1 << max(0, (len(order) // FACETS_PER_LEAF).bit_length() - 1)
         starts = (np.arange(leaves + 1) * len(order)) // leaves
         boxes = np.empty((2 * leaves - 1, 15))
         fit_boxes(corners, starts, boxes)
@@ -46,10 +49,10 @@ class FacetTree:
 
 
 def along_morton_curve(points: Floats, bounds: Floats) -> Ints:
-    """Return the order (N,) of points (N, 3) within bounds (2, 3) along a Morton curve: neighbours are near."""
+    """Return the order (N,) along a Morton curve of points (N, 3) within bounds (2, 3); neighbours in it are close."""
     low, high = bounds
     extent = float((high - low).max()) or 1.0
-    cells = ((points - low) * ((2**_BITS - 1) / extent)).astype(np.int64)
+    cells = ((points - low) * ((2**MORTON_BITS - 1) / extent)).astype(np.int64)
     return np.argsort(_spread(cells[:, 0]) | _spread(cells[:, 1]) << 1 | _spread(cells[:, 2]) << 2, kind="stable")
 
 

@@ -18,7 +18,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.geometry.transport import carried_frames
+from pentapod.geometry.directions import rotation_minimising_frames
 from pentapod.numerics.banded import banded, banded_product
 from pentapod.numerics.divided_differences import as_matrix, divided_differences
 from pentapod.planning.problem.samples import ToolpathSamples
@@ -71,7 +71,7 @@ class AxisSpline:
         # each knot where there are as many: at the knots alone the cost hardly sees coefficients that alternate.
         nodes = _apart(way, spacing / _NODES)
         basis = sparse.csr_matrix(BSpline.design_matrix(way, _knots(way[nodes], spacing), _DEGREE))
-        frames = carried_frames(samples.nominal)
+        frames = rotation_minimising_frames(samples.nominal)
         cost = _cost(samples.nominal[nodes], cone * frames[nodes], basis[nodes], way[nodes])
         return cls(cone, basis, frames, nodes, way[nodes], *cost)
 

@@ -1,9 +1,9 @@
-"""APT / CLDATA: GOTO with i, j, k, MULTAX, RAPID, FEDRAT, DELAY, UNITS: the everyday words of ISO 4343.
+"""APT / CLDATA (ISO 4343): GOTO with i, j, k, MULTAX, RAPID, FEDRAT, DELAY, UNITS and words that do not move the tool.
 
-The reader is strict: what it cannot honour (a missing unit, CUTCOM, TRACUT, a word it does not know) is an error,
-not a guess. i, j, k point from the tip to the spindle. RAPID counts for the next GOTO alone. DELAY/s stops at the
-last point for s seconds; DELAY/0 is an exact stop. A `$$` remark "pentapod link" or "pentapod cut" tells moves on feed
-apart, for APT has no word for it.
+The reader is strict: a missing unit, an unknown word, and words that it cannot follow (CUTCOM, TRACUT) are errors.
+i, j, k point from the tip to the spindle. RAPID holds for the next GOTO only. DELAY/s is a dwell of s seconds at the
+last point; DELAY/0 is an exact stop. A `$$` remark "pentapod link" or "pentapod cut" gives the kind of the feed moves,
+for which APT has no word.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from pentapod.base.errors import nearest
-from pentapod.toolpath.formats.moves import plain, poses, stands
-from pentapod.toolpath.formats.reading import number, read_lines, seconds
+from pentapod.toolpath.formats.moves import dwell_times, kind_remark, plain, poses, tilt_centre_remark
+from pentapod.toolpath.formats.reading import StatementReader, number, read_lines, seconds
 from pentapod.toolpath.formats.registry import Defaults, Format, register
-from pentapod.toolpath.formats.remarks import StatementReader, kind_remark, tilt_centre_remark
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 _MM = {"MM": 1.0, "INCHES": 25.4, "INCH": 25.4}
@@ -52,7 +51,7 @@ class _Reader(StatementReader):
         line, pending, lines = 0, "", read_lines(self.file)
         for line, raw in enumerate(lines, start=1):
             text, _, remark = raw.partition("$$")
-            self.remarks.read(remark, line)
+            self.read_remark(remark, line)
             text = text.strip()
             if text.endswith("$"):
                 pending += text[:-1]
@@ -114,13 +113,13 @@ class _Reader(StatementReader):
         if self.unit is None:
             raise self.wrong("the unit is missing", line, "CUTTER", expected="UNITS/MM or UNITS/INCHES before it")
         ball = len(numbers) > 1 and abs(numbers[1] - 0.5 * numbers[0]) <= 1e-6 * numbers[0]
-        # Of CUTTER and a remark the one that comes last counts.
-        self.remarks.tilt_centre = numbers[1] * self.unit * 1e-3 if ball else 0.0
+        # The last of CUTTER and the remarks counts.
+        self.tilt_centre = numbers[1] * self.unit * 1e-3 if ball else 0.0
 
     def _delay(self, words: list[str], line: int) -> None:
         if len(words) != 1:
             raise self.wrong("not a time", line, "DELAY", value=",".join(words)[:40], expected="DELAY/seconds")
-        self.moves.stand(seconds(words[0], self.file, line, "DELAY"))
+        self.moves.add_dwell(seconds(words[0], self.file, line, "DELAY"))
 
     def _from(self, words: list[str], line: int) -> None:
         if self.moves.tips:
@@ -143,7 +142,7 @@ class _Reader(StatementReader):
         feed = self.defaults.feed if self.feed is None else self.feed / 6e4
         if feed is None and not self.rapid:
             raise self.wrong("the feed is missing", line, name, expected="FEDRAT before it")
-        kind = SegmentKind.RAPID if self.rapid else self.remarks.kind
+        kind = SegmentKind.RAPID if self.rapid else self.kind
         speed = float("inf") if self.rapid or feed is None else feed * 6e4
         self.moves.add([v * self.unit for v in values[:3]], axis, kind, speed, line, name)
         self.rapid = False
@@ -160,14 +159,14 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
 
 def _write(toolpath: Toolpath) -> bytes:
     tips, axes, kinds, feeds = poses(toolpath)
-    dwells = stands(toolpath)
+    dwells = dwell_times(toolpath)
     lines = ["PARTNO PENTAPOD", "UNITS/MM", f"$$ {tilt_centre_remark(toolpath.tilt_centre)}", "MULTAX/ON"]
     kind, feed = SegmentKind.CUT, np.nan
     for k in range(len(tips)):
         move = kinds[k - 1] if k else SegmentKind.RAPID
         if move == SegmentKind.RAPID:
             lines.append("RAPID")
-            # FEDRAT is modal in most readers, in some RAPID ends it: it is said again.
+            # FEDRAT is modal in most readers; in some RAPID cancels it, so that it is repeated.
             feed = np.nan
         else:
             if move != kind:
@@ -183,7 +182,7 @@ def _write(toolpath: Toolpath) -> bytes:
     return ("\n".join([*lines, "FINI"]) + "\n").encode()
 
 
-APT = register(
+register(
     Format(
         "apt",
         (".apt", ".cls", ".cl", ".cldata"),

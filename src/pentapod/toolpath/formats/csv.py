@@ -1,4 +1,4 @@
-"""Plain CSV: one waypoint a row, units in the column names; how it is reached, and how long the tool stands there."""
+"""Toolpath CSV: one waypoint a row with the kind, feed and power of the move to it, and its dwell."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ import re
 from pathlib import Path
 
 from pentapod.base.errors import ToolpathError
-from pentapod.toolpath.formats.moves import Moves, plain, poses, stands
+from pentapod.toolpath.formats.moves import Moves, dwell_times, plain, poses
 from pentapod.toolpath.formats.reading import number, read_lines, seconds
 from pentapod.toolpath.formats.registry import Defaults, Format, register
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
-_MAGIC = "pentapod_toolpath"
 _COLUMNS = "x_mm,y_mm,z_mm,i,j,k,kind,feed_mm_min,power,dwell_s"
 _OPTIONAL = (",dwell_s", ",power,dwell_s", ",kind,feed_mm_min,power,dwell_s")
 _MM = {"mm": 1.0, "m": 1e3, "inch": 25.4}
@@ -39,13 +38,13 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
                 "wrong number of columns", file=file, line=line, value=len(cells), expected=str(len(names))
             )
         values = [number(cell, file, line, name) for cell, name in zip(cells[:6], names[:6], strict=True)]
-        kind, feed = _how(file, line, cells[6:8], defaults, first=not moves.tips)
+        kind, feed = _kind_and_feed(file, line, cells[6:8], defaults, first=not moves.tips)
         power = number(cells[8], file, line, "power") if len(cells) > 8 else 1.0
         if not 0.0 <= power <= 1.0:
             raise ToolpathError("not a share", file=file, line=line, key="power", value=cells[8], expected="0 to 1")
         moves.add([v * scale for v in values[:3]], values[3:], kind, feed, line, "i,j,k", power)
         if len(cells) > 9 and cells[9]:
-            moves.stand(seconds(cells[9], file, line, "dwell_s"))
+            moves.add_dwell(seconds(cells[9], file, line, "dwell_s"))
     if "waypoints" in header:
         text, line = header["waypoints"]
         if number(text, file, line, "waypoints") != len(moves.tips):
@@ -54,7 +53,7 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
                 file=file, line=len(lines), key="waypoints", value=len(moves.tips), expected=text,
             )  # fmt: skip
     tilt_centre = defaults.tilt_centre
-    for name in ("pivot_mm", "tilt_centre_mm"):  # the first is how files of earlier versions call it
+    for name in ("pivot_mm", "tilt_centre_mm"):  # the first is the name in files of earlier versions
         if name in header:
             text, line = header[name]
             tilt_centre = 1e-3 * number(text, file, line, name)
@@ -72,7 +71,9 @@ def _unit(file: Path, line: int, names: str) -> float:
     raise ToolpathError(what, file=file, line=line, value=names[:80], expected=f"{_COLUMNS} (or m, inch)")
 
 
-def _how(file: Path, line: int, cells: list[str], defaults: Defaults, *, first: bool) -> tuple[SegmentKind, float]:
+def _kind_and_feed(
+    file: Path, line: int, cells: list[str], defaults: Defaults, *, first: bool
+) -> tuple[SegmentKind, float]:
     """Return kind and feed, mm/min, of the move to a row."""
     word, text = cells if cells else (SegmentKind.CUT.value, "")
     if first and word == _START:
@@ -92,10 +93,10 @@ def _how(file: Path, line: int, cells: list[str], defaults: Defaults, *, first: 
 
 def _write(toolpath: Toolpath) -> bytes:
     tips, axes, kinds, feeds = poses(toolpath)
-    dwells = stands(toolpath)
+    dwells = dwell_times(toolpath)
     powers = [toolpath.segments[k].power for k in toolpath.segment_of_interval]
     lines = [
-        f"# {_MAGIC} = 1",
+        "# pentapod_toolpath = 1",
         f"# tilt_centre_mm = {1e3 * toolpath.tilt_centre!r}",
         f"# waypoints = {len(tips)}",
         _COLUMNS,
@@ -110,4 +111,4 @@ def _write(toolpath: Toolpath) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-CSV = register(Format("csv", (".csv",), "one waypoint a row, units in the column names", _read, _write))
+register(Format("csv", (".csv",), "one waypoint a row, units in the column names", _read, _write))

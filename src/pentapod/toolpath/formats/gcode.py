@@ -1,12 +1,11 @@
 """Five-axis G-code with tool centre point programming: XYZAB and XYZBC (see `rotary`).
 
-Coordinates are those of the tip in the workpiece. LinuxCNC's pentakins works that way from the start; controllers of
-XYZBC machines need G43.4, which the reader insists on before the first move. G0 is a rapid, G1 a cut, or a link after
-a comment "(pentapod link)". G4 stops at the last point: P tells LinuxCNC seconds and other controllers whole
-milliseconds, X and U tell those seconds; of no time it is an exact stop, and so is every point in the mode G61.1 (G61
-of other controllers) and the end of a block with G9. Understood are G90 G91 G20 G21 G93 G94 and modal words; arcs,
-cycles, cutter compensation, coordinate systems other than G54 to G59, and expressions are errors: what is not
-understood is not guessed.
+Coordinates are those of the tip in the workpiece frame. LinuxCNC's pentakins always works that way; controllers of
+XYZBC machines need G43.4, which the reader requires before the first move. G0 is a rapid, G1 a cut, or a link after a
+comment "(pentapod link)". G4 is a dwell at the last point: P in seconds for LinuxCNC and in whole milliseconds for
+other controllers, X and U in seconds for these. A dwell of no time is an exact stop; so is every point in mode G61.1
+(G61 of other controllers) and the end of a block with G9. G90 G91 G20 G21 G93 G94 and modal words are read; arcs,
+cycles, cutter compensation, coordinate systems other than G54 to G59, and expressions are errors.
 """
 
 from __future__ import annotations
@@ -19,10 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.toolpath.formats.moves import plain, poses, stands
-from pentapod.toolpath.formats.reading import read_lines
+from pentapod.toolpath.formats.moves import dwell_times, kind_remark, plain, poses, tilt_centre_remark
+from pentapod.toolpath.formats.reading import StatementReader, read_lines
 from pentapod.toolpath.formats.registry import Defaults, Format, register
-from pentapod.toolpath.formats.remarks import StatementReader, kind_remark, tilt_centre_remark
 from pentapod.toolpath.formats.rotary import AB, BC, Rotary
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
@@ -56,10 +54,10 @@ class _Reader(StatementReader):
         lines = read_lines(self.file)
         for line, text in enumerate(lines, start=1):
             for comment in _COMMENT.finditer(text):
-                self.remarks.read(comment[1] or comment[2] or "", line)
+                self.read_remark(comment[1] or comment[2] or "", line)
             block = _COMMENT.sub("", text).strip()
             if not block.isascii():
-                # Some letters of other scripts become letters of commands as capitals.
+                # Capitals of some letters of other scripts are letters of commands.
                 letter = next(letter for letter in block if not letter.isascii())
                 raise self.wrong("a letter or digit that G-code does not have", line, letter)
             block = block.upper()
@@ -96,7 +94,7 @@ class _Reader(StatementReader):
         if _DWELL in words:
             self._dwell(words, line)
             return
-        # A block's modes hold for the block itself, wherever in it they stand.
+        # The modes of a block apply to the whole block, wherever in it they are.
         for letter, value in words:
             if letter == "G" and (letter, value) != _STOP:
                 self._mode(value, line)
@@ -115,10 +113,10 @@ class _Reader(StatementReader):
         if values:
             self._move(values, line, own_feed=any(letter == "F" for letter, _ in words))
             if self.stopping or _STOP in words:
-                self.moves.stand(0.0)
+                self.moves.add_dwell(0.0)
 
     def _dwell(self, words: list[tuple[str, float]], line: int) -> None:
-        """Stand at the last point, by a block of G4."""
+        """Add the dwell of a G4 block."""
         times = [(letter, value) for letter, value in words if (letter, value) != _DWELL and letter != "N"]
         letters = ("P", "X", "U") if self.needs_tcp else ("P",)
         if len(times) != 1 or times[0][0] not in letters or times[0][1] < 0.0:
@@ -127,7 +125,7 @@ class _Reader(StatementReader):
         milliseconds = self.needs_tcp and letter == "P"
         if milliseconds and value != int(value):
             raise self.wrong("seconds or milliseconds?", line, f"P{value:g}", remedy=f"write G4 X{value:g} for seconds")
-        self.moves.stand(1e-3 * value if milliseconds else value)
+        self.moves.add_dwell(1e-3 * value if milliseconds else value)
 
     def _mode(self, code: float, line: int) -> None:
         word = f"G{code:g}"
@@ -175,7 +173,7 @@ class _Reader(StatementReader):
         tip = [self.place[letter] for letter in _LINEAR]
         axis = self.rotary.axis(np.array([self.place[letter] for letter in self.rotary.words]))
         feed = math.inf if self.motion == 0.0 else self._feed(tip, line, own_feed=own_feed)
-        kind = SegmentKind.RAPID if self.motion == 0.0 else self.remarks.kind
+        kind = SegmentKind.RAPID if self.motion == 0.0 else self.kind
         self.moves.add(tip, axis.tolist(), kind, feed, line, first)
 
     def _feed(self, tip: list[float], line: int, *, own_feed: bool) -> float:
@@ -186,7 +184,7 @@ class _Reader(StatementReader):
             length = math.dist(tip, self.moves.tips[-1]) if self.moves.tips else 0.0
             if length > 0.0:
                 return length * self.feed
-            # A turn on the spot: its time is not a speed of the tip; the last speed is as good as any.
+            # A rotation about the tip has no tip speed; it keeps the last feed.
             return next((f for f in reversed(self.moves.feeds) if math.isfinite(f)), self.feed)
         if self.feed is None:
             if self.defaults.feed is None:
@@ -199,9 +197,9 @@ def _read(file: Path, defaults: Defaults, rotary: Rotary, *, needs_tcp: bool) ->
     return _Reader(file, defaults, rotary, needs_tcp).toolpath()
 
 
-def _write(toolpath: Toolpath, rotary: Rotary, *, needs_tcp: bool, inverse_time: bool = False) -> bytes:
+def _write(toolpath: Toolpath, rotary: Rotary, *, needs_tcp: bool, inverse_time: bool) -> bytes:
     tips, axes, kinds, feeds = poses(toolpath)
-    dwells = stands(toolpath)
+    dwells = dwell_times(toolpath)
     angles = rotary.angles(axes)
     lines = ["%", f"({tilt_centre_remark(toolpath.tilt_centre)})", f"G21 G90 G{93 if inverse_time else 94}"]
     lines += ["G43.4 H1"] if needs_tcp else []
@@ -230,21 +228,13 @@ def _write(toolpath: Toolpath, rotary: Rotary, *, needs_tcp: bool, inverse_time:
     return ("\n".join([*lines, "M2", "%"]) + "\n").encode()
 
 
-def _variant(name: str, suffixes: tuple[str, ...], about: str, rotary: Rotary, *, tcp: bool, inverse: bool) -> Format:
+def _variant(name: str, suffixes: tuple[str, ...], about: str, rotary: Rotary, *, tcp: bool, inverse: bool) -> None:
     read = partial(_read, rotary=rotary, needs_tcp=tcp)
-    return register(
-        Format(
-            name,
-            suffixes,
-            about,
-            read,
-            partial(_write, rotary=rotary, needs_tcp=tcp, inverse_time=inverse),
-            loses=frozenset({"power"}),
-        )
-    )
+    write = partial(_write, rotary=rotary, needs_tcp=tcp, inverse_time=inverse)
+    register(Format(name, suffixes, about, read, write, loses=frozenset({"power"})))
 
 
-XYZAB = _variant("xyzab", (".ngc",), "G-code XYZAB, LinuxCNC pentakins", AB, tcp=False, inverse=False)
-XYZAB_TIME = _variant("xyzab-g93", (), "the same, inverse time feed", AB, tcp=False, inverse=True)
-XYZBC = _variant("xyzbc", (".nc", ".tap"), "G-code XYZBC with G43.4", BC, tcp=True, inverse=False)
-XYZBC_TIME = _variant("xyzbc-g93", (), "the same, inverse time feed", BC, tcp=True, inverse=True)
+_variant("xyzab", (".ngc",), "G-code XYZAB, LinuxCNC pentakins", AB, tcp=False, inverse=False)
+_variant("xyzab-g93", (), "the same, inverse time feed", AB, tcp=False, inverse=True)
+_variant("xyzbc", (".nc", ".tap"), "G-code XYZBC with G43.4", BC, tcp=True, inverse=False)
+_variant("xyzbc-g93", (), "the same, inverse time feed", BC, tcp=True, inverse=True)

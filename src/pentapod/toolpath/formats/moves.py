@@ -1,4 +1,4 @@
-"""Moves: the poses of a toolpath file in their order, with feed and kind of motion."""
+"""Moves: the poses of a toolpath file in order, as readers collect them and as writers need them."""
 
 from __future__ import annotations
 
@@ -14,17 +14,22 @@ from pentapod.base.errors import ToolpathError
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 AXIS_TOLERANCE = 1e-4
-"""How far an axis in a file may be from unit length: room for four decimals."""
+"""Deviation from unit length that a tool axis in a file may have: enough for four decimals."""
 
-_SAME_FEED = 1e-6
+SAME_FEED = 1e-6
+"""Relative difference up to which two feeds are equal."""
+
+REMARK, TILT_CENTRE_REMARK = "pentapod ", "tilt_centre_mm"
+KIND_REMARKS = (SegmentKind.CUT, SegmentKind.LINK)
+"""Comments by which files keep what their language has no word for: kinds of moves, and the tilt centre."""
 
 
 @dataclass
 class Moves:
-    """Poses in the order of a file, gathered by a reader. Millimetres, mm/min; a rapid's feed is infinite.
+    """Poses in the order of a file. Millimetres, mm/min; a rapid's feed is infinite.
 
-    Each pose has the kind, feed and power of the move that leads to it; those of the first are of no account. dwells:
-    seconds for which the tool stands at each pose, None where it does not stop; wait: before the first pose is known.
+    Each pose has the kind, feed and power of the move that leads to it; those of the first are not used. dwells:
+    seconds of dwell at each pose, None where the tool does not stop; wait: seconds before the first pose.
     """
 
     file: Path
@@ -46,7 +51,7 @@ class Moves:
         word: str,
         power: float = 1.0,
     ) -> None:
-        """Add a pose. Raises ToolpathError where the axis has not unit length."""
+        """Add a pose. Raises ToolpathError where the axis is not of unit length."""
         length = float(np.linalg.norm(axis))
         if abs(length - 1.0) > AXIS_TOLERANCE:
             raise ToolpathError(
@@ -60,17 +65,17 @@ class Moves:
         self.powers.append(power)
         self.dwells.append(None)
 
-    def stand(self, seconds: float) -> None:
-        """Stop exactly at the last pose, and stand there."""
+    def add_dwell(self, seconds: float) -> None:
+        """Add an exact stop and a dwell at the last pose."""
         if self.dwells:
             self.dwells[-1] = (self.dwells[-1] or 0.0) + seconds
         else:
             self.wait += seconds
 
     def toolpath(self, tilt_centre: float) -> Toolpath:
-        """Return the toolpath: neighbours of one kind, feed and power make a segment; poses that repeat are left out.
+        """Return the toolpath: consecutive moves of equal kind, feed and power are a segment; repeated poses go.
 
-        Where the tool stands a segment ends. tilt_centre: metres. Raises ToolpathError for fewer than two poses.
+        A dwell ends a segment. tilt_centre: metres. Raises ToolpathError for fewer than two poses.
         """
         tips, axes = np.array(self.tips).reshape(-1, 3) * 1e-3, np.array(self.axes).reshape(-1, 3)
         moved = np.ones(len(tips), dtype=np.bool_)
@@ -83,7 +88,7 @@ class Moves:
         dwells = self._dwells(np.cumsum(moved) - 1, len(rows))
         breaks = [1]
         for k in range(2, len(rows)):
-            same_feed = feeds[k] == feeds[k - 1] or abs(feeds[k] - feeds[k - 1]) <= _SAME_FEED * feeds[k - 1]
+            same_feed = feeds[k] == feeds[k - 1] or abs(feeds[k] - feeds[k - 1]) <= SAME_FEED * feeds[k - 1]
             same = kinds[k] == kinds[k - 1] and same_feed and powers[k] == powers[k - 1]
             if not same or dwells[k - 1] is not None:
                 breaks.append(k)
@@ -96,7 +101,7 @@ class Moves:
         return Toolpath(tuple(segments), tilt_centre, self.wait + (dwells[0] or 0.0))
 
     def _dwells(self, owner: Ints, count: int) -> list[float | None]:
-        """Return the dwells of the poses that stay; owner: for each pose the one that it repeats, or itself."""
+        """Return the dwells of the `count` poses that are kept. owner: the kept pose that each pose repeats, or is."""
         dwells: list[float | None] = [None] * count
         for pose, seconds in zip(owner.tolist(), self.dwells, strict=True):
             if seconds is not None:
@@ -112,8 +117,8 @@ def poses(toolpath: Toolpath) -> tuple[Floats, Floats, list[SegmentKind], Floats
     return toolpath.tips * 1e3, toolpath.axes, kinds, feeds
 
 
-def stands(toolpath: Toolpath) -> dict[int, float]:
-    """Return the seconds for which the tool stands at waypoints where it stops, by the waypoints' indices."""
+def dwell_times(toolpath: Toolpath) -> dict[int, float]:
+    """Return the seconds of dwell at each waypoint where the tool stops, by the waypoint's index."""
     return {int(at): s for at, s in zip(toolpath.starts, toolpath.dwells, strict=True) if s is not None}
 
 
@@ -122,3 +127,13 @@ def plain(value: float, digits: int) -> str:
     text = f"{value:.{digits}f}".rstrip("0")
     text = text + "0" if text.endswith(".") else text
     return "0.0" if text == "-0.0" else text
+
+
+def kind_remark(kind: SegmentKind) -> str:
+    """Return the comment before feed moves of a kind."""
+    return f"{REMARK}{kind}"
+
+
+def tilt_centre_remark(tilt_centre: float) -> str:
+    """Return the comment with the tilt centre, given in metres."""
+    return f"{REMARK}{TILT_CENTRE_REMARK} {1e3 * tilt_centre!r}"

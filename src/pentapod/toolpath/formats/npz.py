@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 from pentapod.base.archives import check_array, read_arrays
 from pentapod.base.errors import InputError, ToolpathError
 from pentapod.base.files import packed_arrays
-from pentapod.toolpath.formats.reading import check_head
 from pentapod.toolpath.formats.registry import Defaults, Format, register
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
@@ -27,13 +27,13 @@ _FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
     "segment_powers": ("fi", (None,)),
     "dwells_s": ("fi", (None,)),
 }
-"""Kinds of numbers, as NumPy names them, and shapes."""
+"""Kinds of numbers, as NumPy names them, and shape of each array."""
 
 
 def toolpath_arrays(toolpath: Toolpath) -> dict[str, NDArray[Any]]:
     """Return the arrays of a toolpath, workpiece frame; a segment's first waypoint is its start.
 
-    dwells_s (S + 1,): standing at the first waypoint of each segment, and at the end; NaN where it does not stop.
+    dwells_s (S + 1,): dwell at the first waypoint of each segment, and at the end; NaN where the tool does not stop.
     """
     values = (
         toolpath.tips * _MM,
@@ -50,7 +50,9 @@ def toolpath_arrays(toolpath: Toolpath) -> dict[str, NDArray[Any]]:
 
 def _read(file: Path, defaults: Defaults) -> Toolpath:
     del defaults
-    check_head(file)
+    # The end of the file alone shows whether it is an archive, before all of it is read.
+    if file.is_file() and not zipfile.is_zipfile(file):
+        raise ToolpathError("not a NumPy archive, or cut off", file=file, expected="an .npz file")
     found = read_arrays(file, [f"toolpath.{name}" for name in _FORMS], ToolpathError)
     arrays = {name: found[f"toolpath.{name}"] for name in _FORMS}
     for name, values in arrays.items():
@@ -82,4 +84,4 @@ def _write(toolpath: Toolpath) -> bytes:
     return packed_arrays(toolpath_arrays(toolpath))
 
 
-NPZ = register(Format("npz", (".npz",), "NumPy archive", _read, _write))
+register(Format("npz", (".npz",), "NumPy archive", _read, _write))

@@ -1,31 +1,33 @@
-"""Shared parts of the readers of toolpath text: numbered lines, numbers with their words, guards against non-text."""
+"""Shared parts of the readers of toolpath text: lines, numbers, and statements with the remarks between them."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from pentapod.base.errors import ToolpathError
 from pentapod.base.files import number_in, read_bytes
+from pentapod.toolpath.formats.moves import KIND_REMARKS, REMARK, TILT_CENTRE_REMARK, Moves
+from pentapod.toolpath.formats.registry import Defaults
+from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 MOST_BYTES = 500_000_000
-"""A toolpath of ten million waypoints is smaller."""
-
-_HEAD = 4096
+"""Largest file that is read; ten million waypoints need less."""
 
 
-def read_lines(file: Path) -> list[str]:
-    """Return the lines of a UTF-8 text file. Raises ToolpathError: missing, empty, too large, not text, cut short.
+def read_lines(file: Path, what: str = "a toolpath", most: int = MOST_BYTES) -> list[str]:
+    """Return the lines of a UTF-8 text file. Raises ToolpathError: missing, empty, too large, not text, truncated.
 
-    The size and the first bytes are looked at before anything else is read. A last line without its end is taken
-    for the sign of a truncated file.
+    what: the kind of file, for messages; most: bytes. A last line without its end counts as truncated.
     """
-    check_head(file)
-    data = read_bytes(file, ToolpathError, "a toolpath", MOST_BYTES)
-    if not data.strip():
-        raise ToolpathError("the file is empty", file=file, expected="a toolpath")
+    data = read_bytes(file, ToolpathError, what, most)
+    if not data.strip(b" \t\r\n\0"):
+        raise ToolpathError("the file is empty", file=file, expected=what)
     if b"\0" in data:
+        wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+        problem = "not UTF-8 text but UTF-16" if wide else "not a text file: it holds zero bytes"
         line = data.count(b"\n", 0, data.index(b"\0")) + 1
-        raise ToolpathError("not a text file: it holds zero bytes", file=file, line=line, remedy="save it as UTF-8")
+        raise ToolpathError(problem, file=file, line=line, remedy="save it as UTF-8")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -43,30 +45,12 @@ def read_lines(file: Path) -> list[str]:
     return lines
 
 
-def check_head(file: Path) -> bytes:
-    """Return the first bytes of a file. Raises ToolpathError: not there, a folder, empty, too large, binary."""
-    try:
-        size = file.stat().st_size
-        with file.open("rb") as stream:
-            head = stream.read(_HEAD)
-    except FileNotFoundError as error:
-        raise ToolpathError("no such file", file=file, expected="a toolpath file") from error
-    except OSError as error:
-        raise ToolpathError(f"cannot be read: {(error.strerror or str(error)).lower()}", file=file) from error
-    if not head.strip():
-        raise ToolpathError("the file is empty", file=file, expected="a toolpath")
-    if size > MOST_BYTES:
-        raise ToolpathError(
-            "the file is too large",
-            file=file,
-            value=f"{size / 1e6:.0f} MB",
-            expected=f"at most {MOST_BYTES / 1e6:.0f} MB",
-        )
-    if b"\0" in head and not head.startswith(b"PK"):
-        wide = head.startswith((b"\xff\xfe", b"\xfe\xff"))
-        what = "not UTF-8 text but UTF-16" if wide else "not a text file: it holds zero bytes"
-        raise ToolpathError(what, file=file, line=1, remedy="save it as UTF-8")
-    return head
+def number(text: str, file: Path, line: int, word: str) -> float:
+    """Return a finite number. Raises ToolpathError naming the word."""
+    value = number_in(text)
+    if value is None:
+        raise ToolpathError("not a finite number", file=file, line=line, key=word, value=text.strip()[:40])
+    return value
 
 
 def seconds(text: str, file: Path, line: int, word: str) -> float:
@@ -77,9 +61,37 @@ def seconds(text: str, file: Path, line: int, word: str) -> float:
     return value
 
 
-def number(text: str, file: Path, line: int, word: str) -> float:
-    """Return a finite number. Raises ToolpathError naming the word."""
-    value = number_in(text)
-    if value is None:
-        raise ToolpathError("not a finite number", file=file, line=line, key=word, value=text.strip()[:40])
-    return value
+@dataclass
+class StatementReader:
+    """Base of the readers of APT and G-code: the moves of a file so far, and what its remarks say.
+
+    kind: of the feed moves from here on; tilt_centre: metres, or None where the file does not give it.
+    """
+
+    file: Path
+    defaults: Defaults
+    moves: Moves = field(init=False)
+    kind: SegmentKind = field(default=SegmentKind.CUT, init=False)
+    tilt_centre: float | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        self.moves = Moves(self.file)
+
+    def read_remark(self, comment: str, line: int) -> None:
+        """Evaluate a comment that pentapod wrote; ignore others. Raises ToolpathError where its number is wrong."""
+        text = comment.strip()
+        if not text.startswith(REMARK):
+            return
+        name, _, value = text.removeprefix(REMARK).partition(" ")
+        if name in KIND_REMARKS:
+            self.kind = SegmentKind(name)
+        elif name in {TILT_CENTRE_REMARK, "pivot_mm"}:  # the second is the name in files of earlier versions
+            self.tilt_centre = 1e-3 * number(value, self.file, line, name)
+
+    def wrong(self, what: str, line: int, word: str, **details: object) -> ToolpathError:
+        """Return the error of a word in a line."""
+        return ToolpathError(what, file=self.file, line=line, key=word, **details)  # type: ignore[arg-type]
+
+    def gathered(self) -> Toolpath:
+        """Return the toolpath of all moves."""
+        return self.moves.toolpath(self.defaults.tilt_centre if self.tilt_centre is None else self.tilt_centre)

@@ -1,4 +1,4 @@
-"""Registry of toolpath formats; reading and writing by a file's suffix."""
+"""Registry of toolpath formats; toolpath files are read and written by their suffix."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pentapod.toolpath.toolpath import Toolpath
 
 @dataclass(frozen=True)
 class Defaults:
-    """What a reader takes where its format has no place for it: tilt_centre in metres, feed in m/s."""
+    """Values for what a file does not give: tilt_centre in metres, feed in m/s."""
 
     tilt_centre: float = 0.0
     feed: float | None = None
@@ -22,7 +22,7 @@ class Defaults:
 
 @dataclass(frozen=True)
 class Format(Value):
-    """A file format. suffixes: those that mean it, lower case. loses: what a file of it cannot tell.
+    """A file format. suffixes: lower case. loses: properties of a toolpath that it has no words for.
 
     read: file → Toolpath, in metres, workpiece frame; raises ToolpathError with file, line and word.
     write: Toolpath → bytes; the same toolpath gives the same bytes.
@@ -39,14 +39,13 @@ class Format(Value):
 FORMATS: dict[str, Format] = {}
 
 
-def register(new: Format) -> Format:
-    """Add a format to `FORMATS` and return it."""
+def register(new: Format) -> None:
+    """Add a format to `FORMATS`."""
     FORMATS[new.name] = new
-    return new
 
 
 def format_of(path: str | Path, name: str | None = None) -> Format:
-    """Return the format of this name, or the one that the file's suffix means. Raises ToolpathError."""
+    """Return the format of this name, or else of the file's suffix. Raises ToolpathError for unknown ones."""
     file = Path(path)
     if name is not None:
         if name not in FORMATS:
@@ -62,21 +61,20 @@ def format_of(path: str | Path, name: str | None = None) -> Format:
 def read_toolpath(
     path: str | Path, format_name: str | None = None, *, tilt_centre: float = 0.0, feed: float | None = None
 ) -> Toolpath:
-    """Return the toolpath of a file, workpiece frame, metres. The suffix tells the format where no name is given.
+    """Return the toolpath of a file, workpiece frame, metres. Without a name the suffix decides on the format.
 
-    tilt_centre: metres, for formats that do not carry it (see `Toolpath`); feed: m/s, of moves to which the file gives
-    none. Raises ToolpathError, one line with file, line and word, for whatever is not understood: nothing is guessed,
-    and there are no partial results.
+    tilt_centre: metres, for formats without it (see `Toolpath`); feed: m/s, of moves without one. Raises ToolpathError
+    with file, line and word for anything that is not understood: nothing is guessed or left out.
     """
     file = Path(path)
     return format_of(file, format_name).read(file, Defaults(tilt_centre, feed))
 
 
 def write_toolpath(toolpath: Toolpath, path: str | Path, format_name: str | None = None) -> Path:
-    """Write a toolpath and return its path. The suffix tells the format where no name is given.
+    """Write a toolpath and return its path. Without a name the suffix decides on the format.
 
-    Same toolpath, same bytes; an interruption leaves no half file. Raises ToolpathError for an unknown format,
-    InputError where the file cannot be written.
+    Equal toolpaths give equal bytes; an interruption leaves no partial file. Raises ToolpathError for an unknown
+    format, InputError where the file cannot be written.
     """
     file = Path(path)
     content = format_of(file, format_name).write(toolpath)

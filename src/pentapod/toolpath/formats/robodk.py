@@ -1,7 +1,7 @@
-"""RoboDK's CSV of points with normals: X,Y,Z,NX,NY,NZ[,speed] in mm and mm/s, with or without names atop.
+"""RoboDK CSV of points with normals: X,Y,Z,NX,NY,NZ[,speed] in mm and mm/s, with or without a header row.
 
-N points from the tip to the spindle. A row's speed is that of the move to it; a rapid's is left empty, which
-RoboDK takes as the robot's own. The format cannot tell links from cuts, and carries no tilt centre.
+The normal points from the tip to the spindle. A row's speed is that of the move to it, empty for a rapid: RoboDK then
+uses the robot's own. The format does not distinguish links from cuts and has no tilt centre.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def _write(toolpath: Toolpath) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-ROBODK = register(
+register(
     Format(
         "robodk",
         (".robodk.csv",),

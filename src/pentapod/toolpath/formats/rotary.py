@@ -2,8 +2,8 @@
 
 XYZAB, as LinuxCNC's pentakins and other machines with A and B heads have it: R = Ry(B) Rx(A), so that the axis from the
 tip to the spindle is (cos A sin B, −sin A, cos A cos B). XYZBC: R = Rz(C) Ry(B), (sin B cos C, sin B sin C, cos B).
-Angles are chosen next to those of the pose before, so that no axis jumps by a turn; where the axis is a pole (B = 0 of
-XYZBC, A = ±90° of XYZAB) the free angle stays where it was.
+Angles are the nearest to those of the pose before, so that no rotary axis jumps by a turn. Where the tool axis is at a
+pole (B = 0 of XYZBC, A = ±90° of XYZAB) the undefined angle keeps its last value.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 
-_POLE = 1e-9
+POLE = 1e-9
+"""Sine of the angle from a pole up to which the other rotary angle is undefined."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,8 @@ def _angles_bc(axes: Floats) -> Floats:
 
 
 def _continued(angle: Floats, level: Floats) -> Floats:
-    """Return angles (N,) without jumps by a turn; where `level` says that they mean nothing, the one before."""
-    known = np.flatnonzero(level > _POLE)
+    """Return angles (N,) without jumps by a turn; where `level` (N,) is almost 0, the one before."""
+    known = np.flatnonzero(level > POLE)
     if not len(known):
         return np.zeros_like(angle)
     last = known[np.clip(np.searchsorted(known, np.arange(len(angle)), side="right") - 1, 0, None)]

@@ -1,4 +1,4 @@
-"""Readers of flat drawings by a file's suffix: SVG and DXF."""
+"""Drawings, SVG or DXF by the file's suffix, as polylines."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from pentapod.toolpath.inputs.svg import svg_lines
 
 
 def read_lines(path: str | Path, tolerance: float) -> list[Floats]:
-    """Return the lines (n, 2), metres, y up, of an .svg or .dxf file; curves leave their chords by `tolerance`.
+    """Return the polylines (n, 2), metres, y up, of an .svg or .dxf file; chords deviate from curves by `tolerance`.
 
-    Raises ToolpathError, naming the file, for what is no such file, holds no line, or has no unit.
+    Raises ToolpathError with the file: missing, of another kind, without a line or a unit.
     """
     path = Path(path)
     readers: dict[str, Callable[[Path, bytes, float], list[Floats]]] = {".svg": svg_lines, ".dxf": dxf_lines}

@@ -1,4 +1,4 @@
-"""Single-stroke lettering, with the font that ships with the package."""
+"""Text in a single-stroke font that is part of the package."""
 
 from __future__ import annotations
 
@@ -15,22 +15,25 @@ CAPITAL = 10.0
 """Height of capitals in the font's own units."""
 
 LINE_SPACING = 16.0
-_DEGREES_PER_CHORD = 6.0
+"""Distance of lines of text, in the font's own units."""
+
+CHORD_DEG = 6.0
+"""Angle of an arc's chords."""
 
 
 @dataclass(frozen=True, eq=False)
 class Glyph:
-    """A character as strokes. advance: to the next character. strokes: each (n, 2), in the font's units."""
+    """Strokes of a character, each (n, 2), and the advance to the next character, in the font's units."""
 
     advance: float
     strokes: tuple[Floats, ...]
 
 
 def lettering(text: str, height: float, *, spacing: float = 1.0, align: str = "centre") -> list[Floats]:
-    """Return the strokes (n, 2) of a text with capitals of a height, metres, in reading order.
+    """Return the strokes (n, 2), metres, in reading order, of a text with capitals of `height` metres.
 
-    Lines are parted by line feeds; the block's middle is the origin. spacing: factor on the advance of characters.
-    align: left, centre or right. Raises ToolpathError for a character that the font does not have, and for no text.
+    Line feeds separate lines; the origin is the middle of the text block. spacing: factor on the characters' widths.
+    align: left, centre or right. Raises ToolpathError for no text, and for a character that the font does not have.
     """
     if not text.strip():
         raise ToolpathError("there is no text", key="text", value=text)
@@ -50,23 +53,17 @@ def lettering(text: str, height: float, *, spacing: float = 1.0, align: str = "c
     return [stroke * (height / CAPITAL) for stroke in strokes]
 
 
-def characters() -> str:
-    """Return all characters that the font has."""
-    return "".join(stroke_font())
-
-
 def _glyph(character: str) -> Glyph:
     glyph = stroke_font().get(character)
     if glyph is None:
-        raise ToolpathError(
-            "the font has no such character", key="text", value=character, expected=f"one of {characters()!r}"
-        )
+        known = "".join(stroke_font())
+        raise ToolpathError("the font has no such character", key="text", value=character, expected=f"one of {known!r}")
     return glyph
 
 
 @cache
 def stroke_font() -> dict[str, Glyph]:
-    """Return the glyphs of the font's file: see its head for the notation."""
+    """Return the glyphs of the font file, whose first lines explain the notation."""
     text = files("pentapod.toolpath.inputs.fonts").joinpath("strokes.txt").read_text(encoding="utf-8")
     glyphs: dict[str, Glyph] = {}
     for line in text.splitlines():
@@ -80,18 +77,18 @@ def stroke_font() -> dict[str, Glyph]:
 
 
 def _stroke(text: str) -> Floats:
-    """Return the points (n, 2) of a stroke: points as they are, arcs in chords of a few degrees."""
+    """Return the points (n, 2) of a stroke, with arcs as chords."""
     parts: list[Floats] = []
     for word in text.split():
         if word.startswith("("):
             cx, cy, rx, ry, first, last = (float(number) for number in word.strip("()").split(","))
-            count = max(2, round(abs(last - first) / _DEGREES_PER_CHORD))
+            count = max(2, round(abs(last - first) / CHORD_DEG))
             angle = np.radians(np.linspace(first, last, count + 1))
             parts.append(np.stack([cx + rx * np.cos(angle), cy + ry * np.sin(angle)], axis=1))
         else:
             x, y = word.split(",")
             parts.append(np.array([[float(x), float(y)]]))
     points = np.concatenate(parts)
-    # Where an arc begins at the point before it, the point is there once.
+    # An arc may begin at the point before it.
     apart = np.abs(np.diff(points, axis=0)).max(axis=1) > 1e-9
     return points[np.concatenate([[True], apart])]

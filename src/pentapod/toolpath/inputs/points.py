@@ -1,4 +1,4 @@
-"""Reader of polylines as points of a CSV file."""
+"""Polylines from the points of a CSV file."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError, nearest
-from pentapod.toolpath.formats.reading import number
-from pentapod.toolpath.inputs.files import small_file
+from pentapod.toolpath.formats.reading import number, read_lines
+from pentapod.toolpath.inputs.files import LIMITS
 
-_TOLD = re.compile(r"#\s*points\s*=\s*([0-9]{1,12})")
+_COUNT_REMARK = re.compile(r"#\s*points\s*=\s*([0-9]{1,12})")
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 25.4e-3}
 
@@ -22,28 +22,17 @@ UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 25.4e-3}
 def read_points(path: str | Path) -> list[Floats]:
     """Return the polylines (n, 3), metres, of a CSV file.
 
-    The first row names the columns with their unit: x_mm, y_mm, z_mm (or cm, m, inch), and perhaps `line`, whose value
-    changes where a new polyline begins; so does an empty row. Lines that begin with # are remarks; one that says
-    "# points = 120" tells how many rows there must be, so that a file that was cut off shows. Raises ToolpathError with
-    file and line.
+    The first row names the columns with their unit: x_mm, y_mm, z_mm (or cm, m, inch), and optionally `line`. A new
+    polyline begins where the value of `line` changes, and after an empty row. Lines that begin with # are remarks; with
+    "# points = 120" a file of another number of rows is refused. Raises ToolpathError with file and line.
     """
     path = Path(path)
-    try:
-        text = small_file(path).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ToolpathError("not a text file in UTF-8", file=path, expected="a CSV file") from error
-    if "\0" in text:
-        raise ToolpathError("not a text file", file=path, expected="a CSV file")
-    if not text.endswith("\n"):
-        what = "the last line has no end: the file was cut off"
-        remedy = "export it again, or end the last line"
-        raise ToolpathError(what, file=path, line=text.count("\n") + 1, remedy=remedy)
     columns: dict[str, tuple[int, float]] | None = None
     lines: list[list[list[float]]] = [[]]
-    name, told = "", None
-    for line, row in _rows(path, text):
+    name, announced = "", None
+    for line, row in _rows(path, read_lines(path, "a CSV file of points", LIMITS.file_bytes)):
         if row and row[0].lstrip().startswith("#"):
-            told = _TOLD.fullmatch(row[0].strip()) or told
+            announced = _COUNT_REMARK.fullmatch(row[0].strip()) or announced
             continue
         if not any(cell.strip() for cell in row):
             lines.append([])
@@ -59,9 +48,9 @@ def read_points(path: str | Path) -> list[Floats]:
             lines.append([])
         lines[-1].append([number(row[columns[axis][0]], path, line, axis) * columns[axis][1] for axis in "xyz"])
     count = sum(map(len, lines))
-    if told is not None and int(told[1]) != count:
+    if announced is not None and int(announced[1]) != count:
         what = "the number of rows is not that of the remark: the file was cut off or rows were added"
-        raise ToolpathError(what, file=path, key="points", value=count, expected=told[1])
+        raise ToolpathError(what, file=path, key="points", value=count, expected=announced[1])
     found = [np.array(line) for line in lines if len(line) > 1]
     if not found:
         raise ToolpathError("the file holds no polyline", file=path, expected="at least two rows of numbers in a line")
@@ -69,7 +58,7 @@ def read_points(path: str | Path) -> list[Floats]:
 
 
 def _columns(path: Path, number: int, row: list[str]) -> dict[str, tuple[int, float]]:
-    """Return the place and the unit of each column, by what it is. Raises ToolpathError for unknown or missing ones."""
+    """Return the index and the unit of each column by its quantity. Raises ToolpathError: unknown, missing or twice."""
     known = [f"{axis}_{unit}" for axis in "xyz" for unit in UNITS] + ["line"]
     columns: dict[str, tuple[int, float]] = {}
     for place, cell in enumerate(row):
@@ -87,9 +76,9 @@ def _columns(path: Path, number: int, row: list[str]) -> dict[str, tuple[int, fl
     return columns
 
 
-def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the cells of each line, with its number. Raises ToolpathError for what is no CSV."""
-    reader = csv.reader(text.split("\n")[:-1], strict=True)
+def _rows(path: Path, lines: list[str]) -> Iterator[tuple[int, list[str]]]:
+    """Yield the cells of each line, with its number. Raises ToolpathError where it is no row of a CSV file."""
+    reader = csv.reader(lines, strict=True)
     try:
         for row in reader:
             yield reader.line_num, row

@@ -1,4 +1,4 @@
-"""Reader of SVG drawings: lines, with curves as chords within a tolerance; their number is bounded first."""
+"""SVG drawings: shapes as polylines, read with svgelements, after a check of how much the file unfolds to."""
 
 from __future__ import annotations
 
@@ -15,13 +15,9 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
-from pentapod.toolpath.inputs.files import check_points, chords, distinct, extra
+from pentapod.toolpath.inputs.files import LIMITS, check_points, chord_count, distinct, extra
 
 _PX_M = 25.4e-3 / 96.0
-_MOST_ELEMENTS, _MOST_NUMBERS = 20_000, 400_000
-"""Of a drawing with all that its <use> elements repeat: elements, and numbers and letters of commands in its paths."""
-
-_DEEPEST, _MOST_ATTRIBUTES, _MOST_TRANSFORM, _MOST_STYLE = 100, 100, 1_000, 4_000
 _HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
 _NUMBERS = re.compile(r"[0-9.]+|[A-DF-Za-df-z]")
 _COMMENT = re.compile(r"/\*.*?(?:\*/|\Z)", re.DOTALL)
@@ -29,14 +25,13 @@ _SHAPING = re.compile(r"(?:^|;)\s*(?:display|transform|d|r|rx|ry|cx|cy|x|y|width
 
 
 def svg_lines(path: Path, data: bytes, tolerance: float) -> list[Floats]:
-    """Return the lines of an SVG; 96 user units are an inch where the file says nothing else; y turned up.
+    """Return the polylines (n, 2), metres, y up, of an SVG; without another unit 96 user units are an inch.
 
-    Raises ToolpathError, before anything is unfolded, for what would take hours or all memory; and for text and
-    pictures, which would be left out.
+    Raises ToolpathError for text and pictures, and for a file that would take hours or all memory.
     """
     svg = extra("svgelements", "svgelements", path)
     try:
-        # The parser below takes what it gets of a file that was cut off.
+        # svgelements would accept a file that was cut off.
         root = ElementTree.fromstring(data.decode("utf-8"))
         _check(path, root)
         text = ElementTree.tostring(root, encoding="unicode")
@@ -57,44 +52,44 @@ def svg_lines(path: Path, data: bytes, tolerance: float) -> list[Floats]:
     except ElementTree.ParseError as error:
         what = f"not a whole SVG file: {error}".split(": line")[0]
         raise ToolpathError(what, file=path, line=error.position[0]) from error
-    except Exception as error:  # of whatever kind: what is in the file decides how the parser stumbles
+    except Exception as error:  # of any kind: the parser's exceptions depend on what is in the file
         line = getattr(error, "position", (None, None))[0]
         what = f"cannot be read as SVG: {str(error) or type(error).__name__}".splitlines()[0][:120]
         raise ToolpathError(what, file=path, line=line) from error
     return [_PX_M * line * [1.0, -1.0] for line in lines]
 
 
-def _too_much(path: Path, what: str, most: int) -> None:
-    raise ToolpathError(f"this SVG is too much: {what}", file=path, expected=f"at most {most:,}", remedy="simplify it")
+def _too_large(path: Path, what: str, most: int) -> None:
+    raise ToolpathError(f"this SVG is too large: {what}", file=path, expected=f"at most {most:,}", remedy="simplify it")
 
 
 def _check(path: Path, root: ElementTree.Element) -> None:
-    """Raise ToolpathError where a drawing unfolds to too much; leave of its styles what shapes have to do with."""
+    """Raise ToolpathError where a drawing is too large; drop rules of its styles that do not affect shapes."""
     named: dict[str, ElementTree.Element] = {}
     style = 0
     for element in root.iter():
         if isinstance(identity := element.get("id"), str):
             named[identity] = element
-        if len(element.attrib) > _MOST_ATTRIBUTES:
-            _too_much(path, "an element has too many attributes", _MOST_ATTRIBUTES)
-        if max(len(element.get(key, "")) for key in ("transform", "viewBox")) > _MOST_TRANSFORM:
-            _too_much(path, "a transform is too long", _MOST_TRANSFORM)
-        if max(len(element.get(key, "")) for key in ("style", "class", "id")) > _MOST_STYLE:
-            _too_much(path, "a style is too long", _MOST_STYLE)
+        if len(element.attrib) > LIMITS.svg_attributes:
+            _too_large(path, "an element has too many attributes", LIMITS.svg_attributes)
+        if max(len(element.get(key, "")) for key in ("transform", "viewBox")) > LIMITS.svg_transform:
+            _too_large(path, "a transform is too long", LIMITS.svg_transform)
+        if max(len(element.get(key, "")) for key in ("style", "class", "id")) > LIMITS.svg_style:
+            _too_large(path, "a style is too long", LIMITS.svg_style)
         if str(element.tag).endswith("}style") or element.tag == "style":
             element.text = _shaping(element.text or "")
             style += len(element.text)
-            if style > _MOST_STYLE:
-                _too_much(path, "its rules of style that move or hide shapes are too long", _MOST_STYLE)
+            if style > LIMITS.svg_style:
+                _too_large(path, "its rules of style that move or hide shapes are too long", LIMITS.svg_style)
     elements, numbers = _unfolded(path, root, named, {}, 0)
-    if elements > _MOST_ELEMENTS:
-        _too_much(path, f"it unfolds to {elements:,} elements", _MOST_ELEMENTS)
-    if numbers > _MOST_NUMBERS:
-        _too_much(path, f"its paths unfold to {numbers:,} numbers and commands", _MOST_NUMBERS)
+    if elements > LIMITS.svg_elements:
+        _too_large(path, f"it unfolds to {elements:,} elements", LIMITS.svg_elements)
+    if numbers > LIMITS.svg_numbers:
+        _too_large(path, f"its paths unfold to {numbers:,} numbers and commands", LIMITS.svg_numbers)
 
 
 def _check_kind(path: Path, svg: Any, element: Any) -> None:
-    """Raise ToolpathError for text and pictures: they show lines, or something like them, that are not read."""
+    """Raise ToolpathError for text and pictures, which are not read."""
     if isinstance(element, svg.Image):
         remedy = "trace or delete the picture"
     elif isinstance(element, svg.Text) and (element.text or "").strip():
@@ -108,7 +103,7 @@ def _check_kind(path: Path, svg: Any, element: Any) -> None:
 
 
 def _shaping(text: str) -> str:
-    """Return the rules of a style sheet that move or hide shapes; colours and fonts are of no account."""
+    """Return the rules of a style sheet that move or hide shapes."""
     rules: list[str] = []
     for rule in _COMMENT.sub("", text).split("}"):
         names, _, body = rule.partition("{")
@@ -124,17 +119,17 @@ def _unfolded(
     known: dict[int, tuple[int, int]],
     depth: int,
 ) -> tuple[int, int]:
-    """Return how many elements, and numbers of paths, an element is with all that is in it and that it repeats."""
+    """Return the numbers of elements, and of numbers in paths, of an element with all that it contains and repeats."""
     if id(element) in known:
         return known[id(element)]
-    if depth > _DEEPEST:
-        _too_much(path, "its elements are nested too deep, or repeat themselves", _DEEPEST)
+    if depth > LIMITS.svg_depth:
+        _too_large(path, "its elements are nested too deep, or repeat themselves", LIMITS.svg_depth)
     parts = [_unfolded(path, child, named, known, depth + 1) for child in element]
     if element.tag == "use" or str(element.tag).endswith("}use"):
         link = next((element.get(key, "") for key in reversed(_HREFS) if key in element.attrib), "")
         target = named.get(link[1:]) if link.startswith("#") else None
         if target is None:
-            what = "a <use> names nothing in this drawing"
+            what = "a <use> refers to nothing in this drawing"
             raise ToolpathError(what, file=path, key="href", value=link[:40], remedy="export it with everything in it")
         parts.append(_unfolded(path, target, named, known, depth + 1))
     own = sum(len(_NUMBERS.findall(element.get(key, ""))) for key in ("d", "points"))
@@ -143,7 +138,7 @@ def _unfolded(
 
 
 def _lines(svg: Any, segments: list[Any], tolerance: float, path: Path, points: Iterator[int]) -> list[Floats]:
-    """Return the lines of one shape, in user units. points: counts those of all shapes."""
+    """Return the polylines of one shape, in user units. points: counts those of all shapes."""
     lines: list[list[Floats]] = []
     for segment in segments:
         if isinstance(segment, svg.Move) or not lines:
@@ -160,11 +155,11 @@ def _lines(svg: Any, segments: list[Any], tolerance: float, path: Path, points: 
             continue
         corners = _corners(svg, segment)
         if corners is None:
-            cut = chords(segment.npoint, tolerance)
+            cut = chord_count(segment.npoint, tolerance)
             lines[-1].append(segment.npoint(np.linspace(0.0, 1.0, cut + 1)[1:]))
         else:
-            cut = chords(lambda t, c=corners: _shares(len(c) - 1, len(t) - 1) @ c, tolerance)
-            lines[-1].append(_shares(len(corners) - 1, cut)[1:] @ corners)
+            cut = chord_count(lambda t, c=corners: _bernstein(len(c) - 1, len(t) - 1) @ c, tolerance)
+            lines[-1].append(_bernstein(len(corners) - 1, cut)[1:] @ corners)
         check_points(path, next(islice(points, cut - 1, None)))
     return [distinct(np.concatenate(line)) for line in lines if line]
 
@@ -181,8 +176,8 @@ def _corners(svg: Any, segment: Any) -> Floats | None:
 
 
 @cache
-def _shares(degree: int, pieces: int) -> Floats:
-    """Return how much of each control point (pieces + 1, degree + 1) there is at evenly spaced places of a curve."""
+def _bernstein(degree: int, pieces: int) -> Floats:
+    """Return the Bernstein polynomials (pieces + 1, degree + 1) at evenly spaced parameters."""
     t = np.linspace(0.0, 1.0, pieces + 1)[:, None]
     k = np.arange(degree + 1)
     ways = np.array({2: (1, 2, 1), 3: (1, 3, 3, 1)}[degree])

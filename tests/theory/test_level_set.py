@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from pentapod.geometry import enclosed_volume, zero_surface
+from pentapod.theory.level_set import enclosed_volume, zero_surface
 
 
 def grid(n: int) -> tuple[np.ndarray, float]:
