@@ -13,13 +13,14 @@ from pathlib import Path
 import pytest
 
 import pentapod
-from pentapod import Job, LegPath, PlacedPath, Program, read_post, retime, run, write_post
+from pentapod import Job, LegPath, PlacedPath, Program, load_mesh, read_post, retime, run, write_post
 from pentapod.cli.commands.new import dome_stl
 from pentapod.cli.main import run as command
 from pentapod.cutters import CUTTERS
 from pentapod.kinematics import GeneralPentapod
 from pentapod.machine import read_machine
 from pentapod.machine.reader import machine_bytes
+from pentapod.mesh import MESH_FORMATS
 from pentapod.program.posts import POSTS, PostInput
 from pentapod.timing import Explanation
 from pentapod.toolpath import STRATEGIES
@@ -28,6 +29,7 @@ from usual_job import job_text
 
 PLUGIN = Path(__file__).parents[2] / "examples" / "plugin"
 CHANGES = (
+    ('mesh = "part.stl"', 'mesh = "part.off"'),
     ('type = "ball"', 'type = "engraver"\nheight_mm = 12'),
     ("[toolpath]", '[toolpath]\nstrategy = "diagonal"\nturn_deg = 10'),
     ("left_share = 1", "left_share = 1\nleft_mm = 2"),  # a point leaves high ridges, which take long to measure finely
@@ -52,25 +54,27 @@ def site(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def planned(site, tmp_path_factory):
-    """What a job reached that names the package's strategy and cutter."""
+    """What a job reached that names the package's mesh format, strategy and cutter."""
     folder, text = tmp_path_factory.mktemp("planned"), job_text()
     for old, new in CHANGES:
         text = text.replace(old, new)
     (folder / "part.stl").write_bytes(dome_stl(cells=12))
+    load_mesh(folder / "part.stl", "m").to_trimesh().export(folder / "part.off")
     (folder / "job.toml").write_text(text, encoding="utf-8")
     with site():
         return run(Job.load(folder / "job.toml"), folder / "out")
 
 
 def test_nothing_of_it_is_known_before_it_is_installed(make_job):
+    assert "off" not in MESH_FORMATS
     assert "drives-ms" not in POSTS
     assert "diagonal" not in STRATEGIES
     assert "engraver" not in CUTTERS
     with pytest.raises(pentapod.InputError, match="unknown strategy"):
-        Job.load(make_job(*CHANGES[1:]))
+        Job.load(make_job(*CHANGES[2:]))
 
 
-def test_a_job_is_planned_with_strategy_cutter_and_limits_of_the_package(planned, site, tmp_path):
+def test_a_job_is_planned_with_mesh_format_strategy_cutter_and_limits_of_the_package(planned, site, tmp_path):
     assert planned.unwrap().passed, [c for c in planned.verdict.certificates if not c.passed]
     assert "tool tip in the table" in planned.find(PlacedPath).margin_names
     names = {use.quantity for use in planned.find(Explanation).uses}
@@ -80,6 +84,15 @@ def test_a_job_is_planned_with_strategy_cutter_and_limits_of_the_package(planned
         (file,) = write_post(PostInput(planned.find(Program)), "drives-ms", folder, verdict=planned.to_dict())
         assert (read_post(folder, "drives-ms").legs == planned.find(Program).legs).all()
     assert file.read_text(encoding="utf-8").startswith("% pentapod_program")
+
+
+def test_a_file_that_trimesh_cannot_read_as_off_gets_one_line(site, tmp_path):
+    for content, message in ((b"solid", "does not begin with"), (b"OFF\n3 1 0\n0 0 x\n", "cannot be read as OFF")):
+        (tmp_path / "part.off").write_bytes(content)
+        with site(), pytest.raises(pentapod.InputError, match=message) as caught:
+            load_mesh(tmp_path / "part.off", "mm")
+        assert "part.off" in str(caught.value)
+        assert "\n" not in str(caught.value)
 
 
 def test_the_limit_of_the_package_holds_in_the_time_law(planned):

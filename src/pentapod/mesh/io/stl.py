@@ -22,6 +22,7 @@ HEADER_BYTES, HEAD_BYTES = 84, 4096
 
 _FACET = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _NUMBER = re.compile(NUMBER)
+_SOLID = re.compile(rb"\s*+solid", re.IGNORECASE)
 _WORDS = (b"facet", b"endfacet", b"endsolid")
 _VERTEX = re.compile(rb"vertex[ \t]++(\S++)[ \t]++(\S++)[ \t]++(\S++)", re.IGNORECASE)
 
@@ -72,7 +73,7 @@ def _check(path: Path, head: bytes, size: int) -> None:
 
 
 def _begins_with_solid(data: bytes) -> bool:
-    return data.lstrip()[:5].lower() == b"solid"
+    return _SOLID.match(data) is not None
 
 
 def _is_text(data: bytes) -> bool:
