@@ -1,4 +1,4 @@
-"""Jerk limits: closed forms, laws, and what the controller makes of the setpoints."""
+"""Jerk limits: closed forms, convergence of the passes, and limits at the interpolated setpoints."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def seven_phases(distance, v, a, j):
 
 @pytest.mark.parametrize(("v", "a", "j"), [(0.2, 5.0, 200.0), (0.1, 5.0, 100.0), (0.3, 2.0, 500.0)])
 @pytest.mark.parametrize("slope", [1.0, 0.1])
-def test_straight_takes_the_time_of_the_seven_phases(v, a, j, slope):
+def test_straight_path_takes_the_time_of_seven_phases(v, a, j, slope):
     m = machine(v=v, a=a, rapid=99.0, period=FINE)
     m.legs.max_jerk.flags.writeable = True
     m.legs.max_jerk[:] = j
@@ -44,7 +44,7 @@ def test_straight_takes_the_time_of_the_seven_phases(v, a, j, slope):
 
 @settings(max_examples=12, deadline=None)
 @given(length=st.floats(-6, 1), j=st.floats(1, 4))
-def test_short_straight_takes_the_time_of_four_phases(length, j):
+def test_short_straight_path_takes_the_time_of_four_phases(length, j):
     """Where neither speed nor acceleration is reached, T = 4 (D / 2 j)^(1/3)."""
     length, j = 10.0**length, 10.0**j
     m = machine(v=1e3, a=1e4, rapid=1e3, period=1e-3)
@@ -62,7 +62,7 @@ def test_short_straight_takes_the_time_of_four_phases(length, j):
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
 @pytest.mark.parametrize("name", PATHS)
-def test_every_limit_holds_on_the_sampled_program(name, interpolation):
+def test_sampled_program_keeps_every_limit(name, interpolation):
     m = machine(interpolation=interpolation)
     trajectory = timed(Path((PATHS[name](),)), m)
     use = {u.quantity: u.share for u in certify(trajectory, m)}
@@ -89,7 +89,7 @@ def rows_of(piece, m):
 
 
 @pytest.mark.parametrize("name", ["nod", "raster"])
-def test_passes_improve_and_two_come_close(name):
+def test_passes_shorten_the_law_and_keep_its_limits(name):
     m, piece = machine(), PATHS[name]()
     s = np.unique(np.concatenate([np.linspace(0, piece.length, 2000), piece.knots]))
     rows = rows_of(piece, m)
@@ -116,7 +116,7 @@ def test_passes_improve_and_two_come_close(name):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_law_through_slopes_keeps_stations_and_speeds(seed):
+def test_law_through_nodes_keeps_stations_speeds_and_slopes(seed):
     rng = np.random.default_rng(seed)
     s = np.concatenate([[0.0], np.cumsum(rng.uniform(0.01, 0.02, 40))])
     x = 1.0 + 0.3 * np.sin(6 * s)

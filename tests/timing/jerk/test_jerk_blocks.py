@@ -1,4 +1,4 @@
-"""Jerk limits block by block: near the law of the whole, and within its limits."""
+"""Jerk limits solved in blocks: near the law of the whole, and within its limits."""
 
 from dataclasses import dataclass
 
@@ -96,8 +96,8 @@ def test_blocks_that_never_agree_have_no_law(whole):
 
 
 @pytest.mark.parametrize(("v", "w"), [(0.02, 0.0), (0.0, 0.03), (0.04, 0.02)])
-def test_given_speeds_at_the_ends(v, w):
-    """Where the rest would be there is the given speed, and no acceleration."""
+def test_law_has_the_given_speeds_at_its_ends(v, w):
+    """Without acceleration there."""
     s, x = profile(0.4, x_start=v * v, x_end=w * w)
     law = limited(s, x)
     assert not isinstance(law, Failure)

@@ -1,4 +1,4 @@
-"""Looser limits never make a motion slower, and its setpoints keep the jerk limit as stated."""
+"""Durations do not rise with looser limits, and setpoints keep the jerk limit as stated."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What it costs that setpoints keep the limits, and paths that bend hard right beside a rest."""
+"""Loss of time by keeping the limits at setpoints, and paths that bend hard right beside a rest."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ def timed(piece, acceleration, jerk):
 
 @pytest.mark.parametrize(("acceleration", "jerk"), [(20.0, 200.0), (20.0, 400.0)])
 def test_setpoints_of_tight_turns_keep_the_limits_for_less_than_two_percent(acceleration, jerk):
-    """Limits are lowered about single places; running slower there would cost about 3 %, and would be told."""
+    """Limits are lowered about single places; running slower there would cost about 3 %, and would be reported."""
     assert timed(MATRIX["turns 1 mm"](), acceleration, jerk).slowed == ()
 
 
@@ -42,7 +42,7 @@ def hook(width, rate, length=0.02):
     return Known(legs, length, 0.05, inner_knots=knots)
 
 
-def test_a_bend_right_beside_a_rest_does_not_slow_the_whole_piece():
+def test_bend_beside_a_rest_does_not_slow_the_whole_piece():
     piece = hook(2e-6, 100.0)
     durations = [timed(piece, acceleration, 200.0).duration for acceleration in (5.0, 10.0, 50.0)]
     assert (np.diff(durations) <= 1e-3 * durations[0] + 1e-3).all(), durations

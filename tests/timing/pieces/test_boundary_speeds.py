@@ -1,4 +1,4 @@
-"""Given speeds at the start and the end of a motion: kept exactly, within the limits, or refused by name."""
+"""Given speeds at the start and the end of a motion: kept exactly within the limits, or refused with the reason."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def arc():
 
 @pytest.mark.parametrize(("interpolation", "limit_jerk"), [("linear", True), ("linear", False), ("cubic", True)])
 @pytest.mark.parametrize(("v", "w"), [(0.05, 0.0), (0.0, 0.08), (0.09, 0.05)])
-def test_speeds_are_kept_within_the_limits(interpolation, limit_jerk, v, w):
+def test_given_speeds_are_kept_within_the_limits(interpolation, limit_jerk, v, w):
     m = machine(interpolation=interpolation)
     motion = retime(arc(), m, limit_jerk=limit_jerk, start_speed=v, end_speed=w)
     assert isinstance(motion, Trajectory), str(motion)
@@ -36,8 +36,8 @@ def test_speeds_are_kept_within_the_limits(interpolation, limit_jerk, v, w):
 
 
 @pytest.mark.parametrize(("interpolation", "v", "w"), [("linear", 0.05, 0.05), ("cubic", 0.0, 0.05)])
-def test_a_plan_that_is_eased_keeps_its_speeds(interpolation, v, w):
-    """A raster whose corners are eased after they were measured; its ends go on, and are not eased as stops."""
+def test_given_speeds_stay_where_limits_are_lowered(interpolation, v, w):
+    """A raster at whose corners limits are lowered after they were measured; its ends are no stops."""
     path, m = Path((raster(lines=3, feed=0.2),)), machine(interpolation=interpolation)
     motion, rest = retime(path, m, start_speed=v, end_speed=w), retime(path, m)
     assert isinstance(motion, Trajectory), str(motion)
@@ -48,7 +48,7 @@ def test_a_plan_that_is_eased_keeps_its_speeds(interpolation, v, w):
 
 
 @pytest.mark.parametrize("length", [2e-5, 1.02e-4])
-def test_a_way_that_takes_no_whole_periods_at_its_speeds_is_refused(length):
+def test_path_that_fills_no_whole_periods_at_its_speeds_is_refused(length):
     """A fifth of a period, and a little more than one: the next whole one would need another speed at the ends."""
     short = Path((straight([0.0, 1.0, 0.0, 0.0, 0.0], length, 0.2),))
     refused = retime(short, machine(), limit_jerk=False, start_speed=0.1, end_speed=0.1)
@@ -57,13 +57,13 @@ def test_a_way_that_takes_no_whole_periods_at_its_speeds_is_refused(length):
 
 
 @pytest.mark.parametrize(("v", "w", "why"), [(0.2, 0.0, "faster than any speed"), (0.0, 0.2, "above a limit")])
-def test_speeds_above_the_limits_are_refused(v, w, why):
+def test_given_speeds_above_the_limits_are_refused(v, w, why):
     refused = retime(arc(), machine(), start_speed=v, end_speed=w)
     assert isinstance(refused, Refusal)
     assert why in str(refused)
 
 
-def test_a_speed_from_which_nothing_stops_in_time_is_refused():
+def test_start_speed_from_which_the_motion_cannot_stop_is_refused():
     short = Path((straight([0.0, 1.0, 0.0, 0.0, 0.0], 1e-4, 0.2),))
     refused = retime(short, machine(), start_speed=0.15)
     assert isinstance(refused, Refusal)
@@ -71,18 +71,18 @@ def test_a_speed_from_which_nothing_stops_in_time_is_refused():
 
 
 @pytest.mark.parametrize("speeds", [{"start_speed": -0.1}, {"end_speed": np.inf}, {"start_speed": np.nan}])
-def test_no_speeds(speeds):
+def test_negative_and_infinite_speeds_raise_input_errors(speeds):
     with pytest.raises(InputError):
         retime(arc(), machine(), **speeds)
 
 
-def test_cubics_ring_where_accelerations_jump():
+def test_given_speeds_with_cubics_need_limited_jerks():
     with pytest.raises(InputError, match="limit_jerk"):
         retime(arc(), machine(interpolation="cubic"), limit_jerk=False, start_speed=0.05)
 
 
 @pytest.mark.parametrize(("before", "after"), [(0, 0), (1, 0), (0, 1), (2, 2)])
-def test_who_stands_at_an_end_is_at_rest_there(before, after):
+def test_given_speeds_next_to_a_dwell_raise_input_errors(before, after):
     """Also where the dwell stands beyond pieces of no length, which are passed over."""
     spot = straight([0.0] * 5, 0.0, start=arc().pieces[0](np.array([0.0]), 0)[0])
     there = straight([0.0] * 5, 0.0, start=arc().pieces[0](np.array([0.1]), 0)[0])

@@ -24,8 +24,8 @@ def problem(seed, n=120, rows=5, lively=3.0, cap=1.0, offset=True):
     return {"s": s, "first": first, "second": second, "ceiling": ceiling, "offset": at_rest}
 
 
-def breaks(p, x):
-    """By how much x breaks its rows and bounds, in shares of the limits."""
+def excess(p, x):
+    """Largest excess of x over its rows and bounds, in shares of the limits."""
     u = np.diff(x) / (2 * np.diff(p["s"]))
     at_rest = 0.0 if p["offset"] is None else p["offset"]
     rows = [p["first"][k] * u[:, None] + p["second"][k] * x[k][:, None] for k in (slice(0, -1), slice(1, None))]
@@ -41,14 +41,14 @@ def breaks(p, x):
     ends=st.tuples(st.floats(0, 0.02), st.floats(0, 0.02)),
     offset=st.booleans(),
 )
-def test_keeps_every_row_and_agrees_with_toppra(seed, cap, ends, offset):
+def test_profiles_keep_every_row_and_agree_with_toppra(seed, cap, ends, offset):
     p = problem(seed, cap=cap, offset=offset)
     ours = fastest(**p, x_start=ends[0] * cap, x_end=ends[1] * cap)
     theirs = fastest(**p, x_start=ends[0] * cap, x_end=ends[1] * cap, engine="toppra")
     assert isinstance(ours, Failure) == isinstance(theirs, Failure)
     if isinstance(ours, Failure):
         return
-    assert breaks(p, ours) < 1e-9
+    assert excess(p, ours) < 1e-9
     assert ours[0] == ends[0] * cap
     assert ours[-1] == ends[1] * cap
     assert np.abs(ours - theirs).max() < 2e-4 * ours.max()
@@ -61,7 +61,7 @@ def test_keeps_every_row_and_agrees_with_toppra(seed, cap, ends, offset):
 
 @pytest.mark.parametrize("ds", [2.0**-40, 2.0**40])
 @pytest.mark.parametrize("dx", [2.0**-40, 2.0**40])
-def test_units_change_nothing_not_even_the_last_bit(ds, dx):
+def test_profiles_in_other_units_are_equal_to_the_last_bit(ds, dx):
     p = problem(5)
     x = fastest(**p)
     scaled = {
@@ -75,7 +75,7 @@ def test_units_change_nothing_not_even_the_last_bit(ds, dx):
 
 
 @pytest.mark.parametrize("engine", ["core", "toppra"])
-def test_a_gridpoint_given_twice_changes_nothing(engine):
+def test_repeated_gridpoints_change_nothing(engine):
     p = problem(8)
     twice = np.sort(np.concatenate([np.arange(121), [0, 17, 17, 60, 120]]))
     x = fastest(**p, engine=engine)
@@ -83,7 +83,7 @@ def test_a_gridpoint_given_twice_changes_nothing(engine):
     assert np.allclose(doubled, x[twice], rtol=1e-6 if engine == "toppra" else 0, atol=0)
 
 
-def test_where_coefficients_jump_both_sides_hold():
+def test_rows_hold_on_both_sides_of_a_jump():
     """One leg whose acceleration limit drops to a quarter in the middle: it brakes for the second half before it."""
     s = np.array([0, 1, 2, 3, 3, 4, 5, 6.0])
     first = np.repeat([1.0, 4.0], 4)[:, None]
@@ -106,7 +106,7 @@ def test_failures_name_the_gridpoint_and_the_rows():
     assert fastest(s, rows, rows * np.where(s == s[4], np.nan, 1)[:, None], free).gridpoint == 4
 
 
-def test_bad_input():
+def test_wrong_arrays_and_engines_raise_input_errors():
     s, rows, free = np.linspace(0, 1, 5), np.ones((5, 1)), np.ones(5)
     with pytest.raises(InputError, match="must not fall"):
         fastest(s[::-1], rows, rows, free)

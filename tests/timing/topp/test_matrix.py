@@ -74,7 +74,7 @@ def test_matrix_reduced(case):
     ],
     ids=str,
 )
-def test_what_tells_the_durations_apart_is_the_coarse_grid(case):
+def test_durations_differ_from_toppra_on_coarse_grids_alone(case):
     """The worst of some 5,000: on a grid 4 times as fine the durations agree, on a finer one toppra's are longer."""
     assert apart(case) > 1.9e-5
     assert abs(apart(case, 4)) < 5e-6
@@ -113,7 +113,7 @@ def test_matrix_by_hypothesis(case):
 
 @pytest.mark.parametrize("unit", MATRIX["units"])
 @pytest.mark.parametrize("scale", MATRIX["scales_m"][::3])
-def test_units_and_scales_do_not_change_what_is_asked(unit, scale):
+def test_durations_do_not_depend_on_units_and_scales(unit, scale):
     """The same motion in other units lasts as long: in metres and in steps of the grid, to the last digits."""
     plain, other = (arrays(Case("polyline", name, scale, 3)) for name in ("metre", unit))
     times = [duration(a[0], fastest(*a)) for a in (plain, other)]
@@ -122,7 +122,7 @@ def test_units_and_scales_do_not_change_what_is_asked(unit, scale):
 
 @pytest.mark.parametrize("spec", MATRIX["refused"], ids=lambda spec: spec["reason"])
 @pytest.mark.parametrize("scale", MATRIX["scales_m"])
-def test_what_cannot_be_done_says_so(spec, scale):
+def test_failures_name_gridpoint_and_reason(spec, scale):
     s, first, second, ceiling = arrays(Case(spec["kind"], "metre", scale, 1))
     result = fastest(
         s,
