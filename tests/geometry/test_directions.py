@@ -13,19 +13,19 @@ numbers = st.floats(-1.0, 1.0, allow_subnormal=False)
 
 
 @given(st.tuples(numbers, numbers, numbers), st.floats(1e-6, 1e6))
-def test_normalised_has_unit_length_and_no_memory_of_scale(v: tuple, factor: float) -> None:
+def test_normalised_has_unit_length_whatever_the_scale(v: tuple, factor: float) -> None:
     assume(np.linalg.norm(v) > 1e-3)
     assert abs(np.linalg.norm(normalised(v)) - 1.0) < 4e-16
     np.testing.assert_allclose(normalised(np.multiply(factor, v)), normalised(v), atol=4e-16)
 
 
-def test_no_direction_in_a_zero_vector() -> None:
+def test_normalised_refuses_a_zero_vector() -> None:
     with pytest.raises(ArrayError, match="axis has zero length"):
         normalised([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]], "axis")
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-8, 1e-3, 1.0, np.pi / 2, 3.0])
-def test_angle_to_a_turned_vector_is_the_turn(angle: float) -> None:
+def test_angle_between_a_vector_and_its_rotation(angle: float) -> None:
     rng = np.random.default_rng(1)
     a = normalised(rng.normal(size=(50, 3)))
     t1, _ = tangent_frame(a)
@@ -45,7 +45,7 @@ def test_partway_divides_the_turn_evenly_even_between_opposites() -> None:
     np.testing.assert_allclose(angle_between(found, b), (1 - share) * angle_between(a, b), atol=1e-8)
 
 
-def test_weights_of_an_arc_give_what_is_partway() -> None:
+def test_arc_weights_match_partway() -> None:
     rng = np.random.default_rng(4)
     a, share = normalised(rng.normal(size=(40, 3))), rng.uniform(0, 1, 40)
     angle = np.concatenate([[0.0, 1e-12, 1e-8, 1e-3], rng.uniform(0.0, 3.0, 36)])[:, None]
@@ -56,7 +56,7 @@ def test_weights_of_an_arc_give_what_is_partway() -> None:
     np.testing.assert_allclose(np.concatenate(opposite), [0.75, 0.25], atol=1e-6)
 
 
-def test_small_angles_keep_their_digits() -> None:
+def test_angle_between_keeps_the_digits_of_small_angles() -> None:
     exact = 1e-9 * (1.0 - 1e-18 / 3.0)  # the arc tangent's series
     assert abs(angle_between([0.0, 0.0, 1.0], [1e-9, 0.0, 1.0]) / exact - 1.0) < 1e-15
 
@@ -77,7 +77,7 @@ def test_tangent_frames_are_smooth_through_each_pole(pole: float) -> None:
         assert np.abs(np.stack(tangent_frame(near)) - at_pole).max() < 2e-6
 
 
-def test_tangent_frame_in_the_upper_half_is_carried_along_the_great_circle() -> None:
+def test_tangent_frame_in_the_upper_half_is_transported_along_the_great_circle() -> None:
     rng = np.random.default_rng(2)
     d = normalised(np.abs(rng.normal(size=(20, 3))))
     turns = np.cross([0.0, 0.0, 1.0], d)

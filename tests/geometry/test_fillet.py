@@ -22,7 +22,7 @@ def chord_parameter(points):
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10_000), st.integers(3, 12), st.sampled_from([1e-2, 1e-3, 1e-5]))
-def test_curve_stays_within_the_tolerance(seed, count, tolerance):
+def test_blended_curve_stays_within_the_tolerance(seed, count, tolerance):
     points = np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 3))
     u = chord_parameter(points)
     curve = blended(u, points, within(tolerance))
@@ -35,7 +35,7 @@ def test_curve_stays_within_the_tolerance(seed, count, tolerance):
     np.testing.assert_allclose(curve(u[[0, -1]]), points[[0, -1]], atol=1e-14)
 
 
-def test_straight_stretches_are_reproduced_exactly():
+def test_blended_curve_reproduces_straight_parts_exactly():
     points = np.array([[0.0, 0.0], [0.3, 0.0], [1.0, 0.0], [1.0, 2.0]])
     u = chord_parameter(points)
     curve = blended(u, points, within(1e-3))
@@ -43,7 +43,7 @@ def test_straight_stretches_are_reproduced_exactly():
     np.testing.assert_allclose(curve(at), np.c_[at, 0.0 * at], atol=1e-13)
 
 
-def test_third_derivative_is_continuous_and_the_fourth_is_not():
+def test_blended_curve_is_c3_and_not_c4():
     points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.2, 1.3]])
     curve = blended(chord_parameter(points), points, within(1e-2))
     inner = np.unique(curve.t)[1:-1]
@@ -57,8 +57,8 @@ def test_third_derivative_is_continuous_and_the_fourth_is_not():
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000), st.sampled_from([1e-2, 1e-4]))
-def test_the_stretches_that_are_judged_enclose_the_curve_and_cover_it(seed, tolerance):
-    """What `too_far` is told encloses the curve: within at 41 places of each span, by numpy's own interpolation."""
+def test_blended_spans_enclose_the_curve_and_cover_it(seed, tolerance):
+    """The arguments of `too_far` enclose the curve: within at 41 places of each span, by numpy's own interpolation."""
     points = np.random.default_rng(seed).uniform(-1.0, 1.0, (5, 2))
     u = chord_parameter(points)
     largest = []
@@ -78,7 +78,7 @@ def test_the_stretches_that_are_judged_enclose_the_curve_and_cover_it(seed, tole
     assert max(map(np.max, largest)) > tolerance  # it was refined at all
 
 
-def test_a_micrometre_step_beside_metres():
+def test_blended_curve_of_a_micrometre_step_beside_metres():
     """Knots of very different spacing."""
     points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1e-6], [0.0, 1e-6]])
     u = chord_parameter(points)
@@ -88,6 +88,6 @@ def test_a_micrometre_step_beside_metres():
     assert np.linalg.norm(curve(at) - on_line, axis=1).max() <= 1e-5
 
 
-def test_parameters_must_increase():
+def test_blended_curve_refuses_parameters_that_do_not_increase():
     with pytest.raises(ArrayError, match="increase strictly"):
         blended(np.array([0.0, 1.0, 1.0]), np.zeros((3, 2)), within(1.0))

@@ -11,7 +11,7 @@ from pentapod.geometry.interpolant import Interpolant, largest_length
 PERIOD = 0.25
 
 
-def test_random_spline_extrema():
+def test_interpolant_extrema_of_a_random_spline():
     """A wild spline, where extrema lie between the rows: dense sampling never exceeds them, and comes close."""
     rows = 0.6 + 0.1 * np.random.default_rng(5).standard_normal((40, 5))
     motion = Interpolant.through(rows, PERIOD, "cubic")
@@ -39,7 +39,7 @@ def test_steps_of_the_acceleration_at_the_ends_count_over_one_period():
     assert motion.jerks[0, 0] >= start / PERIOD
 
 
-def test_linear_by_hand():
+def test_interpolant_of_lines_by_hand():
     rows = np.full((4, 5), 0.5)
     rows[:, 2] += [0.0, 1e-6, 3e-6, 3e-6]
     motion = Interpolant.through(rows, 1e-3, "linear")
@@ -63,5 +63,5 @@ def test_largest_length_is_the_maximum(seed, degree):
     assert dense[where].max() == pytest.approx(value, rel=1e-6)
 
 
-def test_largest_length_of_nothing_that_moves_is_zero():
+def test_largest_length_of_zero_vectors_is_zero():
     assert largest_length(np.zeros((3, 3, 3))) == (0.0, 0)

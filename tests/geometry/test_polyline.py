@@ -9,16 +9,16 @@ from pentapod.base.errors import ArrayError
 from pentapod.geometry import arc_length
 
 
-def test_a_known_polyline() -> None:
+def test_arc_length_of_a_known_polyline() -> None:
     np.testing.assert_allclose(arc_length([[0, 0], [3, 4], [3, 4], [3, 5]]), [0, 5, 5, 6])
 
 
-def test_one_point_has_no_length() -> None:
+def test_arc_length_of_one_point_is_zero() -> None:
     np.testing.assert_array_equal(arc_length([[1.0, 2.0, 3.0]]), [0.0])
 
 
 @given(st.integers(2, 40), st.floats(0.0, 1.0))
-def test_does_not_depend_on_points_added_on_an_edge(n: int, at: float) -> None:
+def test_arc_length_does_not_depend_on_points_added_on_an_edge(n: int, at: float) -> None:
     points = np.random.default_rng(n).normal(size=(n, 3))
     extra = np.insert(points, 1, (1 - at) * points[0] + at * points[1], axis=0)
     length = arc_length(points)
@@ -27,6 +27,6 @@ def test_does_not_depend_on_points_added_on_an_edge(n: int, at: float) -> None:
     assert length[-1] >= np.linalg.norm(points[-1] - points[0]) - 1e-12
 
 
-def test_a_single_vector_is_no_polyline() -> None:
+def test_arc_length_refuses_a_single_vector() -> None:
     with pytest.raises(ArrayError):
         arc_length([1.0, 2.0, 3.0])

@@ -23,7 +23,7 @@ def same(a: RigidTransform, b: RigidTransform) -> bool:
 
 
 @given(transforms(), transforms(), transforms())
-def test_they_form_a_group(a: RigidTransform, b: RigidTransform, c: RigidTransform) -> None:
+def test_rigid_transforms_form_a_group(a: RigidTransform, b: RigidTransform, c: RigidTransform) -> None:
     one = RigidTransform.identity()
     assert same((a @ b) @ c, a @ (b @ c))
     assert same(a @ one, a)
@@ -33,7 +33,7 @@ def test_they_form_a_group(a: RigidTransform, b: RigidTransform, c: RigidTransfo
 
 
 @given(transforms(), transforms(), st.lists(st.tuples(numbers, numbers, numbers), min_size=2, max_size=5))
-def test_they_act_on_points_and_keep_distances(a: RigidTransform, b: RigidTransform, points: list) -> None:
+def test_rigid_transforms_act_on_points_and_keep_distances(a: RigidTransform, b: RigidTransform, points: list) -> None:
     x = np.array(points)
     np.testing.assert_allclose((a @ b).apply(x), a.apply(b.apply(x)), atol=1e-12)
     np.testing.assert_allclose(a.inverse().apply(a.apply(x)), x, atol=1e-12)
@@ -44,11 +44,11 @@ def test_they_act_on_points_and_keep_distances(a: RigidTransform, b: RigidTransf
 
 
 @given(transforms())
-def test_the_matrix_carries_everything(a: RigidTransform) -> None:
+def test_rigid_transform_comes_back_from_its_matrix(a: RigidTransform) -> None:
     assert same(RigidTransform.from_matrix(a.matrix), a)
 
 
-def test_applies_to_any_batch_and_keeps_its_arrays_to_itself() -> None:
+def test_rigid_transform_applies_to_batches_and_copies_its_arrays() -> None:
     rotation = Rotation.from_euler("z", 90, degrees=True).as_matrix()
     shift = np.array([1.0, 0.0, 0.0])
     a = RigidTransform(rotation, shift)
@@ -64,11 +64,11 @@ def test_applies_to_any_batch_and_keeps_its_arrays_to_itself() -> None:
     [np.diag([1.0, 1.0, -1.0]), 1.001 * np.eye(3), np.eye(3) * np.nan, np.eye(2)],
     ids=["reflection", "scaled", "nan", "2x2"],
 )
-def test_what_is_no_rotation_is_refused(rotation: np.ndarray) -> None:
+def test_rigid_transform_refuses_what_is_no_rotation(rotation: np.ndarray) -> None:
     with pytest.raises(ArrayError):
         RigidTransform(rotation, np.zeros(3))
 
 
-def test_a_matrix_with_a_wrong_last_row_is_refused() -> None:
+def test_rigid_transform_refuses_a_matrix_with_a_wrong_last_row() -> None:
     with pytest.raises(ArrayError, match="last row"):
         RigidTransform.from_matrix(np.diag([1.0, 1.0, 1.0, 2.0]))

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pentapod.geometry.runs import equal_runs, marked_runs, run_starts
+from pentapod.geometry.runs import equal_runs, marked_runs, members, run_starts
 
 
 def plain_runs(values: list[int]) -> list[list[int]]:
@@ -36,3 +36,10 @@ def test_run_starts(counts: list[int]) -> None:
     starts = run_starts(counts)
     assert starts.dtype == np.intp
     assert starts.tolist() == [sum(counts[:k]) for k in range(len(counts) + 1)]
+
+
+@given(st.lists(st.integers(0, 4), max_size=20))
+def test_members(counts: list[int]) -> None:
+    run, number = members(np.array(counts, dtype=np.intp))
+    pairs = [(r, n) for r, count in enumerate(counts) for n in range(count)]
+    assert list(zip(run.tolist(), number.tolist(), strict=True)) == pairs

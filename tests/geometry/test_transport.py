@@ -1,4 +1,4 @@
-"""Carried frames: laws of parallel transport, and the holonomy of a closed curve against the area it encloses."""
+"""Rotation-minimising frames: laws of parallel transport, and holonomy of a closed curve against its area."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def walk(seed, step):
 
 
 @given(st.integers(0, 10_000), st.sampled_from([1e-3, 0.05, 0.5]))
-def test_pairs_are_right_handed_frames(seed, step):
+def test_transported_pairs_are_right_handed_frames(seed, step):
     d = walk(seed, step)
     pairs = rotation_minimising_frames(d)
     whole = np.concatenate([pairs, d[:, None]], axis=1)
@@ -30,7 +30,7 @@ def test_pairs_are_right_handed_frames(seed, step):
 
 
 @given(st.integers(0, 10_000), st.sampled_from([1e-3, 0.05]))
-def test_a_pair_turns_no_more_than_its_direction(seed, step):
+def test_transported_pair_turns_no_more_than_its_direction(seed, step):
     """What carries each pair to the next is the smallest rotation: about an axis across both directions."""
     d = walk(seed, step)
     frames = np.concatenate([rotation_minimising_frames(d), d[:, None]], axis=1)
@@ -41,7 +41,7 @@ def test_a_pair_turns_no_more_than_its_direction(seed, step):
 
 
 @pytest.mark.parametrize("angle", [0.3, np.pi / 2, 2.0, 3.0])
-def test_a_closed_curve_turns_the_pair_by_the_area_it_encloses(angle):
+def test_transport_along_a_closed_curve_turns_by_the_enclosed_area(angle):
     """Gauss and Bonnet: around a cone of half angle α the pair turns by 2π (1 − cos α)."""
     pairs = rotation_minimising_frames(circle(angle))
     cosine, sine = (pairs[-1, 0] * pairs[0, 0]).sum(), (pairs[-1, 0] * pairs[0, 1]).sum()

@@ -36,7 +36,7 @@ def test_noise_about_zero_is_welded():
     assert Mesh.of(loose, np.arange(len(loose)).reshape(-1, 3)).diagnosis.watertight
 
 
-def test_doubled_and_degenerate_facets_are_dropped_and_listed():
+def test_duplicated_and_degenerate_facets_are_dropped_and_listed():
     vertices, faces = surfaces.sphere()
     bad = np.concatenate([faces, faces[:10], faces[10:15, ::-1], [[0, 0, 1], [2, 3, 3]]])
     mesh = Mesh.of(vertices, bad)
@@ -46,7 +46,7 @@ def test_doubled_and_degenerate_facets_are_dropped_and_listed():
     assert mesh.diagnosis.consistent
 
 
-def test_every_facet_doubled_is_one_surface():
+def test_duplicates_of_all_facets_are_dropped():
     vertices, faces = surfaces.sphere()
     mesh = Mesh.of(vertices, np.concatenate([faces, faces]))
     assert mesh.diagnosis.watertight
@@ -55,7 +55,7 @@ def test_every_facet_doubled_is_one_surface():
 
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10_000))
-def test_winding_is_diagnosed_and_mended_only_when_asked(seed):
+def test_winding_is_diagnosed_and_repaired_only_on_request(seed):
     vertices, faces = surfaces.sphere(subdivisions=2)
     random = np.random.default_rng(seed)
     wrong = random.random(len(faces)) < random.uniform(0.02, 0.98)
@@ -70,7 +70,7 @@ def test_winding_is_diagnosed_and_mended_only_when_asked(seed):
     assert ((mended.facet_normals * centres).sum(axis=1) > 0).all()
 
 
-def test_inside_out_is_told_and_mended():
+def test_inverted_mesh_is_diagnosed_and_repaired():
     vertices, faces = surfaces.sphere()
     found = Mesh.of(vertices, faces[:, ::-1])
     assert found.diagnosis.inverted
@@ -109,7 +109,7 @@ def test_a_third_sheet_on_an_edge_is_not_manifold():
     assert "more than two facets" in str(diagnosis)
 
 
-def test_bodies_apart_are_counted_and_taken_out():
+def test_bodies_are_counted_and_extracted():
     vertices, faces = surfaces.sphere()
     both = Mesh.of(np.concatenate([vertices, vertices + 1.0]), np.concatenate([faces, faces + len(vertices)]))
     assert both.diagnosis.bodies == 2

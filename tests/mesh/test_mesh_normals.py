@@ -10,14 +10,14 @@ from pentapod.geometry import angle_between
 from pentapod.toolpath import Mesh
 
 
-def test_on_a_ball_they_point_from_the_centre():
+def test_corner_normals_of_a_ball_point_from_its_centre():
     mesh = Mesh.of(*surfaces.sphere())
     corners = mesh.vertices[mesh.faces]
     assert np.degrees(angle_between(mesh.corner_normals, corners)).max() < 0.2
     assert np.degrees(angle_between(mesh.facet_normals, corners[:, 0])).max() > 1.5  # facets are worse
 
 
-def test_on_a_torus_they_match_the_formula():
+def test_vertex_normals_of_a_torus_match_the_formula():
     mesh = Mesh.of(*surfaces.torus())
     x, y, z = mesh.vertices.T
     ring = np.hypot(x, y)
@@ -26,7 +26,7 @@ def test_on_a_torus_they_match_the_formula():
     np.testing.assert_allclose(mesh.corner_normals, mesh.vertex_normals[mesh.faces], atol=1e-12)
 
 
-def test_a_box_keeps_its_edges():
+def test_corner_normals_of_a_box_keep_its_edges():
     mesh = Mesh.of(*surfaces.box())
     np.testing.assert_allclose(mesh.corner_normals, np.repeat(mesh.facet_normals[:, None], 3, axis=1), atol=1e-12)
     # Weighted by angle, a corner's three faces count alike although their triangles do not.
@@ -34,7 +34,7 @@ def test_a_box_keeps_its_edges():
 
 
 @pytest.mark.parametrize(("fold_deg", "smooth"), [(30.0, True), (39.0, True), (41.0, False), (80.0, False)])
-def test_folds_are_smoothed_up_to_the_crease_angle(fold_deg, smooth):
+def test_corner_normals_are_smooth_up_to_the_crease_angle(fold_deg, smooth):
     slope = np.tan(np.radians(fold_deg / 2))
     mesh = Mesh.of(*surfaces.grid(lambda x, y: -slope * np.abs(x), cells=10))
     on_ridge = np.abs(mesh.vertices[mesh.faces][:, :, 0]) < 1e-9
@@ -42,7 +42,7 @@ def test_folds_are_smoothed_up_to_the_crease_angle(fold_deg, smooth):
     np.testing.assert_allclose(np.degrees(tilt), 0.0 if smooth else fold_deg / 2, atol=1.0 if smooth else 1e-6)
 
 
-def test_normals_turn_with_the_mesh_and_ignore_its_scale():
+def test_normals_rotate_with_the_mesh_and_ignore_its_scale():
     from scipy.spatial.transform import Rotation
 
     vertices, faces = surfaces.grid(lambda x, y: 0.01 * np.sin(60 * x) * np.cos(40 * y))

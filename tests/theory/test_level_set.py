@@ -12,7 +12,7 @@ def grid(n: int) -> tuple[np.ndarray, float]:
     return np.stack(np.meshgrid(line, line, line, indexing="ij"), axis=-1), line[1] - line[0]
 
 
-def test_the_volume_of_an_ellipsoid_converges_with_the_square_of_the_step() -> None:
+def test_zero_surface_volume_of_an_ellipsoid_converges_with_the_square_of_the_step() -> None:
     errors = []
     for n in (16, 31, 61):
         nodes, step = grid(n)
@@ -27,7 +27,7 @@ def test_the_volume_of_an_ellipsoid_converges_with_the_square_of_the_step() -> N
     assert errors[0] > 3.0 * errors[1] > 9.0 * errors[2]
 
 
-def test_noise_and_full_grids_are_closed() -> None:
+def test_zero_surface_of_noise_and_of_full_grids_is_closed() -> None:
     for values in (np.random.default_rng(0).normal(size=(9, 8, 7)), np.ones((3, 4, 5)), np.zeros((2, 2, 2))):
         vertices, triangles = zero_surface(values, [1.0, 2.0, 3.0], 0.1)
         solid = trimesh.Trimesh(vertices, triangles, process=False)
@@ -39,7 +39,7 @@ def test_noise_and_full_grids_are_closed() -> None:
     assert (full.max(axis=0) < np.array([0.25, 0.35, 0.45])).all()
 
 
-def test_nothing_inside_is_no_surface() -> None:
+def test_zero_surface_of_negative_values_is_empty() -> None:
     vertices, triangles = zero_surface(-np.ones((4, 4, 4)), [0.0, 0.0, 0.0], 0.1)
     assert vertices.shape == (0, 3)
     assert triangles.shape == (0, 3)

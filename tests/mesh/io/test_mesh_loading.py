@@ -51,7 +51,7 @@ def test_every_format_gives_the_same_closed_ball(tmp_path, ball, suffix):
     assert str(mesh.diagnosis).startswith(path.name)
 
 
-def test_writing_stl_agrees_with_another_reader(tmp_path, ball):
+def test_written_stl_is_read_by_trimesh(tmp_path, ball):
     import trimesh
 
     path = tmp_path / "ball.stl"
@@ -169,7 +169,7 @@ def test_bad_files_get_one_clear_line(tmp_path, ball, name):
     assert name in str(caught.value)
 
 
-def test_missing_file_directory_and_bad_scale(tmp_path):
+def test_missing_file_folder_and_bad_scale_are_refused(tmp_path):
     with pytest.raises(MeshError, match="no such file"):
         load_mesh(tmp_path / "nowhere.stl", "mm")
     (tmp_path / "folder.stl").mkdir()
@@ -180,7 +180,7 @@ def test_missing_file_directory_and_bad_scale(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", ["stl", "ply", "obj"])
-def test_no_truncation_ends_in_a_raw_traceback(tmp_path, suffix):
+def test_truncated_files_are_refused(tmp_path, suffix):
     """Every cut is refused with an InputError; but an OBJ does not tell how many lines it has."""
     import trimesh
 
@@ -204,7 +204,7 @@ def test_no_truncation_ends_in_a_raw_traceback(tmp_path, suffix):
     assert refused > 50
 
 
-def test_obj_as_others_write_it(tmp_path):
+def test_obj_with_the_words_of_other_programs(tmp_path):
     """Polygons, textures, corners counted from the end, groups, continued lines; what belongs to no facet is told."""
     path = tmp_path / "a.obj"
     path.write_text(
@@ -217,7 +217,7 @@ def test_obj_as_others_write_it(tmp_path):
     assert "1 of 6 vertices belong to no facet" in str(mesh.diagnosis)
 
 
-def test_a_backslash_does_not_carry_a_comment_on(tmp_path):
+def test_obj_comments_end_at_a_backslash(tmp_path):
     path = tmp_path / "a.obj"
     path.write_bytes(b"# from C:\\parts\\\nv 0 0 0\nv 1 0 0 # in D:\\\r\nv 0 1 0\nf 1 2 3\n")
     vertices, faces, notes = MESH_FORMATS["obj"].read(path, path.read_bytes(), False)
@@ -226,7 +226,7 @@ def test_a_backslash_does_not_carry_a_comment_on(tmp_path):
     assert not notes
 
 
-def test_obj_reads_what_another_reader_reads(tmp_path, ball):
+def test_obj_is_read_as_trimesh_reads_it(tmp_path, ball):
     import trimesh
 
     path = tmp_path / "ball.obj"
@@ -239,7 +239,7 @@ def test_obj_reads_what_another_reader_reads(tmp_path, ball):
     assert not notes
 
 
-def test_what_a_comment_of_a_ply_announces_is_not_counted(tmp_path, ball):
+def test_ply_comments_announce_nothing(tmp_path, ball):
     """A comment, or an obj_info line, may hold any words, those of an element too; what is announced is counted."""
     told = b"comment element vertex 999\nobj_info element face 7\ncomment\n  comment property float x\n"
     head = PLY_HEAD % 3 + PLY_FACES % 1
@@ -254,7 +254,7 @@ def test_what_a_comment_of_a_ply_announces_is_not_counted(tmp_path, ball):
         load_mesh(path, "mm")
 
 
-def test_bytes_after_the_last_facet_are_refused(tmp_path, ball):
+def test_stl_with_bytes_after_the_last_facet_is_refused(tmp_path, ball):
     path = tmp_path / "ball.stl"
     path.write_bytes(write_stl(ball, "ball") + b"\0\0")
     with pytest.raises(MeshError, match="2 bytes follow after the last of 320 facets"):

@@ -44,14 +44,14 @@ def segments(count, seed):
     return rng.uniform(-0.15, 0.15, (count, 3)), rng.uniform(-0.15, 0.15, (count, 3))
 
 
-def test_points_match_trimesh(shape):
+def test_distances_of_points_match_trimesh(shape):
     rng = np.random.default_rng(1)
     at = np.concatenate([rng.uniform(-0.1, 0.1, (400, 3)), shape.sample(100, seed=2) * rng.uniform(0.9, 1.1, (100, 1))])
     found = MeshDistance.of(mesh_of(shape)).points(at)
     np.testing.assert_allclose(found.distance, oracle_distance(shape, at), atol=1e-9)
 
 
-def test_the_normal_is_the_way_out(shape):
+def test_the_normal_is_the_gradient_of_the_distance(shape):
     """A step along it changes the distance by its own length, wherever the nearest point is the only one near."""
     distance = MeshDistance.of(mesh_of(shape))
     at = np.random.default_rng(3).uniform(-0.1, 0.1, (400, 3))
@@ -60,7 +60,7 @@ def test_the_normal_is_the_way_out(shape):
     assert (np.abs(moved - 1e-6) < 1e-9).mean() > 0.97
 
 
-def test_segments_match_dense_samples(shape):
+def test_distances_of_segments_match_dense_samples(shape):
     distance = MeshDistance.of(mesh_of(shape))
     a, b = segments(15, 4)
     found = distance.segments(a, b)
@@ -76,14 +76,14 @@ def test_segments_match_dense_samples(shape):
         assert oracle_distance(shape, at[None])[0] == pytest.approx(found.distance[k], abs=1e-8)
 
 
-def test_what_is_far_counts_as_the_cap(shape):
+def test_distances_are_capped(shape):
     distance = MeshDistance.of(mesh_of(shape))
     a, b = segments(200, 5)
     free, capped = distance.segments(a, b).distance, distance.segments(a, b, within=0.02).distance
     np.testing.assert_allclose(capped, np.minimum(free, 0.02), atol=1e-12)
 
 
-def test_tools_match_dense_samples_of_their_surface(shape):
+def test_distances_of_tools_match_dense_samples_of_their_surface(shape):
     distance = MeshDistance.of(mesh_of(shape))
     solids = (Solid("shank", 0.0, 0.03, 0.004, 0.006), Solid("holder", 0.03, 0.06, 0.02, 0.025))
     rng = np.random.default_rng(6)
@@ -136,7 +136,7 @@ def test_an_open_sheet_has_no_inside():
     assert not distance.contains([[0.0, 0.0, -0.01]]).any()
 
 
-def test_contains_matches_trimesh(shape):
+def test_winding_numbers_match_trimesh(shape):
     at = np.random.default_rng(8).uniform(-0.08, 0.08, (200, 3))
     np.testing.assert_array_equal(MeshDistance.of(mesh_of(shape)).contains(at), shape.contains(at))
 

@@ -29,7 +29,7 @@ def slice_mesh(mesh, planes, region=None):
     return level_set(mesh, planes, region).lines()
 
 
-def test_a_ball_is_cut_into_closed_circles():
+def test_slices_of_a_ball_are_closed_circles():
     mesh = Mesh.of(*surfaces.sphere())
     passes = slice_mesh(mesh, WHOLE_BALL)
     assert len(passes) == 19
@@ -42,7 +42,7 @@ def test_a_ball_is_cut_into_closed_circles():
 
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10_000), snapped=st.booleans())
-def test_the_same_length_as_another_slicer(seed, snapped):
+def test_slices_are_as_long_as_those_of_trimesh(seed, snapped):
     """Total length in each plane against trimesh, on rotated tori; snapped: planes run exactly through vertices."""
     import trimesh
     from scipy.spatial.transform import Rotation
@@ -64,7 +64,7 @@ def test_the_same_length_as_another_slicer(seed, snapped):
     np.testing.assert_allclose(passes.points[passes.starts[:-1]], passes.points[passes.starts[1:] - 1], atol=1e-12)
 
 
-def test_planes_through_rows_of_vertices_cut_once():
+def test_slices_through_rows_of_vertices_are_not_doubled():
     mesh = Mesh.of(*surfaces.grid(lambda x, y: 0.1 * x * y, cells=10))
     passes = slice_mesh(mesh, ([0.0, 1.0, 0.0], -0.05, 0.01, 11), ALL)
     # The lowest border counts as above its plane: it is not cut; the highest is.
@@ -72,21 +72,21 @@ def test_planes_through_rows_of_vertices_cut_once():
     np.testing.assert_allclose(passes.lengths, 0.1, rtol=1e-4)
 
 
-def test_passes_run_forward_with_the_planes_normal_to_the_left():
+def test_slices_run_with_the_planes_normal_to_the_left():
     mesh = Mesh.of(*surfaces.grid(lambda x, y: 0 * x))
     passes = slice_mesh(mesh, ([0.0, 1.0, 0.0], -0.031, 0.02, 4), ALL)
     assert (passes.points[passes.starts[1:] - 1, 0] > passes.points[passes.starts[:-1], 0]).all()
 
 
 @pytest.mark.parametrize("fold_deg", [30.0, 60.0])
-def test_creases_end_passes_and_smooth_folds_do_not(fold_deg):
+def test_slices_end_at_creases_and_not_at_smooth_folds(fold_deg):
     slope = np.tan(np.radians(fold_deg / 2))
     mesh = Mesh.of(*surfaces.grid(lambda x, y: -slope * np.abs(x), cells=10))
     passes = slice_mesh(mesh, ([0.0, 1.0, 0.0], -0.031, 0.02, 4), ALL)
     assert len(passes) == (4 if fold_deg < 40 else 8)
 
 
-def test_region_ends_passes_exactly():
+def test_slices_end_exactly_at_the_region():
     mesh = Mesh.of(*surfaces.sphere())
     region = Region(angle=np.radians(50.0), box=((-0.02, -1, -1), (0.03, 1, 1)))
     passes = slice_mesh(mesh, WHOLE_BALL, region)
@@ -110,7 +110,7 @@ def test_region_ends_passes_exactly():
 
 @settings(max_examples=50, deadline=None)
 @given(st.data())
-def test_chains_against_walking_them(data):
+def test_chained_items_match_walking(data):
     count = data.draw(st.integers(1, 40))
     target = data.draw(st.permutations(range(count)))
     cut = data.draw(st.lists(st.booleans(), min_size=count, max_size=count))
@@ -161,7 +161,7 @@ def test_resampling_is_even_where_only_the_spacing_binds():
     assert len(few.points) == 5 * 51
 
 
-def test_duplicate_points_go_and_ends_stay():
+def test_without_duplicates_keeps_the_ends():
     mesh = Mesh.of(*surfaces.sphere(subdivisions=5))
     passes = slice_mesh(mesh, WHOLE_BALL, ALL)
     thinned = without_duplicates(passes, 3e-4)
@@ -171,13 +171,13 @@ def test_duplicate_points_go_and_ends_stay():
     np.testing.assert_array_equal(thinned.points[thinned.starts[1:] - 1], passes.points[passes.starts[1:] - 1])
 
 
-def test_the_cost_of_slicing_is_foretold():
+def test_crossings_count_the_points_of_slices():
     mesh = Mesh.of(*surfaces.sphere())
     count = level_set(mesh, WHOLE_BALL).crossings
     assert len(slice_mesh(mesh, WHOLE_BALL).points) == count + 19
 
 
-def test_nothing_has_no_edges():
+def test_topology_of_no_facets_is_empty():
     topology = Topology(np.zeros((0, 3), dtype=np.intp), 0)
     assert topology.edges.shape == (0, 2)
     assert topology.edge_of_side.shape == (0, 3)

@@ -45,7 +45,7 @@ def near(found, expected):
 
 
 @pytest.mark.parametrize("tool", TOOLS[:4], ids=lambda t: type(t).__name__)
-def test_pressed_into_a_plane_the_depth_is_how_far(tool):
+def test_depth_in_a_plane_is_the_offset(tool):
     tree = tree_of(plate())
     pressed = np.array([0.1e-3, 0.5e-3, 1.2e-3])
     tips = np.stack([[4e-3, 3e-3, -d] for d in pressed])
@@ -56,7 +56,7 @@ def test_pressed_into_a_plane_the_depth_is_how_far(tool):
     near(above.depths[0, 0], -2e-4)
 
 
-def test_a_leaning_flat_end_digs_its_rim_in():
+def test_depth_of_a_leaning_flat_end_is_that_of_its_rim():
     lean, radius = np.radians(10.0), 3e-3
     axis = np.array([np.sin(lean), 0.0, np.cos(lean)])
     found = touch(tree_of(plate()), FlatEnd(radius, flute=0.01), np.zeros((1, 3)), axis[None])
@@ -67,7 +67,7 @@ def test_a_leaning_flat_end_digs_its_rim_in():
     near(found.depths[0, 0], inside.max())
 
 
-def test_beside_a_wall_the_flank_and_the_holder_count():
+def test_depth_beside_a_wall_is_that_of_flank_and_holder():
     wall = np.array([[0.0, -0.1, 0.0], [0.0, 0.1, 0.0], [0.0, 0.1, 0.1], [0.0, -0.1, 0.1]])
     tree = tree_of((wall, np.array([[0, 1, 2], [0, 2, 3]])))
     tool = BallCutter(3e-3, flute=0.02, shank=(Cone(0.02, 2e-3, 2e-3),), holder=(Cone(0.02, 5e-3, 12e-3),))
@@ -85,7 +85,7 @@ def test_beside_a_wall_the_flank_and_the_holder_count():
 
 
 @pytest.mark.parametrize("ball", [True, False])
-def test_on_a_sphere_the_sag_between_points_is_the_depth(ball):
+def test_depth_on_a_sphere_is_the_sag_between_points(ball):
     """Poses in contact, chords between: the ball's centre passes below its circle by r (1 − cos(step / 2))."""
     big, radius, step = 0.05, 5e-3, np.radians(6.0)
     tree = tree_of(surfaces.sphere(big, 6))
@@ -105,7 +105,7 @@ def test_on_a_sphere_the_sag_between_points_is_the_depth(ball):
     assert not touch(tree, tool, tips, axes, threshold=1e-5).beyond(1e-5).any()
 
 
-def test_in_a_torus_groove_a_ball_larger_than_the_groove_digs_in():
+def test_depth_of_a_ball_larger_than_a_torus_groove():
     """A ball on the inner equator of a torus: along the ring the surface is hollow with radius R − r."""
     major, minor = 0.04, 0.015
     tree = tree_of(surfaces.torus(major, minor, (320, 160)))
@@ -163,7 +163,7 @@ def inside(solid, r, z):
 
 @settings(max_examples=12, deadline=None)
 @given(seed=st.integers(0, 100_000), which=st.integers(0, len(TOOLS) - 1))
-def test_random_motions_are_never_shallower_than_their_samples(seed, which):
+def test_depth_of_random_motions_is_at_least_that_of_samples(seed, which):
     rng, tool = np.random.default_rng(seed), TOOLS[which]
     vertices = rng.uniform(-0.012, 0.012, (12, 3)) - 0.004 * UP
     mesh = Mesh.of(vertices, np.arange(12).reshape(4, 3))
@@ -180,7 +180,7 @@ def test_random_motions_are_never_shallower_than_their_samples(seed, which):
 
 
 @pytest.mark.parametrize("name", ["1002_tray_bottom.STL", "octagonal_pocket.stl", "facade_infill_open_mid_res.stl"])
-def test_drop_cutter_of_another_library_agrees_on_real_parts(parts, name):
+def test_depth_matches_the_drop_cutter_of_opencamlib_on_real_parts(parts, name):
     """Where its ball rests, ours touches; pressed on by 50 µm it gouges, by at most that."""
     ocl = pytest.importorskip("opencamlib", reason="opencamlib has no wheel for this Python")
     unit = "m" if name.startswith("octagonal") else "mm"
@@ -212,6 +212,6 @@ def test_drop_cutter_of_another_library_agrees_on_real_parts(parts, name):
     assert (pressed <= 5e-5 + 2e-6).all()
 
 
-def test_one_pose_is_no_motion():
+def test_sweep_refuses_a_single_pose():
     with pytest.raises(ToolpathError, match="two poses"):
         sweep(tree_of(plate()), TOOLS[0], np.zeros((1, 3)), UP[None])

@@ -72,7 +72,7 @@ def test_round_trip(tmp_path, name, seed):
 
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10**6), name=st.sampled_from(sorted(FORMATS)))
-def test_round_trip_of_anything(tmp_path_factory, seed, name):
+def test_round_trip_of_random_toolpaths(tmp_path_factory, seed, name):
     rng = np.random.default_rng(seed)
     scale = 10.0 ** rng.uniform(-4, 0)
     tips, axes = rng.normal(size=(9, 3)) * scale, rng.normal(size=(9, 3))
@@ -85,7 +85,7 @@ def test_round_trip_of_anything(tmp_path_factory, seed, name):
     round_trip(name, path, tmp_path_factory.mktemp("formats"))
 
 
-def test_suffixes_tell_the_format():
+def test_format_of_a_suffix():
     assert format_of("a/PART.APT").name == "apt"
     assert format_of("x.robodk.csv").name == "robodk"
     assert format_of("x.csv").name == "csv"
@@ -124,7 +124,7 @@ M2
 """
 
 
-def test_apt_as_others_write_it(tmp_path):
+def test_apt_of_other_programs(tmp_path):
     (tmp_path / "a.apt").write_text(APT)
     path = read_toolpath(tmp_path / "a.apt")
     np.testing.assert_allclose(path.tips, np.array([[0, 0, 1], [0, 0, 0], [1, 0, 0]]) * 0.0254, atol=1e-15)
@@ -188,7 +188,7 @@ def test_gcode_dwells_and_exact_stops(tmp_path, name, blocks, expected):
     assert stands(path) == expected
 
 
-def test_rotary_conventions_are_those_of_their_machines(tmp_path):
+def test_rotary_angles_match_rotation_matrices(tmp_path):
     """XYZAB against rotation matrices of the kinematics notes, XYZBC against C on B."""
     from scipy.spatial.transform import Rotation
 

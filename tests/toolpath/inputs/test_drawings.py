@@ -57,7 +57,7 @@ def test_dxf_entities_have_their_size(tmp_path):
         read_lines(path, 1e-6)
 
 
-def test_points_by_line_and_by_empty_row(tmp_path):
+def test_points_are_split_by_line_and_by_empty_row(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("# remark\nline,x_mm,y_cm,z_m\na,1,2,3\na,2,2,3\nb,0,0,0\nb,1,1,1\n\nb,5,5,5\nb,6,6,6\n")
     lines = read_points(path)
@@ -124,7 +124,7 @@ LEFT_OUT = {
 
 
 @pytest.mark.parametrize("name", LEFT_OUT)
-def test_what_would_be_left_out_is_told(tmp_path, name):
+def test_drawings_with_text_blocks_or_pictures_are_refused(tmp_path, name):
     content, message = LEFT_OUT[name]
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ToolpathError, match=message) as caught:
@@ -132,7 +132,7 @@ def test_what_would_be_left_out_is_told(tmp_path, name):
     assert "\n" not in str(caught.value)
 
 
-def test_what_shows_no_line_is_passed_over(tmp_path):
+def test_drawings_entities_without_lines_are_ignored(tmp_path):
     path = tmp_path / "a.svg"
     path.write_text(SVG.format('<title>N 1</title><defs><text id="t">N</text></defs><text/><circle r="3"/>'))
     assert len(read_lines(path, 1e-5)) == 1

@@ -12,7 +12,7 @@ from pentapod.toolpath import lettering
 from pentapod.toolpath.inputs.lettering import CAPITAL, stroke_font
 
 
-def test_every_printable_character_is_there():
+def test_font_has_every_printable_character():
     assert set(string.printable[:95]) <= set(stroke_font())
     assert set("ÄÖÜäöüß°±µ×Ø") <= set(stroke_font())
     for character, glyph in stroke_font().items():
@@ -26,7 +26,7 @@ def test_every_printable_character_is_there():
             assert stroke[:, 0].max() <= glyph.advance + 0.9
 
 
-def test_strokes_have_no_jumps():
+def test_font_strokes_have_no_jumps():
     """What one stroke draws is one line: no step is longer than a letter is high."""
     for glyph in stroke_font().values():
         for stroke in glyph.strokes:
@@ -35,19 +35,19 @@ def test_strokes_have_no_jumps():
 
 
 @pytest.mark.parametrize("letter", string.ascii_uppercase + string.digits)
-def test_capitals_and_digits_are_as_high_as_asked_for(letter):
+def test_lettering_has_the_height_of_capitals(letter):
     points = np.concatenate(lettering(letter, 7e-3))
     assert np.ptp(points[:, 1]) == pytest.approx(7e-3 * (10.8 / 10 if letter == "Q" else 1.0), rel=1e-2)
 
 
-def test_letters_differ():
+def test_font_letters_differ():
     shapes = {c: np.concatenate(g.strokes) for c, g in stroke_font().items() if g.strokes}
     for a, one in shapes.items():
         for b, two in shapes.items():
             assert a == b or one.shape != two.shape or np.abs(one - two).max() > 0.1, (a, b)
 
 
-def test_lines_and_alignment():
+def test_lettering_of_lines_and_alignment():
     sides = ("left", "centre", "right")
     left, centre, right = (lettering("AAAA\nA", 1.0, align=side)[-1][:, 0].mean() for side in sides)
     assert left < centre < right
@@ -64,6 +64,6 @@ def test_lines_and_alignment():
     ("text", "align", "message"),
     [("", "left", "no text"), ("語", "left", "no such character"), ("A", "top", "alignment")],
 )
-def test_what_cannot_be_written_is_said(text, align, message):
+def test_lettering_refuses_unknown_characters_and_alignment(text, align, message):
     with pytest.raises(ToolpathError, match=message):
         lettering(text, 1e-3, align=align)
