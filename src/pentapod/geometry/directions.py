@@ -33,13 +33,13 @@ def partway(start: Floats, end: Floats, share: Floats) -> Floats:
     Between opposite vectors, which no single great circle joins, one of them is taken.
     """
     angle = np.asarray(share * angle_between(start, end))[..., None]
-    aside = end - np.einsum("...i,...i->...", start, end)[..., None] * start
-    length = np.linalg.norm(aside, axis=-1, keepdims=True)
-    any_way = tangent_frame(start)[0]
-    aside = np.where(length > 1e-12, aside / np.where(length > 1e-12, length, 1.0), any_way)
+    across = end - np.einsum("...i,...i->...", start, end)[..., None] * start
+    length = np.linalg.norm(across, axis=-1, keepdims=True)
+    any_across = tangent_frame(start)[0]
+    across = np.where(length > 1e-12, across / np.where(length > 1e-12, length, 1.0), any_across)
     # For nearly opposite vectors the difference keeps few digits: orthogonalise once more.
-    aside = normalised(aside - np.einsum("...i,...i->...", start, aside)[..., None] * start)
-    mixed = np.cos(angle) * start + np.sin(angle) * aside
+    across = normalised(across - np.einsum("...i,...i->...", start, across)[..., None] * start)
+    mixed = np.cos(angle) * start + np.sin(angle) * across
     return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
 
 

@@ -112,10 +112,10 @@ class Patch:
         border = self.topology.edges[~self.joins]
         if not len(border):
             return Patch(self.vertices[:0], self.faces[:0], self.normals[:0]), np.zeros(0, dtype=np.bool_)
-        start, way = self.vertices[border[:, 0]], self.vertices[border[:, 1]] - self.vertices[border[:, 0]]
-        counts = np.ceil(np.linalg.norm(way, axis=1) / longest).astype(np.intp) + 1
+        start, along = self.vertices[border[:, 0]], self.vertices[border[:, 1]] - self.vertices[border[:, 0]]
+        counts = np.ceil(np.linalg.norm(along, axis=1) / longest).astype(np.intp) + 1
         edge, number = members(counts)
-        tree = KDTree(start[edge] + (number / np.maximum(counts - 1, 1)[edge])[:, None] * way[edge])
+        tree = KDTree(start[edge] + (number / np.maximum(counts - 1, 1)[edge])[:, None] * along[edge])
         # Drop distant facets and halve long edges in turns, so that distant facets are never refined.
         sides = self.vertices[np.roll(self.faces, -1, axis=1)] - self.vertices[self.faces]
         patch, size = self, max(float(np.linalg.norm(sides, axis=2).max()), longest)

@@ -75,22 +75,22 @@ def facet_distance(p: Floats, x: float, y: float, z: float, g: Floats) -> float:
 
 
 @kernel
-def slope(g: Floats, distance: float, way: Floats) -> float:
+def slope(g: Floats, distance: float, travel: Floats) -> float:
     """Return the derivative of a distance by time, from the vector g (3,) to the point; 0 at distance 0."""
     if distance <= 0.0:
         return 0.0
-    return (g[0] * way[0] + g[1] * way[1] + g[2] * way[2]) / distance
+    return (g[0] * travel[0] + g[1] * travel[1] + g[2] * travel[2]) / distance
 
 
 @kernel
-def lower_bound(box: Floats, start: Floats, way: Floats, enough: float, g: Floats) -> float:
+def lower_bound(box: Floats, start: Floats, travel: Floats, enough: float, g: Floats) -> float:
     """Return the lower bound by the tangents at both ends of the distance of a moving point from a box (15,)."""
     first = _box_distance(box, start[0], start[1], start[2], g)
-    start_slope = slope(g, first, way)
+    start_slope = slope(g, first, travel)
     if start_slope >= 0.0 or first + start_slope >= enough:
         return max(first + min(start_slope, 0.0), 0.0)
-    last = _box_distance(box, start[0] + way[0], start[1] + way[1], start[2] + way[2], g)
-    end_slope = slope(g, last, way)
+    last = _box_distance(box, start[0] + travel[0], start[1] + travel[1], start[2] + travel[2], g)
+    end_slope = slope(g, last, travel)
     if end_slope <= 0.0:
         return last
     # Where the tangents meet.
@@ -99,15 +99,15 @@ def lower_bound(box: Floats, start: Floats, way: Floats, enough: float, g: Float
 
 
 @kernel
-def nearest_time(p: Floats, start: Floats, way: Floats, g: Floats) -> tuple[float, float]:
+def nearest_time(p: Floats, start: Floats, travel: Floats, g: Floats) -> tuple[float, float]:
     """Return the minimum distance of a moving point from a facet, and when; g (3,) is left as it is then."""
     t0, t1 = 0.0, 1.0
     d0 = facet_distance(p, start[0], start[1], start[2], g)
-    s0 = slope(g, d0, way)
+    s0 = slope(g, d0, travel)
     if s0 >= 0.0:
         return d0, 0.0
-    d1 = facet_distance(p, start[0] + way[0], start[1] + way[1], start[2] + way[2], g)
-    s1 = slope(g, d1, way)
+    d1 = facet_distance(p, start[0] + travel[0], start[1] + travel[1], start[2] + travel[2], g)
+    s1 = slope(g, d1, travel)
     if s1 <= 0.0:
         return d1, 1.0
     best, when = (d0, 0.0) if d0 < d1 else (d1, 1.0)
@@ -117,8 +117,8 @@ def nearest_time(p: Floats, start: Floats, way: Floats, g: Floats) -> tuple[floa
             break
         # At a kink tangents converge slowly: every third time the middle is taken.
         t = 0.5 * (t0 + t1) if round_ % 3 == 2 or not t0 < meet < t1 else meet
-        d = facet_distance(p, start[0] + t * way[0], start[1] + t * way[1], start[2] + t * way[2], g)
-        s = slope(g, d, way)
+        d = facet_distance(p, start[0] + t * travel[0], start[1] + t * travel[1], start[2] + t * travel[2], g)
+        s = slope(g, d, travel)
         if d < best:
             best, when = d, t
         if s < 0.0:
@@ -127,5 +127,5 @@ def nearest_time(p: Floats, start: Floats, way: Floats, g: Floats) -> tuple[floa
             t1, d1, s1 = t, d, s
         else:
             break
-    facet_distance(p, start[0] + when * way[0], start[1] + when * way[1], start[2] + when * way[2], g)
+    facet_distance(p, start[0] + when * travel[0], start[1] + when * travel[1], start[2] + when * travel[2], g)
     return best, when

@@ -140,17 +140,17 @@ class MeshDistance:
             turns[k] = np.arctan2(above, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb).sum() / (2 * np.pi)
         return np.abs(turns) > 0.5
 
-    def _nearest(self, starts: Floats, ways: Floats, within: float) -> tuple[Floats, Floats, Floats, Ints]:
-        """Return distances, places on the ways, offsets from the mesh, and facets in tree order (−1: too far)."""
+    def _nearest(self, starts: Floats, travels: Floats, within: float) -> tuple[Floats, Floats, Floats, Ints]:
+        """Return distances, shares of the travels, offsets from the mesh, and facets in tree order (−1: too far)."""
         from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415  loads numba
 
         count = len(starts)
         distance, where = np.full(count, within), np.zeros((count, 4))
         facet = np.full(count, -1, dtype=np.intp)
         tree = self.tree
-        points, ways = np.ascontiguousarray(starts), np.ascontiguousarray(ways)
-        nearest_all(points, ways, tree.corners, tree.boxes, tree.starts, within, True, distance, where, facet)
-        offset = np.where(facet[:, None] >= 0, starts + where[:, :1] * ways - where[:, 1:], 0.0)
+        points, travels = np.ascontiguousarray(starts), np.ascontiguousarray(travels)
+        nearest_all(points, travels, tree.corners, tree.boxes, tree.starts, within, True, distance, where, facet)
+        offset = np.where(facet[:, None] >= 0, starts + where[:, :1] * travels - where[:, 1:], 0.0)
         return distance, where[:, 0], offset, facet
 
     def _inside(self, points: Floats, offset: Floats, facet: Ints) -> Bools:
@@ -207,9 +207,9 @@ def _feature(corners: Floats, points: Floats) -> Ints:
     return np.where(on_corner, 4 + shares.argmax(axis=1), np.where(on_side, 1 + shares.argmin(axis=1), 0))
 
 
-def _part_in_box(start: Floats, way: Floats, bounds: Floats) -> tuple[Floats, Floats]:
+def _part_in_box(start: Floats, travel: Floats, bounds: Floats) -> tuple[Floats, Floats]:
     """Return the shares (M,), (M,) between which each segment is in the box; 0 and 1 where it never is."""
-    safe = np.where(way == 0.0, 1e-300, way)
+    safe = np.where(travel == 0.0, 1e-300, travel)
     with np.errstate(over="ignore"):
         first, second = (bounds[0] - start) / safe, (bounds[1] - start) / safe
     low = np.clip(np.minimum(first, second).max(axis=1), 0.0, 1.0)

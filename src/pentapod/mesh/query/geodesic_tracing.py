@@ -44,8 +44,8 @@ def neighbours(patch: Patch) -> Ints:
     return other.reshape(-1, 3)
 
 
-def traced(patch: Patch, beside: Ints, start: SurfaceRays, lengths: Floats) -> SurfaceRays:
-    """Return the ends of rays of `lengths` (N,) metres over a patch. beside: its `neighbours`."""
+def traced(patch: Patch, adjacent: Ints, start: SurfaceRays, lengths: Floats) -> SurfaceRays:
+    """Return the ends of rays of `lengths` (N,) metres over a patch. adjacent: its `neighbours`."""
     facets, weights = start.facets.copy(), start.weights.copy()
     directions, landed = start.directions.copy(), start.landed.copy()
     left = np.where(landed, lengths, 0.0).astype(np.float64)
@@ -72,7 +72,7 @@ def traced(patch: Patch, beside: Ints, start: SurfaceRays, lengths: Floats) -> S
         weights[going] = w / w.sum(axis=1, keepdims=True)
         left[going] -= advance
         going, side, f = going[~ends], side[~ends], f[~ends]
-        after = beside[f, side]
+        after = adjacent[f, side]
         left_patch = after < 0
         landed[going[left_patch]] = False
         going, side, f, after = going[~left_patch], side[~left_patch], f[~left_patch], after[~left_patch]

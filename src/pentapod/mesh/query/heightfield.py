@@ -17,12 +17,12 @@ from pentapod.mesh.mesh import Mesh
 class GridOptions:
     """facets_per_cell: on average. most_entries: of facets in cells; a coarser grid is made where there were more.
 
-    aside: metres to both sides of a point at which `hides` looks.
+    sideways: metres to both sides of a point at which `hides` looks.
     """
 
     facets_per_cell: float = 2.0
     most_entries: int = 20_000_000
-    aside: float = 1e-7
+    sideways: float = 1e-7
 
 
 OPTIONS = GridOptions()
@@ -92,9 +92,9 @@ class HeightField:
         Tested a little to either side, and true only if it is on both: a point at the foot of a wall is not hidden by
         it, a point under a seam between two facets is.
         """
-        aside = OPTIONS.aside * (0.83 * self._frame[0] + 0.56 * self._frame[1])
+        sideways = OPTIONS.sideways * (0.83 * self._frame[0] + 0.56 * self._frame[1])
         height = points @ self.view + slack
-        return (self.topmost(points + aside)[2] > height) & (self.topmost(points - aside)[2] > height)
+        return (self.topmost(points + sideways)[2] > height) & (self.topmost(points - sideways)[2] > height)
 
     def _candidates(self, points: Floats, margin: float) -> tuple[Ints, Ints, Floats]:
         """Return pairs (M,), (M,) of points and facets over each other, and barycentric weights (M, 3)."""

@@ -20,27 +20,27 @@ STACK = 128
 
 
 @kernel
-def _bound(box: Floats, start: Floats, way: Floats, square: float, enough: float, g: Floats) -> float:
+def _bound(box: Floats, start: Floats, travel: Floats, square: float, enough: float, g: Floats) -> float:
     """Return a lower bound on the distance of a segment, of squared length `square`, from a box (15,).
 
     Where the square is negative only tangents are used, which is best for short segments near the mesh.
     """
     if square < 0.0:
-        return lower_bound(box, start, way, enough, g)
+        return lower_bound(box, start, travel, enough, g)
     x, y, z = box[0] - start[0], box[1] - start[1], box[2] - start[2]
     t = 0.0
     if square > 0.0:
-        t = min(max((x * way[0] + y * way[1] + z * way[2]) / square, 0.0), 1.0)
-    x, y, z = x - t * way[0], y - t * way[1], z - t * way[2]
+        t = min(max((x * travel[0] + y * travel[1] + z * travel[2]) / square, 0.0), 1.0)
+    x, y, z = x - t * travel[0], y - t * travel[1], z - t * travel[2]
     ball = math.sqrt(x * x + y * y + z * z) - box_radius(box)
     if ball >= enough:
         return ball
-    return max(ball, lower_bound(box, start, way, enough, g))
+    return max(ball, lower_bound(box, start, travel, enough, g))
 
 
 @kernel
 def _segment_distance(
-    p: Floats, start: Floats, way: Floats, square: float, enough: float, g: Floats
+    p: Floats, start: Floats, travel: Floats, square: float, enough: float, g: Floats
 ) -> tuple[float, float]:
     """Return the distance of a segment from a facet (3, 3), and where on it; any value above `enough` if it is larger.
 
@@ -53,15 +53,15 @@ def _segment_distance(
     mz = (p[0, 2] + p[1, 2] + p[2, 2]) / 3.0 - start[2]
     t = 0.0
     if square > 0.0:
-        t = min(max((mx * way[0] + my * way[1] + mz * way[2]) / square, 0.0), 1.0)
+        t = min(max((mx * travel[0] + my * travel[1] + mz * travel[2]) / square, 0.0), 1.0)
     low0 = low1 = -math.inf
     s0, s1 = -1.0, 1.0
     best, when = math.inf, t
     for round_ in range(ROUNDS):
-        d = facet_distance(p, start[0] + t * way[0], start[1] + t * way[1], start[2] + t * way[2], g)
+        d = facet_distance(p, start[0] + t * travel[0], start[1] + t * travel[1], start[2] + t * travel[2], g)
         if d < best:
             best, when = d, t
-        s = slope(g, d, way)
+        s = slope(g, d, travel)
         if s < 0.0 and t < 1.0:
             t0, low0, s0 = t, d, s
         elif s > 0.0 and t > 0.0:
@@ -80,14 +80,14 @@ def _segment_distance(
         # At a kink tangents converge slowly: every third time the middle is taken.
         t = 0.5 * (t0 + t1) if round_ % 3 == 2 or not t0 < meet < t1 else meet
     if best < enough:
-        facet_distance(p, start[0] + when * way[0], start[1] + when * way[1], start[2] + when * way[2], g)
+        facet_distance(p, start[0] + when * travel[0], start[1] + when * travel[1], start[2] + when * travel[2], g)
     return best, when
 
 
 @kernel
 def nearest_all(
     starts: Floats,
-    ways: Floats,
+    travels: Floats,
     corners: Floats,
     boxes: Floats,
     leaf_starts: Ints,
@@ -97,18 +97,18 @@ def nearest_all(
     where: Floats,
     facets: Ints,
 ) -> None:
-    """Fill distances (M,), where (M, 4): place on the way and mesh point, and facets (M,), −1 where none is nearer.
+    """Fill distances (M,), where (M, 4): share of the travel and mesh point, and facets (M,), −1 where none is nearer.
 
-    starts, ways (M, 3): each point moves linearly from starts to starts + ways. within: only facets nearer than this
-    are searched. far: motions may be long and far from the mesh; otherwise they are short and near it.
+    starts, travels (M, 3): each point moves linearly from starts to starts + travels. within: only facets nearer than
+    this are searched. far: motions may be long and far from the mesh; otherwise they are short and near it.
     """
     nodes, bounds, g = np.empty(STACK, dtype=np.intp), np.empty(STACK), np.empty(3)
     leaves = len(leaf_starts) - 1
     for m in range(len(starts)):
-        start, way, best = starts[m], ways[m], within
-        square = way[0] * way[0] + way[1] * way[1] + way[2] * way[2] if far else -1.0
+        start, travel, best = starts[m], travels[m], within
+        square = travel[0] * travel[0] + travel[1] * travel[1] + travel[2] * travel[2] if far else -1.0
         facets[m] = -1
-        nodes[0], bounds[0] = 0, _bound(boxes[0], start, way, square, best, g)
+        nodes[0], bounds[0] = 0, _bound(boxes[0], start, travel, square, best, g)
         count = 1
         while count > 0:
             count -= 1
@@ -117,17 +117,17 @@ def nearest_all(
                 continue
             leaf = node - (leaves - 1)
             if leaf < 0:
-                near = _bound(boxes[2 * node + 1], start, way, square, best, g)
-                last = _bound(boxes[2 * node + 2], start, way, square, best, g)
+                near = _bound(boxes[2 * node + 1], start, travel, square, best, g)
+                last = _bound(boxes[2 * node + 2], start, travel, square, best, g)
                 count = open_node(node, near, last, best, count, nodes, bounds)
             else:
                 for k in range(leaf_starts[leaf], leaf_starts[leaf + 1]):
                     if far:
-                        distance, t = _segment_distance(corners[k], start, way, square, best, g)
+                        distance, t = _segment_distance(corners[k], start, travel, square, best, g)
                     else:
-                        distance, t = nearest_time(corners[k], start, way, g)
+                        distance, t = nearest_time(corners[k], start, travel, g)
                     if distance < best:
                         best, facets[m] = distance, k
                         distances[m], where[m, 0] = distance, t
                         for j in range(3):
-                            where[m, 1 + j] = start[j] + t * way[j] - g[j]
+                            where[m, 1 + j] = start[j] + t * travel[j] - g[j]

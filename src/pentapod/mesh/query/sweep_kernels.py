@@ -101,7 +101,7 @@ def _derivatives(solid: Floats, motion: Floats, pose: Floats, x: float, y: float
     g[1] = scale * ry + by_z * j
     g[2] = scale * rz + by_z * k
     g[VALUE] = f
-    # The body moves with velocity V + ω × w at the point; seen from it the point moves the other way.
+    # The body moves with velocity V + ω × w at the point; in its frame the point moves the opposite way.
     vx = motion[6] + motion[13] * wz - motion[14] * wy
     vy = motion[7] + motion[14] * wx - motion[12] * wz
     vz = motion[8] + motion[12] * wy - motion[13] * wx
@@ -112,8 +112,8 @@ def _derivatives(solid: Floats, motion: Floats, pose: Floats, x: float, y: float
 @kernel
 def _deviation_bound(motion: Floats, g: Floats, tau: float, size: float) -> float:
     """Return the bound on how far f falls below its tangent plane within ± tau, for offsets up to `size`."""
-    angle, way = motion[16], motion[15]
-    bend = angle * angle * (g[RADIUS] + way * tau + size) + 2.0 * angle * way
+    angle, travel = motion[16], motion[15]
+    bend = angle * angle * (g[RADIUS] + travel * tau + size) + 2.0 * angle * travel
     return abs(g[RATE]) * tau + 0.5 * tau * tau * bend + angle * tau * size
 
 

@@ -93,7 +93,8 @@ def sweep(
     tips, axes = as_floats(tips, "tips", (None, 3)), as_floats(axes, "axes", (None, 3))
     if len(tips) < 2:
         raise ToolpathError("a motion needs two poses", value=len(tips))
-    return _swept(tree, tool, tips[:-1:every], axes[:-1:every], tips[1::every], axes[1::every], threshold, progress)
+    start, end = (tips[:-1:every], axes[:-1:every]), (tips[1::every], axes[1::every])
+    return _swept(tree, tool, start, end, threshold, RESOLUTION_M, progress)
 
 
 def touch(
@@ -111,28 +112,27 @@ def touch(
     resolution: metres to which depths are exact; a coarser one is faster.
     """
     tips, axes = as_floats(tips, "tips", (None, 3)), as_floats(axes, "axes", (None, 3))
-    return _swept(tree, tool, tips, axes, tips, axes, threshold, progress, resolution)
+    return _swept(tree, tool, (tips, axes), (tips, axes), threshold, resolution, progress)
 
 
 def _swept(
     tree: FacetTree,
     tool: Body,
-    tips0: Floats,
-    axes0: Floats,
-    tips1: Floats,
-    axes1: Floats,
+    start: tuple[Floats, Floats],
+    end: tuple[Floats, Floats],
     threshold: float,
+    resolution: float,
     progress: Progress,
-    resolution: float = RESOLUTION_M,
 ) -> Sweep:
     from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415 - loads numba
     from pentapod.mesh.query.sweep_kernels import sweep_all  # noqa: PLC0415
 
     solids = tool.solids
-    count, parts = len(tips0), len(solids)
+    motions = _motions(start, end, tool.tilt_centre)
+    count, parts = len(motions), len(solids)
     depths, where = np.full((parts, count), -np.inf), np.full((parts, count, 4), np.nan)
     facets = np.full((parts, count), -1, dtype=np.intp)
-    motions = _motions(tips0, axes0, tips1, axes1, tool.tilt_centre)
+    hierarchy = (tree.corners, tree.boxes, tree.starts)
     for k, solid in enumerate(solids):
         ball = solid.is_ball and solid.low == tool.tilt_centre
         numbers = np.array(solid.numbers)
@@ -140,23 +140,21 @@ def _swept(
             rows = slice(first, first + CHUNK)
             progress("gouge", (k + first / count) / parts)
             found = (depths[k, rows], where[k, rows], facets[k, rows])
-            place = (tree.corners, tree.boxes, tree.starts)
             if ball:
-                way = np.ascontiguousarray(motions[rows, 6:9])
-                nearest_all(
-                    np.ascontiguousarray(motions[rows, :3]), way, *place, solid.rounding - threshold, False, *found
-                )
+                centres, travels = (np.ascontiguousarray(motions[rows, at : at + 3]) for at in (0, 6))
+                nearest_all(centres, travels, *hierarchy, solid.rounding - threshold, False, *found)
                 depths[k, rows] = np.where(facets[k, rows] < 0, -np.inf, solid.rounding - depths[k, rows])
             else:
-                sweep_all(numbers, motions[rows], *place, threshold, resolution, *found)
+                sweep_all(numbers, motions[rows], *hierarchy, threshold, resolution, *found)
     kinds = np.array([KINDS.index(solid.kind) for solid in solids], dtype=np.intp)
     return _by_kind(depths, where, np.where(facets < 0, -1, tree.facets[facets]), kinds)
 
 
-def _motions(tips0: Floats, axes0: Floats, tips1: Floats, axes1: Floats, tilt_centre: float) -> Floats:
+def _motions(start_pose: tuple[Floats, Floats], end_pose: tuple[Floats, Floats], tilt_centre: float) -> Floats:
     """Return the motions (M, 18) in the layout of `sweep_kernels.deepest`."""
+    (tips0, axes0), (tips1, axes1) = start_pose, end_pose
     start, end = tips0 + tilt_centre * axes0, tips1 + tilt_centre * axes1
-    way = end - start
+    travel = end - start
     angle = angle_between(axes0, axes1)
     # The axis a quarter turn later; between opposite axes any direction will do.
     ahead = axes1 - (axes0 * axes1).sum(axis=1, keepdims=True) * axes0
@@ -164,9 +162,9 @@ def _motions(tips0: Floats, axes0: Floats, tips1: Floats, axes1: Floats, tilt_ce
     ahead = np.where(length > 1e-12, ahead / np.where(length > 1e-12, length, 1.0), tangent_frame(axes0)[0])
     angle = np.where((length[:, 0] > 1e-12) | (angle > 1.0), angle, 0.0)
     spin = angle[:, None] * np.cross(axes0, ahead)
-    size = np.linalg.norm(way, axis=1)
+    size = np.linalg.norm(travel, axis=1)
     tall = np.full((len(start), 1), tilt_centre)
-    return np.ascontiguousarray(np.hstack([start, axes0, way, ahead, spin, size[:, None], angle[:, None], tall]))
+    return np.ascontiguousarray(np.hstack([start, axes0, travel, ahead, spin, size[:, None], angle[:, None], tall]))
 
 
 def _by_kind(depths: Floats, where: Floats, facets: Ints, kinds: Ints) -> Sweep:

@@ -176,9 +176,9 @@ def _corners(svg: Any, segment: Any) -> Floats | None:
 
 
 @cache
-def _bernstein(degree: int, pieces: int) -> Floats:
-    """Return the Bernstein polynomials (pieces + 1, degree + 1) at evenly spaced parameters."""
-    t = np.linspace(0.0, 1.0, pieces + 1)[:, None]
+def _bernstein(degree: int, intervals: int) -> Floats:
+    """Return the Bernstein polynomials (intervals + 1, degree + 1) at evenly spaced parameters."""
+    t = np.linspace(0.0, 1.0, intervals + 1)[:, None]
     k = np.arange(degree + 1)
-    ways = np.array({2: (1, 2, 1), 3: (1, 3, 3, 1)}[degree])
-    return ways * t**k * (1.0 - t) ** (degree - k)
+    binomials = np.array({2: (1, 2, 1), 3: (1, 3, 3, 1)}[degree])
+    return binomials * t**k * (1.0 - t) ** (degree - k)
