@@ -19,7 +19,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.view.opened import open_run
+from pentapod.view.opened_run import open_run
 from pentapod.view.study import Study
 
 PLACES, LOOPED = 20, 100

@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from pentapod import Component, Machine, Refusal, Toolpath, plan
-from pentapod.cli.commands.explain import blames_text
+from pentapod.cli.commands.explain import shortfalls_text
 from pentapod.toolpath import Segment, SegmentKind
 
 LENGTH, WIDTH, RADIUS, TILT = 0.62, 0.44, 1.2, np.radians(15.0)
@@ -45,7 +45,7 @@ def main() -> None:
     answer = plan(toolpath, Machine.load("desk"), tilt=TILT, component=Component(1, 1))
     if not isinstance(answer, Refusal):
         raise SystemExit("the plate fits: this example needs a larger one")
-    print(f"refused: {answer.cause}\n\n{blames_text(answer)}")
+    print(f"refused: {answer.cause}\n\n{shortfalls_text(answer)}")
     draw(toolpath, answer, out)
 
 

@@ -19,13 +19,13 @@ def block(language: str) -> str:
     return found[1]
 
 
-def test_the_job_is_a_job(tmp_path):
+def test_readme_job_loads(tmp_path):
     (tmp_path / "dome.stl").write_bytes((ROOT / "toolpaths" / "dome.stl").read_bytes())
     (tmp_path / "job.toml").write_text(block("toml"), encoding="utf-8")
     assert Job.load(tmp_path / "job.toml").tool.diameter_mm == 6
 
 
-def test_the_python_runs(tmp_path, monkeypatch):
+def test_readme_python_runs(tmp_path, monkeypatch):
     code = block("python")
     for old, new in (
         ('"toolpaths/dome.stl"', repr(str(ROOT / "toolpaths" / "dome.stl"))),

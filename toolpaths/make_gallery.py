@@ -16,7 +16,8 @@ from matplotlib.collections import LineCollection, PolyCollection
 
 from pentapod.base.arrays import Floats
 from pentapod.job import Job
-from pentapod.job.build.values import job_mesh, job_toolpath
+from pentapod.job.build.toolpath import job_toolpath
+from pentapod.job.build.values import job_mesh
 from pentapod.toolpath import Mesh, PathReport, SegmentKind, Toolpath
 
 FOLDER = Path(__file__).parent

@@ -2,7 +2,7 @@
 
     mesh → Toolpath → PlacedPath → LegPath → Trajectory → Program → Verdict
 
-The names below, in the order of the flow, are loaded when they are first used: `import pentapod` is light.
+The names below are imported when they are first used, so that `import pentapod` is quick.
 """
 
 from __future__ import annotations
@@ -129,14 +129,14 @@ if not TYPE_CHECKING:  # type checkers read the imports above
 
 
 def __getattr__(name: str) -> Any:
-    """Load a name of `__all__` from where it lives. Raises AttributeError for others."""
+    """Import a name of `__all__`. Raises AttributeError for others."""
     if name not in _HOMES:
         raise AttributeError(f"module 'pentapod' has no attribute {name!r}")
     home = import_module(f"pentapod.{_HOMES[name]}")
-    if name == "verify":  # the package of this name, which can be called
+    if name == "verify":  # a package that can be called
         return home
     value = getattr(home, name)
-    globals()[name] = value  # so that it is looked up once
+    globals()[name] = value
     return value
 
 

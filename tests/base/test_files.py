@@ -6,7 +6,7 @@ from pentapod.base.errors import InputError
 from pentapod.base.files import atomic_write
 
 
-def test_success_replaces_and_leaves_nothing_else(tmp_path):
+def test_atomic_write_replaces_and_leaves_nothing_else(tmp_path):
     target = tmp_path / "verdict.json"
     target.write_text("old")
     with atomic_write(target) as temporary:
@@ -27,7 +27,7 @@ def interrupted(target, error):
 
 @pytest.mark.parametrize("interruption", [ValueError, KeyboardInterrupt, SystemExit])
 @pytest.mark.parametrize("old", ["old", None])
-def test_interruption_keeps_the_old_file_or_none(tmp_path, interruption, old):
+def test_atomic_write_interrupted_keeps_the_old_file_or_none(tmp_path, interruption, old):
     target = tmp_path / "program.csv"
     if old is not None:
         target.write_text(old)
@@ -37,13 +37,13 @@ def test_interruption_keeps_the_old_file_or_none(tmp_path, interruption, old):
     assert old is None or target.read_text() == old
 
 
-def test_errors_of_the_writer_pass_through(tmp_path):
+def test_atomic_write_raises_errors_of_the_writer(tmp_path):
     with pytest.raises(OSError, match="disk full"):
         interrupted(tmp_path / "a", OSError("disk full"))
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_cannot_be_written_is_bad_input(tmp_path):
+def test_atomic_write_to_an_impossible_place_is_bad_input(tmp_path):
     (tmp_path / "file").write_text("")
     for target in (tmp_path, tmp_path / "missing" / "a.csv", tmp_path / "file" / "a.csv"):
         with pytest.raises(InputError, match="cannot be written") as caught, atomic_write(target):
@@ -52,7 +52,7 @@ def test_what_cannot_be_written_is_bad_input(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
-def test_new_files_have_the_usual_permissions(tmp_path):
+def test_atomic_write_keeps_the_usual_permissions(tmp_path):
     mask = os.umask(0o022)
     try:
         with atomic_write(tmp_path / "a") as temporary:

@@ -20,6 +20,7 @@ from pentapod.base.keys import Key, check_fields, check_size, declared, fields_f
 from pentapod.base.tables import Table, table_of
 from pentapod.base.units import from_si, split_key, to_si
 from pentapod.cutters import CUTTERS
+from pentapod.job.schema.tables import JobTables, table_model
 from pentapod.machine.tables import PARTS
 from pentapod.toolpath import STRATEGIES, GougeOptions, Orientation, Region
 
@@ -97,6 +98,7 @@ def test_every_default_is_the_same_in_si_and_in_the_unit_of_files():
         **PARTS,
         **CUTTERS,
         **{name: strategy.options for name, strategy in STRATEGIES.items()},
+        **{cls.__name__: cls for name in JobTables.model_fields for cls in table_model(name).declared_by},
     }
     for cls in parts.values():
         for item in declared(cls):

@@ -55,18 +55,18 @@ def test_a_package_names_a_thing_or_what_makes_it(things):
     ("name", "said"),
     [
         ("three", 'three: the entry point names no thing .*others:NUMBER.*expected a pentapod str.*package "others"'),
-        ("torn", 'torn: this thing cannot be loaded: ZeroDivisionError.*mend or remove the package "others"'),
-        ("gone", 'gone: this thing cannot be loaded: AttributeError.*mend or remove the package "others"'),
+        ("torn", 'torn: this thing cannot be loaded: ZeroDivisionError.*repair or remove the package "others"'),
+        ("gone", 'gone: this thing cannot be loaded: AttributeError.*repair or remove the package "others"'),
         ("spon", 'unknown thing.*did you mean "spoon"'),
     ],
 )
-def test_what_is_no_thing_is_one_line_that_names_the_package(things, name, said):
+def test_registry_errors_name_the_package(things, name, said):
     with pytest.raises(InputError, match=said) as caught:
         things.find(name)
     assert "\n" not in str(caught.value)
 
 
-def test_a_name_that_is_not_there(things):
+def test_registry_names_the_nearest_for_an_unknown_name(things):
     assert "knife" not in things
     with pytest.raises(KeyError):
         things["knife"]

@@ -30,7 +30,7 @@ min = 2
         (["x"], None),
     ],
 )
-def test_line_of(where: list[str], line: int | None) -> None:
+def test_line_of_a_key_in_toml(where: list[str], line: int | None) -> None:
     assert line_of(TEXT, where) == line
 
 

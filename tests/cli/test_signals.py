@@ -33,7 +33,7 @@ main()
 
 @pytest.mark.parametrize("imports", [30, 400, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 100, 200, 600))])
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
-def test_while_modules_are_loaded(imports, number, tmp_path):
+def test_signals_during_imports_end_the_command(imports, number, tmp_path):
     environment = {**os.environ, "IMPORTS": str(imports), "SIGNAL": str(int(number))}
     command = [sys.executable, "-c", AT_AN_IMPORT, "plan", str(OVERSIZE), "-o", str(tmp_path / "out")]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
@@ -44,7 +44,7 @@ def test_while_modules_are_loaded(imports, number, tmp_path):
 
 
 @pytest.mark.parametrize("number", SIGNALS)
-def test_while_it_plans(number, tmp_path):
+def test_signals_during_planning_end_the_command(number, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "notes.txt").write_text("mine")
     command = [sys.executable, "-c", MAIN, "plan", str(OVERSIZE), "-o", str(tmp_path / "out")]
@@ -62,7 +62,7 @@ def test_while_it_plans(number, tmp_path):
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["notes.txt"]
 
 
-def test_what_the_parent_ignores_stays_ignored(tmp_path):
+def test_signals_that_the_parent_ignores_stay_ignored(tmp_path):
     command = [sys.executable, "-c", f"import signal; signal.raise_signal(signal.SIGTERM); {MAIN}", "--version"]
     ignoring = lambda: signal.signal(signal.SIGTERM, signal.SIG_IGN)  # noqa: E731
     done = subprocess.run(command, preexec_fn=ignoring, capture_output=True, text=True, check=False)

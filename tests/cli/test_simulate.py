@@ -65,7 +65,7 @@ def test_plots_show_every_measure_with_its_extremes(planned, tmp_path, capsys):
     assert drawn.max() == pytest.approx(said["contour_error_mm"]["largest"], rel=1e-6)
 
 
-def test_a_bound_makes_it_a_check(planned, capsys):
+def test_simulate_within_a_bound_is_a_check(planned, capsys):
     assert simulate(planned, "--within", "1", "-q") == 0
     assert capsys.readouterr() == ("", "")
     assert simulate(planned, "--within", "0.0001", "-q") == 1
@@ -87,14 +87,14 @@ def test_drives_come_from_the_machine_file(planned, tmp_path, capsys):
     ("options", "words"),
     [(["--engine", "magic"], "magic"), (["--seed", "-1"], "seed"), (["--within", "0"], "within")],
 )
-def test_bad_options(planned, options, words, capsys):
+def test_simulate_refuses_bad_options(planned, options, words, capsys):
     assert simulate(planned, *options) == 2
     said = capsys.readouterr().err
     assert words in said
     assert said.count("\n") == 1
 
 
-def test_bad_files(planned, tmp_path, capsys):
+def test_simulate_refuses_bad_files(planned, tmp_path, capsys):
     job, program = planned
     assert run(["simulate", str(tmp_path / "none.csv"), "--job", job]) == 2
     assert run(["simulate", program, "--job", str(tmp_path / "none.toml")]) == 2
@@ -156,7 +156,7 @@ def test_options_of_the_other_engine(planned, options, words, capsys):
     assert said.count("\n") == 1
 
 
-def test_without_mujoco(planned, monkeypatch, capsys):
+def test_simulate_without_mujoco_names_the_extra(planned, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     assert simulate(planned, "--engine", "mujoco") == 2
     assert capsys.readouterr().err == 'error: mujoco: this engine needs MuJoCo; pip install "pentapod[sim]"\n'

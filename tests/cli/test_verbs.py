@@ -77,7 +77,7 @@ def test_json_and_quiet(make_job, tmp_path, capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def test_what_cannot_be_done_is_exit_code_1_with_the_reason(make_job, tmp_path, capsys):
+def test_a_refusal_is_exit_code_1_with_the_reason(make_job, tmp_path, capsys):
     job, out = make_job(TOO_FAR), tmp_path / "out"
     assert run(["plan", str(job), "-o", str(out)]) == 1
     said = capsys.readouterr()
@@ -201,7 +201,7 @@ def test_bad_arguments(arguments, tmp_path, capsys, monkeypatch):
         (["plan", "."], ".: this is a folder; expected a job file"),
     ],
 )
-def test_what_was_meant_is_told(arguments, words, tmp_path, capsys, monkeypatch):
+def test_mistyped_verbs_and_options_name_the_nearest(arguments, words, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert words in bad_input(arguments, tmp_path, capsys)
 
@@ -220,7 +220,7 @@ def bad_input(arguments: list[str], folder: Path, capsys: pytest.CaptureFixture[
     return said.err
 
 
-def test_bugs_are_told_from_bad_input(monkeypatch, capsys):
+def test_exit_code_3_is_an_error_of_pentapod(monkeypatch, capsys):
     def broken() -> None:
         raise ZeroDivisionError("one\ntwo")
 
@@ -274,7 +274,7 @@ def test_toolpath(make_job, tmp_path, capsys):
     assert run(["toolpath", str(job), "-o", str(tmp_path / "path.xyz")]) == 2
 
 
-def test_machines(capsys):
+def test_machine_list_and_check(capsys):
     assert run(["machine", "list", "--json"]) == 0
     assert "desk" in json.loads(capsys.readouterr().out)
     assert run(["machine", "check", "desk"]) == 0
@@ -352,7 +352,7 @@ def test_ctrl_c_in_the_search_for_a_placement_goes_on_with_the_best_so_far(make_
     assert "leg 1 too long" in said  # the table of limits
 
 
-def test_explain_prints_the_blame_table(make_job, tmp_path, capsys):
+def test_explain_prints_the_table_of_limits(make_job, tmp_path, capsys):
     out = ["-o", str(tmp_path / "out"), "--explain"]
     assert run(["plan", str(make_job()), *out]) == 0
     table = capsys.readouterr().out
@@ -366,5 +366,5 @@ def test_explain_prints_the_blame_table(make_job, tmp_path, capsys):
     assert sum(limit["share"] for limit in limits) == pytest.approx(1.0)
     assert run(["plan", str(make_job(TOO_FAR)), *out]) == 1
     refused = capsys.readouterr().out
-    assert "limit in the way" in refused
+    assert "limit exceeded" in refused
     assert re.search(r"too long +\d+ mm +\d+", refused)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -70,6 +71,42 @@ def test_entry_points_that_are_named_are_read():
     assert set(re.findall(r"`(pentapod\.[a-z_]+)`", TEXT)) == groups
     plugin = (ROOT / "examples" / "plugin" / "pyproject.toml").read_text(encoding="utf-8")
     assert set(re.findall(r'entry-points\."([\w.]+)"', plugin)) | {"pentapod.mesh_formats"} == groups
+
+
+KEY = """    offset: Annotated[float, Key("deg", "of a probe, for the test", ge=0.0, le=2.0)] = 0.0
+"""
+USES_THE_KEY = """
+import sys
+sys.path.insert(0, {docs!r})
+from make_reference import pages
+from pentapod.base import JobError
+from pentapod.cli.commands.new import job_text
+from pentapod.job import Job
+assert "# offset_deg = 0.0" in job_text() and "# of a probe, for the test" in job_text()
+assert "| `offset_deg` | number, ≥ 0, ≤ 2 | `0.0` | of a probe, for the test |" in pages()["job.md"]
+assert abs(Job.load({job!r}).tolerance.si.offset - 0.0261799) < 1e-6
+try:
+    Job.load({job!r}).with_(**{{"tolerance.offset_deg": 3.0}})
+except JobError as error:
+    print(error)
+"""
+
+
+def test_a_job_key_is_added_by_one_field(tmp_path, make_job):
+    """The recipe, done in a copy of the source: one field with a `Key`; the rest follows."""
+    shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("__pycache__"))
+    tables = tmp_path / "src" / "pentapod" / "job" / "schema" / "tables.py"
+    text = tables.read_text(encoding="utf-8")
+    place = text.index("    chordal: ", text.index("class ToleranceKeys"))
+    tables.write_text(text[:place] + KEY + text[place:], encoding="utf-8")
+    job = make_job(("path_mm = 0.05", "path_mm = 0.05\noffset_deg = 1.5"))
+    code = USES_THE_KEY.format(docs=str(ROOT / "docs"), job=str(job))
+    environment = {"PYTHONPATH": str(tmp_path / "src")}
+    made = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert made.returncode == 0, made.stderr
+    assert made.stdout == (
+        "tolerance.offset_deg: out of range (got 3.0); expected less than or equal to 2 (of a probe, for the test)\n"
+    )
 
 
 def test_the_measures_of_the_tree_are_printed():

@@ -34,6 +34,7 @@ CHANGES = (
     ("[toolpath]", '[toolpath]\nstrategy = "diagonal"\nturn_deg = 10'),
     ("left_share = 1", "left_share = 1\nleft_mm = 2"),  # a point leaves high ridges, which take long to measure finely
 )
+LIMITS = ("[placement]", '[limits]\nuse = ["table", "running-in"]\n\n[placement]')
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +57,7 @@ def site(tmp_path_factory):
 def planned(site, tmp_path_factory):
     """What a job reached that names the package's mesh format, strategy and cutter."""
     folder, text = tmp_path_factory.mktemp("planned"), job_text()
-    for old, new in CHANGES:
+    for old, new in (*CHANGES, LIMITS):
         text = text.replace(old, new)
     (folder / "part.stl").write_bytes(dome_stl(cells=12))
     load_mesh(folder / "part.stl", "m").to_trimesh().export(folder / "part.off")
@@ -72,6 +73,20 @@ def test_nothing_of_it_is_known_before_it_is_installed(make_job):
     assert "engraver" not in CUTTERS
     with pytest.raises(pentapod.InputError, match="unknown strategy"):
         Job.load(make_job(*CHANGES[2:]))
+    with pytest.raises(pentapod.InputError, match=r"limits\.use: no such limit \(got 'table'\); installed: none"):
+        Job.load(make_job(LIMITS))
+
+
+def test_limits_of_the_package_hold_in_jobs_that_name_them_alone(site, make_job, tmp_path):
+    with site():
+        outcome = run(Job.load(make_job()), tmp_path / "out")
+        unknown = make_job((LIMITS[0], LIMITS[1].replace("table", "tabel")))
+        with pytest.raises(pentapod.InputError) as caught:
+            Job.load(unknown)
+    assert "tool tip in the table" not in outcome.find(PlacedPath).margin_names
+    assert "leg velocity while running in" not in {use.quantity for use in outcome.find(Explanation).uses}
+    message = "limits.use: no such limit (got 'tabel'); installed: running-in, table"
+    assert str(caught.value) == f"{unknown}:27: {message}"
 
 
 def test_a_job_is_planned_with_mesh_format_strategy_cutter_and_limits_of_the_package(planned, site, tmp_path):

@@ -57,7 +57,7 @@ def test_guides_from_the_plan_to_the_verdict(job, tmp_path):
     )
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert f"<dt>guides 1 to 5</dt><dd>set to {1e3 * rail_positions[0]:.3f}".replace("-", "−") in page
-    assert f"guides 1 to 5 at {1e3 * rail_positions[0]:.3f}" in outcome.stages[2].said
+    assert f"guides 1 to 5 at {1e3 * rail_positions[0]:.3f}" in outcome.stages[2].remark
     # Other programs that need the machine get it with its guides there.
     np.testing.assert_array_equal(PostInput(program, job_machine(job)).the_machine().rail_positions, rail_positions)
 

@@ -16,7 +16,8 @@ from pentapod.geometry import RigidTransform
 from pentapod.job import Job, judge, pipeline, run
 from pentapod.job.artefacts import check_folder
 from pentapod.job.build.placement import job_constraints
-from pentapod.job.build.values import job_machine, job_mesh, job_toolpath
+from pentapod.job.build.toolpath import job_toolpath
+from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.outcome import SetUps
 from pentapod.job.run_folder import staged
 from pentapod.job.schema.strategies import job_strategies

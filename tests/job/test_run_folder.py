@@ -60,7 +60,7 @@ def test_the_manifest_is_the_same_for_the_same_files(tmp_path):
 
 @pytest.mark.parametrize("name", ["report.html", "setup-2/program.csv"])
 @pytest.mark.parametrize("how", ["changed", "gone"])
-def test_a_mixed_or_half_folder_is_told(name, how, tmp_path):
+def test_run_folder_with_mixed_or_missing_files_is_an_error(name, how, tmp_path):
     fill(tmp_path, "old", SET_UPS)
     if how == "gone":
         (tmp_path / name).unlink()
@@ -71,7 +71,7 @@ def test_a_mixed_or_half_folder_is_told(name, how, tmp_path):
     assert name in str(caught.value)
 
 
-def test_files_of_the_user_stay(tmp_path):
+def test_run_folder_keeps_files_of_the_user(tmp_path):
     fill(tmp_path, "old", SET_UPS)
     own = ("notes.txt", "setup-1/notes.txt", "setup-2/replanned/program.csv", ".unfinished-mine/a", "posts/program.csv")
     for name in own:
@@ -157,7 +157,7 @@ print("kills", count)
     pytest.param("SET_UPS", "OLD", marks=pytest.mark.slow),
     pytest.param("OLD", "SET_UPS", marks=pytest.mark.slow),
 ])  # fmt: skip
-def test_killed_at_any_file_system_call(before, after, tmp_path):
+def test_run_folder_killed_at_any_file_system_call(before, after, tmp_path):
     """Old run or new one, never files of both; what is left to do is done by whoever comes next."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
     done = subprocess.run(
@@ -180,7 +180,7 @@ def test_a_second_run_on_the_same_folder_is_refused(tmp_path):
 
 
 @posix
-def test_what_dead_runs_left_is_taken_over_and_swept(tmp_path):
+def test_remains_of_killed_runs_are_completed_or_removed(tmp_path):
     code = textwrap.dedent(f"""
         import os, signal
         from pathlib import Path

@@ -140,7 +140,7 @@ def test_every_cut_is_made_once(done):
     assert length == pytest.approx(float(chords[cutting_intervals(toolpath)].sum()), rel=1e-12)
 
 
-def test_verdict_and_report_tell_of_all(done):
+def test_verdict_and_report_of_several_set_ups_name_all(done):
     out, outcome = done
     verdict = json.loads((out / "verdict.json").read_text())
     assert verdict == outcome.to_dict()

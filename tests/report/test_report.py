@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 from pentapod.cli.commands.new import dome_stl
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job, Outcome, run
-from pentapod.job.build.collision_world import job_collision_world
 from pentapod.job.build.placement import job_constraints, rotation_angles_deg
+from pentapod.job.build.specification import job_collision_world
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.planning import PlacedPath
 from pentapod.program import Program
@@ -200,7 +200,7 @@ def test_report_of_a_failed_verdict_puts_the_failures_first(make_job, tmp_path):
     assert page.text.index("a claim that fails") < page.text.index("leg rates")
 
 
-def test_what_was_not_judged_is_told_with_its_reason(make_job, tmp_path):
+def test_report_shows_claims_not_judged_with_the_reason(make_job, tmp_path):
     """A program that fails only by it shows the cause; one that passes by waivers shows them."""
     outcome = run(Job.load(make_job()), tmp_path / "out")
     for waived, status, lead, mark in (
@@ -220,7 +220,7 @@ def test_what_was_not_judged_is_told_with_its_reason(make_job, tmp_path):
             assert f"{name} {mark} nobody told {name}" in text
 
 
-def test_names_cannot_break_the_page(make_job, tmp_path):
+def test_report_escapes_names(make_job, tmp_path):
     path = make_job(name="a<script>alert(1)</script>&.toml".replace("/", "_"))
     _, page = page_of(run(Job.load(path), tmp_path / "out"), tmp_path)
     assert "a<script>alert(1)<_script>&" in page.text
@@ -237,7 +237,7 @@ def test_decimation_keeps_extremes_and_ends(values, buckets):
     assert array[keep].max() == array.max()
 
 
-def test_a_long_program_stays_small():
+def test_report_of_a_long_program_stays_small():
     values = np.sin(np.arange(1_000_000) / 300.0)
     values[777_777] = 9.0
     keep = keep_extremes(values, 600)
@@ -277,7 +277,7 @@ def test_the_placement_shown_can_be_used(make_job, tmp_path):
     assert np.abs(first.matrix - again.matrix).max() < 1e-8
 
 
-def test_words():
+def test_numbers_durations_and_placements_as_text():
     assert opening("short") == "short"
     assert opening("held; component ++: for all times") == "held"
     assert opening("a word " * 40) == ("a word " * 14) + "a …"
@@ -291,7 +291,7 @@ def test_words():
     high = RigidTransform(np.eye(3), np.array([0.0, 0.0, -0.05]))
     assert "50.00 mm above the base plane" in placement_sentences(high)[0]
     leaning = RigidTransform(np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]]), np.zeros(3))
-    assert "leans 90.00°" in placement_sentences(leaning)[1]
+    assert "tilted 90.00°" in placement_sentences(leaning)[1]
     assert "towards 0.0°" in placement_sentences(leaning)[1]
 
 
@@ -321,7 +321,7 @@ def test_the_setup_sheet_names_the_limit_at_every_place(make_job, tmp_path):
     assert "nearest limits" in page.text
 
 
-def test_a_long_job_stays_small():
+def test_viewer_draws_few_waypoints_of_a_long_job():
     """100,000 waypoints and 400,000 rows: the path and the plots, thinned, and their extremes kept."""
     from pentapod.machine import Machine
     from pentapod.report.plots import time_figure

@@ -134,7 +134,7 @@ def pixels(page, selector):
     return (imread(io.BytesIO(page.locator(selector).screenshot()))[..., :3] * 255).astype(np.int16)
 
 
-def test_the_page_is_drawn_without_a_word(opened):
+def test_report_page_loads_without_console_messages(opened):
     assert opened.errors() == []
     picture = pixels(opened.page, "#scene canvas")
     ground = picture[5, 5]
@@ -143,7 +143,7 @@ def test_the_page_is_drawn_without_a_word(opened):
     assert len(np.unique(picture[coloured] // 32, axis=0)) > 12
 
 
-def test_text_can_be_read(opened):
+def test_report_text_has_contrast(opened):
     """WCAG AA: 4.5 to 1 for text."""
     found = opened.page.evaluate(CONTRAST)
     assert len(found) > 100
@@ -201,7 +201,7 @@ def test_the_path_is_coloured_by(opened, kind):
     assert opened.errors() == []
 
 
-def test_a_dark_screen_prints_black_on_white(opened):
+def test_report_on_a_dark_screen_prints_black_on_white(opened):
     page = opened.page
     ink = "() => ['scene', 'time'].map(id => document.getElementById(id).layout.font.color)"
     before = page.evaluate(ink)
@@ -211,7 +211,7 @@ def test_a_dark_screen_prints_black_on_white(opened):
     assert page.evaluate(ink) == before
 
 
-def test_prints_on_a4(chromium, report, tmp_path):
+def test_report_prints_on_a4(chromium, report, tmp_path):
     opened = Opened(chromium, report[0])
     opened.page.emulate_media(media="print")
     pdf = opened.page.pdf(path=tmp_path / "report.pdf", prefer_css_page_size=True)

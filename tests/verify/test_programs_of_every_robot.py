@@ -9,7 +9,8 @@ import replay_cases as cases
 
 from pentapod import Job, Machine, Provenance, leg_path, plan, read_csv, retime, sample, write_csv
 from pentapod.job.build.specification import job_specification
-from pentapod.job.build.values import job_machine, job_mesh, job_toolpath
+from pentapod.job.build.toolpath import job_toolpath
+from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.kinematics import AsBuiltPentapod, GeneralPentapod
 from pentapod.verify import judged, verify
 

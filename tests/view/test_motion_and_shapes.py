@@ -18,26 +18,26 @@ from pentapod.view.shapes import along, quaternion, revolved, rotation_of, solid
 UNITS = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1)
 
 
-def test_at_a_rows_time_the_legs_are_the_rows(opened):
+def test_motion_at_the_time_of_a_row_has_its_legs(opened):
     motion, program = Motion.of(opened), opened.program
     assert motion.duration == pytest.approx(program.duration)
     for row in (0, 1, len(program.legs) // 3, len(program.legs) - 1):
-        stance = motion.stance(program.times[row], opened.machine, program.placement)
-        assert stance.legs == pytest.approx(program.legs[row], abs=1e-9)
-        assert all(stance.within)
-        assert np.linalg.norm(stance.joints - stance.bases, axis=1) == pytest.approx(stance.legs)
+        machine_pose = motion.machine_pose(program.times[row], opened.machine, program.placement)
+        assert machine_pose.legs == pytest.approx(program.legs[row], abs=1e-9)
+        assert all(machine_pose.within)
+        assert np.linalg.norm(machine_pose.joints - machine_pose.bases, axis=1) == pytest.approx(machine_pose.legs)
         # The joints lie on the tool's axis.
-        assert np.linalg.norm(np.cross(stance.joints - stance.tip, stance.axis), axis=1).max() < 1e-12
-    between = motion.stance(0.5 * (program.times[40] + program.times[41]), opened.machine, program.placement)
+        assert np.linalg.norm(np.cross(machine_pose.joints - machine_pose.tip, machine_pose.axis), axis=1).max() < 1e-12
+    between = motion.machine_pose(0.5 * (program.times[40] + program.times[41]), opened.machine, program.placement)
     assert between.legs == pytest.approx(program.legs[40:42].mean(axis=0), abs=1e-6)
     assert motion.pose(1e9)[0] == pytest.approx(motion.tips[-1]), "after the end it stands"
 
 
-def test_the_tool_goes_with_the_part(opened):
+def test_motion_moves_with_the_part(opened):
     motion, seconds = Motion.of(opened), 0.4 * opened.program.duration
-    before = motion.stance(seconds, opened.machine, opened.placement)
+    before = motion.machine_pose(seconds, opened.machine, opened.placement)
     shift = np.array([0.3, 0.0, 0.2])
-    after = motion.stance(
+    after = motion.machine_pose(
         seconds, opened.machine, RigidTransform(opened.placement.rotation, opened.placement.translation + shift)
     )
     assert after.tip - before.tip == pytest.approx(shift)
@@ -48,7 +48,7 @@ def test_the_tool_goes_with_the_part(opened):
     assert not all(after.within), "so far out no leg reaches"
 
 
-def test_without_a_program_the_feeds_are_the_clock(opened):
+def test_motion_without_a_program_follows_the_feeds(opened):
     motion, toolpath = Motion.of_toolpath(opened.toolpath, opened.machine), opened.toolpath
     seconds = 0.0
     for segment in toolpath.segments:
@@ -86,12 +86,12 @@ def volume(vertices, faces):
         (Solid("cutter", 0.0, 3.0, 0.0, 0.0, 1.0), np.pi * 3.0 + 4.0 / 3.0 * np.pi),  # a capsule
     ],
 )  # fmt: skip
-def test_bodies_have_their_volume(solid, expected):
+def test_solids_of_revolution_have_their_volume(solid, expected):
     # A polygon of 32 corners and arcs of 7 points are a little less than the round.
     assert volume(*revolved(solid_profile(solid))) == pytest.approx(expected, rel=0.03)
 
 
-def test_profiles_stay_at_the_rounding_from_the_frustum():
+def test_solid_profiles_have_the_rounding_of_the_frustum():
     solid = Solid("cutter", 1.0, 3.0, 2.0, 0.5, 0.4)
     corners = np.array([[2.0, 1.0], [0.5, 3.0]])
     profile = solid_profile(solid)[1:-1]
@@ -99,7 +99,7 @@ def test_profiles_stay_at_the_rounding_from_the_frustum():
     assert distance == pytest.approx(np.full(len(profile), 0.4))
 
 
-def test_tools_stand_on_their_tip():
+def test_tool_meshes_begin_at_the_tip():
     for tool in (BallCutter(3e-3, 8e-3), BullNose(4e-3, 1e-3)):
         vertices, faces = tool_mesh(tool.solids)
         assert vertices[:, 2].min() == pytest.approx(0.0, abs=1e-12)

@@ -48,14 +48,14 @@ def test_what_is_missing_is_named(planned, tmp_path):
     with pytest.raises(InputError, match=r"no run in this folder.*pentapod plan"):
         open_run(tmp_path)
     shutil.copytree(planned[0] / "out", tmp_path / "alone")
-    with pytest.raises(InputError, match=r"not there any more.*--job"):
+    with pytest.raises(InputError, match=r"the job file of this run is gone.*--job"):
         open_run(tmp_path / "alone")
     assert open_run(tmp_path / "alone", planned[0] / "job.toml").same_job
     with np.load(tmp_path / "alone" / "plan.npz") as archive:
         arrays = {name: archive[name] for name in archive if name != "job.file"}
     np.savez(tmp_path / "alone" / "plan.npz", **arrays)
     (tmp_path / "alone" / "manifest.json").unlink()
-    with pytest.raises(InputError, match=r"does not say which job.*--job"):
+    with pytest.raises(InputError, match=r"does not name its job.*--job"):
         open_run(tmp_path / "alone")
 
 

@@ -83,7 +83,7 @@ def wait_for(condition):
         time.sleep(0.02)
 
 
-def test_dragging_the_part_moves_the_margins(viewer):
+def test_viewer_margins_follow_the_dragged_part(viewer):
     before, start = viewer.reach, viewer.placement
     assert before.fits
     assert "**Fits.**" in viewer.panel.reach.content
@@ -119,7 +119,7 @@ def _until_replayed(client):
     return found
 
 
-def test_turning_the_part_turns_it_about_its_middle(viewer):
+def test_viewer_turns_the_part_about_its_middle(viewer):
     start = viewer.placement
     middle = viewer.run.mesh.bounds.mean(axis=0)
     turn = rotation_of(np.array([np.cos(0.2), 0.0, 0.0, np.sin(0.2)]))
@@ -144,7 +144,7 @@ def test_the_slider_moves_legs_and_tool(viewer):
     assert np.abs(np.subtract(*lengths)).max() > 1e-3
 
 
-def test_it_plays(viewer):
+def test_viewer_plays_the_motion(viewer):
     viewer.panel.speed.value = "4 ×"
     viewer.panel.play.value = True
     wait_for(lambda: viewer.panel.time.value > 0.3)
@@ -154,7 +154,7 @@ def test_it_plays(viewer):
     assert viewer.panel.time.value == pytest.approx(stopped, abs=0.2)
 
 
-def test_it_plans_anew_where_the_part_is(viewer):
+def test_viewer_plans_again_at_the_dragged_placement(viewer):
     start = viewer.placement
     viewer.move(shifted(start, 0.012, -0.007, 0.004))
     wanted = viewer.placement
@@ -172,7 +172,7 @@ def test_it_plans_anew_where_the_part_is(viewer):
     assert Job.load(job).digest == viewer.run.program.provenance.job_digest
 
 
-def test_what_cannot_be_planned_is_said(viewer):
+def test_viewer_shows_a_refusal(viewer):
     start = viewer.placement
     viewer.move(shifted(start, 1.0, 0.0, 0.0))
     before = viewer.run
@@ -211,7 +211,7 @@ def test_the_command_serves_until_it_is_interrupted(planned):
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium; PENTAPOD_CHROMIUM may name one")
-def test_a_browser_draws_it(viewer):
+def test_viewer_is_drawn_in_a_browser(viewer):
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     from matplotlib.image import imread
 

@@ -1,4 +1,4 @@
-"""Base: errors, refusals, values, registries, files and versions. No mathematics."""
+"""Base: errors, refusals, values, registries, keys, files and versions. No mathematics."""
 
 from pentapod.base.errors import (
     ArrayError,

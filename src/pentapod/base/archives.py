@@ -1,4 +1,4 @@
-"""NumPy archives (.npz): arrays by name, with every size checked before anything is unpacked."""
+"""NumPy archives (.npz): read arrays by name; every size is checked before memory is allocated."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from pentapod.base.files import read_bytes
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-MOST_UNPACKED = 1_000_000_000
-"""Bytes that the arrays of one archive may have unpacked: twenty million rows of five legs, with room."""
+MOST_UNPACKED, MOST_TEXT = 1_000_000_000, 50_000_000
+"""Bytes, unpacked, of the arrays of one archive, and of an array of text."""
 
-_MOST_ENTRIES = 1_000
-_MOST_TEXT = 50_000_000
+MOST_ENTRIES = 1_000
+"""Files in one archive."""
+
 _VERSIONS = ((1, 0), (2, 0))
 _ENTRY = b"PK\x01\x02"
 _PLAIN = frozenset("biufU")
@@ -29,17 +30,17 @@ _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 def read_arrays(
     path: Path, names: Iterable[str], wrong: type[InputError], optional: Iterable[str] = ()
 ) -> dict[str, NDArray[Any]]:
-    """Return arrays of an .npz by name, numbers, truth values or text; `optional` ones as far as they are there.
+    """Return arrays of an .npz by name, numbers, truth values or text; `optional` ones only if present.
 
-    Raises `wrong`: not there, no NumPy archive, broken, an array missing or of another kind, or larger unpacked
-    than `MOST_UNPACKED`. Nothing is allocated that the archive does not hold.
+    Raises `wrong`: no such file, no NumPy archive, broken, an array missing or of another kind, or larger than
+    `MOST_UNPACKED`. No more memory is allocated than the archive needs.
     """
     data = read_bytes(path, wrong, "an .npz file")
     if not data.startswith(b"PK"):
         raise wrong("not a NumPy archive", file=path, expected="an .npz file")
-    # Each entry of the list at the end costs an object; a list may be long where the arrays are not.
-    if data.count(_ENTRY) > _MOST_ENTRIES:
-        raise wrong("an archive of too many files", file=path, expected=f"at most {_MOST_ENTRIES:,}")
+    # zipfile makes an object for each entry, however small.
+    if data.count(_ENTRY) > MOST_ENTRIES:
+        raise wrong("an archive of too many files", file=path, expected=f"at most {MOST_ENTRIES:,}")
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             return _arrays(archive, path, tuple(names), tuple(optional), wrong)
@@ -54,13 +55,13 @@ def read_arrays(
 def check_array(
     values: NDArray[Any], name: str, path: Path, wrong: type[InputError], kinds: str, shape: tuple[int | None, ...]
 ) -> None:
-    """Raise `wrong` for an array of another kind. kinds: of numbers as NumPy names them; shape: None for any length."""
+    """Raise `wrong` for an array of another kind. kinds: NumPy's `dtype.kind`; shape: None for any length."""
     fits = values.ndim == len(shape) and all(b in (None, a) for a, b in zip(values.shape, shape, strict=True))
     if values.dtype.kind not in kinds or not fits:
-        told = ", ".join("n" if length is None else str(length) for length in shape)
+        wanted = ", ".join("n" if length is None else str(length) for length in shape)
         raise wrong(
             "an array of another kind", file=path, key=name, value=f"{values.dtype} {values.shape}",
-            expected=f"{'text' if kinds == 'U' else 'numbers'} of shape ({told})",
+            expected=f"{'text' if kinds == 'U' else 'numbers'} of shape ({wanted})",
         )  # fmt: skip
 
 
@@ -69,7 +70,7 @@ def _arrays(
 ) -> dict[str, NDArray[Any]]:
     held = {entry.filename.removesuffix(".npy"): entry for entry in archive.infolist()}
     if len(held) < len(archive.infolist()):
-        raise wrong("an array stands in the archive twice", file=path, remedy="write it anew")
+        raise wrong("an array is in the archive twice", file=path, remedy="write it anew")
     for name in names:
         if name not in held:
             raise wrong("an array is missing", file=path, key=name)
@@ -86,12 +87,12 @@ def _arrays(
 def _array(
     archive: zipfile.ZipFile, entry: zipfile.ZipInfo, name: str, path: Path, wrong: type[InputError]
 ) -> NDArray[Any]:
-    """Return one array. Its own header must tell the size that the archive has for it."""
+    """Return one array. The size in its header must be that of its entry."""
     import numpy as np  # noqa: PLC0415 - the command line reads files without it
 
     if entry.compress_type not in _METHODS or entry.flag_bits & 1:
         raise wrong("an array is packed in a way that NumPy does not use", file=path, key=name, remedy="write it anew")
-    # Asked for a number of bytes, the unpacker stops there, whatever the archive holds.
+    # With a number of bytes the decompression stops there, whatever the archive holds.
     with archive.open(entry) as source:
         content = source.read(entry.file_size)
     head = io.BytesIO(content)
@@ -107,11 +108,11 @@ def _array(
         count *= length
     if min(shape, default=0) < 0 or head.tell() + count * dtype.itemsize != len(content):
         raise _broken(path, wrong, name)
-    if dtype.kind == "U" and len(content) > _MOST_TEXT:
-        raise wrong("a text of too many letters", file=path, key=name, expected=f"at most {_MOST_TEXT:,} bytes")
+    if dtype.kind == "U" and len(content) > MOST_TEXT:
+        raise wrong("a text of too many characters", file=path, key=name, expected=f"at most {MOST_TEXT:,} bytes")
     values = np.frombuffer(content, dtype, count, head.tell()) if count * dtype.itemsize else np.empty(count, dtype)
     if dtype.kind == "U":
-        "".join(values.tolist()).encode()  # raises ValueError where a letter is none
+        "".join(values.tolist()).encode()  # raises ValueError for an invalid code point
     return values.reshape(shape, order="F" if fortran else "C")
 
 

@@ -17,7 +17,7 @@ Bools: TypeAlias = NDArray[np.bool_]
 def as_floats(value: ArrayLike, name: str, shape: tuple[int | None, ...] | None = None) -> Floats:
     """Return `value` as a finite float64 array, without a copy where none is needed.
 
-    `shape` constrains the trailing axes: ``(None, 3)`` asks for at least two axes, the last of length 3.
+    `shape` constrains the trailing axes: ``(None, 3)`` requires at least two axes, the last of length 3.
     Raises ArrayError with the shape received, or the index of the first non-finite entry.
     """
     array = as_batch(value, name, shape)
@@ -28,7 +28,7 @@ def as_floats(value: ArrayLike, name: str, shape: tuple[int | None, ...] | None 
 
 
 def as_batch(value: ArrayLike, name: str, shape: tuple[int | None, ...] | None = None) -> Floats:
-    """As `as_floats`, but NaN passes: for batches where NaN marks an element that has no answer."""
+    """As `as_floats`, but NaN passes: for batches where NaN marks an element without a result."""
     try:
         array = np.asarray(value)
         array = array if np.iscomplexobj(array) else np.asarray(array, dtype=np.float64)
@@ -44,7 +44,7 @@ def as_batch(value: ArrayLike, name: str, shape: tuple[int | None, ...] | None =
 
 
 def frozen(value: ArrayLike, name: str, shape: tuple[int | None, ...] | None = None) -> Floats:
-    """Return a finite, read-only copy of `value`: what the frozen dataclasses store. Raises ArrayError."""
+    """Return a finite, read-only copy of `value`: for frozen dataclasses. Raises ArrayError."""
     array = as_floats(value, name, shape).copy()
     array.flags.writeable = False
     return array

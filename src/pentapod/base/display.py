@@ -1,4 +1,4 @@
-"""Display in notebooks and plots: optional packages loaded when they are used, and small HTML tables."""
+"""Display in notebooks and plots: HTML tables, matplotlib axes, and optional packages imported when used."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from pentapod.base.errors import InputError
 
-_RULE = "border-bottom:1px solid color-mix(in srgb,currentColor 25%,transparent)"
+RULE = "border-bottom:1px solid color-mix(in srgb,currentColor 25%,transparent)"
 
 
 def load_extra(module: str, extra: str, what: str, **place: Any) -> Any:
@@ -35,12 +35,9 @@ def plot_axes(axes: Any, rows: int = 1, **subplot: Any) -> list[Any]:
 
 
 def html_table(title: str, rows: Iterable[Sequence[object]], head: Sequence[str] = (), more: str = "") -> str:
-    """Return a table as HTML, its text escaped; it has no colours of its own, for light and dark ground.
-
-    more: HTML that stands below it, as it is.
-    """
-    lines = [f'<tr style="{_RULE}">{_cells("th", head)}</tr>'] if head else []
-    lines += [f'<tr style="{_RULE}">{_cells("td", row)}</tr>' for row in rows]
+    """Return a table as HTML, text escaped, without colours of its own. more: HTML below the table."""
+    lines = [f'<tr style="{RULE}">{_cells("th", head)}</tr>'] if head else []
+    lines += [f'<tr style="{RULE}">{_cells("td", row)}</tr>' for row in rows]
     table = f'<table style="border-collapse:collapse;background:none">{"".join(lines)}</table>'
     return f'<div style="color:inherit;background:none"><strong>{escape(title)}</strong>{table}{more}</div>'
 

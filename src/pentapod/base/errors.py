@@ -9,8 +9,8 @@
         ├── JobError                     a job file
         └── ProgramError                 a program file, or one that does not belong to its job
 
-That something *cannot be done* (a part out of reach, no time law) is not an exception: it is a
-`pentapod.base.refusal.Refusal`, a value that names the cause.
+A task that *cannot be done* (a part out of reach, no time law) is not an exception but a value that names the cause:
+`pentapod.base.refusal.Refusal`.
 """
 
 from __future__ import annotations
@@ -28,10 +28,9 @@ class PentapodError(Exception):
 
 
 class InputError(PentapodError, ValueError):
-    """What was given is wrong; the message is one line that names the place, the value and the remedy.
+    """Bad input; the message is one line that names the place, the value and the remedy.
 
-    `what` says what is wrong. The keyword arguments are kept as attributes and appear in the message:
-    file, key, line and column say where; value what was found; expected and remedy what to do.
+    what: what is wrong. file, key, line, column: where. value: what was found. All are kept as attributes.
     """
 
     def __init__(
@@ -91,7 +90,7 @@ class ProgramError(InputError):
 
 
 def _shown(value: object) -> str:
-    """Return a value for a message, shortened; what is in a file may be of any size."""
+    """Return a value for a message, shortened."""
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # a whole number beyond 4,300 digits, or lists in lists in lists
@@ -100,7 +99,7 @@ def _shown(value: object) -> str:
 
 
 def _printable(text: str) -> str:
-    """Return a text of a file, shortened and without control characters, which a terminal would obey."""
+    """Return a text for a message, shortened and without control characters, which a terminal would execute."""
     text = text if text.isprintable() else ascii(text)[1:-1]
     return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 1] + "…"
 

@@ -1,4 +1,4 @@
-"""Files: written so that an interruption leaves the old one or none, and read up to a size, numbers by one rule."""
+"""Files: atomic writing, reading up to a size, hashes, .npz bytes, and strict decimal numbers."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from pentapod.base.errors import InputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-_EPOCH = (1980, 1, 1, 0, 0, 0)
+DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 @contextmanager
@@ -29,7 +29,7 @@ def atomic_write(path: str | Path) -> Generator[Path]:
     """Yield the path of an empty temporary file beside `path`; rename it to `path` when the block succeeds.
 
     The temporary name keeps the suffix, since some writers look at it. When the block raises (also on
-    KeyboardInterrupt) the temporary file is removed and what stood at `path` before is untouched.
+    KeyboardInterrupt) the temporary file is removed and the file at `path` is untouched.
     Raises InputError where the folder does not exist or cannot be written, `path` is a folder, or no space is left.
 
         with atomic_write("verdict.json") as temporary:
@@ -47,13 +47,13 @@ def atomic_write(path: str | Path) -> Generator[Path]:
         raise unwritable(target, error) from error
     try:
         yield temporary
-        # Without it a power cut after the rename may leave an empty file of the right name.
+        # Otherwise a power failure after the rename may leave an empty file.
         with temporary.open("rb+") as written:
             os.fsync(written.fileno())
         temporary.replace(target)
     except OSError as error:
-        # A full disk is told by a number alone, or by a name that is gone by now.
-        if (error.errno in _FULL and error.filename is None) or error.filename in (str(temporary), temporary):
+        # A full disk is reported without a file name, or with the temporary one.
+        if (error.errno in DISK_ERRORS and error.filename is None) or error.filename in (str(temporary), temporary):
             raise unwritable(target, error) from error
         raise
     finally:
@@ -64,7 +64,7 @@ def atomic_write(path: str | Path) -> Generator[Path]:
 def unwritable(path: Path, error: OSError) -> InputError:
     """Return the error that says why a file cannot be written."""
     reason = (error.strerror or str(error)).lower()
-    expected = "room for it on the disk" if error.errno in _FULL else "a folder that exists and can be written"
+    expected = "room for it on the disk" if error.errno in DISK_ERRORS else "a folder that exists and can be written"
     return InputError(f"cannot be written: {reason}", file=path, expected=expected)
 
 
@@ -75,7 +75,7 @@ def sha256_of(path: Path) -> str:
 
 
 def packed_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
-    """Return the bytes of an .npz; the same arrays give the same bytes."""
+    """Return the bytes of an .npz; they depend on the arrays alone."""
     import numpy as np  # noqa: PLC0415 - the command line writes files without it
 
     packed = io.BytesIO()
@@ -83,30 +83,29 @@ def packed_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
         for name, array in arrays.items():
             buffer = io.BytesIO()
             np.lib.format.write_array(buffer, np.asarray(array, order="C"), allow_pickle=False)
-            archive.writestr(zipfile.ZipInfo(f"{name}.npy", _EPOCH), buffer.getvalue())
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy", ZIP_EPOCH), buffer.getvalue())
     return packed.getvalue()
 
 
 MOST_BYTES = 2_000_000_000
-"""No file is read into memory beyond this size; programs are read in blocks and have no bound."""
+"""Largest file that is read into memory; programs are read in blocks and may be larger."""
 
-_BLOCK = 1 << 20
+BLOCK_BYTES = 1 << 20
 
 
 def read_bytes(
     path: Path, wrong: type[InputError], expected: str, most: int = MOST_BYTES, start: str | None = None
 ) -> bytes:
-    """Return the bytes of a file. Raises `wrong`: not there, not readable, or larger than `most` bytes.
+    """Return the bytes of a file. Raises `wrong`: no such file, not readable, or larger than `most` bytes.
 
-    expected: what kind of file this should be; start: how one gets a file to start from, for messages. Devices and
-    pipes are read up to `most` too.
+    expected: kind of file, for messages; start: how to get a first file, for messages.
     """
     try:
         with path.open("rb") as source:
             size = path.stat().st_size
             data = source.read(size) if size <= most else b""
             # Devices and pipes have no size.
-            while size <= most and len(data) <= most and (more := source.read(_BLOCK)):
+            while size <= most and len(data) <= most and (more := source.read(BLOCK_BYTES)):
                 data += more
     except FileNotFoundError as error:
         if start:
@@ -119,7 +118,7 @@ def read_bytes(
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise wrong(f"cannot be read: {reason}", file=path, expected=expected) from error
-    except ValueError as error:  # a name that no file can have
+    except ValueError as error:  # an impossible file name
         raise wrong("no such file", file=path, expected=expected) from error
     except MemoryError as error:
         raise wrong("there is not enough memory for this file", file=path, expected=expected) from error
@@ -132,9 +131,9 @@ def read_bytes(
 
 
 def number_in(text: str) -> float | None:
-    """Return the finite number that a text is; None for anything else.
+    """Return the finite number of a text in ASCII digits; None for other texts.
 
-    Only decimal numbers in ASCII: Python's own reading takes 1_0 for ten, and digits of every script.
+    `float` alone would accept 1_0, and digits of every script.
     """
     if "_" in text or not text.isascii():
         return None

@@ -1,4 +1,4 @@
-"""Key: what a file says of a dataclass field, declared once, beside the field.
+"""Key: the key of a dataclass field in files, declared once, beside the field.
 
     spacing: Annotated[float, Key("mm", "largest distance between waypoints", gt=0.0)] = 2e-3
 
@@ -31,18 +31,19 @@ _BOUNDS = {
     "lt": ("less than", operator.lt),
     "le": ("at most", operator.le),
 }
-_DIGITS = 12  # of a default that is shown in the unit of files
+DEFAULT_DIGITS = 12
+"""Significant digits of a default in the unit of files."""
 
 
 @dataclass(frozen=True)
 class Key:
     """The key of a field in a file. meaning: for the reference, `pentapod new` and messages; unit: "" for none.
 
-    name: of the key without its unit, where it is not the field's. share: field = share · value (a radius that the
-    file gives as a diameter: 0.5). kind: type of the value in the file, where it is not that of the field. read: for a
-    key that names a file: what gives the field's value. needed: the file must have it, though the field has a default.
-    gt, ge, lt, le: bounds in the file's unit. of_part: for lengths: the largest that makes sense, as a multiple of the
-    part's largest extent.
+    name: of the key without its unit, where it is not the field's. share: field = share · value (0.5 for a radius that
+    the file gives as a diameter). kind: type of the value in the file, where it is not that of the field. read: reads
+    the file that the key names and returns the field's value. needed: the file must have the key, though the field has
+    a default. gt, ge, lt, le: bounds in the file's unit; min_length: of a text or a list. of_part: for lengths, the
+    largest allowed multiple of the part's largest extent.
     """
 
     unit: str
@@ -56,6 +57,7 @@ class Key:
     ge: float | None = None
     lt: float | None = None
     le: float | None = None
+    min_length: int | None = None
     of_part: float = 10.0
 
     @property
@@ -65,7 +67,7 @@ class Key:
         return {name: value for name, value in values.items() if value is not None}
 
     def si(self, value: Any) -> Any:
-        """Return a value of the file as the field has it."""
+        """Return the field's value for a value of the file."""
         value = to_si(value, self.unit)
         return value if value is None or self.share == 1.0 else self.share * value
 
@@ -103,7 +105,7 @@ class Declared:
 
 
 def _shortest(value: float) -> float:
-    return float(f"{value:.{_DIGITS}g}")
+    return float(f"{value:.{DEFAULT_DIGITS}g}")
 
 
 @cache
@@ -131,8 +133,8 @@ def file_key(classes: tuple[type, ...] | type, field: str) -> str | None:
 def fields_from(cls: type, table: object, files: Mapping[str, Path] | None = None) -> dict[str, Any]:
     """Return the fields of a dataclass, SI, from a table of a file.
 
-    files: those that keys name, by key; without them these fields are left out, as is what the table does not set
-    (None): the dataclass's own default holds. Raises what `Key.read` raises.
+    files: paths by the keys that name them; without `files` these fields are left out, as are keys that are None: the
+    default of the dataclass holds. Raises what `Key.read` raises.
     """
     values: dict[str, Any] = {}
     for item in declared(cls):
@@ -189,10 +191,7 @@ def chosen(name: str, value: str, choices: Sequence[str], wrong: type[InputError
 
 
 def oversized(cls: type, values: Mapping[str, Any], extent: float) -> Declared | None:
-    """Return the first length, of a dataclass's fields in SI, that makes no sense for a part of this largest extent.
-
-    A default is never refused.
-    """
+    """Return the first length (SI, no default) of a dataclass that is too large for a part of this extent."""
     for item in declared(cls):
         value = values.get(item.field)
         if item.key.unit != "mm" or not isinstance(value, int | float) or value == item.default:
@@ -203,7 +202,7 @@ def oversized(cls: type, values: Mapping[str, Any], extent: float) -> Declared |
 
 
 def check_size(instance: object, extent: float, wrong: type[InputError]) -> None:
-    """Raise `wrong` for a length of a dataclass that makes no sense for a part of this largest extent, metres."""
+    """Raise `wrong` for a length of a dataclass that is too large for a part of this largest extent, metres."""
     if (item := oversized(type(instance), vars(instance), extent)) is not None:
         value, times = getattr(instance, item.field), item.key.of_part
         than = "larger than" if times == 1.0 else f"more than {times:g} times as large as"

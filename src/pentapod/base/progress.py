@@ -1,4 +1,4 @@
-"""Progress: the callback by which long stages report how far they are."""
+"""Progress: the callback by which long stages report their progress."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Refusal: what cannot be done, as a value: the cause, where on the path, and by how much. RefusalError raises it."""
+"""Refusal: a task that cannot be done, as a value with cause, waypoints and shortfalls. RefusalError raises it."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ class Shortfall(Value):
     """One constraint that cannot be met, the waypoints where, and the shortfall.
 
     constraint: a name a user knows, "leg 2 too long". waypoints: inclusive index ranges into the
-    toolpath's waypoints. shortfall: how far beyond the limit the best attempt is, in `unit` (mm, deg, ...); 0 where
-    no attempt can be measured.
+    toolpath's waypoints. shortfall: of the best attempt, in `unit` (mm, deg, ...); 0 where it is unknown.
     """
 
     constraint: str
@@ -38,9 +37,9 @@ class Shortfall(Value):
 
 @dataclass(frozen=True)
 class Refusal(Value):
-    """A stage's answer when it cannot be done. stage: "placement", "timing", ...; cause: one sentence.
+    """Result of a stage that cannot do its task. stage: "placement", "timing", ...; cause: one sentence.
 
-    The stages after it return it unchanged, so a chain of stages needs one `unwrap` at its end.
+    Later stages return it unchanged, so a chain of stages needs one `unwrap` at its end.
     """
 
     stage: str
@@ -51,7 +50,7 @@ class Refusal(Value):
     def __str__(self) -> str:
         text = f"{self.stage}: {self.cause}"
         if self.diagnosis:
-            text += ": " + "; ".join(str(blame) for blame in self.diagnosis[:3])
+            text += ": " + "; ".join(str(item) for item in self.diagnosis[:3])
             text += f"; and {len(self.diagnosis) - 3} more limits" if len(self.diagnosis) > 3 else ""
         return text + (f". {self.remedy}" if self.remedy else "")
 
@@ -81,7 +80,7 @@ class Stage(Protocol[Given_contra, Options, Answer_co]):
 
 
 def stage(function: Callable[Concatenate[Given_contra, Options], Answer_co]) -> Stage[Given_contra, Options, Answer_co]:
-    """Decorate a stage: where its first argument is a `Refusal`, that is its answer, and nothing else happens."""
+    """Decorate a stage: if its first argument is a `Refusal`, it is returned and the stage does not run."""
 
     @wraps(function)
     def passed(*args: Any, **options: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Registry: things by name, those that pentapod brings and those of other packages, found by entry points."""
+"""Registry: plug-ins by name, pentapod's own and those of other packages, found by entry points."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ T = TypeVar("T")
 
 @cache
 def _entries_of(group: str, path: tuple[str, ...]) -> dict[str, EntryPoint]:
-    """Return the entry points of a group by name. path: where Python looks for packages."""
+    """Return the entry points of a group by name. path: `sys.path`, the key of the cache."""
     from importlib.metadata import entry_points  # noqa: PLC0415 - a plain command does not read them
 
-    del path  # only another path makes another answer
+    del path
     return {entry.name: entry for entry in entry_points(group=group)}
 
 
 class Registry(Mapping[str, T], Generic[T]):
     """Things of one kind by name: pentapod's own, then those that installed packages name by entry points.
 
-    kind: what the things are, in messages ("post"); group: of the entry points; type_: what each must be. An entry
-    point names such a thing, or a function without arguments that returns one. Entry points are read when a name is
-    looked up that is not pentapod's own, or when all are listed; a plug-in is loaded when it is used. homes: modules of
-    pentapod's own things by name, where they do not register themselves; each holds its thing as `constant`.
+    kind: word for messages ("post"); group: of the entry points; type_: required type. An entry point names a thing of
+    this type, or a function without arguments that returns one. Entry points are read when another name than pentapod's
+    own is looked up, or all are listed; a plug-in is imported when it is used. homes: modules of pentapod's own things
+    by name, where they do not register themselves; each has its thing as `constant`.
     """
 
     def __init__(
@@ -50,10 +50,15 @@ class Registry(Mapping[str, T], Generic[T]):
 
     @property
     def own(self) -> Mapping[str, T]:
-        """The things that pentapod brings; no other package is looked for."""
+        """Pentapod's own things; entry points are not read."""
         for name in self._homes:
             self.find(name)
         return self._own
+
+    @property
+    def added(self) -> tuple[str, ...]:
+        """Names of the things of other packages."""
+        return tuple(name for name in self._entries() if name not in self._homes and name not in self._own)
 
     def register(self, name: str, thing: T) -> T:
         """Add one of pentapod's own, and return it."""
@@ -61,10 +66,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return thing
 
     def find(self, name: str, key: str | None = None) -> T:
-        """Return the thing of this name. Raises InputError: unknown, or a package's that cannot be loaded.
-
-        key: of the job, machine or call that names it, for the message.
-        """
+        """Return the thing of this name. Raises InputError: unknown, or it cannot be loaded. key: for the message."""
         if name in self._own:
             return self._own[name]
         if name in self._homes:
@@ -83,9 +85,8 @@ class Registry(Mapping[str, T], Generic[T]):
         return name in self._homes or name in self._own or name in self._entries()
 
     def __iter__(self) -> Iterator[str]:
-        own = dict.fromkeys((*self._homes, *self._own))
-        yield from own
-        yield from (name for name in self._entries() if name not in own)
+        yield from dict.fromkeys((*self._homes, *self._own))
+        yield from self.added
 
     def __len__(self) -> int:
         return len(tuple(iter(self)))
@@ -95,7 +96,7 @@ class Registry(Mapping[str, T], Generic[T]):
 
     def _loaded(self, entry: EntryPoint) -> T:
         """Return what an entry point names. Raises InputError that names the package."""
-        package = f'the package "{entry.dist.name}"' if entry.dist else "the package that names it"
+        package = f'the package "{entry.dist.name}"' if entry.dist else "its package"
         try:
             thing: Any = entry.load()
             if not isinstance(thing, self._type) and callable(thing):
@@ -103,11 +104,11 @@ class Registry(Mapping[str, T], Generic[T]):
         except Exception as error:
             raise self._wrong(
                 f"this {self.kind} cannot be loaded: {type(error).__name__}: {error}", key=entry.name,
-                value=entry.value, remedy=f"mend or remove {package}",
+                value=entry.value, remedy=f"repair or remove {package}",
             ) from error  # fmt: skip
         if isinstance(thing, self._type):
             return thing
         raise self._wrong(
             f"the entry point names no {self.kind}", key=entry.name, value=entry.value,
-            expected=f"a pentapod {self._type.__name__}", remedy=f"mend or remove {package}",
+            expected=f"a pentapod {self._type.__name__}", remedy=f"repair or remove {package}",
         )  # fmt: skip

@@ -8,7 +8,7 @@ from dataclasses import MISSING
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Annotated, Any, ClassVar, Literal, NoReturn, TypeVar, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NoReturn, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
@@ -25,14 +25,18 @@ class Table(BaseModel):
     """A table of a file: unknown keys, wrong types, NaN and infinity are errors. Values are as in the file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-    declared_by: ClassVar[type | None] = None
-    """The dataclass whose fields have these keys, where the table was made from one."""
+    declared_by: ClassVar[tuple[type, ...]] = ()
+    """The dataclasses whose fields have these keys, where the table was made from some."""
 
     @property
     def si(self) -> Any:
         """The values in SI units, by keys without their unit: `feed.si.cut` in m/s is `feed.cut_mm_min`."""
         parts = {key: split_key(key) for key in type(self).model_fields}
         return SimpleNamespace(**{name: to_si(getattr(self, key), unit) for key, (name, unit) in parts.items()})
+
+    if TYPE_CHECKING:  # most keys are declared by dataclasses
+
+        def __getattr__(self, key: str) -> Any: ...
 
 
 TableType = TypeVar("TableType", bound=Table)
@@ -52,13 +56,21 @@ def table_fields(cls: type, *, optional: bool = False) -> dict[str, Any]:
 
 
 @cache
-def table_of(cls: type, base: type[TableType]) -> type[TableType]:
-    """Return the table whose keys a dataclass declares. Its description is the first sentence of the dataclass."""
+def table_of(cls: type, base: type[TableType] = Table, *more: type) -> type[TableType]:
+    """Return the table whose keys a dataclass declares, and `more` of them; it pickles as a name of `cls`'s module.
+
+    Its name is that of the dataclass with "Table" for "Options" or "Keys", its description the first sentence. Rules
+    that span several keys are static methods `rules` of the dataclasses: called with a table, they raise by `wrong`.
+    """
     about = " ".join((cls.__doc__ or "").split()).split(". ")[0].rstrip(".") + "."
-    name = f"{cls.__name__.removesuffix('Options')}Table"
-    rules: Any = {"exclusive": model_validator(mode="after")(_one_of)} if hasattr(cls, "one_of") else {}
-    made = create_model(name, __base__=base, __doc__=about, __validators__=rules, **table_fields(cls))
-    made.declared_by = cls
+    name = f"{cls.__name__.removesuffix('Options').removesuffix('Keys')}Table"
+    every = (cls, *more)
+    fields = {key: field for one in every for key, field in table_fields(one).items()}
+    checks = [check for one in every if (check := getattr(one, "rules", None)) is not None]
+    checks += [_one_of] if hasattr(cls, "one_of") else []
+    rules: Any = {f"rules{k}": model_validator(mode="after")(_checked_by(check)) for k, check in enumerate(checks)}
+    made = create_model(name, __base__=base, __module__=cls.__module__, __doc__=about, __validators__=rules, **fields)
+    made.declared_by = every
     return made
 
 
@@ -68,28 +80,35 @@ def extended(name: str, base: type[TableType], cls: type) -> type[TableType]:
     return made
 
 
-def _one_of(table: Any) -> Any:
-    """Raise where not exactly one of the keys is given of which the dataclass takes one."""
-    cls = table.declared_by
+def _checked_by(check: Callable[[Any], object]) -> Callable[[Any], Any]:
+    def checked(table: Any) -> Any:
+        check(table)
+        return table
+
+    return checked
+
+
+def _one_of(table: Any) -> None:
+    """Raise unless exactly one of the keys in `one_of` is given."""
+    cls = table.declared_by[0]
     keys = [key for field in cls.one_of if (key := file_key(cls, field)) is not None]
     given = [key for key in keys if getattr(table, key) is not None]
     if len(given) > 1:
         wrong(given[-1], f"{' and '.join(given)} are both given", "one of the two")
     if not given:
         wrong(keys[0], f"{' or '.join(keys)} is missing", "one of the two")
-    return table
 
 
 def _field(item: Declared, *, optional: bool) -> Any:
     default = None if optional else item.file_default
     default = ... if default is MISSING else default
-    bounds = item.key.bounds if item.key.kind is None else {}  # others are checked by the dataclass
-    least: dict[str, Any] = {"min_length": 1} if item.key.kind is Path or (item.hint is str and not default) else {}
-    return Field(default=default, description=item.key.meaning, **bounds, **least)
+    bounds: dict[str, Any] = item.key.bounds if item.key.kind is None else {}  # else the dataclass checks them
+    least = 1 if item.key.kind is Path or (item.hint is str and not default) else item.key.min_length
+    return Field(default=default, description=item.key.meaning, min_length=least, **bounds)
 
 
 def _kind(item: Declared, *, optional: bool) -> Any:
-    """Return the type of a key's value in the file; an optional one where the default is None."""
+    """Return the type of a key's value in the file, with None where that is the default."""
     kind: Any = item.key.kind or _plain(item.hint)
     if kind is Path:
         kind = str
@@ -153,7 +172,7 @@ def _details(error: ErrorDetails, where: tuple[str, ...], root: type[BaseModel],
 
 
 def _meaning(where: tuple[str, ...], root: type[BaseModel], table: TableOf) -> str:
-    """Return what the schema says of a key, or of a table what keys it must have."""
+    """Return the meaning of a key, or the keys that a table must have."""
     model = table(where[0]) if where else None
     if model is None:
         field = root.model_fields.get(where[0]) if where else None

@@ -12,22 +12,22 @@ from pentapod.base.errors import InputError
 from pentapod.base.files import read_bytes
 
 MOST_BYTES = 1_000_000
-"""Files that people write are smaller."""
+"""Largest file."""
 
 DEEPEST = 16
-"""How many arrays and tables may stand in each other."""
+"""Largest depth of nested arrays and tables."""
 
-_PLACE = re.compile(r"\(at line (\d+), column (\d+)\)")
+ERROR_PLACE = re.compile(r"\(at line (\d+), column (\d+)\)")
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w\"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{4 * DEEPEST}}}")
 _MANY_DIGITS = re.compile(r"\w{19,}")
-_TOO_LARGE = 2**63
+TOO_LARGE = 2**63
 _SHALLOW = f"at most {DEEPEST} levels"
 _FEW_DIGITS = "a number that fits 64 bits"
 
 
 def read_toml(path: Path, kind: str, wrong: type[InputError], *, start: str | None = None) -> str:
-    """Return the text of a file. kind: "job" or "machine"; start: how one gets a file to start from, for messages.
+    """Return the text of a file. kind: "job" or "machine"; start: how to get a first file, for messages.
 
     Raises `wrong` where it is missing, a folder, not readable, not text, or empty.
     """
@@ -42,10 +42,10 @@ def read_toml(path: Path, kind: str, wrong: type[InputError], *, start: str | No
 
 
 def parsed(text: str, file: str | Path, wrong: type[InputError]) -> dict[str, Any]:
-    """Return the tables of a text. Raises `wrong` with line and column where it is not TOML, or none that is read.
+    """Return the tables of a text. Raises `wrong` with line and column where it is not TOML.
 
-    Not read are numbers beyond 4,300 digits, and tables or arrays nested deeper than `DEEPEST`: none of our files has
-    such, and Python's parser fails on them, or needs hours.
+    Numbers beyond 4,300 digits and nesting deeper than `DEEPEST` are errors as well: Python's parser fails on them or
+    takes hours.
     """
     if deep := _LONG_KEY.search(text):
         line = text.count("\n", 0, deep.start()) + 1
@@ -53,8 +53,8 @@ def parsed(text: str, file: str | Path, wrong: type[InputError]) -> dict[str, An
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        place = _PLACE.search(str(error))
-        # Only the end of the file comes without a place.
+        place = ERROR_PLACE.search(str(error))
+        # An error at the end of the file has no place.
         line, column = (int(place[1]), int(place[2])) if place else (len(text.splitlines()), None)
         raise wrong(f"not TOML: {str(error).split(' (at ')[0]}", file=file, line=line, column=column) from error
     except RecursionError as error:
@@ -66,7 +66,7 @@ def parsed(text: str, file: str | Path, wrong: type[InputError]) -> dict[str, An
 
 
 def _check_values(content: dict[str, Any], text: str, file: str | Path, wrong: type[InputError]) -> None:
-    """Raise `wrong` where values are nested too deep, or a whole number is too large for a computer's own numbers."""
+    """Raise `wrong` where values are nested too deep, or an integer needs more than 64 bits."""
     level: list[Any] = [content]
     for _ in range(DEEPEST):
         inner: list[Any] = []
@@ -75,7 +75,7 @@ def _check_values(content: dict[str, Any], text: str, file: str | Path, wrong: t
                 inner += cast("dict[str, Any]", value).values()
             elif isinstance(value, list):
                 inner += cast("list[Any]", value)
-            elif isinstance(value, int) and abs(value) >= _TOO_LARGE:
+            elif isinstance(value, int) and abs(value) >= TOO_LARGE:
                 raise wrong("a number of too many digits", file=file, line=_digits_line(text), expected=_FEW_DIGITS)
         level = inner
     if level:

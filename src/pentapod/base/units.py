@@ -1,4 +1,4 @@
-"""Units: keys of files end with their unit; values become SI here, and nowhere else."""
+"""Units: keys of files end with their unit; this module alone converts values to SI and back."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-_MM_MIN = 1e-3 / 60.0
+MM_MIN = 1e-3 / 60.0
 
 _TO_SI: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("mm", "mm_s", "mm_s2", "mm_s3", "ms"), lambda x: x / 1000.0),
-    "mm_min": lambda x: x * _MM_MIN,
+    "mm_min": lambda x: x * MM_MIN,
     **dict.fromkeys(("deg", "deg_s", "deg_s2"), np.radians),
     "deg_mm": lambda x: np.radians(x) / 1e-3,
     "per_mm": lambda x: x * 1000.0,
@@ -19,7 +19,7 @@ _TO_SI: dict[str, Callable[[Any], Any]] = {
 }
 _FROM_SI: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("mm", "mm_s", "mm_s2", "mm_s3", "ms"), lambda x: x * 1000.0),
-    "mm_min": lambda x: x / _MM_MIN,
+    "mm_min": lambda x: x / MM_MIN,
     **dict.fromkeys(("deg", "deg_s", "deg_s2"), np.degrees),
     "deg_mm": lambda x: np.degrees(x) * 1e-3,
     "per_mm": lambda x: x / 1000.0,
@@ -38,7 +38,7 @@ def split_key(key: str) -> tuple[str, str]:
 def to_si(value: Any, unit: str) -> Any:
     """Return a value of a file in SI units: numbers as float, tuples and lists of numbers as arrays.
 
-    What has no unit stays as it is, None stays None. Lengths are divided by 1000, which rounds once.
+    A value without a unit, and None, stay as they are. Lengths are divided by 1000, which rounds once.
     """
     if value is None or unit not in _TO_SI:
         return value

@@ -10,10 +10,12 @@ from pathlib import PurePath
 from types import FunctionType
 from typing import Any, ClassVar, Self, cast
 
-LONGEST = 300
-"""Characters of a value's `repr`."""
+LONGEST, LONGEST_FIELD, LONGEST_TEXT = 300, 120, 80
+"""Characters of a value's `repr`, of one field and of one text in it."""
 
-_LONGEST_FIELD, _LONGEST_TEXT, _MOST_ITEMS = 120, 80, 6
+MOST_ITEMS = 6
+"""Items of a tuple that a `repr` shows one by one."""
+
 _UNITS = {
     "m": "tips legs tilt_centres points vertices stations knots tilt_centre length radius stepover scallop spacing"
     " chordal clearance approach hop closest shortest flute corner neck_radius height path_tolerance translation"
@@ -31,16 +33,15 @@ class Value:
     """Base of the frozen dataclasses that users hold.
 
     `repr` has at most `LONGEST` characters: the properties that `summary` names, then the fields; arrays as shape and
-    range, with the SI unit where the name of the field implies one. Values are equal where their class and their
-    fields are, arrays element by element, NaN equal to NaN. Pickles hold no cached properties; arrays are read-only
-    again when they are read back.
+    range, with the SI unit where the name of the field implies one. Values are equal if class and fields are, arrays
+    element by element, NaN equal to NaN. Pickles have no cached properties; unpickled arrays are read-only.
     """
 
     summary: ClassVar[tuple[str, ...]] = ()
-    """Names of quick properties that say the most: they come first in `repr`."""
+    """Names of quick properties that come first in `repr`."""
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Keep these methods where the dataclass decorator would write its own."""
+        """Keep these methods; the dataclass decorator would write its own."""
         super().__init_subclass__(**options)
         for name in ("__repr__", "__eq__", "__hash__"):
             if name not in cls.__dict__:
@@ -49,7 +50,7 @@ class Value:
     def __repr__(self) -> str:
         names = dict.fromkeys((*self.summary, *(f.name for f in fields(cast(Any, self)) if f.repr)))
         parts = [f"{name}={_text(getattr(self, name), _UNIT_OF.get(name, ''))}" for name in names]
-        shown = [part if len(part) <= _LONGEST_FIELD else part[: _LONGEST_FIELD - 1] + "…" for part in parts]
+        shown = [part if len(part) <= LONGEST_FIELD else part[: LONGEST_FIELD - 1] + "…" for part in parts]
         while len(text := f"{type(self).__name__}({', '.join(shown)})") > LONGEST:
             shown[-2:] = ["…"]
         return text
@@ -71,7 +72,7 @@ class Value:
 
 
 class Result(Value):
-    """Base of what a stage returns where it may also refuse: `unwrap` returns the value; on a `Refusal` it raises."""
+    """Base of the results of stages that may also return a `Refusal`, whose `unwrap` raises."""
 
     def unwrap(self) -> Self:
         """Return the value itself."""
@@ -104,14 +105,14 @@ def _is_array(value: Any) -> bool:
 
 
 def _text(value: Any, unit: str = "") -> str:  # noqa: PLR0911 - a kind of value each
-    """Return what `repr` shows of a field."""
+    """Return a field as `repr` shows it."""
     if _is_array(value):
         return _array(value, unit)
     if isinstance(value, float):
         return f"{value:.6g}{unit}"
     if isinstance(value, str | PurePath) and not isinstance(value, Enum):
         text = str(value)
-        return repr(text if len(text) <= _LONGEST_TEXT else text[: _LONGEST_TEXT - 1] + "…")
+        return repr(text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 1] + "…")
     if isinstance(value, Mapping):
         return f"{{{', '.join(map(str, cast('Mapping[Any, Any]', value)))}}}"
     if isinstance(value, tuple | list) and type(value).__repr__ in (tuple.__repr__, list.__repr__):
@@ -124,7 +125,7 @@ def _text(value: Any, unit: str = "") -> str:  # noqa: PLR0911 - a kind of value
 
 
 def _items(items: tuple[Any, ...], unit: str) -> str:
-    if len(items) > _MOST_ITEMS:
+    if len(items) > MOST_ITEMS:
         kinds = {type(item).__name__ for item in items}
         return f"{len(items)} × {' | '.join(sorted(kinds))}"
     return f"({', '.join(_text(item, unit) for item in items)})"

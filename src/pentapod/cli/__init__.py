@@ -1,6 +1,3 @@
-"""The command line: one file for each verb. Modules here import nothing heavy at their top.
-
-It has no Python interface; `pentapod.cli.main` holds the entry point.
-"""
+"""Command line: one file for each verb; heavy modules are imported where they are used. No Python interface."""
 
 __all__: list[str] = []

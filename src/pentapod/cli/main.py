@@ -1,9 +1,7 @@
-"""The entry point: errors and signals become one line and an exit code.
+"""Entry point: errors and signals become one line and an exit code.
 
-What is loaded here is little, so that signals are taken care of from the first moment.
+Few modules are imported at the top, so that signals are handled from the start.
 """
-
-# ruff: noqa: PLC0415 - loaded when signals are taken care of
 
 from __future__ import annotations
 
@@ -11,14 +9,14 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from pentapod.cli.signals import Terminated, signals_told
+from pentapod.cli.signals import Terminated, signals_as_exceptions
 
 EXIT_FAILED, EXIT_INPUT, EXIT_BUG, EXIT_INTERRUPTED, EXIT_TERMINATED = 1, 2, 3, 130, 143
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and leave with its exit code."""
-    with signals_told():
+    """Run the command line and exit with its code."""
+    with signals_as_exceptions():
         code = run(sys.argv[1:] if arguments is None else arguments)
     sys.exit(code)
 
@@ -43,7 +41,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _answer(error: BaseException) -> tuple[int, str]:
-    """Return the exit code of an error, and its one line."""
+    """Return the exit code of an error, and its message of one line."""
     import click
 
     from pentapod.base.errors import InputError

@@ -1,6 +1,4 @@
-"""Shared by the commands: options, progress bar on stderr, JSON on stdout."""
-
-# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+"""Options, progress bar on stderr, JSON on stdout, and the text of a verdict, shared by the commands."""
 
 from __future__ import annotations
 
@@ -24,17 +22,17 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 def quiet_option(command: Command) -> Command:
-    """Add --quiet: nothing but errors and what was asked for with --json."""
-    return click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")(command)
+    """Add --quiet: print errors only, and JSON with --json."""
+    return click.option("-q", "--quiet", is_flag=True, help="Print errors only.")(command)
 
 
 def json_option(command: Command) -> Command:
     """Add --json."""
-    return click.option("--json", "as_json", is_flag=True, help="Print JSON on stdout, nothing else.")(command)
+    return click.option("--json", "as_json", is_flag=True, help="Print only JSON on stdout.")(command)
 
 
 def echo_json(content: Any) -> None:
-    """Print JSON on stdout; what is not finite becomes null."""
+    """Print JSON on stdout; NaN and infinity become null."""
     click.echo(json.dumps(_finite(content), indent=2, allow_nan=False, ensure_ascii=False))
 
 
@@ -50,9 +48,9 @@ def _finite(value: Any) -> Any:
 
 @contextmanager
 def progress_bar(*, quiet: bool) -> Generator[Progress]:
-    """Yield a Progress that draws bars on stderr, one for each stage, with its rate; silent off terminals.
+    """Yield a Progress that draws a bar for each stage on stderr; silent where that is no terminal.
 
-    What the log `pentapod` has to say (that kernels are compiled) stands above the bars.
+    Messages of the log `pentapod` (kernels are compiled) are printed above the bars.
     """
     from pentapod.base.progress import silent
 
@@ -77,7 +75,7 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
 
         def show(stage: str, fraction: float, note: str = "") -> None:
             if stage not in tasks:
-                # A stage without a known length shows a pulsing bar.
+                # Without a total the bar pulses.
                 tasks[stage] = bars.add_task(stage, total=None, note=note, rate="")
             speed = bars.tasks[tasks[stage]].speed
             rate = f"{100.0 * speed:.3g} %/s" if speed and fraction < 1.0 else ""
@@ -85,10 +83,8 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
             bars.update(tasks[stage], total=total, completed=fraction, note=note, rate=rate)
 
         log = logging.getLogger("pentapod")
-        handler, level = (
-            RichHandler(console=bars.console, show_time=False, show_level=False, show_path=False),
-            log.level,
-        )
+        level = log.level
+        handler = RichHandler(console=bars.console, show_time=False, show_level=False, show_path=False)
         log.addHandler(handler)
         log.setLevel(logging.INFO)
         try:
@@ -110,7 +106,7 @@ def note_changes(folder: Path) -> None:
 
 
 def verdict_text(verdict: Verdict) -> str:
-    """Return a verdict as lines of text: every claim with value and bound, what was not judged, and the answer."""
+    """Return a verdict as text: every claim with value and bound, the claims not judged, and the answer."""
     lines = [_claim(certificate) for certificate in verdict.certificates]
     lines += [_unjudged(entry) for entry in verdict.not_judged]
     return "\n".join([*lines, f"verdict: {verdict.answer}"])

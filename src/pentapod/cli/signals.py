@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: as exceptions, also in the first second, when modules are still being loaded."""
+"""Ctrl-C and SIGTERM as exceptions, also while modules are still being imported."""
 
 from __future__ import annotations
 
@@ -8,33 +8,34 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from types import FrameType
 
-_AGAIN_S = 0.05
+RETRY_S = 0.05
+"""Seconds after which a signal that came during an import is raised again."""
 
 
 class Terminated(SystemExit):
-    """SIGTERM. Unlike KeyboardInterrupt it does not end a search with the best found so far: it ends the command."""
+    """SIGTERM. It ends the command; KeyboardInterrupt only ends a search with the best result so far."""
 
 
 @contextmanager
-def signals_told() -> Generator[None]:
+def signals_as_exceptions() -> Generator[None]:
     """Raise KeyboardInterrupt on Ctrl-C and Terminated on SIGTERM; once the block has ended, they end the process.
 
-    A signal that comes while a module is loaded is taken when that is done: a module that is cut off raises whatever it
-    likes, or swallows the interruption. Signals that the parent told this process to ignore stay ignored.
+    A signal during an import is raised after it, because an interrupted import may raise any other error, or none.
+    Signals that the parent process set to be ignored stay ignored.
     """
-    heeded = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) != signal.SIG_IGN]
-    for number in heeded:
-        signal.signal(number, _take)
+    handled = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) != signal.SIG_IGN]
+    for number in handled:
+        signal.signal(number, _raise)
     try:
         yield
     finally:
-        for number in heeded:
+        for number in handled:
             signal.signal(number, signal.SIG_DFL)
 
 
-def _take(number: int, frame: FrameType | None) -> None:
+def _raise(number: int, frame: FrameType | None) -> None:
     if _is_loading(frame):
-        later = threading.Timer(_AGAIN_S, signal.raise_signal, (number,))
+        later = threading.Timer(RETRY_S, signal.raise_signal, (number,))
         later.daemon = True
         later.start()
     elif number == signal.SIGINT:
@@ -44,7 +45,7 @@ def _take(number: int, frame: FrameType | None) -> None:
 
 
 def _is_loading(frame: FrameType | None) -> bool:
-    """Whether a module is being imported: then the import system is among the callers."""
+    """Whether the import system is among the callers."""
     while frame is not None:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
             return True

@@ -1,6 +1,4 @@
-"""The verbs by name, loaded when used."""
-
-# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+"""The verbs of the command line by name, imported when used."""
 
 from __future__ import annotations
 
@@ -26,7 +24,7 @@ VERBS = {
 
 
 class LazyGroup(click.Group):
-    """A group whose commands are imported when they are asked for."""
+    """A group whose commands are imported when they are used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the verbs in the order of `VERBS`."""
@@ -45,7 +43,7 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command that the first argument names. Raises UsageError that tells the nearest verb."""
+        """Return the command that the first argument names. Raises UsageError with the nearest verb."""
         if args[0] not in VERBS:
             raise click.UsageError(f'no such verb: "{args[0]}"; {nearest(args[0], VERBS)}', ctx)
         return super().resolve_command(ctx, args)
@@ -73,14 +71,14 @@ def _print_completion(ctx: click.Context, _: click.Parameter, value: str | None)
 @click.option("--version", is_flag=True, expose_value=False, is_eager=True, callback=_print_version,
               help="Show the version and exit.")  # fmt: skip
 @click.option("--completion", type=click.Choice(["bash", "zsh", "fish"]), expose_value=False, is_eager=True,
-              callback=_print_completion, help="Print what the shell needs to complete words, and exit.")  # fmt: skip
-@click.option("--debug", is_flag=True, expose_value=False, help="With any verb: errors show their traceback.")
+              callback=_print_completion, help="Print the completion script of a shell and exit.")  # fmt: skip
+@click.option("--debug", is_flag=True, expose_value=False, help="With any verb: show the traceback of errors.")
 def cli() -> None:
     """From a surface mesh to a checked leg-length program for a five-legged parallel robot.
 
     Lengths are in millimetres, angles in degrees, feeds in mm/min.
 
-    Exit code 0: done, and the verdict passed. 1: the job cannot be done, or the verdict failed; the reason is
-    named. 2: bad input, one line says what and where. 3: an error of pentapod itself. 130: interrupted (Ctrl-C).
+    Exit code 0: done, and the verdict passed. 1: the job cannot be done, or the verdict failed; the message
+    says why. 2: bad input; one line says what and where. 3: an error of pentapod itself. 130: interrupted (Ctrl-C).
     143: terminated (SIGTERM).
     """

@@ -1,6 +1,6 @@
-"""Planning pipeline of one job: schema of the job file, run of the stages, outcome, output files.
+"""Jobs: schema of the job file, planning pipeline, outcome, output files, verdict on a run.
 
-The names below are loaded when they are first used: to read a job file needs no solver.
+The names below are imported when they are first used, so that reading a job file needs no solver.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ __all__ = ["Job", "Outcome", "judge", "run"]
 
 
 def __getattr__(name: str) -> Any:
-    """Load a name of `__all__` from where it lives. Raises AttributeError for others."""
+    """Import a name of `__all__`. Raises AttributeError for others."""
     if name not in _HOMES:
         raise AttributeError(f"module 'pentapod.job' has no attribute {name!r}")
     value = getattr(import_module(f"pentapod.job.{_HOMES[name]}"), name)
-    globals()[name] = value  # so that it is looked up once
+    globals()[name] = value
     return value

@@ -1,4 +1,4 @@
-"""The files of a run: their names, and how they are written."""
+"""Artefacts: names of the files of a run, and their writers."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from pentapod.base.files import atomic_write, packed_arrays
 PROGRAM, VERDICT, REPORT, ARRAYS = "program.csv", "verdict.json", "report.html", "plan.npz"
 MANIFEST = "manifest.json"
 NAMES = (PROGRAM, ARRAYS, REPORT, VERDICT, MANIFEST)
-"""In the order in which they move into the folder; the manifest is last and shows that all are there."""
+"""In the order in which they are moved into the folder; the manifest is last and marks a complete run."""
 
 SETUPS = "setup-[1-9]*"
 """Folders of the same files, one for each set-up of a job that needs several."""
 
 
 def check_folder(folder: Path) -> None:
-    """Raise InputError where the folder cannot be made or written. It leaves nothing behind."""
+    """Raise InputError where the folder cannot be made or written. Nothing is left behind."""
     existing = folder
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
@@ -45,6 +45,6 @@ def write_json(content: Mapping[str, Any], path: Path) -> None:
 
 
 def write_arrays(arrays: Mapping[str, NDArray[Any]], path: Path) -> None:
-    """Write an .npz, atomically; the same arrays give the same bytes."""
+    """Write an .npz atomically; its bytes depend on the arrays alone."""
     with atomic_write(path) as temporary:
         temporary.write_bytes(packed_arrays(arrays))

@@ -1,4 +1,4 @@
-"""Outcome: the results of a run, stage by stage with wall times, and the verdict."""
+"""Outcome: results of a run, stage by stage with wall times, and the verdict; set-ups and refusals as verdicts."""
 
 from __future__ import annotations
 
@@ -22,22 +22,19 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Stage(Value):
-    """A stage that ran: its name, wall time in seconds, result, and a text about it.
-
-    A value that is a tuple is several values of one stage.
-    """
+    """A stage that ran. value: its result, or a tuple of several; remark: a text about it."""
 
     name: str
     seconds: float
     value: Any
-    said: str = ""
+    remark: str = ""
 
 
 @dataclass(frozen=True)
 class Outcome(Result):
-    """The results of a run. stages: in the order of the flow; a refusal is the last one.
+    """Results of a run. stages: in the order of the flow; a refusal is the last one.
 
-    machine: with the job's own tool length and controller settings.
+    machine: with the job's tool length and controller settings.
     """
 
     summary = ("passed", "refusal")
@@ -48,7 +45,7 @@ class Outcome(Result):
     verdict: Verdict
 
     def find(self, kind: type[T]) -> T | None:
-        """Return the value of this type, or None where no stage gave one."""
+        """Return the first value of this type; None where there is none."""
         for stage in self.stages:
             for value in stage.value if isinstance(stage.value, tuple) else (stage.value,):
                 if isinstance(value, kind):
@@ -57,12 +54,12 @@ class Outcome(Result):
 
     @property
     def refusal(self) -> Refusal | None:
-        """The reason why the job cannot be done; None where a program was made."""
+        """The refusal of a job that cannot be done; None where there is a program."""
         return self.find(Refusal)
 
     @property
     def passed(self) -> bool:
-        """True when there is a program and every claim about it holds."""
+        """Whether there is a program and every claim about it holds."""
         return self.refusal is None and self.verdict.passed
 
     def unwrap(self) -> Self:
@@ -91,12 +88,12 @@ class SetUp(Value):
 
     @staticmethod
     def folder_of(number: int) -> str:
-        """Return the name of the folder of a set-up's files, within the job's."""
+        """Return the name of a set-up's folder."""
         return f"setup-{number}"
 
     @property
     def folder(self) -> str:
-        """The folder of its files, within the job's."""
+        """Name of its folder."""
         return self.folder_of(self.number)
 
     @property
@@ -118,7 +115,7 @@ class SetUp(Value):
 
     @property
     def seconds(self) -> float:
-        """Wall time of its own stages, from its toolpath on."""
+        """Wall time of its stages from the toolpath on."""
         names = [stage.name for stage in self.outcome.stages]
         return sum(stage.seconds for stage in self.outcome.stages[names.index("toolpath") :])
 
@@ -135,10 +132,10 @@ class SetUp(Value):
 
 @dataclass(frozen=True)
 class SetUps(Value):
-    """The set-ups into which a job was split, in their order.
+    """The set-ups of a job, in their order.
 
-    cuts: how many intervals of the toolpath are cut; missed: how many of them in no set-up, or in more than one. most:
-    set-ups that the job allows.
+    cuts: number of cut intervals of the toolpath; missed: number of those in no set-up, or in more than one. most:
+    number of set-ups that the job allows.
     """
 
     parts: tuple[SetUp, ...]
@@ -147,26 +144,26 @@ class SetUps(Value):
     most: int
 
     def __str__(self) -> str:
-        lines = [f"{len(self.parts)} set-ups, for one placement cannot reach all:"]
+        lines = [f"{len(self.parts)} set-ups, because one placement cannot reach the whole path:"]
         lines += [f"  {part.folder}: {part.piece}, verdict {part.answer}" for part in self.parts]
         return "\n".join(lines)
 
     @property
     def verdict(self) -> Verdict:
-        """All claims about all set-ups, and the claim that together they make every cut once."""
+        """All claims about all set-ups, and that together they make every cut once."""
         return setups_verdict(
             [(part.number, part.outcome.verdict) for part in self.parts], self.cuts, self.missed, self.most
         )
 
 
 def setups_verdict(verdicts: Sequence[tuple[int, Verdict]], cuts: int, missed: int, most: int) -> Verdict:
-    """Return the verdict on all set-ups, and that together they make every cut once; most: set-ups that the job allows.
+    """Return the verdict on all set-ups, and that together they make every cut once; arguments as in `SetUps`.
 
-    Its sources name no program: each set-up's verdict names its own.
+    Its sources name no program; the verdict of each set-up does.
     """
     words = (
-        f"{cuts} intervals between waypoints are cut; the set-ups' pieces were counted against them; {len(verdicts)} "
-        f"set-ups, at most {most} are allowed"
+        f"{cuts} cut intervals between waypoints, counted in the set-ups' pieces; {len(verdicts)} set-ups, at most "
+        f"{most} are allowed"
     )
     whole = Certificate(WHOLE, missed == 0 and len(verdicts) <= most, missed, 0.0, "", Place(), words)
     parts = [(f"set-up {number}: ", verdict) for number, verdict in verdicts]
@@ -177,36 +174,36 @@ def setups_verdict(verdicts: Sequence[tuple[int, Verdict]], cuts: int, missed: i
 
 
 def refusal_verdict(refusal: Refusal, sources: Sources) -> Verdict:
-    """Return the verdict on a job that was refused: each limit in the way is a claim that fails."""
-    blames = [
+    """Return the verdict on a refused job: each exceeded limit is a claim that fails."""
+    limits = [
         Certificate(
-            claim=blame.constraint,
+            claim=shortfall.constraint,
             passed=False,
-            value=blame.shortfall,
+            value=shortfall.shortfall,
             bound=0.0,
-            unit=blame.unit,
+            unit=shortfall.unit,
             where=Place(),
             method=f"{refusal.stage}: shortfall of the best attempt",
         )
-        for blame in refusal.diagnosis
+        for shortfall in refusal.diagnosis
     ]
     whole = Certificate("the job can be done", False, None, None, "", Place(), str(refusal))
-    return Verdict((whole, *blames), sources=sources)
+    return Verdict((whole, *limits), sources=sources)
 
 
 def refusal_dict(refusal: Refusal) -> dict[str, Any]:
-    """Return a refusal as verdict.json tells it."""
+    """Return a refusal as in verdict.json."""
     return {
         "stage": refusal.stage,
         "cause": refusal.cause,
         "remedy": refusal.remedy,
         "diagnosis": [
             {
-                "constraint": blame.constraint,
-                "shortfall": blame.shortfall,
-                "unit": blame.unit,
-                "waypoints": [list(pair) for pair in blame.waypoints],
+                "constraint": shortfall.constraint,
+                "shortfall": shortfall.shortfall,
+                "unit": shortfall.unit,
+                "waypoints": [list(pair) for pair in shortfall.waypoints],
             }
-            for blame in refusal.diagnosis
+            for shortfall in refusal.diagnosis
         ],
     }

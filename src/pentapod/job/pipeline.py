@@ -1,24 +1,26 @@
-"""Planning pipeline: runs the stages of a job in order and writes their results."""
+"""Planning pipeline: run the stages of a job in order and write their results."""
 
 from __future__ import annotations
 
 import dataclasses
+import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, write_arrays, write_json
+from pentapod.job.build.limits import placement_limits, timing_limits
 from pentapod.job.build.placement import job_weights
 from pentapod.job.build.specification import job_specification
-from pentapod.job.build.tool import job_link_style
-from pentapod.job.build.values import job_machine, job_mesh, job_piece, job_toolpath
+from pentapod.job.build.toolpath import job_link_style, job_piece, job_toolpath
+from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
 from pentapod.job.plan_arrays import arrays_of
 from pentapod.job.run_folder import staged, unstaged
 from pentapod.job.schema.job import Job
-from pentapod.job.stage_runner import StageRunner
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
 from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
@@ -30,9 +32,28 @@ from pentapod.timing import Explanation, Limit, Trajectory, certify, explain, re
 from pentapod.toolpath import Mesh, Toolpath
 from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.linking.partition import Piece, missed_cuts, part_of
-from pentapod.verify import Claim, Specification, judged
+from pentapod.verify import Claim, Specification, Verdict, judged
 
 Writer = Callable[[Outcome, Path], object]
+T = TypeVar("T")
+
+
+class StageRunner:
+    """Runs stages and records their names, wall times and results."""
+
+    def __init__(self, progress: Progress) -> None:
+        self.progress = progress
+        self.stages: list[Stage] = []
+
+    def run(self, name: str, stage: Callable[[], T], remark: Callable[[T], str] = lambda _: "") -> T:
+        """Return the result of a stage and record it. remark: returns a text about the result."""
+        self.progress(name, 0.0)
+        start = time.perf_counter()
+        value = stage()
+        seconds = time.perf_counter() - start
+        self.stages.append(Stage(name, seconds, value, remark(value)))
+        self.progress(name, 1.0)
+        return value
 
 
 def run(
@@ -40,6 +61,7 @@ def run(
     out: str | Path,
     progress: Progress = silent,
     *,
+    machine: Machine | None = None,
     piece: Piece | None = None,
     writers: Mapping[str, Writer] | None = None,
     limits: Sequence[Limit] = (),
@@ -47,25 +69,28 @@ def run(
 ) -> Outcome:
     """Plan a job, write program.csv, plan.npz and verdict.json into `out`, and return the outcome.
 
-    piece: of the job's toolpath, where only that is to be planned, in one set-up. writers: further files, by name,
-    each made from the outcome (the report, which stands above this floor). limits: further ones for the time law;
-    claims: further ones for the verdict.
-    The program is judged from the file, as it was written. What cannot be done ends in an outcome with a
-    refusal: verdict.json says so, and there is no program. The folder changes when the run ends: an
-    error or an interruption leaves it as it was. Raises InputError for a bad job, mesh, machine or folder, and where
-    another run is writing into the folder.
+    machine: to be used instead of the one that the job names, with the job's tool length and controller settings.
+    piece: plan only this piece of the job's toolpath, in one set-up. writers: further files, by name, each written from
+    the outcome (the report, for example). limits: further limits on the time law. claims: further claims of the
+    verdict.
+    The program is judged from the file, as it was written. A job that cannot be done gives an outcome with a refusal,
+    a verdict.json that says so, and no program. The folder changes when the run ends: an error or an interruption
+    leaves it as it was. Raises InputError for a bad job, mesh, machine or folder, and where another run is writing into
+    the folder.
     """
     folder = Path(out)
     check_folder(folder)
     runner = StageRunner(progress)
     with staged(folder) as staging:  # from the start: a second run on the folder fails at once
-        machine = job_machine(job)
-        mesh = runner.time("mesh", lambda: job_mesh(job, progress), says=lambda mesh: str(mesh.diagnosis))
-        asked = job_specification(job, machine, mesh, lambda: _toolpath(job, mesh, piece, runner))
+        used, own_machine = job_machine(job, machine), machine is not None
+        mesh = runner.run("mesh", lambda: job_mesh(job, progress), remark=lambda mesh: str(mesh.diagnosis))
+        specification = job_specification(
+            job, used, mesh, lambda: _toolpath(job, mesh, piece, runner), own_machine=own_machine
+        )
         if piece is not None:  # the caller plans the other pieces elsewhere
-            asked = dataclasses.replace(asked, setups=max(asked.setups, 2))
-        task = _Task(job, asked, runner, piece, tuple(limits), tuple(claims))
-        outcome = _reached(task, staging, writers or {})
+            specification = dataclasses.replace(specification, setups=max(specification.setups, 2))
+        task = _Task(job, specification, runner, piece, (*timing_limits(job, used), *limits), tuple(claims))
+        outcome = _planned(task, staging, writers or {})
         refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
         if refusal is not None and refusal.stage == "placement" and splits:
             style = job_link_style(job, mesh, task.toolpath)
@@ -75,32 +100,36 @@ def run(
 
 def _toolpath(job: Job, mesh: Mesh, piece: Piece | None, runner: StageRunner) -> Toolpath:
     """Return the job's toolpath, or a piece of it, as a stage of the run."""
-    if piece is None:
-        return runner.time("toolpath", lambda: job_toolpath(job, mesh, runner.progress), says=lambda it: str(it[1]))[0]
-    made = runner.time(
-        "toolpath", lambda: (job_piece(job, mesh, piece, runner.progress), piece), says=lambda _: str(piece)
-    )
-    return made[0]
+
+    def made() -> tuple[Toolpath, object]:
+        if piece is None:
+            return job_toolpath(job, mesh, runner.progress)
+        return job_piece(job, mesh, piece, runner.progress), piece
+
+    return runner.run("toolpath", made, remark=lambda it: str(it[1]))[0]
 
 
-def _reached(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
-    """Run the stages after the toolpath, verify, write the files, and return the outcome."""
+def _planned(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+    """Run the stages after the toolpath and the verification, write the files, and return the outcome."""
     program, runner = task.program(staging / PROGRAM), task.runner
     if isinstance(program, Refusal):
-        verdict = refusal_verdict(program, task.asked.sources)
+        verdict = refusal_verdict(program, task.specification.sources)
     else:
         file = staging / PROGRAM
-        verdict = runner.time("verify", lambda: judged(file, task.asked, claims=task.claims, progress=runner.progress))
-    outcome = Outcome(task.job, task.machine, tuple(runner.stages), verdict)
+        verdict = runner.run(
+            "verify", lambda: judged(file, task.specification, claims=task.claims, progress=runner.progress)
+        )
+    return _written(task, verdict, staging, writers)
+
+
+def _written(task: _Task, verdict: Verdict, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+    """Write the files of a run but its program, and return the outcome."""
+    outcome = Outcome(task.job, task.machine, tuple(task.runner.stages), verdict)
     if (placed := outcome.find(PlacedPath)) is not None:
         outcome = dataclasses.replace(outcome, machine=task.on(placed.placement).machine)
-    return _written(outcome, staging, writers, runner.progress)
-
-
-def _written(outcome: Outcome, staging: Path, writers: Mapping[str, Writer], progress: Progress) -> Outcome:
     write_arrays(arrays_of(outcome, unstaged(staging)), staging / ARRAYS)
     for name, write in writers.items():
-        progress("report", 0.0, name)
+        task.runner.progress("report", 0.0, name)
         write(outcome, staging / name)
     write_json(outcome.to_dict(), staging / VERDICT)
     return outcome
@@ -112,10 +141,9 @@ def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, write
     # The refusal is not part of the outcome.
     runner.stages = [stage for stage in runner.stages if stage.value is not refusal]
     search = (task.toolpath, task.fits, style, job.placement.setups, refusal, runner.progress)
-    found = runner.time("set-ups", lambda: setups(*search))
+    found = runner.run("set-ups", lambda: setups(*search))
     if isinstance(found, Refusal):
-        verdict = refusal_verdict(found, task.asked.sources)
-        return _written(Outcome(job, task.machine, tuple(runner.stages), verdict), staging, writers, runner.progress)
+        return _written(task, refusal_verdict(found, task.specification.sources), staging, writers)
     cutting, missed = missed_cuts(toolpath, found)
     parts: list[SetUp] = []
     before = [stage for stage in runner.stages if stage.name not in ("toolpath", "set-ups")]
@@ -125,21 +153,20 @@ def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, write
         own.stages += [*before, Stage("toolpath", 0.0, (part, piece), f"set-up {number} of {len(found)}: {piece}")]
         folder = staging / SetUp.folder_of(number)
         folder.mkdir()
-        own_task = dataclasses.replace(
-            task, asked=dataclasses.replace(task.asked, toolpath=part, missed=missed), runner=own, piece=piece
-        )
-        parts.append(SetUp(number, piece, _reached(own_task, folder, writers)))
+        specification = dataclasses.replace(task.specification, toolpath=part, missed=missed)
+        own_task = dataclasses.replace(task, specification=specification, runner=own, piece=piece)
+        parts.append(SetUp(number, piece, _planned(own_task, folder, writers)))
     done = SetUps(tuple(parts), cutting, missed, job.placement.setups)
     runner.stages.append(Stage("set-ups planned", sum(part.seconds for part in parts), done, str(done)))
-    return _written(Outcome(job, task.machine, tuple(runner.stages), done.verdict), staging, writers, runner.progress)
+    return _written(task, done.verdict, staging, writers)
 
 
 @dataclasses.dataclass(frozen=True)
 class _Task:
-    """What the stages after the toolpath need. asked: all that the job asks, of the plan as of the program."""
+    """The inputs of the stages after the toolpath. specification: the job's requirements on plan and program."""
 
     job: Job
-    asked: Specification
+    specification: Specification
     runner: StageRunner
     piece: Piece | None = None
     limits: tuple[Limit, ...] = ()
@@ -147,37 +174,37 @@ class _Task:
 
     @property
     def machine(self) -> Machine:
-        return self.asked.machine
+        return self.specification.machine
 
     @property
     def toolpath(self) -> Toolpath:
-        return self.asked.toolpath
+        return self.specification.toolpath
 
     def program(self, file: Path) -> Program | Refusal:
         """Plan, write the program to `file` and return it; or return the first refusal."""
-        placed = self.runner.time("placement", self._placed, says=_remarks)
+        placed = self.runner.run("placement", self._placed, remark=_remarks)
         if isinstance(placed, Refusal):
             return placed
         return self.on(placed.placement).written(placed, file)
 
     def on(self, placement: Placement) -> _Task:
-        """Return the task with the machine's guides where a placement wants them."""
+        """Return the task with the machine's guides at the rail positions of a placement."""
         if placement.rail_positions is None:
             return self
         machine = self.machine.at(placement.rail_positions)
-        return dataclasses.replace(self, asked=dataclasses.replace(self.asked, machine=machine))
+        return dataclasses.replace(self, specification=dataclasses.replace(self.specification, machine=machine))
 
     def written(self, placed: PlacedPath, file: Path) -> Program | Refusal:
         """Write the program of a placed path to `file` and return it; or return the first refusal."""
-        path = self.runner.time("leg path", lambda: self._path(placed))
+        path = self.runner.run("leg path", lambda: self._path(placed))
         if isinstance(path, Refusal):
             return path
         machine, progress = self.machine, self.runner.progress
-        trajectory = self.runner.time("timing", lambda: retime(path, machine, limits=self.limits, progress=progress))
+        trajectory = self.runner.run("timing", lambda: retime(path, machine, limits=self.limits, progress=progress))
         if isinstance(trajectory, Refusal):
             return trajectory
-        program = self.runner.time("program", lambda: self._program(placed, trajectory, file))
-        self.runner.time("explain", lambda: self._explanation(path, trajectory, program), says=str)
+        program = self.runner.run("program", lambda: self._program(placed, trajectory, file))
+        self.runner.run("explain", lambda: self._explanation(path, trajectory, program), remark=str)
         return program
 
     def fits(self, part: Toolpath) -> bool:
@@ -190,11 +217,12 @@ class _Task:
 
     def _options(self) -> PlacementOptions:
         return {
-            "tilt": self.asked.tilt,
-            "constraints": self.asked.constraints or FREE,
-            "component": self.asked.component,
-            "collision_world": self.asked.collision_world or NOTHING,
+            "tilt": self.specification.tilt,
+            "constraints": self.specification.constraints or FREE,
+            "component": self.specification.component,
+            "collision_world": self.specification.collision_world or NOTHING,
             "weights": job_weights(self.job),
+            "limits": placement_limits(self.job),
             "solver": self.job.placement.solver,
         }
 
@@ -202,8 +230,8 @@ class _Task:
         return leg_path(
             placed,
             self.machine,
-            path_tolerance=self.asked.path_tolerance,
-            axis_tolerance=self.asked.axis_tolerance,
+            path_tolerance=self.specification.path_tolerance,
+            axis_tolerance=self.specification.axis_tolerance,
             stop_angle=self.job.feed.si.stop_angle,
         )
 

@@ -1,4 +1,4 @@
-"""The content of plan.npz: the arrays of all stages by name, with units."""
+"""Content of plan.npz: the arrays of all stages by name, with units."""
 
 from __future__ import annotations
 
@@ -31,19 +31,17 @@ GUIDES = "placed.guides_mm"
 """Positions of the base joints along their guides, for a reconfigurable machine."""
 
 WAYPOINTS, BOX = "setup.waypoints", "setup.box_mm"
-"""Of one of several set-ups: its piece of the job's toolpath, first and last waypoint (2,) and corners (2, 3)."""
+"""For one of several set-ups: first and last waypoint (2,) and box (2, 3) of its piece of the toolpath."""
 
 
 def arrays_of(outcome: Outcome, folder: Path) -> Arrays:
-    """Return every array of the stages that were reached, by name: `stage.quantity_unit`; and `JOB_FILE`.
-
-    folder: of the run.
-    """
-    arrays: Arrays = {JOB_FILE: np.array(_way(outcome.job.path, folder))}
+    """Return the arrays of an outcome by name, `stage.quantity_unit`, and `JOB_FILE`. folder: of the run."""
+    arrays: Arrays = {JOB_FILE: np.array(_relative(outcome.job.path, folder))}
     if (toolpath := outcome.find(Toolpath)) is not None:
         arrays |= toolpath_arrays(toolpath)
     if (piece := outcome.find(Piece)) is not None:
-        arrays |= _set_up(piece)
+        box = np.array([piece.low, piece.high])
+        arrays |= _in_units({WAYPOINTS: np.array([piece.first, piece.last]), BOX: box})
     if (placed := outcome.find(PlacedPath)) is not None:
         arrays |= _placed(placed)
     if (path := outcome.find(LegPath)) is not None:
@@ -55,7 +53,7 @@ def arrays_of(outcome: Outcome, folder: Path) -> Arrays:
     return arrays
 
 
-def _way(job: Path, folder: Path) -> str:
+def _relative(job: Path, folder: Path) -> str:
     try:
         return Path(os.path.relpath(job.resolve(), folder.resolve())).as_posix()
     except ValueError:  # on another drive
@@ -70,7 +68,7 @@ def matrix_mm(transform: RigidTransform) -> Floats:
 
 
 def piece_in(arrays: Mapping[str, NDArray[Any]]) -> Piece | None:
-    """Return the piece of the job's toolpath that a run is about; None where it is about all of it."""
+    """Return the piece of the job's toolpath that a run is for; None for the whole toolpath."""
     if WAYPOINTS not in arrays:
         return None
     first, last = arrays[WAYPOINTS].tolist()
@@ -91,10 +89,6 @@ def _metres(values_mm: Floats) -> list[float]:
 def _in_units(values: Arrays) -> Arrays:
     """Return SI arrays in the units at the end of their names."""
     return {name: from_si(value, split_key(name)[1]) for name, value in values.items()}
-
-
-def _set_up(piece: Piece) -> Arrays:
-    return _in_units({WAYPOINTS: np.array([piece.first, piece.last]), BOX: np.array([piece.low, piece.high])})
 
 
 def _placed(placed: PlacedPath) -> Arrays:

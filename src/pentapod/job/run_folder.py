@@ -1,16 +1,18 @@
-"""Transactional output folder: all files are those of one finished run, or of the one before.
+"""Transactional output folder with a manifest: all files are of one finished run, or all of the run before.
 
     DIR/.unfinished-PID-…   what a run writes; its end is one rename to
-    DIR/.finished           a whole run, with its manifest: from here on it is the run of this folder
-    DIR/program.csv …       where its files go; those of the run before are removed first
+    DIR/.finished           a whole run with its manifest: from now on it is the run of this folder
+    DIR/program.csv …       its files at their places; those of the run before are removed first
 
-Killed before that rename, a run has changed nothing; killed after it, what is left to move is moved by whoever
-opens the folder next. Files of two runs never stand beside each other. Files of the user are not touched.
+A run killed before that rename has changed nothing. After it, the next command that opens the folder moves the
+remaining files. Files of the user are not touched. manifest.json has the SHA-256 of the files, so that a mix of two
+runs is noticed.
 """
 
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import re
 import secrets
@@ -19,11 +21,11 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
+from typing import Any, cast
 
 from pentapod.base.errors import InputError
-from pentapod.base.files import unwritable
-from pentapod.job.artefacts import MANIFEST, SETUPS
-from pentapod.job.manifest import changed_files, read_manifest, run_files, write_manifest
+from pentapod.base.files import sha256_of, unwritable
+from pentapod.job.artefacts import MANIFEST, NAMES, SETUPS, write_json
 
 try:
     import fcntl as _fcntl
@@ -38,19 +40,19 @@ _UNFINISHED = re.compile(r"\.unfinished-(?:(\d+)-)?[a-z0-9_]{8}")
 
 @contextmanager
 def staged(folder: Path) -> Generator[Path]:
-    """Yield a new folder inside `folder`; what was written there is the run of `folder` when the block ends.
+    """Yield a new folder inside `folder`; its files become the run of `folder` when the block ends.
 
-    Files of an earlier run that this one did not write are removed (a refused job leaves no old program). When the
-    block raises, also on KeyboardInterrupt and SystemExit, everything is as it was before. What killed runs left is
-    removed first. Raises InputError where another run is writing into the folder, or it cannot be written.
+    Files of an earlier run are removed (a refused job leaves no old program). When the block raises, also on
+    KeyboardInterrupt and SystemExit, nothing has changed. Remains of killed runs are removed first. Raises InputError
+    where another run is writing into the folder, or it cannot be written.
     """
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     with _locked(folder, make=True) as alone:
         try:
             if alone:
-                _settle(folder)
-                _sweep(folder)
-            yield from _filled(folder)
+                _complete(folder)
+                _remove_unfinished(folder)
+            yield from _transaction(folder)
         except BaseException:
             for path in made:
                 with contextlib.suppress(OSError):  # not empty
@@ -58,7 +60,7 @@ def staged(folder: Path) -> Generator[Path]:
             raise
 
 
-def _filled(folder: Path) -> Generator[Path]:
+def _transaction(folder: Path) -> Generator[Path]:
     staging = folder / f".unfinished-{os.getpid()}-{secrets.token_hex(4)}"
     try:
         try:
@@ -67,42 +69,42 @@ def _filled(folder: Path) -> Generator[Path]:
             raise unwritable(folder, error) from error
         try:
             yield staging
-            write_manifest(staging)
+            _write_manifest(staging)
         except InputError as error:
             if error.file is None or staging not in Path(error.file).parents:
                 raise
-            raise _of_the_folder(error) from error
-        for relative in run_files(staging):
+            raise _with_final_name(error) from error
+        for relative in _run_files(staging):
             if (folder / relative).is_dir():
                 raise InputError("a file of the run cannot be written: a folder has its name", file=folder / relative)
         _sync(staging)
         try:
             staging.rename(folder / _FINISHED)
-            _settle(folder)
+            _complete(folder)
         except BaseException:
-            _settle(folder)  # the run has ended: an interruption must not leave half of its files
+            _complete(folder)  # an interruption must not leave half of the files
             raise
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 
 
 def unstaged(folder: Path) -> Path:
-    """Return where a folder within a staged one will stand in the end."""
+    """Return the final path of a folder within a staged one."""
     return Path(*(part for part in folder.parts if not _UNFINISHED.fullmatch(part)))
 
 
 def check_run(folder: Path) -> None:
     """Raise InputError where the files of a run's folder, or of one of its set-ups, are not of one run.
 
-    What a killed run left to move is moved first. A folder without a manifest is not judged.
+    A killed run is completed first. A folder without a manifest is not checked.
     """
     for whole in (folder, folder.parent):
         if (whole / _FINISHED / MANIFEST).is_file():
             with _locked(whole):
-                _settle(whole)
-    if changed := changed_files(folder):
+                _complete(whole)
+    if changed := _changed_files(folder):
         raise InputError(
-            "files here are not those that the run wrote: they were changed, or are of different runs", file=folder,
+            "files were changed since the run, or are of different runs", file=folder,
             value=", ".join(changed), expected=f"what {MANIFEST} says", remedy="plan the job again",
         )  # fmt: skip
 
@@ -111,7 +113,7 @@ def check_run(folder: Path) -> None:
 def _locked(folder: Path, *, make: bool = False) -> Generator[bool]:
     """Hold the folder's lock; yield False where the file system has none. Raises InputError where another holds it.
 
-    The lock is the system's own, on the folder itself: it ends with its process, however that ends.
+    The lock is the system's, on the folder itself: it ends with the process.
     """
     while True:
         try:
@@ -124,8 +126,8 @@ def _locked(folder: Path, *, make: bool = False) -> Generator[bool]:
             yield False
             return
         try:
-            held = _try(handle, folder)
-            # Whoever held it before may have removed the folder that it had made.
+            held = _try_lock(handle, folder)
+            # The process that held it before may have removed the folder.
             there = folder.exists() and os.path.samestat(folder.stat(), os.fstat(handle))
             if there or not make:
                 yield held
@@ -134,7 +136,7 @@ def _locked(folder: Path, *, make: bool = False) -> Generator[bool]:
             os.close(handle)
 
 
-def _try(handle: int, folder: Path) -> bool:
+def _try_lock(handle: int, folder: Path) -> bool:
     """Take the lock of an open folder; return False where there are no locks. Raises InputError: another holds it."""
     if fcntl is None:
         return False
@@ -152,23 +154,23 @@ def _try(handle: int, folder: Path) -> bool:
     return True
 
 
-def _sweep(folder: Path) -> None:
+def _remove_unfinished(folder: Path) -> None:
     """Remove unfinished folders of killed runs; the lock shows that those runs have ended."""
     for path in folder.glob(".unfinished-*"):
         if path.is_dir() and not path.is_symlink() and _UNFINISHED.fullmatch(path.name):
             shutil.rmtree(path, ignore_errors=True)
 
 
-def _settle(folder: Path) -> None:
-    """Put the files of a finished run in their places. Done again after a kill, it goes on where that was.
+def _complete(folder: Path) -> None:
+    """Move the files of a finished run to their places; after a kill, the remaining ones.
 
-    All old files go before the first new one comes.
+    All old files are removed before the first new one is moved.
     """
     finished = folder / _FINISHED
-    if (finished / MANIFEST).is_file():  # it moves last
-        coming = run_files(finished)
-        kept = {Path(name) for name in read_manifest(finished)} - set(coming)  # they have moved already
-        for relative in reversed(run_files(folder)):
+    if (finished / MANIFEST).is_file():  # it is moved last
+        coming = _run_files(finished)
+        kept = {Path(name) for name in _read_manifest(finished)} - set(coming)  # moved already
+        for relative in reversed(_run_files(folder)):
             if relative not in kept:
                 (folder / relative).unlink()
         for old in folder.glob(SETUPS):
@@ -181,7 +183,7 @@ def _settle(folder: Path) -> None:
     shutil.rmtree(finished, ignore_errors=True)
 
 
-def _of_the_folder(error: InputError) -> InputError:
+def _with_final_name(error: InputError) -> InputError:
     """Return an error about a staged file with the name of the final file."""
     return type(error)(
         error.what, file=unstaged(Path(error.file or "")), key=error.key, line=error.line, column=error.column,
@@ -197,3 +199,48 @@ def _sync(folder: Path) -> None:
             os.fsync(handle)
         finally:
             os.close(handle)
+
+
+def _run_files(folder: Path) -> list[Path]:
+    """Return the files of a run that are in a folder, relative to it, those of set-ups first, manifests last."""
+    parts = [*sorted(path for path in folder.glob(SETUPS) if path.is_dir()), folder]
+    return [(part / name).relative_to(folder) for part in parts for name in NAMES if (part / name).is_file()]
+
+
+def _write_manifest(folder: Path) -> None:
+    """Write manifest.json of a run's folder, and first that of each of its set-ups."""
+    for part in sorted(path for path in folder.glob(SETUPS) if path.is_dir()):
+        _write_manifest(part)
+    files = [relative for relative in _run_files(folder) if relative != Path(MANIFEST)]
+    entries = {
+        relative.as_posix(): {"sha256": sha256_of(folder / relative), "bytes": (folder / relative).stat().st_size}
+        for relative in sorted(files)
+    }
+    write_json({"files": entries}, folder / MANIFEST)
+
+
+def _read_manifest(folder: Path) -> dict[str, tuple[str, int]]:
+    """Return SHA-256 and size of each file by name; {} where there is no manifest. Raises InputError: broken."""
+    file = folder / MANIFEST
+    try:
+        entries = cast("dict[str, dict[str, Any]]", json.loads(file.read_text(encoding="utf-8"))["files"])
+        return {name: (str(entry["sha256"]), int(entry["bytes"])) for name, entry in entries.items()}
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise InputError(
+            "not the manifest of a run, or a broken one", file=file, remedy="plan the job again"
+        ) from error
+
+
+def _changed_files(folder: Path) -> list[str]:
+    """Return the names of files that are not as manifest.json says, or not there. Raises InputError: broken."""
+    return [name for name, entry in _read_manifest(folder).items() if not _is(folder / name, *entry)]
+
+
+def _is(path: Path, sha256: str, size: int) -> bool:
+    """Whether a file is there with these bytes; its size is compared first."""
+    try:
+        return path.stat().st_size == size and sha256_of(path) == sha256
+    except OSError:
+        return False

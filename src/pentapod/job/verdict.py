@@ -5,40 +5,53 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from pentapod.base.errors import InputError, ProgramError
+from pentapod.base.errors import ProgramError
 from pentapod.base.progress import Progress, silent
 from pentapod.job.artefacts import PROGRAM, SETUPS
 from pentapod.job.build.specification import job_specification
-from pentapod.job.build.tool import job_link_style
-from pentapod.job.build.values import job_machine, job_mesh, job_toolpath, program_toolpath
+from pentapod.job.build.toolpath import job_link_style, job_toolpath, program_piece, program_toolpath
+from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.outcome import setups_verdict
 from pentapod.job.schema.job import Job
-from pentapod.program import read_header
-from pentapod.toolpath import Toolpath
+from pentapod.machine.machine import Machine
 from pentapod.toolpath.linking.partition import Piece, missed_cuts, part_of
 from pentapod.verify import Verdict, judged
 
 
-def judge(job: Job, program: str | Path, progress: Progress = silent, *, strict: bool = False) -> Verdict:
+def judge(
+    job: Job,
+    program: str | Path,
+    progress: Progress = silent,
+    *,
+    machine: Machine | None = None,
+    strict: bool = False,
+) -> Verdict:
     """Return the verdict on a program file, or on the folder of a run, against its job.
 
     A folder holds one program, or one for each set-up in setup-1, setup-2, and so on: then all of them are judged, and
-    that together they make every cut once. The program of one set-up alone leaves that "not judged". strict as in
-    `verify`. Raises InputError for a bad job, mesh or machine, and where there is no such program.
+    that together they make every cut once. The program of one set-up alone leaves that "not judged". machine: to be
+    used instead of the one that the job names, as in `run`. strict as in `verify`. Raises InputError for a bad job,
+    mesh or machine, and where there is no such program.
     """
     path = Path(program)
     files = _programs(path) if path.is_dir() else [path]
-    machine, mesh = job_machine(job), job_mesh(job, progress)
+    used, own_machine, mesh = job_machine(job, machine), machine is not None, job_mesh(job, progress)
+
     if not path.is_dir() or (path / PROGRAM).is_file():
-        asked = job_specification(job, machine, mesh, lambda: program_toolpath(job, mesh, files[0], progress))
-        return judged(files[0], asked, strict=strict, progress=progress)
-    asked = job_specification(job, machine, mesh, lambda: job_toolpath(job, mesh, progress)[0])
-    whole, style = asked.toolpath, job_link_style(job, mesh, asked.toolpath)
-    pieces = [_piece(file, whole) for file in files]
-    cuts, missed = missed_cuts(whole, pieces)
+        specification = job_specification(
+            job, used, mesh, lambda: program_toolpath(job, mesh, files[0], progress), own_machine=own_machine
+        )
+        return judged(files[0], specification, strict=strict, progress=progress)
+    specification = job_specification(
+        job, used, mesh, lambda: job_toolpath(job, mesh, progress)[0], own_machine=own_machine
+    )
+    toolpath = specification.toolpath
+    style = job_link_style(job, mesh, toolpath)
+    pieces = [program_piece(file) or Piece(0, len(toolpath) - 1) for file in files]
+    cuts, missed = missed_cuts(toolpath, pieces)
     verdicts: list[tuple[int, Verdict]] = []
     for number, (file, piece) in enumerate(zip(files, pieces, strict=True), start=1):
-        own = replace(asked, toolpath=part_of(whole, piece, style), missed=missed)
+        own = replace(specification, toolpath=part_of(toolpath, piece, style), missed=missed)
         verdicts.append((number, judged(file, own, strict=strict, progress=progress)))
     return setups_verdict(verdicts, cuts, missed, job.placement.setups)
 
@@ -57,12 +70,3 @@ def _programs(folder: Path) -> list[Path]:
 def _number(file: Path) -> int:
     digits = file.parent.name.removeprefix("setup-")
     return int(digits) if digits.isascii() and digits.isdecimal() else 0
-
-
-def _piece(file: Path, whole: Toolpath) -> Piece:
-    """Return the piece that a program is about; the whole where its header does not say, or cannot be read."""
-    try:
-        piece = read_header(file).provenance.piece
-    except InputError:  # the verdict says what is wrong with the file
-        piece = None
-    return piece or Piece(0, len(whole) - 1)

@@ -42,6 +42,7 @@ class PlacementOptions(TypedDict):
     component: Branch | None
     collision_world: CollisionWorld
     weights: Weights
+    limits: Sequence[LimitKind] | None
     solver: SolverName
 
 
@@ -67,10 +68,10 @@ def plan(
     constraints: the allowed placements; of them, and of all components where none is given, the one with the largest
     smallest margin is kept, the margins weighed by `weights`; a machine's guides are chosen with it. collision_world:
     what legs, spindle and tool must not touch.
-    secondary_objective: a tenth of that margin may be given up for it. limits: the kinds of limits, all of `LIMITS` by
-    default. Deterministic for a seed. Returns a Refusal that names limits, waypoints and shortfalls where the part does
-    not fit. An interruption (Ctrl-C) of the search ends it with the best placement found so far, if that fits; else
-    KeyboardInterrupt is raised.
+    secondary_objective: a tenth of that margin may be given up for it. limits: the kinds of limits, pentapod's
+    own by default. Deterministic for a seed. Returns a Refusal that names limits, waypoints and shortfalls where the
+    part does not fit. An interruption (Ctrl-C) of the search ends it with the best placement found so far, if that
+    fits; else KeyboardInterrupt is raised.
     """
     problem = PlacementProblem.of(
         ToolpathSamples.of(toolpath, tilt), machine, constraints, weights,
@@ -102,7 +103,7 @@ def fits(toolpath: Toolpath, machine: Machine, **options: Unpack[PlacementOption
     """
     problem = PlacementProblem.of(
         ToolpathSamples.of(toolpath, options["tilt"]), machine, options["constraints"], options["weights"],
-        component=options["component"], collision_world=options["collision_world"],
+        component=options["component"], collision_world=options["collision_world"], limits=options["limits"],
     )  # fmt: skip
     _, found = _searched(problem, 0, options["solver"], silent)
     if found.interrupted:

@@ -1,4 +1,4 @@
-"""Fewer points for the eye, with every extreme kept."""
+"""Decimation of curves and meshes for display."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pentapod.base.arrays import Floats, Ints
 def keep_extremes(values: Floats, buckets: int) -> Ints:
     """Return indices, ascending, of the first, last, lowest and highest value in each of `buckets` runs.
 
-    values (N,); NaN counts as neither. All indices where N is at most 4 · buckets. A curve drawn through
-    these points covers the same pixels, and its largest and smallest value are the true ones.
+    values (N,); NaN counts as neither. All indices where N is at most 4 · buckets. The thinned curve covers
+    the same pixels and has the same largest and smallest value.
     """
     count = len(values)
     if count <= 4 * buckets:

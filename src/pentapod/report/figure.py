@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from pentapod.base.arrays import Floats
+from pentapod.report.decimate import keep_extremes
 
 Figure = dict[str, Any]
 
@@ -27,6 +32,33 @@ PLOT_CONFIG = {
 """Of every figure. plotly.js has a button that uploads the figure to a public server: no button, and no server."""
 
 
+@dataclass(frozen=True)
+class Detail:
+    """How many elements of each kind the report shows at most; they bound the size of the page.
+
+    poses: of the slider. margin_rows: rows of the program with margins. time_buckets, simulation_buckets,
+    path_buckets: of a curve against time, of a simulation, of the path; each keeps four points. margin_curves: margins
+    plotted. facets, edges: of a mesh in 3D. view_facets, view_points: of mesh and path in the drawings of the set-up
+    sheet. band_columns: of the band of margins. limits: rows of the table of limits.
+    """
+
+    poses: int = 240
+    margin_rows: int = 40_000
+    time_buckets: int = 600
+    simulation_buckets: int = 1000
+    path_buckets: int = 2500
+    margin_curves: int = 6
+    facets: int = 60_000
+    edges: int = 5000
+    view_facets: int = 1200
+    view_points: int = 1500
+    band_columns: int = 480
+    limits: int = 10
+
+
+DETAIL = Detail()
+
+
 def leg_colour(leg: int) -> str:
     """Return the colour of a leg, counted from 0; they repeat where there are more legs than colours."""
     return LEG_COLOURS[leg % len(LEG_COLOURS)]
@@ -37,6 +69,31 @@ def leg_dash(leg: int) -> str:
     return LEG_DASHES[leg % len(LEG_DASHES)]
 
 
+def curve(times: Floats, values: Floats, row: int, buckets: int, line: dict[str, Any], **more: Any) -> dict[str, Any]:
+    """Return a curve against time, thinned with its extremes kept. row: of the figure, from 1; line: its look."""
+    keep = keep_extremes(values, buckets)
+    data = {"x": packed(times[keep], "f8"), "y": packed(values[keep]), "yaxis": _axis("y", row)}
+    return {"type": "scatter", "mode": "lines", **data, "line": line, **more}
+
+
+def rows_layout(titles: Sequence[str], height: int, gap: float, **axis: Any) -> dict[str, Any]:
+    """Return the layout of rows that share the time axis. height: pixels; gap: share of it; axis: of each y axis."""
+    count = len(titles)
+    share = (1.0 - gap * (count - 1)) / count
+    layout: dict[str, Any] = {
+        "height": height,
+        "margin": {"l": 72, "r": 16, "t": 44, "b": 48},
+        "hovermode": "x",
+        "xaxis": {"title": {"text": "time, s"}, "anchor": f"y{count}", "zeroline": False},
+        "legend": {"orientation": "h", "x": 0.0, "y": 1.0, "yanchor": "bottom"},
+    }
+    for row, title in enumerate(titles, start=1):
+        top = 1.0 - (row - 1) * (share + gap)
+        own = {"title": {"text": title}, "domain": [max(top - share, 0.0), top], "anchor": "x", "zeroline": False}
+        layout[_axis("yaxis", row)] = own | axis
+    return layout
+
+
 def packed(values: ArrayLike, dtype: str = "f4") -> dict[str, str]:
     """Return an array (N,) as plotly.js takes it; f4 for floats, i4 for indices. NaN stays NaN (a gap)."""
     array = np.ascontiguousarray(values, dtype=f"<{dtype}")
@@ -44,6 +101,10 @@ def packed(values: ArrayLike, dtype: str = "f4") -> dict[str, str]:
 
 
 def as_script(content: Any) -> str:
-    """Return JSON that may stand within a <script> element."""
+    """Return JSON for a <script> element."""
     text = json.dumps(content, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
     return text.replace("<", "\\u003c")
+
+
+def _axis(name: str, row: int) -> str:
+    return name if row == 1 else f"{name}{row}"

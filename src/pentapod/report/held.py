@@ -1,18 +1,18 @@
-"""What holds the part or stands in the machine, for the pictures."""
+"""The fixture or table of a job, for the drawings."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.job.build.collision_world import job_fixture
+from pentapod.job.build.specification import job_fixture
 from pentapod.job.outcome import Outcome
 from pentapod.planning.placement.placed_path import PlacedPath
 
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """name; vertices (V, 3), metres, machine frame; faces (F, 3)."""
+    """Mesh of a fixture or table: vertices (V, 3), metres, machine frame; faces (F, 3)."""
 
     name: str
     vertices: Floats
@@ -20,7 +20,7 @@ class Held:
 
 
 def held_mesh(outcome: Outcome, placed: PlacedPath) -> Held | None:
-    """Return the fixture of an outcome's job where a placement has it; None where it has none."""
+    """Return the fixture of an outcome's job at a placement; None where the job has none."""
     mesh = job_fixture(outcome.job)
     if mesh is None:
         return None

@@ -1,19 +1,18 @@
-"""write_report: one HTML file that needs nothing else: the verdict first, then what explains it."""
+"""The report of a run as one self-contained HTML file: the verdict first, then placement, motion and provenance."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pentapod.base.files import atomic_write
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job.build.collision_world import job_collision_world
+from pentapod.job.build.limits import placement_limits
 from pentapod.job.build.placement import job_at, placement_toml
+from pentapod.job.build.specification import job_collision_world
 from pentapod.job.outcome import Outcome, SetUps
 from pentapod.job.plan_arrays import matrix_mm
 from pentapod.job.schema.job import Job
@@ -23,54 +22,33 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.placed_path import PlacedPath, UnplacedPath
 from pentapod.program.program import Program
 from pentapod.report import plots, scene, words
-from pentapod.report.figure import PLOT_CONFIG, Figure, as_script
+from pentapod.report.figure import DETAIL, Figure, as_script
 from pentapod.report.held import held_mesh
 from pentapod.report.setup_sheet import setup_sheet
 from pentapod.report.signals import Signals
+from pentapod.report.template import write_page
 from pentapod.report.worst import worst_places
 from pentapod.timing.explain import Explanation
 from pentapod.timing.time_law.trajectory import Trajectory
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
-_POSES = 240
-
 
 def write_report(outcome: Outcome, path: str | Path) -> Path:
     """Write report.html on a run and return its path. Raises InputError where it cannot be written."""
-    text = render(outcome)
-    with atomic_write(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return Path(path)
-
-
-def render(outcome: Outcome) -> str:
-    """Return the page as text."""
-    import jinja2  # noqa: PLC0415 - heavy, and only needed here
-    import plotly.offline  # noqa: PLC0415
-
-    folder = resources.files("pentapod.report")
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(number=words.number, duration=words.duration, opening=words.opening)
-    template = environment.from_string((folder / "page.html.j2").read_text(encoding="utf-8"))
-    return template.render(
-        style=(folder / "style.css").read_text(encoding="utf-8"),
-        script=(folder / "page.js").read_text(encoding="utf-8"),
-        plotly=plotly.offline.get_plotlyjs(),
-        plot_config=as_script(PLOT_CONFIG),
-        **_context(outcome),
-    )
+    return write_page(path, "page.html.j2", **_context(outcome))
 
 
 def _context(outcome: Outcome) -> dict[str, Any]:
-    """Return what the template shows."""
+    """Return the variables of the template."""
     failed = [c for c in outcome.verdict.certificates if not c.passed]
     status = "refused" if outcome.refusal is not None else "passed" if outcome.passed else "failed"
     placed, program = outcome.find(PlacedPath), outcome.find(Program)
     trajectory, toolpath = outcome.find(Trajectory), outcome.find(Toolpath)
     signals = None
     if program is not None and trajectory is not None and toolpath is not None:
-        signals = Signals.of(program, outcome.machine, trajectory, toolpath, _collision_world(outcome))
+        world, limits = _collision_world(outcome), placement_limits(outcome.job)
+        signals = Signals.of(program, outcome.machine, trajectory, toolpath, world, limits)
     figures: dict[str, Figure] = {"scene": _scene(outcome, signals)}
     if signals is not None:
         figures["time"] = plots.time_figure(signals, outcome.machine)
@@ -86,7 +64,7 @@ def _context(outcome: Outcome) -> dict[str, Any]:
         "facts": _facts(outcome, signals),
         "worst": [] if signals is None else worst_places(signals, outcome.machine),
         "story": outcome.find(Explanation),
-        "sheet": _to_prepare(outcome, signals),
+        "sheet": _preparations(outcome, signals),
         "placement": None if placed is None else _placement(outcome.job, placed.placement.transform),
         "setups": outcome.find(SetUps),
         "one_of_several": outcome.find(Piece) is not None,
@@ -103,13 +81,13 @@ def _context(outcome: Outcome) -> dict[str, Any]:
 
 
 def _collision_world(outcome: Outcome) -> CollisionWorld:
-    """Return what the planner kept clear of."""
+    """Return the collision world of the planner."""
     mesh = outcome.find(Mesh)
     return NOTHING if mesh is None else job_collision_world(outcome.job, outcome.machine, mesh)
 
 
 def _facts(outcome: Outcome, signals: Signals | None) -> list[tuple[str, str]]:
-    """Return the few numbers at the top: name and value."""
+    """Return names and values of the numbers at the top."""
     toolpath, placed = outcome.find(Toolpath), outcome.find(PlacedPath)
     program = outcome.find(Program)
     facts: list[tuple[str, str]] = []
@@ -144,7 +122,7 @@ def _scene(outcome: Outcome, signals: Signals | None) -> Figure:
         traces += scene.machine_traces(outcome.machine, signals.tips[row], signals.axes[row])
     elif toolpath is not None and refusal is not None:
         shown = toolpath if placed is None else placed
-        traces += scene.blamed_traces(shown.tips, shown.axes, refusal)
+        traces += scene.refused_traces(shown.tips, shown.axes, refusal)
         if placed is not None:
             worst, rail_positions = int(placed.margins.min(axis=1).argmin()), placed.placement.rail_positions
             machine = outcome.machine if rail_positions is None else outcome.machine.at(rail_positions)
@@ -160,12 +138,12 @@ def _start_row(signals: Signals) -> int:
 
 
 def _poses(outcome: Outcome, signals: Signals | None) -> dict[str, Any]:
-    """Return the poses of the slider and what the page's script needs to draw the machine there, mm."""
+    """Return the poses of the slider, and the other data of the page's script, mm."""
     if signals is None:
         return {"poses": []}
     machine = outcome.machine
-    rows = np.linspace(0, len(signals.times) - 1, min(_POSES, len(signals.times))).astype(np.intp)
-    # Every place that the tables link to has its own pose.
+    rows = np.linspace(0, len(signals.times) - 1, min(DETAIL.poses, len(signals.times))).astype(np.intp)
+    # Every place that a table links to has a pose of its own.
     linked = [c.where.row for c in outcome.verdict.certificates if c.where.row is not None]
     linked += [place.row for place in worst_places(signals, machine) if place.row is not None]
     rows = np.unique(np.concatenate([rows, [_start_row(signals)], np.clip(linked, 0, len(signals.times) - 1)]))
@@ -211,8 +189,8 @@ def _placement(job: Job, transform: RigidTransform) -> dict[str, Any]:
     }
 
 
-def _to_prepare(outcome: Outcome, signals: Signals | None) -> list[tuple[str, str]]:
-    """Return what someone in front of the machine has to prepare: name and value."""
+def _preparations(outcome: Outcome, signals: Signals | None) -> list[tuple[str, str]]:
+    """Return names and values of what the operator has to prepare."""
     job, machine, toolpath = outcome.job, outcome.machine, outcome.find(Toolpath)
     sheet = [
         ("tool", words.tool_sentence(job.tool)),
@@ -220,9 +198,9 @@ def _to_prepare(outcome: Outcome, signals: Signals | None) -> list[tuple[str, st
     ]
     placed = outcome.find(PlacedPath)
     if placed is not None and placed.placement.guides:
-        stand = placed.placement.guides.replace("-", "−")
+        rail_positions = placed.placement.guides.replace("-", "−")
         sheet.append(
-            (f"guides 1 to {machine.robot.n_legs}", f"set to {stand} from where the machine file has the base joints")
+            (f"guides 1 to {machine.robot.n_legs}", f"set to {rail_positions} from the base joints of the machine file")
         )
     mesh = outcome.find(Mesh)
     if mesh is not None:

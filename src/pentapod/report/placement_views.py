@@ -12,11 +12,11 @@ from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.report.decimate import thinned_mesh
-from pentapod.report.figure import HELD_COLOUR, LIMIT_COLOUR, QUIET_COLOUR, leg_colour
+from pentapod.report.figure import DETAIL, HELD_COLOUR, LIMIT_COLOUR, QUIET_COLOUR, leg_colour
 from pentapod.report.held import Held
 
-_FACETS, _POINTS = 1200, 1500
-_LETTER = 15.0  # of a drawing 500 wide
+LETTER = 15.0
+"""Height of letters in a drawing 500 wide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class _Subject:
 
     facets (F, 3, 3); tips (K, 3); base, joints (n_legs, 3); far, tip, origin (3,).
     hangs: whether the base is above the work, so that the machine's z points down. table: z of its surface, if any.
-    around (G, 3, 3): facets of what holds the part; holder: its name.
+    around (G, 3, 3): facets of the fixture; holder: its name.
     """
 
     facets: Floats
@@ -46,11 +46,10 @@ def placement_views(
 ) -> str:
     """Return the views as SVG elements.
 
-    table: height z of the table's surface, metres, where there is one; held: what holds the part.
+    table: height z of the table's surface, metres, where there is one; held: the fixture.
     """
     subject = _subject(mesh, placed, machine, table, held)
-    # Seen as someone sees it who stands at the machine: with z pointing down, y comes towards one where x is to the
-    # right. Drawn the other way it would be the mirror image.
+    # As an operator sees it: where z points down and x to the right, y points towards the viewer.
     y, side = ("down", "y towards you") if subject.hangs else ("up", "y away from you")
     return (
         _view(subject, f"from above: x to the right, y {y}", (0, 1))
@@ -66,16 +65,16 @@ def _subject(
     axis, tip = placed.axes[worst], placed.tips[worst]
     base, joints = leg_ends(machine, tip, axis)
     starts = placed.toolpath.starts
-    even = np.linspace(0, len(placed.tips) - 1, min(len(placed.tips), _POINTS)).astype(np.intp)
-    tips = placed.tips[np.unique(np.concatenate([even, starts[:: -(-len(starts) // _POINTS)]]))]
+    even = np.linspace(0, len(placed.tips) - 1, min(len(placed.tips), DETAIL.view_points)).astype(np.intp)
+    tips = placed.tips[np.unique(np.concatenate([even, starts[:: -(-len(starts) // DETAIL.view_points)]]))]
     facets = np.zeros((0, 3, 3))
     if mesh is not None:
-        vertices, faces = thinned_mesh(mesh.vertices, mesh.faces, _FACETS)
+        vertices, faces = thinned_mesh(mesh.vertices, mesh.faces, DETAIL.view_facets)
         facets = transform.apply(vertices)[faces]
     far, hangs = line_top(machine, tip, axis), bool(machine.work.centre[2] > 0.0)
     around = np.zeros((0, 3, 3))
     if held is not None:
-        vertices, faces = thinned_mesh(held.vertices, held.faces, _FACETS)
+        vertices, faces = thinned_mesh(held.vertices, held.faces, DETAIL.view_facets)
         around = vertices[faces]
     origin, name = transform.translation, "" if held is None else held.name
     return _Subject(facets, tips, base, joints, far, tip, origin, hangs, table, around, name)
@@ -83,7 +82,7 @@ def _subject(
 
 @dataclass(frozen=True, eq=False)
 class _Paper:
-    """Where points (..., 2), mm, to the right and up, come to lie in a drawing that holds those from low to high."""
+    """Map from points (..., 2), mm, to the right and up, to a drawing of the box from low to high."""
 
     low: Floats
     high: Floats
@@ -100,11 +99,11 @@ class _Paper:
 
     @property
     def unit(self) -> float:
-        """What lines and letters are measured in, mm: the drawing looks the same whatever the machine's size."""
+        """Unit of line widths and letters, mm: 1/500 of the drawing."""
         return float(self.size.max()) / 500.0
 
     def at(self, points: Floats) -> Floats:
-        """Return the places (..., 2): to the right and down, as SVG has it."""
+        """Return SVG coordinates (..., 2): to the right and down."""
         right, up = points[..., 0], points[..., 1]
         return np.stack([right - self.low[0] + self.room, self.high[1] + self.room - up], axis=-1)
 
@@ -117,7 +116,7 @@ class _Paper:
         return f'<polyline points="{self._words(points)}" fill="none" {pen} {more}/>'
 
     def filled(self, facets: Floats, colour: str, name: str) -> str:
-        """Return facets (F, 3, 2) as one shape that tells its name."""
+        """Return facets (F, 3, 2) as one shape with a title."""
         shape = "".join(f"M{self._words(facet)}Z" for facet in facets)
         return f'<path d="{shape}" fill="{colour}" fill-opacity="0.45"><title>{name}</title></path>'
 
@@ -126,11 +125,11 @@ class _Paper:
         (x, y), u = self.at(point), self.unit
         return (
             f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{5.0 * u:.2f}" fill="{colour}"/><text x="{x + 8.0 * u:.1f}" '
-            f'y="{y - 6.0 * u:.1f}" font-size="{_LETTER * u:.1f}" fill="currentColor">{number}</text>'
+            f'y="{y - 6.0 * u:.1f}" font-size="{LETTER * u:.1f}" fill="currentColor">{number}</text>'
         )
 
     def cross(self, point: Floats, name: str) -> str:
-        """Return a cross that tells its name."""
+        """Return a cross with a title."""
         (x, y), arm = self.at(point), 8.0 * self.unit
         return (
             f'<path d="M{x - arm:.1f},{y:.1f}h{2 * arm:.1f}M{x:.1f},{y - arm:.1f}v{2 * arm:.1f}" '

@@ -8,21 +8,22 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
-from pentapod.report.decimate import keep_extremes
-from pentapod.report.figure import LIMIT_COLOUR, QUIET_COLOUR, Figure, leg_colour, leg_dash, packed
+from pentapod.report.figure import (
+    DETAIL,
+    LIMIT_COLOUR,
+    QUIET_COLOUR,
+    Figure,
+    curve,
+    leg_colour,
+    leg_dash,
+    rows_layout,
+)
 from pentapod.report.signals import Signals
 
-_BUCKETS = 600
-_SHOWN_MARGINS = 6
-_TITLES = (
-    "leg lengths, mm",
-    "leg rates, mm/s",
-    "leg accelerations, mm/s²",
-    "speed, mm/min",
-    "margins, 0 at a limit",
-)
-_MARGIN_ROW = len(_TITLES)
-_MARGIN_COLOURS = ("#c2417c", "#2a78d6", "#e08a00", "#1baa7a", "#7a5cd6", "#5f7d8c")
+TITLES = ("leg lengths, mm", "leg rates, mm/s", "leg accelerations, mm/s²", "speed, mm/min", "margins, 0 at a limit")
+SPEED_ROW, MARGIN_ROW = 4, len(TITLES)
+MARGIN_COLOURS = ("#c2417c", "#2a78d6", "#e08a00", "#1baa7a", "#7a5cd6", "#5f7d8c")
+AT_LIMIT = {"dash": "dash", "width": 1.1}
 
 
 def time_figure(signals: Signals, machine: Machine) -> Figure:
@@ -35,35 +36,24 @@ def time_figure(signals: Signals, machine: Machine) -> Figure:
     )
     for row, (values, low, high, unit) in enumerate(quantities, start=1):
         for leg in range(values.shape[1]):
-            traces.append(_leg_line(signals.times, 1e3 * values[:, leg], leg, row, unit))
+            traces.append(
+                _line(
+                    signals.times, 1e3 * values[:, leg], row, f"leg {leg + 1}", leg_colour(leg),
+                    {"dash": leg_dash(leg)}, f"leg {leg + 1}: %{{y:.5g}} {unit}",
+                    legendgroup=f"leg{leg}", showlegend=row == 1,
+                )
+            )  # fmt: skip
         traces += _limits(signals.times, 1e3 * low, row, unit) + _limits(signals.times, 1e3 * high, row, unit)
-    traces += _speed_lines(signals)
-    traces += _margin_lines(signals)
-    return {"data": traces, "layout": _layout()}
+    return {"data": [*traces, *_speed_lines(signals), *_margin_lines(signals)], "layout": _layout()}
 
 
-def _line(times: Floats, values: Floats, row: int, name: str, colour: str, **more: Any) -> dict[str, Any]:
-    keep = keep_extremes(values, _BUCKETS)
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": packed(times[keep], "f8"),
-        "y": packed(values[keep]),
-        "yaxis": "y" if row == 1 else f"y{row}",
-        "name": name,
-        "line": {"color": colour, "width": 1.3},
-        **more,
-    }
-
-
-def _leg_line(times: Floats, values: Floats, leg: int, row: int, unit: str) -> dict[str, Any]:
-    hover = f"leg {leg + 1}: %{{y:.5g}} {unit}<extra></extra>"
-    line = _line(
-        times, values, row, f"leg {leg + 1}", leg_colour(leg), legendgroup=f"leg{leg}", showlegend=row == 1,
-        hovertemplate=hover,
-    )  # fmt: skip
-    line["line"] = line["line"] | {"dash": leg_dash(leg)}
-    return line
+def _line(
+    times: Floats, values: Floats, row: int, name: str, colour: str, look: dict[str, Any], hover: str, **more: Any
+) -> dict[str, Any]:
+    line = {"color": colour, "width": 1.3, **look}
+    return curve(
+        times, values, row, DETAIL.time_buckets, line, name=name, hovertemplate=f"{hover}<extra></extra>", **more
+    )
 
 
 def _limits(times: Floats, values: Floats, row: int, unit: str) -> list[dict[str, Any]]:
@@ -71,65 +61,52 @@ def _limits(times: Floats, values: Floats, row: int, unit: str) -> list[dict[str
     ends, shared = times[[0, -1]], bool(np.ptp(values) == 0.0)
     lines: list[dict[str, Any]] = []
     for leg in range(1 if shared else len(values)):
-        whose = "limit" if shared else f"limit of leg {leg + 1}"
-        line = _line(ends, np.full(2, values[leg]), row, whose, LIMIT_COLOUR if shared else leg_colour(leg))
-        line |= {"showlegend": False, "hovertemplate": f"{whose}: %{{y:.5g}} {unit}<extra></extra>"}
-        line["line"] = line["line"] | {"dash": "dash", "width": 1.1}
-        lines.append(line)
+        name = "limit" if shared else f"limit of leg {leg + 1}"
+        colour = LIMIT_COLOUR if shared else leg_colour(leg)
+        hover = f"{name}: %{{y:.5g}} {unit}"
+        lines.append(_line(ends, np.full(2, values[leg]), row, name, colour, AT_LIMIT, hover, showlegend=False))
     return lines
 
 
 def _speed_lines(signals: Signals) -> list[dict[str, Any]]:
     wanted = _line(
-        signals.times, 6e4 * signals.speed_limits, 4, "feed asked for, rapid rate", LIMIT_COLOUR, showlegend=False,
-        hovertemplate="allowed: %{y:.5g} mm/min<extra></extra>",
+        signals.times, 6e4 * signals.speed_limits, SPEED_ROW, "feed or rapid rate", LIMIT_COLOUR,
+        AT_LIMIT | {"shape": "hv"}, "allowed: %{y:.5g} mm/min", showlegend=False,
     )  # fmt: skip
-    wanted["line"] = wanted["line"] | {"dash": "dash", "width": 1.1, "shape": "hv"}
     speed = _line(
-        signals.times, 6e4 * signals.speeds, 4, "speed", "#5f7d8c", showlegend=False,
-        hovertemplate="moves: %{y:.5g} mm/min<extra></extra>",
+        signals.times, 6e4 * signals.speeds, SPEED_ROW, "speed", "#5f7d8c", {}, "speed: %{y:.5g} mm/min",
+        showlegend=False,
     )  # fmt: skip
     return [wanted, speed]
 
 
 def _margin_lines(signals: Signals) -> list[dict[str, Any]]:
-    """Return the smallest margin, and those that come nearest to their limits, by name."""
+    """Return the smallest margin, and the margins that come nearest to their limits, by name."""
     times = signals.times[signals.margin_rows]
-    order = np.argsort(signals.margins.min(axis=0), kind="stable")[:_SHOWN_MARGINS]
-    smallest = _line(
-        times, signals.smallest_margins, _MARGIN_ROW, "smallest margin", QUIET_COLOUR, legend="legend2",
-        hovertemplate="smallest: %{y:.3f}<extra></extra>",
-    )  # fmt: skip
-    smallest["line"] = {"color": QUIET_COLOUR, "width": 4}
-    lines = [smallest]
-    for colour, k in zip(_MARGIN_COLOURS, order, strict=False):
-        name = signals.margin_names[k]
-        hover = f"{name}: %{{y:.3f}}<extra></extra>"
-        line = _line(times, signals.margins[:, k], _MARGIN_ROW, name, colour, legend="legend2", hovertemplate=hover)
-        line["line"] = line["line"] | {"dash": leg_dash(len(lines))}
-        lines.append(line)
-    zero = _line(times[[0, -1]], np.zeros(2), _MARGIN_ROW, "limit", LIMIT_COLOUR, showlegend=False, hoverinfo="skip")
-    zero["line"] = zero["line"] | {"dash": "dash", "width": 1.1}
+    order = np.argsort(signals.margins.min(axis=0), kind="stable")[: DETAIL.margin_curves]
+    lines = [
+        _line(
+            times, signals.smallest_margins, MARGIN_ROW, "smallest margin", QUIET_COLOUR, {"width": 4},
+            "smallest: %{y:.3f}", legend="legend2",
+        )
+    ]  # fmt: skip
+    for n, (colour, k) in enumerate(zip(MARGIN_COLOURS, order, strict=False), start=1):
+        name, look = signals.margin_names[k], {"dash": leg_dash(n)}
+        values, hover = signals.margins[:, k], f"{name}: %{{y:.3f}}"
+        lines.append(_line(times, values, MARGIN_ROW, name, colour, look, hover, legend="legend2"))
+    ends = times[[0, -1]]
+    zero = _line(ends, np.zeros(2), MARGIN_ROW, "limit", LIMIT_COLOUR, AT_LIMIT, "limit", showlegend=False)
     return [*lines, zero]
 
 
 def _layout() -> dict[str, Any]:
-    count, gap = len(_TITLES), 0.035
-    height = (1.0 - gap * (count - 1)) / count
-    layout: dict[str, Any] = {
-        "height": 1180,
-        "margin": {"l": 72, "r": 16, "t": 44, "b": 48},
-        "hovermode": "x",
-        "xaxis": {"title": {"text": "time, s"}, "anchor": f"y{count}", "domain": [0.0, 1.0], "showspikes": True,
-                  "spikemode": "across", "spikethickness": 1, "spikedash": "dot", "zeroline": False},
-        "shapes": [{"type": "line", "xref": "x", "yref": "paper", "x0": 0, "x1": 0, "y0": 0, "y1": 1,
-                    "line": {"color": QUIET_COLOUR, "width": 1.5}}],
-        "legend": {"orientation": "h", "x": 0.0, "y": 1.0, "yanchor": "bottom", "itemsizing": "constant"},
-        "legend2": {"orientation": "h", "x": 0.0, "y": -0.06, "yanchor": "top"},
+    layout = rows_layout(TITLES, 1180, 0.035, fixedrange=False)
+    layout["xaxis"] |= {
+        "domain": [0.0, 1.0], "showspikes": True, "spikemode": "across", "spikethickness": 1, "spikedash": "dot",
     }  # fmt: skip
-    for row, title in enumerate(_TITLES, start=1):
-        top = 1.0 - (row - 1) * (height + gap)
-        axis: dict[str, Any] = {"title": {"text": title}, "domain": [max(top - height, 0.0), top], "anchor": "x"}
-        layout["yaxis" if row == 1 else f"yaxis{row}"] = axis | {"zeroline": False, "fixedrange": False}
-    layout["yaxis4"]["rangemode"] = "tozero"
+    now = {"type": "line", "xref": "x", "yref": "paper", "x0": 0, "x1": 0, "y0": 0, "y1": 1}
+    layout["shapes"] = [now | {"line": {"color": QUIET_COLOUR, "width": 1.5}}]
+    layout["legend"]["itemsizing"] = "constant"
+    layout["legend2"] = {"orientation": "h", "x": 0.0, "y": -0.06, "yanchor": "top"}
+    layout[f"yaxis{SPEED_ROW}"]["rangemode"] = "tozero"
     return layout

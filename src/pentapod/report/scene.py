@@ -15,7 +15,16 @@ from pentapod.machine.machine import Machine
 from pentapod.mesh.diagnosis import fault_edges
 from pentapod.mesh.mesh import Mesh
 from pentapod.report.decimate import keep_extremes, thinned_mesh
-from pentapod.report.figure import HELD_COLOUR, LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR, Figure, leg_colour, packed
+from pentapod.report.figure import (
+    DETAIL,
+    HELD_COLOUR,
+    LEG_COLOURS,
+    LIMIT_COLOUR,
+    QUIET_COLOUR,
+    Figure,
+    leg_colour,
+    packed,
+)
 from pentapod.report.held import Held
 from pentapod.report.signals import Signals
 from pentapod.toolpath.linking.partition import Piece
@@ -26,14 +35,13 @@ CUTS_BY = {
     "feed": "cuts, by share of the feed",
     "cause": "cuts, by what limits them",
 }
-"""The names of the traces of which one at a time is shown."""
+"""Names of the traces of the cuts, of which one at a time is shown."""
 
-_MOST_FACETS = 60_000
-_MOST_EDGES = 5_000
-_BUCKETS = 2_500
-_CUT_WIDTH = 5.0
-_LIFT_M = 0.5e-3  # along the tool axis: a ball's tip runs on and below the surface, which would hide its path
-# Worst is darkest, on a light part: the order can be read without colour, too.
+CUT_WIDTH = 5.0
+LIFT_M = 0.5e-3
+"""Shift of the path along the tool axis: a ball's tip runs on and below the surface, which would hide it."""
+
+# The worst is the darkest, so that the order can be read without colour.
 _MARGIN_COLOURS = [[0.0, "#5c0019"], [0.2, "#b5371c"], [0.5, "#e39a2d"], [1.0, "#9fe0bd"]]
 _CAUSE_COLOURS = ("#14213d", "#8f2d56", "#2a78d6", "#d1603d", "#1baa7a", "#e0a526", "#8ecae6", "#c9b1e8")
 
@@ -44,12 +52,12 @@ def part_trace(mesh: Mesh, placement: RigidTransform, *, down: bool) -> dict[str
 
 
 def fixture_trace(held: Held, *, down: bool) -> dict[str, Any]:
-    """Return the surface of what holds the part; see through, so that it hides nothing."""
+    """Return the surface of the fixture, transparent."""
     return _surface(held.vertices, held.faces, held.name, HELD_COLOUR, down=down) | {"opacity": 0.55}
 
 
 def _surface(vertices: Floats, faces: Ints, name: str, colour: str, *, down: bool) -> dict[str, Any]:
-    vertices, faces = thinned_mesh(vertices, faces, _MOST_FACETS)
+    vertices, faces = thinned_mesh(vertices, faces, DETAIL.facets)
     x, y, z = 1e3 * vertices.T
     i, j, k = faces.T
     return {
@@ -66,61 +74,62 @@ def fault_traces(mesh: Mesh, placement: RigidTransform) -> list[dict[str, Any]]:
     """Return the edges of each fault that the mesh has, thinned for display."""
     traces: list[dict[str, Any]] = []
     for k, (name, edges) in enumerate(fault_edges(mesh.vertices, mesh.topology).items()):
-        shown = placement.apply(edges[:: max(1, len(edges) // _MOST_EDGES)])
+        shown = placement.apply(edges[:: max(1, len(edges) // DETAIL.edges)])
         lines = np.concatenate([shown, np.full((len(shown), 1, 3), np.nan)], axis=1).reshape(-1, 3)
         trace = _line3d(1e3 * lines, f"mesh: {name} ({len(edges):,})", leg_colour(k), 4.0)
-        # An open sheet's border is as it should be: there to look at, not to alarm.
+        # The border of an open sheet is no fault.
         traces.append(trace | ({"visible": "legendonly"} if name == "border" else {}))
     return traces
 
 
 def path_traces(signals: Signals) -> list[dict[str, Any]]:
     """Return the cuts coloured by margin, by feed and by what limits them (one is shown at a time), and the rest."""
-    tips = 1e3 * (signals.tips + _LIFT_M * signals.axes)
+    tips = 1e3 * (signals.tips + LIFT_M * signals.axes)
     margins = np.interp(signals.times, signals.times[signals.margin_rows], signals.smallest_margins)
     shares = 100.0 * signals.speeds / signals.speed_limits
-    names = signals.cause_names
+    names, buckets = signals.cause_names, DETAIL.path_buckets
     steps = np.flatnonzero(np.diff(signals.causes))
-    by_cause = _cuts(
-        signals, tips, signals.causes, np.append(steps, steps + 1)[: 2 * _BUCKETS], CUTS_BY["cause"],
-        {
-            "colorscale": _steps(len(names)), "cmin": -0.5, "cmax": len(names) - 0.5,
-            "colorbar": _bar("limited<br>by") | {"tickvals": list(range(len(names))), "ticktext": list(names)},
-        },
-        names,
-    )  # fmt: skip
-    return [
-        _cuts(
-            signals, tips, margins, keep_extremes(margins, _BUCKETS), CUTS_BY["margin"],
-            {"colorscale": _MARGIN_COLOURS, "cmin": 0.0, "cmax": 0.5, "colorbar": _bar("smallest<br>margin")},
+    ticks = {"tickvals": list(range(len(names))), "ticktext": list(names)}
+    causes = {"colorscale": _steps(len(names)), "cmin": -0.5, "cmax": len(names) - 0.5}
+    coloured = {
+        "margin": (margins, keep_extremes(margins, buckets), _scale(0.5, "smallest<br>margin")),
+        "feed": (shares, keep_extremes(shares, buckets), _scale(100.0, "% of the<br>feed")),
+        "cause": (
+            signals.causes, np.append(steps, steps + 1)[: 2 * buckets],
+            causes | {"colorbar": _bar("limited<br>by") | ticks},
         ),
-        _cuts(
-            signals, tips, shares, keep_extremes(shares, _BUCKETS), CUTS_BY["feed"],
-            {"colorscale": _MARGIN_COLOURS, "cmin": 0.0, "cmax": 100.0, "colorbar": _bar("% of the<br>feed")},
-        ) | {"visible": False},
-        by_cause | {"visible": False},
+    }  # fmt: skip
+    return [
+        *(
+            _cuts(signals, tips, *how, CUTS_BY[kind], names if kind == "cause" else ()) | {"visible": kind == "margin"}
+            for kind, how in coloured.items()
+        ),
         _line3d(_with_gaps(tips, ~signals.cutting), "links and rapids", QUIET_COLOUR, 1.5, visible="legendonly"),
-    ]  # fmt: skip
+    ]
 
 
 def _cuts(
     signals: Signals,
     tips: Floats,
     values: Floats | Ints,
-    also: Ints,
-    name: str,
+    kept: Ints,
     look: dict[str, Any],
-    words: Sequence[str] = (),
+    name: str,
+    words: Sequence[str],
 ) -> dict[str, Any]:
-    """Return the cuts coloured by values (N,), thinned: whatever `also` names is kept. words: of whole values."""
-    even = np.linspace(0, len(tips) - 1, min(len(tips), 2 * _BUCKETS)).astype(np.intp)
-    keep = np.unique(np.concatenate([even, also]))
-    trace = _line3d(np.where(signals.cutting[keep, None], tips[keep], np.nan), name, "", _CUT_WIDTH)
-    trace["line"] = {"width": _CUT_WIDTH, "color": packed(values[keep]), "showscale": True, **look}
+    """Return the cuts coloured by values (N,), thinned except for rows `kept`. words: texts of integer values."""
+    even = np.linspace(0, len(tips) - 1, min(len(tips), 2 * DETAIL.path_buckets)).astype(np.intp)
+    keep = np.unique(np.concatenate([even, kept]))
+    trace = _line3d(np.where(signals.cutting[keep, None], tips[keep], np.nan), name, "", CUT_WIDTH)
+    trace["line"] = {"width": CUT_WIDTH, "color": packed(values[keep]), "showscale": True, **look}
     trace["showlegend"] = False
     trace["text"] = [words[int(v)] for v in values[keep]] if words else [f"{float(v):.3g}" for v in values[keep]]
     trace["hovertemplate"] = "%{text}<br>%{x:.1f}, %{y:.1f}, %{z:.1f} mm<extra></extra>"
     return trace
+
+
+def _scale(largest: float, title: str) -> dict[str, Any]:
+    return {"colorscale": _MARGIN_COLOURS, "cmin": 0.0, "cmax": largest, "colorbar": _bar(title)}
 
 
 def _bar(title: str) -> dict[str, Any]:
@@ -133,16 +142,16 @@ def _steps(count: int) -> list[list[Any]]:
     return [[edge / count, colour] for k, colour in enumerate(colours) for edge in (k, k + 1)]
 
 
-def blamed_traces(tips: Floats, axes: Floats, refusal: Refusal) -> list[dict[str, Any]]:
-    """Return the path in grey, and for each blame the waypoints that it names, as points. tips, axes (N, 3)."""
-    tips = 1e3 * (tips + _LIFT_M * axes)
-    path = _line3d(tips[keep_extremes(tips[:, 2], _BUCKETS)], "toolpath", QUIET_COLOUR, 1.5)
+def refused_traces(tips: Floats, axes: Floats, refusal: Refusal) -> list[dict[str, Any]]:
+    """Return the path in grey, and the waypoints of each exceeded limit as points. tips, axes (N, 3)."""
+    tips = 1e3 * (tips + LIFT_M * axes)
+    path = _line3d(tips[keep_extremes(tips[:, 2], DETAIL.path_buckets)], "toolpath", QUIET_COLOUR, 1.5)
     traces = [path]
     colours = (LIMIT_COLOUR, *LEG_COLOURS)
-    for k, blame in enumerate(refusal.diagnosis):
-        chosen = np.concatenate([np.arange(a, b + 1) for a, b in blame.waypoints] or [np.zeros(0, dtype=np.intp)])
+    for k, shortfall in enumerate(refusal.diagnosis):
+        chosen = np.concatenate([np.arange(a, b + 1) for a, b in shortfall.waypoints] or [np.zeros(0, dtype=np.intp)])
         chosen = chosen[: len(tips)][:: max(1, len(chosen) // 3000)]
-        points = _line3d(tips[np.minimum(chosen, len(tips) - 1)], blame.constraint, colours[k % len(colours)], 1.0)
+        points = _line3d(tips[np.minimum(chosen, len(tips) - 1)], shortfall.constraint, colours[k % len(colours)], 1.0)
         points |= {"mode": "markers", "marker": {"size": 3, "color": colours[k % len(colours)]}}
         traces.append(points)
     return traces
@@ -150,7 +159,7 @@ def blamed_traces(tips: Floats, axes: Floats, refusal: Refusal) -> list[dict[str
 
 def piece_traces(toolpath: Toolpath, pieces: Sequence[Piece]) -> list[dict[str, Any]]:
     """Return the cuts of each set-up in a colour of its own, workpiece frame."""
-    tips = 1e3 * (toolpath.tips + _LIFT_M * toolpath.axes)
+    tips = 1e3 * (toolpath.tips + LIFT_M * toolpath.axes)
     traces: list[dict[str, Any]] = []
     for k, piece in enumerate(pieces):
         cuts = np.append(piece.cuts(toolpath), False)
@@ -231,7 +240,7 @@ def _line3d(points: Floats, name: str, colour: str, width: float, **more: Any) -
 
 def _with_gaps(points: Floats, chosen: Bools) -> Floats:
     """Return points (K, 3), thinned, NaN where not chosen so that lines break there."""
-    step = max(1, len(points) // _BUCKETS)
+    step = max(1, len(points) // DETAIL.path_buckets)
     edges = np.flatnonzero(np.diff(chosen.astype(np.int8)))
     keep = np.unique(np.concatenate([np.arange(0, len(points), step), edges, edges + 1]))
     return np.where(chosen[keep, None], points[keep], np.nan)

@@ -1,4 +1,4 @@
-"""The sheet for whoever clamps the part: the drawing, the table's terms, and where the plan is tight."""
+"""Set-up sheet for the operator: drawings of the placement, margins along the path, nearest limits."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from pentapod.job.outcome import Outcome
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.active_limits import ActiveLimit, active_limits
 from pentapod.planning.placement.placed_path import PlacedPath
+from pentapod.report.figure import DETAIL
 from pentapod.report.held import held_mesh
 from pentapod.report.margin_band import margin_band
 from pentapod.report.placement_views import placement_views
 from pentapod.report.words import number
-
-_ROWS = 10
 
 
 def setup_sheet(outcome: Outcome) -> str:
@@ -24,15 +23,15 @@ def setup_sheet(outcome: Outcome) -> str:
     table = outcome.job.placement
     height = table.table_z_mm if table.mode == "table" else None
     surface = None if height is None else 1e-3 * height
-    told = "" if height is None else f"<p>It stands on the table, whose surface is at z = {number(height, 'mm')}.</p>"
+    on_table = "" if height is None else f"<p>The part stands on the table, at z = {number(height, 'mm')}.</p>"
     held = held_mesh(outcome, placed)
     views = placement_views(outcome.find(Mesh), placed, outcome.machine, surface, held)
-    rows = "".join(_row(limit) for limit in active_limits(placed)[:_ROWS])
+    rows = "".join(_row(limit) for limit in active_limits(placed)[: DETAIL.limits])
     return (
-        f'{told}<div class="views">{views}</div>'
-        f"<h3>Margins along the path</h3>{margin_band(placed)}"
-        '<p class="hint">As high as the smallest margin (0: a limit, about 1: comfortable), in the colour of the limit '
-        "that is nearest; point at it for its name.</p>"
+        f'{on_table}<div class="views">{views}</div>'
+        f"<h3>Margins along the path</h3>{margin_band(placed.tips, placed.margins, placed.margin_names)}"
+        '<p class="hint">Height: the smallest margin (0: a limit, about 1: comfortable). Colour: the nearest limit; '
+        "point at it for its name.</p>"
         '<div class="scroll"><table><thead><tr><th>nearest limits</th><th class="n">smallest margin</th>'
         '<th class="n">room</th><th class="n">at waypoint</th><th class="n">nearest on</th></tr></thead>'
         f"<tbody>{rows}</tbody></table></div>"

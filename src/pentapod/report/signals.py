@@ -1,7 +1,8 @@
-"""Signals: what the emitted program does in time, computed again from its rows for the plots."""
+"""Signals: motion of the written program against time, computed from its rows, for the plots."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +12,12 @@ from pentapod.base.arrays import Floats, Ints, set_frozen
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.machine import Machine
+from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.limits.margins import Margins
 from pentapod.program.program import Program
+from pentapod.report.figure import DETAIL
 from pentapod.timing.time_law.trajectory import Trajectory
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
-
-MOST_MARGIN_ROWS = 40_000
-_CHUNK = 50_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +25,10 @@ class Signals:
     """At the rows of a program (N): SI units, machine frame.
 
     times (N,) s; legs, rates, accelerations (N, n_legs) m, m/s, m/s², as the controller moves between rows;
-    tips, axes (N, 3); speeds (N,), m/s: of the tip, or, with a stand-off and off rapids, of the spot on the
-    surface; speed_limits (N,): the feed that is asked for, or the rapid rate; segments (N,) of the toolpath; cutting
-    (N,). causes (N,): what limits the motion, index into `cause_names`. margins (K, M) at rows `margin_rows` (K,),
-    collisions with the surroundings among them.
+    tips, axes (N, 3); speeds (N,), m/s: of the tip, with a stand-off tool of the spot on the surface except on
+    rapids; speed_limits (N,): the programmed feed, or the rapid rate; segments (N,) of the toolpath; cutting
+    (N,). causes (N,): the active limit, index into `cause_names`. margins (K, M) at rows
+    `margin_rows` (K,), with those to obstacles.
     """
 
     times: Floats
@@ -55,10 +55,12 @@ class Signals:
         trajectory: Trajectory,
         toolpath: Toolpath,
         collision_world: CollisionWorld = NOTHING,
+        limits: Sequence[LimitKind] | None = None,
     ) -> Signals:
-        """Compute the signals of a program. The trajectory tells which segment is due when, and what limits it.
+        """Return the signals of a program. The trajectory gives the segment and the active limit at a time.
 
-        collision_world: what legs, spindle and tool must not touch; the gaps to it are margins, too.
+        collision_world: what legs, spindle and tool must not touch. limits: kinds of limits on poses, pentapod's own by
+        default.
         """
         times = program.times
         joined = Interpolant.through(program.legs, program.period, program.interpolation)
@@ -71,17 +73,16 @@ class Signals:
             speeds = np.where(rapid, speeds, np.linalg.norm(np.gradient(spots, program.period, axis=0), axis=1))
         feeds = np.array([min(s.feed, machine.rapid_velocity) for s in toolpath.segments])
         kinds = np.array([s.kind == SegmentKind.CUT for s in toolpath.segments])
-        margins = Margins.of(machine, program.component, collision_world)
-        step = max(1, -(-len(times) // MOST_MARGIN_ROWS))
+        margins = Margins.of(machine, program.component, collision_world, limits)
+        step = max(1, -(-len(times) // DETAIL.margin_rows))
         rows = np.unique(np.append(np.arange(0, len(times), step), len(times) - 1)).astype(np.intp)
-        blocks = np.array_split(rows, -(-len(rows) // _CHUNK))
-        values = [margins(tips[k], axes[k], program.placement) for k in blocks]
+        values = margins(tips[rows], axes[rows], program.placement)
         names = tuple(limit.name for limit in margins.limits)
         profile = trajectory.profile
         at = np.clip(np.searchsorted(profile.times, times, side="right") - 1, 0, len(profile.active) - 1)
         return cls(
             times, program.legs, joined.first, joined.second, tips, axes, speeds, feeds[segments], segments,
-            kinds[segments], profile.active[at], tuple(profile.constraint_names), np.concatenate(values), rows, names,
+            kinds[segments], profile.active[at], tuple(profile.constraint_names), values, rows, names,
         )  # fmt: skip
 
     def __post_init__(self) -> None:

@@ -1,15 +1,15 @@
-"""Numbers and placements in words."""
+"""Numbers, durations, tools and placements as text."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from pentapod.base.tables import Table
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job.schema.tool import ToolTable
 
 
 def number(value: float | None, unit: str = "") -> str:
-    """Return a number as a person writes it, with its unit; a dash for None."""
+    """Return a number with its unit, in 4 digits (6 from 1000 on); a dash for None."""
     if value is None:
         return "–"
     digits = 6 if abs(value) >= 1000 else 4
@@ -26,26 +26,26 @@ def duration(seconds: float) -> str:
 
 
 def opening(sentence: str, most: int = 100) -> str:
-    """Return the beginning of a long sentence: up to its first semicolon, or as many whole words as fit."""
+    """Return the beginning of a long sentence: up to its first semicolon, or whole words up to `most` characters."""
     first = sentence.split(";", maxsplit=1)[0]
     if len(first) <= most:
         return first
     return first[:most].rsplit(" ", 1)[0].rstrip(" ,:") + " …"
 
 
-def tool_sentence(tool: ToolTable) -> str:
-    """Return the job's tool in words: its type and the measures that it has."""
+def tool_sentence(tool: Table) -> str:
+    """Return the type of the job's tool and its sizes, as text."""
     measures = [f"{key.removesuffix('_mm')} {value:g} mm" for key, value in tool.sizes().items()]
     return ", ".join([f"{tool.type} tool", *measures])
 
 
 def placement_sentences(transform: RigidTransform) -> list[str]:
-    """Return where the part stands, in words, for someone in front of the machine."""
+    """Return the placement in sentences for the operator."""
     x, y, z = 1e3 * transform.translation
     up = transform.rotation[:, 2]
     lean = float(np.degrees(np.arccos(np.clip(-up[2], -1.0, 1.0))))
     sentences = [
-        f"The origin of the mesh stands {abs(z):.2f} mm {'below' if z >= 0.0 else 'above'} the base plane, "
+        f"The origin of the mesh is {abs(z):.2f} mm {'below' if z >= 0.0 else 'above'} the base plane, "
         f"at x = {x:.2f} mm, y = {y:.2f} mm.".replace("-", "−")
     ]
     if lean < 0.005:
@@ -53,7 +53,7 @@ def placement_sentences(transform: RigidTransform) -> list[str]:
     else:
         azimuth = float(np.degrees(np.arctan2(up[1], up[0])))
         sentences.append(
-            f"Its z axis leans {lean:.2f}° from straight up, towards {azimuth:.1f}° (0° is the machine's x, "
+            f"Its z axis is tilted {lean:.2f}° from straight up, towards {azimuth:.1f}° (0° is the machine's x, "
             "90° its y).".replace("-", "−")
         )
     ahead = transform.rotation[:, 0]

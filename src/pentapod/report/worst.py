@@ -1,4 +1,4 @@
-"""The worst places by name."""
+"""The places where a program comes nearest to its limits."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from pentapod.report.signals import Signals
 from pentapod.report.words import number
 
 FULL_FEED = 0.98
-"""Share of the feed asked for from which a cut counts as running at full feed."""
+"""Share of the programmed feed from which a cut counts as running at full feed."""
 
 
 @dataclass(frozen=True)
 class WorstPlace:
-    """One line of the table. what: the quantity; value: how near to its limit, in words; where: in words; row."""
+    """One line of the table. value: distance from the limit, as text; where: as text; row: of the program."""
 
     what: str
     value: str
@@ -55,7 +55,7 @@ def worst_places(signals: Signals, machine: Machine) -> list[WorstPlace]:
         where, row = _longest(signals, slow)
         time = None if row is None else float(signals.times[row])
         value = f"{share:.1%} of the cutting time"
-        places.append(WorstPlace("cutting below the feed asked for", value, where, row, time))
+        places.append(WorstPlace("cutting below the programmed feed", value, where, row, time))
     return places
 
 
@@ -78,7 +78,7 @@ def _at(signals: Signals, row: int) -> str:
 
 
 def _longest(signals: Signals, slow: Bools) -> tuple[str, int | None]:
-    """Return where the longest slow run is, in words and as the row in its middle."""
+    """Return the longest slow interval, as text and as the row in its middle."""
     if not slow.any():
         return "", None
     runs = marked_runs(slow)

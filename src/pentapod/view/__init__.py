@@ -1,12 +1,11 @@
-"""The live scene: machine, part and path in a browser; the part can be dragged about, and its margins follow.
+"""Live viewer in a browser: machine, part and path; drag the part and see the margins of its new placement.
 
-`opened` and `study` compute, `motion` and `shapes` say what stands where; only `server` and what it draws with know
-viser (the extra `view`).
+Only `server`, `scene`, `panel` and `access` use viser (extra `view`).
 """
 
 from pentapod.view.motion import Motion
-from pentapod.view.opened import Opened, open_run
+from pentapod.view.opened_run import OpenedRun, open_run
 from pentapod.view.server import Viewer
 from pentapod.view.study import Reach, Study
 
-__all__ = ["Motion", "Opened", "Reach", "Study", "Viewer", "open_run"]
+__all__ = ["Motion", "OpenedRun", "Reach", "Study", "Viewer", "open_run"]

@@ -1,4 +1,4 @@
-"""Motion: where the tool is at a time, told in the workpiece frame, so that it moves with the part."""
+"""Motion: tool poses over time in the workpiece frame, so that they move with the part."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from pentapod.machine.leg_ends import leg_ends
 from pentapod.machine.machine import Machine
 from pentapod.program import Program
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.view.opened import Opened
+from pentapod.view.opened_run import OpenedRun
 
-_ROWS = 200_000
+MOST_ROWS = 200_000
+"""Rows of a program that are kept; longer ones are thinned."""
 
 
 @dataclass(frozen=True, eq=False)
-class Stance:
+class MachinePose:
     """The machine at one pose of the tool, machine frame, metres.
 
-    tip, axis (3,): axis unit, tip → spindle. legs (n_legs,): lengths. within: whether each leg keeps its stroke.
-    bases, joints (n_legs, 3): where the legs begin and end.
+    tip, axis (3,): axis unit, tip → spindle. legs (n_legs,): lengths. within: whether each leg is within its stroke.
+    bases, joints (n_legs, 3): ends of the legs.
     """
 
     tip: Floats
@@ -44,7 +45,7 @@ class Motion(Value):
     axes: Floats
 
     @classmethod
-    def of(cls, run: Opened) -> Motion:
+    def of(cls, run: OpenedRun) -> Motion:
         """Return the motion of a run: of its program, else along its toolpath."""
         if run.program is None:
             return cls.of_toolpath(run.toolpath, run.machine)
@@ -52,8 +53,8 @@ class Motion(Value):
 
     @classmethod
     def of_program(cls, program: Program, machine: Machine) -> Motion:
-        """Return the motion of a program; a long one is thinned to two hundred thousand rows."""
-        rows = np.unique(np.linspace(0, len(program.legs) - 1, min(len(program.legs), _ROWS)).astype(np.intp))
+        """Return the motion of a program."""
+        rows = np.unique(np.linspace(0, len(program.legs) - 1, min(len(program.legs), MOST_ROWS)).astype(np.intp))
         position, direction = machine.robot.pose(program.legs[rows], program.component)
         back = program.placement.inverse()
         tips = back.apply(position + machine.tool_length * direction)
@@ -61,7 +62,7 @@ class Motion(Value):
 
     @classmethod
     def of_toolpath(cls, toolpath: Toolpath, machine: Machine) -> Motion:
-        """Return the motion along a toolpath at its feeds: no program, no ramps."""
+        """Return the motion along a toolpath at its feeds, without acceleration limits."""
         way = np.linalg.norm(np.diff(toolpath.tips, axis=0), axis=1)
         feeds = np.array([min(segment.feed, machine.rapid_velocity) for segment in toolpath.segments])
         seconds = np.maximum(way / feeds[toolpath.segment_of_interval], 1e-6)
@@ -73,15 +74,15 @@ class Motion(Value):
         return float(self.times[-1])
 
     def pose(self, time: float) -> tuple[Floats, Floats]:
-        """Return tip and axis (3,), workpiece frame, at a time in seconds: in a straight line between rows."""
+        """Return tip and axis (3,), workpiece frame, at a time in seconds, linear between rows."""
         tip, axis = (np.array([np.interp(time, self.times, c) for c in rows.T]) for rows in (self.tips, self.axes))
         return tip, normalised(axis)
 
-    def stance(self, time: float, machine: Machine, placement: RigidTransform) -> Stance:
-        """Return how the machine stands at a time where the part is at a placement."""
+    def machine_pose(self, time: float, machine: Machine, placement: RigidTransform) -> MachinePose:
+        """Return the machine's pose at a time, with the part at a placement."""
         tip, axis = self.pose(time)
         tip, axis = placement.apply(tip), placement.rotate(axis)
         bases, joints = leg_ends(machine, tip, axis)
         legs = machine.robot.leg_lengths(tip + machine.tool_length * axis, -axis)
         within = (legs >= machine.legs.min_length) & (legs <= machine.legs.max_length)
-        return Stance(tip, axis, legs, tuple(bool(k) for k in within), bases, joints)
+        return MachinePose(tip, axis, legs, tuple(bool(k) for k in within), bases, joints)

@@ -1,4 +1,4 @@
-"""Panel: the controls beside the scene, and what they say in words."""
+"""Panel: the controls beside the scene, and their texts."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.build.placement import rotation_angles_deg
 from pentapod.report.words import duration, number
-from pentapod.view.motion import Motion, Stance
-from pentapod.view.opened import Opened
+from pentapod.view.motion import MachinePose, Motion
+from pentapod.view.opened_run import OpenedRun
 from pentapod.view.study import Reach
 
 if TYPE_CHECKING:
@@ -16,54 +16,54 @@ if TYPE_CHECKING:
 
 SPEEDS = ("1/4 ×", "1 ×", "4 ×", "16 ×", "64 ×")
 _FACTORS = dict(zip(SPEEDS, (0.25, 1.0, 4.0, 16.0, 64.0), strict=True))
-_STEPS = 2000
+SLIDER_STEPS = 2000
 
 
 class Panel:
-    """The handles of the controls; what they do is said in `server`."""
+    """The controls; `server` connects them."""
 
-    def __init__(self, server: viser.ViserServer, run: Opened, motion: Motion) -> None:
+    def __init__(self, server: viser.ViserServer, run: OpenedRun, motion: Motion) -> None:
         gui = server.gui
         gui.set_panel_label(f"pentapod · {run.job.path.name}")
         gui.add_markdown(run_words(run))
         with gui.add_folder("Motion"):
-            self.time = gui.add_slider("time, s", 0.0, motion.duration, motion.duration / _STEPS, 0.0)
+            self.time = gui.add_slider("time, s", 0.0, motion.duration, motion.duration / SLIDER_STEPS, 0.0)
             self.play = gui.add_checkbox("play", initial_value=False)
             self.speed = gui.add_dropdown("speed", SPEEDS, initial_value="1 ×")
-            self.stance = gui.add_markdown("")
+            self.machine_pose = gui.add_markdown("")
         with gui.add_folder("Placement"):
             self.reach = gui.add_markdown("")
             self.tilted = gui.add_checkbox(
-                "lean as best", initial_value=False,
-                hint="Judge each place with the best tool axis within the job's cone, not with the one that was chosen",
+                "best tool axis", initial_value=False,
+                hint="Use the best tool axis within the job's cone at each waypoint, instead of the planned one",
             )  # fmt: skip
             self.tilted.disabled = run.job.axis.tilt_deg == 0.0
             self.place = gui.add_markdown("")
             self.back = gui.add_button("back to the plan")
-        with gui.add_folder("Plan anew"):
+        with gui.add_folder("Plan again"):
             self.replan = gui.add_button("plan with the part here")
             self.bar = gui.add_progress_bar(0.0, visible=False)
             self.news = gui.add_markdown("")
 
     @property
     def speed_factor(self) -> float:
-        """How much faster than in life the motion is shown."""
+        """Factor of the playback on the real speed."""
         return _FACTORS[self.speed.value]
 
 
-def run_words(run: Opened) -> str:
-    """Return what is looked at."""
+def run_words(run: OpenedRun) -> str:
+    """Return what the run is, as text."""
     whole = "" if run.piece is None else f"One of several set-ups, {run.piece}. "
     if run.program is None:
-        return f"{whole}**Refused**: no program. Drag the part until it can be reached."
+        return f"{whole}**Refused**: no program. Drag the part to where it fits."
     lines = [f"{whole}Component {run.component}, {duration(run.program.duration)}, {len(run.toolpath):,} waypoints."]
     if not run.same_job:
-        lines.append("The job was changed since: the program is that of an earlier one.")
+        lines.append("The job was changed after this program was made.")
     return " ".join(lines)
 
 
 def reach_words(reach: Reach) -> str:
-    """Return what a placement comes to."""
+    """Return the margins of a placement, as text."""
     worst = reach.worst
     room = (
         f", {number(abs(worst.room), worst.unit)} {'beyond' if worst.room < 0.0 else 'to spare'}" if worst.unit else ""
@@ -76,15 +76,15 @@ def reach_words(reach: Reach) -> str:
 
 
 def place_words(placement: RigidTransform) -> str:
-    """Return where the part stands, in the numbers of a job file."""
+    """Return position and rotation as in a job file."""
     position = ", ".join(f"{round(1e3 * value, 2) + 0.0:.2f}" for value in placement.translation.tolist())
     angles = ", ".join(f"{round(angle, 2) + 0.0:.2f}" for angle in rotation_angles_deg(placement.rotation))
-    return f"position ({position}) mm, turned by ({angles})°".replace("-", "−")
+    return f"position ({position}) mm, rotation ({angles})°".replace("-", "−")
 
 
-def stance_words(time: float, stance: Stance) -> str:
-    """Return the pose of the tool and the lengths of the legs; one beyond its stroke stands out."""
-    tip = ", ".join(f"{1e3 * value:.1f}" for value in stance.tip)
-    legs = [f"{1e3 * length:.2f}" for length in stance.legs]
-    told = ", ".join(leg if fits else f"**{leg}!**" for leg, fits in zip(legs, stance.within, strict=True))
-    return f"{time:.2f} s, tip ({tip}) mm, legs {told} mm".replace("-", "−")
+def machine_pose_words(time: float, machine_pose: MachinePose) -> str:
+    """Return the pose of the tool and the lengths of the legs; one beyond its stroke is bold."""
+    tip = ", ".join(f"{1e3 * value:.1f}" for value in machine_pose.tip)
+    legs = [f"{1e3 * length:.2f}" for length in machine_pose.legs]
+    lengths = ", ".join(leg if fits else f"**{leg}!**" for leg, fits in zip(legs, machine_pose.within, strict=True))
+    return f"{time:.2f} s, tip ({tip}) mm, legs {lengths} mm".replace("-", "−")

@@ -1,4 +1,4 @@
-"""Planning anew with the part where it was dragged to."""
+"""Planning again with the part at the placement to which it was dragged."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from pentapod.job.build.placement import job_at, placement_toml
 from pentapod.job.outcome import Outcome
 from pentapod.job.pipeline import run as run_job
 from pentapod.report import write_report
-from pentapod.view.opened import Opened, run_of
+from pentapod.view.opened_run import OpenedRun, run_of
 
 FOLDER = "replanned"
-"""Where the files go, within the folder of the run that is looked at."""
+"""Folder of the files, within the folder of the run."""
 
 
 @dataclass(frozen=True, eq=False)
 class Replanned:
-    """What planning anew came to. run: to be looked at, None where it was refused.
+    """Result of planning again. run: None where it was refused.
 
-    table: for the job file; of one of several set-ups for a copy of it, for the others stand elsewhere.
+    table: [placement] for the job file; for one of several set-ups it belongs into a copy of the job file.
     """
 
     outcome: Outcome
-    run: Opened | None
+    run: OpenedRun | None
     folder: Path
     table: str
 
 
-def replanned(run: Opened, placement: RigidTransform, progress: Progress = silent) -> Replanned:
+def replanned(run: OpenedRun, placement: RigidTransform, progress: Progress = silent) -> Replanned:
     """Plan the run's job, or its set-up's piece of it, with the part fixed at a placement, all artefacts included.
 
-    The program's job is the run's with `table` as its [placement]: with that in the job file, `verify` knows it.
+    With `table` as [placement] in the job file, `verify` accepts the program.
     """
     job = job_at(run.job, placement)
     folder = run.folder if run.folder.name == FOLDER else run.folder / FOLDER

@@ -11,8 +11,8 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.clearance.collision_world import mounted
 from pentapod.report.decimate import thinned_mesh
 from pentapod.report.figure import LIMIT_COLOUR, leg_colour
-from pentapod.view.motion import Stance
-from pentapod.view.opened import Opened
+from pentapod.view.motion import MachinePose
+from pentapod.view.opened_run import OpenedRun
 from pentapod.view.shapes import along, quaternion, revolved, rotation_of, tool_mesh
 from pentapod.view.study import Reach, Study
 
@@ -22,18 +22,22 @@ if TYPE_CHECKING:
 Rgb = tuple[int, int, int]
 
 PART = "/part"
-"""The node that is dragged; mesh and path hang on it."""
+"""The node that is dragged, parent of mesh and path."""
 
-_MOST_FACETS = 120_000
-_LIFT_M = 0.5e-3  # of the path along the tool axis: a ball's tip runs on and below the surface
-_SHAFT_SHARE = 0.25  # of the spindle's radius, for what joins tip and spindle where the job does not say
-_STEEL, _DARK, _PART_COLOUR, _BEAM = (150, 156, 166), (84, 90, 100), (195, 206, 217), (224, 60, 40)
+MOST_FACETS = 120_000
+LIFT_M = 0.5e-3
+"""Shift of the path along the tool axis: a ball's tip runs on and below the surface."""
+
+SHAFT_SHARE = 0.25
+"""Radius of the shaft between tip and spindle, as a share of the spindle's."""
+
+STEEL, DARK, PART_COLOUR, BEAM = (150, 156, 166), (84, 90, 100), (195, 206, 217), (224, 60, 40)
 
 
 class Scene:
-    """One run in a viser scene. The part is dragged about its middle; what is on the tool moves as one."""
+    """One run in a viser scene. The part is dragged about its middle; all bodies of the tool move together."""
 
-    def __init__(self, server: viser.ViserServer, run: Opened, study: Study) -> None:
+    def __init__(self, server: viser.ViserServer, run: OpenedRun, study: Study) -> None:
         self._server, self._run, self._study = server, run, study
         self._middle = run.mesh.bounds.mean(axis=0)
         api = server.scene
@@ -41,9 +45,9 @@ class Scene:
         size = float(np.ptp(run.mesh.bounds, axis=0).max())
         self.part = api.add_transform_controls(PART, scale=0.6 * size, depth_test=False, opacity=0.7, line_width=3.0)
         self.set_placement(run.placement)
-        vertices, faces = thinned_mesh(run.mesh.vertices, run.mesh.faces, _MOST_FACETS)
-        api.add_mesh_simple(f"{PART}/mesh", vertices - self._middle, faces, color=_PART_COLOUR, side="double")
-        tips = run.toolpath.tips[study.shown] + _LIFT_M * run.axes[study.shown] - self._middle
+        vertices, faces = thinned_mesh(run.mesh.vertices, run.mesh.faces, MOST_FACETS)
+        api.add_mesh_simple(f"{PART}/mesh", vertices - self._middle, faces, color=PART_COLOUR, side="double")
+        tips = run.toolpath.tips[study.shown] + LIFT_M * run.axes[study.shown] - self._middle
         grey = np.full((len(tips) - 1, 2, 3), 128, dtype=np.uint8)
         self._path = api.add_line_segments(
             f"{PART}/path", np.stack([tips[:-1], tips[1:]], axis=1), grey, thickness=3.5, thickness_units="screen"
@@ -58,13 +62,13 @@ class Scene:
 
     @property
     def placement(self) -> RigidTransform:
-        """Where the part stands now, workpiece → machine."""
+        """The present placement, workpiece → machine."""
         rotation = rotation_of(np.asarray(self.part.wxyz, dtype=np.float64))
         position = np.asarray(self.part.position, dtype=np.float64)
         return RigidTransform(rotation, position - rotation @ self._middle)
 
     def set_placement(self, placement: RigidTransform) -> None:
-        """Put the part somewhere."""
+        """Move the part to a placement."""
         self.part.wxyz = quaternion(placement.rotation)
         self.part.position = placement.apply(self._middle)
 
@@ -73,18 +77,18 @@ class Scene:
         colours = reach.colours(self._study.shown)
         self._path.colors = np.stack([colours[:-1], colours[1:]], axis=1)
 
-    def show_stance(self, stance: Stance) -> None:
+    def show_machine_pose(self, machine_pose: MachinePose) -> None:
         """Move legs and tool; a leg beyond its stroke is red."""
         with self._server.atomic():
-            self._tool.position, self._tool.wxyz = stance.tip, quaternion(along(stance.axis))
+            self._tool.position, self._tool.wxyz = machine_pose.tip, quaternion(along(machine_pose.axis))
             for k, leg in enumerate(self._legs):
-                leg.position, way = stance.bases[k], stance.joints[k] - stance.bases[k]
+                leg.position, way = machine_pose.bases[k], machine_pose.joints[k] - machine_pose.bases[k]
                 length = float(np.linalg.norm(way))
                 leg.wxyz, leg.scale = quaternion(along(way / length)), (1.0, 1.0, length)
-                leg.color = _rgb(leg_colour(k) if stance.within[k] else LIMIT_COLOUR)
+                leg.color = _rgb(leg_colour(k) if machine_pose.within[k] else LIMIT_COLOUR)
 
     def _set_up(self, server: viser.ViserServer) -> None:
-        """Look at the work from the side, the base above it."""
+        """Set the camera: the work from the side, the base above it."""
         machine = self._run.machine
         centre, upward = machine.work.centre, -float(np.sign(machine.work.centre[2]) or 1.0)
         server.scene.set_up_direction((0.0, 0.0, upward))
@@ -102,7 +106,7 @@ class Scene:
         turn = np.linspace(0.0, 2.0 * np.pi, 97)
         rim = centre + radius * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
         rims = np.stack([rim[:-1], rim[1:]], axis=1)
-        self._server.scene.add_line_segments("/base/rim", rims, _DARK, thickness=3.0, thickness_units="screen")
+        self._server.scene.add_line_segments("/base/rim", rims, DARK, thickness=3.0, thickness_units="screen")
         ball = 1.8 * self._run.machine.bodies.leg_radius
         for k, joint in enumerate(base):
             self._server.scene.add_icosphere(f"/base/{k + 1}", ball, color=_rgb(leg_colour(k)), position=joint)
@@ -114,18 +118,18 @@ class Scene:
         machine = run.machine
         heights = machine.tool_length - machine.robot.offsets
         top, nose = float(heights.max()), machine.bodies.shaft_end
-        self._cylinder("/tool/spindle", machine.bodies.shaft_radius, _STEEL, nose, top)
-        self._cylinder("/tool/shaft", _SHAFT_SHARE * machine.bodies.shaft_radius, _DARK, 0.0, nose)
+        self._cylinder("/tool/spindle", machine.bodies.shaft_radius, STEEL, nose, top)
+        self._cylinder("/tool/shaft", SHAFT_SHARE * machine.bodies.shaft_radius, DARK, 0.0, nose)
         for k, height in enumerate(heights.tolist()):
             ball = 1.6 * machine.bodies.leg_radius
             api.add_icosphere(f"/tool/joint{k + 1}", ball, color=_rgb(leg_colour(k)), position=(0.0, 0.0, height))
         cutter = [solid for solid in run.tool.solids if solid.kind == "cutter"]
-        for name, solids, colour in (("cutter", cutter, _DARK), ("body", mounted(run.tool.solids, machine), _STEEL)):
+        for name, solids, colour in (("cutter", cutter, DARK), ("body", mounted(run.tool.solids, machine), STEEL)):
             if solids:
                 vertices, faces = tool_mesh(solids)
                 api.add_mesh_simple(f"/tool/{name}", vertices, faces, color=colour)
         if run.tool.tilt_centre < 0.0:
-            self._cylinder("/tool/beam", 0.4e-3, _BEAM, run.tool.tilt_centre, 0.0)
+            self._cylinder("/tool/beam", 0.4e-3, BEAM, run.tool.tilt_centre, 0.0)
 
     def _cylinder(self, name: str, radius: float, colour: Rgb, low: float = 0.0, high: float = 1.0) -> viser.MeshHandle:
         profile: Floats = np.array([[0.0, low], [radius, low], [radius, high], [0.0, high]])

@@ -1,4 +1,4 @@
-"""Viewer: a run in the browser, live: scrub and play, drag the part, see what that comes to, plan anew there."""
+"""Viewer: server of the live view: play the motion, drag the part, see its margins, plan again there."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 from pentapod.base.errors import PentapodError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.toolpath.linking.partition import Piece
-from pentapod.view.doors import Doors, open_server
+from pentapod.view.access import Access, open_server
 from pentapod.view.motion import Motion
-from pentapod.view.opened import Opened
-from pentapod.view.panel import Panel, place_words, reach_words, stance_words
+from pentapod.view.opened_run import OpenedRun
+from pentapod.view.panel import Panel, machine_pose_words, place_words, reach_words
 from pentapod.view.replan import Replanned, replanned
 from pentapod.view.scene import Scene
 from pentapod.view.study import Reach, Study
@@ -23,22 +23,23 @@ from pentapod.view.study import Reach, Study
 if TYPE_CHECKING:
     import viser
 
-_FRAME_S = 1.0 / 30.0
+FRAME_S = 1.0 / 30.0
+"""Seconds between frames of the playback."""
 
 
 class Viewer:
     """A server that shows one run, until it is stopped. Also a context manager.
 
-    host, port: where it listens; the next port that is free where that one is taken. Only who knows the token in `url`
-    is let in (`doors`). What is computed for a drag is always that of the latest place: places that were passed
-    meanwhile are left out. Raises InputError without viser, or with another version of it than was tested.
+    host, port: address; the next free port where that one is in use. Only requests with the token in `url` are answered
+    (`access`). While the part is dragged, the margins of the latest placement are computed; those passed meanwhile are
+    skipped. Raises InputError without viser, or with a version of it that was not tested.
     """
 
-    def __init__(self, run: Opened, *, host: str = "127.0.0.1", port: int = 8080) -> None:
-        self._doors = Doors(host)
-        self._server: viser.ViserServer = open_server(self._doors, port)
+    def __init__(self, run: OpenedRun, *, host: str = "127.0.0.1", port: int = 8080) -> None:
+        self._access = Access(host)
+        self._server: viser.ViserServer = open_server(self._access, port)
         self._stopped, self._moved = threading.Event(), threading.Event()
-        self._lock, self._planning = threading.RLock(), threading.Lock()  # of what is shown; of planning anew
+        self._lock, self._planning = threading.RLock(), threading.Lock()  # of the scene; of planning again
         self._thorough = False
         self.reach: Reach
         self.replanned: Replanned | None = None
@@ -49,18 +50,18 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Where to point a browser, with the token that lets it in."""
-        return f"http://{self._server.get_host()}:{self._server.get_port()}/?token={self._doors.token}"
+        """The address for the browser, with the token."""
+        return f"http://{self._server.get_host()}:{self._server.get_port()}/?token={self._access.token}"
 
     @property
     def placement(self) -> RigidTransform:
-        """Where the part stands now."""
+        """The present placement."""
         return self._scene.placement
 
     def move(self, placement: RigidTransform) -> None:
-        """Put the part somewhere, as if it had been dragged there and let go."""
+        """Move the part to a placement, as if it had been dragged there."""
         self._scene.set_placement(placement)
-        self._take(thorough=True)
+        self._moved_part(thorough=True)
 
     def stop(self) -> None:
         """End the server."""
@@ -79,7 +80,7 @@ class Viewer:
     ) -> None:
         self.stop()
 
-    def _show(self, run: Opened) -> None:
+    def _show(self, run: OpenedRun) -> None:
         """Draw a run, and connect its controls."""
         study, motion = Study.of(run), Motion.of(run)
         with self._lock, self._server.atomic():
@@ -88,15 +89,15 @@ class Viewer:
             self._server.gui.reset()
             self._scene = Scene(self._server, run, study)
             self.panel = panel = Panel(self._server, run, motion)
-        self._scene.part.on_update(lambda event: self._take(thorough=event.phase == "end"))
-        panel.time.on_update(lambda _: self._show_stance())
-        panel.tilted.on_update(lambda _: self._take(thorough=True))
+        self._scene.part.on_update(lambda event: self._moved_part(thorough=event.phase == "end"))
+        panel.time.on_update(lambda _: self._show_machine_pose())
+        panel.tilted.on_update(lambda _: self._moved_part(thorough=True))
         panel.back.on_click(lambda _: self.move(run.placement))
         panel.replan.on_click(lambda _: self.plan_here())
         self._judge(thorough=True)
 
-    def _take(self, *, thorough: bool) -> None:
-        """Note that the part was moved; it is judged as soon as the place before has been."""
+    def _moved_part(self, *, thorough: bool) -> None:
+        """Note that the part was moved; its margins follow when those of the last placement are done."""
         self._thorough = thorough
         self._moved.set()
 
@@ -108,31 +109,31 @@ class Viewer:
                 self._judge(thorough=self._thorough)
 
     def _judge(self, *, thorough: bool) -> None:
-        """Show what the part's place comes to."""
+        """Show the margins of the present placement."""
         with self._lock:
             placement, study, tilted = self._scene.placement, self._study, self.panel.tilted.value
         reach = study.at(placement, tilted=tilted, thorough=thorough)
         with self._lock, self._server.atomic():
-            if study is not self._study:  # another run is shown by now
+            if study is not self._study:  # another run is shown meanwhile
                 return
             self.reach = reach
             self._scene.show_reach(self.reach)
             self.panel.reach.content = reach_words(self.reach)
             self.panel.place.content = place_words(placement)
-        self._show_stance()
+        self._show_machine_pose()
 
-    def _show_stance(self) -> None:
-        """Show the machine at the slider's time, the part where it stands."""
+    def _show_machine_pose(self) -> None:
+        """Show the machine at the slider's time."""
         with self._lock:
             seconds = self.panel.time.value
-            stance = self._motion.stance(seconds, self.run.machine, self._scene.placement)
-            self._scene.show_stance(stance)
-            self.panel.stance.content = stance_words(seconds, stance)
+            machine_pose = self._motion.machine_pose(seconds, self.run.machine, self._scene.placement)
+            self._scene.show_machine_pose(machine_pose)
+            self.panel.machine_pose.content = machine_pose_words(seconds, machine_pose)
 
     def _play(self) -> None:
-        """Move the slider on while "play" is ticked; from the end it begins again."""
+        """Move the slider while "play" is ticked; after the end it starts again."""
         last = time.perf_counter()
-        while not self._stopped.wait(_FRAME_S):
+        while not self._stopped.wait(FRAME_S):
             now = time.perf_counter()
             with self._lock:
                 if self.panel.play.value:
@@ -141,30 +142,30 @@ class Viewer:
             last = now
 
     def plan_here(self) -> None:
-        """Plan the job with the part where it stands, into a folder of its own, and show what comes of it."""
+        """Plan the job with the part at the present placement, into a folder of its own, and show the result."""
         if not self._planning.acquire(blocking=False):
             return
         panel = self.panel
         try:
             panel.replan.disabled, panel.bar.visible = True, True
-            self.replanned = done = replanned(self.run, self._scene.placement, self._tell)
+            self.replanned = done = replanned(self.run, self._scene.placement, self._show_progress)
             if done.run is not None:
                 self._show(done.run)
-            self.panel.news.content = _came_to(done)
+            self.panel.news.content = _result_words(done)
         except PentapodError as error:
             self.panel.news.content = str(error)
         finally:
             self.panel.replan.disabled, self.panel.bar.visible = False, False
             self._planning.release()
 
-    def _tell(self, stage: str, fraction: float, note: str = "") -> None:
-        """Show how far planning is."""
+    def _show_progress(self, stage: str, fraction: float, note: str = "") -> None:
+        """Show the progress of planning."""
         self.panel.bar.value = 100.0 * fraction
         self.panel.news.content = f"{stage} {note}".strip()
 
 
-def _came_to(done: Replanned) -> str:
-    """Return what planning anew came to."""
+def _result_words(done: Replanned) -> str:
+    """Return the result of planning again, as text."""
     refusal = done.outcome.refusal
     if refusal is not None:
         return f"**Refused**: {refusal}"

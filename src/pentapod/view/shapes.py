@@ -1,16 +1,18 @@
-"""Meshes for the eye: tools as bodies of revolution, and how a cylinder is laid between two points."""
+"""Meshes of tools as solids of revolution, and rotations as quaternions, for display."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.solids import Solid
 
-_AROUND, _ARC = 32, 7
+SECTIONS, ARC_POINTS = 32, 7
+"""Corners of a circle about the axis; points of a rounded edge."""
 
 
 def revolved(profile: Floats) -> tuple[Floats, Ints]:
@@ -18,21 +20,17 @@ def revolved(profile: Floats) -> tuple[Floats, Ints]:
 
     Facets face outwards.
     """
-    turn = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
-    radius, height = profile[:, 0, None], np.repeat(profile[:, 1, None], _AROUND, axis=1)
-    vertices = np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=-1).reshape(-1, 3)
-    ring, step = np.meshgrid(np.arange(len(profile) - 1), np.arange(_AROUND), indexing="ij")
-    a = (ring * _AROUND + step).ravel()
-    b = (ring * _AROUND + (step + 1) % _AROUND).ravel()
-    faces = np.concatenate([np.stack([a, b, b + _AROUND], axis=1), np.stack([a, b + _AROUND, a + _AROUND], axis=1)])
-    return vertices, faces.astype(np.intp)
+    from trimesh.creation import revolve  # noqa: PLC0415 - heavy
+
+    body = revolve(profile, sections=SECTIONS)
+    return np.asarray(body.vertices, dtype=np.float64), np.asarray(body.faces, dtype=np.intp)
 
 
 def solid_profile(solid: Solid) -> Floats:
     """Return the profile (k, 2) of a thickened frustum, radius and height, from its lowest point to its highest."""
     lean = float(np.arctan2(solid.low_radius - solid.high_radius, max(solid.high - solid.low, 1e-12)))
     lean = 0.0 if solid.is_ball else lean
-    lower, upper = np.linspace(-0.5 * np.pi, lean, _ARC), np.linspace(lean, 0.5 * np.pi, _ARC)
+    lower, upper = np.linspace(-0.5 * np.pi, lean, ARC_POINTS), np.linspace(lean, 0.5 * np.pi, ARC_POINTS)
     ends = ((solid.low_radius, solid.low, lower), (solid.high_radius, solid.high, upper))
     arcs = [
         np.stack([radius + solid.rounding * np.cos(arc), height + solid.rounding * np.sin(arc)], axis=1)
@@ -60,24 +58,9 @@ def along(direction: Floats) -> Floats:
 
 def quaternion(rotation: Floats) -> Floats:
     """Return the unit quaternion (4,), w first and not negative, of a rotation (3, 3)."""
-    r = rotation
-    # Of each product of two components: the column of the largest square is the least rounded.
-    k = np.array([
-        [1.0 + r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
-        [r[2, 1] - r[1, 2], 1.0 + r[0, 0] - r[1, 1] - r[2, 2], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
-        [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], 1.0 - r[0, 0] + r[1, 1] - r[2, 2], r[1, 2] + r[2, 1]],
-        [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], 1.0 - r[0, 0] - r[1, 1] + r[2, 2]],
-    ])  # fmt: skip
-    column = k[int(np.diag(k).argmax())]
-    q = column / np.linalg.norm(column)
-    return q if q[0] >= 0.0 else -q
+    return np.roll(Rotation.from_matrix(rotation).as_quat(canonical=True), 1)
 
 
 def rotation_of(wxyz: Floats) -> Floats:
     """Return the rotation (3, 3) of a quaternion (4,), w first, of any length but zero."""
-    w, x, y, z = np.asarray(wxyz, dtype=np.float64) / np.linalg.norm(wxyz)
-    return np.array([
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ])  # fmt: skip
+    return Rotation.from_quat(np.roll(wxyz, -1)).as_matrix()

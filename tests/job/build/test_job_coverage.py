@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from pentapod.job import Job, run
-from pentapod.job.build.collision_world import job_collision_world
-from pentapod.job.build.coverage import job_coverage
-from pentapod.job.build.cutting import job_cutting
-from pentapod.job.build.values import job_machine, job_mesh, job_toolpath
+from pentapod.job.build.specification import job_collision_world, job_coverage, job_cutting
+from pentapod.job.build.toolpath import job_toolpath
+from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.toolpath import write_stl
 
 CLAIM = "surface left on the region"
@@ -61,7 +60,7 @@ def coverage(job):
         ("scallop_mm = 0.2", 1.25 * 0.2),
     ],
 )
-def test_what_may_be_left_follows_from_the_job(make_job, way, left):
+def test_material_that_may_be_left_follows_from_the_job(make_job, way, left):
     found = coverage(Job.load(make_job(BY_DEFAULT, (STEPOVER, way))))
     assert found.left == pytest.approx(1e-3 * (left + 0.01 + 0.05))
     assert found.share == 1e-3

@@ -25,11 +25,11 @@ def constraints_of(job: Job) -> PlacementConstraints:
     return job_constraints(job, job_machine(job), job_mesh(job))
 
 
-def test_free_is_free(make_job):
+def test_placement_mode_free_bounds_nothing(make_job):
     assert constraints_of(load(make_job, 'mode = "free"\n')) is FREE
 
 
-def test_box_and_turn(make_job):
+def test_placement_box_and_largest_turn(make_job):
     constraints = constraints_of(
         load(make_job, "box_mm = [[10, 90, 500], [-10, 20, 600]]\nrotation_deg = [180, 0, 0]\nlargest_turn_deg = 30\n")
     )
@@ -40,7 +40,7 @@ def test_box_and_turn(make_job):
 
 
 @pytest.mark.parametrize("up", [(0, 0, 1), (0, -1, 0), (1, 2, -2)])
-def test_the_lowest_point_rests_on_the_table(up, make_job):
+def test_placement_on_a_table_rests_on_the_lowest_point(up, make_job):
     """Every allowed placement: the mesh touches the table's surface from above and is nowhere below it."""
     job = load(make_job, f'mode = "table"\ntable_z_mm = 640\ntable_x_mm = [-50, 50]\nup = {list(up)}\n')
     constraints, rng = constraints_of(job), np.random.default_rng(0)
@@ -54,7 +54,7 @@ def test_the_lowest_point_rests_on_the_table(up, make_job):
         assert abs(origin[0]) <= 0.05
 
 
-def test_fixture(make_job):
+def test_fixture_poses_are_the_placements_to_choose_from(make_job):
     constraints = constraints_of(
         load(make_job, 'mode = "fixture"\nposes_mm_deg = [[1, 2, 3, 0, 0, 0], [4, 5, 6, 0, 0, 90]]\n')
     )

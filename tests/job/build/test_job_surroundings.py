@@ -7,7 +7,7 @@ import trimesh
 
 from pentapod.base.errors import JobError, MeshError
 from pentapod.job import Job, judge, run
-from pentapod.job.build.collision_world import job_collision_world
+from pentapod.job.build.specification import job_collision_world
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.mesh.io.stl import write_stl
 

@@ -13,7 +13,8 @@ from pentapod.base.errors import JobError
 from pentapod.cli.main import run as run_cli
 from pentapod.geometry import angle_between
 from pentapod.job import Job, run
-from pentapod.job.build.values import job_mesh, job_toolpath
+from pentapod.job.build.toolpath import job_toolpath
+from pentapod.job.build.values import job_mesh
 from pentapod.toolpath import SegmentKind
 from pentapod.toolpath.formats import read_toolpath
 
@@ -123,7 +124,9 @@ def test_a_tilt_that_breaks_the_cap_on_turning_is_told(make_job):
     job = Job.load(make_job(fixed, wide, ("[feed]", '[gouge]\nremedy = ["tilt"]\ncone_deg = 60\n\n[feed]')))
     path, report = job_toolpath(job, job_mesh(job))
     assert "waypoints tilted clear" in str(report)
-    assert re.search(r"problem: tilted clear, the axis turns by up to \S+ deg/mm, the cap is 0.1", str(report))
+    assert re.search(
+        r"problem: tilted to avoid a gouge, the axis turns by up to \S+ deg/mm, the cap is 0.1", str(report)
+    )
     assert angle_between(path.axes[1:], path.axes[:-1]).max() <= np.radians(3.0) * (1 + 1e-8)
 
 

@@ -100,9 +100,9 @@ def test_files_that_are_no_job(content, piece, tmp_path):
         Job.load(tmp_path)
 
 
-def test_what_only_shows_later_is_told_with_its_line(make_job):
+def test_errors_found_with_the_mesh_name_the_line_of_the_job(make_job):
     leaning = make_job(('type = "ball"', 'type = "flat"'), ("tilt_deg = 0", "tilt_deg = 5"))
-    with pytest.raises(JobError, match=r"job\.toml:17: axis\.tilt_deg: .*cannot lean"):
+    with pytest.raises(JobError, match=r"job\.toml:17: axis\.tilt_deg: .*cannot tilt"):
         Job.load(leaning)
     job = Job.load(make_job(("path_mm = 0.05", "path_mm = 50")))
     with pytest.raises(JobError, match=r"job\.toml:23: tolerance\.path_mm: the tolerance is too large"):
@@ -152,7 +152,7 @@ def test_every_key_is_described_and_has_its_unit():
         "matrix", "component", "interpolation", "solver", "format", "direction", "line", "directions", "remedy", "up",
         "then", "setups", "weight_strokes", "weight_singularities", "weight_joints", "weight_bodies",
         "entry", "fill", "upright", "curve", "form", "which", "laying", "centred", "text", "letter_spacing", "align",
-        "towards", "effect", "levels", "threshold", "frame", "waive", "lowest_share", "left_share",
+        "towards", "effect", "levels", "threshold", "frame", "use", "waive", "lowest_share", "left_share",
     }  # fmt: skip
     units = ("_mm", "_deg", "_mm_min", "_ms", "_s", "_mm_s2", "_mm_s3", "_deg_s", "_deg_s2")
     models = [table_model(name) for name in JobTables.model_fields if name != "toolpath"]

@@ -10,7 +10,8 @@ import pytest
 
 from pentapod.base.errors import JobError
 from pentapod.job import Job
-from pentapod.job.build.values import job_mesh, job_toolpath
+from pentapod.job.build.toolpath import job_toolpath
+from pentapod.job.build.values import job_mesh
 
 
 def content_of(path):

@@ -1,4 +1,4 @@
-"""The blame table: which limits bind, where on the path, and by how much."""
+"""Table of the nearest limits of a plan, or of the exceeded limits of a refusal."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ if TYPE_CHECKING:
     from pentapod.base.refusal import Refusal
     from pentapod.planning.active_limits import ActiveLimit
 
-_RANGES = 6
+MOST_RANGES = 6
+"""Ranges of waypoints that a row shows."""
 
 
 def limits_text(found: Sequence[ActiveLimit]) -> str:
-    """Return the table of a plan that fits: every limit with its smallest margin, the nearest first."""
+    """Return the table of a plan: every limit with its smallest margin, the nearest first."""
     lines = [
         f"{'limit':<46} {'margin':>8} {'room':>12} {'waypoint':>9} {'nearest at':>10}  waypoints where it is nearest"
     ]
@@ -27,18 +28,18 @@ def limits_text(found: Sequence[ActiveLimit]) -> str:
     return "\n".join(lines)
 
 
-def blames_text(refusal: Refusal) -> str:
-    """Return the table of a refusal: every limit in the way, the worst first."""
-    lines = [f"{'limit in the way':<46} {'beyond it by':>14}  waypoints"]
-    for blame in refusal.diagnosis:
-        amount = f"{blame.shortfall:.3g} {blame.unit}" if blame.shortfall else "–"
-        lines.append(f"{blame.constraint:<46} {amount:>14}  {_ranges(blame.waypoints)}".rstrip())
+def shortfalls_text(refusal: Refusal) -> str:
+    """Return the table of a refusal: every limit that is exceeded, the worst first."""
+    lines = [f"{'limit exceeded':<46} {'by':>14}  waypoints"]
+    for shortfall in refusal.diagnosis:
+        amount = f"{shortfall.shortfall:.3g} {shortfall.unit}" if shortfall.shortfall else "–"
+        lines.append(f"{shortfall.constraint:<46} {amount:>14}  {_ranges(shortfall.waypoints)}".rstrip())
     return "\n".join([*lines, refusal.remedy])
 
 
 def _ranges(waypoints: Sequence[tuple[int, int]]) -> str:
-    """Return the longest ranges, in the order of the path."""
-    longest = sorted(sorted(waypoints, key=lambda pair: pair[0] - pair[1])[:_RANGES])
+    """Return the longest ranges as text, in the order of the path."""
+    longest = sorted(sorted(waypoints, key=lambda pair: pair[0] - pair[1])[:MOST_RANGES])
     text = ", ".join(f"{a}-{b}" if b > a else f"{a}" for a, b in longest)
     more = len(waypoints) - len(longest)
     return text + (f" and {more} shorter" if more > 0 else "")

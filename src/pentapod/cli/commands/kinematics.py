@@ -1,6 +1,4 @@
-"""pentapod ik and fk: between tool poses and leg lengths, for a number or a stream of them."""
-
-# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+"""pentapod ik and fk: inverse and forward kinematics of one pose, or of CSV on stdin."""
 
 from __future__ import annotations
 
@@ -15,7 +13,6 @@ from pentapod.cli.output import echo_json, json_option, quiet_option
 
 if TYPE_CHECKING:
     from pentapod.base.arrays import Floats
-    from pentapod.machine import Machine
 
 POSE = ("x_mm", "y_mm", "z_mm", "i", "j", "k")
 LEGS = ("leg1_mm", "leg2_mm", "leg3_mm", "leg4_mm", "leg5_mm")
@@ -37,7 +34,7 @@ _machine_option = click.option(
 @json_option
 @quiet_option
 def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -> int:
-    """Leg lengths in mm of a tool pose: tip X Y Z in mm, and tool axis I J K, machine frame.
+    """Inverse kinematics: leg lengths in mm of a tip X Y Z in mm and a tool axis I J K, machine frame.
 
     The axis points from the tip to the spindle, as in APT; it need not have unit length. Without numbers, CSV
     is read from stdin: a header "x_mm,y_mm,z_mm,i,j,k", then a pose in each line.
@@ -45,8 +42,9 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -
     import numpy as np
 
     from pentapod.base.errors import InputError
+    from pentapod.machine import Machine
 
-    machine = _machine(machine_name)
+    machine = Machine.load(machine_name)
     rows = _rows(pose, POSE)
     length = np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
     if (length == 0.0).any():
@@ -70,7 +68,7 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -
 @json_option
 @quiet_option
 def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_json: bool, quiet: bool) -> int:
-    """Tool poses of five leg lengths in mm: tip in mm, tool axis, distances to singularities.
+    """Forward kinematics: tips in mm, tool axes and distances to singularities of five leg lengths in mm.
 
     Five legs have four poses, one in each component, or none. Without numbers, CSV is read from stdin: a
     header "leg1_mm,...,leg5_mm", then one set of legs in each line. nan: no such pose. Exit code 1 where a
@@ -80,8 +78,9 @@ def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_jso
 
     from pentapod.kinematics import COMPONENTS, Component, orientation_distance, position_distance
     from pentapod.kinematics.families.quadratic import as_quadratic
+    from pentapod.machine import Machine
 
-    machine = _machine(machine_name)
+    machine = Machine.load(machine_name)
     rows = _rows(legs, LEGS) * 1e-3
     chosen = list(COMPONENTS) if component is None else [Component.parse(component)]
     position, direction = machine.robot.pose(rows[:, None, :], np.array(chosen))
@@ -98,12 +97,6 @@ def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_jso
     return 0 if np.isfinite(tips).all() else 1
 
 
-def _machine(name: str) -> Machine:
-    from pentapod.machine import Machine
-
-    return Machine.load(name)
-
-
 def _component(signs: Sequence[int]) -> str:
     return "".join("+" if sign > 0 else "-" if sign < 0 else "0" for sign in signs)
 
@@ -117,13 +110,10 @@ def _rows(numbers: tuple[float, ...], names: tuple[str, ...]) -> Floats:
     if numbers:
         if len(numbers) != len(names):
             raise InputError("wrong count of numbers", value=len(numbers), expected=" ".join(names))
-        rows = np.array([numbers])
-        if not np.isfinite(rows).all():
-            raise InputError("numbers must be finite", value=list(numbers), expected=" ".join(names))
-        return rows
+        return np.array([numbers])
     if sys.stdin.isatty():
         raise InputError("no numbers given", expected=" ".join(names), remedy="or CSV on stdin")
-    # Numbered before blank ones are passed over.
+    # Lines are numbered with the blank ones.
     try:
         lines = [(number, line.strip()) for number, line in enumerate(sys.stdin, start=1) if line.strip()]
     except UnicodeDecodeError as error:
@@ -139,13 +129,11 @@ def _row(line: str, number: int, names: tuple[str, ...]) -> list[float]:
     from pentapod.base.errors import InputError
     from pentapod.base.files import number_in
 
-    fields, what = line.split(","), "not a row of finite numbers"
-    if len(fields) != len(names):
-        what = "wrong count of numbers"
-    else:
-        row = [value for field in fields if (value := number_in(field)) is not None]
-        if len(row) == len(names):
-            return row
+    fields = line.split(",")
+    row = [value for field in fields if (value := number_in(field)) is not None]
+    if len(fields) == len(names) == len(row):
+        return row
+    what = "not a row of finite numbers" if len(fields) == len(names) else "wrong count of numbers"
     raise InputError(what, file="stdin", line=number, value=line[:80], expected=",".join(names))
 
 

@@ -1,6 +1,4 @@
-"""pentapod machine: explain the machines that ship, and check one's own."""
-
-# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+"""pentapod machine: list, explain and check machines."""
 
 from __future__ import annotations
 
@@ -47,25 +45,12 @@ def check(name_or_file: str, as_json: bool, quiet: bool) -> int:
     passed = all(finding.passed for finding in report.findings)
     if as_json:
         findings = [
-            {
-                "name": finding.name,
-                "passed": bool(finding.passed),
-                "value": float(finding.value),
-                "must_be": finding.kind,
-                "limit": float(finding.limit),
-                "unit": finding.unit,
-                "where": finding.where,
-            }
-            for finding in report.findings
-        ]
-        echo_json(
-            {
-                "machine": report.machine.name,
-                "digest": report.machine.digest,
-                "passed": passed,
-                "findings": findings,
-            }
-        )
+            {"name": found.name, "passed": bool(found.passed), "value": float(found.value), "must_be": found.kind,
+             "limit": float(found.limit), "unit": found.unit, "where": found.where}
+            for found in report.findings
+        ]  # fmt: skip
+        described = {"machine": report.machine.name, "digest": report.machine.digest}
+        echo_json({**described, "passed": passed, "findings": findings})
     elif not quiet:
         click.echo(explain(report))
     return 0 if passed else 1

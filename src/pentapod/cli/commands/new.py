@@ -1,6 +1,4 @@
-"""pentapod new: a commented job file made from the schema, and a small part."""
-
-# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+"""pentapod new: write a commented job file, made from the schema, and a small part."""
 
 from __future__ import annotations
 
@@ -25,7 +23,7 @@ _VALUES: dict[str, dict[str, Any]] = {
     "axis": {"tilt_deg": 15.0},
     "feed": {"cut_mm_min": 1500.0},
 }
-_WIDTH = 46
+COMMENT_COLUMN = 46
 
 
 @click.command()
@@ -33,7 +31,7 @@ _WIDTH = 46
 @json_option
 @quiet_option
 def new(folder: Path, as_json: bool, quiet: bool) -> int:
-    """Write DIR/job.toml, every key explained, and DIR/part.stl, a shallow 60 mm dome, to start from."""
+    """Write an example: DIR/job.toml with every key explained, and DIR/part.stl, a shallow dome of 60 mm."""
     from pentapod.base.errors import InputError
     from pentapod.base.files import atomic_write
 
@@ -54,10 +52,10 @@ def new(folder: Path, as_json: bool, quiet: bool) -> int:
 
 
 def job_text() -> str:
-    """Return a job with every key of the schema; those that may be left out are commented out."""
+    """Return a job with every key of the schema; optional keys are commented out."""
     from pentapod.job.schema.tables import JobTables, table_model
 
-    lines = ["# A pentapod job. Keys that are commented out show their defaults, or what they could be.", ""]
+    lines = ["# A pentapod job. Keys that are commented out show their defaults.", ""]
     for table in JobTables.model_fields:
         model = table_model(table)
         lines += [f"# {(model.__doc__ or '').splitlines()[0]}", f"[{table}]"]
@@ -68,12 +66,12 @@ def job_text() -> str:
 
 
 def _line(key: str, info: FieldInfo, value: Any) -> str:
-    """Return `key = value  # what it means`, commented out where the job need not say it."""
+    """Return `key = value  # meaning`, commented out where the key is optional."""
     if value is not None:
-        return f"{f'{key} = {json.dumps(value)}':<{_WIDTH}} # {info.description}"
+        return f"{f'{key} = {json.dumps(value)}':<{COMMENT_COLUMN}} # {info.description}"
     default = info.default if not info.is_required() else None
     shown = json.dumps(default) if default is not None else "..."
-    return f"{f'# {key} = {shown}':<{_WIDTH}} # {info.description}"
+    return f"{f'# {key} = {shown}':<{COMMENT_COLUMN}} # {info.description}"
 
 
 def dome_stl(size_mm: float = 60.0, height_mm: float = 8.0, cells: int = 40) -> bytes:

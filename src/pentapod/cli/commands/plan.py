@@ -1,7 +1,5 @@
 """pentapod plan: plan a job and write its files."""
 
-# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
-
 from __future__ import annotations
 
 import dataclasses
@@ -20,17 +18,17 @@ if TYPE_CHECKING:
 @click.argument("job", type=click.Path(path_type=Path))
 @click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True,
               help="Folder for the files.")  # fmt: skip
-@click.option("--explain", is_flag=True, help="Print which limits bind, where, and by how much.")
+@click.option("--explain", is_flag=True, help="Print the nearest limits: where, and by how much.")
 @json_option
 @quiet_option
 def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int:
     """Plan JOB.toml: write program.csv, verdict.json, report.html and plan.npz.
 
-    The folder changes only when the run ends: then its four files are of one run. A job that cannot be done
-    leaves no program.csv. A job in several set-ups has these files in a folder for each, setup-1, setup-2, and so on.
+    The folder changes only when the run ends, so that its files are always of one run. A job that cannot be done
+    leaves no program.csv. A job in several set-ups has a folder of files for each: setup-1, setup-2, and so on.
 
-    Ctrl-C during the search for a placement ends the search and goes on with the best found so far, if that fits; at
-    any other time it ends the command and changes nothing.
+    Ctrl-C during the search for a placement continues with the best one so far, if that fits. At any other time it
+    ends the command and changes nothing.
     """
     from pentapod.job.artefacts import PROGRAM, REPORT
     from pentapod.job.outcome import SetUps
@@ -48,12 +46,12 @@ def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int
     if as_json:
         seconds = {stage.name: round(stage.seconds, 3) for stage in outcome.stages}
         story = outcome.find(Explanation)
-        told: dict[str, Any] = {} if story is None else {"timing": story.to_dict()}
+        more: dict[str, Any] = {} if story is None else {"timing": story.to_dict()}
         if explain and (placed := outcome.find(PlacedPath)) is not None:
-            told["limits"] = [dataclasses.asdict(limit) for limit in active_limits(placed)]
-        echo_json({**outcome.to_dict(), **told, "out": str(out), "seconds": seconds})
+            more["limits"] = [dataclasses.asdict(limit) for limit in active_limits(placed)]
+        echo_json({**outcome.to_dict(), **more, "out": str(out), "seconds": seconds})
     elif not quiet:
-        click.echo("\n".join(stage.said for stage in outcome.stages if stage.said))
+        click.echo("\n".join(stage.remark for stage in outcome.stages if stage.remark))
         if explain:
             click.echo(_explained(outcome))
         if refusal is None:
@@ -70,8 +68,8 @@ def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int
 
 
 def _explained(outcome: Outcome) -> str:
-    """Return the blame table of a run: of its refusal, or of the plan that fits."""
-    from pentapod.cli.commands.explain import blames_text, limits_text
+    """Return the table of limits of a run: of its refusal, or of its plan."""
+    from pentapod.cli.commands.explain import limits_text, shortfalls_text
     from pentapod.job.outcome import SetUps
     from pentapod.planning import PlacedPath
     from pentapod.planning.active_limits import active_limits
@@ -79,6 +77,6 @@ def _explained(outcome: Outcome) -> str:
     if (setups := outcome.find(SetUps)) is not None:
         return "\n\n".join(f"{part.folder}\n{_explained(part.outcome)}" for part in setups.parts)
     if outcome.refusal is not None and outcome.refusal.diagnosis:
-        return blames_text(outcome.refusal)
+        return shortfalls_text(outcome.refusal)
     placed = outcome.find(PlacedPath)
     return "" if placed is None else limits_text(active_limits(placed))

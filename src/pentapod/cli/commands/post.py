@@ -1,7 +1,5 @@
 """pentapod post: write a program in the format of a controller."""
 
-# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
-
 from __future__ import annotations
 
 from pathlib import Path
@@ -35,15 +33,15 @@ def _complete_format(ctx: click.Context, param: click.Parameter, incomplete: str
 
 @click.command()
 @click.argument("program", type=click.Path(path_type=Path))
-@click.option("--to", "name", required=True, shell_complete=_complete_format, help="Format; --formats lists them.")
+@click.option("--to", "name", required=True, shell_complete=_complete_format, help="Format; see --formats.")
 @click.option("-o", "--out", required=True, type=click.Path(path_type=Path), help="Folder for the files.")
-@click.option("--job", type=click.Path(path_type=Path), help="The job it was made from: tells the machine.")
-@click.option("--machine", help="The machine's name or file, where there is no job.")
+@click.option("--job", type=click.Path(path_type=Path), help="The job of the program; it names the machine.")
+@click.option("--machine", help="The machine's name or file, without --job.")
 @click.option("--plan", type=click.Path(path_type=Path),
-              help="The run's plan.npz, for formats that hold the toolpath  [default: beside PROGRAM]")  # fmt: skip
+              help="The run's plan.npz, for formats with the toolpath  [default: beside PROGRAM]")  # fmt: skip
 @click.option("--verdict", type=click.Path(path_type=Path),
-              help="What judged exactly this file, and passed  [default: verdict.json beside PROGRAM]")  # fmt: skip
-@click.option("--unverified", is_flag=True, help="Write it without a passed verdict; every file then says so.")
+              help="The verdict on exactly this file  [default: verdict.json beside PROGRAM]")  # fmt: skip
+@click.option("--unverified", is_flag=True, help="Write without a passed verdict; every file is marked.")
 @click.option("--formats", is_flag=True, expose_value=False, is_eager=True, callback=_print_formats,
               help="List the formats and exit.")  # fmt: skip
 @json_option
@@ -62,9 +60,8 @@ def post(
 ) -> int:
     """Write PROGRAM.csv in another format, if a verdict has passed for exactly this file.
 
-    A machine that pentapod ships is found by the name in the program; another one, or a shipped one with another
-    tool or period, by --job or --machine. Formats of your own are found by entry points of the group
-    pentapod.posts.
+    A shipped machine is found by its name in the program. Name another one, or one with another tool or period, by
+    --job or --machine. Installed packages add formats by entry points of the group pentapod.posts.
     """
     from pentapod.base.files import sha256_of
     from pentapod.job.artefacts import ARRAYS, VERDICT
@@ -96,7 +93,7 @@ def post(
 
 
 def _machine(program: Program, job: Path | None, machine: str | None) -> Machine | None:
-    """Return the machine that was named, or the shipped one of the program's name; None where there is none."""
+    """Return the named machine, or the shipped one that the program names; None where there is none."""
     from pentapod.base.errors import MachineError
     from pentapod.job.build.values import job_machine
     from pentapod.job.schema.job import Job

@@ -1,7 +1,5 @@
 """pentapod simulate: tracking errors of a program on a simulated machine."""
 
-# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
-
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -20,39 +18,41 @@ if TYPE_CHECKING:
     from pentapod.simulate import Physics, Reference, Tracking
     from pentapod.toolpath import Toolpath
 
-_OF_SERVO, _OF_MUJOCO = ("correct", "seed"), ("export", "cutting_force_n", "base_error", "offset_error")
+SERVO_OPTIONS, MUJOCO_OPTIONS = ("correct", "seed"), ("export", "cutting_force_n", "base_error", "offset_error")
 _LEG, _MM = Whole(1, len(LEGS)), Real()
 
 
 @click.command()
 @click.argument("program", type=click.Path(path_type=Path))
-@click.option("--job", required=True, type=click.Path(path_type=Path), help="The job it was made from.")
+@click.option("--job", required=True, type=click.Path(path_type=Path), help="The job of the program.")
 @click.option("--engine", type=click.Choice(["servo", "mujoco"]), default="servo", show_default=True,
               help="servo: drives with encoders, dead time and force ripple. mujoco: rigid bodies.")  # fmt: skip
-@click.option("--correct", is_flag=True, help="Servo: correct the legs by the pose, rebuilt in the loop.")
-@click.option("--seed", type=Whole(0), default=0, show_default=True, help="Servo: of the ripple's phases.")
+@click.option("--correct", is_flag=True, help="Servo: correct the legs by the pose from forward kinematics.")
+@click.option(
+    "--seed", type=Whole(0), default=0, show_default=True, help="Servo: seed of the phases of the force ripple."
+)
 @click.option("--export", type=click.Path(path_type=Path), metavar="FILE", help="MuJoCo: write the model as MJCF.")
 @click.option("--cutting-force", "cutting_force_n", type=Real(0.0, min_open=True), metavar="N",
-              help="MuJoCo: play again with this force on the tip, against its motion, on cuts.")  # fmt: skip
+              help="MuJoCo: simulate again with this force on the tip against its motion on cuts.")  # fmt: skip
 @click.option("--base-error", type=(_LEG, _MM, _MM, _MM), multiple=True, metavar="LEG X Y Z",
-              help="MuJoCo: a base joint is off by so many mm; may be repeated.")  # fmt: skip
+              help="MuJoCo: error of a base joint; may be repeated.")  # fmt: skip
 @click.option("--offset-error", type=(_LEG, _MM), multiple=True, metavar="LEG MM",
-              help="MuJoCo: a platform joint is off along the tool by so many mm; may be repeated.")  # fmt: skip
+              help="MuJoCo: error of a platform joint along the tool; may be repeated.")  # fmt: skip
 @click.option("--within", "within_mm", type=Real(0.0, min_open=True), metavar="MM",
-              help="Fail where the tip leaves the programmed path by more.")  # fmt: skip
+              help="Fail if the contour error is larger.")  # fmt: skip
 @click.option("--plots", "plots", type=click.Path(path_type=Path), metavar="FILE",
-              help="Write every measure against time as a page for the browser.")  # fmt: skip
+              help="Write an HTML page with all measures against time.")  # fmt: skip
 @json_option
 @quiet_option
 @click.pass_context
 def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet: bool, **given: Any) -> int:
-    """Play PROGRAM.csv on a simulated machine and measure how far the tool is off.
+    """Simulate PROGRAM.csv on a machine and measure the errors of the tool.
 
-    Drives and masses are those of the machine file's tables [drives] and [masses]; docs/simulation.md says what is
-    modelled.
+    Drives and masses are [drives] and [masses] of the machine file; docs/simulation.md describes the models.
     """
     from pentapod.base.refusal import Refusal
-    from pentapod.job.build.values import job_machine, job_mesh, program_toolpath
+    from pentapod.job.build.toolpath import program_toolpath
+    from pentapod.job.build.values import job_machine, job_mesh
     from pentapod.job.schema.job import Job
     from pentapod.program import read_csv
     from pentapod.program.posts import PostInput
@@ -91,7 +91,7 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
     elif not quiet:
         click.echo("\n".join([f"{engine}: {len(read.legs)} setpoints, {read.duration:.6g} s", *lines]))
     if not same_job and not quiet:
-        click.echo("note: the program was made from another job, so its toolpath may be another", err=True)
+        click.echo("note: the program was made from another job; its toolpath may differ", err=True)
     if not passed:
         click.echo(f"the contour error, {largest:.3g} mm, exceeds {within_mm:g} mm", err=True)
     return 0 if passed else 1
@@ -99,7 +99,7 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
 
 def _check_options(ctx: click.Context, engine: str) -> None:
     """Raise UsageError for an option of the other engine."""
-    for name in _OF_MUJOCO if engine == "servo" else _OF_SERVO:
+    for name in MUJOCO_OPTIONS if engine == "servo" else SERVO_OPTIONS:
         if ctx.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE:
             other = "mujoco" if engine == "servo" else "servo"
             option = name.removesuffix("_n").replace("_", "-")
@@ -111,7 +111,7 @@ _Found = tuple[list[str], dict[str, Any], tuple["Tracking", ...]]
 
 @dataclass(frozen=True)
 class _Task:
-    """A program on its machine, and what it is measured against; each engine returns text, JSON and measures."""
+    """A program, its machine and its toolpath; each engine returns text, JSON and measures."""
 
     reference: Reference
     toolpath: Toolpath
@@ -135,29 +135,29 @@ class _Task:
         from pentapod.base.refusal import Refusal
         from pentapod.simulate import cutting_forces, plant, simulate_mujoco
 
-        stands = plant(self.reference, **_errors(given["base_error"], given["offset_error"]))
-        if isinstance(stands, Refusal):
-            return stands
+        modelled = plant(self.reference, **_errors(given["base_error"], given["offset_error"]))
+        if isinstance(modelled, Refusal):
+            return modelled
         if export is not None:
             with atomic_write(export) as temporary:
-                temporary.write_text(stands.xml, encoding="utf-8")
-        free = simulate_mujoco(self.reference, stands, progress=self.progress)
+                temporary.write_text(modelled.xml, encoding="utf-8")
+        free = simulate_mujoco(self.reference, modelled, progress=self.progress)
         if isinstance(free, Refusal):
             return free
-        tracking, lines, content = self._told(free)
+        tracking, lines, content = self._measured(free)
         if export is not None:
             lines, content = [*lines, f"  model: {export}"], {**content, "model": str(export)}
         if cutting_force_n is None:
             return lines, content, (tracking,)
         forces = cutting_forces(self.reference, tracking.cutting, cutting_force_n)
-        loaded = simulate_mujoco(self.reference, stands, tip_forces=forces, progress=self.progress)
+        loaded = simulate_mujoco(self.reference, modelled, tip_forces=forces, progress=self.progress)
         if isinstance(loaded, Refusal):
             return loaded
-        second, more, inner = self._told(loaded)
+        second, more, inner = self._measured(loaded)
         lines = [*lines, f"with {cutting_force_n:g} N against the motion on cuts", *more]
         return lines, {**content, "cutting": {"force_n": cutting_force_n, **inner}}, (tracking, second)
 
-    def _told(self, physics: Physics) -> tuple[Tracking, list[str], dict[str, Any]]:
+    def _measured(self, physics: Physics) -> tuple[Tracking, list[str], dict[str, Any]]:
         from pentapod.simulate import Tracking
 
         tracking = Tracking(physics.played, self.reference, self.toolpath, self.tolerance, physics.measures)

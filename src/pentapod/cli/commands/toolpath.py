@@ -1,6 +1,4 @@
-"""pentapod toolpath: a job's toolpath alone, in the workpiece frame."""
-
-# ruff: noqa: PLC0415 - a verb loads what it needs when it runs, so that --help stays quick
+"""pentapod toolpath: write a job's toolpath alone, in the workpiece frame."""
 
 from __future__ import annotations
 
@@ -14,20 +12,21 @@ from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_opti
 @click.command()
 @click.argument("job", type=click.Path(path_type=Path))
 @click.option(
-    "-o", "--out", required=True, type=click.Path(path_type=Path), help="File to write; its suffix tells the format."
+    "-o", "--out", required=True, type=click.Path(path_type=Path), help="File to write; its suffix names the format."
 )
-@click.option("--format", "format_name", help="Format, where the suffix does not tell: see above.")
+@click.option("--format", "format_name", help="Format, where the suffix does not name it: see above.")
 @json_option
 @quiet_option
 def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet: bool) -> int:
-    """Write the toolpath of JOB.toml: no machine, no placement, no time.
+    """Write the toolpath of JOB.toml, without machine, placement and time law.
 
     Formats: apt (.apt .cls .cl .cldata), xyzab G-code of LinuxCNC's pentakins (.ngc), xyzbc G-code with G43.4 (.nc
     .tap), both also as xyzab-g93 and xyzbc-g93 with inverse time feed, robodk (.robodk.csv), csv, npz. Axes point
     from the tip to the spindle; the frame is that of the workpiece.
     """
     from pentapod.geometry import arc_length
-    from pentapod.job.build.values import job_mesh, job_toolpath
+    from pentapod.job.build.toolpath import job_toolpath
+    from pentapod.job.build.values import job_mesh
     from pentapod.job.schema.job import Job
     from pentapod.toolpath.formats import format_of, write_toolpath
 
@@ -38,7 +37,7 @@ def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet
         mesh = job_mesh(loaded, progress)
         progress("mesh", 1.0)
         progress("toolpath", 0.0)
-        path, came_to = job_toolpath(loaded, mesh, progress)
+        path, report = job_toolpath(loaded, mesh, progress)
         progress("toolpath", 1.0)
         progress("writing", 0.0, out.name)
         write_toolpath(path, out, format_name)
@@ -50,6 +49,6 @@ def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet
         echo_json({**summary, "file": str(out)})
     elif not quiet:
         click.echo(str(mesh.diagnosis))
-        click.echo(str(came_to))
+        click.echo(str(report))
         click.echo(f"toolpath: {out}")
     return 0

@@ -1,4 +1,4 @@
-"""Placement constraints from a job's table [placement], and the table of a placement."""
+"""Placement constraints and weights from a job's table [placement], and the table of a chosen placement."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ArrayError
-from pentapod.base.tables import Vector
+from pentapod.base.keys import VECTOR
+from pentapod.base.tables import Table
 from pentapod.base.units import from_si, to_si
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.schema.job import Job
@@ -21,7 +22,7 @@ from pentapod.planning.problem.constraints import FREE, PlacementConstraints
 from pentapod.planning.problem.weights import Weights
 
 _EVERYWHERE = (-np.inf, np.inf)
-_PLACE_KEYS = frozenset(("mode", "setups", *(key for keys in PLACEMENT_KEYS.values() for key in keys)))
+_BOUNDING_KEYS = frozenset(("mode", "setups", *(key for keys in PLACEMENT_KEYS.values() for key in keys)))
 """Keys that bound the placement; the other keys are objectives."""
 
 
@@ -44,7 +45,7 @@ def job_constraints(job: Job, machine: Machine, mesh: Mesh) -> PlacementConstrai
 
 
 def job_weights(job: Job) -> Weights:
-    """Return the weights of the margins that the job asks for."""
+    """Return the weights of the margins in the job's objective."""
     table = job.placement
     return Weights(table.weight_strokes, table.weight_singularities, table.weight_joints, table.weight_bodies)
 
@@ -52,19 +53,19 @@ def job_weights(job: Job) -> Weights:
 def job_at(job: Job, placement: RigidTransform) -> Job:
     """Return the job with its part fixed at a placement, rounded as in `placement_toml`."""
     table = job.placement
-    kept = {name: getattr(table, name) for name in table.model_fields_set - _PLACE_KEYS}
+    kept = {name: getattr(table, name) for name in table.model_fields_set - _BOUNDING_KEYS}
     position = _rounded(from_si(placement.translation, "mm"), 6)
     angles = _rounded(np.array(rotation_angles_deg(placement.rotation)), 8)
     fixed = PlacementTable(mode="fixed", position_mm=position, rotation_deg=angles, **kept)
     return dataclasses.replace(job, tables=job.tables.model_copy(update={"placement": fixed}))
 
 
-def _rounded(values: Floats, digits: int) -> Vector:
+def _rounded(values: Floats, digits: int) -> VECTOR:
     x, y, z = (round(float(value), digits) + 0.0 for value in values)  # no −0
     return x, y, z
 
 
-def placement_toml(table: PlacementTable) -> str:
+def placement_toml(table: Table) -> str:
     """Return a table [placement] in TOML, without keys that have their defaults."""
     content = table.model_dump(mode="json", exclude_defaults=True)
     lines = [f"{key} = {json.dumps(value)}" for key, value in content.items()]
@@ -72,20 +73,20 @@ def placement_toml(table: PlacementTable) -> str:
 
 
 def rotation_angles_deg(rotation: Floats) -> tuple[float, float, float]:
-    """Return the turns about the fixed x, then y, then z axis (degrees) that make up a rotation (3, 3)."""
+    """Return the extrinsic x-y-z Euler angles of a rotation (3, 3): about the fixed x, then y, then z axis, degrees."""
     x = np.arctan2(rotation[2, 1], rotation[2, 2])
     y = np.arctan2(-rotation[2, 0], np.hypot(rotation[2, 1], rotation[2, 2]))
     z = np.arctan2(rotation[1, 0], rotation[0, 0])
-    if np.hypot(rotation[2, 1], rotation[2, 2]) < 1e-9:  # only the sum or difference of x and z is known
+    if np.hypot(rotation[2, 1], rotation[2, 2]) < 1e-9:  # gimbal lock: only the sum or difference of x and z is known
         x, z = np.arctan2(-rotation[1, 2], rotation[1, 1]), 0.0
     return float(np.degrees(x)), float(np.degrees(y)), float(np.degrees(z))
 
 
 def _on_table(job: Job, machine: Machine, mesh: Mesh) -> PlacementConstraints:
-    """Return the constraints of the job's part standing on the table with its lowest point."""
+    """Return the constraints of a part whose lowest point rests on the table."""
     table = job.placement
     up = np.array(table.up) / np.linalg.norm(table.up)
-    # Up is towards the base: away from where the machine works.
+    # Up is towards the base.
     side = -1.0 if machine.work.centre[2] > 0.0 else 1.0
     lowest = float((mesh.vertices @ up).min())
     height = table.si.table_z - side * lowest
@@ -106,7 +107,7 @@ def _fixed(job: Job) -> RigidTransform:
 
 
 def _pose(position_mm: Sequence[float], rotation_deg: Sequence[float]) -> RigidTransform:
-    """Return the placement at a position (mm) after turns about the fixed x, then y, then z axis (degrees)."""
+    """Return the placement at a position (mm), rotated about the fixed x, then y, then z axis (degrees)."""
     turns = to_si(rotation_deg, "deg")
     (cx, cy, cz), (sx, sy, sz) = np.cos(turns), np.sin(turns)
     about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])

@@ -3,23 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from hashlib import sha256
 
-from pentapod.job.build.collision_world import job_collision_world
-from pentapod.job.build.cutting import job_cutting
+from pentapod.base.errors import InputError, MachineError
+from pentapod.base.files import sha256_of
 from pentapod.job.build.placement import job_constraints
-from pentapod.job.build.sources import job_sources
+from pentapod.job.build.toolpath import job_options, job_region, job_sink, job_tool, job_toolpath
 from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import Component
+from pentapod.machine.clearance.collision_world import CollisionWorld
 from pentapod.machine.machine import Machine
+from pentapod.machine.reader import machine_bytes
+from pentapod.mesh.io.load import load_mesh
 from pentapod.mesh.mesh import Mesh
+from pentapod.toolpath.options import CoverOptions, PathOptions
+from pentapod.toolpath.strategies.registry import STRATEGIES
 from pentapod.toolpath.toolpath import Toolpath
-from pentapod.verify import Specification
+from pentapod.verify import Coverage, Cutting, Specification
+from pentapod.verify.verdict.sources import Sources
 
 
-def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Callable[[], Toolpath]) -> Specification:
-    """Return the requirements of a job on its program; machine and mesh: those of the job.
+def job_specification(
+    job: Job, machine: Machine, mesh: Mesh, make_toolpath: Callable[[], Toolpath], *, own_machine: bool = False
+) -> Specification:
+    """Return the requirements of a job on its program. machine: from `job_machine`; mesh: the job's.
 
-    make_toolpath: called last, so that errors of the job's tables are told before the long work.
+    make_toolpath: called last, so that errors of the job's tables come before the long computation. own_machine:
+    whether the machine is a value of the caller, of no file.
     Raises JobError where tables of the job do not go with the machine or the mesh.
     """
     collision_world, constraints = job_collision_world(job, machine, mesh), job_constraints(job, machine, mesh)
@@ -39,5 +49,81 @@ def job_specification(job: Job, machine: Machine, mesh: Mesh, make_toolpath: Cal
         stop_angle=job.feed.si.stop_angle,
         setups=job.placement.setups,
         waived=job.verify.waive,
-        sources=job_sources(job),
+        sources=_sources(job, own_machine=own_machine),
     )
+
+
+def job_collision_world(job: Job, machine: Machine, mesh: Mesh) -> CollisionWorld:
+    """Return the part, its fixture, legs, spindle and tool; mesh: the part's.
+
+    Raises JobError where the tool does not go with the machine.
+    """
+    held = job_fixture(job)
+    name = "fixture" if job.fixture.frame == "part" else "table"
+    around = {} if held is None else {name: held}
+    try:
+        return CollisionWorld.of(machine, job_tool(job), mesh, **around, allowance=job.gouge.si.tolerance)
+    except MachineError as error:
+        remedy = "a longer tool.length_mm, or a shorter holder"
+        raise job.error("tool", "holder_mm", error.what, expected=error.expected, remedy=remedy) from error
+
+
+def job_fixture(job: Job) -> Mesh | None:
+    """Return the mesh of the job's fixture, in the frame that the job says; None without one. Raises MeshError."""
+    if job.fixture_mesh is None:
+        return None
+    return load_mesh(job.fixture_mesh, job.fixture.unit, scale=job.fixture.scale)
+
+
+def job_cutting(job: Job, collision_world: CollisionWorld) -> Cutting | None:
+    """Return the bodies that cut and the largest depth, for the part of a collision world; None without a part.
+
+    The tolerance of the gouge check, and the depth of an engraving, count as no gouge. Raises JobError where the tool's
+    sizes make no tool.
+    """
+    depth = job.gouge.si.tolerance + job_sink(job)
+    for obstacle in collision_world.obstacles:
+        if obstacle.name == "part":
+            mesh = obstacle.surface.mesh
+            return Cutting(obstacle.surface, job_tool(job).solids, depth, job_coverage(job, mesh))
+    return None
+
+
+def job_coverage(job: Job, mesh: Mesh) -> Coverage:
+    """Return the region that a job's program must machine; none where its strategy covers no surface.
+
+    With `left_mm` in the job, the region must be machined whatever the strategy.
+    """
+    strategy, tolerance = job.toolpath.strategy, job.tolerance.si
+    covers = strategy in STRATEGIES and issubclass(STRATEGIES[strategy].options, CoverOptions)
+    if not covers and tolerance.left is None:
+        return Coverage.nothing(f'the strategy "{strategy}" covers no region')
+    return Coverage.of(
+        mesh,
+        job_tool(job),
+        job_options(job) if covers else PathOptions(region=job_region(job)),
+        path_tolerance=tolerance.path,
+        left=tolerance.left,
+        share=tolerance.left_share,
+        whole=lambda: job_toolpath(job, mesh)[0],
+    )
+
+
+def _sources(job: Job, *, own_machine: bool) -> Sources:
+    """Return the SHA-256 of a job's files. Raises MachineError where the machine's file is gone."""
+    machine = None if own_machine else machine_bytes(job.machine_file or str(job.machine.name))
+    return Sources(
+        job=_job_file(job),
+        machine=None if machine is None else sha256(machine).hexdigest(),
+        mesh=sha256_of(job.mesh_path),
+        fixture=None if job.fixture_mesh is None else sha256_of(job.fixture_mesh),
+        **{f"toolpath_{key}": sha256_of(file) for key, file in job.files.items()},
+    )
+
+
+def _job_file(job: Job) -> str | None:
+    """Return the SHA-256 of a job's file; None where the file says something else than the job."""
+    try:
+        return sha256_of(job.path) if Job.load(job.path).tables == job.tables else None
+    except (InputError, OSError):
+        return None

@@ -1,29 +1,42 @@
-"""Machine, mesh and toolpath from a job."""
+"""Machine, further limits and mesh from a job."""
 
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
 
 from pentapod.base.errors import InputError, MachineError, MeshError
-from pentapod.base.keys import fields_from
+from pentapod.base.keys import fields_from, oversized
 from pentapod.base.progress import Progress, silent
-from pentapod.job.build.strategy import check_sizes, job_options
-from pentapod.job.build.tool import FileReport, Reports, finished_as_asked, job_link_style, job_tool
+from pentapod.base.units import from_si
 from pentapod.job.schema.job import Job
-from pentapod.job.schema.strategies import FileTable
 from pentapod.machine.machine import Machine
 from pentapod.machine.parts import ControllerSettings
 from pentapod.machine.tool_limits import ToolLimits
-from pentapod.program import read_header
-from pentapod.toolpath import Mesh, Tool, Toolpath, load_mesh, toolpath_with_report
-from pentapod.toolpath.formats import read_toolpath
-from pentapod.toolpath.linking.partition import Piece, part_of
+from pentapod.mesh.io.load import load_mesh
+from pentapod.mesh.mesh import Mesh
+from pentapod.toolpath.axis.orientation import Orientation
+from pentapod.toolpath.gouge.report import GougeOptions
+from pentapod.toolpath.strategies.registry import STRATEGIES
+
+LARGEST_TOLERANCE = 0.1
+"""Largest tolerance that makes sense, as a share of the part's largest extent."""
 
 
-def job_machine(job: Job) -> Machine:
-    """Return the job's machine, with its tool length, controller settings and tool limits. Raises MachineError."""
-    machine = Machine.load(job.machine_file or str(job.machine.name))
+def job_machine(job: Job, machine: Machine | None = None) -> Machine:
+    """Return the machine with the job's tool length, controller settings and tool limits.
+
+    machine: the one to use instead of the machine that the job names. Raises MachineError where its file is wrong,
+    InputError where `machine` is none, JobError where the tool length does not go with it.
+    """
+    if machine is None:
+        machine = Machine.load(job.machine_file or str(job.machine.name))
+    elif not isinstance(cast(Any, machine), Machine):
+        raise InputError(
+            "not a machine", key="machine", value=machine, expected="a Machine", remedy="Machine.load(name or file)"
+        )
     controller = ControllerSettings(
         period=machine.controller.period if job.output.period_ms is None else job.output.si.period,
         interpolation=job.output.interpolation or machine.controller.interpolation,
@@ -45,44 +58,25 @@ def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
         if error.key != "unit":
             raise
         raise job.error("part", "unit", error.what, expected=error.expected, remedy=error.remedy) from error
-    check_sizes(job, mesh)
+    _check_sizes(job, mesh)
     return mesh
 
 
-def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Toolpath, Reports]:
-    """Return the job's toolpath, workpiece frame, and its reports.
-
-    Raises ToolpathError where nothing is there to machine, or the toolpath file cannot be read.
-    """
-    tool = job_tool(job)
-    toolpath, report = _drawn(job, mesh, tool)
-    toolpath, gouges = finished_as_asked(job, mesh, tool, toolpath, progress)
-    if job.feed.dwell_s is not None:
-        toolpath = toolpath.stopping(job.feed.dwell_s)
-    return toolpath, Reports((report, gouges))
-
-
-def job_piece(job: Job, mesh: Mesh, piece: Piece, progress: Progress = silent) -> Toolpath:
-    """Return a piece of the job's toolpath, with the ways to it and from it. Raises ToolpathError as `part_of`."""
-    toolpath, _ = job_toolpath(job, mesh, progress)
-    return part_of(toolpath, piece, job_link_style(job, mesh, toolpath))
-
-
-def program_toolpath(job: Job, mesh: Mesh, program: Path, progress: Progress = silent) -> Toolpath:
-    """Return the toolpath that a program file is about: the job's, or its set-up's piece of it."""
-    try:
-        piece = read_header(program).provenance.piece
-    except InputError:  # the verdict says what is wrong with the file
-        piece = None
-    return job_toolpath(job, mesh, progress)[0] if piece is None else job_piece(job, mesh, piece, progress)
-
-
-def _drawn(job: Job, mesh: Mesh, tool: Tool) -> tuple[Toolpath, object]:
-    """Return the toolpath of the strategy or of the file, and its report."""
-    if isinstance(job.toolpath, FileTable):
-        file = job.file("file")
-        read = read_toolpath(file, job.toolpath.format, tilt_centre=tool.tilt_centre, feed=job.feed.si.cut)
-        # Whatever the file says of its tool, this job's is the one that moves.
-        read = dataclasses.replace(read, tilt_centre=tool.tilt_centre)
-        return read, FileReport(file.name, len(read), len(read.segments))
-    return toolpath_with_report(mesh, tool, job_options(job))
+def _check_sizes(job: Job, mesh: Mesh) -> None:
+    """Raise JobError for a tolerance or another length that is too large for the part."""
+    extent = float(np.ptp(mesh.bounds, axis=0).max())
+    largest = f"the part, whose largest extent is {from_si(extent, 'mm'):.4g} mm"
+    remedy = "check part.unit and part.scale"
+    for key, value in (("chordal_mm", job.tolerance.si.chordal), ("path_mm", job.tolerance.si.path)):
+        if value > LARGEST_TOLERANCE * extent:
+            expected = f"at most {from_si(LARGEST_TOLERANCE * extent, 'mm'):.3g}"
+            what = f"the tolerance is too large for {largest}"
+            raise job.error("tolerance", key, what, expected=expected, remedy=remedy)
+    options: dict[str, type] = {"axis": Orientation, "gouge": GougeOptions}
+    if job.toolpath.strategy in STRATEGIES:
+        options["toolpath"] = STRATEGIES[job.toolpath.strategy].options
+    for table, cls in options.items():
+        values = fields_from(cls, getattr(job, table))
+        if (item := oversized(cls, values, extent)) is not None:
+            expected = f"at most {from_si(item.key.of_part * extent, 'mm'):.4g}"
+            raise job.error(table, item.file_key, f"too large for {largest}", expected=expected, remedy=remedy)

@@ -11,79 +11,63 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, cast
 
 from pydantic import BaseModel, ValidationError
 
 from pentapod.base.errors import JobError, nearest
-from pentapod.base.tables import problem_of
+from pentapod.base.tables import Table, problem_of
 from pentapod.base.toml import line_of, parsed, read_toml
 from pentapod.base.values import Value
 from pentapod.cutters.registry import CUTTERS
-from pentapod.job.schema.placement import FixtureTable, PlacementTable
-from pentapod.job.schema.strategies import StrategyTable, file_keys, job_strategies, strategy_table
-from pentapod.job.schema.tables import (
-    AxisTable,
-    FeedTable,
-    GougeTable,
-    JobTables,
-    MachineTable,
-    OutputTable,
-    PartTable,
-    ToleranceTable,
-    VerifyTable,
-    table_model,
-)
-from pentapod.job.schema.tool import ToolTable
+from pentapod.job.schema.strategies import file_keys, job_strategies, strategy_table
+from pentapod.job.schema.tables import JobTables, table_model
 
 _VARIABLE = re.compile(r"\$\{(\w+)\}")
 Content = Mapping[str, Any]
-T = TypeVar("T")
 
 
-class _TableOf(Generic[T]):
+class _TableOf:
     """Attribute of a job: its table of that name."""
-
-    def __init__(self, kind: type[T]) -> None:
-        self.kind = kind
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
 
-    def __get__(self, job: Job | None, owner: type) -> T:
-        return cast(T, self if job is None else getattr(job.tables, self.name))
+    def __get__(self, job: Job | None, owner: type) -> Table:
+        return cast(Table, self if job is None else getattr(job.tables, self.name))
 
 
 @dataclass(frozen=True)
 class Job(Value):
-    """What a job file says. Values are as in the file; each table gives them in SI units, too: `job.feed.si.cut`.
+    """Content of a job file. Values are as in the file; each table has them in SI units as well: `job.feed.si.cut`.
 
-    path: the job file; of a job from values, where it would stand. mesh_path, fixture_mesh, machine_file and files, by
-    their keys in [toolpath]: resolved against its folder. from_file: whether the job is as its file says.
+    path: the job file; for a job from values, a name in its folder. mesh_path, fixture_mesh, machine_file and files (by
+    their keys in [toolpath]): resolved against its folder. from_file: whether the job is that of its file.
     """
 
     summary = ("path",)
 
     path: Path
-    tables: JobTables
+    tables: Table
     mesh_path: Path
     machine_file: Path | None
     files: dict[str, Path] = field(default_factory=dict[str, Path])
     fixture_mesh: Path | None = None
     from_file: bool = field(default=True, compare=False)
 
-    part = _TableOf(PartTable)
-    machine = _TableOf(MachineTable)
-    tool = _TableOf(ToolTable)
-    toolpath = _TableOf(StrategyTable)
-    axis = _TableOf(AxisTable)
-    gouge = _TableOf(GougeTable)
-    feed = _TableOf(FeedTable)
-    tolerance = _TableOf(ToleranceTable)
-    placement = _TableOf(PlacementTable)
-    fixture = _TableOf(FixtureTable)
-    output = _TableOf(OutputTable)
-    verify = _TableOf(VerifyTable)
+    part = _TableOf()
+    machine = _TableOf()
+    tool = _TableOf()
+    toolpath = _TableOf()
+    axis = _TableOf()
+    gouge = _TableOf()
+    feed = _TableOf()
+    tolerance = _TableOf()
+    placement = _TableOf()
+    fixture = _TableOf()
+    output = _TableOf()
+    limits = _TableOf()
+    verify = _TableOf()
 
     @classmethod
     def load(cls, path: str | Path) -> Job:
@@ -96,8 +80,8 @@ class Job(Value):
     def from_dict(cls, content: Content, folder: str | Path = ".") -> Job:
         """Return the job of nested values: tables of keys, as in a job file, `{"feed": {"cut_mm_min": 1500}, ...}`.
 
-        folder: that relative paths start from. Lists, tuples and arrays may stand for lists, paths for texts. The same
-        values give the same job as their file, with the same digest. Raises JobError as `load`, without a line.
+        folder: of relative paths. Lists, tuples and arrays may be used for lists, paths for texts. The job and its
+        digest are those of a file with the same values. Raises JobError as `load`, without a line.
         """
         return cls._of(content, Path(folder) / "job.toml", None)
 
@@ -105,7 +89,7 @@ class Job(Value):
         """Return the job with other values; all else stays.
 
         Tables of keys, `job.with_(feed={"cut_mm_min": 1200}, tolerance={"path_mm": 0.05})`, or keys with their table,
-        `job.with_(**{"feed.cut_mm_min": 1200})`. A value None takes the key out: its default holds. Raises JobError as
+        `job.with_(**{"feed.cut_mm_min": 1200})`. None removes the key, so that its default holds. Raises JobError as
         `from_dict`.
         """
         content = self.tables.model_dump(exclude_unset=True)
@@ -128,7 +112,7 @@ class Job(Value):
             where, details = _problem(error, content)
             raise _error(path, text, where, **details) from error
         resolve = partial(_resolve, path, text)
-        fixture, machine, waive = tables.fixture.mesh, tables.machine.file, tables.verify.waive
+        fixture, machine = tables.fixture.mesh, tables.machine.file
         names = {key: getattr(tables.toolpath, key) for key in file_keys(tables.toolpath.strategy)}
         job = cls(
             path,
@@ -139,30 +123,37 @@ class Job(Value):
             None if fixture is None else resolve(("fixture", "mesh"), fixture),
             from_file=text is not None,
         )
-        if waive:
-            job._check_waived()
+        job._check_names()
         return job
 
-    def _check_waived(self) -> None:
-        """Raise JobError where [verify] waives a claim that does not exist."""
-        from pentapod.verify.judge import CLAIM_NAMES  # noqa: PLC0415  most jobs waive nothing, and it is heavy
+    def _check_names(self) -> None:
+        """Raise JobError where [verify] waives a claim, or [limits] uses a limit, that does not exist."""
+        if self.verify.waive:  # most jobs waive nothing, and the import is slow
+            from pentapod.verify.judge import CLAIM_NAMES  # noqa: PLC0415
 
-        for name in self.verify.waive:
-            if name not in CLAIM_NAMES:
-                raise self.error("verify", "waive", "no such claim", remedy=nearest(name, CLAIM_NAMES))
+            for name in self.verify.waive:
+                if name not in CLAIM_NAMES:
+                    raise self.error("verify", "waive", "no such claim", value=name, remedy=nearest(name, CLAIM_NAMES))
+        if self.limits.use:
+            from pentapod.planning.limits.margins import LIMITS  # noqa: PLC0415
+            from pentapod.timing.limits.limits import PLUGGED  # noqa: PLC0415
 
-    def file(self, key: str) -> Path:
-        """Return the file that a key of [toolpath] names."""
-        return self.files[key]
+            known = sorted({*LIMITS.added, *PLUGGED.added})
+            for name in self.limits.use:
+                if name not in known:
+                    listed = ", ".join(known) or "none"
+                    raise self.error("limits", "use", "no such limit", value=name, remedy=f"installed: {listed}")
 
     @cached_property
     def digest(self) -> str:
         """16 hexadecimal digits over the meaning of the job: defaults filled in, files by their bytes.
 
-        Comments, the order of keys and the folders where files lie do not change it; nor does [verify], which says
-        nothing of the program.
+        Comments, order of keys and folders of files do not change it; nor does [verify], which does not affect the
+        program.
         """
         content = self.tables.model_dump(mode="json", exclude={"verify"})
+        if not self.limits.use:
+            del content["limits"]
         content["part"]["mesh"] = [self.mesh_path.suffix.lower(), _sha(self.mesh_path)]
         if self.machine_file is not None:
             content["machine"]["file"] = _sha(self.machine_file)
@@ -176,15 +167,15 @@ class Job(Value):
         return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 
     def error(self, table: str, key: str, what: str, **details: Any) -> JobError:
-        """Return the JobError about a key of this job that only shows once the mesh or machine is known."""
+        """Return the JobError about a key of this job that is found with the mesh or the machine."""
         text = None
         if self.from_file:
-            with suppress(OSError, UnicodeDecodeError):  # the file may have changed since: then its line is left out
+            with suppress(OSError, UnicodeDecodeError):  # the file may have changed: then the line is left out
                 text = self.path.read_text(encoding="utf-8-sig")
-        value = getattr(getattr(self.tables, table), key)
+        details = {"value": getattr(getattr(self.tables, table), key), **details}
         file = self.path if self.from_file else None
         line = line_of(text, (table, key)) if text is not None else None
-        return JobError(what, file=file, line=line, key=f"{table}.{key}", value=value, **details)
+        return JobError(what, file=file, line=line, key=f"{table}.{key}", **details)
 
 
 def _sha(path: Path) -> str:
@@ -192,7 +183,7 @@ def _sha(path: Path) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return content with lists and arrays as tuples, which is what the strict tables take, and paths as texts."""
+    """Return content with lists and arrays as tuples, for the strict tables, and paths as texts."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, Mapping):
@@ -210,7 +201,7 @@ def _error(path: Path, text: str | None, where: tuple[str, ...], what: str, **de
 
 
 def _resolve(job: Path, text: str | None, where: tuple[str, str], name: str) -> Path:
-    """Return the file that a key names. Raises JobError where a variable is not set or no file can be read there."""
+    """Return the file that a key names. Raises JobError: a variable is not set, or there is no readable file."""
 
     def wrong(what: str, **details: Any) -> JobError:
         return _error(job, text, where, what, key=".".join(where), value=name, **details)

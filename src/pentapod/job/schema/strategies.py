@@ -1,8 +1,9 @@
-"""The table [toolpath] of a job file: for each strategy a model, made from the options that the strategy declares."""
+"""The table [toolpath] of a job file: a model for each strategy, made from the keys of its options."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
@@ -10,52 +11,55 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BeforeValidator, Field, SerializeAsAny, create_model
 
 from pentapod.base.errors import InputError, nearest
-from pentapod.base.keys import declared
+from pentapod.base.keys import Key, declared
 from pentapod.base.tables import Table, table_of, wrong
 from pentapod.toolpath.strategies.registry import STRATEGIES
+
+FILE = "file"
+"""The strategy that reads a toolpath instead of making one."""
 
 
 class StrategyTable(Table):
     """Toolpath strategy and its options."""
 
-    strategy: str = Field(default="raster", description="how the surface is machined")
+    strategy: str = "raster"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the given values; the model is made again from the strategy's options."""
+        """Pickle the given values, from which the model follows."""
         return _of_strategy, ({"strategy": self.strategy, **self.model_dump(exclude_unset=True)},)
 
 
-class FileTable(StrategyTable):
+@dataclass(frozen=True, kw_only=True)
+class FileOptions:
     """A toolpath read from a file."""
 
-    strategy: str = Field(default="file", description="how the surface is machined")
-    file: str = Field(min_length=1, description="the toolpath (APT, G-code, CSV, npz), relative to this job file")
-    format: str | None = Field(default=None, min_length=1, description="its format, where the suffix does not tell")
+    file: Annotated[Path, Key("", "the toolpath (APT, G-code, CSV, npz), relative to this job file", kind=Path)]
+    format: Annotated[str | None, Key("", "its format, where the suffix does not tell", min_length=1)] = None
 
 
 def job_strategies() -> tuple[str, ...]:
     """Return the strategies that a job file can name."""
-    return (*(name for name, strategy in STRATEGIES.items() if strategy.in_jobs), "file")
+    return (*(name for name, strategy in STRATEGIES.items() if strategy.in_jobs), FILE)
 
 
 @cache
 def strategy_table(name: str) -> type[StrategyTable]:
     """Return the table [toolpath] of a strategy. Raises InputError where there is no such strategy for job files."""
-    if name == "file":
-        return FileTable
-    if name in STRATEGIES and (strategy := STRATEGIES[name]).in_jobs:
-        base = table_of(strategy.options, StrategyTable)
-        field: Any = (Literal[name], Field(default=name, description="how the surface is machined"))
-        made: Any = create_model(base.__name__, __base__=base, __doc__=base.__doc__, strategy=field)
-        return made
-    raise InputError("unknown strategy", value=name, remedy=nearest(name, job_strategies()))
+    field: Any = (Literal[name], Field(default=name, description="how the surface is machined"))
+    base = table_of(_options_of(name), StrategyTable)
+    made: Any = create_model(base.__name__, __base__=base, __doc__=base.__doc__, strategy=field)
+    return made
 
 
 def file_keys(strategy: str) -> tuple[str, ...]:
     """Return the keys of [toolpath] that name a file, for a strategy."""
-    if strategy == "file":
-        return ("file",)
-    return tuple(item.file_key for item in declared(STRATEGIES[strategy].options) if item.key.kind is Path)
+    return tuple(item.file_key for item in declared(_options_of(strategy)) if item.key.kind is Path)
+
+
+def _options_of(name: str) -> type:
+    if name not in job_strategies():
+        raise InputError("unknown strategy", value=name, remedy=nearest(name, job_strategies()))
+    return FileOptions if name == FILE else STRATEGIES[name].options
 
 
 def _of_strategy(value: Any) -> Any:

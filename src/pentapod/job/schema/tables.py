@@ -1,17 +1,20 @@
-"""Schema of the job file: every key with its unit, meaning, default and range, stated once.
+"""Schema of the job file: every key with its unit, meaning, default and range, stated once (`Key`).
 
-Keys of strategies, cutters, regions, orientations, gouges and tool limits are declared there, beside the SI fields that
-they set (`Key`); all others here. Parser, error messages, `pentapod new` and the reference are made from them. Units
-are in the names; values are as in the file (mm, degrees, mm/min), and in SI at `table.si`.
+Keys of strategies, cutters, regions, orientations, gouges and tool limits are declared beside the SI fields
+that they set, all others in this folder. Parser, error messages, `pentapod new` and the reference are made from them.
+Values of a table are as in the file (mm, degrees, mm/min), and in SI at `table.si`.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, cast
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, cast
 
-from pydantic import Field, model_validator
+from pydantic import create_model, model_validator
 
-from pentapod.base.tables import Positive, Table, Vector, extended, wrong
+from pentapod.base.keys import VECTOR, Key
+from pentapod.base.tables import Table, table_of, wrong
+from pentapod.base.units import to_si
 from pentapod.job.schema.placement import FixtureTable, PlacementTable
 from pentapod.job.schema.strategies import ToolpathTable, strategy_table
 from pentapod.job.schema.tool import AnyTool, tool_table
@@ -21,216 +24,241 @@ from pentapod.toolpath.axis.orientation import Orientation
 from pentapod.toolpath.gouge.report import GougeOptions
 
 
-class MeshTable(Table):
+@dataclass(frozen=True, kw_only=True)
+class PartKeys:
     """The workpiece: its mesh, and which side of it is machined."""
 
-    mesh: str = Field(
-        min_length=1,
-        description="mesh file (.stl, .ply, .obj); relative to this job file, ${VARIABLE} is expanded",
-    )
-    unit: Literal["mm", "cm", "m", "inch"] | None = Field(
-        default=None, description="unit of the numbers in the mesh file: compulsory, for no format says it"
-    )
-    scale: Positive = Field(default=1.0, description="factor applied to the mesh after its unit")
-    repair: bool = Field(
-        default=False,
-        description="turn facets so that all are wound alike (doubled or empty ones are left out anyway, and told)",
-    )
+    mesh: Annotated[
+        str, Key("", "mesh file (.stl, .ply, .obj); relative to this job file, ${VARIABLE} is expanded", min_length=1)
+    ]
+    unit: Annotated[
+        Literal["mm", "cm", "m", "inch"] | None,
+        Key("", "unit of the numbers in the mesh file: compulsory, for no format says it"),
+    ] = None
+    scale: Annotated[float, Key("", "factor applied to the mesh after its unit", gt=0.0)] = 1.0
+    repair: Annotated[
+        bool, Key("", "wind all facets alike (double and degenerate ones are left out anyway, and reported)")
+    ] = False
 
-    @model_validator(mode="after")
-    def _region(self) -> MeshTable:
-        box = self.si.region_box
-        if box is not None and (box[0] == box[1]).any():
+    @staticmethod
+    def rules(table: Any) -> None:
+        """Check that the region has a size and a direction."""
+        box = table.region_box_mm
+        if box is not None and any(a == b for a, b in zip(*box, strict=True)):
             wrong("region_box_mm", "the box is flat", "corners that differ in x, y and z")
-        if not any(self.si.region_direction):
+        if not any(table.region_direction):
             wrong("region_direction", "the direction is zero", "a direction such as [0, 0, 1]")
-        return self
 
 
-if TYPE_CHECKING:
-    PartTable = MeshTable
-else:
-    PartTable = extended("PartTable", MeshTable, Region)
-
-
-class MachineTable(Table):
+@dataclass(frozen=True, kw_only=True)
+class MachineKeys:
     """The machine: one that ships, by name, or a machine file."""
 
-    name: str | None = Field(default=None, min_length=1, description='a shipped machine, such as "desk"')
-    file: str | None = Field(default=None, min_length=1, description="a machine file, relative to this one")
+    name: Annotated[str | None, Key("", 'a shipped machine, such as "desk"', min_length=1)] = None
+    file: Annotated[str | None, Key("", "a machine file, relative to this one", min_length=1)] = None
 
-    @model_validator(mode="after")
-    def _one(self) -> MachineTable:
-        if (self.name is None) == (self.file is None):
+    @staticmethod
+    def rules(table: Any) -> None:
+        """Check that there is one machine."""
+        if (table.name is None) == (table.file is None):
             wrong("name", "name the machine once", 'either name = "desk" or file = "machine.toml"')
-        return self
 
 
-class ModeTable(Table):
-    """Tool axis: nominal direction, tilt cone, lead and side angle, smoothing."""
-
-    tilt_deg: float = Field(
-        default=15.0,
-        ge=0.0,
-        le=60.0,
-        description="largest angle of the tool axis to the nominal one (the normal, unless it is set below)",
-    )
-    mode: Literal["normal", "fixed", "toward", "from", "between"] = Field(
-        default="normal",
-        description='nominal axis: "normal", "fixed", "toward" or "from" a point or line, "between" given directions',
-    )
-    direction: Vector | None = Field(default=None, description="fixed: from the tip to the spindle, mesh frame")
-    point_mm: Vector | None = Field(default=None, description="toward, from: a point, mesh frame")
-    line: Vector | None = Field(default=None, description="toward, from: direction of a line through the point")
-    places_mm: tuple[Vector, ...] | None = Field(default=None, description="between: where the directions hold")
-    directions: tuple[Vector, ...] | None = Field(default=None, description="between: one direction for each place")
-
-    @model_validator(mode="after")
-    def _mode_keys(self) -> ModeTable:
-        needed = _MODE_KEYS[self.mode]
-        for key in ("direction", "point_mm", "places_mm", "directions"):
-            given = getattr(self, key) is not None
-            if given != (key in needed):
-                what = "missing for" if not given else "means nothing for"
-                wrong(key, f'{what} axis mode "{self.mode}"', ", ".join(needed) or "none of these keys")
-        if self.line is not None and self.mode not in ("toward", "from"):
-            wrong("line", f'means nothing for axis mode "{self.mode}"', 'mode = "toward" or "from"')
-        for key in ("direction", "line"):
-            if getattr(self, key) is not None and not any(getattr(self, key)):
-                wrong(key, "the direction is zero", "a direction such as [0, 0, 1]")
-        if self.places_mm is not None and len(self.places_mm) != len(self.directions or ()):
-            wrong("directions", "as many directions as places are needed", f"{len(self.places_mm)} directions")
-        return self
-
-
-if TYPE_CHECKING:
-    AxisTable = ModeTable
-else:
-    AxisTable = extended("AxisTable", ModeTable, Orientation)
-
-_MODE_KEYS: dict[str, tuple[str, ...]] = {
+_AXIS_KEYS: dict[str, tuple[str, ...]] = {
     "normal": (),
     "fixed": ("direction",),
     "toward": ("point_mm",),
     "from": ("point_mm",),
     "between": ("places_mm", "directions"),
 }
+"""The keys that each mode of the nominal axis needs."""
 
 
-class RemedyTable(Table):
+@dataclass(frozen=True, kw_only=True)
+class AxisKeys:
+    """Tool axis: nominal direction, tilt cone, lead and side angle, smoothing."""
+
+    tilt: Annotated[
+        float,
+        Key(
+            "deg",
+            "largest angle between tool axis and nominal axis (the normal, unless mode says otherwise)",
+            ge=0.0,
+            le=60.0,
+        ),
+    ] = to_si(15.0, "deg")
+    mode: Annotated[
+        Literal["normal", "fixed", "toward", "from", "between"],
+        Key("", 'nominal axis: "normal", "fixed", "toward" or "from" a point or line, "between" given directions'),
+    ] = "normal"
+    direction: Annotated[VECTOR | None, Key("", "fixed: from the tip to the spindle, mesh frame")] = None
+    point: Annotated[VECTOR | None, Key("mm", "toward, from: a point, mesh frame")] = None
+    line: Annotated[VECTOR | None, Key("", "toward, from: direction of a line through the point")] = None
+    places: Annotated[tuple[VECTOR, ...] | None, Key("mm", "between: where the directions hold")] = None
+    directions: Annotated[tuple[VECTOR, ...] | None, Key("", "between: one direction for each place")] = None
+
+    @staticmethod
+    def rules(table: Any) -> None:
+        """Check the keys that a mode needs, and those that it does not take."""
+        needed = _AXIS_KEYS[table.mode]
+        for key in ("direction", "point_mm", "places_mm", "directions"):
+            given = getattr(table, key) is not None
+            if given != (key in needed):
+                what = "missing for" if not given else "means nothing for"
+                wrong(key, f'{what} axis mode "{table.mode}"', ", ".join(needed) or "none of these keys")
+        if table.line is not None and table.mode not in ("toward", "from"):
+            wrong("line", f'means nothing for axis mode "{table.mode}"', 'mode = "toward" or "from"')
+        for key in ("direction", "line"):
+            if getattr(table, key) is not None and not any(getattr(table, key)):
+                wrong(key, "the direction is zero", "a direction such as [0, 0, 1]")
+        if table.places_mm is not None and len(table.places_mm) != len(table.directions or ()):
+            wrong("directions", "as many directions as places are needed", f"{len(table.places_mm)} directions")
+
+
+@dataclass(frozen=True, kw_only=True)
+class GougeKeys:
     """Gouge check: what is done where cutter, shank or holder would cut into the part."""
 
-    remedy: tuple[Literal["tilt", "lift", "drop", "report"], ...] | None = Field(
-        default=None,
-        min_length=1,
-        description='tried in this order: "tilt", "lift", "drop"; or "report" alone, and the verdict fails where it'
-        ' gouges; when left out "drop", for a toolpath from a file "report"',
-    )
+    remedy: Annotated[
+        tuple[Literal["tilt", "lift", "drop", "report"], ...] | None,
+        Key(
+            "",
+            'tried in this order: "tilt", "lift", "drop"; or "report" alone, and the verdict fails where it gouges; '
+            'when left out "drop", for a toolpath from a file "report"',
+            min_length=1,
+        ),
+    ] = None
 
 
-if TYPE_CHECKING:
-    GougeTable = RemedyTable
-else:
-    GougeTable = extended("GougeTable", RemedyTable, GougeOptions)
-
-
-class SpeedTable(Table):
+@dataclass(frozen=True, kw_only=True)
+class FeedKeys:
     """Feed rates of the tool tip, exact stops, and limits of tip and tool axis in addition to the machine's."""
 
-    cut_mm_min: Positive = Field(le=100_000.0, description="feed while cutting")
-    link_mm_min: Positive | None = Field(
-        default=None, le=100_000.0, description="feed of approaches and links; the cutting feed when left out"
-    )
-    lowest_share: float | None = Field(
-        default=None,
-        ge=0.0,
-        le=1.0,
-        description="share of the feed that cuts and links must reach where no limit of machine or job is active; "
-        "below it the verdict fails. 0.9 when left out, 0.95 for laser and spray; 0 asks for none",
-    )
-    dwell_s: float | None = Field(
-        default=None,
-        ge=0.0,
-        le=3600.0,
-        description="dwell in an exact stop at the end of each cut; no stop when left out",
-    )
-    stop_angle_deg: float = Field(
-        default=135.0,
-        gt=0.0,
-        le=180.0,
-        description="exact stop at corners where the toolpath turns by more; other corners are blended",
-    )
+    cut: Annotated[float, Key("mm_min", "feed while cutting", gt=0.0, le=100_000.0)]
+    link: Annotated[
+        float | None,
+        Key("mm_min", "feed of approaches and links; the cutting feed when left out", gt=0.0, le=100_000.0),
+    ] = None
+    lowest_share: Annotated[
+        float | None,
+        Key(
+            "",
+            "share of the feed that cuts and links must reach where no limit of machine or job is active; below it "
+            "the verdict fails. 0.9 when left out, 0.95 for laser and spray; 0 requires none",
+            ge=0.0,
+            le=1.0,
+        ),
+    ] = None
+    dwell: Annotated[
+        float | None,
+        Key("s", "dwell in an exact stop at the end of each cut; no stop when left out", ge=0.0, le=3600.0),
+    ] = None
+    stop_angle: Annotated[
+        float,
+        Key(
+            "deg", "exact stop at corners where the toolpath turns by more; other corners are blended", gt=0.0, le=180.0
+        ),
+    ] = to_si(135.0, "deg")
 
 
-if TYPE_CHECKING:
-    FeedTable = SpeedTable
-else:
-    FeedTable = extended("FeedTable", SpeedTable, ToolLimits)
-
-
-class ToleranceTable(Table):
+@dataclass(frozen=True, kw_only=True)
+class ToleranceKeys:
     """Tolerances of the path, of the tool axis and of the material left."""
 
-    chordal_mm: Positive = Field(default=0.01, description="between the waypoints' chords and the mesh")
-    path_mm: Positive = Field(
-        default=0.02,
-        description="between the motion of the tool's tilt centre (a ball's centre, a beam's spot) and the toolpath",
-    )
-    axis_deg: float = Field(
-        default=0.5,
-        gt=0.0,
-        le=10.0,
-        description="largest angle by which the axis may leave the tilt cone between waypoints",
-    )
-    left_mm: Positive | None = Field(
-        default=None,
-        description="material above the surface that counts as none; for a stand-off tool, distance from its lines;"
-        " when left out, a ridge (half a stepover) and a quarter, and chordal_mm and path_mm",
-    )
-    left_share: float = Field(
-        default=0.001,
-        ge=0.0,
-        le=1.0,
-        description="share of the region's area, 0 to 1, on which more may be left where the cutter can reach",
-    )
+    chordal: Annotated[float, Key("mm", "between the waypoints' chords and the mesh", gt=0.0)] = 10e-6
+    path: Annotated[
+        float,
+        Key(
+            "mm",
+            "between the motion of the tool's tilt centre (a ball's centre, a beam's spot) and the toolpath",
+            gt=0.0,
+        ),
+    ] = 20e-6
+    axis: Annotated[
+        float, Key("deg", "largest angle by which the axis may leave the tilt cone between waypoints", gt=0.0, le=10.0)
+    ] = to_si(0.5, "deg")
+    left: Annotated[
+        float | None,
+        Key(
+            "mm",
+            "material above the surface that counts as none; for a stand-off tool, distance from its lines; when left "
+            "out, a ridge (half a stepover) and a quarter, and chordal_mm and path_mm",
+            gt=0.0,
+        ),
+    ] = None
+    left_share: Annotated[
+        float,
+        Key(
+            "",
+            "share of the region's area, 0 to 1, on which more may be left where the cutter can reach",
+            ge=0.0,
+            le=1.0,
+        ),
+    ] = 0.001
 
 
-class OutputTable(Table):
+@dataclass(frozen=True, kw_only=True)
+class OutputKeys:
     """Sampling of the program; the machine's controller settings when left out."""
 
-    period_ms: Positive | None = Field(default=None, ge=0.1, le=100.0, description="time between rows")
-    interpolation: Literal["linear", "cubic"] | None = Field(
-        default=None, description="how the controller moves between rows"
-    )
+    period: Annotated[float | None, Key("ms", "time between rows", ge=0.1, le=100.0)] = None
+    interpolation: Annotated[Literal["linear", "cubic"] | None, Key("", "how the controller moves between rows")] = None
 
 
-class VerifyTable(Table):
+@dataclass(frozen=True, kw_only=True)
+class LimitsKeys:
+    """Limits of installed packages that the plan must keep as well."""
+
+    use: Annotated[
+        tuple[str, ...], Key("", "names of entry points in the groups pentapod.limits and pentapod.timing_limits")
+    ] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class VerifyKeys:
     """Claims that the verdict may waive."""
 
-    waive: tuple[str, ...] = Field(default=(), description="claims that may stay unjudged without failing the verdict")
+    waive: Annotated[tuple[str, ...], Key("", "claims that may stay unjudged without failing the verdict")] = ()
 
 
-class JobTables(Table):
+PartTable = table_of(PartKeys, Table, Region)
+MachineTable = table_of(MachineKeys)
+AxisTable = table_of(AxisKeys, Table, Orientation)
+GougeTable = table_of(GougeKeys, Table, GougeOptions)
+FeedTable = table_of(FeedKeys, Table, ToolLimits)
+ToleranceTable = table_of(ToleranceKeys)
+OutputTable = table_of(OutputKeys)
+LimitsTable = table_of(LimitsKeys)
+VerifyTable = table_of(VerifyKeys)
+
+
+class _JobRules(Table):
     """All tables of a job file, in the order of the flow."""
 
-    part: PartTable
-    machine: MachineTable = Field(default=MachineTable(name="desk"))
-    tool: AnyTool
-    toolpath: ToolpathTable
-    axis: AxisTable = Field(default=AxisTable())
-    gouge: GougeTable = Field(default=GougeTable())
-    feed: FeedTable
-    tolerance: ToleranceTable = Field(default=ToleranceTable())
-    placement: PlacementTable = Field(default=PlacementTable())
-    fixture: FixtureTable = Field(default=FixtureTable())
-    output: OutputTable = Field(default=OutputTable())
-    verify: VerifyTable = Field(default=VerifyTable())
-
     @model_validator(mode="after")
-    def _leaning(self) -> JobTables:
+    def _leaning(self) -> _JobRules:
         if self.tool.type in ("bull", "flat") and self.axis.tilt_deg > 0.0:
-            wrong("axis.tilt_deg", f'a tool of type "{self.tool.type}" cannot lean without digging in', "tilt_deg = 0")
+            wrong("axis.tilt_deg", f'a tool of type "{self.tool.type}" cannot tilt without gouging', "tilt_deg = 0")
         return self
+
+
+_TABLES: dict[str, Any] = {
+    "part": (PartTable, ...),
+    "machine": (MachineTable, MachineTable(name="desk")),
+    "tool": (AnyTool, ...),
+    "toolpath": (ToolpathTable, ...),
+    "axis": (AxisTable, AxisTable()),
+    "gouge": (GougeTable, GougeTable()),
+    "feed": (FeedTable, ...),
+    "tolerance": (ToleranceTable, ToleranceTable()),
+    "placement": (PlacementTable, PlacementTable()),
+    "fixture": (FixtureTable, FixtureTable()),
+    "output": (OutputTable, OutputTable()),
+    "limits": (LimitsTable, LimitsTable()),
+    "verify": (VerifyTable, VerifyTable()),
+}
+JobTables = create_model("JobTables", __base__=_JobRules, __module__=__name__, __doc__=_JobRules.__doc__, **_TABLES)
+"""A whole job file."""
 
 
 def table_model(name: str, strategy: str = "raster", tool: str = "ball") -> type[Table]:

@@ -1,56 +1,63 @@
-"""The table [tool] of a job file, made from the sizes that the cutters declare."""
+"""The table [tool] of a job file, made from its own keys and those of the cutters."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import BeforeValidator, Field, SerializeAsAny, create_model, model_validator
+from pydantic import BeforeValidator, Field, SerializeAsAny, create_model
 
-from pentapod.base.keys import declared
-from pentapod.base.tables import Positive, Table, Vector, table_fields, wrong
+from pentapod.base.keys import VECTOR, Key, declared
+from pentapod.base.tables import Table, table_fields, table_of, wrong
 from pentapod.cutters.registry import CUTTERS, OWN_CUTTERS
 
 
-class ToolTable(Table):
+@dataclass(frozen=True, kw_only=True)
+class ToolKeys:
     """The tool: a cutter that touches the surface, or a beam or spray that keeps its distance."""
 
-    type: str = Field(
-        description='"ball", "bull" (nose), "flat" or "lollipop" cutter, or "standoff" (laser, spray, water jet)'
-    )
-    shank_mm: tuple[Vector, ...] | None = Field(
-        default=None, description="shank or nozzle: [height, lower diameter, upper diameter] of each piece, upwards"
-    )
-    holder_mm: tuple[Vector, ...] | None = Field(default=None, description="holder: pieces as of the shank, above it")
-    length_mm: Positive | None = Field(
-        default=None, le=1000.0, description="from the platform's origin to the tip; the machine's if left out"
-    )
+    type: Annotated[
+        str, Key("", '"ball", "bull" (nose), "flat" or "lollipop" cutter, or "standoff" (laser, spray, water jet)')
+    ]
+    shank: Annotated[
+        tuple[VECTOR, ...] | None,
+        Key("mm", "shank or nozzle: [height, lower diameter, upper diameter] of each piece, upwards"),
+    ] = None
+    holder: Annotated[tuple[VECTOR, ...] | None, Key("mm", "holder: pieces as of the shank, above it")] = None
+    length: Annotated[
+        float | None, Key("mm", "from the platform's origin to the tip; the machine's if left out", gt=0.0, le=1000.0)
+    ] = None
+
+    @staticmethod
+    def rules(table: Any) -> None:
+        """Check the sizes that the type of cutter needs, and those that it does not take."""
+        own = {item.file_key: item.is_needed for item in declared(CUTTERS[table.type])}
+        needed = [key for key, is_needed in own.items() if is_needed]
+        for key in _sizes(table.type):
+            given = getattr(table, key) is not None
+            if key in needed and not given:
+                wrong(key, f'missing for a tool of type "{table.type}"', "a length in mm")
+            if given and key not in own:
+                wrong(key, f'means nothing for a tool of type "{table.type}"', f"{', '.join(needed)} alone")
+        for key in ("shank_mm", "holder_mm"):
+            for piece in getattr(table, key) or ():
+                if piece[0] <= 0.0 or min(piece) < 0.0 or max(piece[1:]) <= 0.0:
+                    wrong(key, "an impossible piece", "[height, lower diameter, upper diameter], all positive")
+
+
+class ToolTable(Table):
+    """The table of a tool; its type says which sizes it has."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the given values; the model is made again from the cutters."""
+        """Pickle the given values, from which the model follows."""
         return _of_type, (self.model_dump(exclude_unset=True),)
 
     def sizes(self) -> dict[str, float]:
         """Return the sizes of the cutter that are given, by key, in mm."""
         values = {item.file_key: getattr(self, item.file_key) for item in declared(CUTTERS[self.type])}
         return {key: value for key, value in values.items() if value is not None}
-
-    @model_validator(mode="after")
-    def _own_size(self) -> ToolTable:
-        own = {item.file_key: item.is_needed for item in declared(CUTTERS[self.type])}
-        needed = [key for key, is_needed in own.items() if is_needed]
-        for key in _sizes(self.type):
-            given = getattr(self, key) is not None
-            if key in needed and not given:
-                wrong(key, f'missing for a tool of type "{self.type}"', "a length in mm")
-            if given and key not in own:
-                wrong(key, f'means nothing for a tool of type "{self.type}"', f"{', '.join(needed)} alone")
-        for key in ("shank_mm", "holder_mm"):
-            for piece in getattr(self, key) or ():
-                if piece[0] <= 0.0 or min(piece) < 0.0 or max(piece[1:]) <= 0.0:
-                    wrong(key, "an impossible piece", "[height, lower diameter, upper diameter], all positive")
-        return self
 
 
 def _sizes(kind: str) -> dict[str, Any]:
@@ -63,9 +70,11 @@ def _sizes(kind: str) -> dict[str, Any]:
 @cache
 def tool_table(kind: str = "ball") -> type[ToolTable]:
     """Return the table [tool] for a type of tool; that of pentapod's own types is the same."""
-    about = ToolTable.model_fields["type"].description
-    types: Any = (Literal[tuple(dict.fromkeys((*OWN_CUTTERS, kind)))], Field(description=about))
-    return create_model("ToolTable", __base__=ToolTable, __doc__=ToolTable.__doc__, type=types, **_sizes(kind))
+    base = table_of(ToolKeys, ToolTable)
+    types = Literal[tuple(dict.fromkeys((*OWN_CUTTERS, kind)))]
+    field: Any = (types, Field(description=base.model_fields["type"].description))
+    made: Any = create_model("ToolTable", __base__=base, __doc__=base.__doc__, type=field, **_sizes(kind))
+    return made
 
 
 def _of_type(value: Any) -> Any:

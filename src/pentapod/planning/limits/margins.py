@@ -33,7 +33,10 @@ from pentapod.planning.limits.strokes import LegStroke
 from pentapod.planning.limits.tool_pose import ToolPose, WorkpieceContacts
 
 LIMITS = Registry("limit", "pentapod.limits", LimitKind)
-"""The kinds of limits by name, in the order of the margins; those to obstacles come after them."""
+"""The kinds of limits by name, in the order of the margins; those to obstacles come after them.
+
+Those of other packages hold where a job names them (`[limits] use`), or `plan(limits=...)` does.
+"""
 
 LIMITS.register("strokes", LimitKind(LegStroke.of))
 LIMITS.register("singular surfaces", LimitKind(SurfaceDistance.of))
@@ -70,9 +73,9 @@ class Margins:
     ) -> Margins:
         """Build the margins of `machine` in a branch.
 
-        collision_world: what must not be touched. kinds: of limits; all of `LIMITS` where none are given.
+        collision_world: what must not be touched. kinds: of limits; pentapod's own where none are given.
         """
-        kinds = tuple(LIMITS.values()) if kinds is None else tuple(kinds)
+        kinds = tuple(LIMITS.own.values()) if kinds is None else tuple(kinds)
         scene = Scene(machine, branch, collision_world)
         own = tuple(limit for kind in kinds for limit in kind.of(scene))
         return cls(scene, kinds, own, (*own, *ObstacleClearance.of(scene)))

@@ -46,7 +46,10 @@ LIMITS: tuple[type[MachineLimit], ...] = (
 """Every limit that a machine or a path sets, in the order of rows and certificates: a new one is added here."""
 
 PLUGGED: Registry[type] = Registry("limit", "pentapod.timing_limits", type)
-"""Limits of other packages, by entry points of this group: classes like those of `LIMITS`."""
+"""Limits of other packages, by entry points of this group: classes like those of `LIMITS`.
+
+They hold where a job names them (`[limits] use`), or `retime(limits=...)` is given one.
+"""
 
 _RINGING = 0.975
 """Share of a jerk limit that is planned with: where jerk steps, the spline through setpoints rings above it."""
@@ -54,7 +57,7 @@ _RINGING = 0.975
 
 def machine_limits(machine: Machine, reserve: Reserve = NOTHING_LEFT_FREE) -> tuple[Limit, ...]:
     """Return the limits that a machine sets, less a reserve."""
-    found = (limit.of(machine, reserve) for limit in (*LIMITS, *PLUGGED.values()))
+    found = (limit.of(machine, reserve) for limit in LIMITS)
     return tuple(limit for limit in found if limit is not None)
 
 

@@ -1,4 +1,4 @@
-"""open_run: what the folder of a run holds, with the job that it was made from, ready to be looked at."""
+"""OpenedRun: a run read back from its folder, with its job, for the viewer."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.artefacts import ARRAYS, PROGRAM
-from pentapod.job.build.collision_world import job_collision_world
-from pentapod.job.build.tool import job_tool
+from pentapod.job.build.specification import job_collision_world
+from pentapod.job.build.toolpath import job_tool
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.outcome import Outcome, SetUp
 from pentapod.job.plan_arrays import BOX, GUIDES, JOB_FILE, WAYPOINTS, guides_in, piece_in
@@ -49,13 +49,13 @@ _FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Opened(Value):
+class OpenedRun(Value):
     """A run. placement: workpiece → machine. axes (N, 3): the chosen tool axes, workpiece frame.
 
-    machine: as the program wants it.
+    machine: with its guides as in the program.
     piece: of the job's toolpath, where the run is one of several set-ups.
-    program: None where the job was refused; then the part stands in the middle of the work volume with nominal axes,
-    unless a placement was found. same_job: whether the job is still what the program was made from.
+    program: None where the job was refused; then the part is in the middle of the work volume with nominal axes,
+    unless a placement was found. same_job: whether the program was made from the job as it is now.
     """
 
     folder: Path
@@ -73,11 +73,11 @@ class Opened(Value):
     piece: Piece | None = None
 
 
-def open_run(folder: str | Path, job: str | Path | None = None, progress: Progress = silent) -> Opened:
-    """Return the run of a folder; its job is found by what the run says, or given.
+def open_run(folder: str | Path, job: str | Path | None = None, progress: Progress = silent) -> OpenedRun:
+    """Return the run of a folder. job: its job file, by default the one that the run names.
 
-    Raises InputError: no run in the folder, or one in several set-ups, or files of different runs; its job is not there
-    any more, or one of its files is broken.
+    Raises InputError: no run in the folder, one in several set-ups, or files of different runs; the job file is gone; a
+    broken file.
     """
     folder = Path(folder)
     file = folder / ARRAYS
@@ -85,7 +85,7 @@ def open_run(folder: str | Path, job: str | Path | None = None, progress: Progre
         what = "there is no run in this folder" if folder.is_dir() else "no such folder"
         raise InputError(what, file=folder, expected=f"a folder with {ARRAYS}", remedy="pentapod plan JOB.toml -o DIR")
     if (first := folder / SetUp.folder_of(1)).is_dir():
-        what = "this job is done in several set-ups, each of which is a run"
+        what = "this job has several set-ups, each of which is a run"
         raise InputError(what, file=folder, expected="the folder of one of them", remedy=f"pentapod view {first}")
     check_run(folder)
     progress("open", 0.0, "arrays")
@@ -101,21 +101,21 @@ def open_run(folder: str | Path, job: str | Path | None = None, progress: Progre
     wanted = loaded.placement.component
     asked = COMPONENTS[0] if wanted is None else Component.parse(wanted)
     placement, component, axes = _placed(arrays, toolpath, machine, asked)
-    return Opened(
+    return OpenedRun(
         folder, loaded, machine, mesh, job_tool(loaded), toolpath, job_collision_world(loaded, machine, mesh),
         placement, component, axes, program, program is None or program.provenance.job_digest == loaded.digest,
         piece_in(arrays),
     )  # fmt: skip
 
 
-def run_of(outcome: Outcome, folder: Path) -> Opened | None:
-    """Return the run of an outcome that was written into a folder; None where it came to no program."""
+def run_of(outcome: Outcome, folder: Path) -> OpenedRun | None:
+    """Return the run of an outcome that was written into a folder; None where there is no program."""
     mesh, toolpath = outcome.find(Mesh), outcome.find(Toolpath)
     placed, program = outcome.find(PlacedPath), outcome.find(Program)
     if mesh is None or toolpath is None or placed is None or program is None:
         return None
     job, machine, placement = outcome.job, outcome.machine, placed.placement.transform
-    return Opened(
+    return OpenedRun(
         folder, job, machine, mesh, job_tool(job), toolpath, job_collision_world(job, machine, mesh), placement,
         placed.component, placement.inverse().rotate(placed.axes), program, same_job=True, piece=outcome.find(Piece),
     )  # fmt: skip
@@ -132,17 +132,17 @@ def _arrays(file: Path) -> dict[str, NDArray[Any]]:
 def _job_file(folder: Path, arrays: dict[str, NDArray[Any]]) -> Path:
     remedy = "name it with --job"
     if JOB_FILE not in arrays:
-        raise InputError("the run does not say which job it was made from", file=folder / ARRAYS, remedy=remedy)
+        raise InputError("the run does not name its job", file=folder / ARRAYS, remedy=remedy)
     path = folder / str(arrays[JOB_FILE])
     if not path.is_file():
-        raise InputError("the job of this run is not there any more", file=path, remedy=remedy)
+        raise InputError("the job file of this run is gone", file=path, remedy=remedy)
     return path
 
 
 def _placed(
     arrays: dict[str, NDArray[Any]], toolpath: Toolpath, machine: Machine, component: Component
 ) -> tuple[RigidTransform, Component, Floats]:
-    """Return what the run found; without a placement the middle of the work volume, in `component`."""
+    """Return the run's placement, component and axes; without one the middle of the work volume, in `component`."""
     if "placed.axes" not in arrays:
         return _middle(toolpath, machine, component), component, toolpath.axes
     matrix = arrays["placed.placement_mm"].copy()

@@ -1,4 +1,4 @@
-"""The viewer's doors: raw clients with foreign Origin, foreign Host or no token get nothing and change nothing."""
+"""The viewer's access: raw clients with foreign Origin, foreign Host or no token get nothing and change nothing."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 from pentapod.base.errors import InputError
 from pentapod.view import Viewer, open_run
-from pentapod.view.doors import Doors, load_viser, open_server
+from pentapod.view.access import Access, load_viser, open_server
 
 viser = pytest.importorskip("viser", reason="viser is not installed")
 pytestmark = [
@@ -24,7 +24,7 @@ FOREIGN = "https://evil.example"
 
 @pytest.fixture(scope="module")
 def viewer(planned, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("doors")
+    folder = tmp_path_factory.mktemp("access")
     shutil.copytree(planned[0], folder / "job")
     with Viewer(open_run(folder / "job" / "out"), port=18300) as viewer:
         yield viewer
@@ -123,7 +123,7 @@ def test_the_page_keeps_the_token_for_its_own_socket(viewer):
 
 
 def test_no_tunnel_is_opened(viewer, monkeypatch):
-    """Not even for a client that was let in."""
+    """Not even for a client that was answered."""
     import msgspec
     from viser import _tunnel
     from websockets.sync.client import connect
@@ -144,21 +144,21 @@ def test_listening_to_all_lets_addresses_in_but_no_names():
     from websockets.datastructures import Headers
     from websockets.http11 import Request
 
-    doors = Doors("0.0.0.0")
+    access = Access("0.0.0.0")
 
     def answer(host):
-        return doors.refusal(Request(f"/?token={doors.token}", Headers(Host=host)))
+        return access.refusal(Request(f"/?token={access.token}", Headers(Host=host)))
 
     assert {answer(host) for host in ("10.1.2.3:8080", "[fe80::1]:8080", "localhost:8080", socket.gethostname())} == {
         ""
     }
     assert all(answer(host) for host in ("evil.example", "10.1.2.3.evil.example:8080"))
-    assert doors.token not in repr(doors)
+    assert access.token not in repr(access)
 
 
 def test_another_version_of_viser_is_refused(monkeypatch):
     monkeypatch.setattr(viser, "__version__", "1.2.0")
-    with pytest.raises(InputError, match=r"viser: .*foreign web pages.*1\.2\.0.*pip install \"viser==1\.1\.1\""):
+    with pytest.raises(InputError, match=r"viser: .*other web pages.*1\.2\.0.*pip install \"viser==1\.1\.1\""):
         load_viser()
 
 
@@ -173,6 +173,6 @@ def test_a_server_that_cannot_be_guarded_is_not_opened(monkeypatch):
             stopped.append(self)
 
     monkeypatch.setattr(viser, "ViserServer", Unguarded)
-    with pytest.raises(InputError, match="let every web page in"):
-        open_server(Doors("127.0.0.1"), 18390)
+    with pytest.raises(InputError, match="let every web page connect"):
+        open_server(Access("127.0.0.1"), 18390)
     assert stopped

@@ -1,8 +1,8 @@
-"""Who may connect to the viewer: the browser that was given its address, and no other page that is open in it.
+"""Access control of the viewer: only the browser that was given its address may connect.
 
-A web page of anybody can open connections to this machine. So every request, also for a web socket, is looked at
-before it is answered: its Host must be this machine, its Origin this server, and it must bring the token.
-The token is in the address that is told; a page that was opened by it keeps the token as a cookie.
+Any web page that is open in the browser can send requests to this machine. So every request, also for a web socket, is
+checked first: its Host must be this machine, its Origin this server, and it must have the token. The token is in the
+printed address; a page that was opened by it keeps the token as a cookie.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from websockets.http11 import Request, Response
 
 TESTED = "1.1.1"
-"""The version of viser with which the doors were found shut; it has no public way to shut them."""
+"""The version of viser that was tested: it has no public way to check requests."""
 
-_LOOPBACK = ("localhost", "127.0.0.1", "::1")
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 
 def load_viser() -> Any:
@@ -37,15 +37,15 @@ def load_viser() -> Any:
     viser = load_extra("viser", "view", "the viewer needs viser", key="viser")
     if viser.__version__ != TESTED:
         raise InputError(
-            "with another version of viser foreign web pages may connect to the viewer", key="viser",
+            "with another version of viser, other web pages may be able to connect to the viewer", key="viser",
             value=viser.__version__, expected=TESTED, remedy=f'pip install "viser=={TESTED}"',
         )  # fmt: skip
     return viser
 
 
 @dataclass(frozen=True)
-class Doors:
-    """What a request must bring. host: where the server listens. cookie: under this name a page keeps the token."""
+class Access:
+    """Requirements on a request. host: address that the server listens on. cookie: name of the one with the token."""
 
     host: str
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24), repr=False)
@@ -55,15 +55,15 @@ class Doors:
         """Return why a request is refused; empty where it is not."""
         hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
         if len(hosts) != 1 or not self._is_here(hosts[0]):
-            return "this server is not of that name"
+            return "this server has another name"
         if origins and (len(origins) > 1 or not _is_origin_of(origins[0], hosts[0])):
             return "pages of other servers may not connect"
         if not any(secrets.compare_digest(given.encode(), self.token.encode()) for given in self._tokens(request)):
-            return "open the address that pentapod view says, with its token"
+            return "open the address that pentapod view prints, with its token"
         return ""
 
     def shows_token(self, request: Request) -> bool:
-        """Whether the token is in the address, where a page has it once."""
+        """Whether the token is in the address."""
         return self.token in _in_address(request)
 
     @property
@@ -82,54 +82,56 @@ class Doors:
         return found
 
     def _is_here(self, host: str) -> bool:
-        """Whether a Host header names this machine. A name that somebody else points here is not one of its names."""
+        """Whether a Host header names this machine. Names that others point to it do not count."""
         try:
             name = urlsplit(f"//{host}").hostname or ""
         except ValueError:
             return False
-        if name in (*_LOOPBACK, self.host.lower()):
+        if name in (*LOOPBACK, self.host.lower()):
             return True
-        if self.host in _LOOPBACK:
+        if self.host in LOOPBACK:
             return False
         own = socket.gethostname().lower()
         return _is_address(name) or name in (own, f"{own}.local")
 
 
-def open_server(doors: Doors, port: int) -> viser.ViserServer:
-    """Return a server whose doors are shut, its tunnel for sharing as well. Raises InputError where that fails."""
+def open_server(access: Access, port: int) -> viser.ViserServer:
+    """Return a server that checks every request and opens no tunnel. Raises InputError where that fails."""
     viser = load_viser()
     from websockets.asyncio import server as sockets  # noqa: PLC0415 - comes with viser
 
     class Server(viser.ViserServer):
         def request_share_url(self, verbose: bool = True) -> str | None:
-            """Open no tunnel: it would make the run public."""
+            """Open no tunnel, which would make the run public."""
             del verbose
 
     plain, guards = sockets.serve, list[str]()
 
     def serve(*given: Any, process_request: Any, **named: Any) -> Any:
-        guards.append("shut")
+        guards.append("set")
 
         def first(connection: ServerConnection, request: Request) -> Response | None:
-            if refused := doors.refusal(request):
+            if refused := access.refusal(request):
                 return connection.respond(HTTPStatus.FORBIDDEN, refused + "\n")
             answer: Response | None = process_request(connection, request)
-            if answer is not None and doors.shows_token(request):
-                answer.headers["Set-Cookie"] = doors.kept
+            if answer is not None and access.shows_token(request):
+                answer.headers["Set-Cookie"] = access.kept
             return answer
 
         return plain(*given, process_request=first, **named)
 
-    # viser takes no such function; it starts to listen within its constructor.
+    # viser has no option for such a function, and starts to listen within its constructor.
     sockets.serve = serve
     try:
-        with redirect_stdout(io.StringIO()):  # it has a word to say even when it is told not to
-            server = Server(host=doors.host, port=port, verbose=False)
+        with redirect_stdout(io.StringIO()):  # it prints even without verbose
+            server = Server(host=access.host, port=port, verbose=False)
     finally:
         sockets.serve = plain
     if not guards:
         server.stop()
-        raise InputError("the viewer's server would let every web page in", key="viser", expected=f"viser {TESTED}")
+        raise InputError(
+            "this version of viser would let every web page connect", key="viser", expected=f"viser {TESTED}"
+        )
     server.gui.configure_theme(show_share_button=False)
     return server
 

@@ -1,0 +1,21 @@
+"""Limits from a job: pentapod's own, and those of installed packages that [limits] names."""
+
+from __future__ import annotations
+
+from pentapod.job.schema.job import Job
+from pentapod.machine.machine import Machine
+from pentapod.planning.limits.limit import LimitKind
+from pentapod.planning.limits.margins import LIMITS
+from pentapod.timing.limits.limit import NOTHING_LEFT_FREE, Limit
+from pentapod.timing.limits.limits import PLUGGED
+
+
+def placement_limits(job: Job) -> tuple[LimitKind, ...]:
+    """Return the kinds of limits that a job's placement keeps. Raises InputError: one cannot be loaded."""
+    return (*LIMITS.own.values(), *(LIMITS.find(name) for name in job.limits.use if name in LIMITS.added))
+
+
+def timing_limits(job: Job, machine: Machine) -> tuple[Limit, ...]:
+    """Return the limits on the time law beside the machine's own. Raises InputError: one cannot be loaded."""
+    found = (PLUGGED.find(name).of(machine, NOTHING_LEFT_FREE) for name in job.limits.use if name in PLUGGED.added)
+    return tuple(limit for limit in found if limit is not None)

@@ -1,0 +1,180 @@
+"""Tool and toolpath from a job: strategy or file, tool axes, gouge check, exact stops."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import InputError, ToolpathError
+from pentapod.base.keys import fields_from, file_key
+from pentapod.base.progress import Progress, silent
+from pentapod.base.units import from_si
+from pentapod.cutters.registry import CUTTERS
+from pentapod.cutters.tool import Tool
+from pentapod.geometry.directions import normalised
+from pentapod.geometry.solids import Cone
+from pentapod.job.schema.job import Job
+from pentapod.job.schema.strategies import FILE
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.region import Region
+from pentapod.program import read_header
+from pentapod.toolpath import toolpath_with_report
+from pentapod.toolpath.axis.modes import AxisMode, Between, Fixed, Normal, Pointed
+from pentapod.toolpath.axis.orientation import Orientation
+from pentapod.toolpath.axis.orienting import oriented
+from pentapod.toolpath.axis.steps import fastest_turn, stepped
+from pentapod.toolpath.formats import read_toolpath
+from pentapod.toolpath.gouge.gouge import without_gouges
+from pentapod.toolpath.gouge.report import GougeOptions, Remedy
+from pentapod.toolpath.linking.links import LinkStyle
+from pentapod.toolpath.linking.partition import Piece, part_of
+from pentapod.toolpath.options import PathOptions
+from pentapod.toolpath.strategies.registry import STRATEGIES
+from pentapod.toolpath.toolpath import Toolpath
+
+RATE_SLACK = 1.05
+"""Factor on the cap of the axis's turn: it holds along the contact points, not along the tilt centres."""
+
+
+@dataclass(frozen=True)
+class Reports:
+    """The reports of the steps that made a toolpath."""
+
+    parts: tuple[object, ...]
+
+    def __str__(self) -> str:
+        return "\n".join(str(part) for part in self.parts)
+
+
+def job_tool(job: Job) -> Tool:
+    """Return the job's tool. Raises JobError where its sizes make no tool."""
+    cutter = CUTTERS[job.tool.type]
+    mounted = {"shank": _cones(job.tool.si.shank), "holder": _cones(job.tool.si.holder)}
+    try:
+        return cutter(**fields_from(cutter, job.tool), **mounted)
+    except ToolpathError as error:
+        key = file_key(cutter, error.key or "") or "type"
+        raise job.error("tool", key, error.what, expected=error.expected) from error
+
+
+def job_options(job: Job) -> PathOptions:
+    """Return the options of the job's strategy, its files read.
+
+    Raises ToolpathError for a drawing, picture or list of points that cannot be used.
+    """
+    options, feed = STRATEGIES[job.toolpath.strategy].options, job.feed.si
+    return options(
+        region=job_region(job),
+        chordal=job.tolerance.si.chordal,
+        feed=feed.cut,
+        link_feed=feed.cut if feed.link is None else feed.link,
+        **fields_from(options, job.toolpath, job.files),
+    )
+
+
+def job_region(job: Job) -> Region:
+    """Return the part of the surface that a job machines."""
+    return Region(**fields_from(Region, job.part))
+
+
+def job_sink(job: Job) -> float:
+    """Return the depth below the surface at which the job's strategy cuts on purpose, metres."""
+    strategy = job.toolpath.strategy
+    return STRATEGIES[strategy].options.sink_of(job.toolpath.si) if strategy in STRATEGIES else 0.0
+
+
+def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Toolpath, Reports]:
+    """Return the job's toolpath, workpiece frame, and its reports.
+
+    Raises ToolpathError where there is nothing to machine, or the toolpath file cannot be read.
+    """
+    tool, from_file = job_tool(job), job.toolpath.strategy == FILE
+    if from_file:
+        toolpath, report = _read(job, tool)
+    else:
+        toolpath, report = toolpath_with_report(mesh, tool, job_options(job))
+        orientation = Orientation(mode=_mode(job), **fields_from(Orientation, job.axis))
+        toolpath = stepped(oriented(toolpath, tool, orientation), job.toolpath.si.axis_step)
+    gouge = fields_from(GougeOptions, job.gouge)
+    options = GougeOptions(
+        # By default, nothing is taken out of a toolpath that was read from a file.
+        tuple(Remedy(name) for name in job.gouge.remedy or ("report" if from_file else "drop",)),
+        # An engraving lies below the surface on purpose.
+        **{**gouge, "tolerance": gouge["tolerance"] + job_sink(job)},
+        links=None if from_file else job_link_style(job, mesh, toolpath),
+    )
+    toolpath, gouges = without_gouges(toolpath, tool, mesh, options, progress)
+    reports: list[object] = [report, gouges]
+    if gouges.tilted:  # the axes may turn faster than before
+        toolpath = stepped(toolpath, np.inf if from_file else job.toolpath.si.axis_step)
+        reports += _turns(toolpath, from_si(job.axis.si.rate, "deg_mm"))
+    if job.feed.dwell_s is not None:
+        toolpath = toolpath.stopping(job.feed.dwell_s)
+    return toolpath, Reports(tuple(reports))
+
+
+def job_piece(job: Job, mesh: Mesh, piece: Piece, progress: Progress = silent) -> Toolpath:
+    """Return a piece of the job's toolpath, with approach and retract. Raises ToolpathError as `part_of`."""
+    toolpath, _ = job_toolpath(job, mesh, progress)
+    return part_of(toolpath, piece, job_link_style(job, mesh, toolpath))
+
+
+def program_toolpath(job: Job, mesh: Mesh, program: Path, progress: Progress = silent) -> Toolpath:
+    """Return the toolpath of a program file: the job's, or its set-up's piece of it."""
+    piece = program_piece(program)
+    return job_toolpath(job, mesh, progress)[0] if piece is None else job_piece(job, mesh, piece, progress)
+
+
+def program_piece(program: Path) -> Piece | None:
+    """Return the piece of the toolpath that a program file is for; None for all of it, or for a broken file."""
+    try:
+        return read_header(program).provenance.piece
+    except InputError:  # the verdict names the error
+        return None
+
+
+def job_link_style(job: Job, mesh: Mesh, toolpath: Toolpath) -> LinkStyle:
+    """Return the style of additional links: along the axis and over the clearance level."""
+    view = normalised(job.part.si.region_direction)
+    top = max(float((mesh.vertices @ view).max()), float((toolpath.tips @ view).max()))
+    style = PathOptions() if job.toolpath.strategy == FILE else job.toolpath.si
+    level = top + max(style.clearance, 2.0 * style.approach)
+    feed = job.feed.si.cut if job.feed.link_mm_min is None else job.feed.si.link
+    return LinkStyle(view, level, style.approach, spacing=style.spacing, feed=feed)
+
+
+def _read(job: Job, tool: Tool) -> tuple[Toolpath, str]:
+    """Return the toolpath of the job's file, and a sentence about it."""
+    file = job.files["file"]
+    read = read_toolpath(file, job.toolpath.format, tilt_centre=tool.tilt_centre, feed=job.feed.si.cut)
+    # The job's tool is used, whatever tool the file names.
+    read = dataclasses.replace(read, tilt_centre=tool.tilt_centre)
+    return read, f"{file.name}: {len(read):,} waypoints in {len(read.segments):,} segments, read as they are"
+
+
+def _turns(toolpath: Toolpath, most: float | None) -> list[str]:
+    """Return what to report where tilted axes turn faster than the job's cap, degrees per millimetre."""
+    fastest = float(from_si(fastest_turn(toolpath), "deg_mm"))
+    if not most or fastest <= most * RATE_SLACK:
+        return []
+    return [f"  problem: tilted to avoid a gouge, the axis turns by up to {fastest:.3g} deg/mm, the cap is {most:.3g}"]
+
+
+def _mode(job: Job) -> AxisMode:
+    axis = job.axis.si
+    if axis.mode == "fixed":
+        return Fixed(axis.direction)
+    if axis.mode in ("toward", "from"):
+        return Pointed(axis.point, None if axis.line is None else np.array(axis.line), toward=axis.mode == "toward")
+    if axis.mode == "between":
+        return Between(axis.places, np.array(axis.directions))
+    return Normal()
+
+
+def _cones(pieces: Floats | None) -> tuple[Cone, ...]:
+    """Return the pieces of a shank or holder from rows of height, lower and upper diameter."""
+    return () if pieces is None else tuple(Cone(height, 0.5 * low, 0.5 * high) for height, low, high in pieces.tolist())
