@@ -91,12 +91,7 @@ def _rates(corners: Floats, directions: Floats) -> Floats:
 
 
 def _cross(
-    patch: Patch,
-    state: tuple[Ints, Floats, Floats, Ints],
-    going: Ints,
-    f: Ints,
-    side: Ints,
-    after: Ints,
+    patch: Patch, state: tuple[Ints, Floats, Floats, Ints], going: Ints, f: Ints, side: Ints, after: Ints
 ) -> None:
     """Move rays `going` from facets f over their sides into the facets `after`, in place."""
     facets, weights, directions, from_side = state

@@ -36,15 +36,12 @@ def svg_lines(path: Path, data: bytes, tolerance: float) -> list[Floats]:
         _check(path, root)
         text = ElementTree.tostring(root, encoding="unicode")
         drawing = svg.SVG.parse(io.StringIO(text), reify=True, on_error="raise")
-        parts = list(drawing.elements())
-        for element in parts:
-            _check_kind(path, svg, element)
-        shapes = [e for e in parts if isinstance(e, svg.Shape)]
-        found = [svg.Path(shape).segments() for shape in shapes]
         lines: list[Floats] = []
         points = count()
-        for segments in found:
-            lines += _lines(svg, segments, tolerance / _PX_M, path, points)
+        for element in drawing.elements():
+            _check_kind(path, svg, element)
+            if isinstance(element, svg.Shape):
+                lines += _lines(svg, svg.Path(element).segments(), tolerance / _PX_M, path, points)
     except ToolpathError:
         raise
     except UnicodeDecodeError as error:
@@ -59,8 +56,10 @@ def svg_lines(path: Path, data: bytes, tolerance: float) -> list[Floats]:
     return [_PX_M * line * [1.0, -1.0] for line in lines]
 
 
-def _too_large(path: Path, what: str, most: int) -> None:
-    raise ToolpathError(f"this SVG is too large: {what}", file=path, expected=f"at most {most:,}", remedy="simplify it")
+def _check_size(path: Path, size: int, most: int, what: str) -> None:
+    if size > most:
+        what = f"this SVG is too large: {what}"
+        raise ToolpathError(what, file=path, expected=f"at most {most:,}", remedy="simplify it")
 
 
 def _check(path: Path, root: ElementTree.Element) -> None:
@@ -70,22 +69,18 @@ def _check(path: Path, root: ElementTree.Element) -> None:
     for element in root.iter():
         if isinstance(identity := element.get("id"), str):
             named[identity] = element
-        if len(element.attrib) > LIMITS.svg_attributes:
-            _too_large(path, "an element has too many attributes", LIMITS.svg_attributes)
-        if max(len(element.get(key, "")) for key in ("transform", "viewBox")) > LIMITS.svg_transform:
-            _too_large(path, "a transform is too long", LIMITS.svg_transform)
-        if max(len(element.get(key, "")) for key in ("style", "class", "id")) > LIMITS.svg_style:
-            _too_large(path, "a style is too long", LIMITS.svg_style)
+        transform = max(len(element.get(key, "")) for key in ("transform", "viewBox"))
+        names = max(len(element.get(key, "")) for key in ("style", "class", "id"))
+        _check_size(path, len(element.attrib), LIMITS.svg_attributes, "an element has too many attributes")
+        _check_size(path, transform, LIMITS.svg_transform, "a transform is too long")
+        _check_size(path, names, LIMITS.svg_style, "a style is too long")
         if str(element.tag).endswith("}style") or element.tag == "style":
             element.text = _shaping(element.text or "")
             style += len(element.text)
-            if style > LIMITS.svg_style:
-                _too_large(path, "its rules of style that move or hide shapes are too long", LIMITS.svg_style)
+            _check_size(path, style, LIMITS.svg_style, "its style rules that move or hide shapes are too long")
     elements, numbers = _unfolded(path, root, named, {}, 0)
-    if elements > LIMITS.svg_elements:
-        _too_large(path, f"it unfolds to {elements:,} elements", LIMITS.svg_elements)
-    if numbers > LIMITS.svg_numbers:
-        _too_large(path, f"its paths unfold to {numbers:,} numbers and commands", LIMITS.svg_numbers)
+    _check_size(path, elements, LIMITS.svg_elements, f"it unfolds to {elements:,} elements")
+    _check_size(path, numbers, LIMITS.svg_numbers, f"its paths unfold to {numbers:,} numbers and commands")
 
 
 def _check_kind(path: Path, svg: Any, element: Any) -> None:
@@ -122,8 +117,7 @@ def _unfolded(
     """Return the numbers of elements, and of numbers in paths, of an element with all that it contains and repeats."""
     if id(element) in known:
         return known[id(element)]
-    if depth > LIMITS.svg_depth:
-        _too_large(path, "its elements are nested too deep, or repeat themselves", LIMITS.svg_depth)
+    _check_size(path, depth, LIMITS.svg_depth, "its elements are nested too deep, or repeat themselves")
     parts = [_unfolded(path, child, named, known, depth + 1) for child in element]
     if element.tag == "use" or str(element.tag).endswith("}use"):
         link = next((element.get(key, "") for key in reversed(_HREFS) if key in element.attrib), "")
