@@ -48,7 +48,7 @@ class Iterate(NamedTuple):
 
 
 @kernel
-def _rows(a0: Floats, a1: Floats, c: Floats, moves: int, jerks: Floats, x_k: Floats, top: Floats) -> Rows:
+def _rows(a0: Floats, a1: Floats, c: Floats, varies: int, jerks: Floats, x_k: Floats, top: Floats) -> Rows:
     """Return all rows; arguments as for `minimise_duration`."""
     count, rows = a0.shape
     more = jerks.shape[1]
@@ -57,7 +57,7 @@ def _rows(a0: Floats, a1: Floats, c: Floats, moves: int, jerks: Floats, x_k: Flo
     for i in range(count):
         for j in range(rows):
             p[i, j, 0], p[i, j, 1], p[i, j, 2], lean[i, j] = a0[i, j], a1[i, j], 0.0, 0.0
-            bound[i, j, 0], bound[i, j, 1] = 1.0 + c[i * moves, j], 1.0 - c[i * moves, j]
+            bound[i, j, 0], bound[i, j, 1] = 1.0 + c[i * varies, j], 1.0 - c[i * varies, j]
         root = np.sqrt(x_k[i])
         for j in range(rows, rows + more):
             for d in range(3):
@@ -248,7 +248,7 @@ def minimise_duration(
     a0: Floats,
     a1: Floats,
     c: Floats,
-    moves: int,
+    varies: int,
     jerks: Floats,
     x_k: Floats,
     top: Floats,
@@ -261,14 +261,14 @@ def minimise_duration(
 ) -> tuple[bool, float, float]:
     """Improve the coefficients y (n,) in their place; those marked 1 in `fixed` (n,) stay.
 
-    a0, a1 (N, R): A₀ and A₁; c (N, R), or (1, R) where `moves` is 0; jerks (N, K, 3): J₀, J₁, J₂; x_k, top, weight
+    a0, a1 (N, R): A₀ and A₁; c (N, R), or (1, R) where `varies` is 0; jerks (N, K, 3): J₀, J₁, J₂; x_k, top, weight
     (N,). level: where slacks and multipliers start. Returns whether the method converged, the duality gap over the
     objective, and the largest residual of a row.
     """
     count, n = len(first), len(y)
     v, dv, band = np.empty((count, 3)), np.empty((count, 3)), np.empty((n, 4))
     right, down, step = np.empty(n), np.empty(n), np.empty(n)
-    rows = _rows(a0, a1, c, moves, jerks, x_k, top)
+    rows = _rows(a0, a1, c, varies, jerks, x_k, top)
     spline_values(basis, first, y, v)
     iterate = _start(rows, v, level)
     s, z, off, rest = iterate

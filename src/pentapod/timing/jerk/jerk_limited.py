@@ -72,7 +72,7 @@ class BlockLaw:
 
 
 @dataclass(frozen=True, eq=False)
-class SmoothProfile:
+class JerkProfile:
     """Nodes of a jerk-limited profile; the jerk is about constant between them.
 
     longer: seconds that tightening has added; exceeds: whether setpoints still exceed limits; overlap: gridpoints by
@@ -152,7 +152,7 @@ class JerkProblem:
         return SpeedNodes(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("s", "x", "slope")))
 
 
-def jerk_limited(problem: JerkProblem) -> SmoothProfile | Failure:
+def jerk_limited(problem: JerkProblem) -> JerkProfile | Failure:
     """Return the fastest jerk-limited profile, with the first overlap at which all blocks have a law and agree."""
     reason = NO_AGREEMENT
     for overlap in problem.overlaps():
@@ -161,7 +161,7 @@ def jerk_limited(problem: JerkProblem) -> SmoothProfile | Failure:
         nodes = problem.joined(overlap, laws) if len(laws) == len(found) else None
         if nodes is not None:
             longer, exceeds = sum(law.longer for law in laws), any(law.exceeds for law in laws)
-            return SmoothProfile(nodes, longer, exceeds, overlap)
+            return JerkProfile(nodes, longer, exceeds, overlap)
         reason = NO_LAW if len(laws) < len(found) else NO_AGREEMENT
     return reason
 

@@ -141,14 +141,14 @@ class Subproblem:
         fixed[: ends[0]] = 1
         fixed[len(fixed) - ends[1] :] = 1
         rows, part = self.rows, y[low:high].copy()
-        moves = int(len(rows.offset) > 1)
+        varies = int(len(rows.offset) > 1)
         converged, gap, residual = minimise_duration(
             self.basis[here],
             self.first[here] - low,
             rows.second[here],
             0.5 * rows.first[here],
-            -rows.offset[here] if moves else -rows.offset,
-            moves,
+            -rows.offset[here] if varies else -rows.offset,
+            varies,
             rows.jerks[here],
             x_k[here],
             self.top[here],

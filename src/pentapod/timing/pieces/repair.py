@@ -117,7 +117,7 @@ def repaired_laws(
     dwells (P + 1,): seconds of standing before each piece, and after the last. jerk_options: None where jerks are not
     limited.
     """
-    period, smooth = machine.controller.period, jerk_options is not None
+    period, jerk_limited = machine.controller.period, jerk_options is not None
     stood = np.rint(dwells / period).astype(int).tolist()
 
     def timed(k: int, plan: _Plan | Failure) -> tuple[_Plan, Setpoints] | Failure:
@@ -126,7 +126,8 @@ def repaired_laws(
         law = plan.law(period)
         if isinstance(law, Failure):
             return law
-        return plan, Setpoints(plan.profile, law, smooth, period, stood[0] if k == 0 else 0, stood[k + 1])
+        before = stood[0] if k == 0 else 0
+        return plan, Setpoints(plan.profile, law, jerk_limited, period, before, stood[k + 1])
 
     current: list[tuple[_Plan, Setpoints]] = []
     for k, profile in enumerate(profiles):
@@ -163,9 +164,9 @@ def _planned(
     """
     window = WINDOW_PERIODS if jerk_options is not None or machine.controller.interpolation == "cubic" else 0
     if jerk_options is not None:
-        from pentapod.timing.pieces.smooth import smooth_profile  # noqa: PLC0415  (compiled: loaded where it is used)
+        from pentapod.timing.pieces.jerk_profile import jerk_limited_profile  # noqa: PLC0415  (compiled: loaded where it is used)
 
-        found = smooth_profile(profile, partial(excess, profile, machine), jerk_options)
+        found = jerk_limited_profile(profile, partial(excess, profile, machine), jerk_options)
         if not isinstance(found, Failure):
             first = found.nodes.law()
             # The first law is the one before limits were lowered where setpoints exceeded them.
@@ -184,7 +185,7 @@ def _changed(plan: _Plan, piece: Setpoints, shares: LimitShares, machine: Machin
         at = np.clip((bad - piece.before) * period, 0.0, law.duration) * (raw.duration / law.duration)
         at = np.asarray(at, dtype=np.float64)
         return replace(plan, nodes=slowed_at(plan.nodes, raw, plan.profile, at, shares.at(bad), period)[0])
-    if attempt < options.local_rounds and not piece.smooth:
+    if attempt < options.local_rounds and not piece.jerk_limited:
         again = _with_lower_limits(piece, shares, machine, options, attempt)
         return again if isinstance(again, Failure) else replace(plan, profile=again)
     slower = plan.slower * float(shares.slowing.max()) * options.extra

@@ -73,12 +73,12 @@ class Setpoints:
     """A piece with its law, which lasts whole periods.
 
     before, after: periods for which the machine stands at its ends; between two pieces they count with the first.
-    smooth: whether jerks are limited.
+    jerk_limited: whether limits of jerk count.
     """
 
     profile: PieceProfile
     law: MotionLaw
-    smooth: bool
+    jerk_limited: bool
     period: float
     before: int
     after: int
@@ -110,7 +110,7 @@ class Setpoints:
         at_rows: dict[Group, Floats] = {group: np.zeros(count + 1) for group in ("speed", "acceleration", "jerk")}
         between: dict[Group, Floats] = {group: np.zeros(count) for group in at_rows}
         for limit in self.profile.limits.all:
-            if limit.group != "jerk" or self.smooth:
+            if limit.group != "jerk" or self.jerk_limited:
                 used = limit.used(joined)
                 kept = at_rows if len(used) > count else between
                 kept[limit.group] = np.maximum(kept[limit.group], used)

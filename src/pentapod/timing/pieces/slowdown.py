@@ -15,7 +15,7 @@ from pentapod.timing.pieces.violations import law_times, violations
 from pentapod.timing.time_law.motion_law import MotionLaw, SpeedNodes
 
 if TYPE_CHECKING:
-    from pentapod.timing.jerk.jerk_limited import SmoothProfile
+    from pentapod.timing.jerk.jerk_limited import JerkProfile
 
 
 @dataclass(frozen=True)
@@ -32,16 +32,16 @@ DEFAULTS = SlowdownOptions()
 
 
 def slowed_locally(
-    profile: PieceProfile, smooth: SmoothProfile, machine: Machine, options: SlowdownOptions = DEFAULTS
+    profile: PieceProfile, found: JerkProfile, machine: Machine, options: SlowdownOptions = DEFAULTS
 ) -> SpeedNodes:
     """Return the law of a piece whose setpoints keep the limits at any phase; given end speeds stay.
 
     Places that exceed limits are run slower, round after round. Running the whole slower is taken where it costs less.
     """
-    nodes, period = smooth.nodes, machine.controller.period
-    if not smooth.exceeds:
-        return nodes
-    law = first = nodes.law()
+    nodes = given = found.nodes
+    if not found.exceeds:
+        return given
+    law = first = given.law()
     between: Floats | None = None
     uniform = 1.0
     for _ in range(options.rounds):
@@ -49,12 +49,11 @@ def slowed_locally(
         if not len(at):
             break
         uniform = uniform if uniform > 1.0 else float(shares.slowing.max())
-        nodes, changed = slowed_at(nodes, law, profile, at, shares, period, options)
+        nodes, changed = slowed_at(nodes, law, profile, at, shares, machine.controller.period, options)
         law = nodes.law()
         between = law_times(law, changed)
     if not profile.moving and law.duration > first.duration * uniform * (1.0 + options.extra):
         slower = 1.0 / (uniform * (1.0 + options.extra)) ** 2
-        given = smooth.nodes
         return SpeedNodes(given.s, given.x * slower, given.slope * slower)
     return nodes
 

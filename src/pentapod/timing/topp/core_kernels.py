@@ -5,7 +5,7 @@ In every stage x = ṡ² is linear in s with slope 2u, and each row holds at bot
 concave, so the largest x with an interval is the right root of a convex, piecewise linear function, which
 Newton's method finds from the right in a few steps. (Pham and Pham 2018, solved without linear programs.)
 
-All thresholds are relative: the kernels work in any units. a, b (n, rows); c (n, rows) where `moves` is 1,
+All thresholds are relative: the kernels work in any units. a, b (n, rows); c (n, rows) where `varies` is 1,
 (1, rows) where it is 0.
 """
 
@@ -27,46 +27,55 @@ NEWTON_STEPS = 100
 
 
 @kernel
-def _fits(a: Floats, b: Floats, c: Floats, moves: int, i: int, u: float, here: float, there: float) -> bool:
+def _fits(a: Floats, b: Floats, c: Floats, varies: int, i: int, u: float, here: float, there: float) -> bool:
     """Return whether the rows of stage i allow u from x = here to x = there."""
     fits = True
     for j in range(a.shape[1]):
-        fits &= abs(a[i, j] * u + b[i, j] * here - c[i * moves, j]) <= 1.0
-        fits &= abs(a[i + 1, j] * u + b[i + 1, j] * there - c[(i + 1) * moves, j]) <= 1.0
+        fits &= abs(a[i, j] * u + b[i, j] * here - c[i * varies, j]) <= 1.0
+        fits &= abs(a[i + 1, j] * u + b[i + 1, j] * there - c[(i + 1) * varies, j]) <= 1.0
     return fits
 
 
 @kernel
-def _reach(a: Floats, b: Floats, c: Floats, moves: int, i: int, twice: float, there: float) -> float:
+def _reach(a: Floats, b: Floats, c: Floats, varies: int, i: int, twice: float, there: float) -> float:
     """Return an upper bound of x at stage i, of the row steepest in x, for 0 ≤ x ≤ there at its end."""
     steepest, reach = 0.0, np.inf
     for j in range(a.shape[1]):
         tilt = abs(b[i, j] - a[i, j] / twice)
         if tilt > steepest:
             steepest = tilt
-            reach = (1.0 + abs(c[i * moves, j]) + abs(a[i, j]) / twice * there) / tilt
+            reach = (1.0 + abs(c[i * varies, j]) + abs(a[i, j]) / twice * there) / tilt
         tilt = abs(a[i + 1, j]) / twice
         if tilt > steepest:
             steepest = tilt
             side = abs(a[i + 1, j] / twice + b[i + 1, j]) * there
-            reach = (1.0 + abs(c[(i + 1) * moves, j]) + side) / tilt
+            reach = (1.0 + abs(c[(i + 1) * varies, j]) + side) / tilt
     return 1.01 * reach
 
 
 @kernel
 def _row(
-    a: Floats, b: Floats, c: Floats, moves: int, i: int, j: int, end: int, twice: float
+    a: Floats, b: Floats, c: Floats, varies: int, i: int, j: int, end: int, twice: float
 ) -> tuple[float, float, float]:
     """Return f ≥ 0, g, c of row j at the start (end 0) or end (1) of stage i: |f u + g x − c| ≤ 1, x at its start."""
     g = b[i + end, j]
     f = a[i + end, j] + end * twice * g
-    shift = c[(i + end) * moves, j]
+    shift = c[(i + end) * varies, j]
     return (-f, -g, -shift) if f < 0.0 else (f, g, shift)
 
 
 @kernel
 def _stage(
-    a: Floats, b: Floats, c: Floats, moves: int, i: int, twice: float, x: float, there: float, rows: Floats, names: Ints
+    a: Floats,
+    b: Floats,
+    c: Floats,
+    varies: int,
+    i: int,
+    twice: float,
+    x: float,
+    there: float,
+    rows: Floats,
+    names: Ints,
 ) -> tuple[int, float]:
     """Write a stage's rows as rows[0] − rows[2] x ≤ u ≤ rows[1] − rows[2] x, from the second on.
 
@@ -77,7 +86,7 @@ def _stage(
     m = 1
     for j in range(a.shape[1]):
         for end in range(2):
-            f, g, shift = _row(a, b, c, moves, i, j, end, twice)
+            f, g, shift = _row(a, b, c, varies, i, j, end, twice)
             if f > least:
                 r = 1.0 / f
                 rows[0, m], rows[1, m], rows[2, m], names[m] = (shift - 1.0) * r, (shift + 1.0) * r, g * r, 2 * j + end
@@ -144,7 +153,7 @@ def _left_root(top: float, rows: Floats, m: int) -> tuple[float, int, int]:
 
 @kernel
 def controllable(
-    s: Floats, a: Floats, b: Floats, c: Floats, moves: int, ceiling: Floats, low: Floats, high: Floats, conflict: Ints
+    s: Floats, a: Floats, b: Floats, c: Floats, varies: int, ceiling: Floats, low: Floats, high: Floats, conflict: Ints
 ) -> int:
     """Fill the least and largest controllable x, low and high (n,), backwards from their last entries.
 
@@ -164,16 +173,16 @@ def controllable(
                 return i
             continue
         # Most gridpoints run at their ceiling: the stage to the next one's largest x is then allowed at once.
-        if low[i + 1] == 0.0 and np.isfinite(x) and _fits(a, b, c, moves, i, (there - x) / twice, x, there):
+        if low[i + 1] == 0.0 and np.isfinite(x) and _fits(a, b, c, varies, i, (there - x) / twice, x, there):
             low[i], high[i] = 0.0, x
             continue
         if not x <= 1e3 * there:  # far above what can be reached, Newton would lose digits
-            x = min(x, _reach(a, b, c, moves, i, twice, there))
+            x = min(x, _reach(a, b, c, varies, i, twice, there))
             if not np.isfinite(x):
                 conflict[:] = -2
                 return i
         rows[0, 0], rows[1, 0], rows[2, 0] = low[i + 1] / twice, there / twice, 1.0 / twice
-        m, x = _stage(a, b, c, moves, i, twice, x, there, rows, names)
+        m, x = _stage(a, b, c, varies, i, twice, x, there, rows, names)
         x, below, above = _right_root(x, rows, m)
         least = 0.0
         if x >= 0.0 and low[i + 1] > 0.0:
@@ -187,7 +196,7 @@ def controllable(
 
 @kernel
 def fastest_forward(
-    s: Floats, a: Floats, b: Floats, c: Floats, moves: int, low: Floats, high: Floats, x: Floats
+    s: Floats, a: Floats, b: Floats, c: Floats, varies: int, low: Floats, high: Floats, x: Floats
 ) -> None:
     """Fill the largest reachable x (n,) forwards from its first entry, within the controllable speeds."""
     for i in range(len(s) - 1):
@@ -197,13 +206,13 @@ def fastest_forward(
         if twice == 0.0:
             x[i + 1] = min(here, top)
             continue
-        if _fits(a, b, c, moves, i, u, here, top):
+        if _fits(a, b, c, varies, i, u, here, top):
             x[i + 1] = top
             continue
         least = NEGLIGIBLE_TERM * twice / max(here, top, 1e-300)
         for j in range(a.shape[1]):
             for end in range(2):
-                f, g, shift = _row(a, b, c, moves, i, j, end, twice)
+                f, g, shift = _row(a, b, c, varies, i, j, end, twice)
                 if f > least:
                     u = min(u, (shift + 1.0 - g * here) / f)
         x[i + 1] = min(max(here + twice * u, low[i + 1]), top)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.timing.jerk.jerk_limited import JerkProblem, SmoothProfile, jerk_limited
+from pentapod.timing.jerk.jerk_limited import JerkProblem, JerkProfile, jerk_limited
 from pentapod.timing.jerk.options import JerkOptions
 from pentapod.timing.jerk.rows import JerkRows, MeasureExcess
 from pentapod.timing.limits.limit import AccelerationRows
@@ -15,7 +15,7 @@ from pentapod.timing.pieces.piece import PieceProfile
 from pentapod.timing.topp.stages import Failure
 
 
-def smooth_profile(profile: PieceProfile, measure: MeasureExcess, options: JerkOptions) -> SmoothProfile | Failure:
+def jerk_limited_profile(profile: PieceProfile, measure: MeasureExcess, options: JerkOptions) -> JerkProfile | Failure:
     """Return the fastest profile below a piece's that keeps the jerk limits too; measure: of its setpoints."""
     limits = profile.limits
     caps = limits.caps(profile.derivatives, profile.full_ceiling, moving=profile.moving)
