@@ -27,8 +27,10 @@ from pentapod.kinematics.forces import (
     leg_force_map,
     leg_load_map,
     leg_moment_map,
+    tip_compliance,
     tip_force_amplification,
     tip_moment_amplification,
+    tip_stiffness,
 )
 from pentapod.kinematics.forward.singularity_polynomial import singularity_cofactors, singularity_polynomial
 from pentapod.kinematics.jacobian import pose_jacobian, square_jacobian
@@ -40,7 +42,6 @@ from pentapod.kinematics.proofs.motion import MotionProof, certify_motion
 from pentapod.kinematics.proofs.pose_enclosure import pose_enclosure
 from pentapod.kinematics.proofs.tip_tube import TipTube, prove_tip_tube
 from pentapod.kinematics.robot import Branch, Robot, SingularSurface
-from pentapod.kinematics.stiffness import tip_compliance, tip_stiffness
 
 __all__ = [
     "COMPONENTS",

@@ -19,8 +19,11 @@ from pentapod.numerics.kernels import kernels_pay
 SAVED_BY_KERNELS = 30e-9
 """Seconds a pose that compiled kernels save, forwards and backwards."""
 
-_LARGEST = 1e9
-"""Metres, or the slope δ: what is computed from larger numbers could overflow."""
+LARGEST_NUMBER = 1e9
+"""Of a geometry, in metres or for the slope δ: what is computed from larger numbers could overflow."""
+
+SINGULAR_CONDITION = 1e-12
+"""Reciprocal condition number of a geometry below which forward kinematics has no correct digits."""
 
 
 class FiveLegs:
@@ -147,6 +150,6 @@ def given(value: ArrayLike, key: str, shape: tuple[int, ...]) -> Floats:
     if array.shape != shape:
         raise MachineError(f"{key} has shape {array.shape}", key=key, expected=f"shape {shape}")
     largest = float(np.abs(array).max())
-    if largest > _LARGEST:
-        raise MachineError("too large for a machine", key=key, value=largest, expected=f"at most {_LARGEST:g}")
+    if largest > LARGEST_NUMBER:
+        raise MachineError("too large for a machine", key=key, value=largest, expected=f"at most {LARGEST_NUMBER:g}")
     return array

@@ -6,7 +6,7 @@ from leg_motions import segments
 from scipy.interpolate import BPoly
 
 from pentapod.kinematics import LinearPentapod, certify_component
-from pentapod.kinematics.proofs.discriminants import Discriminants
+from pentapod.kinematics.proofs.certificate import Discriminants
 
 T = np.linspace(0.0, 1.0, 7)
 

@@ -9,7 +9,7 @@ from scipy.optimize import fsolve
 from test_motion import BASE, DELTA, grazing_intervals, linear, smooth_motion, struts, tangent_jacobian
 
 from pentapod.kinematics import AsBuiltPentapod, LinearPentapod, certify_motion
-from pentapod.kinematics.tubes.jacobian_sign import determinant_sign
+from pentapod.kinematics.tubes.tube import determinant_sign
 
 
 def test_signs_of_determinants_over_the_rationals() -> None:

@@ -1,10 +1,9 @@
-"""Forward kinematics of machines as built: the nominal closed form, carried over to the real geometry, with a proof.
+"""Forward kinematics of machines as built: continuation of the nominal closed form to the real geometry, with a proof.
 
 Let the geometry change linearly from the nominal one (s = 0) to the real one (s = 1) while the leg readings stay. The
-*intended* pose of the real machine is where the nominal pose of the chosen component goes along the way: the end of
-the continuous curve of solutions that starts there and meets no singularity. It is unique where it exists, and
-has nothing to do with any solver. `as_built_pose` finds it by Newton's method and proves it with tubes
-(`continuation`).
+*intended* pose of the real machine is the end of the continuous curve of solutions that starts at the nominal pose of
+the chosen component and meets no singularity. It is unique where it exists, and does not depend on any solver.
+`as_built_pose` finds it by Newton's method and proves it with tubes (`continuation`).
 """
 
 from __future__ import annotations
@@ -20,15 +19,14 @@ from pentapod.base.values import Value
 from pentapod.kinematics.batches import broadcast
 from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
-from pentapod.kinematics.tubes.continuation import Pose, carry
-from pentapod.kinematics.tubes.jacobian_sign import determinant_sign
+from pentapod.kinematics.tubes.continuation import ContinuationOptions, Pose, continue_poses
 from pentapod.kinematics.tubes.leg_equations import BuiltLegs, Legs, length_scale
-from pentapod.kinematics.tubes.tube import LegFamily, Tube
+from pentapod.kinematics.tubes.tube import LegFamily, Tube, determinant_sign
 from pentapod.numerics.balls import Ball
 from pentapod.numerics.blocks import blocks
 
-_SIDE = 1  # of det ∂G/∂(p, i) where a general pentapod's order is +1
-_SHORTEST = 2.0**-16  # of the way from the nominal geometry: where shorter steps are needed, there is no proof
+STEPS = ContinuationOptions(shortest=2.0**-16)
+"""Of the way from the nominal geometry to the real one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +72,9 @@ def as_built_pose(
     proven = np.zeros(len(readings), dtype=bool)
     with np.errstate(all="ignore"):
         for block in blocks(len(readings), 2048):
-            way = _Way(machine, nominal, readings[block].T)
+            way = _GeometryHomotopy(machine, nominal, readings[block].T)
             start = (position[block].T, direction[block].T)
-            found = carry(way, start, way.scale, admit=way.in_component, shortest=_SHORTEST)
+            found = continue_poses(way, start, way.scale, admit=way.in_component, options=STEPS)
             errors = [found.error * way.scale, found.error]
             out[block], proven[block] = np.concatenate([found.position, found.direction, errors]).T, found.proven
     values = out.reshape(*batch, 8)
@@ -89,8 +87,8 @@ def as_built_pose(
     )
 
 
-class _Way:
-    """The straight way from a nominal geometry to one as built, for leg readings (5, N)."""
+class _GeometryHomotopy:
+    """The linear change of a nominal geometry into one as built, for leg readings (5, N)."""
 
     def __init__(self, machine: BuiltLegs, nominal: LinearPentapod | GeneralPentapod, readings: Floats) -> None:
         self.nominal, self.readings = nominal, readings
@@ -140,7 +138,7 @@ class _Way:
         same_image = np.abs(w.mid) > w.rad
         if isinstance(self.nominal, GeneralPentapod):
             computed = np.sign(self.nominal.order_value(nominal_pose[0].T, nominal_pose[1].T))
-            return same_image & (determinant_sign(tube.inverse) == _SIDE * computed)
+            return same_image & (determinant_sign(tube.inverse) == computed)  # det ∂G/∂(p, i) > 0 where the order is +1
         delta, x3 = self.nominal.delta, float(self.nominal.base[2, 0])
         lever = Ball.exact(self.nominal.offsets[2]) - Ball.exact(delta) * x3
         s = w * x * delta + (1.0 - delta * u) * z + lever * w

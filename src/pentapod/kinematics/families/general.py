@@ -14,20 +14,33 @@ from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
 from pentapod.kinematics.arithmetic import Arithmetic, Vector
 from pentapod.kinematics.batches import as_poses, broadcast, joined_poses
-from pentapod.kinematics.five_legs import FiveLegs, given
+from pentapod.kinematics.five_legs import SINGULAR_CONDITION, FiveLegs, given
 from pentapod.kinematics.forward.line_equations import LineEquations, line_condition
 from pentapod.kinematics.forward.line_roots import interior, root
-from pentapod.kinematics.forward.newton_refinement import polish
 from pentapod.kinematics.forward.singularity_polynomial import polynomial_terms
 from pentapod.kinematics.forward.solution_line import SolutionLine
+from pentapod.kinematics.jacobian import line_tangents
 from pentapod.kinematics.mode import MODES, Mode, as_labels
 from pentapod.kinematics.proofs.by_leg_equations import ProvenByLegEquations
 from pentapod.kinematics.robot import Branch, SingularSurface
 from pentapod.numerics.blocks import blocks
 
-_LEAST_STEP = 2.0**-40  # of the solution line's size; a double root is uncertain by about 2⁻²⁶ of it
-_DOUBLINGS = 24
-_SINGULAR = 1e-12  # below this reciprocal condition no digits are left
+_EPS = float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True)
+class SideOptions:
+    """How a pose next to a double root is moved to the side of its order.
+
+    least_step: the first step, as a share of the solution line's size; a double root is uncertain by about 2⁻²⁶ of it.
+    doublings: how often the step is doubled at most.
+    """
+
+    least_step: float = 2.0**-40
+    doublings: int = 24
+
+
+SIDE_OPTIONS = SideOptions()
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +67,7 @@ class GeneralPentapod(Value, FiveLegs, ProvenByLegEquations):
         base, offsets = given(self.base, "base", (5, 2)), given(self.offsets, "offsets", (5,))
         set_frozen(self, base=frozen(base, "base"), offsets=frozen(offsets, "offsets"))
         measure = line_condition(base, offsets)
-        if not measure >= _SINGULAR:
+        if not measure >= SINGULAR_CONDITION:
             raise MachineError(
                 "the geometry is architecturally singular: no pose is held by its legs",
                 key="base",
@@ -162,14 +175,14 @@ class GeneralPentapod(Value, FiveLegs, ProvenByLegEquations):
             outside = np.where(single, tau, np.where(sign[known] > 0.0, high, low))
             tau = root(line, outside, tau)
             p, i = self._pose_of(line, tau)
-            p, i = self._sided(line, tau, sign[known], *polish(self, p, i, lengths[known]))
+            p, i = self._on_side_of_order(line, tau, sign[known], *_newton_refinement(self, p, i, lengths[known]))
             below = _below(p[:, 2] + self.offsets[2] * i[:, 2], i[:, 2])[:, None]
             mirrored = self.mirror(p, i)
             position[block.start + known] = np.where(below, mirrored[0], p)
             direction[block.start + known] = np.where(below, mirrored[1], i)
         return position, direction
 
-    def _sided(
+    def _on_side_of_order(
         self, line: SolutionLine, tau: Floats, order: Floats, position: Floats, direction: Floats
     ) -> tuple[Floats, Floats]:
         """Poses (N, 3) with those that rounding has put beyond the singularity moved back to their order's side.
@@ -177,8 +190,8 @@ class GeneralPentapod(Value, FiveLegs, ProvenByLegEquations):
         Next to a double root f is flat: a step along the line that is as long as the root is uncertain changes the leg
         lengths by their rounding only.
         """
-        step = _LEAST_STEP * (np.abs(tau) + np.abs(line.start).max(axis=0))
-        for _ in range(_DOUBLINGS):
+        step = SIDE_OPTIONS.least_step * (np.abs(tau) + np.abs(line.start).max(axis=0))
+        for _ in range(SIDE_OPTIONS.doublings):
             wrong = np.flatnonzero(self.order_value(position, direction) * order <= 0.0)
             if not wrong.size:
                 break
@@ -204,3 +217,39 @@ class GeneralPentapod(Value, FiveLegs, ProvenByLegEquations):
 def _below(pz: Floats, w: Floats) -> Bools:
     """Return whether a pose is the image −1."""
     return (w < 0.0) | ((w == 0.0) & (pz < 0.0))
+
+
+def _newton_refinement(pentapod: FiveLegs, position: Floats, direction: Floats, legs: Floats) -> tuple[Floats, Floats]:
+    """Return poses (N, 3) after a Newton step towards the lengths legs (N, 5); NaN where the given ones are.
+
+    It reduces the error of a closed form to that of the lengths. A step is kept only where it does not increase the
+    largest error of the squared lengths, up to rounding, and keeps the sign of the Jacobian's determinant: it never
+    changes the assembly mode.
+    """
+    vectors, tangents = pentapod.leg_vectors(position, direction), line_tangents(direction)
+    error, matrix = _errors(vectors, legs), _matrix(pentapod, vectors, tangents)
+    with np.errstate(over="ignore", invalid="ignore"):
+        determinant = np.linalg.det(matrix)
+        regular = np.isfinite(determinant) & (np.abs(determinant) > 0.0)
+    safe = np.where(regular[:, None, None], matrix, np.eye(5))
+    step = np.linalg.solve(safe, -0.5 * error[..., None])[..., 0]
+    p = position + step[:, :3]
+    i = direction + (tangents @ step[:, 3:, None])[..., 0]
+    with np.errstate(over="ignore", invalid="ignore"):
+        i = i / np.linalg.norm(i, axis=-1, keepdims=True)
+        vectors = pentapod.leg_vectors(p, i)
+        rounding = 4.0 * _EPS * np.square(legs).max(axis=-1)
+        better = np.abs(_errors(vectors, legs)).max(axis=-1) <= np.maximum(np.abs(error).max(axis=-1), rounding)
+        same_mode = np.linalg.det(_matrix(pentapod, vectors, line_tangents(i))) * determinant > 0.0
+    keep = (regular & better & same_mode)[:, None]
+    return np.where(keep, p, position), np.where(keep, i, direction)
+
+
+def _errors(vectors: Floats, legs: Floats) -> Floats:
+    """Return |b_i − a_i|² − l_i² (N, 5)."""
+    return np.square(vectors).sum(axis=-1) - np.square(legs)
+
+
+def _matrix(pentapod: FiveLegs, vectors: Floats, tangents: Floats) -> Floats:
+    """Return half the derivative (N, 5, 5) of the squared lengths along (p, tangents)."""
+    return np.concatenate([vectors, pentapod.offsets[:, None] * (vectors @ tangents)], axis=-1)

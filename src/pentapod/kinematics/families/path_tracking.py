@@ -1,4 +1,4 @@
-"""Following a general linear pentapod along a path of leg lengths, through poses where w or pz vanishes."""
+"""Path tracking of a general linear pentapod along leg lengths, through poses where w or pz vanishes."""
 
 from __future__ import annotations
 
@@ -12,16 +12,28 @@ from pentapod.base.errors import ArrayError
 from pentapod.base.values import Value
 from pentapod.kinematics.families.general import GeneralPentapod
 
-_NEAR = 0.25 * np.pi  # between two samples (pz/l_3, w) may turn by this; mirror images are π apart
-_HALVINGS = 30
+
+@dataclass(frozen=True)
+class TrackingOptions:
+    """When two neighbouring rows are near enough to tell a pose from its mirror image.
+
+    near: angle by which (pz/l_3, w) may turn between them, radians; mirror images are π apart. halvings: how often an
+    interval is halved at most.
+    """
+
+    near: float = 0.25 * np.pi
+    halvings: int = 30
+
+
+OPTIONS = TrackingOptions()
 
 
 @dataclass(frozen=True, eq=False)
 class FollowedPath(Value):
     """Positions and directions (N, 3) along a path. lost_at: the first row that could not be reached, or None.
 
-    Rows from lost_at on are NaN: before it the legs have no pose, or the motion comes so near a
-    singularity that the mirror images cannot be told apart any more.
+    Rows from lost_at on are NaN: there the legs have no pose, or the motion comes so near a singularity that the
+    mirror images cannot be told apart any more.
     """
 
     position: Floats
@@ -33,8 +45,8 @@ def follow(pentapod: GeneralPentapod, legs: ArrayLike, position: ArrayLike, dire
     """Return the poses along leg lengths (N, 5), metres, that continue the pose (3,), (3,) of the first row.
 
     The legs move linearly between rows. The order of the root is kept, as it is by every motion that meets no
-    singularity; of the two mirror images (pz, w) and (−pz, −w) that one is taken which continues the row before:
-    intervals in which (pz/l_3, w) turns too far to tell are halved until it does not. So w may change its sign, and
+    singularity; of the two mirror images (pz, w) and (−pz, −w) the one that continues the row before is taken:
+    intervals in which (pz/l_3, w) turns too far to decide are halved. So w may change its sign, and
     the `Mode`'s image with it. Raises ArrayError: wrong shapes, a first pose whose legs are not those of the first row.
     """
     rows = as_batch(legs, "legs", (None, 5))
@@ -71,14 +83,14 @@ def _angles(pentapod: GeneralPentapod, rows: Floats, position: Floats, direction
 def _continued(angles: Floats) -> tuple[Bools, Bools]:
     """Return (N − 1,): whether the next angle, not its mirror image, continues this one; and if that is sure."""
     cosine = np.cos(np.diff(angles))
-    return cosine >= 0.0, np.abs(cosine) >= np.cos(_NEAR)
+    return cosine >= 0.0, np.abs(cosine) >= np.cos(OPTIONS.near)
 
 
 def _refined(pentapod: GeneralPentapod, rows: Floats, order: int) -> tuple[Floats, np.ndarray]:
     """Return rows with as many more between them as it takes to be sure of each; and where the given ones are."""
     at = np.arange(len(rows), dtype=np.float64)
     every, stations = rows, at
-    for _ in range(_HALVINGS):
+    for _ in range(OPTIONS.halvings):
         angles = _angles(pentapod, every, *pentapod.pose(every, (order, 1)))
         unsure = np.flatnonzero(~_continued(angles)[1] & np.isfinite(angles[:-1]) & np.isfinite(angles[1:]))
         if not len(unsure):

@@ -16,7 +16,7 @@ from pentapod.kinematics.arithmetic import Arithmetic, Vector
 from pentapod.kinematics.batches import as_poses, broadcast
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.families.offsets import check_offsets, fit_delta
-from pentapod.kinematics.five_legs import SAVED_BY_KERNELS, FiveLegs, given, outputs
+from pentapod.kinematics.five_legs import SAVED_BY_KERNELS, SINGULAR_CONDITION, FiveLegs, given, outputs
 from pentapod.kinematics.forward.quadratic import (
     NEAR_W_SQUARED,
     LinearPart,
@@ -33,8 +33,6 @@ from pentapod.kinematics.proofs.certificate import METHOD, certify_component
 from pentapod.kinematics.robot import Branch, Poses, Robot, SingularSurface
 from pentapod.numerics.blocks import blocks
 from pentapod.numerics.kernels import kernels_pay
-
-_SINGULAR = 1e-12  # below this reciprocal condition the closed form has no digits left
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +87,7 @@ class LinearPentapod(Value, FiveLegs, ProvenByLegEquations):
         offsets = np.where(np.abs(offsets - fitting) <= 2.0**-50 * size, offsets, fitting)
         set_frozen(self, base=frozen(base, "base"), offsets=frozen(offsets, "offsets"), delta=delta)
         measure = reciprocal_condition(base, delta)
-        if not measure >= _SINGULAR:
+        if not measure >= SINGULAR_CONDITION:
             raise MachineError(
                 "the geometry is architecturally singular: no pose is held by its legs",
                 key="base" if delta else "delta",

@@ -14,8 +14,9 @@ from pentapod.kinematics.batches import as_poses, broadcast, common_batch
 from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.five_legs import given
-from pentapod.kinematics.forward.turning import dihedral, frame_of, twist
 from pentapod.kinematics.mode import as_labels
+
+_ARM_ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +76,8 @@ class SixLegPlatform(Value):
         unit: Floats = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
         arms = self.pentapod.offsets[:, None] * r[..., None, :, 2]
         arms = np.concatenate([arms, (r @ self.sixth_joint)[..., None, :]], axis=-2)
-        turning: Floats = np.cross(arms, unit)
-        return np.concatenate([unit, turning], axis=-1)
+        by_turn: Floats = np.cross(arms, unit)
+        return np.concatenate([unit, by_turn], axis=-1)
 
     def twist(self, position: ArrayLike, rotation: ArrayLike) -> Floats:
         """Return (p + z_6 i − a_6) · (i × (b_6 − p − z_6 i)) (...), m²: zero where leg 6 lies in the platform's plane.
@@ -86,7 +87,7 @@ class SixLegPlatform(Value):
         """
         p, r = _pose(position, rotation)
         i, arm = r[..., 2], r[..., :2] @ self.sixth_joint[:2]
-        return twist(p + self.sixth_joint[2] * i - self.sixth_base, i, arm)
+        return _signed_volume(p + self.sixth_joint[2] * i - self.sixth_base, i, arm)
 
     def label(self, position: ArrayLike, rotation: ArrayLike) -> NDArray[np.int8]:
         """Return the signs (..., 3) of each pose's mode: the line's two and the twist's; 0 where singular or NaN."""
@@ -104,8 +105,8 @@ class SixLegPlatform(Value):
         lengths, signs = broadcast(as_batch(legs, "legs", (6,)), signs, ("legs", "label"))
         p, i = self.pentapod.pose(lengths[..., :5], signs[..., :2])
         seen = p + self.sixth_joint[2] * i - self.sixth_base
-        arm = dihedral(seen, i, float(np.hypot(*self.sixth_joint[:2])), lengths[..., 5], signs[..., 2])
-        rotation = frame_of(i, arm, float(np.arctan2(self.sixth_joint[1], self.sixth_joint[0])))
+        arm = _arm(seen, i, float(np.hypot(*self.sixth_joint[:2])), lengths[..., 5], signs[..., 2])
+        rotation = _rotation(i, arm, float(np.arctan2(self.sixth_joint[1], self.sixth_joint[0])))
         return np.where(np.isnan(rotation[..., 0]), np.nan, p), rotation
 
     def assembly_modes(self, legs: ArrayLike) -> tuple[Floats, Floats]:
@@ -129,3 +130,42 @@ def _pose(position: ArrayLike, rotation: ArrayLike) -> tuple[Floats, Floats]:
     p, r = as_batch(position, "position", (3,)), as_batch(rotation, "rotation", (3, 3))
     batch = common_batch(p, r, ("position", "rotation"), tail=2)
     return np.broadcast_to(p, (*batch, 3)), np.broadcast_to(r, (*batch, 3, 3))
+
+
+def _signed_volume(seen: Floats, axis: Floats, arm: Floats) -> Floats:
+    """Return seen · (axis × arm) (...): signed volume, zero where all three are coplanar. Each (..., 3)."""
+    return np.einsum("...k,...k->...", seen, np.cross(axis, arm))
+
+
+def _arm(seen: Floats, axis: Floats, radius: float, length: Floats, side: Floats) -> Floats:
+    """Return the arm (..., 3) of a radius, perpendicular to axis (..., 3): |seen + arm| = length, twist of sign `side`.
+
+    seen (..., 3) leads from the fixed point to the foot of the arm on the line; all in metres. With h = seen · axis,
+    M the distance of the fixed point from the line and λ² = length² − h², the arm, M and λ are a plane
+    triangle: it exists where |M − radius| ≤ λ ≤ M + radius, to within rounding. NaN elsewhere, where side is 0 or
+    NaN, and where M = 0.
+    """
+    height = np.einsum("...k,...k->...", seen, axis)
+    across = seen - height[..., None] * axis
+    distance = np.linalg.norm(across, axis=-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        reach = np.sqrt(np.maximum((length - height) * (length + height), 0.0))
+        # 1 ∓ cos ψ = each of these by 2 M r: the half angle keeps its digits at both ends
+        scale = distance + radius + reach
+        outer = (distance + radius - reach) * scale
+        inner = (reach - np.abs(distance - radius)) * (reach + np.abs(distance - radius))
+        slack = _ARM_ROUNDING * np.square(scale + np.abs(height))
+        exists = (outer >= -slack) & (inner >= -slack) & (np.abs(side) == 1.0) & (distance > 0.0)
+        angle = 2.0 * np.arctan2(np.sqrt(np.maximum(outer, 0.0)), np.sqrt(np.maximum(inner, 0.0)))
+        angle = np.where(exists & (length >= 0.0), -side * angle, np.nan)  # seen · (axis × arm) = −M r sin ψ
+        towards = across / distance[..., None]
+    return radius * (np.cos(angle)[..., None] * towards + np.sin(angle)[..., None] * np.cross(axis, towards))
+
+
+def _rotation(axis: Floats, arm: Floats, azimuth: float) -> Floats:
+    """Return rotations (..., 3, 3) from (0, 0, 1) to axis and (cos azimuth, sin azimuth, 0) to the arm's direction."""
+    radial: Floats = arm / np.linalg.norm(arm, axis=-1, keepdims=True)
+    tangential = np.cross(axis, radial)
+    c, s = float(np.cos(azimuth)), float(np.sin(azimuth))
+    first, second = c * radial - s * tangential, s * radial + c * tangential
+    return np.stack([first, second, axis + 0.0 * arm], axis=-1)

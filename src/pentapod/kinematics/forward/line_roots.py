@@ -1,10 +1,11 @@
-"""The two roots on each solution line: found by bisection on a concave function, then by bracketed Newton.
+"""The two roots on each solution line: bisection on a concave function, then Newton's method with a bracket.
 
-Loops run over iterations, never over poses; what has converged leaves the batch.
+Loops run over iterations, never over poses; lines that have converged leave the batch.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +14,21 @@ from pentapod.base.arrays import Bools, Floats
 from pentapod.kinematics.forward.solution_line import SolutionLine
 
 _EPS = float(np.finfo(np.float64).eps)
-_ROUNDS = 64  # bisection halves an interval to neighbouring floats in fewer
-_CLEARLY = 1e-6  # a margin of −_CLEARLY · l_3 is no work of rounding
+
+
+@dataclass(frozen=True)
+class RootOptions:
+    """How long roots are searched for.
+
+    bisections: at most; fewer halve an interval to neighbouring floats. clearly: a margin below −clearly · l_3 cannot
+    come from rounding.
+    """
+
+    bisections: int = 64
+    clearly: float = 1e-6
+
+
+OPTIONS = RootOptions()
 
 
 class Interior(NamedTuple):
@@ -27,11 +41,11 @@ class Interior(NamedTuple):
 
 
 def interior(line: SolutionLine, *, thorough: bool = False) -> Interior:
-    """Return a point between the two roots of each line (N,); where there is none, the best there is.
+    """Return a point between the two roots of each line (N,); where there is none, the point of largest margin.
 
     Lemmas 1 and 2 of docs/proofs.md.
 
-    thorough: where there clearly is none, go on to the best point instead of stopping when that is known.
+    thorough: search for the largest margin also where there clearly are no roots.
     The margin √(D1 E) − |g| is concave, so its slope tells on which side its maximum lies, and its tangent bounds
     what can still be found. A maximum that is negative by no more than rounding counts as a double root: the leg
     lengths of a singular pose, rounded, are those of no pose as often as of two. Near w = 0 the discs D1 ≥ 0 and E ≥ 0
@@ -62,7 +76,7 @@ def _climb(line: SolutionLine, tau: Floats, low: Floats, high: Floats, *, to_top
     """
     largest = np.full(len(tau), -np.inf)
     top, active = tau.copy(), np.flatnonzero(low < high)
-    for _ in range(_ROUNDS):
+    for _ in range(OPTIONS.bisections):
         part, at = line.take(active), tau[active]
         margin, slope = part.factors(at).margin()
         better = margin > largest[active]
@@ -71,7 +85,7 @@ def _climb(line: SolutionLine, tau: Floats, low: Floats, high: Floats, *, to_top
         if give_up:
             ahead = np.where(slope > 0.0, high[active] - at, low[active] - at)
             with np.errstate(invalid="ignore"):  # an endless slope, and no way ahead
-                running &= ~(margin + slope * ahead < -_CLEARLY * np.sqrt(part.reach_squared))
+                running &= ~(margin + slope * ahead < -OPTIONS.clearly * np.sqrt(part.reach_squared))
         rising = slope > 0.0
         low[active] = np.where(running & rising, at, low[active])
         high[active] = np.where(running & ~rising, at, high[active])
@@ -89,7 +103,7 @@ def root(line: SolutionLine, outside: Floats, inside: Floats) -> Floats:
     x = 0.5 * (outside + inside)
     last = np.abs(outside - inside)
     active = np.flatnonzero(np.isfinite(x) & (last > 0.0))
-    for _ in range(2 * _ROUNDS):
+    for _ in range(2 * OPTIONS.bisections):
         part, at = line.take(active), x[active]
         values = part.factors(at)
         f, slope = values.f()
@@ -102,10 +116,10 @@ def root(line: SolutionLine, outside: Floats, inside: Floats) -> Floats:
         within = (np.minimum(a, b) <= newton) & (newton <= np.maximum(a, b))
         found = np.abs(f) <= _EPS * (values.e + values.d1 * part.reach_squared + np.square(values.g))
         quick = within & (found | (2.0 * np.abs(f) < np.abs(last[active] * slope)))
-        following = np.where(quick, newton, np.where(found, at, 0.5 * (a + b)))
-        last[active] = np.abs(following - at)
-        x[active] = following
-        running = ~found & (last[active] > _EPS * np.abs(following))
+        next_ = np.where(quick, newton, np.where(found, at, 0.5 * (a + b)))
+        last[active] = np.abs(next_ - at)
+        x[active] = next_
+        running = ~found & (last[active] > _EPS * np.abs(next_))
         active = active[running]
         if not active.size:
             break

@@ -1,10 +1,10 @@
-"""A proof in continuous time that a motion of the legs stays in its component (kinematics notes, section 7).
+"""Proof in continuous time that a motion of the legs stays in its component (kinematics notes, section 7).
 
 Between two setpoints the legs are polynomials of degree k in time. So are the squared legs (2k), hence q, py,
 u, v, and both discriminants, w² = 1 − u² − v² (4k) and S² = R²|n|² − c² (8k). Where both are positive on a
 whole interval, the four assembly modes exist throughout and never meet, and none can turn into another.
 Positivity is read off Bernstein coefficients, with subdivision, and holds in spite of rounding:
-see `_roundings`. Lemmas 3, 4 and 6 of docs/proofs.md. The coefficients themselves come from `discriminants`.
+see `_roundings`. Lemmas 3, 4 and 6 of docs/proofs.md. The kernel works in scaled Bernstein form (`numerics.bernstein`).
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from pentapod.base.errors import ArrayError
 from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.component import Component, as_component
+from pentapod.kinematics.forward.quadratic import LinearPart
 from pentapod.kinematics.proof_results import ProofResult
-from pentapod.kinematics.proofs.discriminants import Discriminants
 from pentapod.kinematics.tubes.leg_equations import QuadraticLegs
+from pentapod.numerics.bernstein import binomials
 from pentapod.numerics.blocks import blocks
 from pentapod.numerics.positivity import Positivity, positivity
 
@@ -30,6 +31,35 @@ METHOD = "by Bernstein coefficients of the discriminants of the forward kinemati
 
 _UNIT_ROUNDOFF = 2.0**-53
 _SANE = (1e-40, 1e40)  # metres; within these nothing below can underflow or overflow to harm
+
+
+@dataclass(frozen=True, eq=False)
+class Discriminants:
+    """w² and S² as polynomials in time, of N intervals with legs of degree k; computed, with rounding errors.
+
+    w_squared (N, 4k + 1) and s_squared (N, 8k + 1), metres²: Bernstein coefficients of w² = 1 − u² − v² and
+    S² = R²|n|² − c². largest (5, N): the largest |coefficient| of each leg, metres. tops (6, N): that of py, u, v,
+    R², |n|², c; only where asked for.
+    """
+
+    linear: LinearPart
+    delta: float
+    degree: int
+    w_squared: Floats
+    s_squared: Floats
+    largest: Floats
+    tops: Floats
+
+    @classmethod
+    def of(cls, pentapod: QuadraticLegs, legs: Floats, *, tops: bool) -> Discriminants:
+        """Return them for Bernstein coefficients of the legs (N, 5, k + 1), metres."""
+        from pentapod.kinematics.proofs.discriminants_kernels import discriminants  # noqa: PLC0415
+
+        linear, delta, k, count = pentapod.linear_part, pentapod.delta, legs.shape[-1] - 1, len(legs)
+        d1, d, largest, maxima = (np.empty((n, count)) for n in (4 * k + 1, 8 * k + 1, 5, 6))
+        units = (binomials(k), binomials(2 * k), binomials(4 * k), binomials(8 * k))
+        discriminants(legs, linear.linear_map, linear.constant, delta, units, tops, d1, d, largest, maxima)
+        return cls(linear, delta, k, d1.T, d.T, largest, maxima)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,12 +1,11 @@
-"""A proof in continuous time, for any geometry near a linear pentapod, that a motion of the legs meets no singularity.
+"""Proof in continuous time that a motion of the legs meets no singularity, for any geometry near a linear pentapod.
 
-Between two setpoints the legs are polynomials in time. `certify_motion` carries the pose along (`continuation`): where
-it succeeds, the motion that the legs prescribe exists, is unique and continuous, and keeps clear of every singularity,
-so it stays in its component. Where the poses at the two ends are proven to be on different sides of the singularities
-(`jacobian_sign`), no motion leads from one to the other without meeting one. This needs no closed form: general
-pentapods, base joints off the plane and rings are all the same to it. For the quadratic family
-`certify_component` is faster, and bounds |w| and |S|; here there are no such functions, and what is bounded is how far
-leg errors move the pose.
+Between two setpoints the legs are polynomials in time. `certify_motion` follows the pose by proven continuation: where
+it succeeds, the motion that the legs prescribe exists, is unique and continuous, and meets no singularity, so it stays
+in its component. Where the Jacobian's determinant is proven to have different signs at the two ends, every motion from
+one to the other meets a singularity. No closed form is needed: general pentapods, base joints off the plane and rings
+are all served. For the quadratic family `certify_component` is faster, and bounds |w| and |S|; here the bound is of how
+far leg errors move the pose.
 """
 
 from __future__ import annotations
@@ -21,11 +20,9 @@ from pentapod.base.errors import ArrayError
 from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.proof_results import BranchProof, ProofResult, ProvenMeasure
-from pentapod.kinematics.tubes.continuation import carry
-from pentapod.kinematics.tubes.jacobian_sign import proven_sides
-from pentapod.kinematics.tubes.leg_equations import BuiltLegs, Legs, length_scale, mids
-from pentapod.kinematics.tubes.newton import newton
-from pentapod.kinematics.tubes.tube import LegFamily
+from pentapod.kinematics.tubes.continuation import ContinuationOptions, continue_poses
+from pentapod.kinematics.tubes.leg_equations import BuiltLegs, Legs, length_scale, mids, newton
+from pentapod.kinematics.tubes.tube import LegFamily, proven_jacobian_signs
 from pentapod.numerics.ball_bernstein import blossom, hull, restricted, stack
 from pentapod.numerics.balls import Ball
 from pentapod.numerics.blocks import blocks
@@ -101,12 +98,12 @@ def certify_motion(
         for block in blocks(n, 2048):
             after = slice(block.start + 1, block.stop + 1)
             part = _Motion(machine, np.moveaxis(coefficients[block], 0, -1), leg_error)
-            found = carry(
+            found = continue_poses(
                 part,
                 (nodes_p[:, block], nodes_i[:, block]),
                 scale,
                 end=(nodes_p[:, after], nodes_i[:, after]),
-                shortest=2.0**-depth,
+                options=ContinuationOptions(2.0**-depth),
             )
             out[:2, block] = found.reached, np.minimum(found.reached + found.step, 1.0)
             out[2:, block] = np.where(found.reached > 0.0, found.sensitivity, np.inf)
@@ -115,7 +112,7 @@ def certify_motion(
         for block in blocks(len(doubt), 2048):
             some = doubt[block]
             before, after = (
-                proven_sides((nodes_p[:, k], nodes_i[:, k]), route.legs(legs[:, some]), route.slack, scale)
+                proven_jacobian_signs((nodes_p[:, k], nodes_i[:, k]), route.legs(legs[:, some]), route.slack, scale)
                 for k, legs in ((some, route.coefficients[0]), (some + 1, route.coefficients[-1]))
             )
             refuted[some] = before * after < 0

@@ -1,11 +1,11 @@
-"""How far a platform may stray while its legs keep within given lengths: for proofs over stretches of time.
+"""Enclosure of the poses of a platform while its legs keep within given lengths, by Krawczyk's operator.
 
 With x = (p, i), x̃ a pose, d_j = p̃ + z_j ĩ − a_j and δ = x − x̃, the leg equations are exactly quadratic:
 
     ½(|d_j|² − l_j²) + d_j·(δp + z_j δi) + ½|δp + z_j δi|² = 0,   ½(|ĩ|² − 1) + ĩ·δi + ½|δi|² = 0.
 
 A leg that ends on a ring of radius r around the line adds −r ρ, ρ = |(p − a_j) × i|: its gradient is part of J, and
-what its second derivative can make of δ is bounded with q.
+a bound of its second derivative is added to q (lemma 15).
 
 So δ = (1 − C J) δ − C (g + ½q(δ)) with J the matrix of the linear part and C nearly its inverse. Where that maps the
 ball |δp| ≤ P, |δi| ≤ Q into itself and contracts it, for every choice of lengths there is exactly one pose in the ball,
@@ -25,29 +25,32 @@ from pentapod.base.arrays import Floats, as_batch
 from pentapod.kinematics.jacobian import invert
 from pentapod.kinematics.tubes.leg_equations import BuiltLegs
 
-_ROUNDS = 6
 _U = 2.0**-53
-_UP = 1.0 + 1e-9  # for what rounding takes from sums of positive terms
+ROUND_UP = 1.0 + 1e-9
+"""Factor that exceeds the rounding of sums of positive terms."""
+
+BALL_ITERATIONS = 6
+"""How often the ball is enlarged before it is tested; more make the bounds no closer."""
 
 
 def pose_enclosure(
-    robot: BuiltLegs, position: ArrayLike, direction: ArrayLike, lengths: ArrayLike, offsets: ArrayLike
+    robot: BuiltLegs, position: ArrayLike, direction: ArrayLike, legs: ArrayLike, offsets: ArrayLike
 ) -> tuple[Floats, Floats]:
-    """Return how far (N, K) points of the platform line get from where they are, at most, and how far (N,) i does.
+    """Return bounds of how far points of the platform line (N, K) and i (N,) get from where they are.
 
-    position, direction (N, 3): poses. lengths (N, M, 5): metres; at all times the five readings together are in
-    the convex hull of these M (Bernstein coefficients, say), and so are those of the pose. offsets (K,): of the points
+    position, direction (N, 3): poses. legs (N, M, 5): metres; at all times the five readings together are in the
+    convex hull of these M (Bernstein coefficients, say), and so are those of the pose. offsets (K,): of the points
     along the line, metres. Infinite where nothing is proven: the lengths change too much for this, or the pose is
     close to a singularity.
     """
     p, i = as_batch(position, "position", (None, 3)), as_batch(direction, "direction", (None, 3))
-    legs, along = as_batch(lengths, "lengths", (None, None, 5)), as_batch(offsets, "offsets", (None,))
+    readings, along = as_batch(legs, "legs", (None, None, 5)), as_batch(offsets, "offsets", (None,))
     with np.errstate(all="ignore"):
-        z, legs = robot.offsets, legs - robot.zeros
+        z, lengths = robot.offsets, readings - robot.zeros
         d = p[..., None, :] + z[:, None] * i[..., None, :] - robot.base_joints
         # Where the base is far off, d has lost digits: by so many metres each vector may be wrong (N, 5).
         far = np.linalg.norm(p, axis=1)[:, None] + np.linalg.norm(robot.base_joints, axis=1) + 2.0 * np.abs(z)
-        wrong = 4.0 * _U * far * _UP
+        wrong = 4.0 * _U * far * ROUND_UP
         here = np.linalg.norm(d, axis=2)
         last = np.concatenate([np.zeros_like(i), i], axis=-1)[:, None]
         by_pose, rings = np.concatenate([d, z[:, None] * d], axis=-1), _Rings.of(robot, p, i)
@@ -58,30 +61,30 @@ def pose_enclosure(
         jacobian = np.concatenate([by_pose, last], axis=1)
         c = invert(jacobian, np.nan)
         # ½(l² − |d|²) = |d| e + ½ e², e = l − |d|: the first part of all legs together, the second of each.
-        change = legs - here[:, None]
+        change = lengths - here[:, None]
         linear = here[:, None] * change
         largest = np.concatenate([np.abs(linear).max(axis=1), np.zeros((len(p), 1))], axis=1)
         length = wrong + 8.0 * _U * here  # by how much |d| may be wrong
-        bent = (0.5 * np.square(change).max(axis=1) + length * (here + length) + 16.0 * _U * largest[:, :5]) * _UP
+        bent = (0.5 * np.square(change).max(axis=1) + length * (here + length) + 16.0 * _U * largest[:, :5]) * ROUND_UP
         unit = 0.5 * np.abs(np.einsum("nk,nk->n", i, i)[:, None] - 1.0) + 8.0 * _U
-        rest = np.concatenate([bent, unit * _UP], axis=1)
+        rest = np.concatenate([bent, unit * ROUND_UP], axis=1)
         off = _defect(c, jacobian, wrong, z)
 
         def moved(rows: Floats, size: Floats, residual: Floats) -> Floats:
-            """Return the largest |rows · what is off| (N,), rows (N, 3, 6), with a residual (N, 6) of any sign.
+            """Return the largest |rows · (linear + residual)| (N,), rows (N, 3, 6), for residuals (N, 6) of any sign.
 
             size (N, 3, 6): what the rows are sums of, all counted as positive, for the rounding of these sums.
             """
             straight = np.linalg.norm(linear @ rows[:, :, :5].swapaxes(1, 2), axis=2).max(axis=1)
             lost = (np.linalg.norm(size, axis=1) * (16.0 * _U * (largest + residual))).sum(axis=1)
-            return (straight + (np.linalg.norm(rows, axis=1) * residual).sum(axis=1) + lost) * _UP
+            return (straight + (np.linalg.norm(rows, axis=1) * residual).sum(axis=1) + lost) * ROUND_UP
 
-        def strayed(rows: Floats, by: Floats) -> Floats:
-            """Return how far (N,) `rows` (N, 3, 6) of 1 − C J move p or i, for |δp| and |δi| (N,) in `by`."""
-            sums = rows[:, :, :3].sum(axis=2) * by[0][:, None] + rows[:, :, 3:].sum(axis=2) * by[1][:, None]
-            return np.linalg.norm(sums, axis=1) * _UP
+        def by_defect(rows: Floats, ball: Floats) -> Floats:
+            """Return how far (N,) `rows` (N, 3, 6) of 1 − C J move p or i, for |δp| and |δi| (N,) in `ball`."""
+            sums = rows[:, :, :3].sum(axis=2) * ball[0][:, None] + rows[:, :, 3:].sum(axis=2) * ball[1][:, None]
+            return np.linalg.norm(sums, axis=1) * ROUND_UP
 
-        by_p, by_i = (np.linalg.norm(part, axis=1) * _UP for part in (c[:, :3], c[:, 3:]))
+        by_p, by_i = (np.linalg.norm(part, axis=1) * ROUND_UP for part in (c[:, :3], c[:, 3:]))
         first = moved(c[:, :3], np.abs(c[:, :3]), rest), moved(c[:, 3:], np.abs(c[:, 3:]), rest)
         large, turn = first[0].copy(), first[1].copy()
         lever = np.append(np.abs(z), 1.0)
@@ -94,24 +97,26 @@ def pose_enclosure(
                 bend[:, :5] += rings.bend(large[:, None], turn[:, None])
             return (
                 bend,
-                (by_p * bend).sum(axis=1) + strayed(off[:, :3], ball),
-                (by_i * bend).sum(axis=1) + strayed(off[:, 3:], ball),
+                (by_p * bend).sum(axis=1) + by_defect(off[:, :3], ball),
+                (by_i * bend).sum(axis=1) + by_defect(off[:, 3:], ball),
             )
 
         # q and not q/2: the change of q/2 over the ball is bounded by that too, so the map contracts.
-        for _ in range(_ROUNDS):
+        for _ in range(BALL_ITERATIONS):
             _, more_p, more_i = next_ball()
             large, turn = first[0] * (1.0 + 1e-6) + more_p * 1.05, first[1] * (1.0 + 1e-6) + more_i * 1.05
         bend, more_p, more_i = next_ball()
-        proven = ((first[0] + more_p) * _UP < large) & ((first[1] + more_i) * _UP < turn)
-        rest, ball = (rest + 0.5 * bend) * _UP, np.stack([large, turn])
+        proven = ((first[0] + more_p) * ROUND_UP < large) & ((first[1] + more_i) * ROUND_UP < turn)
+        rest, ball = (rest + 0.5 * bend) * ROUND_UP, np.stack([large, turn])
         points = [
             moved(c[:, :3] + k * c[:, 3:], np.abs(c[:, :3]) + abs(k) * np.abs(c[:, 3:]), rest)
-            + strayed(off[:, :3] + abs(k) * off[:, 3:], ball)
+            + by_defect(off[:, :3] + abs(k) * off[:, 3:], ball)
             for k in along
         ]
-        turned = moved(c[:, 3:], np.abs(c[:, 3:]), rest) + strayed(off[:, 3:], ball)
-        return np.where(proven[:, None], np.stack(points, axis=1) * _UP, np.inf), np.where(proven, turned * _UP, np.inf)
+        turned = moved(c[:, 3:], np.abs(c[:, 3:]), rest) + by_defect(off[:, 3:], ball)
+        return np.where(proven[:, None], np.stack(points, axis=1) * ROUND_UP, np.inf), np.where(
+            proven, turned * ROUND_UP, np.inf
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,4 +160,4 @@ def _defect(c: Floats, jacobian: Floats, wrong: Floats, z: Floats) -> Floats:
     size, computed = np.abs(c), np.abs(np.eye(6) - c @ jacobian)
     slack = wrong[..., None] * np.concatenate([np.ones((5, 3)), np.repeat(np.abs(z)[:, None], 3, axis=1)], axis=1)
     slack = np.concatenate([slack, np.zeros((len(c), 1, 6))], axis=1) + 16.0 * _U * np.abs(jacobian)
-    return (computed + size @ slack + 2.0 * _U) * _UP
+    return (computed + size @ slack + 2.0 * _U) * ROUND_UP

@@ -6,9 +6,8 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.numerics.ball_bernstein import elevate, hull, multiply, restricted, stack
-from pentapod.numerics.balls import Ball
+from pentapod.numerics.balls import ROUND_UP, Ball
 
-_UP = 1.0 + 2.0**-48
 _PARTS = 8
 
 
@@ -20,7 +19,7 @@ def distance_bound(a: Ball, b: Ball, error: Floats) -> Floats:
     """
     n, m = len(a.mid) - 1, len(b.mid) - 1
     apart = elevate(a, max(m - n, 0)) - elevate(b, max(n - m, 0))
-    return (_longest(apart) + _norm(error)) * _UP
+    return (_longest(apart) + _norm(error)) * ROUND_UP
 
 
 def angle_bound(a: Ball, b: Ball, error: Floats) -> Floats:
@@ -34,8 +33,8 @@ def angle_bound(a: Ball, b: Ball, error: Floats) -> Floats:
     shortest = _dot(b, Ball.exact(np.broadcast_to(ahead, (1, *ahead.shape)))).lower.min(axis=0)
     shortest = shortest / (np.linalg.norm(ahead, axis=0) * (1.0 + 2.0**-50))
     longest = _longest(b)
-    sine = (_longest(_cross(a, b)) + off * longest * _UP) * _UP / shortest * _UP
-    acute = (_dot(a, b).lower.min(axis=0) - off * longest * _UP > 0.0) & (shortest > 0.0) & (sine < 1.0)
+    sine = (_longest(_cross(a, b)) + off * longest * ROUND_UP) * ROUND_UP / shortest * ROUND_UP
+    acute = (_dot(a, b).lower.min(axis=0) - off * longest * ROUND_UP > 0.0) & (shortest > 0.0) & (sine < 1.0)
     return np.where(acute, np.arcsin(np.where(acute, sine, 0.0)) * (1.0 + 2.0**-40), np.pi)
 
 
@@ -52,7 +51,7 @@ def _longest(a: Ball) -> Floats:
 
 def _norm(vectors: Floats) -> Floats:
     """Return norms (...) of vectors (3, ...), rounded up."""
-    return np.sqrt((vectors**2).sum(axis=0)) * _UP
+    return np.sqrt((vectors**2).sum(axis=0)) * ROUND_UP
 
 
 def _dot(a: Ball, b: Ball) -> Ball:

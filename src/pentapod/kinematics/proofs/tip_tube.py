@@ -30,10 +30,8 @@ from pentapod.kinematics.jacobian import invert
 from pentapod.kinematics.proofs.tip_deviation import angle_bound, distance_bound
 from pentapod.kinematics.tubes.leg_equations import PosedQuadraticLegs
 from pentapod.numerics.ball_bernstein import blossom, elevate, hull, multiply, restricted
-from pentapod.numerics.balls import Ball
+from pentapod.numerics.balls import ROUND_UP, Ball
 from pentapod.numerics.blocks import blocks
-
-_UP = 1.0 + 2.0**-48
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +62,7 @@ class TipTube(Value):
         """
         wanted = self._coefficients(path, "path")
         tip = Ball.exact(self.position) + Ball.exact(self.direction) * about
-        error = (self.position_error + abs(about) * self.direction_error) * _UP
+        error = (self.position_error + abs(about) * self.direction_error) * ROUND_UP
         return self._worst(distance_bound(tip, wanted, error), np.inf)
 
     def axis_deviation(self, axes: ArrayLike) -> Floats:
@@ -163,19 +161,19 @@ def _prove(
     y = (inverse @ columns).magnitude.max(axis=-1)  # (N, 6)
     if leg_error > 0.0:
         longest = np.maximum(np.abs(legs.lower), np.abs(legs.upper)).max(axis=0)
-        loose = (longest + leg_error) * leg_error * _UP  # ½ (l + e)² − ½ l², and more
-        y = (y + np.einsum("nrl,ln->nr", np.abs(inverse[:, :, :5]), loose) * _UP) * _UP
+        loose = (longest + leg_error) * leg_error * ROUND_UP  # ½ (l + e)² − ½ l², and more
+        y = (y + np.einsum("nrl,ln->nr", np.abs(inverse[:, :, :5]), loose) * ROUND_UP) * ROUND_UP
 
     scale = np.repeat([float(np.abs(pentapod.base_joints - pentapod.base_joints[2]).max()), 1.0], 3)
     largest = (y / scale).max(axis=1, keepdims=True) + 2.0**-50
-    radius = (y + 0.5 * largest * scale) * _UP
+    radius = (y + 0.5 * largest * scale) * ROUND_UP
     p_hull, i_hull = hull(Ball.exact(p)).widened(radius[:, :3].T), hull(Ball.exact(i)).widened(radius[:, 3:].T)
     rows = p_hull + i_hull * offsets - attachments
-    rough = hull(joints).widened((radius[:, :3].T + np.abs(offsets) * radius[:, 3:].T) * _UP)
+    rough = hull(joints).widened((radius[:, :3].T + np.abs(offsets) * radius[:, 3:].T) * ROUND_UP)
     narrow = rough.rad < rows.rad  # both enclose the same; their own curves are narrower where p and i move together
     rows = Ball(np.where(narrow, rough.mid, rows.mid), np.where(narrow, rough.rad, rows.rad))
     z = (np.eye(6) - inverse @ _ball_jacobian(rows, i_hull, pentapod.offsets)).magnitude
-    error = (y + np.einsum("nij,nj->ni", z, radius) * _UP) * _UP
+    error = (y + np.einsum("nij,nj->ni", z, radius) * ROUND_UP) * ROUND_UP
     w, s = i_hull[2], _s(pentapod, p_hull, i_hull)
     sided = ((w * signs[0]).lower > 0.0) & ((s * signs[1]).lower > 0.0)
     return (p, i, error[:, :3].T, error[:, 3:].T), (error < radius).all(axis=1) & sided

@@ -1,7 +1,4 @@
-"""Poses carried along while the legs change, with a proof: tube after tube, each step as long as its proof allows.
-
-Lemma 10 of docs/proofs.md.
-"""
+"""Numerical continuation of poses while the legs change, proven step by step by tubes (lemma 10 of docs/proofs.md)."""
 
 from __future__ import annotations
 
@@ -12,19 +9,28 @@ from typing import Protocol, TypeAlias
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
-from pentapod.kinematics.tubes.leg_equations import Legs, mids
-from pentapod.kinematics.tubes.newton import newton
+from pentapod.kinematics.tubes.leg_equations import Legs, mids, newton
 from pentapod.kinematics.tubes.tube import LegFamily, Tube, error_bound, prove_tube, sensitivity
 from pentapod.numerics.balls import Ball
 
 Pose: TypeAlias = tuple[Floats, Floats]
 """Positions and directions, (3, N) each."""
 
-ATTEMPTS = 150
-_EASY = 0.4  # a contraction below which the next step may be twice as long
+
+@dataclass(frozen=True)
+class ContinuationOptions:
+    """Step control.
+
+    shortest: share of the whole way below which a step is given up. attempts: of all steps together, at most. easy: the
+    contraction of a tube below which the next step is twice as long.
+    """
+
+    shortest: float
+    attempts: int = 150
+    easy: float = 0.4
 
 
-class Route(Protocol):
+class LegHomotopy(Protocol):
     """How the legs of each element of a batch change with s in [0, 1]; all s and h are short binary fractions."""
 
     def at(self, which: Ints, s: Floats) -> Legs[Ball]:
@@ -37,8 +43,8 @@ class Route(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Carried:
-    """How far N poses were carried.
+class Continuation:
+    """How far N poses were continued.
 
     position, direction (3, N): at s = 1 where proven, else what Newton's method alone found there; NaN for nothing.
     error (N,): how far at most the exact pose at s = 1 is, in the norm of `tube`; NaN where not proven.
@@ -55,25 +61,24 @@ class Carried:
 
     @property
     def proven(self) -> Bools:
-        """Where the pose was carried all the way (N,)."""
+        """Where the pose was continued to s = 1 (N,)."""
         return np.asarray(self.reached == 1.0)
 
 
-def carry(
-    route: Route,
+def continue_poses(
+    route: LegHomotopy,
     start: Pose,
     scale: float,
     *,
     end: Pose | None = None,
     admit: Callable[[Pose, Tube], Bools] | None = None,
-    shortest: float,
-) -> Carried:
-    """Carry poses from s = 0 to s = 1 of their routes.
+    options: ContinuationOptions,
+) -> Continuation:
+    """Continue poses from s = 0 to s = 1 of their routes.
 
-    start: approximate solutions; the exact ones that are carried are those in the first tube around them. end: the
-    approximate solutions at s = 1 that the last tubes shall lead to, by default what Newton's method leads to. admit:
-    asks of the poses at the start and their tubes more than that they are tubes. A step that is not proven is halved,
-    after an easy one the next is doubled; what is `shortest` or needs too many attempts is given up.
+    start: approximate solutions; continued are the exact ones in the first tube around them. end: the approximate
+    solutions at s = 1 to which the last tubes lead, by default those of Newton's method. admit: a further condition on
+    the poses at the start and their tubes. A step that is not proven is halved, after an easy one the next is doubled.
     """
     n = start[0].shape[-1]
     out, sure = np.full((7, n), np.nan), np.zeros((4, n))
@@ -81,7 +86,7 @@ def carry(
     here, s, h = (start[0][:, left], start[1][:, left]), np.zeros(len(left)), np.ones(len(left))
     speed = (np.zeros_like(here[0]), np.zeros_like(here[1]))
     sure[1] = 1.0
-    for attempt in range(ATTEMPTS):
+    for attempt in range(options.attempts):
         if not left.size:
             break
         to, legs = s + h, route.at(left, s + h)
@@ -111,11 +116,11 @@ def carry(
         sure[:2, left] = s, np.where(done, 0.0, h)
         worst = sure[2:, left]
         sure[2:, left] = np.where(good, np.maximum(worst, sensitivity(tube, family, scale)), worst)
-        h = np.minimum(h * np.where(~good, 0.5, np.where(tube.contraction < _EASY, 2.0, 1.0)), 1.0 - s)
-        keep = ~done & (h >= shortest)
+        h = np.minimum(h * np.where(~good, 0.5, np.where(tube.contraction < options.easy, 2.0, 1.0)), 1.0 - s)
+        keep = ~done & (h >= options.shortest)
         left, s, h = left[keep], s[keep], h[keep]
         here, speed = (here[0][:, keep], here[1][:, keep]), (speed[0][:, keep], speed[1][:, keep])
-    return Carried(out[:3], out[3:6], out[6], sure[0], sure[1], sure[2:])
+    return Continuation(out[:3], out[3:6], out[6], sure[0], sure[1], sure[2:])
 
 
 def _next(here: Pose, speed: Pose, h: Floats, legs: Legs[Ball], scale: float) -> tuple[Pose, Bools]:

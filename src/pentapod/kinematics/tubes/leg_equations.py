@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from pentapod.base.arrays import Bools, Floats
 from pentapod.kinematics.forward.quadratic import LinearPart
+from pentapod.kinematics.jacobian import invert
 from pentapod.numerics.balls import Ball
 
 Q = TypeVar("Q", Floats, Ball)
@@ -187,3 +188,54 @@ def ball_jacobian(found: Rows[Ball], direction: Ball, scale: float) -> Ball:
         Rows(found.by_position.rad, found.by_direction.rad, found.e.rad, found.rho.rad), direction.rad, scale
     )
     return Ball(mid, rad)
+
+
+@dataclass(frozen=True)
+class NewtonOptions:
+    """When Newton's method ends.
+
+    iterations: at most. settled: size of a step, in radians and in the length that counts as much, below which one last
+    step follows; the error that is left after it is rounding.
+    """
+
+    iterations: int = 12
+    settled: float = 1e-9
+
+
+def newton(
+    position: Floats, direction: Floats, legs: Legs[Floats], scale: float, options: NewtonOptions = NewtonOptions()
+) -> tuple[Floats, Floats, Bools]:
+    """Return poses (3, N) near the given ones that satisfy the leg equations, and where Newton's method converged (N,).
+
+    scale: metres that count as much as a radian, a power of two. A pose that is NaN or meets a singular Jacobian does
+    not converge; it comes back as NaN or as the last iterate.
+    """
+    p, i = position.copy(), direction.copy()
+    settled = np.zeros(p.shape[-1], dtype=bool)
+    open_ = np.flatnonzero(np.isfinite(p.sum(axis=0) + i.sum(axis=0)))
+    last = np.zeros(p.shape[-1], dtype=bool)
+    for _ in range(options.iterations):
+        if not open_.size:
+            break
+        x, d, some = p[:, open_], i[:, open_], _taken(legs, open_)
+        jacobian = float_jacobian(rows(x, d, some), d, scale)
+        values = np.empty((len(open_), 6))
+        values[:, :5] = residuals(x, d, some).T
+        values[:, 5] = 0.5 * (np.einsum("cn,cn->n", d, d) - 1.0)
+        step = np.einsum("nij,nj->ni", invert(jacobian, np.nan), values)
+        p[:, open_] -= scale * step[:, :3].T
+        i[:, open_] -= step[:, 3:].T
+        size = np.abs(step).max(axis=-1)
+        settled[open_[last[open_]]] = True
+        last[open_] = size < options.settled
+        open_ = open_[~settled[open_] & np.isfinite(size)]
+    return p, i, settled & np.isfinite(p.sum(axis=0) + i.sum(axis=0))
+
+
+def _taken(legs: Legs[Floats], which: np.ndarray) -> Legs[Floats]:
+    """Return the geometry of some of the batch; quantities that are the same for all stay so."""
+
+    def take(a: Floats) -> Floats:
+        return a if a.shape[-1] == 1 else a[..., which]
+
+    return Legs(take(legs.base), take(legs.offsets), take(legs.radii), take(legs.lengths), legs.rings)

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats
+from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.kinematics.jacobian import invert
 from pentapod.kinematics.tubes.leg_equations import (
     Legs,
@@ -38,9 +38,7 @@ from pentapod.kinematics.tubes.leg_equations import (
     residuals,
     rows,
 )
-from pentapod.numerics.balls import Ball
-
-_UP = 1.0 + 2.0**-48
+from pentapod.numerics.balls import ROUND_UP, Ball
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,22 +84,22 @@ def prove_tube(
     ends = residuals(p_mid, i_mid, family.middle)
     off = _largest(inverse @ _column(ends, (dot(i_mid, i_mid) - 1.0) * 0.5))
     length = family.hull.lengths.magnitude
-    loose = (length + family.slack) * family.slack * _UP  # ½ (l + slack)² − ½ l², and more
-    off = (off + (np.abs(inverse[:, :, :5]) @ loose.T[..., None])[..., 0].max(axis=-1) * _UP) * _UP
+    loose = (length + family.slack) * family.slack * ROUND_UP  # ½ (l + slack)² − ½ l², and more
+    off = (off + (np.abs(inverse[:, :, :5]) @ loose.T[..., None])[..., 0].max(axis=-1) * ROUND_UP) * ROUND_UP
 
     reach = np.maximum(dp.magnitude.max(axis=0) / scale, di.magnitude.max(axis=0))
     radius = 0.5 * reach + 2.0 * off + 2.0**-48
     proven = np.zeros(len(radius), dtype=bool)
     kept, contraction = radius, radius
     for _ in range(tries):
-        p, i = p_hull.widened(radius * scale * _UP), i_hull.widened(radius)
+        p, i = p_hull.widened(radius * scale * ROUND_UP), i_hull.widened(radius)
         found = rows(p, i, family.hull)
         along = _change(found, dp, di, i, family)
         drift = _largest(inverse @ _column(along, dot(i, di)))
-        y = (off + 0.5 * drift) * _UP
+        y = (off + 0.5 * drift) * ROUND_UP
         product = inverse @ ball_jacobian(found, i, scale)
-        z = ((np.eye(6) - product).magnitude.sum(axis=-1) * _UP).max(axis=-1)
-        good = ((y + z * radius) * _UP < radius) & (z < 1.0)
+        z = ((np.eye(6) - product).magnitude.sum(axis=-1) * ROUND_UP).max(axis=-1)
+        good = ((y + z * radius) * ROUND_UP < radius) & (z < 1.0)
         kept, contraction = np.where(good & ~proven, radius, kept), np.where(good & ~proven, z, contraction)
         proven |= good
         if proven.all():
@@ -119,7 +117,7 @@ def error_bound(tube: Tube, pose: tuple[Floats, Floats], legs: Legs[Ball]) -> Fl
     p, i = Ball.exact(pose[0]), Ball.exact(pose[1])
     off = _largest(tube.inverse @ _column(residuals(p, i, legs), (dot(i, i) - 1.0) * 0.5))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(tube.proven, off / (1.0 - tube.contraction) * _UP, np.nan)
+        return np.where(tube.proven, off / (1.0 - tube.contraction) * ROUND_UP, np.nan)
 
 
 def sensitivity(tube: Tube, family: LegFamily, scale: float) -> Floats:
@@ -128,12 +126,45 @@ def sensitivity(tube: Tube, family: LegFamily, scale: float) -> Floats:
     Metres, and no unit, for each metre of the leg that changes most. With ∂G_k/∂l_k = −l_k and E = 1 − C ∂G/∂x,
     ‖E‖ ≤ Z, the pose changes by (1 − E)⁻¹ C l = C l + E (1 − E)⁻¹ C l. Infinite where the tube is not proven.
     """
-    lengths = (family.hull.lengths.magnitude + family.slack) * _UP
+    lengths = (family.hull.lengths.magnitude + family.slack) * ROUND_UP
     moves = (np.abs(tube.inverse[:, :, :5]) @ lengths.T[..., None])[..., 0].T  # (6, N)
     with np.errstate(divide="ignore", invalid="ignore"):
         rest = tube.contraction / (1.0 - tube.contraction) * moves.max(axis=0)
-    both = np.stack([scale * (moves[:3].max(axis=0) + rest), moves[3:].max(axis=0) + rest]) * _UP
+    both = np.stack([scale * (moves[:3].max(axis=0) + rest), moves[3:].max(axis=0) + rest]) * ROUND_UP
     return np.where(tube.proven, both, np.inf)
+
+
+def proven_jacobian_signs(pose: tuple[Floats, Floats], legs: Legs[Ball], slack: Floats, scale: float) -> Ints:
+    """Return the sign (N,) of det ∂G/∂(p, i) at the exact poses next to the given ones; 0 where it is not proven.
+
+    Lemma 11 of docs/proofs.md: it tells on which side of the singularities a pose is.
+
+    pose: positions and directions (3, N). slack: metres by which each leg (5, 1) may differ from `legs`: the sign is
+    that of every pose which such legs have there. In a tube of no length ‖1 − C ∂G/∂x‖ < 1, so det C has the sign.
+    """
+    still = Ball.exact(np.zeros((1, 1)))
+    slope = Legs(still[None] * np.zeros((3, 1, 1)), still, still, still, legs.rings)
+    tube = prove_tube(pose, pose, LegFamily(legs, legs, slope, slack), scale)
+    return np.where(tube.proven, determinant_sign(tube.inverse), 0)
+
+
+def determinant_sign(matrices: Floats) -> Ints:
+    """Return the signs (N,) of the determinants of matrices (N, n, n), n ≤ 12, whose entries are exact; 0 if in doubt.
+
+    Gauss's elimination in ball arithmetic: the sign is proven where no pivot's ball contains zero.
+    """
+    left, sign, at = Ball.exact(matrices), np.ones(len(matrices), dtype=np.intp), np.arange(len(matrices))
+    for size in range(matrices.shape[-1], 0, -1):
+        row = np.argmax(np.abs(left.mid[:, :, 0]), axis=1)
+        pivots = left[at, row]
+        first = pivots[:, 0]
+        clear = np.abs(first.mid) > first.rad
+        sign = sign * np.where(clear, np.sign(np.where(clear, first.mid, 0.0)), 0.0).astype(np.intp)
+        sign = np.where(row % 2 == 1, -sign, sign)  # the pivot's row goes on top, the others keep their order
+        others = np.argsort(np.arange(size) == row[:, None], axis=1, kind="stable")[:, : size - 1]
+        rest = left[at[:, None], others]
+        left = rest[:, :, 1:] - (rest[:, :, :1] / first[:, None, None]) * pivots[:, None, 1:]
+    return sign
 
 
 def _change(found: Rows[Ball], dp: Ball, di: Ball, i: Ball, family: LegFamily) -> Ball:

@@ -16,14 +16,13 @@ import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.numerics.banded import banded_product
 from pentapod.numerics.convex.interior_point import ConvexProgram, InteriorPointOptions
 
 if TYPE_CHECKING:
     from pentapod.numerics.convex.banded_rows_kernels import Rows
 
-_OFF_ROWS, _OFF_DISCS = 1e-6, 1e-3
-_FOUR = 4
+NEIGHBOURS = 4
+"""Coefficients that a row of the basis combines: those of a cubic spline."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +85,8 @@ class _Solver(ConvexProgram):
         self.options = InteriorPointOptions(program.accuracy)
         self.coefficients, soft = len(program.centre), program.soft
         self.rows: Rows = (
-            program.basis.data.reshape(-1, _FOUR),
-            program.basis.indices[::_FOUR].astype(np.intp),
+            program.basis.data.reshape(-1, NEIGHBOURS),
+            program.basis.indices[::NEIGHBOURS].astype(np.intp),
             program.point,
             np.ascontiguousarray(program.slopes),
             soft.windows,
@@ -98,7 +97,10 @@ class _Solver(ConvexProgram):
 
     def keeps(self, off: Floats) -> bool:
         """Tell whether rows are met, and discs nearly: whoever asked scales back into the discs."""
-        return float(np.abs(off[: self.hard]).max(initial=0.0)) < _OFF_ROWS and float(np.abs(off).max()) < _OFF_DISCS
+        return (
+            float(np.abs(off[: self.hard]).max(initial=0.0)) < self.options.off
+            and float(np.abs(off).max()) < self.options.off_soft
+        )
 
     def cost_gradient(self, x: Floats) -> Floats:
         return banded_product(self.p.hessian, x.ravel()) + self.p.gradient
@@ -150,3 +152,24 @@ class _Solver(ConvexProgram):
         return lambda right: np.asarray(
             cho_solve_banded((factor, True), right, check_finite=False), dtype=np.float64
         ).reshape(-1, 2)
+
+
+def banded(matrix: Any, bands: int) -> Floats:
+    """Return a symmetric sparse matrix (n, n) in SciPy's lower banded form (B, n).
+
+    Entries beyond its `bands` diagonals must be zero.
+    """
+    lower = np.zeros((bands, matrix.shape[0]))
+    for k in range(min(bands, matrix.shape[0])):
+        diagonal = matrix.diagonal(-k)
+        lower[k, : len(diagonal)] = diagonal
+    return lower
+
+
+def banded_product(lower: Floats, x: Floats) -> Floats:
+    """Return H x (n,) of a symmetric matrix in lower banded form."""
+    y = lower[0] * x
+    for k in range(1, min(len(lower), len(x))):
+        y[k:] += lower[k, :-k] * x[:-k]
+        y[:-k] += lower[k, :-k] * x[k:]
+    return y

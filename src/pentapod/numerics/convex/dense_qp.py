@@ -16,7 +16,6 @@ from scipy.linalg import cho_factor, cho_solve, get_blas_funcs
 from pentapod.base.arrays import Floats
 from pentapod.numerics.convex.interior_point import ConvexProgram
 
-_OFF = 1e-6
 _SYRK: Any = get_blas_funcs("syrk", dtype=np.float64)  # half of the symmetric product
 
 
@@ -42,7 +41,7 @@ class _DenseQP(ConvexProgram):
         return lambda right: np.asarray(cho_solve(factor, right, check_finite=False), dtype=np.float64)
 
     def keeps(self, off: Floats) -> bool:
-        return float(np.abs(off).max()) < _OFF
+        return float(np.abs(off).max()) < self.options.off
 
 
 def dense_qp(hessian: Floats, gradient: Floats, matrix: Floats, upper: Floats) -> tuple[Floats, Floats] | None:

@@ -23,7 +23,8 @@ class InteriorPointOptions:
     accuracy: the duality gap, as a share of the cost's scale, at which an answer is good; ten times as much of the
     gradient. iterations: at most. to_boundary: largest share of the way to the boundary that a step takes. shortest:
     share of a Newton step below which the method has failed. least_slack: from which slacks start at least, in the
-    units of the constraints, which are numbers of the size of 1.
+    units of the constraints, which are numbers of the size of 1. off: by how much a constraint may be violated.
+    off_soft: the same of constraints that the caller restores afterwards.
     """
 
     accuracy: float = 1e-6
@@ -31,6 +32,8 @@ class InteriorPointOptions:
     to_boundary: float = 0.995
     shortest: float = 1e-9
     least_slack: float = 1e-2
+    off: float = 1e-6
+    off_soft: float = 1e-3
 
 
 class ConvexProgram(ABC):

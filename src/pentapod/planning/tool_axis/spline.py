@@ -19,7 +19,7 @@ from scipy.linalg import solveh_banded
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.directions import rotation_minimising_frames
-from pentapod.numerics.banded import banded, banded_product
+from pentapod.numerics.convex.banded_qp import banded, banded_product
 from pentapod.numerics.divided_differences import as_matrix, divided_differences
 from pentapod.planning.problem.samples import ToolpathSamples
 
