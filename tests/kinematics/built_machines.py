@@ -1,4 +1,4 @@
-"""Machines that came out of the workshop with errors."""
+"""Pentapods with manufacturing errors."""
 
 import numpy as np
 

@@ -107,7 +107,7 @@ def test_processes_that_compile_at_once_spoil_nothing(package: Package):
 
 
 def test_one_at_a_time_and_the_next_when_all_of_it_is_done(tmp_path: Path):
-    one, other = kernel_cache.Turns(tmp_path), kernel_cache.Turns(tmp_path)
+    one, other = kernel_cache.ProcessLock(tmp_path), kernel_cache.ProcessLock(tmp_path)
     order = []
 
     def follow() -> None:

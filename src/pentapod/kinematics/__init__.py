@@ -1,4 +1,4 @@
-"""The robot as mathematics: leg lengths, assembly modes, singularities, Jacobian, forces, certificates."""
+"""Kinematics of the robots: leg lengths, assembly modes, singularities, Jacobian, statics, proofs."""
 
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.families.as_built import AsBuiltPentapod

@@ -18,6 +18,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import IO
@@ -26,8 +27,22 @@ _log = logging.getLogger("pentapod")
 
 _NAME = "pentapod-kernels-"
 _LOCK = "lock"
-_UNUSED = 30 * 86400.0  # seconds after which the folder of another version goes
-_PATIENCE, _LOOK = 600.0, 0.05  # seconds: waited for another process that compiles, and between two looks
+
+
+@dataclass(frozen=True)
+class CacheOptions:
+    """Times of the cache, seconds.
+
+    unused: after which the folder of another version is removed. patience: how long to wait for another process that
+    compiles. poll: between two attempts to get the lock.
+    """
+
+    unused: float = 30 * 86400.0
+    patience: float = 600.0
+    poll: float = 0.05
+
+
+OPTIONS = CacheOptions()
 
 
 @cache
@@ -69,16 +84,16 @@ def _sweep(folder: Path) -> None:
     for other in folder.parent.glob(f"{_NAME}*"):
         with suppress(OSError):  # gone already, or not ours
             unused = time.time() - (other / _LOCK).stat().st_mtime
-            if other != folder and unused > _UNUSED and not other.is_symlink():
+            if other != folder and unused > OPTIONS.unused and not other.is_symlink():
                 shutil.rmtree(other)
 
 
-class Turns:
-    """Lets one process at a time load and compile kernels: `begin` waits for the others, `end` lets the next one in.
+class ProcessLock:
+    """Lock of the folder: one process at a time loads and compiles kernels between `begin` and `end`.
 
     Two that write numba's index of one kernel at once could else file one's machine code under the other's types. A
-    process may begin several times, also in several threads; it is done when all have ended. Where the file
-    system knows no locks, and after ten minutes, it goes on without.
+    process may begin several times, also in several threads; the lock is released when all have ended. Where the file
+    system has no locks, and after `patience`, the process goes on without.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -88,14 +103,14 @@ class Turns:
         self._held: IO[bytes] | None = None
 
     def begin(self) -> None:
-        """Wait until no other process is at it."""
+        """Wait until no other process holds the lock."""
         with self._guard:
             self._count += 1
             if self._count == 1:
                 self._held = _locked(self._path)
 
     def end(self) -> None:
-        """Let others begin, where this is the last end."""
+        """Release the lock, where this is the last end."""
         with self._guard:
             self._count -= 1
             if self._count == 0 and self._held is not None:
@@ -104,17 +119,17 @@ class Turns:
 
 
 def _locked(path: Path) -> IO[bytes] | None:
-    """Return the file, open and locked; None where that cannot be had."""
+    """Return the file, open and locked; None where it cannot be locked."""
     try:
         file = path.open("ab")
     except OSError:
         return None
-    until = time.monotonic() + _PATIENCE
+    until = time.monotonic() + OPTIONS.patience
     while time.monotonic() < until:
         try:
             _lock()(file.fileno())
-        except (BlockingIOError, PermissionError):  # another has it
-            time.sleep(_LOOK)
+        except (BlockingIOError, PermissionError):  # another process has it
+            time.sleep(OPTIONS.poll)
         except OSError:
             break
         else:
@@ -124,7 +139,7 @@ def _locked(path: Path) -> IO[bytes] | None:
 
 
 def _lock() -> Callable[[int], None]:
-    """Return what locks an open file at once or raises OSError."""
+    """Return a function that locks an open file at once or raises OSError."""
     if sys.platform == "win32":
         import msvcrt  # noqa: PLC0415
 

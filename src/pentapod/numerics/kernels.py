@@ -22,7 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeVar, cast
 
-from pentapod.numerics.kernel_cache import Turns, kernel_cache
+from pentapod.numerics.kernel_cache import ProcessLock, kernel_cache
 
 _log = logging.getLogger("pentapod")
 
@@ -31,7 +31,7 @@ _Policy = Literal["when they pay", "always", "never"]
 
 _choosing = threading.Lock()
 _policy: ContextVar[_Policy] = ContextVar("kernels", default="when they pay")
-_lost = [0.0]  # seconds that kernels would have saved so far
+_saved = [0.0]  # seconds that kernels would have saved so far
 _NUMBA, _CACHED = 0.5, 0.05  # seconds: loading numba, and kernels from the cache once it is there
 
 
@@ -40,8 +40,8 @@ def kernels_pay(saved: float) -> bool:
     policy = _policy.get()
     if policy == "never":
         return False
-    _lost[0] += saved
-    return policy == "always" or _lost[0] > (_CACHED if "numba" in sys.modules else _NUMBA)
+    _saved[0] += saved
+    return policy == "always" or _saved[0] > (_CACHED if "numba" in sys.modules else _NUMBA)
 
 
 @contextmanager
@@ -76,11 +76,11 @@ def kernel(function: _Function) -> _Function:
 
 @cache
 def _listen(folder: Path | None) -> None:
-    """Let processes compile by turns, and see to it that the log says once when this one begins: it takes long."""
+    """Let one process at a time compile, and write to the log once when this one begins: it takes long."""
     from numba.core import event  # noqa: PLC0415
 
-    class Told(event.Listener):
-        """Says it at the first compilation; what comes from the cache is none."""
+    class CompileMessage(event.Listener):
+        """Writes to the log at the first compilation; loading from the cache is none."""
 
         said = False
 
@@ -92,18 +92,18 @@ def _listen(folder: Path | None) -> None:
         def on_end(self, event: object) -> None:
             """Nothing to say."""
 
-    class InTurn(event.Listener):
-        """Holds the folder while numba holds its own lock: from the look into the cache to the entry in it."""
+    class FolderLock(event.Listener):
+        """Holds the folder's lock while numba holds its own: from the look into the cache to the entry in it."""
 
-        def __init__(self, turns: Turns) -> None:
-            self._turns = turns
+        def __init__(self, lock: ProcessLock) -> None:
+            self._lock = lock
 
         def on_start(self, event: object) -> None:
-            self._turns.begin()
+            self._lock.begin()
 
         def on_end(self, event: object) -> None:
-            self._turns.end()
+            self._lock.end()
 
-    event.register("numba:compile", Told())
+    event.register("numba:compile", CompileMessage())
     if folder is not None:
-        event.register("numba:compiler_lock", InTurn(Turns(folder)))
+        event.register("numba:compiler_lock", FolderLock(ProcessLock(folder)))

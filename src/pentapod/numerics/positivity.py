@@ -13,7 +13,8 @@ from pentapod.base.arrays import Bools, Floats
 from pentapod.base.values import Value
 from pentapod.numerics.bernstein import split
 
-_RESOLUTION = 6  # halvings: to 1/64
+DOUBT_HALVINGS = 6
+"""Halvings to which the undecided part of an interval is located: to 1/64."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +96,7 @@ def positivity(
         _include(doubt, pieces[hopeless & ~refuted[owner]])
         pieces = pieces[~(done | hopeless | refuted[owner])]
         crowd = np.bincount(pieces.owner, minlength=count)[pieces.owner]
-        given_up = (crowd > most) | (lost[pieces.owner] & (level >= _RESOLUTION))
+        given_up = (crowd > most) | (lost[pieces.owner] & (level >= DOUBT_HALVINGS))
         _include(doubt, pieces[given_up])
         pieces = pieces[~given_up]
     _include(doubt, pieces)

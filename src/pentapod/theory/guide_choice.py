@@ -1,4 +1,4 @@
-"""Where to put the guides for given poses: the slides that make the worst pose best, by a criterion that is stated."""
+"""Choice of rail positions for given poses: maximises the worst pose's value of a given criterion."""
 
 from __future__ import annotations
 
