@@ -28,8 +28,7 @@ from pentapod.base.refusal import Refusal
 from pentapod.machine.machine import Machine
 from pentapod.planning.leg_path.leg_path import leg_path
 from pentapod.planning.placement.ipopt import IpoptSolver
-from pentapod.planning.placement.placed_path import PlacedPath
-from pentapod.planning.placement.placement import Placement
+from pentapod.planning.placement.placed_path import PlacedPath, Placement
 from pentapod.planning.placement.sampling import first_candidate, first_guesses
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.plan import plan
@@ -174,7 +173,7 @@ def along_path(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return axis rates and second derivatives of the legs along the path, at one density, for axes (N, 3)."""
     tips, turned = problem.samples.machine_poses(at.transform, axes)
-    component = at.margins.component
+    component = at.margins.scene.branch
     values, limits = at.margins(tips, turned, at.transform), at.margins.limits
     placed = PlacedPath(task.toolpath, Placement(at.transform, "benchmark"), component, tips, turned, values, limits)
     path = leg_path(placed, problem.machine, path_tolerance=20e-6, axis_tolerance=np.radians(0.5))

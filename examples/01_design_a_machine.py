@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.machine.clearance.segments import segment_distance
+from pentapod.machine import segment_distance
 
 LEG_RADIUS, SHAFT_RADIUS, JOINT_RADIUS, SHAFT_END = 0.008, 0.012, 0.080, 0.060
 PAIRS = np.array(list(itertools.combinations(range(5), 2)))

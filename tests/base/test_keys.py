@@ -95,7 +95,7 @@ def test_every_default_is_the_same_in_si_and_in_the_unit_of_files():
         "region": Region,
         "axis": Orientation,
         "gouge": GougeOptions,
-        **PARTS,
+        **{part.__name__: part for parts in PARTS.values() for part in parts},
         **CUTTERS,
         **{name: strategy.options for name, strategy in STRATEGIES.items()},
         **{cls.__name__: cls for name in JobTables.model_fields for cls in table_model(name).declared_by},

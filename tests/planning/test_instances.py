@@ -40,7 +40,7 @@ def check(instance: Instance, samples: int, folder: Path) -> bool:
     answer = plan(instance.toolpath, robot, tilt=instance.tilt)
     if isinstance(answer, Refusal):
         assert answer.diagnosis
-        assert all(blame.waypoints and blame.shortfall > 0.0 for blame in answer.diagnosis)
+        assert all(each.waypoints and each.shortfall > 0.0 for each in answer.diagnosis)
         return brute_force(instance, robot, samples) < CLEARLY_FEASIBLE
     assert isinstance(answer, PlacedPath)
     p, i = answer.tips + robot.tool_length * answer.axes, -answer.axes

@@ -99,7 +99,7 @@ def test_wrong_component_is_refused(desk, cap, placed):
     given = PlacementConstraints.fixture([placed.placement.transform])
     answer = plan(cap, desk, tilt=TILT, constraints=given, component=Component(1, -1))
     assert isinstance(answer, Refusal)
-    assert any("S = 0" in blame.constraint for blame in answer.diagnosis)
+    assert any("S = 0" in shortfall.constraint for shortfall in answer.diagnosis)
 
 
 def test_placement_out_of_reach_is_refused_with_the_true_shortfall(desk, cap, placed):
@@ -110,18 +110,18 @@ def test_placement_out_of_reach_is_refused_with_the_true_shortfall(desk, cap, pl
     assert isinstance(answer, Refusal)
     tips, axes = far.apply(cap.tips), far.rotate(cap.axes)
     legs = desk.robot.leg_lengths(tips + desk.tool_length * axes, -axes)
-    for blame in answer.diagnosis:
-        if "too long" in blame.constraint:
-            k = int(blame.constraint.split()[1]) - 1
+    for shortfall in answer.diagnosis:
+        if "too long" in shortfall.constraint:
+            k = int(shortfall.constraint.split()[1]) - 1
             missing_mm = (legs[:, k].max() - desk.legs.max_length[k]) * 1e3
             margin_mm = NEEDED_MARGIN * 0.5 * desk.legs.stroke[k] * 1e3
-            assert blame.unit == "mm"
-            assert missing_mm <= blame.shortfall <= missing_mm + margin_mm + 1e-9
-            covered = np.concatenate([np.arange(a, b + 1) for a, b in blame.waypoints])
+            assert shortfall.unit == "mm"
+            assert missing_mm <= shortfall.shortfall <= missing_mm + margin_mm + 1e-9
+            covered = np.concatenate([np.arange(a, b + 1) for a, b in shortfall.waypoints])
             assert set(np.flatnonzero(legs[:, k] > desk.legs.max_length[k])) <= set(covered)
             break
     else:
-        pytest.fail(f"no leg is blamed: {answer}")
+        pytest.fail(f"no leg is named: {answer}")
 
 
 def test_oversize_part_is_refused(desk):
@@ -134,7 +134,7 @@ def test_oversize_part_is_refused(desk):
     assert isinstance(answer, Refusal)
     assert answer.diagnosis
     assert answer.diagnosis[0].shortfall > 1.0
-    assert all(0 <= a <= b < len(tips) for blame in answer.diagnosis for a, b in blame.waypoints)
+    assert all(0 <= a <= b < len(tips) for shortfall in answer.diagnosis for a, b in shortfall.waypoints)
 
 
 def test_the_region_that_a_refusal_names_fits(desk, wide):

@@ -8,7 +8,7 @@ import pytest
 from scipy.interpolate import CubicSpline, make_interp_spline
 from timing_paths import Path, Piece, by_tip, line, machine, nodding, raster, straight
 
-from pentapod.machine.tool_limits import ToolLimits
+from pentapod.machine.parts import ToolLimits
 from pentapod.timing import LimitUse, Trajectory, certify, retime
 from pentapod.timing.limits.leg_jerk import LegJerk
 from pentapod.timing.limits.leg_velocity import LegVelocity

@@ -8,8 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from pentapod.machine.parts import ControllerSettings, LegLimits
-from pentapod.machine.tool_limits import ToolLimits
+from pentapod.machine.parts import ControllerSettings, LegLimits, ToolLimits
 from pentapod.toolpath.toolpath import SegmentKind
 
 BASE = np.array([[-0.5, -0.1], [-0.1, 0.45], [0.05, -0.5], [0.3, 0.3], [0.5, -0.2]])

@@ -1,17 +1,13 @@
-"""Machines that were built: geometry with limits and bodies, their files, and what can be said about them."""
+"""Machines: geometry with limits and bodies, machine files, clearances, calibration, and the report on a machine."""
 
 from pentapod.machine.calibration.calibration import Calibration, calibrate
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld, Obstacle
-from pentapod.machine.clearance.leg_clearance import clearances, pair_names
-from pentapod.machine.clearance.segments import segment_distance
+from pentapod.machine.clearance.leg_clearance import clearances, pair_names, segment_distance
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.machine import ARCHITECTURAL_LIMIT, Machine, load_machine, read_machine
-from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, WorkVolume
+from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 from pentapod.machine.reader import shipped_machines
-from pentapod.machine.report.check import AMPLIFICATION_LIMIT, Finding, MachineReport, check
-from pentapod.machine.report.explain import explain
-from pentapod.machine.report.work_volume import sample_work_volume
-from pentapod.machine.tool_limits import ToolLimits
+from pentapod.machine.report import AMPLIFICATION_LIMIT, Finding, MachineReport, check, explain, sample_work_volume
 
 __all__ = [
     "AMPLIFICATION_LIMIT",

@@ -1,4 +1,4 @@
-"""What moves the legs, and what they move: numbers for simulation, on which no program depends."""
+"""Drives and masses: numbers for simulation, on which no program depends."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import MachineError
 from pentapod.base.keys import Key, check_fields, declared
 from pentapod.base.values import Value
-from pentapod.machine.fields import LEGS, LIST_OF_3, PER_LEG, per_leg
+from pentapod.machine.fields import LIST_OF_3, PER_LEG, each_leg, per_leg
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,28 +22,28 @@ class Drives(Value):
         acceleration = velocity_gain · (rate error + velocity_integral · ∫ rate error)
                        + acceleration_feedforward · acceleration wanted + load_feedforward · load / moving_mass
 
-    Programs do not depend on it. Arrays (n,), scalars hold for all legs: gains in 1/s, moving_mass in kg, ripple_force
-    in N, once up and down in ripple_pitch metres of travel. The other fields hold for all legs, SI; the load is that of
-    the `Masses`. Raises MachineError: numbers out of range or not finite.
+    Arrays (n,), where scalars hold for all legs: gains in 1/s, moving_mass in kg, ripple_force in N with the period
+    ripple_pitch, metres of travel. The other fields hold for all legs, SI; the load is that of the `Masses`. Raises
+    MachineError: numbers out of range or not finite.
     """
 
     position_gain: Annotated[Floats, Key("per_s", "gain of the position loop (Kv)", kind=PER_LEG, gt=0.0)] = field(
-        default_factory=lambda: np.full(LEGS, 80.0)
+        default_factory=each_leg(80.0)
     )
     velocity_gain: Annotated[
         Floats, Key("per_s", "gain of the velocity loop, its bandwidth in rad/s", kind=PER_LEG, gt=0.0)
-    ] = field(default_factory=lambda: np.full(LEGS, 600.0))
+    ] = field(default_factory=each_leg(600.0))
     velocity_integral: Annotated[
         Floats, Key("per_s", "integral share of the velocity loop, 1 / reset time", kind=PER_LEG, ge=0.0)
-    ] = field(default_factory=lambda: np.full(LEGS, 50.0))
-    moving_mass: Annotated[Floats, Key("kg", "what a drive feels, motor and screw included", kind=PER_LEG, gt=0.0)] = (
-        field(default_factory=lambda: np.full(LEGS, 100.0))
-    )
+    ] = field(default_factory=each_leg(50.0))
+    moving_mass: Annotated[
+        Floats, Key("kg", "moving mass seen by a drive, motor and screw included", kind=PER_LEG, gt=0.0)
+    ] = field(default_factory=each_leg(100.0))
     ripple_force: Annotated[Floats, Key("n", "amplitude of the force ripple", "ripple", kind=PER_LEG, ge=0.0)] = field(
-        default_factory=lambda: np.full(LEGS, 20.0)
+        default_factory=each_leg(20.0)
     )
     ripple_pitch: Annotated[Floats, Key("mm", "travel of one period of the ripple", kind=PER_LEG, gt=0.0)] = field(
-        default_factory=lambda: np.full(LEGS, 5e-3)
+        default_factory=each_leg(5e-3)
     )
     velocity_feedforward: Annotated[
         float, Key("", "share of the wanted velocity given to the velocity loop", ge=0.0, le=2.0)
@@ -55,11 +55,11 @@ class Drives(Value):
         float, Key("", "share of the forces that [masses] need given; MuJoCo alone", ge=0.0, le=2.0)
     ] = 1.0
     encoder_step: Annotated[float, Key("mm", "resolution of the leg scales; 0: continuous", ge=0.0)] = 1e-4 / 1e3
-    dead_time: Annotated[float, Key("ms", "from reading the scale to the force", ge=0.0)] = 2.5e-4
-    period: Annotated[float, Key("ms", "of the drive's own loop", gt=0.0)] = 1.25e-4
+    dead_time: Annotated[float, Key("ms", "delay from reading the scale to the force", ge=0.0)] = 2.5e-4
+    period: Annotated[float, Key("ms", "period of the drive's own loop", gt=0.0)] = 1.25e-4
     contour_margin: Annotated[
         float,
-        Key("", "the correction by pose may enlarge what is too fast for it so many times; less is slower", ge=1.1),
+        Key("", "largest gain of the pose correction at any frequency; smaller values make it slower", ge=1.1),
     ] = 2.0
 
     def __post_init__(self) -> None:

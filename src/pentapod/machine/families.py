@@ -1,4 +1,4 @@
-"""FAMILIES: the robot families by the names that machine files use, in `[geometry] family`."""
+"""FAMILIES: the robot families by their names in `[geometry] family` of machine files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ QUADRATIC = "quadratic"
 class GeometryTable(Table):
     """Where the joints are. Of the quadratic family give delta, or platform_mm, or both if they agree."""
 
-    family: str = Field(default=QUADRATIC, description="of the robot; packages can add families")
+    family: str = Field(default=QUADRATIC, description="name of the robot family; packages can add families")
     base_mm: FIVE_PAIRS = Field(description="base joints [x, y] in the base plane z = 0, leg 1 to leg 5")
     delta: float | None = Field(default=None, description="platform joint i is at delta · x_i along the tool axis")
     platform_mm: FIVE_NUMBERS | None = Field(
@@ -33,8 +33,8 @@ class GeometryTable(Table):
 class Family(Value):
     """A robot family in machine files.
 
-    robot: table [geometry] → robot; its values in SI are `table.si`. table: with further keys, where it has such.
-    Raises MachineError where the numbers make no robot.
+    robot: table [geometry] → robot; `table.si` has the table's values in SI units. Raises MachineError where they make
+    no robot. table: a subclass of `GeometryTable`, where the family has further keys.
     """
 
     robot: Callable[[Any], Robot]

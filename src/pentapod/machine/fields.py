@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Annotated, Any, cast
 
 import numpy as np
 from pydantic import BeforeValidator, Field
 from pydantic_core import PydanticCustomError
 
-from pentapod.base.arrays import frozen, set_frozen
+from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import MachineError
 from pentapod.kinematics.five_legs import FiveLegs
 
 LEGS = FiveLegs.n_legs
 """Of the machines that files describe."""
+
+
+def each_leg(value: float | list[float]) -> Callable[[], Floats]:
+    """Return a factory of defaults: the same value, or row of values, for each leg."""
+    return lambda: np.array([value] * LEGS)
 
 
 def per_leg(owner: object, *names: str, **widths: int) -> None:

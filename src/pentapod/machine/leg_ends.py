@@ -1,4 +1,4 @@
-"""Where the legs and the platform line of a machine end in a pose of the tool, for drawings."""
+"""End points of the legs and of the platform line in a pose of the tool, for drawings."""
 
 from __future__ import annotations
 
@@ -14,5 +14,5 @@ def leg_ends(machine: Machine, tips: Floats, axes: Floats) -> tuple[Floats, Floa
 
 
 def line_top(machine: Machine, tip: Floats, axis: Floats) -> Floats:
-    """Return the end (3,) of the platform line that is farther from the tip: the highest platform joint, metres."""
+    """Return the far end (3,) of the platform line: the platform joint farthest from the tip, metres."""
     return tip + (machine.tool_length - float(machine.robot.offsets.min())) * axis

@@ -1,8 +1,10 @@
-"""Machine: a robot that was built. Geometry, limits and bodies, all in SI units."""
+"""Machine: a robot with its limits, bodies, drives and controller, all in SI units."""
 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -19,25 +21,22 @@ from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.robot import Robot
 from pentapod.machine import reader
-from pentapod.machine.digest import digest_of
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.fields import positive
-from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, WorkVolume
-from pentapod.machine.tool_limits import ToolLimits
+from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 
 ARCHITECTURAL_LIMIT = 0.005
-"""Least `conditioning` of a machine's robot: below it, leg lengths say almost nothing about some motion."""
+"""Least `conditioning` of a machine's robot: below it, some motion hardly changes the leg lengths."""
 
 
 @dataclass(frozen=True, eq=False)
 class Machine(Value):
-    """A robot that was built.
+    """A robot with its limits, bodies, drives and controller.
 
     tool_length: metres from p (the platform line's origin, where offset = 0) along i to the tool tip.
-    rapid_velocity: largest tip speed in m/s on rapids. drives, masses: for simulation alone; a program does not
-    depend on them. tool_limits: of the motion of tip and axis, none unless set. guides: of a reconfigurable machine, on
-    which the base joints are set before a program runs; slides (n_legs,) metres: where they stand, `robot` is that
-    geometry.
+    rapid_velocity: largest tip speed on rapids, m/s. drives, masses: for simulation alone; a program does not depend on
+    them. guides: of a reconfigurable machine, on which the base joints are set before a program runs; rail_positions
+    (n_legs,) metres: where they stand; `robot` is the geometry there.
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
     spindle's nose would be above the lowest platform joint.
@@ -100,30 +99,36 @@ class Machine(Value):
                 "guides are for machines of the quadratic family alone",
                 key="guides",
                 value=type(self.robot).__name__,
-                remedy="a machine without guides, built where they stand",
+                remedy="describe a machine without guides, with the base joints where they stand",
             )
 
     @classmethod
     def load(cls, name_or_path: str | Path) -> Machine:
-        """Return a shipped machine by its name ("desk"), or that of a TOML file. Raises MachineError."""
+        """Return a shipped machine by its name ("desk"), or the machine of a TOML file. Raises MachineError.
+
+        A text without folder and suffix is taken for a name first. The error is one line with file, line, key, value
+        and remedy.
+        """
         return reader.load(name_or_path, cls)
 
     @cached_property
     def digest(self) -> str:
-        """16 hexadecimal digits over all numbers that programs depend on: equal machines have equal digests.
+        """16 hexadecimal digits of a SHA-256 over all numbers that programs depend on, −0 counted as 0.
 
         Name, drives and masses do not count. With its guides elsewhere it is another machine.
         """
-        return digest_of(dict(_numbers(self)))
+        plain = {name: _plain(value) for name, value in _numbers(self)}
+        text = json.dumps(plain, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def with_tool(self, tool_length: float) -> Machine:
         """Return this machine with another tool: metres from p to the tip. Raises MachineError."""
         return dataclasses.replace(self, tool_length=tool_length)
 
     def at(self, rail_positions: ArrayLike) -> Machine:
-        """Return this machine with its guides at slides (n_legs,), metres.
+        """Return this machine with its guides at `rail_positions` (n_legs,), metres; their travel is not checked.
 
-        Raises MachineError: it has no guides, or is architecturally singular there. Their travel is not looked at.
+        Raises MachineError: it has no guides, or is architecturally singular there.
         """
         if self.guides is None:
             raise MachineError("this machine has no guides", key="guides", value=np.asarray(rail_positions).tolist())
@@ -133,17 +138,17 @@ class Machine(Value):
 
 
 def load_machine(name_or_path: str | Path) -> Machine:
-    """Return a shipped machine by its name, or the machine of a TOML file.
-
-    A text without folder and suffix is taken for a name first. Raises MachineError: one line with file, line,
-    key, value and remedy.
-    """
-    return reader.load(name_or_path, Machine)
+    """Return a shipped machine by its name, or the machine of a TOML file, as `Machine.load` does."""
+    return Machine.load(name_or_path)
 
 
 def read_machine(text: str, file: str | Path) -> Machine:
     """Return the machine that TOML text describes; `file` is named in errors. Raises MachineError."""
     return reader.read(text, file, Machine)
+
+
+def _plain(value: object) -> object:
+    return value if isinstance(value, str) else (np.asarray(value, dtype=np.float64) + 0.0).tolist()
 
 
 def _numbers(machine: Machine) -> Iterator[tuple[str, object]]:

@@ -1,7 +1,8 @@
-"""The parts of a machine beside its geometry: limits of legs and joints, bodies, controller, advertised work."""
+"""The parts of a machine beside its geometry: limits of legs, joints and tool, bodies, controller, work volume."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -86,19 +87,20 @@ class JointLimits(Value):
 class Bodies(Value):
     """Simple bodies around the legs and the platform line.
 
-    leg_radius: each leg is a capsule from base joint to platform joint. shaft_radius: the platform (spindle)
-    is a capsule along the line, from the platform joint farthest from the tip to the tip's holder end,
-    `shaft_end` metres short of the tip. Within `joint_radius` of a leg's own platform joint, leg and shaft
-    are joined, not colliding.
+    leg_radius: each leg is a capsule from base joint to platform joint. shaft_radius: the spindle is a capsule along
+    the line, from the platform joint farthest from the tip to `shaft_end` metres short of the tip. Within
+    `joint_radius` of a leg's own platform joint, leg and spindle are joined and do not collide.
     """
 
-    leg_radius: Annotated[float, Key("mm", "each leg is a cylinder with round ends", "leg_diameter", 0.5, gt=0.0)]
-    shaft_radius: Annotated[
-        float, Key("mm", "the spindle is one too, along the platform line", "shaft_diameter", 0.5, gt=0.0)
+    leg_radius: Annotated[
+        float, Key("mm", "diameter of the legs, cylinders with round ends", "leg_diameter", 0.5, gt=0.0)
     ]
-    shaft_end: Annotated[float, Key("mm", "the spindle ends this far short of the tip", gt=0.0)]
+    shaft_radius: Annotated[
+        float, Key("mm", "diameter of the spindle, a cylinder along the platform line", "shaft_diameter", 0.5, gt=0.0)
+    ]
+    shaft_end: Annotated[float, Key("mm", "distance from the spindle's end to the tip", gt=0.0)]
     joint_radius: Annotated[
-        float, Key("mm", "so close to its own platform joint a leg may be inside the spindle", gt=0.0)
+        float, Key("mm", "distance from its own platform joint within which a leg may be inside the spindle", gt=0.0)
     ]
 
     def __post_init__(self) -> None:
@@ -106,11 +108,45 @@ class Bodies(Value):
 
 
 @dataclass(frozen=True)
+class ToolLimits(Value):
+    """Limits of the tool's own motion, as spindles, hoses and workpieces may set them; infinite where there is none.
+
+    Tip: m/s² and m/s³; direction of the tool axis: rad/s and rad/s². Raises MachineError: not positive.
+    """
+
+    max_tip_acceleration: Annotated[
+        float, Key("mm_s2", "largest acceleration of the tip; of machine and job the smaller", gt=0.0)
+    ] = math.inf
+    max_tip_jerk: Annotated[float, Key("mm_s3", "largest jerk of the tip; of machine and job the smaller", gt=0.0)] = (
+        math.inf
+    )
+    max_axis_velocity: Annotated[
+        float, Key("deg_s", "largest angular velocity of the tool axis; of machine and job the smaller", gt=0.0)
+    ] = math.inf
+    max_axis_acceleration: Annotated[
+        float, Key("deg_s2", "largest angular acceleration of the tool axis; of machine and job the smaller", gt=0.0)
+    ] = math.inf
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not value > 0.0:
+                raise MachineError("must be positive", key=name, value=value)
+
+    def given(self) -> dict[str, float]:
+        """Return the limits that are set, by name."""
+        return {name: float(value) for name, value in vars(self).items() if value < math.inf}
+
+    def and_(self, other: ToolLimits) -> ToolLimits:
+        """Return the stricter of both, limit by limit."""
+        return ToolLimits(**{name: min(value, getattr(other, name)) for name, value in vars(self).items()})
+
+
+@dataclass(frozen=True)
 class ControllerSettings(Value):
-    """How the controller takes its setpoints. period: seconds between them."""
+    """How the controller moves through its setpoints. period: seconds between them."""
 
     period: Annotated[float, Key("ms", "time between setpoints", gt=0.0)]
-    interpolation: Annotated[Interpolation, Key("", "how it moves between them")]
+    interpolation: Annotated[Interpolation, Key("", "interpolation between setpoints")]
 
     def __post_init__(self) -> None:
         check_fields(self, MachineError)
@@ -118,15 +154,15 @@ class ControllerSettings(Value):
 
 @dataclass(frozen=True, eq=False)
 class WorkVolume(Value):
-    """What the machine is advertised for: a cylinder of tips and a cone of tool axes, machine frame.
+    """The advertised work volume: a cylinder of tips and a cone of tool axes, machine frame.
 
-    centre (3,) metres; diameter and height (along z) in metres; tilt: largest angle in radians between the
-    tool axis and −z (the base normal away from the work).
+    centre (3,), diameter, height (along z): metres. tilt: largest angle in radians between the tool axis and −z, which
+    points from the work to the base.
     """
 
     centre: Annotated[Floats, Key("mm", "centre of the cylinder", kind=LIST_OF_3)]
-    diameter: Annotated[float, Key("mm", "of the cylinder of tip positions", gt=0.0)]
-    height: Annotated[float, Key("mm", "of the cylinder, along z", gt=0.0)]
+    diameter: Annotated[float, Key("mm", "diameter of the cylinder of tip positions", gt=0.0)]
+    height: Annotated[float, Key("mm", "height of the cylinder, along z", gt=0.0)]
     tilt: Annotated[float, Key("deg", "largest angle between tool axis and −z", ge=0.0, lt=90.0)]
 
     def __post_init__(self) -> None:

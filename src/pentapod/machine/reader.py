@@ -1,14 +1,15 @@
 """Machine files: TOML to the parts of a machine, with one clear error for whatever is wrong.
 
-What is made of the parts is given (`Machine`): the errors that it raises are told by key and line, too.
+The class of the machine is given (`Machine`); the errors that it raises name key and line, too.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -22,46 +23,19 @@ from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.families import FAMILIES
-from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, WorkVolume
-from pentapod.machine.tables import FILE_KEYS, PARTS, GuidesTable, MachineTables
-from pentapod.machine.tool_limits import ToolLimits
+from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
+from pentapod.machine.tables import FILE_KEYS, GuideKeys, MachineTables, PlatformJointKeys, ToolKeys
 
-_Made_co = TypeVar("_Made_co", covariant=True)
-
-
-class Maker(Protocol[_Made_co]):
-    """What a machine is made by: the class `Machine`. Raises MachineError where the parts make no machine."""
-
-    def __call__(
-        self,
-        *,
-        name: str,
-        robot: Any,
-        legs: LegLimits,
-        joints: JointLimits,
-        bodies: Bodies,
-        tool_length: float,
-        rapid_velocity: float,
-        controller: ControllerSettings,
-        work: WorkVolume,
-        drives: Drives,
-        masses: Masses,
-        tool_limits: ToolLimits,
-        guides: ReconfigurablePentapod | None,
-    ) -> _Made_co:
-        """Return what the parts make, all in SI units."""
-        ...
+Made = TypeVar("Made")
 
 
 def shipped_machines() -> tuple[str, ...]:
     """Return the names of the machines that come with pentapod, sorted."""
-    return tuple(
-        sorted(entry.name.removesuffix(".toml") for entry in _library().iterdir() if entry.name.endswith(".toml"))
-    )
+    return tuple(sorted(entry.name.removesuffix(".toml") for entry in _library().iterdir() if ".toml" in entry.name))
 
 
-def load(name_or_path: str | Path, make: Maker[_Made_co]) -> _Made_co:
-    """Return what is made of a shipped machine's file, by the machine's name, or of another TOML file.
+def load(name_or_path: str | Path, make: Callable[..., Made]) -> Made:
+    """Return what `make` makes of a shipped machine's file, by the machine's name, or of another TOML file.
 
     A text without folder and suffix is taken for a name first. Raises MachineError: one line with file, line,
     key, value and remedy.
@@ -87,18 +61,16 @@ def machine_bytes(name_or_path: str | Path) -> bytes:
     """Return the bytes of the file that `load` reads. Raises MachineError where it cannot be read."""
     name = str(name_or_path)
     try:
-        if name in shipped_machines():
-            return (_library() / f"{name}.toml").read_bytes()
-        return Path(name_or_path).read_bytes()
+        return (_library() / f"{name}.toml" if name in shipped_machines() else Path(name)).read_bytes()
     except OSError as error:
         raise MachineError("the machine file cannot be read", file=name) from error
 
 
-def read(text: str, file: str | Path, make: Maker[_Made_co]) -> _Made_co:
-    """Return what is made of the machine that TOML text describes; `file` is named in errors. Raises MachineError."""
+def read(text: str, file: str | Path, make: Callable[..., Made]) -> Made:
+    """Return the machine that TOML text describes, made by `make`; `file` is named in errors. Raises MachineError."""
     content = parsed(text, file, MachineError)
     try:
-        return _made(MachineTables.model_validate(content), make)
+        return make(**_fields(MachineTables.model_validate(content)))
     except ValidationError as error:
         where, details = problem_of(error, MachineTables, _table)
         raise MachineError(file=file, line=line_of(text, where), **details) from error
@@ -119,36 +91,37 @@ def _library() -> Traversable:
     return resources.files("pentapod.machine") / "library"
 
 
-def _made(tables: Any, make: Maker[_Made_co]) -> _Made_co:
-    """Return what is made of the parts; tables: a `MachineTables`."""
-    robot, joints = FAMILIES[tables.geometry.family].robot(tables.geometry), tables.joints
-    parts = {name: fields_from(part, getattr(tables, name)) for name, part in PARTS.items()}
-    return make(
-        name=tables.name,
-        robot=robot,
-        legs=LegLimits(**parts["legs"]),
-        joints=JointLimits(
-            platform_range=np.stack([joints.si.platform_min, joints.si.platform_max], axis=1), **parts["joints"]
+def _fields(tables: Any) -> dict[str, Any]:
+    """Return the fields of a machine, SI, from a `MachineTables`."""
+    robot = FAMILIES[tables.geometry.family].robot(tables.geometry)
+    platform = fields_from(PlatformJointKeys, tables.joints)
+    return {
+        "name": tables.name,
+        "robot": robot,
+        "legs": LegLimits(**fields_from(LegLimits, tables.legs)),
+        "joints": JointLimits(
+            platform_range=np.stack([platform["platform_min"], platform["platform_max"]], axis=1),
+            **fields_from(JointLimits, tables.joints),
         ),
-        bodies=Bodies(**parts["bodies"]),
-        tool_length=tables.tool.si.length,
-        rapid_velocity=tables.tool.si.rapid,
-        controller=ControllerSettings(**parts["controller"]),
-        work=WorkVolume(**parts["work"]),
-        drives=Drives(**parts["drives"]),
-        masses=Masses(**parts["masses"]),
-        tool_limits=ToolLimits(**parts["tool"]),
-        guides=_guides(tables.guides, robot),
-    )
+        "bodies": Bodies(**fields_from(Bodies, tables.bodies)),
+        "controller": ControllerSettings(**fields_from(ControllerSettings, tables.controller)),
+        "work": WorkVolume(**fields_from(WorkVolume, tables.work)),
+        "drives": Drives(**fields_from(Drives, tables.drives)),
+        "masses": Masses(**fields_from(Masses, tables.masses)),
+        "tool_limits": ToolLimits(**fields_from(ToolLimits, tables.tool)),
+        "guides": _guides(robot, **fields_from(GuideKeys, tables.guides)),
+        **fields_from(ToolKeys, tables.tool),
+    }
 
 
-def _guides(table: GuidesTable, robot: Robot) -> ReconfigurablePentapod | None:
-    travel = np.stack([table.si.least, table.si.greatest], axis=1)
+def _guides(robot: Robot, direction: Any, least: Any, greatest: Any) -> ReconfigurablePentapod | None:
+    """Return the guides of a robot; None where none of them can move."""
+    travel = np.stack([least, greatest], axis=1)
     if not travel.any():
         return None
     if not isinstance(robot, LinearPentapod):
         family = type(robot).__name__
-        raise MachineError("guides are for the quadratic family alone", key="guides.direction", value=family)
+        raise MachineError("guides are for the quadratic family alone", key="guides", value=family)
     if ((travel[:, 0] > 0.0) | (travel[:, 1] < 0.0)).any():
         raise MachineError(
             "base_mm is not within the travel of the guides",
@@ -156,7 +129,7 @@ def _guides(table: GuidesTable, robot: Robot) -> ReconfigurablePentapod | None:
             value=travel.tolist(),
             expected="least_mm at most 0, greatest_mm at least 0",
         )
-    return ReconfigurablePentapod(robot, np.asarray(table.direction), travel)
+    return ReconfigurablePentapod(robot, np.asarray(direction), travel)
 
 
 def _table(name: str) -> type[BaseModel] | None:

@@ -1,4 +1,4 @@
-"""What rounding setpoints to the resolution of programs does to the legs' jerks."""
+"""Jerk caused by rounding setpoints to the resolution of programs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ QUANTA_PER_M = 1e11
 """Leg lengths in programs are whole numbers of these: hundred-millionths of a millimetre."""
 
 TIP_ROUNDING = 10.0
-"""What rounding the rows may add to the tip's jerk, by what it may add to a leg's."""
+"""Largest jerk of the tip that rounding the rows can add, as a multiple of the largest added to a leg's."""
 
 # What rounding each row by half a quantum can do to third differences, 8 / 2, and to the spline's third derivative,
 # 24 / 2 (rows rounded up and down in turn), in quanta by the period cubed.

@@ -1,94 +1,104 @@
-"""The tables of a machine file, made from the keys that the parts of a machine declare beside their fields.
-
-Values are as in the file: millimetre, degree, mm/min, the unit in the key's name.
-"""
+"""The tables of a machine file as models, made from the keys that its parts declare beside their fields."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from pydantic import Field, create_model
 
-from pentapod.base.keys import declared
-from pentapod.base.tables import Positive, Table, extended, table_of
+from pentapod.base.arrays import Floats
+from pentapod.base.keys import Key, declared
+from pentapod.base.tables import Table, extended, table_of
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.families import OfFamily
-from pentapod.machine.fields import FIVE_PAIRS, LEGS, PER_LEG
-from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, WorkVolume
-from pentapod.machine.tool_limits import ToolLimits
+from pentapod.machine.fields import FIVE_PAIRS, PER_LEG, each_leg
+from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 
 
-class GuidesTable(Table):
+@dataclass(frozen=True, eq=False)
+class GuideKeys:
     """Guides of a reconfigurable machine: the base joints are set along them before a program runs."""
 
-    direction: FIVE_PAIRS = Field(
-        default=[[0.0, 1.0]] * LEGS,
-        description="of each guide in the base plane, unit [x, y]; [0, 0] for a fixed joint",
+    direction: Annotated[
+        Floats,
+        Key("", "direction of each guide in the base plane, unit [x, y]; [0, 0] for a fixed joint", kind=FIVE_PAIRS),
+    ] = field(default_factory=each_leg([0.0, 1.0]))
+    least: Annotated[Floats, Key("mm", "least position on the guide, from base_mm", kind=PER_LEG)] = field(
+        default_factory=each_leg(0.0)
     )
-    least_mm: PER_LEG = Field(default=[0.0] * LEGS, description="least slide from base_mm along it")
-    greatest_mm: PER_LEG = Field(default=[0.0] * LEGS, description="greatest slide; no guides where none can move")
+    greatest: Annotated[
+        Floats, Key("mm", "greatest position on the guide; where no joint can move there are no guides", kind=PER_LEG)
+    ] = field(default_factory=each_leg(0.0))
 
 
-class ToolTable(Table):
+@dataclass(frozen=True, eq=False)
+class PlatformJointKeys:
+    """The angles of the platform joints: `JointLimits.platform_range`."""
+
+    platform_min: Annotated[
+        Floats, Key("deg", "least angle between leg (seen from its platform joint) and tool axis", kind=PER_LEG)
+    ]
+    platform_max: Annotated[Floats, Key("deg", "largest angle between leg and tool axis", kind=PER_LEG)]
+
+
+@dataclass(frozen=True)
+class ToolKeys:
     """The tool that the machine comes with."""
 
-    length_mm: Positive = Field(description="from the platform line's origin (offset 0) to the tip")
-    rapid_mm_min: Positive = Field(description="largest tip speed on rapids")
+    tool_length: Annotated[
+        float, Key("mm", "distance from the platform line's origin (offset 0) to the tip", "length", gt=0.0)
+    ]
+    rapid_velocity: Annotated[float, Key("mm_min", "largest tip speed on rapids", "rapid", gt=0.0)]
 
 
-class JointsTable(Table):
-    """How far the joints turn."""
-
-    platform_min_deg: PER_LEG = Field(description="least angle of leg (seen from its platform joint) and tool axis")
-    platform_max_deg: PER_LEG = Field(description="largest angle between leg and tool axis")
+PARTS: dict[str, tuple[type, ...]] = {
+    "guides": (GuideKeys,),
+    "legs": (LegLimits,),
+    "joints": (JointLimits, PlatformJointKeys),
+    "bodies": (Bodies,),
+    "tool": (ToolKeys, ToolLimits),
+    "controller": (ControllerSettings,),
+    "work": (WorkVolume,),
+    "drives": (Drives,),
+    "masses": (Masses,),
+}
+"""The dataclasses whose keys a table has, by the table's name."""
 
 
 class NamedTable(Table):
     """A machine file."""
 
-    name: Annotated[str, Field(min_length=1, pattern=r"^[\w .+-]+$")] = Field(description="what it is called")
+    name: Annotated[str, Field(min_length=1, pattern=r"^[\w .+-]+$")] = Field(description="name of the machine")
     description: str = Field(default="", description="one sentence")
     geometry: OfFamily
-    guides: GuidesTable = Field(default_factory=GuidesTable, description="on which base joints can be set, if they can")
 
 
-PARTS: dict[str, type] = {
-    "legs": LegLimits,
-    "joints": JointLimits,
-    "bodies": Bodies,
-    "tool": ToolLimits,
-    "controller": ControllerSettings,
-    "work": WorkVolume,
-    "drives": Drives,
-    "masses": Masses,
-}
-"""The parts of a machine whose keys a table has, by the table's name."""
-
-_MORE = {"tool": ToolTable, "joints": JointsTable}
-_FOR_SIMULATION = {"drives": "what moves the legs, for simulation", "masses": "what the drives move, for simulation"}
+def _table(first: type, *more: type) -> Any:
+    """Return type and field of the table of some dataclasses; it may be left out where all its keys have defaults."""
+    model: Any = table_of(first, Table)
+    for part in more:
+        model = extended(model.__name__, model, part)
+    needed = any(item.is_needed for part in (first, *more) for item in declared(part))
+    return model, ... if needed else Field(default_factory=model)
 
 
-def _table(name: str, part: type) -> Any:
-    """Return type and field of a table; those for simulation may be left out."""
-    model: Any = extended(_MORE[name].__name__, _MORE[name], part) if name in _MORE else table_of(part, Table)
-    if name in _FOR_SIMULATION:
-        return model, Field(default_factory=model, description=_FOR_SIMULATION[name])
-    return model, ...
-
-
-_TABLES: dict[str, Any] = {name: _table(name, part) for name, part in PARTS.items()}
+_TABLES: dict[str, Any] = {name: _table(*parts) for name, parts in PARTS.items()}
 MachineTables = create_model("MachineTables", __base__=NamedTable, __doc__=NamedTable.__doc__, **_TABLES)
 """A whole machine file."""
 
 FILE_KEYS = {
-    **{item.field: f"{table}.{item.file_key}" for table, part in PARTS.items() for item in declared(part)},
+    **{
+        item.field: f"{table}.{item.file_key}"
+        for table, parts in PARTS.items()
+        for part in parts
+        for item in declared(part)
+    },
     "platform_range": "joints.platform_min_deg",
     "base": "geometry.base_mm",
     "delta": "geometry.delta",
     "offsets": "geometry.platform_mm",
     "guides": "guides.direction",
     "travel": "guides.least_mm",
-    "tool_length": "tool.length_mm",
-    "rapid_velocity": "tool.rapid_mm_min",
 }
-"""The key that sets a field of the parts of a machine."""
+"""The key of a machine file by the field that an error names."""

@@ -1,4 +1,4 @@
-"""Placement optimisation: where to clamp the part, in which component to work, and how to tilt the tool."""
+"""plan: the placement of the part, the component of the machine and the tilt of the tool, by optimisation."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from pentapod.numerics.one_thread import on_one_thread
 from pentapod.planning.diagnosis import refusal
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.placement.base_reconfiguration import reconfigured
-from pentapod.planning.placement.placed_path import PlacedPath, UnplacedPath
-from pentapod.planning.placement.placement import Placement
+from pentapod.planning.placement.placed_path import PlacedPath, Placement, UnplacedPath
 from pentapod.planning.placement.sampling import best_tilted_margins
 from pentapod.planning.placement.search import SOLVERS, Search, Solver, SolverName, search
 from pentapod.planning.placement.secondary_objective import SecondaryObjective, improved, objective_of
@@ -31,7 +30,7 @@ from pentapod.planning.tool_axis.spline import AxisSpline
 from pentapod.toolpath.toolpath import Toolpath
 
 KEPT_SHARE = 0.9
-"""Share of the best smallest margin that is kept when the axis is made smooth."""
+"""Share of the best smallest margin that is kept while the axis is smoothed."""
 
 
 class PlacementOptions(TypedDict):
@@ -42,7 +41,7 @@ class PlacementOptions(TypedDict):
     component: Branch | None
     collision_world: CollisionWorld
     weights: Weights
-    limits: Sequence[LimitKind] | None
+    limits: Sequence[LimitKind]
     solver: SolverName
 
 
@@ -57,21 +56,21 @@ def plan(
     collision_world: CollisionWorld = NOTHING,
     weights: Weights = EVEN,
     secondary_objective: SecondaryObjective | None = None,
-    limits: Sequence[LimitKind] | None = None,
+    limits: Sequence[LimitKind] = (),
     seed: int = 0,
     solver: SolverName = "sequential",
     progress: Progress = silent,
 ) -> PlacedPath | Refusal:
-    """Choose placement, component and tool axes that keep the path well inside the machine's limits.
+    """Return placement, component and tool axes that maximise the smallest margin of the machine's limits on the path.
 
-    tilt: half angle in radians of the cone around the nominal axis within which the tool may lean.
-    constraints: the allowed placements; of them, and of all components where none is given, the one with the largest
-    smallest margin is kept, the margins weighed by `weights`; a machine's guides are chosen with it. collision_world:
-    what legs, spindle and tool must not touch.
-    secondary_objective: a tenth of that margin may be given up for it. limits: the kinds of limits, pentapod's
-    own by default. Deterministic for a seed. Returns a Refusal that names limits, waypoints and shortfalls where the
-    part does not fit. An interruption (Ctrl-C) of the search ends it with the best placement found so far, if that
-    fits; else KeyboardInterrupt is raised.
+    tilt: half angle in radians of the cone around the nominal axis within which the tool may lean. constraints: the
+    allowed placements. component: all are searched where none is given. collision_world: obstacles of legs, spindle and
+    tool. weights: of the groups of margins. The rail positions of a reconfigurable machine are optimised, too.
+    secondary_objective: up to a tenth of the margin is given up for it. limits: kinds of limits besides pentapod's
+    own. Deterministic for a seed.
+
+    Returns a Refusal that names limits, waypoints and shortfalls where the part does not fit. An interruption (Ctrl-C)
+    ends the search with the best placement so far, if that fits; else KeyboardInterrupt is raised.
     """
     problem = PlacementProblem.of(
         ToolpathSamples.of(toolpath, tilt), machine, constraints, weights,
@@ -80,11 +79,11 @@ def plan(
     problem, found = _searched(problem, seed, solver, progress)
     best = found.best
     if best.smallest < NEEDED_MARGIN:
-        progress("placement", 1.0, "it does not fit; looking for what would")
+        progress("placement", 1.0, "it does not fit; trying changes that would help")
         return _refusal(toolpath, problem, best, SOLVERS[solver])
     keep = max(KEPT_SHARE * best.smallest, NEEDED_MARGIN)
     if secondary_objective is not None and (constraints.moves or tilt > 0.0):
-        progress("placement", 1.0, f"margin {best.smallest:.3f}; now for {secondary_objective}")
+        progress("placement", 1.0, f"margin {best.smallest:.3f}; now the objective {secondary_objective}")
         objective = objective_of(secondary_objective, problem, toolpath)
         best = improved(SequentialSolver(problem, constraints.moves), best, objective, keep)
     leans = problem.leans(best.coefficients)
@@ -97,7 +96,7 @@ def plan(
 
 @on_one_thread
 def fits(toolpath: Toolpath, machine: Machine, **options: Unpack[PlacementOptions]) -> bool:
-    """Return whether `plan` finds a placement: the quick answer, without axes along the path and without suggestions.
+    """Return whether `plan` finds a placement, without smoothing the axes and without suggestions.
 
     Raises KeyboardInterrupt where the search is interrupted.
     """
@@ -114,7 +113,7 @@ def fits(toolpath: Toolpath, machine: Machine, **options: Unpack[PlacementOption
 def _searched(
     problem: PlacementProblem, seed: int, solver: SolverName, progress: Progress
 ) -> tuple[PlacementProblem, Search]:
-    """Return what the search found, and the problem: with its machine's guides as chosen, where it has some."""
+    """Return the search and its problem: that of a reconfigurable machine at the rail positions found."""
     if problem.machine.guides is not None:
         return reconfigured(problem, seed=seed, solver=solver, progress=progress)
     return problem, search(problem, seed=seed, solver=solver, progress=progress)
@@ -126,14 +125,14 @@ def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: F
     rail_positions = None if problem.machine.guides is None else tuple(problem.machine.rail_positions.tolist())
     values = at.margins(tips, axes, at.transform)
     placement = Placement(at.transform, chosen_by, rail_positions)
-    return PlacedPath(toolpath, placement, at.margins.component, tips, axes, values, at.margins.limits)
+    return PlacedPath(toolpath, placement, at.margins.scene.branch, tips, axes, values, at.margins.limits)
 
 
 def _refusal(
     toolpath: Toolpath, problem: PlacementProblem, best: Candidate, improves: Callable[[PlacementProblem, bool], Solver]
 ) -> UnplacedPath:
     values, leans = best_tilted_margins(problem.samples, best.margins, best.transform)
-    if (values.min(axis=1) >= NEEDED_MARGIN).all():  # each waypoint alone would do, not all with one smooth field
+    if (values.min(axis=1) >= NEEDED_MARGIN).all():  # each waypoint fits by itself, but not with one smooth field
         leans = problem.leans(best.coefficients)
         poses = problem.samples.machine_poses(best.transform, problem.axes(best.coefficients))
         values = best.margins(*poses, best.transform)

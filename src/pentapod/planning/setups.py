@@ -25,20 +25,20 @@ SLICES = 32
 def setups(
     toolpath: Toolpath, fits: Fits, style: LinkStyle, most: int, whole: Refusal, progress: Progress = silent
 ) -> tuple[Piece, ...] | Refusal:
-    """Return the pieces, at most `most` and at least two, into which a path that does not fit is split; or a refusal.
+    """Return the pieces, two to `most`, into which a path that does not fit is partitioned; or a refusal.
 
-    whole: the refusal of the path in one. Ways to split, each taken with as few pieces as it has: the path in a row,
-    between its passes; the part in slabs across its longest or its second extent; the same with each slab in two,
-    three, … columns. Each piece in turn is made as large as still fits: a piece of what fits fits too, so that no split
-    of the same way has fewer. style: of the ways between cuts where others are left out.
+    whole: the refusal of the undivided path. Schemes, each with its least number of pieces: the path in a row, between
+    its passes; the part in slabs across its longest or its second extent; the same with each slab in two, three, …
+    columns. Greedy: each piece in turn is made as large as still fits. Every part of a piece that fits fits too, so no
+    partition of the same scheme has fewer pieces. style: of the links where cuts are left out.
     """
     search = _Search(toolpath, fits, style, progress)
     best: tuple[Piece, ...] = ()
-    for way in _ways(toolpath, most):
+    for scheme in _schemes(toolpath, most):
         limit = len(best) - 1 if best else most
-        if limit // way.columns < 2:
+        if limit // scheme.columns < 2:
             continue
-        found = search.split(way, limit)
+        found = search.split(scheme, limit)
         best = found if found else best
         if len(best) == 2:
             break
@@ -46,11 +46,11 @@ def setups(
 
 
 @dataclass(frozen=True, eq=False)
-class _Way:
-    """A way to split. ends (E,): where a piece may end, rising, the last being the path's end.
+class _Scheme:
+    """A scheme of partition. ends (E,): possible ends of pieces, ascending, the last is the path's end.
 
-    along: direction 0, 1 or 2 to which ends are coordinates in metres, None where they are waypoints; columns: so many
-    pieces side by side at once, in the direction `across`.
+    along: direction 0, 1 or 2 along which ends are coordinates in metres, None where they are waypoints; columns:
+    number of pieces side by side, in the direction `across`.
     """
 
     name: str
@@ -60,25 +60,25 @@ class _Way:
     across: int = 0
 
 
-def _ways(toolpath: Toolpath, most: int) -> Iterator[_Way]:
+def _schemes(toolpath: Toolpath, most: int) -> Iterator[_Scheme]:
     ends = pass_ends(toolpath).astype(np.float64)
     ends[-1] = len(toolpath) - 1
-    yield _Way("between passes", ends)
+    yield _Scheme("between passes", ends)
     middles = (0.5 * (toolpath.tips[:-1] + toolpath.tips[1:]))[cutting_intervals(toolpath)]
     low, extent = middles.min(axis=0), np.ptp(middles, axis=0)
     longest, second = np.argsort(-extent, kind="stable")[:2].tolist()
     for columns in range(1, most // 2 + 1):
         for along, across in ((longest, second), (second, longest)):
-            # In micrometres, so that people can read them and files hold them.
+            # Whole micrometres, so that they can be read and stored in files.
             steps = np.round(low[along] + extent[along] * np.arange(1, SLICES) / SLICES, 6)
             steps = steps[(steps > low[along]) & (steps < low[along] + extent[along])]
             name = f"across {'xyz'[along]}" + (f" in {columns} columns" if columns > 1 else "")
-            yield _Way(name, np.append(np.unique(steps), np.inf), along, columns, across)
+            yield _Scheme(name, np.append(np.unique(steps), np.inf), along, columns, across)
 
 
 @dataclass(eq=False)
 class _Search:
-    """Looks for splits, and remembers the one that left the least: reached (N − 1,) are the cuts of its pieces."""
+    """Searches for partitions; reached (N − 1,): the cuts of the one so far that leaves the fewest over."""
 
     toolpath: Toolpath
     fits: Fits
@@ -89,44 +89,44 @@ class _Search:
         self.cutting = cutting_intervals(self.toolpath)
         self.reached: Bools = np.zeros_like(self.cutting)
 
-    def split(self, way: _Way, most: int) -> tuple[Piece, ...]:
-        """Return the fewest pieces of one way, at most `most`; none where they are not enough."""
+    def split(self, scheme: _Scheme, most: int) -> tuple[Piece, ...]:
+        """Return the fewest pieces of one scheme, at most `most`; none where they are not enough."""
         pieces: list[Piece] = []
-        reached, start, shelves = np.zeros_like(self.cutting), 0, 0
-        while start < len(way.ends):
+        reached, start, slabs = np.zeros_like(self.cutting), 0, 0
+        while start < len(scheme.ends):
             found = None
-            if len(pieces) + way.columns <= most:
-                self.progress("set-ups", float(reached.mean() / self.cutting.mean()), f"{way.name}: {shelves} so far")
-                found = self._furthest(way, start)
+            if len(pieces) + scheme.columns <= most:
+                self.progress("set-ups", float(reached.mean() / self.cutting.mean()), f"{scheme.name}: {slabs} so far")
+                found = self._furthest(scheme, start)
             if found is None:
                 self.reached = max(self.reached, reached, key=np.count_nonzero)
                 return ()
-            (start, more), shelves = found, shelves + 1
+            (start, more), slabs = found, slabs + 1
             pieces += more
             for piece in more:
                 reached |= piece.cuts(self.toolpath)
         self.reached = reached
-        even = self._even(way, shelves)
+        even = self._even(scheme, slabs)
         return tuple(even if 0 < len(even) <= len(pieces) else pieces)
 
-    def _even(self, way: _Way, shelves: int) -> list[Piece]:
-        """Return as many pieces that share the way evenly, where they fit: none is then tighter than it must be."""
-        edges = [0, *(len(way.ends) * k // shelves for k in range(1, shelves + 1))]
-        pieces = [piece for a, b in pairwise(edges) if b > a for piece in self._pieces(way, a, b - 1)]
+    def _even(self, scheme: _Scheme, slabs: int) -> list[Piece]:
+        """Return the pieces of as many slabs of even size, if they fit; none where they do not."""
+        edges = [0, *(len(scheme.ends) * k // slabs for k in range(1, slabs + 1))]
+        pieces = [piece for a, b in pairwise(edges) if b > a for piece in self._pieces(scheme, a, b - 1)]
         return pieces if self._all_fit(pieces) else []
 
     def _all_fit(self, pieces: list[Piece]) -> bool:
         return all(self.fits(part_of(self.toolpath, piece, self.style)) for piece in pieces)
 
-    def _furthest(self, way: _Way, start: int) -> tuple[int, list[Piece]] | None:
-        """Return the place after the last end that fits, from the one at `start` on, and the pieces; by halving."""
-        # All at once is known not to fit, in columns neither: slabs across the other direction would have.
-        low, high, best = start - 1, len(way.ends) - (start == 0), None
-        middle = start  # the least comes first: where it does not fit nothing does
+    def _furthest(self, scheme: _Scheme, start: int) -> tuple[int, list[Piece]] | None:
+        """Return the index after the last end that fits, at `start` or later, and the pieces; by bisection."""
+        # The whole is known not to fit, nor in columns: slabs across the other direction would have fitted.
+        low, high, best = start - 1, len(scheme.ends) - (start == 0), None
+        middle = start  # the smallest piece first: if it does not fit, none does
         while high - low > 1:
-            pieces = self._pieces(way, start, middle)
+            pieces = self._pieces(scheme, start, middle)
             if self._all_fit(pieces):
-                # The rest may well fit as a whole.
+                # Then the whole rest, which often fits.
                 low, middle = middle, (middle + high) // 2 if middle > start or start == 0 else high - 1
                 best = (low + 1, pieces)
             elif middle == start:
@@ -136,25 +136,20 @@ class _Search:
                 middle = (low + high) // 2
         return best
 
-    def _pieces(self, way: _Way, start: int, end: int) -> list[Piece]:
-        """Return what lies between two ends of a way: one piece, or one for each column; those that hold cuts."""
+    def _pieces(self, scheme: _Scheme, start: int, end: int) -> list[Piece]:
+        """Return the pieces between two ends of a scheme, one for each column; those with cuts."""
         last = len(self.toolpath) - 1
-        before, after = way.ends[start - 1] if start > 0 else -np.inf, way.ends[end]
-        if way.along is None:
+        before, after = scheme.ends[start - 1] if start > 0 else -np.inf, scheme.ends[end]
+        if scheme.along is None:
             return [Piece(0 if start == 0 else int(before), int(after))]
-        shelf = _bounded(Piece(0, last), way.along, before, after)
-        if way.columns == 1:
-            candidates = [shelf]
-        else:
-            middles = 0.5 * (self.toolpath.tips[:-1] + self.toolpath.tips[1:])[shelf.cuts(self.toolpath), way.across]
-            inner = np.linspace(*_ends(middles), way.columns + 1)[1:-1].round(6)
+        slab = _bounded(Piece(0, last), scheme.along, before, after)
+        candidates, cuts = [slab], slab.cuts(self.toolpath)
+        if scheme.columns > 1 and cuts.any():
+            middles = 0.5 * (self.toolpath.tips[:-1] + self.toolpath.tips[1:])[cuts, scheme.across]
+            inner = np.linspace(float(middles.min()), float(middles.max()), scheme.columns + 1)[1:-1].round(6)
             borders = [-np.inf, *inner.tolist(), np.inf]
-            candidates = [_bounded(shelf, way.across, a, b) for a, b in pairwise(borders) if a < b]
+            candidates = [_bounded(slab, scheme.across, a, b) for a, b in pairwise(borders) if a < b]
         return [piece for piece in candidates if piece.cuts(self.toolpath).any()]
-
-
-def _ends(values: Floats) -> tuple[float, float]:
-    return (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
 
 
 def _bounded(piece: Piece, along: int, low: float, high: float) -> Piece:
@@ -165,10 +160,10 @@ def _bounded(piece: Piece, along: int, low: float, high: float) -> Piece:
 
 
 def _refusal(search: _Search, most: int, whole: Refusal) -> Refusal:
-    """Return the refusal of a path in set-ups: what was left over, and what was in the way of the whole."""
+    """Return the refusal of a path in set-ups: the cuts left over, and the diagnosis of the whole."""
     left = tuple((a, b) for a, b in marked_runs(search.cutting & ~search.reached).tolist())
     share = 100.0 * float(search.reached.sum() / search.cutting.sum())
-    reached = f"the best split found reaches {share:.0f} % of the cuts"
+    reached = f"the best partition found makes {share:.0f} % of the cuts"
     cause = f"{most} set-ups are not enough: {reached}; in one set-up {whole.cause}"
     over = Shortfall(f"beyond {most} set-ups", left, 0.0, "")
     return replace(whole, cause=cause, diagnosis=(over, *whole.diagnosis), remedy=f"Try more set-ups. {whole.remedy}")

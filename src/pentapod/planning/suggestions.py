@@ -1,4 +1,4 @@
-"""Suggestions for a part that does not fit, found by trying: another place, a wider tilt cone, a smaller region."""
+"""Suggestions for a part that does not fit: another placement, a wider tilt cone, a smaller region, each tried."""
 
 from __future__ import annotations
 
@@ -19,12 +19,13 @@ Raise = Callable[[PlacementProblem, Candidate], Candidate]
 class SuggestionOptions:
     """What is tried.
 
-    wider_deg: by how much the cone is widened, up to widest_deg. halvings: steps of the bisection for the largest
-    region; smallest_share: of the path's extents, below which none is suggested.
+    wider_deg: widenings of the cone, up to widest_deg. first_share: of the path's extents, the first region tried;
+    halvings: steps of the bisection for the largest one; smallest_share: the smallest one suggested.
     """
 
     wider_deg: tuple[float, ...] = (5.0, 10.0, 20.0)
     widest_deg: float = 45.0
+    first_share: float = 0.6
     halvings: int = 4
     smallest_share: float = 0.25
 
@@ -33,7 +34,7 @@ _OPTIONS = SuggestionOptions()
 
 
 def suggestions(problem: PlacementProblem, best: Candidate, improve: Raise, needed: float) -> tuple[str, ...]:
-    """Return what was tried near the best candidate and would do, each a phrase for "Try to …"; maybe nothing."""
+    """Return the changes near the best candidate that make the part fit, as phrases for "Try to …"; maybe none."""
     phrases = [_move(problem, best, improve, needed)] if problem.constraints is not FREE else []
     if problem.constraints.moves:
         phrases += [_cone(problem, best, improve, needed), _region(problem, best, improve, needed)]
@@ -41,6 +42,7 @@ def suggestions(problem: PlacementProblem, best: Candidate, improve: Raise, need
 
 
 def _move(problem: PlacementProblem, best: Candidate, improve: Raise, needed: float) -> str:
+    """Suggest the move to a placement that fits, where the constraints exclude it."""
     moved = improve(replace(problem, constraints=FREE), best)
     if moved.smallest < needed:
         return ""
@@ -52,32 +54,22 @@ def _move(problem: PlacementProblem, best: Candidate, improve: Raise, needed: fl
 
 
 def _cone(problem: PlacementProblem, best: Candidate, improve: Raise, needed: float) -> str:
-    """Return the least of a few wider cones that was found to do; the widest is tried first: it may not do either."""
-    samples = problem.samples
-    wider = [
-        float(tilt) for tilt in samples.tilt + np.radians(_OPTIONS.wider_deg) if tilt <= np.radians(_OPTIONS.widest_deg)
-    ]
-
-    def fits(tilt: float) -> bool:
-        there = problem.along(replace(samples, tilt=tilt))
-        return improve(there, first_candidate(there, best.margins, best.transform)).smallest >= needed
-
-    enough = 0.0
-    for tilt in reversed(wider):
-        if not fits(tilt):
+    """Suggest the narrowest of a few wider cones with which the part fits; the widest is tried first."""
+    enough, wider = 0.0, problem.samples.tilt + np.radians(_OPTIONS.wider_deg)
+    for tilt in wider[wider <= np.radians(_OPTIONS.widest_deg)].tolist()[::-1]:
+        there = problem.along(replace(problem.samples, tilt=tilt))
+        if improve(there, first_candidate(there, best.margins, best.transform)).smallest < needed:
             break
         enough = tilt
-    if enough == 0.0:
-        return ""
-    return f"allow a tilt of {np.degrees(enough):.0f}°, which is enough"
+    return f"allow a tilt of {np.degrees(enough):.0f}°, which is enough" if enough else ""
 
 
 def _region(problem: PlacementProblem, best: Candidate, improve: Raise, needed: float) -> str:
-    """Return the largest box about the path's middle, in proportion to its extents, that was found to fit."""
+    """Suggest the largest box about the path's middle, in proportion to its extents, that was found to fit."""
     low, high = problem.samples.tilt_centres.min(axis=0), problem.samples.tilt_centres.max(axis=0)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     fits, too_large, start = 0.0, 1.0, best
-    share = 0.6
+    share = _OPTIONS.first_share
     for _ in range(_OPTIONS.halvings):
         inside = np.flatnonzero((np.abs(problem.samples.tilt_centres - middle) <= share * half + 1e-9).all(axis=1))
         found = None

@@ -6,7 +6,7 @@ from html import escape
 
 from pentapod.job.outcome import Outcome
 from pentapod.mesh.mesh import Mesh
-from pentapod.planning.active_limits import ActiveLimit, active_limits
+from pentapod.planning.diagnosis import ActiveLimit, active_limits
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.report.figure import DETAIL
 from pentapod.report.held import held_mesh

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from pentapod.kinematics import LinearPentapod, architectural_measure
-from pentapod.machine import Machine
-from pentapod.machine.report.work_volume import sample_work_volume
+from pentapod.machine import Machine, sample_work_volume
 from pentapod.numerics.kernels import kernels_used
 
 DISTANCES = [10.0**-k for k in range(10)]

@@ -12,8 +12,7 @@ from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.planning.leg_path.leg_path import LegPath, leg_path
-from pentapod.planning.placement.placed_path import PlacedPath
-from pentapod.planning.placement.placement import Placement
+from pentapod.planning.placement.placed_path import PlacedPath, Placement
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 TOLERANCE, AXIS_TOLERANCE = 20e-6, np.radians(0.1)

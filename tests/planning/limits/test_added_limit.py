@@ -14,10 +14,8 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.kinematics.forces import leg_force_map
 from pentapod.planning import PlacedPath, PlacementConstraints, Weights, plan
-from pentapod.planning.active_limits import active_limits
-from pentapod.planning.diagnosis import diagnose
+from pentapod.planning.diagnosis import active_limits, diagnose
 from pentapod.planning.limits.limit import LimitKind
-from pentapod.planning.limits.margins import LIMITS
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 
@@ -66,7 +64,7 @@ def solved(matrix, right):
 
 
 def with_force(largest):
-    return (*LIMITS.own.values(), LimitKind(lambda _: [LegForce(largest)]))
+    return (LimitKind(lambda _: [LegForce(largest)]),)
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +103,7 @@ def test_an_added_limit_is_named_in_the_diagnosis(desk, cap):
     problem = PlacementProblem.of(ToolpathSamples.of(cap, 0.0), desk, component=PLUS, limits=with_force(1.0))
     margins, here = problem.margins[0], RigidTransform(np.diag([1.0, -1.0, -1.0]), desk.work.centre)
     values = problem.values(margins, here, problem.upright)
-    named = {blame.constraint: blame for blame in diagnose(values, margins, 0.0)}
+    named = {shortfall.constraint: shortfall for shortfall in diagnose(values, margins, 0.0)}
     tips, axes = problem.samples.machine_poses(here, cap.axes)
     needed = forces(desk, tips, axes).max() - 1.0
     assert named["force in a leg"].unit == "N"

@@ -227,10 +227,10 @@ def test_a_refusal_names_the_fixture(desk, problem, free):
     plate.apply_translation([0.0, 0.0, 0.16])
     margins = Margins.of(desk, PLUS, CollisionWorld((Obstacle("fixture", surface_of(plate), clamped=True),)))
     values = problem.values(margins, free.transform, free.coefficients)
-    blamed = {b.constraint: b for b in diagnose(values, margins, 0.02) if b.constraint.endswith("touches the fixture")}
-    assert "spindle touches the fixture" in blamed
-    assert all(b.unit == "mm" and b.shortfall > 0.0 and b.waypoints for b in blamed.values())
-    depth = blamed["spindle touches the fixture"].shortfall
+    named = {b.constraint: b for b in diagnose(values, margins, 0.02) if b.constraint.endswith("touches the fixture")}
+    assert "spindle touches the fixture" in named
+    assert all(b.unit == "mm" and b.shortfall > 0.0 and b.waypoints for b in named.values())
+    depth = named["spindle touches the fixture"].shortfall
     assert depth >= 1e3 * desk.bodies.shaft_radius
 
 

@@ -19,7 +19,7 @@ from pentapod.planning.placement.curvature import Curvature
 from pentapod.planning.placement.rail_positions import at_rail_positions
 from pentapod.planning.placement.search import search
 from pentapod.planning.problem.constraints import PlacementConstraints
-from pentapod.planning.problem.formulation import guide_function, step_slopes, stepped
+from pentapod.planning.problem.formulation import point_function, step_slopes, stepped
 from pentapod.planning.problem.linear_model import LinearModel
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
@@ -64,10 +64,11 @@ def test_derivatives_are_those_of_the_machine_with_its_guides_moved(sliding, her
         turned = place.rotate(axis / np.linalg.norm(axis))
         return Margins.of(machine, COMPONENT)(place.apply(task.tilt_centres[k]) - task.tilt_centre * turned, turned)
 
-    point = guide_function(problem, margins)
+    kinds = range(len(margins.limits))
+    point = point_function(problem, margins, kinds, by="step and lean", guides=True)
     x = np.concatenate([step, slid, a])
     given = (slid, step, a, task.tilt_centres[k], task.nominal[k], pair, here.rotation, here.translation, np.zeros(0))
-    found, slopes = (output.full() for output in point.call(list(given)))
+    found, _, slopes = (output.full() for output in point.call(list(given)))
     rows = [j for j, limit in enumerate(margins.limits) if "spindle" not in limit.name]
     np.testing.assert_allclose(np.ravel(found)[rows], values(x)[rows], atol=1e-12)
     steps = 1e-6 * np.eye(len(x))
@@ -125,7 +126,7 @@ def test_slides_as_good_as_those_of_another_method(sliding, here):
     rail_positions = there.machine.rail_positions
     assert ((rail_positions >= least) & (rail_positions <= greatest)).all()
     assert there.candidate(found.best.margins, here, found.best.coefficients).smallest == found.best.smallest
-    assert found.best.margins.machine is there.machine
+    assert found.best.margins.scene.machine is there.machine
 
 
 def test_a_plan_says_where_the_guides_stand(sliding, here, desk):

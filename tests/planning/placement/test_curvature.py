@@ -23,7 +23,7 @@ def test_curvature_against_differences(desk, cap):
     strokes = np.flatnonzero(["too" in at.margins.limits[k].name for k in model.kinds])  # smooth everywhere
     multipliers = np.zeros(len(model.values))
     multipliers[rng.choice(strokes, 8, replace=False)] = rng.uniform(0.1, 1.0, 8)
-    bent = Curvature(problem, at.margins)._of_margins(model, at, multipliers)
+    bent = Curvature(problem, at.margins).of_margins(model, at, multipliers)
 
     def weighed(x):
         step, change = model.step_of(x)

@@ -34,7 +34,7 @@ def names(margins):
 
 def test_what_does_not_fit_alone_is_answered_without_obstacles(desk, wide, collision_world):
     problem = PlacementProblem.of(ToolpathSamples.of(wide, 0.2), desk, component=PLUS, collision_world=collision_world)
-    alone = search(problem.alone(), options=SearchOptions(tried=2))
+    alone = search(problem.without_collision_world(), options=SearchOptions(tried=2))
     found = search(problem, options=SearchOptions(tried=2, hopeless=np.inf))
     assert found.best.smallest == alone.best.smallest < NEEDED_MARGIN
     assert names(found.best.margins) == names(Margins.of(desk, PLUS))

@@ -15,7 +15,7 @@ from pentapod.planning.problem.linear_model import REACH
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
-from pentapod.planning.tool_axis.smoothing import SLACK
+from pentapod.planning.tool_axis.smoothing import OPTIONS
 from pentapod.planning.tool_axis.spline import AxisSpline
 
 TILT = np.radians(15.0)
@@ -69,7 +69,7 @@ def test_smooth_axes_match_the_reference(problem, raised):
     keep, spline = 0.9 * raised.smallest, AxisSpline.of(problem.samples, problem.cone)
     ours = SequentialSolver(problem, free=False).smooth(raised, keep)
     reference = IpoptSolver(problem, free=False).smooth(raised, keep)
-    assert problem.values_of(raised.margins, raised.transform, spline.leans(ours)).min() >= keep - SLACK
+    assert problem.values_of(raised.margins, raised.transform, spline.leans(ours)).min() >= keep - OPTIONS.slack
     assert np.linalg.norm(spline.leans(ours), axis=1).max() <= problem.cone * (1.0 + 1e-12)
     assert spline.cost_of(ours) <= 1.001 * spline.cost_of(reference)
     assert spline.cost_of(ours) < spline.cost_of(spline.fitted(problem.leans(raised.coefficients)))

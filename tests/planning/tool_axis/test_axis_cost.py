@@ -6,8 +6,7 @@ import pytest
 from planning_instances import instances
 
 from pentapod.planning.leg_path.leg_path import leg_path
-from pentapod.planning.placement.placed_path import PlacedPath
-from pentapod.planning.placement.placement import Placement
+from pentapod.planning.placement.placed_path import PlacedPath, Placement
 from pentapod.planning.placement.sampling import SamplingOptions, first_candidate, first_guesses
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.problem import PlacementProblem
@@ -15,7 +14,7 @@ from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.tool_axis.cost import AxisCost, CostOptions
 from pentapod.planning.tool_axis.smoothing import SmoothingOptions, smoothed
-from pentapod.planning.tool_axis.spline import BANDS, FORESIGHT_M, AxisSpline
+from pentapod.planning.tool_axis.spline import BANDS, OPTIONS, AxisSpline
 
 KEPT = 0.9
 COST = CostOptions()
@@ -61,7 +60,7 @@ def test_strict_normals_are_not_charged(made):
 def test_charges_are_sums_over_the_nodes(made, desk):
     """Node by node, from lengths of the robot's own kinematics and axes themselves, in plain loops."""
     problem, at, cost = made
-    c, way = random_coefficients(problem), spline_of(problem).way
+    c, way = random_coefficients(problem), spline_of(problem).stations
 
     def bent(legs):
         before, after = np.diff(way)[:-1, None], np.diff(way)[1:, None]
@@ -71,19 +70,21 @@ def test_charges_are_sums_over_the_nodes(made, desk):
     worst = strict.max(axis=1)
     nominal = problem.samples.nominal[spline_of(problem).nodes]
     rates = np.linalg.norm(np.diff(nominal, axis=0), axis=1) / np.diff(way)
-    price = CostOptions().weight * FORESIGHT_M**2 * ((np.diff(way) * rates**2).sum() / (way[-1] - way[0]) + 0.1**2)
+    price = (
+        CostOptions().weight * OPTIONS.foresight**2 * ((np.diff(way) * rates**2).sum() / (way[-1] - way[0]) + 0.1**2)
+    )
     charge = 0.0
     for j, row in enumerate(ours):
         excess = np.maximum(row - worst[j] - 0.01 * np.median(worst), 0.0) / (worst[j] + 0.5 * np.median(worst))
         charge += price * 0.5 * (way[j + 2] - way[j]) / (way[-1] - way[0]) * (excess**2).sum()
-    assert cost.hard.of(np.abs(cost.bends(c))) == pytest.approx(charge, rel=1e-6)
+    assert cost.of_bends.of(np.abs(cost.bends(c))) == pytest.approx(charge, rel=1e-6)
 
 
 def test_rates_are_those_of_the_axes(made):
     """Told in pairs that are carried along they have the length of the axes' own, but for what lies along the axis."""
     problem, _, cost = made
     c = random_coefficients(problem, 0.05)
-    rows, way = spline_of(problem).nodes, spline_of(problem).way
+    rows, way = spline_of(problem).nodes, spline_of(problem).stations
     axes = lean(problem.samples.nominal, spline_of(problem).leans(c))[rows]
     true = np.linalg.norm(np.diff(axes, axis=0), axis=1) / np.diff(way)
     np.testing.assert_allclose(np.linalg.norm(cost.rates(c), axis=1), true, rtol=0.02, atol=0.02 * true.max())
@@ -152,7 +153,7 @@ def accelerations(instance, problem, at, desk, axes):
     tips, turned = problem.samples.machine_poses(at.transform, axes)
     values = at.margins(tips, turned, at.transform)
     placement = Placement(at.transform, "test")
-    placed = PlacedPath(instance.toolpath, placement, at.margins.component, tips, turned, values, at.margins.limits)
+    placed = PlacedPath(instance.toolpath, placement, at.margins.scene.branch, tips, turned, values, at.margins.limits)
     path = leg_path(placed, desk, path_tolerance=20e-6, axis_tolerance=np.radians(0.5))
     parameter = np.linspace(0.0, path.length, 20_000)
     tip, axis = path.pose(parameter)

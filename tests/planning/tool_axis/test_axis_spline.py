@@ -13,7 +13,7 @@ from pentapod.planning.placement.sampling import SamplingOptions, first_candidat
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.tool_axis.smoothing import smoothed
-from pentapod.planning.tool_axis.spline import BANDS, FORESIGHT_M, UPRIGHT_WEIGHT, AxisSpline
+from pentapod.planning.tool_axis.spline import BANDS, OPTIONS, AxisSpline
 
 CONE = 0.3
 
@@ -55,8 +55,8 @@ def test_the_cost_is_the_mean_square_of_rates_and_bends():
     frequency = 2.0 * np.pi / wavelength
     lean = np.zeros((len(x), 3))
     lean[:, 0] = 0.1 * np.sin(frequency * x)
-    share = (FORESIGHT_M * frequency) ** 2
-    expected = 0.5 * 0.1**2 * (share**2 + share + UPRIGHT_WEIGHT)
+    share = (OPTIONS.foresight * frequency) ** 2
+    expected = 0.5 * 0.1**2 * (share**2 + share + OPTIONS.upright_weight)
     assert spline.cost_of(spline.fitted(lean)) == pytest.approx(expected, rel=0.01)
 
 

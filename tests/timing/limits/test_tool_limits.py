@@ -10,7 +10,7 @@ from test_retime import nod
 from timing_paths import Path, Piece, by_tip, circle, line, machine, nodding, raster
 
 from pentapod.base.errors import MachineError
-from pentapod.machine.tool_limits import ToolLimits
+from pentapod.machine.parts import ToolLimits
 from pentapod.timing import Trajectory, certify, explain, override, retime
 from pentapod.timing.limits.polytopes import across_path, polygon, polyhedron
 

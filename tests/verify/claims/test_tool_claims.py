@@ -7,7 +7,7 @@ import pytest
 import replay_cases as cases
 from scipy.interpolate import CubicSpline
 
-from pentapod.machine.tool_limits import ToolLimits
+from pentapod.machine.parts import ToolLimits
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import verify
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pentapod.base.refusal import Refusal
-    from pentapod.planning.active_limits import ActiveLimit
+    from pentapod.planning.diagnosis import ActiveLimit
 
 MOST_RANGES = 6
 """Ranges of waypoints that a row shows."""

@@ -35,7 +35,7 @@ def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int
     from pentapod.job.pipeline import run
     from pentapod.job.schema.job import Job
     from pentapod.planning import PlacedPath
-    from pentapod.planning.active_limits import active_limits
+    from pentapod.planning.diagnosis import active_limits
     from pentapod.report import write_report
     from pentapod.timing import Explanation
 
@@ -72,7 +72,7 @@ def _explained(outcome: Outcome) -> str:
     from pentapod.cli.commands.explain import limits_text, shortfalls_text
     from pentapod.job.outcome import SetUps
     from pentapod.planning import PlacedPath
-    from pentapod.planning.active_limits import active_limits
+    from pentapod.planning.diagnosis import active_limits
 
     if (setups := outcome.find(SetUps)) is not None:
         return "\n\n".join(f"{part.folder}\n{_explained(part.outcome)}" for part in setups.parts)

@@ -1,4 +1,4 @@
-"""Limits from a job: pentapod's own, and those of installed packages that [limits] names."""
+"""Limits from a job: those of installed packages that [limits] names."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pentapod.timing.limits.limits import PLUGGED
 
 
 def placement_limits(job: Job) -> tuple[LimitKind, ...]:
-    """Return the kinds of limits that a job's placement keeps. Raises InputError: one cannot be loaded."""
-    return (*LIMITS.own.values(), *(LIMITS.find(name) for name in job.limits.use if name in LIMITS.added))
+    """Return the limits on poses besides pentapod's own. Raises InputError: one cannot be loaded."""
+    return tuple(LIMITS.find(name) for name in job.limits.use if name in LIMITS.added)
 
 
 def timing_limits(job: Job, machine: Machine) -> tuple[Limit, ...]:

@@ -13,8 +13,7 @@ from pentapod.base.progress import Progress, silent
 from pentapod.base.units import from_si
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
-from pentapod.machine.parts import ControllerSettings
-from pentapod.machine.tool_limits import ToolLimits
+from pentapod.machine.parts import ControllerSettings, ToolLimits
 from pentapod.mesh.io.load import load_mesh
 from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.axis.orientation import Orientation

@@ -18,7 +18,7 @@ from pentapod.base.units import to_si
 from pentapod.job.schema.placement import FixtureTable, PlacementTable
 from pentapod.job.schema.strategies import ToolpathTable, strategy_table
 from pentapod.job.schema.tool import AnyTool, tool_table
-from pentapod.machine.tool_limits import ToolLimits
+from pentapod.machine.parts import ToolLimits
 from pentapod.mesh.region import Region
 from pentapod.toolpath.axis.orientation import Orientation
 from pentapod.toolpath.gouge.report import GougeOptions

@@ -1,13 +1,13 @@
-"""Kinematic calibration: the geometry of a machine from poses that an instrument measured and what its legs read there.
+"""Kinematic calibration: the geometry of a machine from measured poses and the leg readings at them.
 
 Each leg has six unknowns: its base joint (x, y, z), the offset of its platform joint, the radius of its ring and the
 zero of its scale. The instrument defines the frame: a common error of its frame shows as moved base joints, one of the
-point p on the line as equal changes of all offsets. What the measured poses cannot tell apart stays at its nominal
-value, and is named.
+point p on the line as equal changes of all offsets. Parameters that the measured poses cannot distinguish stay at their
+nominal values, and are named.
 
-The fit is generalised least squares: errors of a measured pose enter all five readings, so they are weighed by the
-readings' 5 × 5 covariance Σ = σ_l² 1 + σ_p² J_p J_pᵀ + σ_i² J_i J_iᵀ at each pose, J = `jacobian` of the nominal
-machine with J_i restricted to changes of a unit direction. Where σ_l is not given, `leg_noise` estimates it.
+The fit is generalised least squares: errors of a measured pose enter all readings, so they are weighted by the
+readings' covariance Σ = σ_l² 1 + σ_p² J_p J_pᵀ + σ_i² J_i J_iᵀ at each pose, J = `jacobian` of the nominal machine with
+J_i restricted to changes of a unit direction. Where σ_l is not given, `leg_noise` estimates it.
 """
 
 from __future__ import annotations
@@ -26,30 +26,46 @@ from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.machine.calibration.leg_noise import restricted_sigma
 
 _KINDS = ("x", "y", "z", "offset", "radius", "zero")
-LEGS, _EACH, _ZERO = FiveLegs.n_legs, 6, 5
-"""Legs; numbers of each leg: x, y, z, offset, radius, zero; the place of the zero among them."""
+LEGS, _EACH, _RADIUS, _ZERO = FiveLegs.n_legs, 6, 4, 5
+"""Legs; numbers of each leg: x, y, z, offset, radius, zero; the places of radius and zero among them."""
 
-_GROUPS = {"base": (0, 1, 2), "offsets": (3,), "zeros": (_ZERO,), "radii": (4,)}  # who is identified first
-PARAMETERS = tuple(f"leg {leg} {kind}" for leg in range(1, 6) for kind in _KINDS)
+_GROUPS = {"base": (0, 1, 2), "offsets": (3,), "zeros": (_ZERO,), "radii": (_RADIUS,)}  # in order of identification
+PARAMETERS = tuple(f"leg {leg} {kind}" for leg in range(1, LEGS + 1) for kind in _KINDS)
 """The 30 parameters in the order of `Calibration.covariance`."""
 
-_ROUNDS = 50
-_FIRST_GUESS = 1e-6  # metres, of leg_sigma
-_NOISE_ROUNDS = 12
-_SAME_NOISE = 1e-3  # a relative change of leg_sigma that is none
-_DEPENDENT = 1e-7  # of a column's length: what is left of it beside the others counts as rounding and curvature
+
+@dataclass(frozen=True)
+class CalibrationOptions:
+    """When the iterations end.
+
+    rounds: Gauss-Newton steps at most. settled: relative change of the parameters below which they end. noise_rounds:
+    fits at most while leg_sigma is estimated; same_noise: its relative change below which they end. first_sigma: the
+    first leg_sigma, metres. dependent: share of a column's length left beside the other columns that counts as rounding
+    and curvature. negligible: smaller coefficients are not named in a gauge.
+    """
+
+    rounds: int = 50
+    settled: float = 1e-13
+    noise_rounds: int = 12
+    same_noise: float = 1e-3
+    first_sigma: float = 1e-6
+    dependent: float = 1e-7
+    negligible: float = 5e-3
+
+
+OPTIONS = CalibrationOptions()
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration(Value):
-    """What a calibration found.
+    """The result of a calibration.
 
-    machine: the geometry; what could not be identified is nominal. covariance (30, 30): of the `PARAMETERS`, m²; rows
-    of what is held are zero. identified, held: their names. gauges: for each parameter that the poses cannot tell
-    from others, which changes together change no reading. at_bound: radii that the fit would make negative, held at 0.
-    residuals (N, 5): readings minus those of the machine, metres. leg_sigma: metres, as given or as estimated from the
-    residuals. chi_square: the sum of squares of the whitened residuals; freedom: its expected value. converged: whether
-    the iteration settled.
+    machine: the geometry; parameters that could not be identified are nominal. covariance (30, 30): of the
+    `PARAMETERS`, m²; rows of held ones are zero. identified, held: their names. gauges: for each parameter that the
+    poses cannot distinguish from others, which changes together change no reading. at_bound: radii that the fit would
+    make negative, held at 0. residuals (N, 5): readings minus those of the machine, metres. leg_sigma: metres, as given
+    or as estimated from the residuals. chi_square: sum of squares of the whitened residuals; freedom: its expected
+    value. converged: whether the iteration has converged.
     """
 
     machine: AsBuiltPentapod
@@ -92,8 +108,8 @@ def calibrate(
 
     Metres, machine frame. The sigmas are standard deviations: of each reading (metres; estimated from the residuals
     where None), of each coordinate of a measured position (metres), of a direction to either side (radians). identify:
-    which groups of parameters, the others are nominal. limit: metres; a parameter that could be off by more than this
-    (one standard deviation) when those before it are known is not identified.
+    groups of parameters; the others are nominal. limit: metres; a parameter whose standard deviation, with those before
+    it known, exceeds this is not identified.
 
     Raises ArrayError: wrong shapes, numbers that are not finite, directions that are not unit vectors, sigmas that are
     negative or all zero, unknown groups, too few readings to estimate leg_sigma from.
@@ -113,10 +129,10 @@ def calibrate(
     fit = _Fit(p, i, readings, start, position_sigma, direction_sigma)
     if leg_sigma is not None:
         return fit.run(wanted, leg_sigma, limit, known=True)
-    guess = last = _FIRST_GUESS
-    for _ in range(_NOISE_ROUNDS):  # the estimate decides what is identified, and that changes the estimate
+    guess = last = OPTIONS.first_sigma
+    for _ in range(OPTIONS.noise_rounds):  # the estimate decides what is identified, and that changes the estimate
         guess, last = fit.run(wanted, guess, limit, known=False).leg_sigma, guess
-        if abs(guess - last) <= _SAME_NOISE * guess:
+        if abs(guess - last) <= OPTIONS.same_noise * guess:
             break
     else:
         guess = max(guess, last)
@@ -128,25 +144,32 @@ class _Fit:
 
     def __init__(self, p: Floats, i: Floats, readings: Floats, start: AsBuiltPentapod, s_p: float, s_i: float) -> None:
         self.p, self.i, self.readings, self.start = p, i, readings, start
-        self.pose_sigmas = (s_p, s_i)
+        jacobian = start.jacobian(p, i)
+        by_p, by_i = jacobian[..., :3], jacobian[..., 3:]
+        by_i = by_i - np.einsum("nkc,nc->nk", by_i, i)[..., None] * i[:, None]
+        # Covariances (N, 5, 5) of the readings that the errors of the measured poses alone would give.
+        self.pose_covariances = s_p**2 * by_p @ by_p.swapaxes(1, 2) + s_i**2 * by_i @ by_i.swapaxes(1, 2)
 
     def run(self, wanted: list[int], leg_sigma: float, limit: float, *, known: bool) -> Calibration:
-        """Fit the wanted kinds of parameters. known: whether leg_sigma is to be believed."""
-        theta = _flat(self.start)
-        columns, weights = self._jacobian(theta), self._whitening(leg_sigma)
-        free, gauges = _identifiable(columns, self._marginal_sigmas(leg_sigma), wanted, limit)
+        """Fit the wanted kinds of parameters. known: whether leg_sigma is given, not estimated."""
+        start = self.start
+        theta = np.c_[start.base, start.offsets, start.radii, start.zeros].ravel()
+        covariances = self.pose_covariances + leg_sigma**2 * np.eye(LEGS)
+        weights = np.asarray(np.linalg.inv(np.linalg.cholesky(covariances)), dtype=np.float64)  # W Σ Wᵀ = 1
+        sigmas = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+        free, gauges = _identifiable(self._jacobian(theta), sigmas, wanted, limit)
         bound: list[int] = []
         residual, converged = self._residuals(theta), False
-        for _ in range(_ROUNDS):
-            a, b = self._whitened(self._jacobian(theta), weights), self._whitened_residual(residual, weights)
+        for _ in range(OPTIONS.rounds):
+            a, b = _whitened(self._jacobian(theta), weights), (weights @ residual[..., None]).ravel()
             step, bound = _bounded_step(a, b, theta, free)
-            change = np.zeros(30)
+            change = np.zeros(len(PARAMETERS))
             change[[k for k in free if k not in bound]] = step
-            converged = bool(np.abs(change).max(initial=0.0) < 1e-13 * max(1.0, float(np.abs(theta).max())))
+            converged = bool(np.abs(change).max(initial=0.0) < OPTIONS.settled * max(1.0, float(np.abs(theta).max())))
             theta, residual = self._moved(theta, change, float(b @ b), weights)
             if converged:
                 break
-        a, b = self._whitened(self._jacobian(theta), weights), self._whitened_residual(residual, weights)
+        a, b = _whitened(self._jacobian(theta), weights), (weights @ residual[..., None]).ravel()
         inner = [k for k in free if k not in bound]
         freedom, chi_square = residual.size - len(inner), float(b @ b)
         if not known:
@@ -155,10 +178,10 @@ class _Fit:
                     f"{residual.size} readings cannot tell their own errors from {len(inner)} parameters",
                     expected="more poses, or leg_sigma",
                 )
-            columns = self._whitened(self._jacobian(theta), np.eye(LEGS)).reshape(-1, LEGS, LEGS * _EACH)[..., inner]
+            columns = _whitened(self._jacobian(theta), np.eye(LEGS)).reshape(-1, LEGS, LEGS * _EACH)[..., inner]
             longest = float(np.abs(self.readings).max())
-            leg_sigma = restricted_sigma(columns, residual, self._pose_covariances(), longest)
-        covariance = np.zeros((30, 30))
+            leg_sigma = restricted_sigma(columns, residual, self.pose_covariances, longest)
+        covariance = np.zeros((len(PARAMETERS), len(PARAMETERS)))
         if inner:
             r = np.linalg.qr(a[:, inner], mode="r")
             half = np.linalg.solve(r, np.eye(len(inner)))
@@ -181,9 +204,10 @@ class _Fit:
         """Return the parameters after the change, or so much of it as does not raise the cost, and the residuals."""
         share = 1.0
         while True:
-            trial = _clamped(theta + share * change)
+            trial = theta + share * change
+            trial[_RADIUS::_EACH] = np.maximum(trial[_RADIUS::_EACH], 0.0)
             residual = self._residuals(trial)
-            b = self._whitened_residual(residual, weights)
+            b = (weights @ residual[..., None]).ravel()
             if float(b @ b) <= cost * (1.0 + 1e-12) + 1e-300 or share < 1e-6:
                 return trial, residual
             share *= 0.5
@@ -203,30 +227,10 @@ class _Fit:
         rest = np.stack([-along / length, -across / length, np.ones_like(length)], axis=-1)
         return np.concatenate([by_base, rest], axis=-1)
 
-    def _pose_covariances(self) -> Floats:
-        """Return the covariance (N, 5, 5) of readings that the errors of the measured poses alone would give."""
-        jacobian = self.start.jacobian(self.p, self.i)
-        by_p, by_i = jacobian[..., :3], jacobian[..., 3:]
-        by_i = by_i - np.einsum("nkc,nc->nk", by_i, self.i)[..., None] * self.i[:, None]
-        s_p, s_i = self.pose_sigmas
-        return s_p**2 * by_p @ by_p.swapaxes(1, 2) + s_i**2 * by_i @ by_i.swapaxes(1, 2)
 
-    def _covariances(self, leg_sigma: float) -> Floats:
-        return self._pose_covariances() + leg_sigma**2 * np.eye(LEGS)
-
-    def _whitening(self, leg_sigma: float) -> Floats:
-        """Return W (N, 5, 5) with W Σ Wᵀ = 1."""
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(self._covariances(leg_sigma))), dtype=np.float64)
-
-    def _marginal_sigmas(self, leg_sigma: float) -> Floats:
-        return np.sqrt(np.diagonal(self._covariances(leg_sigma), axis1=1, axis2=2))
-
-    def _whitened(self, columns: Floats, weights: Floats) -> Floats:
-        """Return the whitened derivatives by all 30 parameters (5 N, 30)."""
-        return (weights[..., None] * columns[:, None]).reshape(-1, 30)
-
-    def _whitened_residual(self, residual: Floats, weights: Floats) -> Floats:
-        return (weights @ residual[..., None]).ravel()
+def _whitened(columns: Floats, weights: Floats) -> Floats:
+    """Return the whitened derivatives by all parameters (5 N, 30), of those (N, 5, 6) of each leg by its own."""
+    return (weights[..., None] * columns[:, None]).reshape(-1, len(PARAMETERS))
 
 
 def _identifiable(
@@ -235,8 +239,8 @@ def _identifiable(
     """Return the indices of the identifiable parameters, and the gauge freedoms by name.
 
     columns (N, 5, 6): derivatives of the readings, sigmas (N, 5) their errors. Legs share no parameter, so each is
-    looked at by itself: in the order wanted, a parameter joins when what is left of its column beside those before it
-    determines it.
+    treated by itself: in the order wanted, a parameter is identifiable if the part of its column that is orthogonal to
+    those before it determines it.
     """
     free: list[int] = []
     gauges: list[str] = []
@@ -247,12 +251,14 @@ def _identifiable(
             others = np.linalg.lstsq(a[:, taken], a[:, kind], rcond=None)[0] if taken else np.zeros(0)
             left = a[:, kind] - a[:, taken] @ others
             rest, whole = float(np.linalg.norm(left)), float(np.linalg.norm(a[:, kind]))
-            if rest * limit >= 1.0 and rest > _DEPENDENT * whole:
+            if rest * limit >= 1.0 and rest > OPTIONS.dependent * whole:
                 taken.append(kind)
             else:
-                terms = [f"{_KINDS[k]} {-c:+.3g}" for k, c in zip(taken, others, strict=True) if abs(c) > 5e-3]
+                terms = [
+                    f"{_KINDS[k]} {-c:+.3g}" for k, c in zip(taken, others, strict=True) if abs(c) > OPTIONS.negligible
+                ]
                 gauges.append(f"leg {leg + 1}: " + ", ".join([f"{_KINDS[kind]} +1", *terms]) + " change no reading")
-        free += [6 * leg + kind for kind in taken]
+        free += [_EACH * leg + kind for kind in taken]
     return free, tuple(gauges)
 
 
@@ -262,20 +268,10 @@ def _bounded_step(a: Floats, b: Floats, theta: Floats, free: list[int]) -> tuple
     while True:
         inner = [k for k in free if k not in bound]
         step: Floats = np.asarray(np.linalg.lstsq(a[:, inner], b, rcond=None)[0] if inner else (), dtype=np.float64)
-        out = [k for k, s in zip(inner, step, strict=True) if k % 6 == 4 and theta[k] <= 0.0 and s < 0.0]
+        out = [k for k, s in zip(inner, step, strict=True) if k % _EACH == _RADIUS and theta[k] <= 0.0 and s < 0.0]
         if not out:
             return step, bound
         bound += out
-
-
-def _clamped(theta: Floats) -> Floats:
-    theta = theta.copy()
-    theta[4::6] = np.maximum(theta[4::6], 0.0)
-    return theta
-
-
-def _flat(machine: AsBuiltPentapod) -> Floats:
-    return np.c_[machine.base, machine.offsets, machine.radii, machine.zeros].ravel()
 
 
 def _machine(theta: Floats) -> AsBuiltPentapod:

@@ -1,1 +1,1 @@
-"""What must not touch: legs, spindle, tool, and what stands around them."""
+"""Clearances: distances between legs, spindle, tool and obstacles."""

@@ -1,4 +1,4 @@
-"""CollisionWorld: what legs, spindle and tool must not touch: the part, its fixture, the machine's table."""
+"""CollisionWorld: the obstacles of legs, spindle and tool: the part, its fixture, the machine's table."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import Gap, MeshDistance
 
 TOOL_BODY = "tool body"
-"""How shank and holder are called in claims and margins."""
+"""Name of shank and holder in claims and margins."""
 
 
 @dataclass(frozen=True, eq=False)
 class Obstacle(Value):
-    """One thing in the way. name: "part", "fixture", "table". surface: its mesh.
+    """An obstacle. name: "part", "fixture", "table". surface: its mesh.
 
-    clamped: whether it moves with the workpiece, and its mesh is in the workpiece frame; else in the machine frame.
-    allowance: metres by which the tool body may be in it and still count as clear.
+    clamped: whether it moves with the workpiece and its mesh is in the workpiece frame; else in the machine frame.
+    allowance: metres by which the tool body may be inside it and still count as clear.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Obstacle(Value):
 
 @dataclass(frozen=True, eq=False)
 class CollisionWorld(Value):
-    """obstacles, and the tool's solids above its cutting part (shank and holder; none where the spindle is all)."""
+    """Obstacles, and the tool's solids above its cutting part: shank and holder; none where it has neither."""
 
     obstacles: tuple[Obstacle, ...] = ()
     tool: tuple[Solid, ...] = ()
@@ -53,7 +53,7 @@ class CollisionWorld(Value):
         table: Mesh | None = None,
         allowance: float = 50e-6,
     ) -> CollisionWorld:
-        """Return what is in the way on a machine: the part, what holds it, what stands in the machine.
+        """Return the collision world of a part on a machine.
 
         part, fixture: workpiece frame; table: machine frame. allowance: metres by which the tool's shank and holder may
         be in the part and still count as clear. Raises MachineError where the tool is too long for the machine.
@@ -74,18 +74,18 @@ class CollisionWorld(Value):
         return cls(tuple(found), body)
 
     def names(self, n_legs: int) -> tuple[str, ...]:
-        """Return what moves (K,): the legs, the spindle, and the tool body where there is one."""
+        """Return the names (K,) of the moving bodies: the legs, the spindle, and the tool body where there is one."""
         legs = tuple(f"leg {k + 1}" for k in range(n_legs))
         return (*legs, "spindle", *((TOOL_BODY,) if self.tool else ()))
 
 
 NOTHING = CollisionWorld()
-"""Nothing in the way, and a tool without shank and holder."""
+"""No obstacles, and a tool without shank and holder."""
 
 
 @dataclass(frozen=True, eq=False)
 class MovingBodies:
-    """Where the moving bodies are in N poses, in an obstacle's frame, metres.
+    """Positions of the moving bodies in N poses, in an obstacle's frame, metres.
 
     starts, ends (N, n_legs + 1, 3): axes of the legs, base joint to platform joint, and of the spindle. tips, axes
     (N, 3): of the tool, the axis unit, tip → spindle. radii (n_legs + 1,): of legs and spindle.
@@ -104,10 +104,8 @@ class MovingBodies:
         """Return the bodies at poses (N, 3) of the machine; frame: that of the obstacle → machine, if another."""
         robot, top, nose = machine.robot, *spindle_ends(machine)
         count = len(position)
-        bases, joints = (
-            np.broadcast_to(robot.base_joints, (count, robot.n_legs, 3)),
-            robot.platform_joints(position, direction),
-        )
+        bases = np.broadcast_to(robot.base_joints, (count, robot.n_legs, 3))
+        joints = robot.platform_joints(position, direction)
         starts = np.concatenate([bases, (position + top * direction)[:, None]], axis=1)
         ends = np.concatenate([joints, (position + nose * direction)[:, None]], axis=1)
         tips, axes = position + machine.tool_length * direction, -direction
@@ -124,9 +122,9 @@ class MovingBodies:
         return Gap(np.minimum(distance, within), axes.place, axes.normal)
 
     def gaps(self, obstacle: Obstacle, tool: Sequence[Solid], within: float) -> Floats:
-        """Return the gaps (N, K) of all that moves, in the order of `CollisionWorld.names`; none above `within`.
+        """Return the gaps (N, K) of all moving bodies, in the order of `CollisionWorld.names`; none above `within`.
 
-        What runs through an open sheet is at most as deep in it as it is thick. The tool's allowance is added.
+        The depth of a body in an open sheet is at most its own thickness. The tool's allowance is added.
         """
         found = self.segments(obstacle.surface, within).distance.reshape(-1, len(self.radii))
         if not tool:
@@ -141,7 +139,7 @@ def spindle_ends(machine: Machine) -> tuple[float, float]:
 
 
 def mounted(solids: Sequence[Solid], machine: Machine) -> tuple[Solid, ...]:
-    """Return the shank and holder of a tool's solids, without what the spindle holds inside itself."""
+    """Return the shank and holder of a tool's solids, without their parts inside the spindle."""
     end, radius = machine.bodies.shaft_end, machine.bodies.shaft_radius
     kept: list[Solid] = []
     for solid in solids:

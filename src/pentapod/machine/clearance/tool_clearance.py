@@ -1,8 +1,8 @@
-"""Clearances between each leg and what hangs on its own platform line: the spindle, the shank and the holder.
+"""Clearances between each leg and the bodies on its own platform line: spindle, shank and holder.
 
 A leg begins on the line, at its platform joint: leg and line lie in a plane, and bodies of revolution about the line
-are nearest to it in that plane. So the question is two-dimensional, and has a closed form. It also shows where a leg
-can cross the line at all: nowhere but where it lies along it, that is where the line runs through its base joint.
+are nearest to the leg in that plane. So the problem is two-dimensional and has a closed form: a leg crosses the line
+only where it lies along it, that is where the line runs through its base joint.
 
 With θ the angle between leg (seen from its platform joint) and tool axis, the leg runs from (0, h) along
 (sin θ, cos θ) in coordinates (distance from the line, height over the tip). The formulas use element-wise
@@ -23,6 +23,7 @@ from pentapod.kinematics.arithmetic import NUMPY, Arithmetic
 from pentapod.machine.machine import Machine
 
 _TINY = 1e-18
+"""m²: keeps the derivative of a root finite at 0."""
 
 
 def leg_spindle_gap(machine: Machine, leg: int, cosine: Any, do: Arithmetic) -> Any:
@@ -42,8 +43,8 @@ def leg_spindle_gap(machine: Machine, leg: int, cosine: Any, do: Arithmetic) -> 
 def leg_tool_gap(machine: Machine, solids: Sequence[Solid], leg: int, cosine: Any, length: Any, do: Arithmetic) -> Any:
     """Return the gap in metres of a leg from the nearest of a tool's solids, negative where it runs through one.
 
-    cosine: of θ; length: of the leg, metres. Negative: by how much the leg runs below a rim of the solid, or the
-    solid stands above the platform joint.
+    cosine: of θ; length: of the leg, metres. A negative gap is the depth of the leg below a rim of the solid, or of the
+    platform joint below the solid's top.
     """
     joint = machine.tool_length - float(machine.robot.offsets[leg])
     sine = _sine(cosine, do)
@@ -67,16 +68,11 @@ def leg_tool_gap(machine: Machine, solids: Sequence[Solid], leg: int, cosine: An
 
 def leg_tool_gaps(machine: Machine, solids: Sequence[Solid], position: Floats, direction: Floats) -> Floats:
     """Return the gaps (N, 5) in metres of the legs from a tool's solids in poses (N, 3)."""
-    cosines, lengths = _cosines(machine, position, direction)
-    gaps = [leg_tool_gap(machine, solids, k, cosines[:, k], lengths[:, k], NUMPY) for k in range(len(lengths.T))]
-    return np.stack(gaps, axis=1)
-
-
-def _cosines(machine: Machine, position: Floats, direction: Floats) -> tuple[Floats, Floats]:
-    """Return the cosines of θ and the lengths of the legs, (N, 5)."""
     vectors = machine.robot.leg_vectors(position, direction)
     lengths = np.linalg.norm(vectors, axis=-1)
-    return np.einsum("nji,ni->nj", vectors, direction) / lengths, lengths
+    cosines = np.einsum("nji,ni->nj", vectors, direction) / lengths
+    gaps = [leg_tool_gap(machine, solids, k, cosines[:, k], lengths[:, k], NUMPY) for k in range(len(lengths.T))]
+    return np.stack(gaps, axis=1)
 
 
 def _to_rim(radius: float, depth: float, sine: Any, cosine: Any, length: Any, do: Arithmetic) -> Any:

@@ -1,1 +1,1 @@
-"""From placed poses to leg lengths: C3 curves between exact stops."""
+"""Leg paths: C3 curves of leg lengths through placed poses, between exact stops."""

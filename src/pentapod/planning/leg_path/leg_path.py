@@ -21,21 +21,22 @@ from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.toolpath.toolpath import Segment, SegmentKind
 
 STOP_ANGLE = float(np.radians(135.0))
-"""A path that turns back more sharply than this stops at the corner: rounding it would need a crawl."""
+"""Turn of the path above which the motion stops at a corner; blending it would need a very low speed."""
 
 TOLERANCE_SHARE = 0.8
-"""Share of the tolerances given to corner rounding; the rest is for setpoints and interpolation."""
+"""Share of the tolerances for blending corners; the rest is for setpoints and interpolation."""
 
-_AXIS_LEVER_M = 0.01  # metres of spline parameter per radian: keeps the parameter regular when only the axis turns
+AXIS_LEVER_M = 0.01
+"""Metres of spline parameter per radian, so that the parameter is regular where only the axis turns."""
 
 
 @dataclass(frozen=True, eq=False)
 class LegPiece(Value):
-    """A C3 stretch of the leg path between two exact stops, parametrised by s in metres, as `ToolCurve` says.
+    """A C3 piece of the leg path between two exact stops, parametrised by s in metres (`ToolCurve`).
 
-    section_ends (M,): s at which the toolpath's segments end, the last is `length`;
-    section_feeds (M,): m/s, infinite on rapids; section_kinds, section_segments (M,): kind and index of the segment.
-    waypoint_stations (W,): s nearest to each waypoint; waypoints (W,): its index in the toolpath.
+    section_ends (M,): s at which the toolpath's segments end, the last is `length`; section_feeds (M,): m/s, infinite
+    on rapids; section_kinds, section_segments (M,): kind and index of the segment. waypoint_stations (W,): s nearest to
+    each waypoint; waypoints (W,): its index in the toolpath.
     """
 
     summary = ("length",)
@@ -57,7 +58,7 @@ class LegPiece(Value):
 
     @property
     def knots(self) -> Floats:
-        """Stations (K,) where the fourth derivative may jump, both ends included."""
+        """Stations (K,) where the fourth derivative may jump, with both ends."""
         return self.curve.knots
 
     def pose(self, s: ArrayLike, order: int = 0) -> tuple[Floats, Floats]:
@@ -65,19 +66,19 @@ class LegPiece(Value):
         return self.curve(np.asarray(s, dtype=np.float64), order)
 
     def tip_length(self, s: ArrayLike) -> Floats:
-        """Return how far (n,) in metres the tip itself has moved at stations s (n,)."""
+        """Return the path length (n,) of the tip itself at stations s (n,), metres."""
         return self.curve.tip_length(np.asarray(s, dtype=np.float64))
 
     def surface_rate(self, s: ArrayLike) -> Floats:
-        """Return how far (n,) the tilt centre (a beam's spot) moves for each metre of s, at stations s (n,)."""
+        """Return the speed (n,) of the tilt centre (a beam's spot) per unit of ds/dt, at stations s (n,)."""
         tip, axis = self.pose(s, 1)
         return np.linalg.norm(tip + self.curve.tilt_centre * axis, axis=1)
 
     def feed_rate(self, s: ArrayLike) -> Floats:
-        """Return how far (n,) the point whose speed the feed is moves for each metre of s, at stations s (n,).
+        """Return the speed (n,) of the point to which the feed refers, per unit of ds/dt, at stations s (n,).
 
-        With a stand-off (a beam, a spray) it is the spot on the surface. Otherwise, and on rapids, it is the tip, taken
-        as s itself: it is never faster.
+        With a stand-off (a beam, a spray) it is the spot on the surface. Otherwise, and on rapids, it is the tip, whose
+        speed is taken as ds/dt, an upper bound.
         """
         spot = self.curve.tilt_centre < 0.0 and bool(np.isfinite(self.section_feeds).all())
         return self.surface_rate(s) if spot else np.ones(np.shape(s))
@@ -87,7 +88,7 @@ class LegPiece(Value):
         return self.derivatives(s, order)[-1]
 
     def derivatives(self, s: ArrayLike, order: int) -> list[Floats]:
-        """Return leg lengths and their derivatives (n, n_legs) up to `order` ≤ 3: cheaper than one by one."""
+        """Return leg lengths and their derivatives (n, n_legs) up to `order` ≤ 3, faster than one by one."""
         poses = self.curve.derivatives(np.asarray(s, dtype=np.float64), order)
         return self.robot.leg_derivatives(poses, self.tool_length)
 
@@ -96,7 +97,7 @@ class LegPiece(Value):
 class LegPath(Result):
     """Pieces in order; the machine rests between them.
 
-    starts (P + 1,): station where each begins, and the end. dwells (P + 1,): seconds for which it stands there.
+    starts (P + 1,): station where each begins, and the end. dwells (P + 1,): seconds of rest there.
     """
 
     summary = ("length",)
@@ -124,11 +125,11 @@ class LegPath(Result):
         return both[:, :3], both[:, 3:]
 
     def surface_rate(self, s: ArrayLike) -> Floats:
-        """Return how far (n,) the tilt centre (a beam's spot) moves for each metre of s, at stations s (n,)."""
+        """Return the speed (n,) of the tilt centre (a beam's spot) per unit of ds/dt, at stations s (n,)."""
         return self._each(s, lambda piece, local: piece.surface_rate(local)[:, None], 1)[:, 0]
 
     def piece_at(self, s: ArrayLike) -> Ints:
-        """Return the index (n,) of the piece that holds each station s (n,)."""
+        """Return the index (n,) of the piece at each station s (n,)."""
         k = np.searchsorted(self.starts, np.asarray(s, dtype=np.float64), side="right") - 1
         return np.clip(k, 0, len(self.pieces) - 1)
 
@@ -153,11 +154,11 @@ def leg_path(
 ) -> LegPath | Refusal:
     """Return the smooth leg path through the placed tool poses.
 
-    path_tolerance: how far in metres the tilt centre (the cutter's ball centre, the beam's spot) may leave the
-    toolpath; axis_tolerance: how far in radians the axis may leave the planned one. Corners are rounded within both.
-    The machine stops where a rapid meets another kind of motion, where the toolpath asks for it, and at corners that
-    turn by more than `stop_angle` radians. Raises ToolpathError for numbers that are not positive. Returns a Refusal
-    where the tool would have to stand still.
+    path_tolerance: largest deviation of the tilt centre (the cutter's ball centre, the beam's spot) from the toolpath,
+    metres; axis_tolerance: of the axis from the planned one, radians. Corners are blended within both. The machine
+    stops where a rapid meets another kind of motion, where the toolpath has a stop, and at corners that turn by more
+    than `stop_angle` radians. Raises ToolpathError for numbers that are not positive. Returns a Refusal for a path
+    without motion.
     """
     given = {"path_tolerance": path_tolerance, "axis_tolerance": axis_tolerance, "stop_angle": stop_angle}
     for name, value in given.items():
@@ -167,14 +168,13 @@ def leg_path(
     points = np.hstack([placed.tilt_centres, placed.axes])
     steps = np.sqrt(
         np.square(np.diff(points[:, :3], axis=0)).sum(axis=1)
-        + np.square(_AXIS_LEVER_M * np.diff(points[:, 3:], axis=0)).sum(axis=1)
+        + np.square(AXIS_LEVER_M * np.diff(points[:, 3:], axis=0)).sum(axis=1)
     )
     moving = steps > 1e-12
     keep = np.concatenate([[True], moving])
     if keep.sum() < 2:
-        return Refusal(
-            "leg path", "the toolpath does not move", (Shortfall("motion", ((0, len(toolpath) - 1),), 0.0, "mm"),)
-        )
+        everywhere = Shortfall("motion", ((0, len(toolpath) - 1),), 0.0, "mm")
+        return Refusal("leg path", "the toolpath does not move", (everywhere,))
     points, u = points[keep], np.concatenate([[0.0], np.cumsum(steps[moving])])
     segment = toolpath.segment_of_interval[moving]
     stops = np.zeros(len(points), dtype=np.bool_)
@@ -186,13 +186,10 @@ def leg_path(
             stops[stood], dwells[stood] = True, dwells[stood] + seconds
     stops[[0, -1]] = True
     bounds = np.flatnonzero(stops)
+    too_far = _tolerance(TOLERANCE_SHARE * path_tolerance, TOLERANCE_SHARE * axis_tolerance)
     pieces = []
     for a, b in pairwise(bounds.tolist()):
-        spline = blended(
-            u[a : b + 1] - u[a],
-            points[a : b + 1],
-            _tolerance(TOLERANCE_SHARE * path_tolerance, TOLERANCE_SHARE * axis_tolerance),
-        )
+        spline = blended(u[a : b + 1] - u[a], points[a : b + 1], too_far)
         curve = ToolCurve.of(spline, toolpath.tilt_centre)
         ends = np.flatnonzero(np.diff(segment[a:b], append=-1)) + 1
         which = segment[a:b][ends - 1]
@@ -209,14 +206,15 @@ def leg_path(
                 waypoints=np.flatnonzero(keep)[a : b + 1],
             )
         )
-    return LegPath(tuple(pieces), np.concatenate([[0.0], np.cumsum([p.length for p in pieces])]), dwells[bounds])
+    starts = np.concatenate([[0.0], np.cumsum([piece.length for piece in pieces])])
+    return LegPath(tuple(pieces), starts, dwells[bounds])
 
 
 def _tolerance(path: float, axis: float) -> TooFar:
-    """Return the test of a rounded path: tilt_centres within `path` metres, axes within `axis` radians, proven.
+    """Return the test whether a blended path may deviate by more than `path` metres or `axis` radians.
 
-    Both are read off the Bernstein coefficients of curve minus polyline, which enclose it. An axis that ends within
-    ε of a vector of length n is at most asin(ε / n) from it.
+    Both are bounded by the Bernstein coefficients of curve minus polyline, which enclose it. A vector within ε of one
+    of length n is at most asin(ε / n) from its direction.
     """
 
     def too_far(differences: Floats, chords: Floats) -> Bools:
@@ -235,9 +233,9 @@ def _distance_to_origin(a: Floats, b: Floats) -> Floats:
 
 
 def _stops(points: Floats, tilt_centre: float, segment: Ints, segments: tuple[Segment, ...], angle: float) -> Bools:
-    """Return for each inner waypoint (N − 2,) whether the motion itself asks for a stop there.
+    """Return for each inner waypoint (N − 2,) whether it is a stop: a change from or to rapids, or a sharp corner.
 
-    points (N, 6): tilt_centres and axes. angle: radians, of the corners at which it does.
+    points (N, 6): tilt centres and axes. angle: least turn of a sharp corner, radians.
     """
     rapid = np.array([s.kind is SegmentKind.RAPID for s in segments])[segment]
     tilt_centres, tips = points[:, :3], points[:, :3] - tilt_centre * points[:, 3:]

@@ -1,4 +1,4 @@
-"""ToolCurve: a C3 motion of tilt_centre and tool axis, over the tip's path length and the axis's turn."""
+"""ToolCurve: a C3 motion of tip and tool axis, parametrised by the tip's path length and the axis's turn."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
 
 REORIENTATION_LEVER_M = 1e-3
-"""One radian of axis counts as this much path, so that turning on the spot has a length too."""
+"""Path length of one radian of axis, metres, so that turning on the spot has a length too."""
 
 ARC_LENGTH_ERROR = 1e-7
-"""Largest relative deviation of ds from the length that it should be."""
+"""Largest relative error of ds."""
 
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(6)
 
@@ -25,9 +25,9 @@ _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(6)
 class ToolCurve:
     """Tip and axis as C3 functions of s in metres, ds² = |d tip|² + (REORIENTATION_LEVER_M |d axis|)².
 
-    curve: tilt_centre and un-normalised axis (6 columns) over the spline's own parameter u; parameter: u over s.
-    tilt_centre: metres from the tip along the axis to the tilt centre. The tip is never faster than ds/dt, and where it
-    turns on the spot s still moves on.
+    curve: tilt centre and un-normalised axis (6 columns) over the spline's own parameter u; parameter: u over s.
+    tilt_centre: metres from the tip along the axis to the tilt centre. The tip is never faster than ds/dt, and s
+    increases also where the tool turns on the spot.
     """
 
     curve: PPoly
@@ -36,7 +36,7 @@ class ToolCurve:
 
     @classmethod
     def of(cls, spline: BSpline, tilt_centre: float) -> ToolCurve:
-        """Build it from a C3 spline of tilt centres and axes (6 columns). Raises ToolpathError if they stand still."""
+        """Return the curve of a C3 spline of tilt centres and axes (6 columns). Raises ToolpathError at rest."""
         knots = np.unique(spline.t)
         powers = [spline(knots[:-1], k) / factorial(k) for k in range(spline.k, -1, -1)]
         curve = PPoly(np.stack(powers), knots)
@@ -49,7 +49,7 @@ class ToolCurve:
 
     @property
     def knots(self) -> Floats:
-        """Stations at which the fourth derivative may jump, both ends included."""
+        """Stations at which the fourth derivative may jump, with both ends."""
         return self.arc_length(self.curve.x)
 
     def arc_length(self, u: Floats) -> Floats:
@@ -58,7 +58,7 @@ class ToolCurve:
         return np.asarray(np.interp(u, nodes, self.parameter.x), dtype=np.float64)
 
     def tip_length(self, s: Floats) -> Floats:
-        """Return the way (n,) in metres of the tip alone from the start to stations s (n,)."""
+        """Return the path length (n,) of the tip alone from the start to stations s (n,), metres."""
         return np.asarray(self._tip_length(np.clip(s, 0.0, self.length)), dtype=np.float64)
 
     def __call__(self, s: Floats, order: int) -> tuple[Floats, Floats]:
@@ -144,10 +144,8 @@ def _parameter_over_length(curve: PPoly, tilt_centre: float) -> PPoly:
     nodes = curve.x
     slowest = float(_speed(curve, nodes, tilt_centre, 0)[0].min())
     if slowest < 1e-6:
-        raise ToolpathError(
-            "the tool stands still somewhere on the path",
-            expected="a motion of tip or axis between waypoints",
-        )
+        what = "the tool stands still somewhere on the path"
+        raise ToolpathError(what, expected="a motion of tip or axis between waypoints")
     error = np.ones(1)
     for _ in range(12):
         widths = np.diff(nodes)
@@ -157,11 +155,8 @@ def _parameter_over_length(curve: PPoly, tilt_centre: float) -> PPoly:
         v, v1, v2 = _speed(curve, nodes, tilt_centre, 2)
         u_of_s = _septic(s, [nodes, 1.0 / v, -v1 / v**3, (3.0 * v1**2 - v * v2) / v**5.0])
         between = (s[:-1, None] + np.diff(s)[:, None] * np.array([0.25, 0.5, 0.75])).ravel()
-        error = (
-            np.abs(u_of_s(between, 1) * _speed(curve, u_of_s(between), tilt_centre, 0)[0] - 1.0)
-            .reshape(-1, 3)
-            .max(axis=1)
-        )
+        relative = np.abs(u_of_s(between, 1) * _speed(curve, u_of_s(between), tilt_centre, 0)[0] - 1.0)
+        error = relative.reshape(-1, 3).max(axis=1)
         if error.max() <= ARC_LENGTH_ERROR:
             return u_of_s
         nodes = np.sort(np.concatenate([nodes, 0.5 * (nodes[:-1] + nodes[1:])[error > ARC_LENGTH_ERROR]]))
@@ -171,7 +166,7 @@ def _parameter_over_length(curve: PPoly, tilt_centre: float) -> PPoly:
 _SEPTIC = np.array(
     [[35.0, -15.0, 2.5, -1.0 / 6.0], [-84.0, 39.0, -7.0, 0.5], [70.0, -34.0, 6.5, -0.5], [-20.0, 10.0, -2.0, 1.0 / 6.0]]
 )
-"""Coefficients of τ⁴ to τ⁷ from what the cubic through the left end lacks at τ = 1, in value and 3 derivatives."""
+"""Coefficients of τ⁴ to τ⁷ from the errors at τ = 1, in value and 3 derivatives, of the cubic from the left end."""
 
 
 def _septic(x: Floats, y: list[Floats]) -> PPoly:
@@ -180,10 +175,10 @@ def _septic(x: Floats, y: list[Floats]) -> PPoly:
     scale = np.array([h**k for k in range(4)])
     a = np.array([value[:-1] for value in y]) * scale
     a[2], a[3] = a[2] / 2.0, a[3] / 6.0
-    lacking = np.array([value[1:] for value in y]) * scale - np.array(
+    errors = np.array([value[1:] for value in y]) * scale - np.array(
         [a[0] + a[1] + a[2] + a[3], a[1] + 2.0 * a[2] + 3.0 * a[3], 2.0 * a[2] + 6.0 * a[3], 6.0 * a[3]]
     )
-    powers = np.concatenate([a, _SEPTIC @ lacking]) / np.array([h**k for k in range(8)])
+    powers = np.concatenate([a, _SEPTIC @ errors]) / np.array([h**k for k in range(8)])
     return PPoly(powers[::-1], x)
 
 

@@ -1,1 +1,1 @@
-"""Margins: one dimensionless number for every limit."""
+"""Limits of tool poses, and their margins: one dimensionless number for each."""

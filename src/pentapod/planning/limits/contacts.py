@@ -1,8 +1,8 @@
 """Contacts: signed distances of moving bodies from meshes, and the point pairs that give their derivatives.
 
 Gaps are exact distances. A contact is a point on a body's line (a leg, the tool axis), the radius of the body there,
-and the nearest mesh point with its normal. The gap of that ball from the plane through the mesh point is a formula of
-the pose; where the contact was taken, its value and first derivatives are those of the true gap. The solvers use this
+and the nearest mesh point with its normal. The distance of that ball from the plane through the mesh point is a formula
+of the pose; at the pose of the contact its value and first derivatives are those of the true gap. The solvers use this
 formula, and every step is judged by the true gaps.
 """
 
@@ -25,15 +25,23 @@ from pentapod.machine.machine import Machine
 from pentapod.planning.limits.limit import Scene
 
 NUMBERS = 8
-"""Of a contact: place on the body's line, normal (3), mesh point (3), radius of the ball."""
+"""Numbers of a contact: place on the body's line, normal (3), mesh point (3), radius of the ball."""
 
-_CAP = 1.2  # larger margins are not computed
-_FLAT = 1e-3  # sine of the angle to the axis below which a nearest part counts as flat
+
+@dataclass(frozen=True)
+class ContactOptions:
+    """cap: larger margins are not computed. flat: sine of the angle to the axis below which a face counts as flat."""
+
+    cap: float = 1.2
+    flat: float = 1e-3
+
+
+OPTIONS = ContactOptions()
 
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """margins (N, C) of poses, and the contacts (N, C · NUMBERS) that they come from; C: all bodies by obstacle."""
+    """Margins (N, C) of poses, and the numbers (N, C · NUMBERS) of their contacts; C: all bodies by obstacle."""
 
     margins: Floats
     numbers: Floats
@@ -53,7 +61,7 @@ def contacts(scene: Scene, tips: Floats, axes: Floats, placement: RigidTransform
     comforts = body_comforts(scene)
     comfortable, moving = np.tile(comforts, len(obstacles)), len(comforts)
     both = np.zeros((len(tips), len(comfortable), 1 + NUMBERS))
-    both[..., 0], both[..., -1] = _CAP * comfortable, -_CAP * comfortable
+    both[..., 0], both[..., -1] = OPTIONS.cap * comfortable, -OPTIONS.cap * comfortable
     for k, obstacle in enumerate(obstacles):
         frame = placement if obstacle.clamped else None
         rows = _near(scene, obstacle, tips, axes, frame)
@@ -62,7 +70,7 @@ def contacts(scene: Scene, tips: Floats, axes: Floats, placement: RigidTransform
         bodies = MovingBodies.at(machine, position[rows], direction[rows], frame)
         columns = _lines(machine, obstacle, bodies, comforts)
         if tool:
-            columns.append(_tool(obstacle, tool, bodies, _CAP * comforts[-1]))
+            columns.append(_tool(obstacle, tool, bodies, OPTIONS.cap * comforts[-1]))
         both[rows, k * moving : (k + 1) * moving] = np.stack(columns, axis=1)
     return Contacts(both[..., 0] / comfortable, both[..., 1:].reshape(len(tips), -1))
 
@@ -74,11 +82,11 @@ def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts:
     columns, n_legs = list[Floats](), machine.robot.n_legs
     for body in range(n_legs + 1):
         radius = float(bodies.radii[body])
-        cap = _CAP * comforts[body]
+        cap = OPTIONS.cap * comforts[body]
         column = np.zeros((count, 1 + NUMBERS))
         column[:, 0], column[:, -1] = cap, -cap
         columns.append(column)
-        rows = _boxed(obstacle, bodies.starts[:, body], bodies.ends[:, body], cap + radius)
+        rows = np.flatnonzero(_box_gap(obstacle, bodies.starts[:, body], bodies.ends[:, body]) < cap + radius)
         if not len(rows):
             continue
         starts, ends = bodies.starts[rows, body], bodies.ends[rows, body]
@@ -86,7 +94,7 @@ def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts:
         near = found.distance < cap + radius
         at = starts + found.place[:, None] * (ends - starts)
         place = found.place if body < n_legs else top + found.place * (nose - top)
-        # Where the normal is unknown the gap is a constant.
+        # Without a normal the gap is taken as constant.
         known, gap = found.normal.any(axis=1), found.distance - radius
         numbers = (gap, place, *found.normal.T, *(at - found.distance[:, None] * found.normal).T)
         exact = np.column_stack([*numbers, np.where(known, radius, -gap)])
@@ -95,36 +103,33 @@ def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts:
 
 
 def _near(scene: Scene, obstacle: Obstacle, tips: Floats, axes: Floats, frame: RigidTransform | None) -> Ints:
-    """Return the poses (N, 3) in which the box around any body comes near the obstacle's box: most do not."""
+    """Return the indices of those poses (N, 3) in which a body's bounding box is near the obstacle's."""
     machine, tool, comforts = scene.machine, scene.collision_world.tool, scene.comforts
     robot, bodies = machine.robot, machine.bodies
     base, heights = robot.base_joints, robot.offsets
     if frame is not None:
         back = frame.inverse()
         tips, axes, base = back.apply(tips), back.rotate(axes), back.apply(base)
-    low, high = obstacle.surface.bounds
     top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
     lines = [(base[k], tips + (machine.tool_length - heights[k]) * axes) for k in range(robot.n_legs)]
-    reaches = [_CAP * comforts.leg_obstacle + bodies.leg_radius] * robot.n_legs
+    reaches = [OPTIONS.cap * comforts.leg_obstacle + bodies.leg_radius] * robot.n_legs
     lines.append((tips + nose * axes, tips + top * axes))
-    reaches.append(_CAP * comforts.spindle_obstacle + bodies.shaft_radius)
+    reaches.append(OPTIONS.cap * comforts.spindle_obstacle + bodies.shaft_radius)
     if tool:
         least, most = min(s.low - s.rounding for s in tool), max(s.top for s in tool)
         lines.append((tips + least * axes, tips + most * axes))
         wide = max(max(s.low_radius, s.high_radius) + s.rounding for s in tool)
-        reaches.append(_CAP * comforts.tool_obstacle + wide)
+        reaches.append(OPTIONS.cap * comforts.tool_obstacle + wide)
     near = np.zeros(len(tips), dtype=np.bool_)
     for (a, b), reach in zip(lines, reaches, strict=True):
-        apart = np.maximum(np.minimum(a, b) - high, low - np.maximum(a, b)).max(axis=1)
-        near |= apart < reach
+        near |= _box_gap(obstacle, a, b) < reach
     return np.flatnonzero(near)
 
 
-def _boxed(obstacle: Obstacle, starts: Floats, ends: Floats, within: float) -> Ints:
-    """Return the segments (M, 3) to (M, 3) whose boxes come within `within` of the obstacle's box."""
+def _box_gap(obstacle: Obstacle, starts: Floats, ends: Floats) -> Floats:
+    """Return the gaps (M,), largest coordinate, between the boxes of segments (M, 3) and the obstacle's box."""
     low, high = obstacle.surface.bounds
-    apart = np.maximum(np.minimum(starts, ends) - high, low - np.maximum(starts, ends)).max(axis=1)
-    return np.flatnonzero(apart < within)
+    return np.maximum(np.minimum(starts, ends) - high, low - np.maximum(starts, ends)).max(axis=1)
 
 
 def _tool(obstacle: Obstacle, solids: tuple[Solid, ...], bodies: MovingBodies, cap: float) -> Floats:
@@ -142,9 +147,9 @@ def _tool(obstacle: Obstacle, solids: tuple[Solid, ...], bodies: MovingBodies, c
         across = point - tip - height * axis
         aside = float(np.linalg.norm(across))
         _, by_r, by_h = min(meridian_distance(shape, aside, height) for shape in shapes)
-        # From the body to the mesh point; the line along it meets the axis where the ball's middle is.
-        away = (by_r / aside if aside > 0.0 else 0.0) * across + by_h * axis
-        place = height - aside / max(by_r, _FLAT) * by_h
-        reach = float(-away @ (tip + place * axis - point))
-        column[row, 1:] = (place, *(-away), *point, reach - gaps[row])
+        # From the body to the mesh point; the line along it meets the axis in the centre of the ball.
+        outward = (by_r / aside if aside > 0.0 else 0.0) * across + by_h * axis
+        place = height - aside / max(by_r, OPTIONS.flat) * by_h
+        reach = float(-outward @ (tip + place * axis - point))
+        column[row, 1:] = (place, *(-outward), *point, reach - gaps[row])
     return column

@@ -1,4 +1,4 @@
-"""Leg pairs: clearance of two legs, signed so that legs that passed through each other do not count as apart."""
+"""Leg pairs: signed clearance of two legs, negative where they have passed through each other."""
 
 from __future__ import annotations
 
@@ -48,20 +48,13 @@ class LegPairClearance(LengthLimit):
         return (gap - self.thickness) / self.comfort
 
 
-def signed_leg_clearance(
-    offset: Vector,
-    d1: Vector,
-    d2: Vector,
-    side: float,
-    xp: Arithmetic,
-) -> Any:
+def signed_leg_clearance(offset: Vector, d1: Vector, d2: Vector, side: float, xp: Arithmetic) -> Any:
     """Return the distance of segments α d1 and offset + β d2, α, β in [0, 1].
 
-    offset: of three components, or two where it lies in the base plane.
-
-    It is negative where one has passed through the other: where the nearest points lie inside both and
-    the second runs on the other side of the first than `side`, the sign of offset · (d1 × d2), says.
-    The quadratic in (α, β) is minimised on the unit square by clamping α, then β, then α again.
+    offset: of three components, or two where it lies in the base plane. side: the sign of offset · (d1 × d2) where the
+    segments have not passed through each other. The distance is negative where they have: where the nearest points lie
+    inside both and that sign is the other one. The quadratic in (α, β) is minimised on the unit square by clamping α,
+    then β, then α again.
     """
     a = d1[0] * d1[0] + d1[1] * d1[1] + d1[2] * d1[2]
     e = d2[0] * d2[0] + d2[1] * d2[1] + d2[2] * d2[2]

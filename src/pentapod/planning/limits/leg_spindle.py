@@ -1,4 +1,4 @@
-"""Leg and spindle: the gap between each leg and the spindle on the platform line that it is joined to."""
+"""Leg and spindle: the gap between each leg and the spindle on its own platform line."""
 
 from __future__ import annotations
 

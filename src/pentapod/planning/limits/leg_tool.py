@@ -1,4 +1,4 @@
-"""Leg and tool: the gap between each leg and the shank and holder on the platform line that it is joined to."""
+"""Leg and tool: the gap between each leg and the shank and holder on its own platform line."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class LegToolClearance(LengthLimit):
 
     @classmethod
     def of(cls, scene: Scene) -> list[LegToolClearance]:
-        """Return the gaps of all legs; none where the spindle is all there is."""
+        """Return the gaps of all legs; none for a tool without shank and holder."""
         solids = scene.collision_world.tool
         return [
             cls(name=f"leg {k + 1} touches the {TOOL_BODY}", leg=k, comfort=scene.comforts.tool, solids=solids)

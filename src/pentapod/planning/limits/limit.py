@@ -46,12 +46,12 @@ class Limit(Protocol):
 
 @dataclass(frozen=True)
 class Comforts:
-    """How much room beside each limit counts as margin 1; strokes and joints take half their range.
+    """The distances from limits that count as margin 1; strokes and joints take half their range.
 
     axis_angle: of the tool axis from the base plane, radians. surface_share: distance to the other singular surfaces,
     as a share of the mean leg length. legs: gap between two legs, metres. tool: gap between a leg and the spindle,
-    shank or holder on its own platform, metres. leg_obstacle, spindle_obstacle, tool_obstacle: gaps of legs, spindle,
-    and shank and holder to the part and other obstacles, metres; spindle and tool work near the part.
+    shank or holder on its own platform line, metres. leg_obstacle, spindle_obstacle, tool_obstacle: gaps of legs,
+    spindle, and shank and holder to the part and other obstacles, metres; spindle and tool work near the part.
     """
 
     axis_angle: float = float(np.radians(60.0))
@@ -65,7 +65,7 @@ class Comforts:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What limits are made for: a machine, the branch that it works in, and what it must not touch."""
+    """A machine, its branch and its collision world: what limits are made for."""
 
     machine: Machine
     branch: Branch

@@ -1,7 +1,7 @@
 """Margins: all limits of a machine in one branch as dimensionless numbers, positive inside and 0 at the limit.
 
-The margins are scaled so that 1 is comfortable: the smallest of them is what the planner makes large. Each limit is a
-formula for NumPy arrays and casadi expressions alike.
+The margins are scaled so that 1 is comfortable; the planner maximises the smallest of them. Each limit is a formula for
+NumPy arrays and casadi expressions alike.
 """
 
 from __future__ import annotations
@@ -46,16 +46,13 @@ LIMITS.register("leg pairs", LimitKind(LegPairClearance.of))
 LIMITS.register("leg and spindle", LimitKind(LegSpindleClearance.of))
 LIMITS.register("leg and tool", LimitKind(LegToolClearance.of))
 
-_BLOCK = 16_384
-"""Poses at a time: a hundred intermediate values of each need not be held for a million."""
-
 
 @dataclass(frozen=True, eq=False)
 class Margins:
     """The margins of one machine in one branch.
 
     Called with tips and tool axes (..., 3) in the machine frame it returns (..., M), M = len(limits): those of the
-    machine itself (`own_limits`), and then those to obstacles, which depend on where the workpiece stands.
+    machine itself (`own_limits`), and then those to obstacles, which depend on the workpiece's placement.
     """
 
     scene: Scene
@@ -69,39 +66,21 @@ class Margins:
         machine: Machine,
         branch: Branch,
         collision_world: CollisionWorld = NOTHING,
-        kinds: Sequence[LimitKind] | None = None,
+        limits: Sequence[LimitKind] = (),
     ) -> Margins:
-        """Build the margins of `machine` in a branch.
-
-        collision_world: what must not be touched. kinds: of limits; pentapod's own where none are given.
-        """
-        kinds = tuple(LIMITS.own.values()) if kinds is None else tuple(kinds)
+        """Return the margins of `machine` in a branch. limits: kinds of limits besides pentapod's own."""
+        kinds = tuple(dict.fromkeys((*LIMITS.own.values(), *limits)))
         scene = Scene(machine, branch, collision_world)
         own = tuple(limit for kind in kinds for limit in kind.of(scene))
         return cls(scene, kinds, own, (*own, *ObstacleClearance.of(scene)))
 
     def on(self, machine: Machine) -> Margins:
         """Return the same margins of another machine."""
-        return Margins.of(machine, self.component, self.collision_world, self.kinds)
+        return Margins.of(machine, self.scene.branch, self.scene.collision_world, self.kinds)
 
-    def alone(self) -> Margins:
-        """Return the same margins without collision_world."""
-        return Margins.of(self.machine, self.component, NOTHING, self.kinds)
-
-    @property
-    def machine(self) -> Machine:
-        """The machine."""
-        return self.scene.machine
-
-    @property
-    def component(self) -> Branch:
-        """The branch in which the machine works."""
-        return self.scene.branch
-
-    @property
-    def collision_world(self) -> CollisionWorld:
-        """What must not be touched."""
-        return self.scene.collision_world
+    def without_collision_world(self) -> Margins:
+        """Return the same margins in an empty collision world."""
+        return Margins.of(self.scene.machine, self.scene.branch, NOTHING, self.kinds)
 
     def __call__(self, tips: Floats, axes: Floats, placement: RigidTransform | None = None) -> Floats:
         """Return margins (..., M) of tool tips and axes (tip → spindle), both (..., 3), machine frame.
@@ -109,31 +88,31 @@ class Margins:
         placement: of the workpiece; needed where there are obstacles.
         """
         own = self.own(tips, axes)
-        if not self.collision_world.obstacles:
+        if not self.scene.collision_world.obstacles:
             return own
         if placement is None:
             raise ArrayError("gaps to the part depend on the placement", key="placement", expected="a RigidTransform")
         outer = contacts(self.scene, tips.reshape(-1, 3), axes.reshape(-1, 3), placement).margins
         return np.concatenate([own, outer.reshape(*own.shape[:-1], -1)], axis=-1)
 
-    def own(self, tips: Floats, axes: Floats) -> Floats:
-        """Return the margins (..., M) of the machine alone."""
-        if tips.ndim == 2 and len(tips) > _BLOCK:
-            blocks = range(0, len(tips), _BLOCK)
-            return np.concatenate([self.own(tips[k : k + _BLOCK], axes[k : k + _BLOCK]) for k in blocks])
+    def own(self, tips: Floats, axes: Floats, block: int = 16_384) -> Floats:
+        """Return the margins (..., M) of the machine alone. block: poses at a time, to bound the memory."""
+        if tips.ndim == 2 and len(tips) > block:
+            blocks = range(0, len(tips), block)
+            return np.concatenate([self.own(tips[k : k + block], axes[k : k + block]) for k in blocks])
         tip, axis = list(np.moveaxis(tips, -1, 0)), list(np.moveaxis(axes, -1, 0))
-        pose = ToolPose(self.machine, self.component, tip, axis, NUMPY)
+        pose = ToolPose(self.scene.machine, self.scene.branch, tip, axis, NUMPY)
         return np.stack(np.broadcast_arrays(*(limit.margin(pose) for limit in self.own_limits)), axis=-1)
 
     def contacts(self, tips: Floats, axes: Floats, placement: RigidTransform) -> Floats:
-        """Return the contacts (n, contact_numbers) that the formulas need, of poses (n, 3); none without obstacles."""
-        if not self.collision_world.obstacles:
+        """Return the contacts (n, contact_numbers) that `symbolic` needs, of poses (n, 3); none without obstacles."""
+        if not self.scene.collision_world.obstacles:
             return np.zeros((len(tips), 0))
         return contacts(self.scene, tips, axes, placement).numbers
 
     @property
     def contact_numbers(self) -> int:
-        """How many numbers the contacts of one pose are."""
+        """The length of the contacts of one pose."""
         return NUMBERS * (len(self.limits) - len(self.own_limits))
 
     def symbolic(
@@ -145,18 +124,18 @@ class Margins:
         numbers: Any = None,
         joints: Joints | None = None,
     ) -> Any:
-        """Return the column of the same margins for casadi SX vectors tip and axis (3).
+        """Return the same margins as a column of expressions, for casadi SX vectors tip and axis (3).
 
-        turn, shift: the workpiece's rotation (3×3) and translation; numbers: of its contacts, see `contacts`. All three
-        are needed where there are obstacles. joints: where base joints on guides, and the platform joints that belong
-        to them, are, as expressions. The singular surfaces do not depend on them. The gaps between a leg and the
-        bodies on its platform line hardly do, and are computed with the joints of the machine.
+        turn, shift: the workpiece's rotation (3×3) and translation; numbers: its contacts, see `contacts`. All three
+        are needed where there are obstacles. joints: positions of base joints on guides and of their platform joints,
+        as expressions. The singular surfaces do not depend on them. The gaps between a leg and the bodies on its
+        platform line hardly do, and are computed with the joints of the machine.
         """
         import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
         touching = None
-        if self.collision_world.obstacles:
+        if self.scene.collision_world.obstacles:
             touching = WorkpieceContacts(turn, ca.vertsplit(shift), ca.vertsplit(numbers))
         tip, axis = ca.vertsplit(tip), ca.vertsplit(axis)
-        pose = ToolPose(self.machine, self.component, tip, axis, Arithmetic.casadi(), joints, touching)
+        pose = ToolPose(self.scene.machine, self.scene.branch, tip, axis, Arithmetic.casadi(), joints, touching)
         return ca.vertcat(*(limit.margin(pose) for limit in self.limits))

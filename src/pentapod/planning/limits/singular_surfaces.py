@@ -1,4 +1,4 @@
-"""Singular surfaces: distances of the pose from the surfaces that bound its branch, as the robot states them."""
+"""Singular surfaces: distances of the pose from the surfaces that bound its branch, as the robot defines them."""
 
 from __future__ import annotations
 

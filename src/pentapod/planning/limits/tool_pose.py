@@ -1,4 +1,4 @@
-"""ToolPose: a tool pose with the leg vectors, lengths and angles in which limits are stated."""
+"""ToolPose: a tool pose with the leg vectors, lengths and angles that limits use."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class WorkpieceContacts:
 class ToolPose:
     """Tip and axis (tip → spindle) of the tool, three components each, as NumPy arrays or casadi expressions.
 
-    branch: in which the machine works. xp: the functions of this arithmetic. joints: where the joints are, if not where
-    the machine has them. contacts: with the workpiece and other obstacles, where expressions are asked for.
+    branch: in which the machine works. xp: the functions of this arithmetic. joints: their positions, if not those of
+    the machine. contacts: with the workpiece and other obstacles, for expressions alone.
     """
 
     machine: Machine
@@ -91,6 +91,6 @@ class ToolPose:
 
 
 def joints_of(robot: Robot) -> Joints:
-    """Return where a robot's joints are; without their z where the base joints lie in the base plane."""
+    """Return the positions of a robot's joints; without z where the base joints lie in the base plane."""
     base = robot.base_joints
     return (base if np.any(base[:, 2]) else base[:, :2]).tolist(), robot.offsets.tolist()

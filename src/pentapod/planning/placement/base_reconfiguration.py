@@ -1,8 +1,8 @@
 """Base reconfiguration: rail positions of a reconfigurable machine, optimised together with the placement.
 
-Rail positions are further unknowns of the same problem. First guesses at a Latin hypercube of them tell which part of
-the travel to search. From the best placement found there, placement, rail positions and tilt field are improved
-together by sequential quadratic programming.
+Rail positions are further unknowns of the same problem. First guesses at a Latin hypercube of them select where a
+second search is made. From the better of both, placement, rail positions and tilt field are improved together by
+sequential quadratic programming.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from pentapod.planning.problem.weights import NEEDED_MARGIN
 
 @dataclass(frozen=True)
 class ReconfigurationOptions:
-    """How thoroughly rail positions are searched.
+    """Effort of the search for rail positions.
 
-    spread: how many positions all over the travel are compared, beside the present ones. tries: random placements for
-    each of them. waypoints: that represent the path where the placements are given. rounds: joint improvements at most.
-    gain: least rise of the smallest margin for which another round is made.
+    spread: positions all over the travel that are compared, besides the present ones. tries: random placements for each
+    of them. waypoints: number that represents the path where the placements are given. rounds: joint improvements at
+    most. gain: least increase of the smallest margin for which another round is made.
     """
 
     spread: int = 16
@@ -46,10 +46,10 @@ def reconfigured(
     progress: Progress = silent,
     options: ReconfigurationOptions = ReconfigurationOptions(),
 ) -> tuple[PlacementProblem, Search]:
-    """Return the problem with the machine's guides where they are to stand, and what the search there found.
+    """Return the problem at the best rail positions found, and the search there.
 
-    Never worse than with the guides as they stand. Only positions are taken that the guides reach by moving evenly
-    without an architectural singularity on the way. Raises MachineError for a machine whose guides are not supported,
+    Never worse than at the present rail positions. Every position is reached on a straight line from the home position
+    without an architectural singularity on the way. Raises MachineError for a machine without guides,
     KeyboardInterrupt as in `search`.
     """
     guides_of(problem.machine)
@@ -68,7 +68,7 @@ def reconfigured(
             moved = SequentialSolver(there, there.constraints.moves, guides=True).raise_margin(candidate)
             if moved.smallest < candidate.smallest + options.gain:
                 break
-            there = there.on(moved.margins.machine)
+            there = there.on(moved.margins.scene.machine)
             moved = SOLVERS[solver](there, there.constraints.moves).raise_margin(moved)
             best = there, replace(best[1], best=moved)
     except KeyboardInterrupt:
@@ -81,18 +81,18 @@ def reconfigured(
 def _promising(
     problem: PlacementProblem, seed: int, progress: Progress, options: ReconfigurationOptions
 ) -> PlacementProblem:
-    """Return the problem at the rail positions at which first guesses of the placement come out best."""
-    scores = [(_promise(problem, seed, options), problem)]
+    """Return the problem at the rail positions with the best first guess of the placement."""
+    scores = [(_best_guess(problem, seed, options), problem)]
     for k, positions in enumerate(_spread(problem.machine, seed, options.spread)):
         progress("placement", k / options.spread, "guides")
         margins = at_rail_positions(problem.margins[0], positions)
         if margins is not None:
-            there = problem.on(margins.machine)
-            scores.append((_promise(there, seed, options), there))
+            there = problem.on(margins.scene.machine)
+            scores.append((_best_guess(there, seed, options), there))
     return max(scores, key=lambda pair: pair[0])[1]
 
 
-def _promise(problem: PlacementProblem, seed: int, options: ReconfigurationOptions) -> float:
+def _best_guess(problem: PlacementProblem, seed: int, options: ReconfigurationOptions) -> float:
     if problem.constraints.moves:
         return max(guess.margin for guess in first_guesses(problem, seed, SamplingOptions(tries=options.tries)))
     few = problem.samples.at(problem.samples.representatives(options.waypoints))

@@ -1,7 +1,7 @@
 """The reference placement solver: the interior-point method of IPOPT, with constraint generation.
 
 It starts with a few waypoints and kinds of margin, and adds the worst ones until none is worse than those considered.
-Slower than the default solver by an order of magnitude; tests measure the default against it.
+It is slower than the default solver by an order of magnitude; tests compare the default with it.
 """
 
 from __future__ import annotations
@@ -37,11 +37,10 @@ _OPTIONS: dict[str, Any] = {
 class IpoptOptions:
     """Options of the constraint generation; those of IPOPT itself are fixed.
 
-    waypoints, rounds: so many at first, and at most so many programs. near: kinds of margin within this much of the
-    smallest one are considered from the start. gain: with contacts, a gain that calls for another round; shorter,
-    shortest: factor on the steps without such a gain, and the least. translation_m, rotation: longest step of the
-    placement, metres and tan(angle / 2). upright: weight of the field's coefficients beside the margin, which decides
-    where the margin does not.
+    waypoints: number at first. rounds: programs at most. near: kinds of margin within this distance of the smallest one
+    are considered from the start. gain: with contacts, a smaller increase of the margin shortens the longest step by
+    the factor shorter, down to shortest. translation_m, rotation: longest step of the placement, metres and
+    tan(angle / 2). upright: weight of the field's coefficients beside the margin, a regularisation.
     """
 
     waypoints: int = 96
@@ -57,10 +56,10 @@ class IpoptOptions:
 
 @dataclass(eq=False)
 class IpoptSolver:
-    """Improves candidates of one problem with IPOPT; free: whether the placement may move.
+    """Improves candidates of one problem with IPOPT; free: whether the placement is free.
 
-    whole: all waypoints and all kinds of margin at once, with no constraint generation: plain, and very slow.
-    patience: processor seconds after which IPOPT gives up.
+    whole: all waypoints and all kinds of margin at once, without constraint generation: very slow. patience: processor
+    seconds after which IPOPT stops.
     """
 
     problem: PlacementProblem
@@ -73,7 +72,7 @@ class IpoptSolver:
     def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
         """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one."""
         best, (rows, kinds), reach = start, self._first(start), 1.0
-        touching = bool(start.margins.collision_world.obstacles)
+        touching = bool(start.margins.scene.collision_world.obstacles)
         for _ in range(self.options.rounds):
             transform, raw = self._solve(best, rows, kinds, reach)
             coefficients = self.problem.within_cone(raw)
@@ -83,7 +82,7 @@ class IpoptSolver:
             if smallest > before:
                 best = Candidate(best.margins, transform, coefficients, smallest)
             more = self._with_worst(rows, kinds, values, max(considered, before), raw)
-            if touching and smallest <= before + self.options.gain:  # contacts hold near where they were taken
+            if touching and smallest <= before + self.options.gain:  # contacts are valid nearby only
                 reach *= self.options.shorter
             elif not touching and len(more[0]) == len(rows) and len(more[1]) == len(kinds):
                 break
@@ -95,8 +94,7 @@ class IpoptSolver:
     def smooth(self, start: Candidate, keep: float) -> Floats | None:
         """Return coefficients (K, 2) of the smoothest spline at the placement of `start` that keeps the margin `keep`.
 
-        All waypoints at once, and all kinds of margin near the one to keep at the start. None where IPOPT found no such
-        spline.
+        All waypoints at once, and all kinds of margin that are near `keep` at the start. None where IPOPT finds none.
         """
         import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
@@ -126,8 +124,7 @@ class IpoptSolver:
         solver = ca.nlpsol("smooth", "ipopt", program, self._ipopt)
         lowest = np.concatenate([np.full(free, -np.inf), np.zeros(charged)])
         found = np.asarray(solver(x0=begin, lbx=lowest, lbg=least, ubg=np.inf)["x"], dtype=np.float64)
-        found = found.ravel()[:free].reshape(-1, 2)
-        found = within_discs(found)
+        found = within_discs(found.ravel()[:free].reshape(-1, 2))
         values = problem.values_of(start.margins, start.transform, spline.leans(found))
         return found if values.min() >= keep - 1e-4 else None
 
@@ -145,14 +142,13 @@ class IpoptSolver:
         worst = worst[values[worst].min(axis=1) < level]
         steepness = self.problem.steepness(coefficients)
         steep = valleys(-steepness[:, None])
-        return np.union1d(np.union1d(rows, worst), steep[steepness[steep] > 1.0 + 1e-6]), np.union1d(
-            kinds, np.flatnonzero(values.min(axis=0) < level)
-        )
+        rows = np.union1d(np.union1d(rows, worst), steep[steepness[steep] > 1.0 + 1e-6])
+        return rows, np.union1d(kinds, np.flatnonzero(values.min(axis=0) < level))
 
     def _solve(self, at: Candidate, rows: Ints, kinds: Ints, share: float) -> tuple[RigidTransform, Floats]:
         """Return placement and coefficients with the largest smallest margin over waypoints `rows`.
 
-        share: of the longest step of the placement that is allowed.
+        share: of the longest step of the placement.
         """
         problem, samples = self.problem, self.problem.samples
         count = 32 * int(np.ceil(len(rows) / 32))  # in buckets, so that few solvers are built
@@ -199,10 +195,10 @@ class IpoptSolver:
     def _solver(self, at: Candidate, count: int, kinds: tuple[int, ...]) -> Any:
         """Return the IPOPT solver for `count` waypoints, built once.
 
-        The leans of the waypoints are unknowns of their own, tied to the field by linear equations: so each margin
+        The leans of the waypoints are unknowns of their own, coupled to the field by linear equations: each margin then
         depends on nine unknowns only, and the derivatives stay sparse.
         """
-        key = (at.margins.component, count, kinds)
+        key = (at.margins.scene.branch, count, kinds)
         if key in self._solvers:
             return self._solvers[key]
         import casadi as ca  # noqa: PLC0415  heavy: only when planning

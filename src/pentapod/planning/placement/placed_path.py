@@ -1,4 +1,4 @@
-"""PlacedPath: the toolpath in the machine, with the tool axes that were chosen and the margins that they leave."""
+"""PlacedPath: the toolpath in the machine, with its placement, the chosen tool axes and their margins."""
 
 from __future__ import annotations
 
@@ -10,19 +10,37 @@ import numpy as np
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.display import plot_axes
 from pentapod.base.refusal import Refusal
-from pentapod.base.values import Result
+from pentapod.base.values import Result, Value
+from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.robot import Branch
 from pentapod.planning.limits.limit import Limit
-from pentapod.planning.placement.placement import Placement
 from pentapod.toolpath.toolpath import Toolpath
+
+
+@dataclass(frozen=True)
+class Placement(Value):
+    """Rigid transform workpiece → machine, and the reason for its choice ("job", "largest smallest margin", ...).
+
+    rail_positions (n,): of a reconfigurable machine, metres; None for other machines.
+    """
+
+    summary = ("chosen_by",)
+
+    transform: RigidTransform
+    chosen_by: str
+    rail_positions: tuple[float, ...] | None = None
+
+    @property
+    def guides(self) -> str:
+        """The rail positions as text, in mm; empty for a machine without guides."""
+        return "" if self.rail_positions is None else ", ".join(f"{1e3 * x:.3f}" for x in self.rail_positions) + " mm"
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedPath(Result):
     """Tool poses in the machine frame, one for each waypoint of the toolpath.
 
-    tips (N, 3) metres; axes (N, 3) unit, tip → spindle; margins (N, M), normalised, 0 at a limit; limits (M,): what
-    each stands for.
+    tips (N, 3) metres; axes (N, 3) unit, tip → spindle; margins (N, M) of the limits (M,), dimensionless, 0 at a limit.
     """
 
     summary = ("smallest_margin", "active_limit")
@@ -75,6 +93,6 @@ class PlacedPath(Result):
 
 @dataclass(frozen=True)
 class UnplacedPath(Refusal):
-    """The refusal of a placement, with the attempt that came nearest: what is out of its limits there, and where."""
+    """The refusal of a placement, with the best attempt; the diagnosis is that of the attempt."""
 
     attempt: PlacedPath = field(kw_only=True)

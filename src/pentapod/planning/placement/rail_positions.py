@@ -1,4 +1,4 @@
-"""Rail positions: where the guides of a reconfigurable machine may stand, as unknowns of a placement problem."""
+"""Rail positions of a reconfigurable machine, as unknowns of a placement problem."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pentapod.planning.limits.margins import Margins
 DIGITS = 6
 """Rail positions are rounded to micrometres, so that people can read them and files hold them."""
 STEP_M = 0.1
-"""The unit of a step of a guide, metres."""
+"""Unit of a step of a rail position, metres."""
 
 
 def guides_of(machine: Machine) -> ReconfigurablePentapod:
@@ -29,18 +29,18 @@ def at_rail_positions(margins: Margins, positions: Floats) -> Margins | None:
 
     None where it is architecturally singular there or on the way there.
     """
-    guides = guides_of(margins.machine)
+    guides = guides_of(margins.scene.machine)
     positions = np.clip(np.round(positions, DIGITS), *guides.travel.T)
     if not guides.stays_regular(np.zeros(len(positions)), positions):
         return None
     try:
-        return margins.on(margins.machine.at(positions))
+        return margins.on(margins.scene.machine.at(positions))
     except MachineError:
         return None
 
 
 def with_travel(machine: Machine, room: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-    """Return the room (L,) of a placement and its derivatives (L, 6), with the room of the guides' travel added."""
+    """Return the constraints (L,) of a placement and their derivatives (L, 6), with those of the travel appended."""
     positions, (least, greatest) = machine.rail_positions, guides_of(machine).travel.T
     each = np.eye(len(positions))
     left = np.concatenate([room[0], positions - least, greatest - positions])
@@ -48,5 +48,5 @@ def with_travel(machine: Machine, room: tuple[Floats, Floats]) -> tuple[Floats, 
 
 
 def with_guides(by_step: Floats, by_guides: Floats) -> Floats:
-    """Return the block diagonal matrix of what depends on the placement and what depends on the guides."""
+    """Return the block diagonal matrix of derivatives by the placement and by the rail positions."""
     return np.asarray(block_diag(by_step, by_guides), dtype=np.float64)

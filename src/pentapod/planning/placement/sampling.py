@@ -21,8 +21,9 @@ class SamplingOptions:
     """How many random placements are tried, and which are kept.
 
     tries: for each branch. kept: guesses returned for each branch, which differ by apart_m in place or apart_rad in
-    orientation. ranked: the best that are refined. largest_slope: how far the part's mean axis may lean from the base
-    normal, radians.
+    orientation. ranked: the best that are refined. largest_slope: greatest angle of the part's mean axis from the base
+    normal, radians. judged: waypoints at which a placement is judged. spreads: standard deviations in metres of the
+    samples around the best, one round each. fitted: waypoints to which the first tilt field is fitted.
     """
 
     tries: int = 12_000
@@ -31,43 +32,43 @@ class SamplingOptions:
     apart_m: float = 0.02
     apart_rad: float = float(np.radians(15.0))
     largest_slope: float = float(np.radians(40.0))
+    judged: int = 12
+    spreads: tuple[float, ...] = (0.08, 0.03)
+    fitted: int = 192
 
 
-_FITTED = 192  # waypoints to which the first tilt field is fitted
+OPTIONS = SamplingOptions()
 
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """A placement in the branch of its margins, and the smallest margin over the representatives."""
+    """A placement in the branch of its margins, with its smallest margin over the representatives."""
 
     margins: Margins
     transform: RigidTransform
     margin: float
 
 
-def first_guesses(
-    problem: PlacementProblem, seed: int = 0, options: SamplingOptions = SamplingOptions()
-) -> list[Guess]:
-    """Return the best few of the allowed placements for each branch, best first.
+def first_guesses(problem: PlacementProblem, seed: int = 0, options: SamplingOptions = OPTIONS) -> list[Guess]:
+    """Return the best few random placements for each branch, the best first; the same for a seed.
 
-    The same for a seed, on one kind of processor and with one set of libraries.
-    Each placement is judged on a dozen representatives with their nominal axes, the best again with a cone of tilts and
-    with the collision_world.
+    Each placement is judged at a few representatives with their nominal axes, the best ones again with a cone of tilts
+    and with the obstacles.
     """
     samples, machine, constraints, tries = problem.samples, problem.machine, problem.constraints, options.tries
     rng = np.random.default_rng(seed)
-    rows = samples.representatives(12)
+    rows = samples.representatives(options.judged)
     centre, mean_axis = samples.tilt_centres.mean(axis=0), samples.nominal.mean(axis=0)
     mean_axis = mean_axis / max(float(np.linalg.norm(mean_axis)), 1e-9)
     guesses: list[Guess] = []
     for margins in problem.margins:
-        simple = samples.tilt == 0.0 and not margins.collision_world.obstacles
-        rotations = _rotations(mean_axis, -float(margins.component.w), tries, options.largest_slope, rng)
+        simple = samples.tilt == 0.0 and not margins.scene.collision_world.obstacles
+        rotations = _rotations(mean_axis, -float(margins.scene.branch.w), tries, options.largest_slope, rng)
         places = _places(machine, tries, rng)
         if constraints.is_bounded:
             rotations, origins = constraints.within(rotations, places - rotations @ centre, rng)
             places = origins + rotations @ centre
-        for spread in (0.08, 0.03):  # twice closer around the best
+        for spread in options.spreads:
             best = _best(_score(samples, margins, rotations, places - rotations @ centre, rows), options.ranked)
             repeat = tries // 3 // len(best)
             turned, near = rotations[best].repeat(repeat, axis=0), places[best].repeat(repeat, axis=0)
@@ -79,22 +80,22 @@ def first_guesses(
         translations = places - rotations @ centre
         score = _score(samples, margins, rotations, translations, rows)
         best = _best(score, options.ranked)
-        found = [
-            Guess(margins, t, float(score[k] if simple else _smallest(samples, margins, t, rows)))
-            for k in best
-            for t in (constraints.nearest_to(RigidTransform(_orthonormal(rotations[k]), translations[k])),)
-        ]
+        found: list[Guess] = []
+        for k in best:
+            place = constraints.nearest_to(RigidTransform(_orthonormal(rotations[k]), translations[k]))
+            tilted = score[k] if simple else best_tilted_margins(samples.at(rows), margins, place)[0].min()
+            found.append(Guess(margins, place, float(tilted)))
         guesses += _different(sorted(found, key=lambda g: -g.margin), centre, options)
     return sorted(guesses, key=lambda g: -g.margin)
 
 
 def first_candidate(problem: PlacementProblem, margins: Margins, transform: RigidTransform) -> Candidate:
-    """Return the candidate whose smooth field comes near the tilts that are best for each waypoint by itself."""
+    """Return the candidate with a smooth field fitted to the best tilts of single waypoints (least squares)."""
     coefficients, samples, domain = problem.upright, problem.samples, problem.domain
     if samples.tilt > 0.0:
-        rows = samples.representatives(_FITTED)
+        rows = samples.representatives(OPTIONS.fitted)
         _, leans = best_tilted_margins(samples.at(rows), margins, transform)
-        # Smoothness, lightly weighed, decides where the representatives do not.
+        # Small weights of roughness and size regularise the fit.
         smooth = np.vstack([0.3 * domain.roughness(), 1e-3 * np.eye(domain.size)])
         wanted = np.vstack([leans @ domain.lean_plane.T, np.zeros((len(smooth), 2))])
         fitted = np.linalg.lstsq(np.vstack([problem.basis[rows], smooth]), wanted, rcond=None)[0]
@@ -114,7 +115,7 @@ def tilts(angle: float) -> Floats:
 def best_tilted_margins(
     samples: ToolpathSamples, margins: Margins, placement: RigidTransform, block: int = 4096
 ) -> tuple[Floats, Floats]:
-    """Return margins (N, M) at the best tilt of a grid over the cone, each waypoint by itself, and the lean (N, 3)."""
+    """Return margins (N, M) and leans (N, 3) at each waypoint's best tilt of a grid over the cone."""
     grid = tilts(samples.tilt) if samples.tilt > 0.0 else np.zeros((1, 2))
     out, leans = np.empty((len(samples.tilt_centres), len(margins.limits))), np.empty((len(samples.tilt_centres), 3))
     for start in range(0, len(out), block):
@@ -134,7 +135,7 @@ def _best(score: Floats, count: int) -> Ints:
 
 
 def _different(guesses: list[Guess], centre: Floats, options: SamplingOptions) -> list[Guess]:
-    """Return the first guesses that differ from those before."""
+    """Return the first guesses, sorted, that differ from those before them."""
     kept: list[Guess] = []
     for guess in guesses:
         for other in kept:
@@ -155,10 +156,6 @@ def _score(samples: ToolpathSamples, margins: Margins, r: Floats, t: Floats, row
     return margins.own(tips, turned).min(axis=(-1, -2))
 
 
-def _smallest(samples: ToolpathSamples, margins: Margins, placement: RigidTransform, rows: Ints) -> float:
-    return float(best_tilted_margins(samples.at(rows), margins, placement)[0].min())
-
-
 def _rotations(mean_axis: Floats, side: float, count: int, slope: float, rng: np.random.Generator) -> Floats:
     """Return rotations (count, 3, 3) that turn the mean tool axis to within `slope` radians of side · z."""
     cosine = rng.uniform(np.cos(slope), 1.0, count)
@@ -173,7 +170,7 @@ def _rotations(mean_axis: Floats, side: float, count: int, slope: float, rng: np
 
 
 def _places(machine: Machine, count: int, rng: np.random.Generator) -> Floats:
-    """Return places (count, 3) for the path's centre: a third near the advertised work, the rest anywhere in reach."""
+    """Return random places (count, 3) for the path's centre: a third near the work volume, the rest within reach."""
     base, reach = machine.robot.base_joints[:, :2], float(machine.legs.max_length.max()) + abs(machine.tool_length)
     low, high = base.min(axis=0), base.max(axis=0)
     side = np.sign(machine.joints.base_axes[:, 2].sum()) or 1.0
@@ -183,15 +180,15 @@ def _places(machine: Machine, count: int, rng: np.random.Generator) -> Floats:
 
 
 def _turned(rotations: Floats, spread: float, rng: np.random.Generator) -> Floats:
-    """Return rotations turned by small random angles (to first order; made exact when one is chosen)."""
+    """Return rotations (S, 3, 3) turned by small random angles."""
     a = rng.normal(scale=2.0 * spread, size=(len(rotations), 3))
     small = np.zeros((len(a), 3, 3))
     small[:, 0, 1], small[:, 0, 2], small[:, 1, 2] = -a[:, 2], a[:, 1], -a[:, 0]
     small -= small.transpose(0, 2, 1)
-    u, _, v = np.linalg.svd(rotations @ (np.eye(3) + small))
-    return u @ v
+    return _orthonormal(rotations @ (np.eye(3) + small))
 
 
-def _orthonormal(rotation: Floats) -> Floats:
-    u, _, v = np.linalg.svd(rotation)
+def _orthonormal(matrix: Floats) -> Floats:
+    """Return the orthonormal matrices (..., 3, 3) nearest to given ones."""
+    u, _, v = np.linalg.svd(matrix)
     return u @ v

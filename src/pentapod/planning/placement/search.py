@@ -27,9 +27,9 @@ SolverName = Literal["sequential", "ipopt"]
 class SearchOptions:
     """How many first guesses are improved.
 
-    refined: so many in any case. tried: so many at most, while none is good enough. hopeless: where all guesses are
-    below this margin, whether the part fits without obstacles is found out first. beyond_reach: a best margin,
-    after the first few, below which no other start is expected to lead to a placement that fits.
+    refined: number in any case. tried: maximum while none is good enough. hopeless: where all guesses are below this
+    margin, the search is first made without obstacles. beyond_reach: best margin after the first `refined` starts below
+    which no other start is expected to lead to a placement that fits.
     """
 
     refined: int = 4
@@ -42,16 +42,16 @@ Start = tuple[Margins, RigidTransform]
 
 
 class Solver(Protocol):
-    """What improves candidates: `sequential`, the default, and `ipopt`, the reference."""
+    """A local solver: `sequential`, the default, or `ipopt`, the reference."""
 
     def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
         """Return a candidate near `start` with the largest smallest margin, or with `enough`; never a worse one."""
         ...
 
     def smooth(self, start: Candidate, keep: float) -> Floats | None:
-        """Return coefficients (K, 2) of the smoothest spline of the axes that keeps the margin `keep`.
+        """Return coefficients (K, 2) of the smoothest spline of the axes that keeps the margin `keep`, or None.
 
-        At the placement of `start`, and from its leans on. None where no such spline was found.
+        Placement and first leans are those of `start`.
         """
         ...
 
@@ -60,12 +60,12 @@ SOLVERS: dict[SolverName, Callable[[PlacementProblem, bool], Solver]] = {
     "sequential": SequentialSolver,
     "ipopt": IpoptSolver,
 }
-"""By name: from a problem, and whether the placement may move."""
+"""The solvers by name, made of a problem and whether the placement is free."""
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What a search found: the best candidate, how many of how many starts it improved, whether it was interrupted."""
+    """The result of a search: the best candidate, number of starts tried and in all, whether it was interrupted."""
 
     best: Candidate
     tried: int
@@ -75,7 +75,7 @@ class Search:
 
     @property
     def choice(self) -> str:
-        """What the placement was chosen by, in words."""
+        """The reason for the choice of the placement, in words."""
         poses, aim = self.constraints.poses, "largest smallest margin"
         if len(poses) > 1:
             aim = f"pose {1 + poses.index(self.best.transform)} of {len(poses)} of the fixture: {aim}"
@@ -94,14 +94,16 @@ def search(
 ) -> Search:
     """Return the best allowed placement that was found.
 
-    KeyboardInterrupt ends the search early; it is raised where nothing that fits was found until then.
+    KeyboardInterrupt ends the search early; it is raised where no placement that fits was found before.
     """
     constraints, best, tried, count, interrupted = problem.constraints, None, 0, 1, False
     try:
-        starts, promise = _starts(problem, seed, progress)
-        if promise < options.hopeless and problem.collision_world is not NOTHING:
-            # What does not fit with nothing around does not fit; that is found much sooner.
-            alone = search(problem.alone(), seed=seed, solver=solver, progress=progress, options=options)
+        starts, best_guess = _starts(problem, seed, progress)
+        if best_guess < options.hopeless and problem.margins[0].scene.collision_world is not NOTHING:
+            # A part that does not fit without obstacles does not fit with them; that search is much faster.
+            alone = search(
+                problem.without_collision_world(), seed=seed, solver=solver, progress=progress, options=options
+            )
             if alone.best.smallest < NEEDED_MARGIN:
                 return alone
             if alone.interrupted:
@@ -114,14 +116,14 @@ def search(
             found = improver.raise_margin(first_candidate(problem, margins, transform))
             best = found if best is None or found.smallest > best.smallest else best
             tried += 1
-            note = f"component {best.margins.component}, best margin so far {best.smallest:.3f}"
+            note = f"component {best.margins.scene.branch}, best margin so far {best.smallest:.3f}"
             progress("placement", tried / count, note)
     except KeyboardInterrupt:
         if best is None or best.smallest < NEEDED_MARGIN:
             raise
         interrupted = True
         progress("placement", 1.0, f"interrupted: the best so far is kept, margin {best.smallest:.3f}")
-    if best is None:  # there are components, and first_guesses returns some for each
+    if best is None:  # not reached: there are components, and first_guesses returns some for each
         raise RuntimeError("no first guess was made")
     return Search(best, tried, count, interrupted, constraints)
 
@@ -131,7 +133,7 @@ def _is_decided(best: Candidate, options: SearchOptions) -> bool:
 
 
 def _starts(problem: PlacementProblem, seed: int, progress: Progress) -> tuple[list[Start], float]:
-    """Return where to start, and the smallest margin of the most promising guess (∞ where nothing is guessed)."""
+    """Return the starts, and the margin of the best guess (∞ where the placements are given)."""
     if not problem.constraints.moves:
         return [(margins, pose) for pose in problem.constraints.poses for margins in problem.margins], np.inf
     progress("placement", 0.0, "sampling")

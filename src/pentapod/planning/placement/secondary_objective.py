@@ -1,8 +1,8 @@
 """Secondary objective: small leg forces or a short machining time, by sequential linear programming.
 
-The margin may fall to nine tenths of the largest. The programs hold the linear model of the margins, and derivatives of
-the objective by central differences at each waypoint: by the placement's motion and the waypoint's lean; those by the
-tilt field follow from its basis.
+The smallest margin is kept above a bound. The programs hold the linear model of the margins, and derivatives of the
+objective by central differences at each waypoint: by the placement's motion and the waypoint's lean; those by the tilt
+field follow from its basis.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.forces import tip_force_amplification
-from pentapod.machine.machine import Machine
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.formulation import stepped
 from pentapod.planning.problem.linear_model import LinearModel, by_field, valleys
@@ -26,23 +25,48 @@ from pentapod.toolpath.toolpath import Toolpath
 
 SecondaryObjective = Literal["force", "time"]
 
-_WORST, _SPREAD = 48, 96  # waypoints whose forces enter a program: the worst ones, and some everywhere
-_STEP = 1e-5  # of central differences
-_NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
-
 Poses = tuple[Floats, Floats]
 """Tips and tool axes (n, 3), machine frame."""
 
+_NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
+
+
+@dataclass(frozen=True)
+class ObjectiveOptions:
+    """Options of the sequential linear programming.
+
+    steps: maximum. radius, least_radius: the first and the smallest trust region, in units of the placement step.
+    decrease: relative decrease of the objective below which the iteration stops. slack: violation of the bound on the
+    margin that is accepted. accepted, very_good: ratios of actual to predicted decrease from which a step is taken, and
+    the radius is doubled; shrink: its factor after a rejected step. worst, spread: waypoints whose forces enter a
+    program: the worst ones, and representatives of the path. difference: step of the central differences.
+    """
+
+    steps: int = 40
+    radius: float = 0.3
+    least_radius: float = 1e-3
+    decrease: float = 1e-3
+    slack: float = 1e-5
+    accepted: float = 0.1
+    very_good: float = 0.6
+    shrink: float = 0.4
+    worst: int = 48
+    spread: int = 96
+    difference: float = 1e-5
+
+
+OPTIONS = ObjectiveOptions()
+
 
 class Objective(Protocol):
-    """What is minimised: the largest of some pieces, each a function of quantities at the waypoints."""
+    """An objective: the maximum of some pieces, each a function of quantities at the waypoints."""
 
     def value(self, at: Candidate) -> float:
         """Return the objective over the whole path."""
         ...
 
     def pieces(self, at: Candidate, model: LinearModel) -> tuple[Floats, Floats]:
-        """Return pieces (K,), of which the largest is the objective, and derivatives (K, n) by the model's unknowns."""
+        """Return pieces (K,), whose maximum is the objective, and derivatives (K, n) by the model's unknowns."""
         ...
 
 
@@ -57,21 +81,22 @@ class LeastForce:
         return float(self._at_all(at).max())
 
     def pieces(self, at: Candidate, model: LinearModel) -> tuple[Floats, Floats]:
-        """Return the amplification at the worst waypoints, and at some everywhere."""
-        values = self._at_all(at)
-        worst = np.argsort(-values, kind="stable")[:_WORST]
-        rows = np.union1d(worst, self.problem.samples.representatives(_SPREAD))
-        machine = self.problem.machine
-
-        def amplification(poses: Poses) -> Floats:
-            return _amplification(machine, poses)[:, None]
-
-        by_motion, by_lean = _partials(self.problem, at, rows, model.moves, amplification)
-        return values[rows], _by_unknowns(self.problem, rows, by_motion[:, 0], by_lean[:, 0])
+        """Return the amplification at the worst waypoints, and at representatives of the path."""
+        problem, values = self.problem, self._at_all(at)
+        worst = np.argsort(-values, kind="stable")[: OPTIONS.worst]
+        rows = np.union1d(worst, problem.samples.representatives(OPTIONS.spread))
+        by_motion, by_lean = _partials(
+            problem, at, rows, model.moves, lambda poses: self._amplification(poses)[:, None]
+        )
+        by_coefficients = by_field(problem.basis[rows], by_lean[:, 0]) * problem.cone
+        return values[rows], np.hstack([by_motion[:, 0], by_coefficients])
 
     def _at_all(self, at: Candidate) -> Floats:
-        poses = self.problem.samples.machine_poses(at.transform, self.problem.axes(at.coefficients))
-        return _amplification(self.problem.machine, poses)
+        return self._amplification(self.problem.samples.machine_poses(at.transform, self.problem.axes(at.coefficients)))
+
+    def _amplification(self, poses: Poses) -> Floats:
+        length, (tips, axes) = self.problem.machine.tool_length, poses
+        return tip_force_amplification(self.problem.machine.robot, tips + length * axes, -axes, length)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +114,7 @@ class LeastTime:
         return float(self._times(at)[0].sum())
 
     def pieces(self, at: Candidate, model: LinearModel) -> tuple[Floats, Floats]:
-        """Return the bound as one piece: a sum of so many maxima that its kinks hardly show."""
+        """Return the bound as one piece: a sum of so many maxima that it is almost smooth."""
         problem, robot, length = self.problem, self.problem.machine.robot, self.problem.machine.tool_length
         times, weights = self._times(at)
         rows = np.flatnonzero((weights != 0.0).any(axis=1))
@@ -134,56 +159,37 @@ def objective_of(name: SecondaryObjective, problem: PlacementProblem, toolpath: 
     return LeastTime(problem, np.minimum(feeds, problem.machine.rapid_velocity))
 
 
-@dataclass(frozen=True)
-class ObjectiveOptions:
-    """When the sequential linear programming ends.
-
-    steps: at most so many. least_reach: the smallest trust region, in units of the placement step. decrease: relative
-    decrease of the objective below which the iteration stops. slack: how far the margin may come below the one to keep.
-    """
-
-    steps: int = 40
-    least_reach: float = 1e-3
-    decrease: float = 1e-3
-    slack: float = 1e-5
-
-
-def improved(
-    solver: SequentialSolver,
-    start: Candidate,
-    objective: Objective,
-    keep: float,
-    options: ObjectiveOptions = ObjectiveOptions(),
-) -> Candidate:
-    """Return a candidate near `start`, with the smallest margin `keep` at least, that is better by the objective."""
+def improved(solver: SequentialSolver, start: Candidate, objective: Objective, keep: float) -> Candidate:
+    """Return a candidate near `start` with a smaller objective, and a smallest margin of at least `keep`."""
     problem, rows = solver.problem, np.arange(len(solver.problem.samples.tilt_centres))
-    best, reach, extra = start, 0.3, _NO_ROWS
+    best, radius, extra = start, OPTIONS.radius, _NO_ROWS
     value = objective.value(best)
     model = solver.model(best, rows, keep)
     pieces = objective.pieces(best, model)
-    for _ in range(options.steps):
-        step = _lowest(model, pieces, keep, reach)
-        trial, promise = None, 0.0
+    for _ in range(OPTIONS.steps):
+        step = _lowest(model, pieces, keep, radius)
+        trial, predicted = None, 0.0
         if step is not None:
-            motion, change, promise = step
-            promise += value - float(pieces[0].max())
+            motion, change, predicted = step
+            predicted += value - float(pieces[0].max())
             transform = stepped(best.transform, motion) if model.moves.size else best.transform
             transform = problem.constraints.nearest_to(transform)
             trial = problem.candidate(best.margins, transform, problem.within_cone(best.coefficients + change))
         gain = value - objective.value(trial) if trial is not None else 0.0
-        if trial is not None and trial.smallest >= keep - options.slack and gain > 0.1 * promise and gain > 0.0:
-            done = gain < options.decrease * value
+        enough = gain > OPTIONS.accepted * predicted and gain > 0.0
+        if trial is not None and trial.smallest >= keep - OPTIONS.slack and enough:
+            done = gain < OPTIONS.decrease * value
             best, value, extra = trial, value - gain, _NO_ROWS
-            reach *= 2.0 if gain > 0.6 * promise else 1.0
+            radius *= 2.0 if gain > OPTIONS.very_good * predicted else 1.0
             if done:
                 break
             model = solver.model(best, rows, keep)
             pieces = objective.pieces(best, model)
         else:
-            reach *= 0.4
-            if reach < options.least_reach:
+            radius *= OPTIONS.shrink
+            if radius < OPTIONS.least_radius:
                 break
-            if trial is not None and trial.smallest < keep:  # what came out worst may not have been in the model
+            if trial is not None and trial.smallest < keep:  # the worst margins may not have been in the model
                 values = problem.values(trial.margins, trial.transform, trial.coefficients)
                 extra = np.union1d(extra, valleys(values))
                 model = solver.model(best, rows, keep, extra)
@@ -191,9 +197,9 @@ def improved(
 
 
 def _lowest(
-    model: LinearModel, pieces: tuple[Floats, Floats], keep: float, reach: float
+    model: LinearModel, pieces: tuple[Floats, Floats], keep: float, radius: float
 ) -> tuple[Floats, Floats, float] | None:
-    """Return step (6,), change of coefficients (size, 2) that make the largest piece least, and by how much."""
+    """Return step (6,) and change of coefficients (size, 2) that minimise the largest piece, and its decrease."""
     from scipy.optimize import linprog  # noqa: PLC0415  heavy: only when planning
 
     count, now = model.matrix.shape[1], float(pieces[0].max())
@@ -210,7 +216,7 @@ def _lowest(
             model.values - keep,
             np.maximum(np.append(1.0 - model.steepness, model.room), 0.0),
         ]),
-        bounds=[(-reach, reach)] * count + [(None, None)],
+        bounds=[(-radius, radius)] * count + [(None, None)],
         method="highs-ds",
     )  # fmt: skip
     if answer.status != 0:
@@ -220,29 +226,18 @@ def _lowest(
 
 
 def _partials(
-    problem: PlacementProblem, at: Candidate, rows: Ints, moves: Floats, ingredient: Callable[[Poses], Floats]
+    problem: PlacementProblem, at: Candidate, rows: Ints, moves: Floats, quantity: Callable[[Poses], Floats]
 ) -> tuple[Floats, Floats]:
-    """Return central differences of ingredients (n, I) by the moves (6, k), (n, I, k), and the lean."""
+    """Return central differences of quantities (n, I) by the moves (6, k), (n, I, k), and by the lean, (n, I, 2)."""
     still = np.zeros(2)
 
     def at_offset(step: Floats, tilt: Floats) -> Floats:
         b = (problem.basis[rows] @ at.coefficients + tilt) @ problem.domain.lean_plane
         transform: RigidTransform = stepped(at.transform, step)
-        return ingredient(problem.samples.machine_poses(transform, lean(problem.samples.nominal[rows], b), rows))
+        return quantity(problem.samples.machine_poses(transform, lean(problem.samples.nominal[rows], b), rows))
 
-    steps = _STEP * moves
-    by_motion = [at_offset(step, still) - at_offset(-step, still) for step in steps.T]
-    by_lean = [at_offset(np.zeros(6), _STEP * u) - at_offset(np.zeros(6), -_STEP * u) for u in np.eye(2)]
-    shape = (*by_lean[0].shape, 0)
-    first = np.stack(by_motion, axis=-1) if by_motion else np.zeros(shape)
-    return first / (2.0 * _STEP), np.stack(by_lean, axis=-1) / (2.0 * _STEP)
-
-
-def _by_unknowns(problem: PlacementProblem, rows: Ints, by_motion: Floats, by_lean: Floats) -> Floats:
-    """Return derivatives (n, k + 2·size) by motion and field of those by motion (n, k) and lean (n, 2)."""
-    return np.hstack([by_motion, by_field(problem.basis[rows], by_lean) * problem.cone])
-
-
-def _amplification(machine: Machine, poses: Poses) -> Floats:
-    tips, axes = poses
-    return tip_force_amplification(machine.robot, tips + machine.tool_length * axes, -axes, machine.tool_length)
+    h = OPTIONS.difference
+    by_motion = [at_offset(step, still) - at_offset(-step, still) for step in (h * moves).T]
+    by_lean = [at_offset(np.zeros(6), h * u) - at_offset(np.zeros(6), -h * u) for u in np.eye(2)]
+    first = np.stack(by_motion, axis=-1) if by_motion else np.zeros((*by_lean[0].shape, 0))
+    return first / (2.0 * h), np.stack(by_lean, axis=-1) / (2.0 * h)

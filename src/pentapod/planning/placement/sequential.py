@@ -1,7 +1,7 @@
 """The default placement solver: sequential quadratic programming with a trust region, for the max-min problem.
 
 Each program holds only the smallest margins, at the waypoints where they are smallest (Fletcher, Practical Methods of
-Optimization, ch. 14: minimax). Every step is judged by the margins themselves: a poor model costs a step, no limit.
+Optimization, ch. 14: minimax). Every step is judged by the margins themselves, so a poor model costs only a step.
 """
 
 from __future__ import annotations
@@ -26,11 +26,13 @@ _NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
 
 @dataclass(frozen=True)
 class SequentialOptions:
-    """When the iteration ends, and at how many waypoints margins are computed.
+    """Options of the trust-region method.
 
-    waypoints: at most so many are used in every step; all are checked when the steps have ended. steps, rounds: at most
-    so many steps, and checks at all waypoints. tolerance: a smallest margin over all waypoints that is lower by more
-    than this calls for another round. least: smaller predicted gains, and smaller trust regions, end the steps.
+    waypoints: used in every step, at most; all are checked when the steps have ended. steps, rounds: maximum of steps,
+    and of checks at all waypoints. tolerance: decrease of the smallest margin at all waypoints that calls for another
+    round. least: smaller predicted increases, and smaller trust regions, end the steps. radius: of the first trust
+    region. accepted, good, very_good: ratios of actual to predicted increase from which a step is taken, and the radius
+    is kept, and doubled; else it shrinks by the factor shrink.
     """
 
     waypoints: int = 4000
@@ -38,11 +40,16 @@ class SequentialOptions:
     rounds: int = 6
     tolerance: float = 1e-4
     least: float = 1e-5
+    radius: float = 0.5
+    accepted: float = 0.05
+    good: float = 0.25
+    very_good: float = 0.6
+    shrink: float = 0.4
 
 
 @dataclass(eq=False)
 class SequentialSolver:
-    """Improves candidates of one problem. free, guides: whether the placement and the machine's guides may move."""
+    """Improves candidates of one problem. free, guides: whether placement and rail positions are free."""
 
     problem: PlacementProblem
     free: bool
@@ -53,7 +60,7 @@ class SequentialSolver:
         """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one."""
         rows, best = self._waypoints(), start
         for _ in range(self.options.rounds):
-            found = self._climb(best, rows, enough + self.options.tolerance)
+            found = self._optimised(best, rows, enough + self.options.tolerance)
             values = self.problem.values(found.margins, found.transform, found.coefficients)
             smallest = float(values.min())
             if smallest > best.smallest:
@@ -71,43 +78,44 @@ class SequentialSolver:
         count = len(self.problem.samples.tilt_centres)
         return np.unique(np.linspace(0, count - 1, min(count, self.options.waypoints)).astype(np.intp))
 
-    def _climb(self, start: Candidate, rows: Ints, enough: float) -> Candidate:
-        """Return the candidate that a trust-region method reaches, with its smallest margin over `rows`."""
-        problem, reach, extra = self.problem, 0.5, _NO_ROWS
+    def _optimised(self, start: Candidate, rows: Ints, enough: float) -> Candidate:
+        """Return the result of the trust-region method, with its smallest margin over `rows`."""
+        problem, options, radius, extra = self.problem, self.options, self.options.radius, _NO_ROWS
         smallest = float(problem.values(start.margins, start.transform, start.coefficients, rows).min())
         best = Candidate(start.margins, start.transform, start.coefficients, smallest)
         slopes = step_slopes(problem, start.margins, guides=self.guides)
         curvature = Curvature(problem, start.margins, self.guides)
         model = self.model(best, rows, best.smallest, slopes=slopes)
-        for _ in range(self.options.steps):
+        for _ in range(options.steps):
             if best.smallest >= enough:
                 break
-            step, change, promise = curvature.best_step(model, best, reach)
-            if promise < self.options.least:
+            step, change, predicted = curvature.best_step(model, best, radius)
+            if predicted < options.least:
                 break
             coefficients, values, gain = problem.within_cone(best.coefficients + change), np.zeros((0, 1)), -np.inf
             moved = self._moved(best, step)
             if moved is not None:
                 values = problem.values(*moved, coefficients, rows)
                 gain = float(values.min()) - best.smallest
-            reach *= 2.0 if gain > 0.6 * promise else 1.0 if gain > 0.25 * promise else 0.4
-            if moved is not None and gain > 0.05 * promise:
+            kept = 1.0 if gain > options.good * predicted else options.shrink
+            radius *= 2.0 if gain > options.very_good * predicted else kept
+            if moved is not None and gain > options.accepted * predicted:
                 best = Candidate(*moved, coefficients, float(values.min()))
-            elif reach < self.options.least:
+            elif radius < options.least:
                 break
-            elif moved is not None:  # what came out worst may not have been in the model
+            elif moved is not None:  # the worst margins may not have been in the model
                 steepness = problem.steepness(best.coefficients + change, rows)
                 extra = np.union1d(extra, np.union1d(valleys(values), valleys(-steepness[:, None])))
             model = self.model(best, rows, best.smallest, extra, slopes)
         return best
 
     def _moved(self, at: Candidate, step: Floats) -> tuple[Margins, RigidTransform] | None:
-        """Return margins and placement after a step; None where the guides cannot stand there, or get there."""
+        """Return margins and placement after a step; None where the guides cannot reach their positions."""
         transform, margins = at.transform, at.margins
         if self.free:
             transform = self.problem.constraints.nearest_to(stepped(transform, step[:6]))
         if self.guides:
-            there = at_rail_positions(margins, margins.machine.rail_positions + step[6:])
+            there = at_rail_positions(margins, margins.scene.machine.rail_positions + step[6:])
             return None if there is None else (there, transform)
         return margins, transform
 
@@ -121,7 +129,7 @@ class SequentialSolver:
         slopes = step_slopes(self.problem, at.margins) if slopes is None else slopes
         room = self._room(at.transform)
         if self.guides:
-            room = with_travel(at.margins.machine, room)
+            room = with_travel(at.margins.scene.machine, room)
         return LinearModel.of(self.problem, at, rows, level, extra, slopes, room, self._moves)
 
     @property

@@ -1,8 +1,8 @@
 """PlacementConstraints: the feasible set of placements, and the directions in which a placement may move.
 
 A step of the optimisers moves the workpiece's origin in the machine frame and turns the workpiece about that origin
-(`formulation.stepped`). What a fixture, a table or a box leaves of that is stated here once: for sampling, as a way to
-the nearest allowed placement; for the solvers, as columns of allowed motion and as room that must not become negative.
+(`formulation.stepped`). The constraints of a fixture, a table or a box are stated here once: for sampling, as a
+projection to the nearest allowed placement; for the solvers, as columns of allowed motion and as inequalities.
 """
 
 from __future__ import annotations
@@ -19,9 +19,6 @@ from pentapod.base.errors import ArrayError
 from pentapod.base.values import Value
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
-
-_ALL_MOTION = np.eye(6)
-_NO_MOTION = np.zeros((6, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,20 +43,16 @@ class PlacementConstraints(Value):
     poses: tuple[RigidTransform, ...] = ()
 
     def __post_init__(self) -> None:
-        arrays = {name: np.array(getattr(self, name), dtype=np.float64) for name in ("low", "high")}
-        if any(array.shape != (3,) for array in arrays.values()) or not (arrays["low"] <= arrays["high"]).all():
-            bounds = [array.tolist() for array in arrays.values()]
+        low, high = np.array(self.low, dtype=np.float64), np.array(self.high, dtype=np.float64)
+        if low.shape != (3,) or high.shape != (3,) or not (low <= high).all():
+            bounds = [low.tolist(), high.tolist()]
             raise ArrayError("the bounds of the origin are not low ≤ high", value=bounds, expected="(3,) and (3,)")
         if not 0.0 <= self.largest_turn <= np.pi:
             raise ArrayError("the largest turn is out of range", value=self.largest_turn, expected="0 to π")
-        for array in arrays.values():
-            array.setflags(write=False)
-        set_frozen(
-            self,
-            **arrays,
-            **{name: frozen(getattr(self, name), name) for name in ("motion", "reference", "upright", "normal")},
-            poses=tuple(self.poses),
-        )
+        low.setflags(write=False)  # infinite where nothing bounds them, which `frozen` refuses
+        high.setflags(write=False)
+        others = {name: frozen(getattr(self, name), name) for name in ("motion", "reference", "upright", "normal")}
+        set_frozen(self, low=low, high=high, **others, poses=tuple(self.poses))
 
     @classmethod
     def free(
@@ -70,10 +63,10 @@ class PlacementConstraints(Value):
         reference: RigidTransform | None = None,
         largest_turn: float = np.pi,
     ) -> PlacementConstraints:
-        """Return all six freedoms, within a box for the origin and a largest turn from a reference (radians)."""
+        """Return all six degrees of freedom, with a box for the origin and a largest turn from a reference, radians."""
         rotation = np.eye(3) if reference is None else reference.rotation
         none = np.zeros(3)
-        return cls(_ALL_MOTION, np.asarray(low), np.asarray(high), rotation, largest_turn, none, none)
+        return cls(np.eye(6), np.asarray(low), np.asarray(high), rotation, largest_turn, none, none)
 
     @classmethod
     def table(
@@ -107,7 +100,7 @@ class PlacementConstraints(Value):
         if not poses:
             raise ArrayError("a fixture needs at least one pose", value=0)
         wide, none = np.full(3, np.inf), np.zeros(3)
-        return cls(_NO_MOTION, -wide, wide, np.eye(3), np.pi, none, none, tuple(poses))
+        return cls(np.zeros((6, 0)), -wide, wide, np.eye(3), np.pi, none, none, tuple(poses))
 
     @property
     def moves(self) -> bool:
@@ -125,9 +118,9 @@ class PlacementConstraints(Value):
         return self.largest_turn < np.pi
 
     def within(self, rotations: Floats, origins: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
-        """Return random placements, rotations (S, 3, 3) and origins (S, 3), brought to where they are allowed.
+        """Return allowed placements for random rotations (S, 3, 3) and origins (S, 3).
 
-        What lies beyond a bound is drawn anew, evenly, where both ends of the bound are known: not all put on its edge.
+        Coordinates beyond a bound are drawn anew, evenly, where both ends are finite, rather than put on the bound.
         """
         for k in range(3):
             beyond = (origins[:, k] < self.low[k]) | (origins[:, k] > self.high[k])
@@ -142,7 +135,7 @@ class PlacementConstraints(Value):
         return self.nearest(rotations, origins)
 
     def nearest(self, rotations: Floats, origins: Floats) -> tuple[Floats, Floats]:
-        """Return allowed placements near to rotations (S, 3, 3) and origins (S, 3); those allowed stay as they are."""
+        """Return allowed placements near to rotations (S, 3, 3) and origins (S, 3); allowed ones are not changed."""
         if self.upright.any():
             rotations = _swing(rotations @ self.upright, self.normal) @ rotations
         elif self.turn_is_bounded:
@@ -153,16 +146,17 @@ class PlacementConstraints(Value):
         return rotations, np.clip(origins, self.low, self.high)
 
     def nearest_to(self, transform: RigidTransform) -> RigidTransform:
-        """Return an allowed placement near to a given one; the same where that is allowed."""
+        """Return an allowed placement near to a given one; the same if it is allowed."""
         if not self.is_bounded:
             return transform
         rotations, origins = self.nearest(transform.rotation[None], transform.translation[None])
         return RigidTransform(rotations[0], origins[0])
 
     def room(self, rotation: Any, origin: Any) -> list[Any]:
-        """Return what must not be negative of a placement: metres to each bound, and the cosine of the turn to spare.
+        """Return the inequality constraints of a placement, not negative where it is allowed.
 
-        The formula serves NumPy arrays and casadi symbols alike. Only what bounds the allowed motion is listed.
+        Metres to each finite bound, and the difference of cosines to the largest turn; the formula serves NumPy arrays
+        and casadi symbols alike.
         """
         rows: list[Any] = []
         for k in range(3):
@@ -177,7 +171,7 @@ class PlacementConstraints(Value):
 
 
 FREE = PlacementConstraints.free()
-"""All six freedoms, without bounds."""
+"""All six degrees of freedom, without bounds."""
 
 
 def _swing(directions: Floats, target: Floats) -> Floats:

@@ -1,8 +1,8 @@
 """The optimisation problem in casadi: margins and tilt cone of one waypoint as functions of the unknowns.
 
 Unknowns: a small placement step (3 translations in metres, a Cayley rotation vector) around a given placement, if the
-placement is free, and the lean a (2) of the waypoint in a pair of directions. Both solvers use this function: the
-reference passes it to IPOPT, the default takes its derivatives.
+placement is free; the lean a (2) of the waypoint in a pair of directions; with the guides free, offsets of the rail
+positions. Both solvers use these functions: the reference passes them to IPOPT, the default takes their derivatives.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.arithmetic import Arithmetic, Joints
+from pentapod.kinematics.arithmetic import Arithmetic
 from pentapod.numerics.casadi_vectorised import Vectorised
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.limits.tool_pose import joints_of
@@ -26,57 +26,46 @@ from pentapod.planning.problem.weights import weighed
 Slopes = Callable[[Floats, Floats, Ints], Floats]
 StepSlopes = Callable[[Margins, RigidTransform, Floats, Ints], Floats]
 Room = Callable[[RigidTransform], tuple[Floats, Floats]]
-
-
 By = Literal["nothing", "lean", "step and lean"]
 
 _MADE: WeakKeyDictionary[Margins, dict[tuple[Any, ...], Any]] = WeakKeyDictionary()
 """Making a function takes a good part of a second; problems that differ in their path or cone alone share them."""
 
 
-def point_function(problem: PlacementProblem, margins: Margins, kinds: Sequence[int], *, by: By = "nothing") -> Any:
+def point_function(
+    problem: PlacementProblem, margins: Margins, kinds: Sequence[int], *, by: By = "nothing", guides: bool = False
+) -> Any:
     """Return the casadi function of one waypoint: margins K, and the square of the lean (of the tangent of its angle).
 
     Of step 6, lean a 2, tilt_centre 3, nominal 3, pair 3×2, R 3×3, t 3, contacts. The margins are weighed; kinds:
     which. pair: columns, the directions of the lean's two numbers; only their components across the nominal axis are
-    used. by: also return the margins' derivatives by a, K × 2, or by (step, a), K × 8.
+    used. by: also return the margins' derivatives by a, K × 2, or by (step, a), K × 8. guides: the first argument are
+    the offsets of the rail positions from those of the margins' machine, and derivatives are by (step, offsets, a).
     """
     import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
-    inputs, values, square = _point(problem, margins, kinds, None)
-    step, a = inputs[:2]
-    unknowns = {"nothing": [], "lean": [a], "step and lean": [ca.vertcat(step, a)]}[by]
+    rails, (step, a, *given), values, square = _point(problem, margins, kinds, guides=guides)
+    unknowns = {"nothing": [], "lean": [a], "step and lean": [ca.vertcat(step, *rails, a)]}[by]
     slopes = [ca.densify(ca.jacobian(values, x)) for x in unknowns]
-    return ca.Function("point", inputs, [values, square, *slopes], {"cse": True})
-
-
-def guide_function(problem: PlacementProblem, margins: Margins) -> Any:
-    """Return the casadi function of one waypoint with the guides free: all margins, and their derivatives M × 13.
-
-    Of the slides from where the guides of the margins' machine stand, and then as `point_function`; the derivatives are
-    by (step, rail_positions, a).
-    """
-    import casadi as ca  # noqa: PLC0415
-
-    rail_positions = ca.SX.sym("rail_positions", len(problem.machine.rail_positions))
-    inputs, values, _ = _point(problem, margins, range(len(margins.limits)), rail_positions)
-    slopes = ca.densify(ca.jacobian(values, ca.vertcat(inputs[0], rail_positions, inputs[1])))
-    return ca.Function("guides", [rail_positions, *inputs], [values, slopes], {"cse": True})
+    return ca.Function("point", [*rails, step, a, *given], [values, square, *slopes], {"cse": True})
 
 
 def _point(
-    problem: PlacementProblem, margins: Margins, kinds: Sequence[int], rail_positions: Any
-) -> tuple[list[Any], Any, Any]:
-    """Return the symbols of a waypoint, its weighed margins, and the square of the lean; see above."""
+    problem: PlacementProblem, margins: Margins, kinds: Sequence[int], *, guides: bool
+) -> tuple[list[Any], list[Any], Any, Any]:
+    """Return the symbols of the rails' offsets and of a waypoint, its weighed margins, and the square of the lean."""
     import casadi as ca  # noqa: PLC0415
 
     (step, a, *given), (tip, turned, turn, square) = _pose(problem)
     numbers = ca.SX.sym("contacts", margins.contact_numbers)
-    joints = None if rail_positions is None else _slid(problem, margins, rail_positions)
+    rails, joints = list[Any](), None
+    if guides and problem.machine.guides is not None:
+        rails = [ca.SX.sym("rail_offsets", len(problem.machine.rail_positions))]
+        joints = problem.machine.guides.moved(joints_of(margins.scene.machine.robot), ca.vertsplit(rails[0]))
     values = margins.symbolic(tip, turned, turn, given[-1] + step[:3], numbers, joints)[list(kinds)]
     if not problem.weights.are_even:
         values = weighed(values, ca.DM(problem.weights.of(margins.limits)[list(kinds)]))
-    return [step, a, *given, numbers], values, square
+    return rails, [step, a, *given, numbers], values, square
 
 
 def _pose(problem: PlacementProblem) -> tuple[list[Any], tuple[Any, Any, Any, Any]]:
@@ -107,10 +96,10 @@ def _legs(problem: PlacementProblem, margins: Margins, slopes: bool) -> Any:
     import casadi as ca  # noqa: PLC0415
 
     (step, a, *given), (tip, turned, _, _) = _pose(problem)
-    robot, do = margins.machine.robot, Arithmetic.casadi()
+    robot, do = margins.scene.machine.robot, Arithmetic.casadi()
     bases, heights = joints_of(robot)
     # Heights from the tip along the tool axis, not from p along the platform line.
-    joints = bases, [margins.machine.tool_length - z for z in heights]
+    joints = bases, [margins.scene.machine.tool_length - z for z in heights]
     vectors = robot.vectors_of(ca.vertsplit(tip), ca.vertsplit(turned), do, joints)
     legs = ca.vertcat(*robot.lengths_of(vectors, do))
     wanted = [legs, ca.jacobian(legs, a)] if slopes else [legs]
@@ -119,48 +108,33 @@ def _legs(problem: PlacementProblem, margins: Margins, slopes: bool) -> Any:
 
 
 def _once(margins: Margins, name: tuple[Any, ...], problem: PlacementProblem, make: Callable[[], Any]) -> Any:
-    """Return what `make` returned for these margins, tilt_centre and weights before, or returns now."""
+    """Return the function `name` for these margins, tilt_centre and weights, made once."""
     made, key = _MADE.setdefault(margins, {}), (*name, problem.samples.tilt_centre, problem.weights)
     if key not in made:
         made[key] = make()
     return made[key]
 
 
-def _slid(problem: PlacementProblem, margins: Margins, rail_positions: Any) -> Joints:
-    """Return the joints with the guides moved on by slides."""
-    import casadi as ca  # noqa: PLC0415
-
-    guides, joints = problem.machine.guides, joints_of(margins.machine.robot)
-    return joints if guides is None else guides.moved(joints, ca.vertsplit(rail_positions))
-
-
 def curvature_function(problem: PlacementProblem, margins: Margins, *, guides: bool = False) -> Any:
-    """Return the casadi function of one waypoint: second derivatives, 8 × 8 by (step, a), of weights · margins.
+    """Return the casadi function of one waypoint: second derivatives of weights · margins by (step, a), 8 × 8.
 
-    Of the arguments of `point_function`, and the weights M, one for each margin. With the guides free: of the arguments
-    of `guide_function` and the weights, 13 × 13 by (step, rail_positions, a).
+    Of the arguments of `point_function`, and the weights M, one for each margin. With the guides free the derivatives
+    are by (step, offsets, a).
     """
     return _once(margins, ("curvature", guides), problem, lambda: _curvature(problem, margins, guides))
 
 
 def _curvature(problem: PlacementProblem, margins: Margins, guides: bool) -> Any:
-    import casadi as ca  # noqa: PLC0415  heavy: only when planning
+    import casadi as ca  # noqa: PLC0415
 
-    rail_positions, weights = (
-        ca.SX.sym("rail_positions", len(problem.machine.rail_positions)),
-        ca.SX.sym("weights", len(margins.limits)),
-    )
-    inputs, values, _ = _point(problem, margins, range(len(margins.limits)), rail_positions if guides else None)
-    free = [rail_positions] if guides else []
-    bent, _ = ca.hessian(ca.dot(weights, values), ca.vertcat(inputs[0], *free, inputs[1]))
-    return ca.Function("curvature", [*free, *inputs, weights], [ca.densify(bent)], {"cse": True})
+    weights = ca.SX.sym("weights", len(margins.limits))
+    rails, inputs, values, _ = _point(problem, margins, range(len(margins.limits)), guides=guides)
+    bent, _ = ca.hessian(ca.dot(weights, values), ca.vertcat(inputs[0], *rails, inputs[1]))
+    return ca.Function("curvature", [*rails, *inputs, weights], [ca.densify(bent)], {"cse": True})
 
 
 def room_function(constraints: PlacementConstraints) -> Any:
-    """Return the casadi function (step 6, R 3×3, t 3) → room L of the stepped placement, ∂ room / ∂ step, L × 6.
-
-    The room within the allowed placements must not become negative.
-    """
+    """Return the casadi function (step 6, R 3×3, t 3) → constraints L of the stepped placement, derivatives L × 6."""
     import casadi as ca  # noqa: PLC0415
 
     step, rotation, translation = ca.SX.sym("step", 6), ca.SX.sym("R", 3, 3), ca.SX.sym("t", 3)
@@ -169,7 +143,7 @@ def room_function(constraints: PlacementConstraints) -> Any:
 
 
 def placement_room(constraints: PlacementConstraints, *, free: bool = True) -> Room:
-    """Return the function placement → its room (L,) and derivatives (L, 6) by a step; L = 0 where nothing bounds it."""
+    """Return the function placement → its constraints (L,), derivatives (L, 6) by a step; L = 0 without bounds."""
     function = room_function(constraints) if free and constraints.is_bounded else None
 
     def room(transform: RigidTransform) -> tuple[Floats, Floats]:
@@ -207,24 +181,24 @@ def lean_slopes(problem: PlacementProblem, margins: Margins, transform: RigidTra
 def step_slopes(problem: PlacementProblem, margins: Margins, *, guides: bool = False) -> StepSlopes:
     """Return the function (margins, placement, coefficients, waypoints (n,)) → their derivatives (n, M, 8 or 13).
 
-    By the placement's step and the lean; with the guides free by step, slides and lean, for margins of the problem's
-    machine with its guides anywhere.
+    By the placement's step and the lean; with the guides free by step, rail positions and lean, for margins of the
+    problem's machine with its guides anywhere.
     """
     kinds, samples = range(len(margins.limits)), problem.samples
 
     def made() -> Vectorised:
-        if guides:
-            return Vectorised(guide_function(problem, margins))
-        return Vectorised(point_function(problem, margins, kinds, by="step and lean"))
+        return Vectorised(point_function(problem, margins, kinds, by="step and lean", guides=guides))
 
     point = _once(margins, ("slopes", guides), problem, made)
 
     def slopes(there: Margins, transform: RigidTransform, coefficients: Floats, rows: Ints) -> Floats:
-        slid = [(there.machine.rail_positions - margins.machine.rail_positions)[:, None]] if guides else []
+        offsets = (
+            [(there.scene.machine.rail_positions - margins.scene.machine.rail_positions)[:, None]] if guides else []
+        )
         leans = (problem.basis[rows] @ coefficients).T if samples.tilt > 0.0 else np.zeros((2, 1))
         touching = problem.contacts(there, transform, problem.leans(coefficients, rows), rows)
         found = point(
-            *slid,
+            *offsets,
             np.zeros((6, 1)),
             leans,
             samples.tilt_centres[rows].T,

@@ -1,48 +1,45 @@
-"""LinearModel: first-order model of margins and leans by placement, rail positions and tilt field."""
+"""LinearModel: first-order model of margins and leans in placement, rail positions and tilt field."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.geometry.rigid import RigidTransform
-from pentapod.planning.limits.margins import Margins
+from pentapod.planning.problem.formulation import StepSlopes
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
 
 REACH = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
 """The unit of a placement step: metres, and tan(angle / 2)."""
 
-_WORST_OF_KIND = 12
-
 
 @dataclass(frozen=True)
 class ModelOptions:
-    """What enters the model. near: margins within this much of the level.
+    """What enters the model.
 
-    steepest: the leans at so many waypoints, if they use the share `steep` of the cone. tangents_deg: of the cone at
-    each of these leans, degrees from the lean.
+    worst: local minima of each kind of margin. near: largest distance of a margin from the level. steepest: waypoints
+    whose leans are constrained, if they use the share `steep` of the cone. tangents_deg: tangents of the cone at each
+    of these leans, degrees from the lean.
     """
 
+    worst: int = 12
     near: float = 0.4
     steepest: int = 60
     steep: float = 0.3
     tangents_deg: tuple[float, ...] = (-36.0, -22.0, -12.0, -5.0, 0.0, 5.0, 12.0, 22.0, 36.0)
 
 
-Slopes = Callable[[Margins, RigidTransform, Floats, Ints], Floats]
+OPTIONS = ModelOptions()
 
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """Unknowns x: along moves (p, q), in their units, and the change of coefficients (2·size), in units of the cone.
+    """The model in the unknowns x: along moves (p, q), and the change of coefficients (2·size) in units of the cone.
 
-    moves: columns of a placement step (p = 6), or of one and of the guides' slides (p = 11).
-    Margins ≈ values + matrix @ x, (R,), of the margins near the level, kinds (R,) at waypoints points (R,);
-    leans as shares of the cone ≈ steepness + steep_matrix @ x, several rows for each waypoint of steep; the room of the
-    placement (L,) ≈ room + room_matrix @ x.
+    moves: columns of a placement step (p = 6), or of one and of the rail positions (p = 11). Margins near the level, of
+    kinds (R,) at waypoints points (R,): values + matrix @ x. Leans as shares of the cone, several rows for each
+    waypoint of steep: steepness + steep_matrix @ x. Constraints of the placement (L,): room + room_matrix @ x.
     """
 
     problem: PlacementProblem
@@ -66,29 +63,26 @@ class LinearModel:
         rows: Ints,
         level: float,
         extra: Ints,
-        slopes: Slopes,
+        slopes: StepSlopes,
         room: tuple[Floats, Floats],
         moves: Floats,
-        options: ModelOptions = ModelOptions(),
     ) -> LinearModel:
         """Return the model of the margins near `level` at waypoints `rows`, and of rows[extra] in any case.
 
-        room (L,) of the placement and the rail_positions, with its derivatives (L, p). slopes: the margins' (n, M, p +
-        2) by step, slides and lean.
+        room (L,): constraints of placement and rail positions, with their derivatives (L, p). slopes: derivatives of
+        the margins, (n, M, p + 2) by step, rail positions and lean.
         """
         length, count = moves.shape
         values = problem.values(at.margins, at.transform, at.coefficients, rows)
-        chosen = np.union1d(valleys(values, _WORST_OF_KIND), extra)
-        chosen = chosen[values[chosen].min(axis=1) < level + options.near]
-        point, kinds = np.nonzero(values[chosen] < level + options.near)
+        chosen = np.union1d(valleys(values), extra)
+        chosen = chosen[values[chosen].min(axis=1) < level + OPTIONS.near]
+        point, kinds = np.nonzero(values[chosen] < level + OPTIONS.near)
         few = rows[chosen]
-        slope = (
-            slopes(at.margins, at.transform, at.coefficients, few)[point, kinds]
-            if len(few)
-            else np.zeros((0, length + 2))
-        )
+        slope = np.zeros((0, length + 2))
+        if len(few):
+            slope = slopes(at.margins, at.transform, at.coefficients, few)[point, kinds]
         field = by_field(problem.basis[few][point], slope[:, length:]) * problem.cone
-        steep, share, steep_by_field = _cone_tangents(problem, at, rows, extra, options)
+        steep, share, steep_by_field = _cone_tangents(problem, at, rows, extra)
         return cls(
             problem,
             at,
@@ -105,7 +99,7 @@ class LinearModel:
         )
 
     def inequalities(self) -> tuple[Floats, Floats]:
-        """Return A and b of A (x, t) ≤ b: margins not below the smallest plus t, cone and room kept."""
+        """Return A and b of A (x, t) ≤ b: margins not below the smallest plus t, cone and constraints kept."""
         rising = np.column_stack([-self.matrix, np.ones(len(self.matrix))])
         kept = np.vstack([self.steep_matrix, -self.room_matrix])
         kept = np.column_stack([kept, np.zeros(len(kept))])
@@ -113,13 +107,13 @@ class LinearModel:
         return np.vstack([rising, kept]), np.concatenate([self.values - self.values.min(), spare])
 
     def step_of(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return the step (p,) of placement and guides, and the change of coefficients (size, 2), of unknowns x."""
+        """Return the step (p,) of placement and rail positions, and the change of coefficients (size, 2)."""
         count = self.moves.shape[1]
         return self.moves @ x[:count], (x[count:] * self.problem.cone).reshape(-1, 2)
 
 
-def valleys(values: Floats, count: int = _WORST_OF_KIND) -> Ints:
-    """Return the waypoints where a margin of values (N, M) is smaller than beside it, the worst of each kind."""
+def valleys(values: Floats, count: int = OPTIONS.worst) -> Ints:
+    """Return the waypoints of local minima of values (N, M) along the path, the `count` smallest of each column."""
     edge = np.full((1, values.shape[1]), np.inf)
     padded = np.concatenate([edge, values, edge])
     valley = (values <= padded[:-2]) & (values < padded[2:])
@@ -128,17 +122,15 @@ def valleys(values: Floats, count: int = _WORST_OF_KIND) -> Ints:
     return np.unique(worst[np.take_along_axis(valley, worst, axis=0)])
 
 
-def _cone_tangents(
-    problem: PlacementProblem, at: Candidate, rows: Ints, extra: Ints, options: ModelOptions
-) -> tuple[Ints, Floats, Floats]:
+def _cone_tangents(problem: PlacementProblem, at: Candidate, rows: Ints, extra: Ints) -> tuple[Ints, Floats, Floats]:
     """Return tangents of the cone at the steepest leans: waypoints, the share used in that direction, its derivatives.
 
-    Several tangents for each lean, since a lean on the edge may well turn along it.
+    Several tangents for each lean, since a lean on the edge may turn along it.
     """
-    tangents = np.radians(options.tangents_deg)
+    tangents = np.radians(OPTIONS.tangents_deg)
     steepness = problem.steepness(at.coefficients, rows)
-    steep = np.union1d(valleys(-steepness[:, None], options.steepest), extra)
-    steep = steep[steepness[steep] > options.steep]
+    steep = np.union1d(valleys(-steepness[:, None], OPTIONS.steepest), extra)
+    steep = steep[steepness[steep] > OPTIONS.steep]
     nominal, basis = problem.samples.nominal[rows[steep]], problem.basis[rows[steep]]
     outward = problem.leans(at.coefficients, rows[steep]) / (steepness[steep, None] * problem.cone)
     aside = np.cross(nominal, outward)

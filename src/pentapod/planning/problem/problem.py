@@ -1,4 +1,4 @@
-"""PlacementProblem: the max-min problem that all placement solvers work on; Candidate: what they improve."""
+"""PlacementProblem: the max-min problem of all placement solvers; Candidate: a point of its search space."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from pentapod.planning.problem.weights import EVEN, Weights, weighed
 CONE_SHARE = 0.98
 """Share of the tilt cone used by the optimisers; the rest absorbs what happens between waypoints."""
 
-_CELLS = 2
+FIELD_CELLS = 2
+"""Spline cells of the tilt field in either direction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class PlacementProblem:
-    """Where to clamp a part and how to tilt the tool: the smallest weighed margin is to become largest.
+    """Maximise the smallest weighted margin over the placement of a part and the tilt field of the tool.
 
     margins: one for each branch to choose from. basis (N, size): the tilt field's spline basis at the waypoints;
     without a tilt cone it has size 0.
@@ -61,12 +62,11 @@ class PlacementProblem:
         *,
         component: Branch | None = None,
         collision_world: CollisionWorld = NOTHING,
-        limits: Sequence[LimitKind] | None = None,
+        limits: Sequence[LimitKind] = (),
     ) -> PlacementProblem:
         """Return the problem of samples on a machine, with the allowed placements and the weights of the margins.
 
-        component: the branch to work in, any where none is given. collision_world: what must not be touched. limits:
-        the kinds of limits, all where none are given.
+        component: the branch to work in, any by default. limits: further ones, see `Margins.of`.
         """
         branches = machine.robot.branches if component is None else (component,)
         margins = tuple(Margins.of(machine, branch, collision_world, limits) for branch in branches)
@@ -81,18 +81,13 @@ class PlacementProblem:
         """Return the same problem on another machine."""
         return replace(self, machine=machine, margins=tuple(margins.on(machine) for margins in self.margins))
 
-    def alone(self) -> PlacementProblem:
-        """Return the same problem without collision_world."""
-        return replace(self, margins=tuple(margins.alone() for margins in self.margins))
-
-    @property
-    def collision_world(self) -> CollisionWorld:
-        """What must not be touched."""
-        return self.margins[0].collision_world
+    def without_collision_world(self) -> PlacementProblem:
+        """Return the same problem in an empty collision world."""
+        return replace(self, margins=tuple(margins.without_collision_world() for margins in self.margins))
 
     @property
     def cone(self) -> float:
-        """The longest lean (tangent of the angle) that the optimisers use."""
+        """The longest lean (tangent of the angle) for the optimisers."""
         return float(np.tan(self.samples.tilt) * CONE_SHARE)
 
     @property
@@ -125,9 +120,9 @@ class PlacementProblem:
         return plain if self.weights.are_even else weighed(plain, self.weights.of(margins.limits))
 
     def contacts(self, margins: Margins, transform: RigidTransform, leans: Floats, rows: Ints) -> Floats:
-        """Return the contacts (n, margins.contact_numbers) for leans (n, 3), workpiece frame, at waypoints `rows`.
+        """Return the contacts (n, margins.contact_numbers) at waypoints `rows`.
 
-        Only the components of the leans across the nominal axes are used.
+        leans (n, 3): workpiece frame; only their components across the nominal axes are used.
         """
         nominal = self.samples.nominal[rows]
         across = leans - (leans * nominal).sum(axis=1, keepdims=True) * nominal
@@ -149,7 +144,6 @@ class PlacementProblem:
 
 def _field(samples: ToolpathSamples) -> tuple[FieldDomain, Floats]:
     """Return the domain of the tilt field of a path, and its basis (N, size) at the waypoints."""
-    domain = FieldDomain.around(samples.tilt_centres, samples.nominal, _CELLS)
-    return domain, domain.basis(samples.tilt_centres) if samples.tilt > 0.0 else np.zeros(
-        (len(samples.tilt_centres), 0)
-    )
+    domain = FieldDomain.around(samples.tilt_centres, samples.nominal, FIELD_CELLS)
+    tilts = samples.tilt > 0.0
+    return domain, domain.basis(samples.tilt_centres) if tilts else np.zeros((len(samples.tilt_centres), 0))

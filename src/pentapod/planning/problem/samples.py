@@ -11,7 +11,10 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.toolpath.toolpath import Toolpath
 
 AXIS_LEVER_M = 0.1
-"""How much tip movement one radian of axis counts for when representatives are chosen."""
+"""Tip movement that one radian of axis counts for in the choice of representatives, metres."""
+
+MOST_SAMPLED = 20_000
+"""Waypoints of which representatives are chosen; longer paths are thinned first: the choice costs count × N."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +38,7 @@ class ToolpathSamples:
 
     @classmethod
     def of(cls, toolpath: Toolpath, tilt: float) -> ToolpathSamples:
-        """Return the samples that a toolpath and a tilt cone (half angle, radians) pose."""
+        """Return the samples of a toolpath with a tilt cone (half angle, radians)."""
         return cls(toolpath.tilt_centres, toolpath.axes, toolpath.tilt_centre, tilt)
 
     def at(self, rows: Ints) -> ToolpathSamples:
@@ -52,10 +55,7 @@ class ToolpathSamples:
     def representatives(self, count: int) -> Ints:
         """Return indices of `count` waypoints spread evenly over places and axes (farthest-point sampling)."""
         features = np.hstack([self.tilt_centres, AXIS_LEVER_M * self.nominal])
-        if len(features) > 20_000:  # a stride first: the choice costs count × N
-            stride = np.linspace(0, len(features) - 1, 20_000).astype(np.intp)
-        else:
-            stride = np.arange(len(features))
+        stride = np.linspace(0, len(features) - 1, min(len(features), MOST_SAMPLED)).astype(np.intp)
         features = features[stride]
         count = min(count, len(features))
         first = int(np.square(features - features.mean(axis=0)).sum(axis=1).argmax())

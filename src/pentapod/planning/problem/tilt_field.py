@@ -1,9 +1,8 @@
-"""TiltField: the lean of the tool axis from its nominal direction, as a bicubic spline over the part.
+"""Tilt field: the lean of the tool axis from its nominal direction, as a bicubic spline over the part.
 
-The lean is a vector b(x) in the plane across the mean axis that varies with the place x like a bicubic spline; the
-tool axis is the nominal one plus the part of b perpendicular to it. Neighbouring passes therefore lean alike, and
-the axis along the path is as smooth as the nominal axis is: no jumps, no marks on the surface. The number
-of unknowns depends on the field's mesh, not on the number of waypoints.
+The lean is a vector b(x) in the plane across the mean axis, a bicubic spline of the place x; the tool axis is the
+nominal one plus the part of b perpendicular to it. Neighbouring passes therefore lean alike, and the axis along the
+path is as smooth as the nominal axis. The number of unknowns does not depend on the number of waypoints.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
-from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.arrays import Floats
 from pentapod.geometry.directions import tangent_frame
 
 DEGREE = 3
@@ -21,7 +20,7 @@ DEGREE = 3
 
 @dataclass(frozen=True, eq=False)
 class FieldDomain:
-    """The rectangle over which a tilt field is spread: the two widest directions of the tilt_centres.
+    """The rectangle on which a tilt field is defined, along the two directions of largest spread of the tilt centres.
 
     origin (3,), directions (2, 3) unit rows, lengths (2,) in metres, workpiece frame; cells: spline cells a side.
     lean_plane (2, 3): unit rows, the plane in which the lean lies.
@@ -35,7 +34,7 @@ class FieldDomain:
 
     @classmethod
     def around(cls, tilt_centres: Floats, nominal: Floats, cells: int) -> FieldDomain:
-        """Return the domain that covers tilt_centres (N, 3) with nominal axes (N, 3)."""
+        """Return the domain of tilt centres and nominal axes (N, 3)."""
         centred = tilt_centres - tilt_centres.mean(axis=0)
         # Directions of largest spread; the sign is fixed so that the same part gives the same field.
         _, _, rows = np.linalg.svd(centred.T @ centred)
@@ -67,21 +66,6 @@ class FieldDomain:
         second = np.diff(np.eye(n), 2, axis=0)
         along_both = [np.kron(second, np.eye(n)), np.kron(np.eye(n), second)]
         return np.concatenate(along_both, dtype=np.float64)
-
-
-@dataclass(frozen=True, eq=False)
-class TiltField:
-    """A domain with its coefficients (size, 2): the lean b within the domain's lean plane."""
-
-    domain: FieldDomain
-    coefficients: Floats
-
-    def __post_init__(self) -> None:
-        set_frozen(self, coefficients=frozen(self.coefficients, "coefficients", (self.domain.size, 2)))
-
-    def axes(self, tilt_centres: Floats, nominal: Floats) -> Floats:
-        """Return tool axes (N, 3), unit, workpiece frame, of tilt_centres and nominal axes (N, 3)."""
-        return lean(nominal, self.domain.basis(tilt_centres) @ self.coefficients @ self.domain.lean_plane)
 
 
 def lean(nominal: Floats, b: Floats) -> Floats:

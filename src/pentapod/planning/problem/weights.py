@@ -14,16 +14,16 @@ from pentapod.base.values import Value
 from pentapod.planning.limits.limit import Limit
 
 NEEDED_MARGIN = 0.02
-"""A plan is accepted from this smallest margin on: what rounding corners between waypoints may cost."""
+"""Smallest margin of an accepted plan; it covers the blending of corners between waypoints."""
 
 
 @dataclass(frozen=True)
 class Weights(Value):
     """Positive weights of leg strokes, singular surfaces, joint cones and gaps between bodies.
 
-    The room that a margin leaves beyond what is needed is divided by its weight: with strokes = 2 and all else 1 the
-    largest smallest margin leaves the strokes twice the room of the others. What fits, fits with any weights.
-    Raises ArrayError for a weight that is not positive.
+    A margin's excess over the needed one is divided by its weight: with strokes = 2 and all else 1 the strokes keep
+    twice the excess of the others. Whether a part fits does not depend on the weights. Raises ArrayError for a weight
+    that is not positive.
     """
 
     strokes: float = 1.0
@@ -50,5 +50,5 @@ EVEN = Weights()
 
 
 def weighed(values: Any, weights: Any) -> Any:
-    """Return margins with the room beyond what is needed divided by weights; NumPy arrays or casadi columns."""
+    """Return margins with their excess over the needed one divided by weights; NumPy arrays or casadi columns."""
     return NEEDED_MARGIN + (values - NEEDED_MARGIN) / weights

@@ -1,1 +1,1 @@
-"""The tool axis along the path: its spline, what it costs, and how it is smoothed."""
+"""The tool axis along the path: its spline, its smoothness cost, and the smoothing."""

@@ -1,8 +1,8 @@
 """AxisCost: smoothness cost of the tool axes, with a penalty where they turn faster than the nominal axes.
 
-The smoothest axes are fixed ones, but fixed axes may cost the legs more acceleration than the nominal axes, which turn
-with the surface. So where the axis turns faster, or the second derivative of a leg length by the path is larger, than
-with the nominal axes, the square of the excess is added.
+The smoothest axes are fixed ones, but fixed axes may cause larger leg accelerations than the nominal axes, which turn
+with the surface. So where the axis turns faster, or the second derivative of a leg length by the path length is larger,
+than with the nominal axes, the square of the excess is added.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from pentapod.numerics.convex.banded_qp import SoftRows
 from pentapod.numerics.divided_differences import as_matrix, differences, divided_differences
 from pentapod.planning.problem.formulation import leg_function
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
-from pentapod.planning.tool_axis.spline import BANDS, FORESIGHT_M, AxisSpline
+from pentapod.planning.tool_axis.spline import BANDS, AxisSpline
+from pentapod.planning.tool_axis.spline import OPTIONS as SPLINE
 
 
 @dataclass(frozen=True)
 class CostOptions:
-    """Options of the penalty on excess, which is a rate or bend beyond that of the nominal axes at the same node.
+    """Options of the penalty on excess: a rate or bend beyond that of the nominal axes at the same node.
 
     weight: of the mean square of the relative excess, beside the cost of rates. free, unit: shares of the median of the
-    nominal axes that are added to what is free of charge, and to the unit of excess. least_rate, least_bend: smaller
-    medians count as this, rad/m of an axis and 1/m of a leg. near: rates and bends below this share of what is free do
-    not enter a program.
+    nominal axes that are added to the threshold, and to the unit of excess. least_rate, least_bend: least medians,
+    rad/m of an axis and 1/m of a leg. near: share of the threshold below which rates and bends do not enter a program.
     """
 
     weight: float = 1e4
@@ -45,59 +45,56 @@ _DIRECTIONS = np.array([np.cos(_ANGLES), np.sin(_ANGLES)])
 """Columns: the directions in which rates are measured; a rate is at most 3.5 % larger than in the nearest of them."""
 
 
-_Rows = tuple[Floats, Ints, Floats, Floats]
-"""Windows, starts, upper and weight of soft rows."""
-
-
 @dataclass(frozen=True, eq=False)
-class _Charge:
-    """What a quantity costs at the nodes where it exceeds what is free there; all (n,).
+class _Penalty:
+    """Quadratic penalty on the excess of a quantity over a threshold at each node; all (n,).
 
-    unit: what an excess is measured by; price: of the square of the excess so measured. near: see `CostOptions`.
+    unit: of the excess; weight: of the square of the excess in this unit. near: see `CostOptions`.
     """
 
-    free: Floats
+    threshold: Floats
     unit: Floats
-    price: Floats
+    weight: Floats
     near: float
 
     @classmethod
-    def beyond(cls, nominal: Floats, least: float, price: Floats, options: CostOptions) -> _Charge:
-        """Return the charge of exceeding what the nominal axes have; least: smaller medians count as this."""
+    def above(cls, nominal: Floats, least: float, weight: Floats, options: CostOptions) -> _Penalty:
+        """Return the penalty on exceeding the values of the nominal axes; least: least median of them."""
         middle = max(float(np.median(nominal)) if len(nominal) else 0.0, least)
-        return cls(nominal + options.free * middle, nominal + options.unit * middle, price, options.near)
+        return cls(nominal + options.free * middle, nominal + options.unit * middle, weight, options.near)
 
     def of(self, values: Floats) -> float:
-        """Return the charge of values (n, m)."""
-        excess = np.maximum(values - self.free[:, None], 0.0) / self.unit[:, None]
-        return float(self.price @ np.square(excess).sum(axis=1))
+        """Return the penalty of values (n, m)."""
+        excess = np.maximum(values - self.threshold[:, None], 0.0) / self.unit[:, None]
+        return float(self.weight @ np.square(excess).sum(axis=1))
 
     def symbolic(self, values: Any) -> tuple[Any, Any, Any]:
-        """Return the charge of casadi's values (m, n) by excesses, these as unknowns, and the room left, columns."""
+        """Return the penalty of casadi's values (m, n) by excesses, these as unknowns, and their slacks, columns."""
         import casadi as ca  # noqa: PLC0415  heavy: only for the reference
 
-        free, unit, price = (np.tile(each, (values.shape[0], 1)) for each in (self.free, self.unit, self.price))
+        shape = (values.shape[0], 1)
+        threshold, unit, weight = (np.tile(each, shape) for each in (self.threshold, self.unit, self.weight))
         excess = ca.MX.sym("excess", *values.shape)
-        return ca.dot(price, excess**2), ca.vec(excess), ca.vec(excess - (values - free) / unit)
+        return ca.dot(weight, excess**2), ca.vec(excess), ca.vec(excess - (values - threshold) / unit)
 
     def entering(self, each: list[Floats]) -> tuple[Ints, Ints]:
-        """Return the nodes and columns at which one of several values (n, m) comes near what is free."""
-        node, column = np.nonzero(np.any([values > self.near * self.free[:, None] for values in each], axis=0))
+        """Return the nodes and columns at which one of several values (n, m) comes near the threshold."""
+        node, column = np.nonzero(np.any([values > self.near * self.threshold[:, None] for values in each], axis=0))
         return node, column
 
 
 class AxisCost:
     """The cost of coefficients (K, 2) of a spline of the axes, at the placement of a candidate.
 
-    That of the spline, and `CostOptions.weight` times the excesses. Rates are of nominal plus lean, not normalised, by
-    the path length of the spline; bends are the second derivatives of the leg lengths by it.
+    The cost of the spline plus the penalty. Rates are derivatives of nominal plus lean, not normalised, by the path
+    length of the spline; bends are the second derivatives of the leg lengths by it.
     """
 
     def __init__(
         self, problem: PlacementProblem, spline: AxisSpline, at: Candidate, options: CostOptions = CostOptions()
     ) -> None:
         self.spline, samples = spline, problem.samples
-        nodes, way = self.spline.nodes, self.spline.way
+        nodes, stations = self.spline.nodes, self.spline.stations
         self.basis = self.spline.basis[nodes]
         self.weights, self.first = self.basis.data.reshape(-1, 4), self.basis.indices[::4].astype(np.intp)
         self.frames = self.spline.frames[nodes]
@@ -110,91 +107,87 @@ class AxisCost:
         )
         self.lengths = leg_function(problem, at.margins)
         self.legs = Vectorised(leg_function(problem, at.margins, slopes=True))
-        (self.rate, rate_shares), (self.bend, bend_shares) = divided_differences(way, 1), divided_differences(way, 2)
+        self.rate, rate_shares = divided_differences(stations, 1)
+        self.bend, bend_shares = divided_differences(stations, 2)
         turning = differences(self.rate, samples.nominal[nodes])
         self.nominal_rates = np.einsum("nk,nak->na", turning, self.frames[: len(turning)])
         rates = np.linalg.norm(turning, axis=1)
         bends = np.abs(self.bends(np.zeros((self.basis.shape[1], 2)))).max(axis=1)
-        price = options.weight * FORESIGHT_M**2 * (float(rate_shares @ rates**2) + options.least_rate**2)
-        self.fast = _Charge.beyond(rates, options.least_rate, price * rate_shares, options)
-        self.hard = _Charge.beyond(bends, options.least_bend, price * bend_shares, options)
+        weight = options.weight * SPLINE.foresight**2 * (float(rate_shares @ rates**2) + options.least_rate**2)
+        self.of_rates = _Penalty.above(rates, options.least_rate, weight * rate_shares, options)
+        self.of_bends = _Penalty.above(bends, options.least_bend, weight * bend_shares, options)
 
     def of(self, c: Floats) -> float:
         """Return the cost of coefficients c (K, 2)."""
-        charge = self.fast.of(self.rates(c) @ _DIRECTIONS) + self.hard.of(np.abs(self.bends(c)))
-        return self.spline.cost_of(c) + charge
+        penalty = self.of_rates.of(self.rates(c) @ _DIRECTIONS) + self.of_bends.of(np.abs(self.bends(c)))
+        return self.spline.cost_of(c) + penalty
 
     def symbolic(self, c: Any) -> tuple[Any, Any, Any]:
-        """Return the same for casadi's MX c (2, K), of c transposed: the cost, excesses as unknowns, room for them.
+        """Return the same for casadi's MX c (2, K), of c transposed: the cost, excesses as unknowns, their slacks.
 
-        The cost is that of `of` where each excess (MX, a column) is the least that leaves no room (MX, a column)
-        negative, and is not negative itself.
+        The cost is that of `of` where each excess (MX, a column) is the least that is not negative and leaves no slack
+        (MX, a column) negative.
         """
         import casadi as ca  # noqa: PLC0415  heavy: only for the reference
 
         leans = self.spline.cone * ca.mtimes(c, ca.DM(self.basis.T))
         tilt_centres, nominal, _, rotation, translation = self.given
+        frames = self.frames.transpose(2, 0, 1).reshape(3, -1)
         legs = self.lengths.map(len(self.frames))(
-            leans,
-            tilt_centres,
-            nominal,
-            self.frames.transpose(2, 0, 1).reshape(3, -1),
-            rotation.reshape(3, 3).T,
-            translation,
+            leans, tilt_centres, nominal, frames, rotation.reshape(3, 3).T, translation
         )
         rates = self.nominal_rates.T + ca.mtimes(leans, ca.DM(as_matrix(self.rate, len(self.frames)).T))
         bends = ca.mtimes(legs, ca.DM(as_matrix(self.bend, len(self.frames)).T))
         x = ca.vec(c)
         own = 0.5 * ca.bilin(ca.DM(self.spline.whole_hessian()), x, x) + ca.dot(ca.DM(self.spline.gradient), x)
-        fast, too_fast, room = self.fast.symbolic(ca.mtimes(_DIRECTIONS.T, rates))
-        hard, too_hard, more = self.hard.symbolic(ca.vertcat(bends, -bends))
-        return own + self.spline.constant + fast + hard, ca.vertcat(too_fast, too_hard), ca.vertcat(room, more)
+        first, of_rates, slack = self.of_rates.symbolic(ca.mtimes(_DIRECTIONS.T, rates))
+        second, of_bends, more = self.of_bends.symbolic(ca.vertcat(bends, -bends))
+        return own + self.spline.constant + first + second, ca.vertcat(of_rates, of_bends), ca.vertcat(slack, more)
 
     def rates(self, c: Floats) -> Floats:
-        """Return the axes' rates (n − 1, 2), rad/m, in the carried pairs."""
+        """Return the axes' rates (n − 1, 2), rad/m, in the transported frames."""
         return self.nominal_rates + self.spline.cone * differences(self.rate, self.basis @ c)
 
     def bends(self, c: Floats) -> Floats:
-        """Return the leg lengths' second derivatives (n − 2, n_legs) by the way, 1/m."""
+        """Return the leg lengths' second derivatives (n − 2, n_legs) by the path length, 1/m."""
         return differences(self.bend, self._legs(c)[0])
 
     def excess(self, c: Floats, *others: Floats) -> SoftRows:
-        """Return the soft rows of the penalty around coefficients c (K, 2), to first order, where a limit is near.
+        """Return the soft constraints of the penalty around coefficients c (K, 2), to first order, near the threshold.
 
-        others: further coefficients at which a limit may be near.
+        others: further coefficients at which a value may be near the threshold.
         """
         legs, slopes = self._legs(c)
         rates, bends = self.rates(c) @ _DIRECTIONS, _both_ways(differences(self.bend, legs))
-        near, column = self.fast.entering([rates, *(self.rates(x) @ _DIRECTIONS for x in others)])
+        near, column = self.of_rates.entering([rates, *(self.rates(x) @ _DIRECTIONS for x in others)])
         parts = [(near + k, self.rate[near, k, None] * _DIRECTIONS.T[column]) for k in range(2)]
-        fast = self._rows(c, self.fast, near, rates[near, column], parts)
-        near, column = self.hard.entering([bends, *(_both_ways(self.bends(x)) for x in others)])
+        first = self._rows(c, self.of_rates, near, rates[near, column], parts)
+        near, column = self.of_bends.entering([bends, *(_both_ways(self.bends(x)) for x in others)])
         towards = _both_ways(slopes)
         parts = [(near + k, self.bend[near, k, None] * towards[near + k, column]) for k in range(3)]
-        hard = self._rows(c, self.hard, near, bends[near, column], parts)
-        return SoftRows(
-            np.concatenate([fast[0], hard[0]]),
-            np.concatenate([fast[1], hard[1]]),
-            np.concatenate([fast[2], hard[2]]),
-            np.concatenate([fast[3], hard[3]]),
-        )
+        second = self._rows(c, self.of_bends, near, bends[near, column], parts)
+        joined: Any = (np.concatenate(pair) for pair in zip(first, second, strict=True))
+        return SoftRows(*joined)
 
-    def _rows(self, c: Floats, charge: _Charge, near: Ints, values: Floats, parts: list[tuple[Ints, Floats]]) -> _Rows:
-        """Return the rows that keep values (R,) at nodes near (R,): sums over nodes of slopes times leans; around c.
+    def _rows(
+        self, c: Floats, penalty: _Penalty, near: Ints, values: Floats, parts: list[tuple[Ints, Floats]]
+    ) -> tuple[Floats, Ints, Floats, Floats]:
+        """Return windows, starts, upper bounds and weights of the soft constraints on values (R,) at nodes near (R,).
 
-        parts: of nodes (R,) and slopes (R, 2), the first node of each row first.
+        The values are sums over nodes of slopes times leans, around c. parts: nodes (R,) and slopes (R, 2), the first
+        node of each row first.
         """
         start, each = self.first[parts[0][0]], np.arange(len(near))
         windows = np.zeros((len(near), BANDS + 2))  # the last two stay zero, see BANDS
         for nodes, slopes in parts:
             for k, a in product(range(4), range(2)):
-                reach = self.spline.cone * self.weights[nodes, k] / charge.unit[near]
+                reach = self.spline.cone * self.weights[nodes, k] / penalty.unit[near]
                 windows[each, 2 * (self.first[nodes] - start + k) + a] += reach * slopes[:, a]
         windows = np.ascontiguousarray(windows[:, :BANDS])
         x = np.append(c.ravel(), np.zeros(BANDS))
         here = (windows * x[2 * start[:, None] + np.arange(BANDS)]).sum(axis=1)
-        room = (charge.free[near] - values) / charge.unit[near]
-        return windows, 2 * start, room + here, charge.price[near]
+        slack = (penalty.threshold[near] - values) / penalty.unit[near]
+        return windows, 2 * start, slack + here, penalty.weight[near]
 
     def _legs(self, c: Floats) -> tuple[Floats, Floats]:
         """Return leg lengths (n, n_legs) at the nodes and their derivatives (n, n_legs, 2) by the lean."""

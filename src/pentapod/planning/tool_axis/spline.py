@@ -1,9 +1,8 @@
 """AxisSpline: the lean of the tool along a path as a cubic B-spline, and its quadratic smoothness cost.
 
-The lean is a vector across the nominal axis, given in a frame that is transported in parallel along the path; its two
-numbers are a cubic spline over the path length of the tilt centre, with knots at waypoints. The spline stays within the
-convex hull of its coefficients, so a spline whose coefficients keep the cone keeps it everywhere, and turns nowhere
-faster than they do.
+The lean is a vector across the nominal axis, in a frame that is transported in parallel along the path; its two
+components are a cubic spline over the path length of the tilt centre, with knots at waypoints. The spline stays within
+the convex hull of its coefficients: it keeps the cone everywhere if they do.
 """
 
 from __future__ import annotations
@@ -23,57 +22,66 @@ from pentapod.numerics.convex.banded_qp import banded, banded_product
 from pentapod.numerics.divided_differences import as_matrix, divided_differences
 from pentapod.planning.problem.samples import ToolpathSamples
 
-KNOT_SPACING_M = 2e-3
-"""Shortest way between knots; shorter on small parts. Where waypoints are farther apart there is a knot at each."""
-LEVER_M = 10e-3
-"""How much way one radian of the nominal axis counts for, so that a turn on the spot has knots too."""
-FORESIGHT_M = 20e-3
-"""Over what way the axis turns ahead of a corner: rates count with this length, second derivatives with its square."""
-UPRIGHT_WEIGHT = 1e-2
-"""Of the lean itself beside its rates: a lean that serves nothing fades."""
+
+@dataclass(frozen=True)
+class SplineOptions:
+    """Knots and cost of the spline.
+
+    knot_spacing: least distance between knots, metres; less on small parts, which have intervals_per_extent knot
+    intervals. Where waypoints are farther apart there is a knot at each. nodes: nodes of the cost in a knot interval,
+    at most. lever: path length of one radian of the nominal axis, metres, so that a turn on the spot has knots too.
+    foresight: metres along the path over which the axis turns ahead of a corner: weight of rates, and with its square
+    of second derivatives. upright_weight: of the lean itself. least_curvature: of coefficients on which the cost does
+    not depend.
+    """
+
+    knot_spacing: float = 2e-3
+    intervals_per_extent: int = 50
+    nodes: int = 2
+    lever: float = 10e-3
+    foresight: float = 20e-3
+    upright_weight: float = 1e-2
+    least_curvature: float = 1e-10
+
+
+OPTIONS = SplineOptions()
 
 _DEGREE = 3
-_NODES = 2  # at most, a knot interval
-_INTERVALS_PER_EXTENT = 50
-_NOWHERE_M = 1e-9  # shorter ways count as none
-_LEAST_CURVATURE = 1e-10  # of coefficients that the cost does not see
 BANDS = 10
 """Diagonals of the cost, main one and below: a second difference reaches over five coefficients of two numbers."""
 
 
 @dataclass(frozen=True, eq=False)
 class AxisSpline:
-    """Leans along a samples's path: those at its waypoints are cone · basis @ c, for coefficients c in the unit disc.
+    """Leans along a path: those at its waypoints are cone · basis @ c, for coefficients c (K, 2) in the unit disc.
 
-    c (K, 2); basis (N, K) sparse, four neighbours a row; frames (N, 2, 3): the pair at each waypoint, workpiece frame.
-    nodes (n,): waypoints at which the cost takes derivatives, as many as the spline can tell apart.
-    way (n,): how far along they are, metres.
-    The cost of c is cᵀHc/2 + gᵀc + constant, hessian (BANDS, 2K) in SciPy's lower banded form, in the order of
-    c.ravel().
+    basis (N, K) sparse, four neighbours a row; frames (N, 2, 3): the frame at each waypoint, workpiece frame. nodes
+    (n,): waypoints at which the cost takes derivatives; stations (n,): their path lengths, metres. The cost of c is
+    cᵀHc/2 + gᵀc + constant, hessian (BANDS, 2K) in SciPy's lower banded form, in the order of c.ravel().
     """
 
     cone: float
     basis: Any
     frames: Floats
     nodes: Ints
-    way: Floats
+    stations: Floats
     hessian: Floats
     gradient: Floats
     constant: float
 
     @classmethod
     def of(cls, samples: ToolpathSamples, cone: float) -> AxisSpline:
-        """Return the spline of a samples. cone: the longest lean (tangent of the angle)."""
-        way = _way(samples)
+        """Return the spline along the waypoints of `samples`. cone: the longest lean (tangent of the angle)."""
+        stations = _stations(samples)
         extent = float(np.linalg.norm(np.ptp(samples.tilt_centres, axis=0)))
-        spacing = min(KNOT_SPACING_M, max(extent, LEVER_M) / _INTERVALS_PER_EXTENT)
-        # Between waypoints the tool moves straight on, so derivatives are differences of waypoints. Two nodes for
-        # each knot where there are as many: at the knots alone the cost hardly sees coefficients that alternate.
-        nodes = _apart(way, spacing / _NODES)
-        basis = sparse.csr_matrix(BSpline.design_matrix(way, _knots(way[nodes], spacing), _DEGREE))
+        spacing = min(OPTIONS.knot_spacing, max(extent, OPTIONS.lever) / OPTIONS.intervals_per_extent)
+        # Between waypoints the tool moves on straight lines, so derivatives are differences of waypoints. Two nodes for
+        # each knot where there are as many: at the knots alone the cost hardly depends on alternating coefficients.
+        nodes = _spaced(stations, spacing / OPTIONS.nodes)
+        basis = sparse.csr_matrix(BSpline.design_matrix(stations, _knots(stations[nodes], spacing), _DEGREE))
         frames = rotation_minimising_frames(samples.nominal)
-        cost = _cost(samples.nominal[nodes], cone * frames[nodes], basis[nodes], way[nodes])
-        return cls(cone, basis, frames, nodes, way[nodes], *cost)
+        cost = _cost(samples.nominal[nodes], cone * frames[nodes], basis[nodes], stations[nodes])
+        return cls(cone, basis, frames, nodes, stations[nodes], *cost)
 
     def leans(self, c: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """Return the leans (n, 3) at waypoints `rows`, across the nominal axes, workpiece frame."""
@@ -92,7 +100,7 @@ class AxisSpline:
         return sparse.csc_matrix(lower + sparse.tril(lower, -1).T)
 
     def fitted(self, leans: Floats) -> Floats:
-        """Return the coefficients (K, 2) within the cone that come near leans (N, 3), smooth between the waypoints."""
+        """Return the coefficients (K, 2) within the cone of a smoothing fit to leans (N, 3)."""
         wanted = np.einsum("nk,nak->na", leans, self.frames) / self.cone
         size = self.hessian.shape[1] // 2
         rate, bend = _differences(size, 1), _differences(size, 2)
@@ -102,35 +110,35 @@ class AxisSpline:
 
 
 def within_discs(c: Floats) -> Floats:
-    """Return coefficients (K, 2) with those outside the unit disc brought to its edge."""
+    """Return coefficients (K, 2) with those outside the unit disc projected onto its edge."""
     return c / np.maximum(1.0, np.linalg.norm(c, axis=1, keepdims=True))
 
 
-def _way(samples: ToolpathSamples) -> Floats:
-    """Return the way (N,) in metres to each waypoint: of the tilt centre, and of the axis by its lever."""
+def _stations(samples: ToolpathSamples) -> Floats:
+    """Return the path length (N,) in metres at each waypoint: of the tilt centre, and of the axis by its lever."""
     moved = np.linalg.norm(np.diff(samples.tilt_centres, axis=0), axis=1)
     turned = np.linalg.norm(np.diff(samples.nominal, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(moved + LEVER_M * turned)])
+    return np.concatenate([[0.0], np.cumsum(moved + OPTIONS.lever * turned)])
 
 
-def _apart(way: Floats, spacing: float) -> Ints:
-    """Return indices into an ascending way (N,) that are at least about `spacing` apart, both ends among them.
+def _spaced(stations: Floats, spacing: float) -> Ints:
+    """Return indices of ascending stations (N,) at least about `spacing` apart, first and last included.
 
-    Only the first where the way is of no length.
+    Only the first where the path has no length.
     """
-    places, found = way.tolist(), [0]
-    while (following := bisect_left(places, places[found[-1]] + spacing, found[-1] + 1)) < len(places):
-        found.append(following)
-    if places[-1] - places[found[-1]] > _NOWHERE_M:
+    places, found = stations.tolist(), [0]
+    while (index := bisect_left(places, places[found[-1]] + spacing, found[-1] + 1)) < len(places):
+        found.append(index)
+    if places[-1] - places[found[-1]] > 1e-9:  # metres: shorter paths have no length
         if len(found) > 1 and places[-1] - places[found[-1]] < 0.5 * spacing:
             found.pop()
         found.append(len(places) - 1)
     return np.array(found, dtype=np.intp)
 
 
-def _knots(way: Floats, spacing: float) -> Floats:
-    """Return the knots: some of the nodes' ways (n,), and three more beyond each end."""
-    inner = way[_apart(way, spacing)]
+def _knots(stations: Floats, spacing: float) -> Floats:
+    """Return the knots: some of the nodes' stations (n,), and three more beyond each end."""
+    inner = stations[_spaced(stations, spacing)]
     if inner[-1] <= inner[0]:  # the whole path is one place
         inner = inner[0] + spacing * np.arange(2.0)
     beyond = np.arange(1.0, _DEGREE + 1.0)
@@ -139,18 +147,18 @@ def _knots(way: Floats, spacing: float) -> Floats:
     ])  # fmt: skip
 
 
-def _cost(nominal: Floats, frames: Floats, at_nodes: Any, way: Floats) -> tuple[Floats, Floats, float]:
+def _cost(nominal: Floats, frames: Floats, at_nodes: Any, stations: Floats) -> tuple[Floats, Floats, float]:
     """Return Hessian, gradient and constant of the mean square of the axes' derivatives and leans over the nodes.
 
-    nominal (n, 3); frames (n, 2, 3), the pairs times the cone; at_nodes (n, K): the basis there; way (n,).
+    nominal (n, 3); frames (n, 2, 3), times the cone; at_nodes (n, K): the basis there; stations (n,).
     """
     lean, axes = _axes_by_lean(frames, at_nodes), nominal.ravel()
     size = lean.shape[1]
-    hessian: Any = _LEAST_CURVATURE * sparse.identity(size, format="csr")
+    hessian: Any = OPTIONS.least_curvature * sparse.identity(size, format="csr")
     gradient, constant = np.zeros(size), 0.0
-    for order, weight in ((2, FORESIGHT_M**4), (1, FORESIGHT_M**2), (0, UPRIGHT_WEIGHT)):
-        factors, shares = divided_differences(way, order)
-        derivative = sparse.kron(as_matrix(factors, len(way)), sparse.identity(3), format="csr")
+    for order, weight in ((2, OPTIONS.foresight**4), (1, OPTIONS.foresight**2), (0, OPTIONS.upright_weight)):
+        factors, shares = divided_differences(stations, order)
+        derivative = sparse.kron(as_matrix(factors, len(stations)), sparse.identity(3), format="csr")
         weighed = sparse.diags(2.0 * weight * np.repeat(shares, 3))
         by_lean = sparse.csr_matrix(derivative @ lean)
         fixed = derivative @ axes if order > 0 else np.zeros(len(axes))
@@ -163,11 +171,10 @@ def _cost(nominal: Floats, frames: Floats, at_nodes: Any, way: Floats) -> tuple[
 def _axes_by_lean(frames: Floats, at_nodes: Any) -> Any:
     """Return the sparse matrix (3n, 2K) from coefficients to axes at the nodes: nominal plus lean, not normalised.
 
-    frames (n, 2, 3), the pairs times the cone; at_nodes (n, K): the basis. That it is linear makes the cost a
-    quadratic.
+    frames (n, 2, 3), times the cone; at_nodes (n, K): the basis. Being linear, it makes the cost a quadratic.
     """
     count = len(frames)
-    pair = sparse.kron(at_nodes, sparse.identity(2), format="csr")  # (2n, 2K): the lean's two numbers at each node
+    pair = sparse.kron(at_nodes, sparse.identity(2), format="csr")  # (2n, 2K): the lean's two components at each node
     node = np.arange(count)
     rows = np.broadcast_to((3 * node[:, None] + np.arange(3))[:, None, :], frames.shape)
     columns = np.broadcast_to((2 * node[:, None] + np.arange(2))[:, :, None], frames.shape)

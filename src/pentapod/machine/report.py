@@ -1,0 +1,228 @@
+"""Machine report: the work volume sampled, the worst pose by each limit, and the text of `pentapod machine check`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.base.values import Value
+from pentapod.geometry.directions import angle_between
+from pentapod.kinematics.component import Component
+from pentapod.kinematics.families.quadratic import as_quadratic
+from pentapod.kinematics.families.singularities import orientation_distance, position_distance, singularity_values
+from pentapod.kinematics.forces import tip_force_amplification
+from pentapod.machine.clearance.leg_clearance import clearances, pair_names
+from pentapod.machine.machine import ARCHITECTURAL_LIMIT, Machine
+from pentapod.machine.parts import WorkVolume
+
+AMPLIFICATION_LIMIT = 10.0
+"""Tip force → leg forces beyond which `check` calls a machine weak: 100 N of cutting become 1 kN of leg."""
+
+
+@dataclass(frozen=True)
+class Finding(Value):
+    """The worst value of one quantity over the work volume.
+
+    value and limit in `unit`; kind: "at most", "at least" or "more than". where: tip (mm) and tool axis of the worst
+    pose, as text; empty where the value does not depend on the pose.
+    """
+
+    name: str
+    value: float
+    kind: str
+    limit: float
+    unit: str
+    where: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """Whether the value keeps the limit."""
+        if self.kind == "at most":
+            return self.value <= self.limit
+        return self.value >= self.limit if self.kind == "at least" else self.value > self.limit
+
+
+@dataclass(frozen=True, eq=False)
+class MachineReport(Value):
+    """The worst values over all sampled poses.
+
+    length_range (n_legs, 2) metres; base_angle (n_legs,) largest angle to the base joint's axis, radians;
+    platform_range (n_legs, 2) radians; least_w; least_s: distance to S = 0, metres; least_turn: to any singularity,
+    radians of turning about the tip; amplification: force of the legs by force at the tip; clearance, metres, and its
+    pair of bodies. component: the one in which all poses lie, or None.
+    """
+
+    machine: Machine
+    poses: int
+    length_range: Floats
+    base_angle: Floats
+    platform_range: Floats
+    least_w: float
+    least_s: float
+    least_turn: float
+    amplification: float
+    clearance: float
+    clearance_pair: str
+    component: Component | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether the machine keeps its own limits everywhere in its work volume."""
+        return all(finding.passed for finding in self.findings)
+
+
+def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = 5) -> MachineReport:
+    """Sample the work volume and return the worst value of each quantity.
+
+    rings, around, levels: density of the sample, see `sample_work_volume`. Never raises for a weak machine:
+    that is a finding.
+    """
+    tips, axes = sample_work_volume(machine.work, rings=rings, around=around, levels=levels)
+    position, direction = tips + machine.tool_length * axes, -axes
+    robot = as_quadratic(machine.robot, "the report of a work volume")
+    vectors = robot.leg_vectors(position, direction)
+    lengths = np.linalg.norm(vectors, axis=-1)
+    base = angle_between(vectors, machine.joints.base_axes)
+    platform = angle_between(-vectors, axes[:, None, :])
+    w, s = singularity_values(robot, position, direction)
+    s_distance = position_distance(robot, position, direction)
+    turn = orientation_distance(robot, position, direction, about=machine.tool_length)
+    force = tip_force_amplification(robot, position, direction, machine.tool_length)
+    gaps = clearances(machine, position, direction)
+    signs = {(int(a), int(b)) for a, b in zip(np.sign(w), np.sign(s), strict=True)}  # 0 on a singularity
+    one = next(iter(signs)) if len(signs) == 1 else (0, 0)
+    pair = pair_names(machine)[int(np.argmin(gaps.min(axis=0)))]
+
+    def where(pose: int) -> str:
+        at, along = ", ".join(f"{x:.0f}" for x in 1e3 * tips[pose]), ", ".join(f"{x:+.2f}" for x in axes[pose])
+        return f"tip ({at}) mm, axis ({along})"
+
+    def worst(name: str, values: Floats, kind: str, limit: float, unit: str) -> Finding:
+        pose = int(np.argmax(values) if kind == "at most" else np.argmin(values))
+        return Finding(name, values[pose], kind, limit, unit, where(pose))
+
+    nearest = int(np.argmin(np.minimum(np.abs(w), np.abs(s_distance))))
+    return MachineReport(
+        machine=machine,
+        poses=len(tips),
+        length_range=np.stack([lengths.min(axis=0), lengths.max(axis=0)], axis=1),
+        base_angle=base.max(axis=0),
+        platform_range=np.stack([platform.min(axis=0), platform.max(axis=0)], axis=1),
+        least_w=float(np.abs(w).min()),
+        least_s=float(s_distance.min()),
+        least_turn=float(turn.min()),
+        amplification=float(force.max()),
+        clearance=float(gaps.min()),
+        clearance_pair=pair,
+        component=Component(*one) if 0 not in one else None,
+        findings=(
+            *_of_legs(machine, lengths, base, platform, worst),
+            Finding("components met", len(signs), "at most", 1, "", where(nearest)),
+            worst("|w|", np.abs(w), "more than", 0.0, ""),
+            worst("distance to S = 0", 1e3 * s_distance, "more than", 0.0, "mm"),
+            worst("turn about the tip to a singularity", np.degrees(turn), "more than", 0.0, "deg"),
+            worst("tip force to leg forces", force, "at most", AMPLIFICATION_LIMIT, "N/N"),
+            worst(f"clearance, {pair}", 1e3 * gaps.min(axis=1), "more than", 0.0, "mm"),
+            Finding("architectural measure", machine.architecture, "at least", ARCHITECTURAL_LIMIT, ""),
+        ),
+    )
+
+
+def _of_legs(
+    machine: Machine, lengths: Floats, base: Floats, platform: Floats, worst: Callable[..., Finding]
+) -> list[Finding]:
+    """Return the worst values of strokes and joints. lengths, metres, and angles in the joints, radians: (N, n)."""
+    legs, joints, count, found = machine.legs, machine.joints, machine.robot.n_legs, list[Finding]()
+    for k in range(count):
+        low, high = 1e3 * legs.min_length[k], 1e3 * legs.max_length[k]
+        found += [
+            worst(f"leg {k + 1} shortest", 1e3 * lengths[:, k], "at least", low, "mm"),
+            worst(f"leg {k + 1} longest", 1e3 * lengths[:, k], "at most", high, "mm"),
+        ]
+    for k in range(count):
+        cone, (least, most) = np.degrees(joints.base_cone[k]), np.degrees(joints.platform_range[k])
+        seen = np.degrees(platform[:, k])
+        found += [
+            worst(f"leg {k + 1} base joint", np.degrees(base[:, k]), "at most", cone, "deg"),
+            worst(f"leg {k + 1} platform joint, least", seen, "at least", least, "deg"),
+            worst(f"leg {k + 1} platform joint, most", seen, "at most", most, "deg"),
+        ]
+    return found
+
+
+def explain(report: MachineReport) -> str:
+    """Return the text of `pentapod machine check`: the machine, its legs, its worst poses, the result."""
+    m = report.machine
+    work, legs = m.work, m.legs
+    centre = ", ".join(f"{1e3 * c:.0f}" for c in work.centre)
+    lines = [
+        f"machine {m.name} ({m.digest})",
+        f"  work volume: tips in a cylinder of {1e3 * work.diameter:.0f} mm diameter and "
+        f"{1e3 * work.height:.0f} mm height",
+        f"    around ({centre}) mm; tool axes within {np.degrees(work.tilt):.3g}° of -z",
+        f"  tool {1e3 * m.tool_length:.1f} mm from the line's origin, "
+        f"{1e3 * (m.tool_length - m.robot.offsets.max()):.1f} mm beyond the lowest platform joint; "
+        f"delta {as_quadratic(m.robot, 'this report').delta:.6g}",
+        f"  rapids {6e4 * m.rapid_velocity:.0f} mm/min; a setpoint every {1e3 * m.controller.period:g} ms, "
+        f"{m.controller.interpolation} between them",
+        "",
+        f"  over {report.poses} poses of the work volume:",
+        "  leg   length used (mm)    of stroke (mm)     stroke used   base joint     platform joint",
+    ]
+    for k in range(m.robot.n_legs):
+        low, high = report.length_range[k]
+        used = (high - low) / legs.stroke[k]
+        least, most = np.degrees(report.platform_range[k])
+        lines.append(
+            f"  {k + 1}     {1e3 * low:6.1f} to {1e3 * high:6.1f}    "
+            f"{1e3 * legs.min_length[k]:5.0f} to {1e3 * legs.max_length[k]:5.0f}     {used:8.0%}    "
+            f"{np.degrees(report.base_angle[k]):5.1f}° of {np.degrees(m.joints.base_cone[k]):.0f}°   "
+            f"{least:5.1f}° to {most:5.1f}°"
+        )
+    component = "several: a singularity runs through it" if report.component is None else str(report.component)
+    lines += [
+        "",
+        f"  component                             {component}",
+        f"  least |w|                             {report.least_w:.3f}",
+        f"  distance to the plane S = 0           {1e3 * report.least_s:.0f} mm",
+        f"  turn about the tip to a singularity   {np.degrees(report.least_turn):.1f}°",
+        f"  tip force to leg forces               {report.amplification:.2f} N/N",
+        f"  smallest clearance                    {1e3 * report.clearance:.1f} mm ({report.clearance_pair})",
+        f"  architectural measure                 {m.architecture:.4f}",
+        "",
+    ]
+    failed = [finding for finding in report.findings if not finding.passed]
+    if not failed:
+        return "\n".join([*lines, "The machine keeps its own limits everywhere in its work volume."])
+    lines.append("The machine does not keep its own limits in its work volume:")
+    for finding in failed:
+        place = f" at {finding.where}" if finding.where else ""
+        wanted = f"must be {finding.kind} {finding.limit:.4g}"
+        lines.append(f"  {finding.name}: {finding.value:.4g} {finding.unit}, {wanted}{place}")
+    return "\n".join(lines)
+
+
+def sample_work_volume(volume: WorkVolume, *, rings: int, around: int, levels: int) -> tuple[Floats, Floats]:
+    """Return tips (N, 3) in metres and tool axes tip → spindle (N, 3): every tip with every axis.
+
+    Tips: the cylinder's axis and `rings` circles of `around` points, on `levels` heights. Axes: −z and as
+    many circles in the cone. Both include the boundary, where the worst poses are. Machine frame.
+    """
+    turn = 2.0 * np.pi * np.arange(around) / around
+    circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    radii = np.arange(1, rings + 1) / rings
+    disc = np.concatenate([np.zeros((1, 2)), (radii[:, None, None] * circle).reshape(-1, 2)])
+    heights = volume.height * (np.linspace(-0.5, 0.5, levels) if levels > 1 else np.zeros(1))
+    tips = np.empty((levels, len(disc), 3))
+    tips[..., :2] = 0.5 * volume.diameter * disc
+    tips[..., 2] = heights[:, None]
+    lean = np.linalg.norm(disc, axis=1) * volume.tilt
+    # sin(a)/a · disc keeps the direction −z free of a division by zero.
+    across = disc * (volume.tilt * np.sinc(lean / np.pi))[:, None]
+    axes = np.concatenate([across, -np.cos(lean)[:, None]], axis=1)
+    tips = tips.reshape(-1, 3) + volume.centre
+    return np.repeat(tips, len(axes), axis=0), np.tile(axes, (len(tips), 1))
