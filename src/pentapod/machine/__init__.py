@@ -7,7 +7,14 @@ from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.machine import ARCHITECTURAL_LIMIT, Machine, load_machine, read_machine
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 from pentapod.machine.reader import shipped_machines
-from pentapod.machine.report import AMPLIFICATION_LIMIT, Finding, MachineReport, check, explain, sample_work_volume
+from pentapod.machine.report.report import (
+    AMPLIFICATION_LIMIT,
+    Finding,
+    MachineReport,
+    check,
+    explain,
+    sample_work_volume,
+)
 
 __all__ = [
     "AMPLIFICATION_LIMIT",
