@@ -50,7 +50,7 @@ def turned(direction):
 
 @settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 100_000), which=st.integers(0, len(CUTTERS) - 1), lean=st.floats(0.02, 1.4))
-def test_a_cutter_touches_its_tangent_plane_at_the_contact(seed, which, lean):
+def test_cutters_touch_their_tangent_plane_at_the_contact(seed, which, lean):
     rng, tool = np.random.default_rng(seed), CUTTERS[which]
     normal = rng.normal(size=3)
     normal /= np.linalg.norm(normal)
@@ -66,13 +66,13 @@ def test_a_cutter_touches_its_tangent_plane_at_the_contact(seed, which, lean):
     assert np.linalg.norm(tip + body @ turned(axis).T - contact, axis=1).min() < 1.2e-3
 
 
-def test_upright_ends_lie_flat():
+def test_tip_of_an_upright_cutter_is_the_contact():
     normal = np.array([[0.0, 0.0, 1.0]])
     for tool in (BullNose(5e-3, 1e-3), FlatEnd(4e-3), BallCutter(3e-3)):
         np.testing.assert_allclose(tool.tips(np.ones((1, 3)), normal, normal), np.ones((1, 3)), atol=1e-15)
 
 
-def test_a_beam_keeps_its_distance_along_the_axis():
+def test_stand_off_keeps_its_distance_along_the_axis():
     axis = np.array([[0.0, 0.6, 0.8]])
     tool = StandOff(0.01, shank=SHANK)
     tip = tool.tips(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]), axis)
@@ -81,13 +81,13 @@ def test_a_beam_keeps_its_distance_along_the_axis():
 
 
 @pytest.mark.parametrize("tool", [BallCutter(3e-3), Lollipop(4e-3, 1.5e-3, 0.02), StandOff(5e-3)])
-def test_what_leans_keeps_its_tilt_centre(tool):
+def test_tools_that_can_tilt_keep_their_tilt_centre(tool):
     rng = np.random.default_rng(3)
     axes = rng.normal(size=(50, 3))
     axes /= np.linalg.norm(axes, axis=1)[:, None]
     normals = np.tile([0.0, 0.0, 1.0], (50, 1))
     tilt_centres = tool.tips(np.zeros((50, 3)), normals, axes) + tool.tilt_centre * axes
-    assert tool.leans
+    assert tool.can_tilt
     np.testing.assert_allclose(tilt_centres, tilt_centres[:1].repeat(50, axis=0), atol=1e-15)
 
 

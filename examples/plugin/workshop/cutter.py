@@ -20,7 +20,7 @@ class Engraver(Mounted):
     height: Annotated[float, Key("mm", "of the cone", gt=0.0, le=100.0)] = 0.01
 
     tilt_centre = 0.0
-    leans = False
+    can_tilt = False
     scallop_radius = None
 
     def __post_init__(self) -> None:

@@ -10,9 +10,8 @@ import numpy as np
 from pentapod import Mesh, RasterOptions
 from pentapod.base.keys import Key
 from pentapod.cutters import Tool
-from pentapod.toolpath.drawing import Drawing
-from pentapod.toolpath.strategies.raster import draw_raster
-from pentapod.toolpath.strategies.strategy import Strategy
+from pentapod.toolpath.strategies.raster import raster_paths
+from pentapod.toolpath.strategy import ContactPaths, Strategy
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -22,11 +21,11 @@ class DiagonalOptions(RasterOptions):
     turn: Annotated[float, Key("deg", "of the passes against the part's diagonal", ge=-90.0, le=90.0)] = 0.0
 
 
-def draw_diagonal(mesh: Mesh, tool: Tool, options: DiagonalOptions) -> Drawing:
+def diagonal_paths(mesh: Mesh, tool: Tool, options: DiagonalOptions) -> ContactPaths:
     """Return the passes of a raster along the diagonal."""
     low, high = mesh.bounds
     diagonal = float(np.arctan2(high[1] - low[1], high[0] - low[0]))
-    return draw_raster(mesh, tool, replace(options, direction=diagonal + options.turn))
+    return raster_paths(mesh, tool, replace(options, direction=diagonal + options.turn))
 
 
-STRATEGY = Strategy("diagonal", DiagonalOptions, draw_diagonal)
+STRATEGY = Strategy("diagonal", DiagonalOptions, diagonal_paths)

@@ -1,4 +1,4 @@
-"""Tools as the workpiece sees them: a file for each."""
+"""Cutters, beams and sprays: contact, tip and body; a file for each."""
 
 from pentapod.cutters.ball import BallCutter
 from pentapod.cutters.bull_nose import BullNose

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
 
-from pentapod.base.keys import Key
-from pentapod.cutters.mounted import Balled, check_flute, check_positive, rounded_end
+from pentapod.cutters.mounted import BallEnded, Flute, check_flute, check_positive, rounded_end
 from pentapod.geometry.solids import Solid
 
 
 @dataclass(frozen=True)
-class BallCutter(Balled):
-    """A ball-ended cutter. radius: of the ball; flute: cutting length from the tip, the ball alone if None.
+class BallCutter(BallEnded):
+    """A ball-ended cutter. radius: of the ball; flute: cutting length from the tip, None for the ball alone; metres.
 
-    Metres. Raises ToolpathError unless the radius is positive and the flute at least as long.
+    Raises ToolpathError unless the radius is positive and the flute longer than it.
     """
 
-    flute: Annotated[
-        float | None, Key("mm", "cutting length from the tip; above it the shank begins", gt=0.0, le=500.0)
-    ] = None
+    flute: Flute = None
 
     def __post_init__(self) -> None:
         check_positive("radius", self.radius)
@@ -27,9 +23,6 @@ class BallCutter(Balled):
 
     def _cutter(self) -> tuple[Solid, ...]:
         return rounded_end(self.radius, self.radius, self.flute)
-
-    def _base(self) -> float:
-        return super()._base() if self.flute is None else self.flute
 
 
 CUTTER = BallCutter

@@ -9,7 +9,7 @@ from pentapod.cutters.bull_nose import BullNose
 
 @dataclass(frozen=True)
 class FlatEnd(BullNose):
-    """A flat-ended cutter: sharp corner. radius, flute: metres. Raises ToolpathError unless they are positive."""
+    """A flat-ended cutter with a sharp corner. radius, flute: metres. Raises ToolpathError unless they are positive."""
 
     corner: float = field(default=0.0, init=False)
 

@@ -1,4 +1,4 @@
-"""Shank and holder, which all tools share, and the tools with a ball at the lower end."""
+"""Shank and holder, which all tools have, and cutters with a ball end."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pentapod.geometry.solids import Cone, Solid, stacked
 
 @dataclass(frozen=True, kw_only=True)
 class Mounted(Value, ABC):
-    """shank, holder: what follows on the cutting part, from the tip towards the spindle; heights in metres."""
+    """A tool with shank and holder: stacked cones above the cutting part, towards the spindle."""
 
     shank: tuple[Cone, ...] = field(default=())
     holder: tuple[Cone, ...] = field(default=())
@@ -25,23 +25,20 @@ class Mounted(Value, ABC):
     @property
     def solids(self) -> tuple[Solid, ...]:
         """The convex bodies that make up cutter, shank and holder."""
-        base = self._base()
+        cutter = self._cutter()
+        base = cutter[-1].top if cutter else 0.0
         shank = stacked("shank", self.shank, base)
         holder = stacked("holder", self.holder, max([base, *(s.high for s in shank)]))
-        return (*self._cutter(), *shank, *holder)
+        return (*cutter, *shank, *holder)
 
     @abstractmethod
     def _cutter(self) -> tuple[Solid, ...]:
-        """Return the bodies below shank and holder."""
-
-    def _base(self) -> float:
-        """Return the height at which the shank begins: on top of what cuts."""
-        return max((solid.top for solid in self._cutter()), default=0.0)
+        """Return the bodies below shank and holder, upwards; the shank begins at the top of the last."""
 
 
 @dataclass(frozen=True)
-class Balled(Mounted):
-    """A ball at the lower end. radius: of the ball, metres."""
+class BallEnded(Mounted):
+    """A cutter with a ball end. radius: of the ball, metres."""
 
     radius: Annotated[
         float, Key("mm", "diameter of the cutter, or of its ball", name="diameter", share=0.5, gt=0.0, le=100.0)
@@ -53,18 +50,22 @@ class Balled(Mounted):
         return self.radius
 
     @property
-    def leans(self) -> bool:
+    def can_tilt(self) -> bool:
         """True: about the ball's centre."""
         return True
 
     @property
     def scallop_radius(self) -> float:
-        """The ball's."""
+        """The ball's radius."""
         return self.radius
 
     def tips(self, contacts: Floats, normals: Floats, axes: Floats) -> Floats:
         """Return the tips: the ball's centre lies a radius above the contact along the normal."""
         return contacts + self.radius * (normals - axes)
+
+
+Flute = Annotated[float | None, Key("mm", "cutting length from the tip; above it the shank begins", gt=0.0, le=500.0)]
+"""Cutting length, metres; None for the rounded end alone."""
 
 
 def rounded_end(radius: float, corner: float, flute: float | None) -> tuple[Solid, ...]:
@@ -74,17 +75,17 @@ def rounded_end(radius: float, corner: float, flute: float | None) -> tuple[Soli
 
 
 def check_flute(flute: float | None, least: float) -> None:
-    """Raise ToolpathError unless a cutting length, if there is one, is more than `least` metres."""
+    """Raise ToolpathError unless a cutting length is None or more than `least` metres."""
     if flute is not None and not least < flute < np.inf:
-        raise wrong("flute", flute, f"more than {least} m")
+        raise size_error("flute", flute, f"more than {least} m")
 
 
 def check_positive(key: str, value: float) -> None:
     """Raise ToolpathError unless a length is positive and finite."""
     if not (np.isfinite(value) and value > 0.0):
-        raise wrong(key, value, "> 0")
+        raise size_error(key, value, "> 0")
 
 
-def wrong(key: str, value: float, expected: str) -> ToolpathError:
-    """Return the error of a size that no tool has."""
+def size_error(key: str, value: float, expected: str) -> ToolpathError:
+    """Return the error of a size that no tool can have."""
     return ToolpathError("impossible tool", key=key, value=value, expected=expected)

@@ -1,4 +1,4 @@
-"""CUTTERS: the kinds of tool by the names that job files use. Each is a class in a file of its own, as `CUTTER`."""
+"""CUTTERS: the tools by the names that job files use."""
 
 from __future__ import annotations
 

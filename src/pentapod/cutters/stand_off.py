@@ -1,4 +1,4 @@
-"""StandOff: a tool that keeps its distance from the surface, such as a laser."""
+"""StandOff: a tool at a constant distance from the surface, such as a laser, spray or water jet."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from pentapod.geometry.solids import Solid
 
 @dataclass(frozen=True)
 class StandOff(Mounted):
-    """A laser, spray or water jet that keeps its distance. distance: tip to surface along the axis, metres, ≥ 0.
+    """A laser, spray or water jet. distance: stand-off from the tip to the surface along the axis, metres, ≥ 0.
 
-    The nozzle is the shank, from the tip on. Raises ToolpathError for a negative distance.
+    The shank, from the tip on, is the nozzle. Raises ToolpathError for a negative distance.
     """
 
     distance: Annotated[float, Key("mm", "from the tip to the surface", name="standoff", gt=0.0, le=200.0)]
@@ -33,17 +33,17 @@ class StandOff(Mounted):
         return -self.distance
 
     @property
-    def leans(self) -> bool:
+    def can_tilt(self) -> bool:
         """True: about the spot on the surface."""
         return True
 
     @property
     def scallop_radius(self) -> None:
-        """None: what does not cut leaves no ridge."""
+        """None: a beam or spray leaves no scallop."""
         return
 
     def tips(self, contacts: Floats, normals: Floats, axes: Floats) -> Floats:
-        """Return the tips: the stand-off away from the contact along the axis, whatever the normal."""
+        """Return the tips: the stand-off away from the contact along the axis."""
         del normals
         return contacts + self.distance * axes
 

@@ -1,8 +1,8 @@
-"""Tool: where the tip is when the tool touches the surface, and the solids of its body.
+"""Tool: position of the tip at a contact with the surface, and the solids of its body.
 
-Every tool is a body of revolution about its axis. The tip is where the axis leaves the tool; heights are
-measured from there along the axis, towards the spindle. Shank and holder are cones and cylinders, stacked
-from the upper end of what cuts.
+Every tool is a body of revolution about its axis. The tip is the point of the axis at the lower end of the tool;
+heights are measured from there along the axis, towards the spindle. Shank and holder are cones and cylinders, stacked
+on the cutting part.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pentapod.geometry.solids import Solid
 
 
 class Tool(Protocol):
-    """What meets the surface. `tilt_centre` is as in `Toolpath`."""
+    """A cutter, beam or spray with shank and holder. `tilt_centre` is as in `Toolpath`."""
 
     @property
     def tilt_centre(self) -> float:
@@ -22,13 +22,13 @@ class Tool(Protocol):
         ...
 
     @property
-    def leans(self) -> bool:
-        """Whether the tool may tilt about its tilt centre and still meet the surface where it did."""
+    def can_tilt(self) -> bool:
+        """Whether the contact stays where it is when the tool tilts about its tilt centre."""
         ...
 
     @property
     def scallop_radius(self) -> float | None:
-        """Radius in metres of the rounding that leaves ridges between passes; None where none is defined."""
+        """Radius in metres of the rounding that leaves scallops between passes; None if there is none."""
         ...
 
     @property
@@ -37,5 +37,5 @@ class Tool(Protocol):
         ...
 
     def tips(self, contacts: Floats, normals: Floats, axes: Floats) -> Floats:
-        """Return the tips (N, 3) of a tool with axes (N, 3) that meets contacts (N, 3); normals are unit."""
+        """Return the tips (N, 3) at contacts (N, 3) with unit normals (N, 3) and unit axes (N, 3); metres."""
         ...

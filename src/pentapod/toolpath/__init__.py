@@ -1,4 +1,4 @@
-"""The workpiece as mathematics: meshes, strategies, tools, links. No robot in it."""
+"""Toolpaths: strategies, tool axes, links and gouge check in the workpiece frame; independent of the robot."""
 
 from pentapod.cutters.ball import BallCutter
 from pentapod.cutters.bull_nose import BullNose
@@ -14,8 +14,7 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.heightfield import HeightField
 from pentapod.mesh.region import Region
 from pentapod.toolpath.axis.modes import AxisMode, Between, Fixed, Normal, Pointed
-from pentapod.toolpath.axis.orientation import Orientation
-from pentapod.toolpath.axis.orienting import oriented
+from pentapod.toolpath.axis.orientation import Orientation, oriented
 from pentapod.toolpath.axis.steps import stepped
 from pentapod.toolpath.gouge.gouge import without_gouges
 from pentapod.toolpath.gouge.report import GougeOptions, GougeReport, Remedy
@@ -37,9 +36,9 @@ from pentapod.toolpath.strategies.polyline import PolylineOptions
 from pentapod.toolpath.strategies.raster import Pattern, RasterOptions
 from pentapod.toolpath.strategies.registry import STRATEGIES, make_toolpath, toolpath_with_report
 from pentapod.toolpath.strategies.spiral import SpiralOptions
-from pentapod.toolpath.strategies.strategy import Strategy
 from pentapod.toolpath.strategies.text import TextOptions
 from pentapod.toolpath.strategies.waterline import WaterlineOptions
+from pentapod.toolpath.strategy import Strategy
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 __all__ = [

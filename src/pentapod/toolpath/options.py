@@ -1,6 +1,6 @@
-"""Options of all strategies (PathOptions) and of those that cover a surface (CoverOptions), in SI units.
+"""Options of all strategies (`PathOptions`) and of those that cover a surface (`CoverOptions`), in SI units.
 
-The keys of [toolpath] in a job file are declared here and beside each strategy, with the fields.
+Fields with a `Key` are the keys of [toolpath] in a job file; further ones are declared beside each strategy.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pentapod.mesh.region import Region
 
 
 class Entry(StrEnum):
-    """How the tool comes to a pass: along its axis, straight ahead of the pass on a ramp, or on an arc into it."""
+    """Lead-in and lead-out of a pass: along the tool axis, on a straight ramp ahead of the pass, or on an arc."""
 
     AXIS = "axis"
     STRAIGHT = "straight"
@@ -29,28 +29,28 @@ class Entry(StrEnum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PathOptions(Value):
-    """What every strategy takes. Lengths in metres, angles in radians, feeds in m/s.
+    """Options of every strategy. Lengths in metres, angles in radians, feeds of the tool tip in m/s.
 
-    region: what is machined. view (3,): towards the tool, along which rapids rise; the region's direction when
-    None. chordal: how far a chord may leave the line on the mesh. feed, link_feed: of the tip. The other fields are
-    keys of job files, with their meaning. Raises ToolpathError for values out of range.
+    region: what is machined. view (3,): direction towards the tool, in which rapids rise; None for the region's
+    direction. chordal: largest distance of a chord from the line on the mesh. Raises ToolpathError for values out of
+    range.
     """
 
     region: Region = field(default_factory=Region)
     view: Floats | tuple[float, float, float] | None = None
     chordal: float = 10e-6
     clearance: Annotated[float, Key("mm", "height of rapids above the part", gt=0.0)] = 10e-3
-    approach: Annotated[float, Key("mm", "height of the stretch on feed, to and from a cut", gt=0.0)] = 3e-3
+    approach: Annotated[float, Key("mm", "height of approach and retract on feed, above a cut", gt=0.0)] = 3e-3
     entry: Annotated[
-        Entry | str, Key("", 'form of that stretch: along the "axis", a "straight" ramp ahead, or an "arc"')
+        Entry | str, Key("", 'form of approach and retract: along the "axis", a "straight" ramp, or an "arc"')
     ] = Entry.AXIS
     stay: Annotated[
         float | None,
-        Key("mm", "up to this far the tool stays on the surface between passes; 3 stepovers when left out", ge=0.0),
+        Key("mm", "largest distance between passes for a link on the surface; 3 stepovers when left out", ge=0.0),
     ] = None
-    hop: Annotated[float, Key("mm", "up to this far it hops over the part, further it retracts", ge=0.0)] = 20e-3
+    hop: Annotated[float, Key("mm", "largest distance between passes for a hop just above the part", ge=0.0)] = 20e-3
     spacing: Annotated[float, Key("mm", "largest distance between waypoints on the surface", gt=0.0)] = 2e-3
-    closest: Annotated[float, Key("mm", "waypoints nearer than this are one, if chordal_mm allows", gt=0.0)] = 10e-6
+    closest: Annotated[float, Key("mm", "waypoints nearer than this are merged, if chordal_mm allows", gt=0.0)] = 10e-6
     shortest: Annotated[float, Key("mm", "shorter passes are left out, and reported", ge=0.0)] = 0.5e-3
     axis_step: Annotated[float, Key("deg", "largest turn of the axis between waypoints", gt=0.0, le=30.0)] = float(
         np.radians(3.0)
@@ -60,12 +60,9 @@ class PathOptions(Value):
 
     def __post_init__(self) -> None:
         for name in ("chordal", "feed", "link_feed"):
-            positive(name, getattr(self, name))
+            check_positive(name, getattr(self, name))
         check_fields(self, ToolpathError)
-        view = self.region.direction if self.view is None else self.view
-        if not np.linalg.norm(frozen(view, "view", (3,))) > 0.0:
-            raise ToolpathError("the view direction has no length", key="view")
-        set_frozen(self, view=frozen(normalised(view), "view"))
+        set_frozen(self, view=unit_vector("view", self.region.direction if self.view is None else self.view))
 
     @property
     def up(self) -> Floats:
@@ -73,16 +70,16 @@ class PathOptions(Value):
         return np.asarray(self.view)
 
     @classmethod
-    def sink_of(cls, values: Any) -> float:
-        """Return how far below the surface these options, or SI values of their keys, bring the tool: metres."""
+    def depth_of(cls, values: Any) -> float:
+        """Return how deep below the surface these options, or SI values of their keys, bring the tool: metres."""
         return float(getattr(values, "depth", 0.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CoverOptions(PathOptions):
-    """What strategies take that cover a surface by passes side by side: one of stepover and scallop, and fill.
+    """Options of strategies that cover a surface by passes side by side. Either stepover or scallop is given.
 
-    The scallop takes the surface's curvature and the cutter into account.
+    The stepover for a scallop depends on the curvature of the surface and on the cutter.
     """
 
     stepover: Annotated[
@@ -100,7 +97,14 @@ class CoverOptions(PathOptions):
             raise ToolpathError("give the distance between passes once", key="stepover", expected="stepover or scallop")
 
 
-def positive(name: str, value: float) -> None:
+def check_positive(name: str, value: float) -> None:
     """Raise ToolpathError unless a number is positive and finite."""
     if not (np.isfinite(value) and value > 0.0):
         raise ToolpathError("must be positive", key=name, value=value)
+
+
+def unit_vector(name: str, direction: Any) -> Floats:
+    """Return a direction (3,), any length, as a read-only unit vector. Raises ToolpathError if it has no length."""
+    if not np.linalg.norm(frozen(direction, name, (3,))) > 0.0:
+        raise ToolpathError("the direction has no length", key=name)
+    return frozen(normalised(direction), name)

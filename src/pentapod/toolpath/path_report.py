@@ -9,16 +9,15 @@ from pentapod.base.values import Value
 
 @dataclass(frozen=True)
 class PathReport(Value):
-    """What a toolpath came to. Lengths in metres.
+    """Lengths, counts and problems of a toolpath. Lengths in metres.
 
-    stepover: between passes along the surface, at most; 0 for lines that do not cover it. stay_downs: links on
-    the surface; hops: rapids close above the part; retracts: passes reached over the clearance level, the
-    first too. travel: distance between the end of each pass and the start of the next, in all; no order has
-    less than travel_bound. dropped: passes shorter than asked for, dropped_length their sum. hidden:
-    waypoints left out because the part itself lies above them. tight: waypoints where the surface is hollow
-    along the pass with a radius below the ball's or the stand-off: a ball gouges there, a beam's tip turns back.
-    unproven: rapids for which no way was found that keeps clear with a margin: whether they are clear is for the
-    verdict to judge. notes: of the strategy.
+    stepover: largest distance between passes along the surface; 0 for lines that do not cover it. stay_downs: links on
+    the surface; hops: rapids just above the part; retracts: passes reached by way of the clearance level, with the
+    first. travel: total distance between the end of each pass and the start of the next; travel_bound: lower bound of
+    it for any order. dropped: passes shorter than `PathOptions.shortest`; dropped_length: their total length. hidden:
+    waypoints left out because the part lies above them. tight: waypoints where the concave radius of the surface along
+    the pass is below the ball's radius or the stand-off: a ball gouges there, a beam's tip moves backwards. unproven:
+    rapids that are not proven to keep their distance from the part; the verdict judges them. notes: of the strategy.
     """
 
     strategy: str
@@ -39,9 +38,9 @@ class PathReport(Value):
     notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        apart = f", up to {1e3 * self.stepover:.4g} mm apart" if self.stepover else ""
+        stepover = f", up to {1e3 * self.stepover:.4g} mm apart" if self.stepover else ""
         text = (
-            f"{self.strategy}: {self.passes:,} passes{apart}, {self.cut_length:.4g} m of cut, "
+            f"{self.strategy}: {self.passes:,} passes{stepover}, {self.cut_length:.4g} m of cut, "
             f"{self.waypoints:,} waypoints; {self.stay_downs:,} links on the surface, {self.hops:,} hops, "
             f"{self.retracts:,} by way of the clearance level"
         )
@@ -52,9 +51,7 @@ class PathReport(Value):
         if self.hidden:
             text += f"\n  note: {self.hidden:,} waypoints left out, the part lies above them"
         if self.tight:
-            text += f"\n  problem: at {self.tight:,} waypoints the surface is hollower than the ball or the stand-off"
+            text += f"\n  problem: at {self.tight:,} waypoints the concave radius is below the ball's or the stand-off"
         if self.unproven:
-            text += (
-                f"\n  note: {self.unproven:,} rapids pass the part closely; the verdict judges whether they are clear"
-            )
+            text += f"\n  note: {self.unproven:,} rapids are close to the part; the verdict judges if they are clear"
         return text

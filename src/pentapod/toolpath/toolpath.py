@@ -1,4 +1,4 @@
-"""Toolpath: where the tool goes, in the workpiece frame. No robot in it."""
+"""Toolpath: tool tips and axes in the workpiece frame, as cuts, links and rapids; independent of the robot."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.runs import run_starts
 
 JOIN_TOLERANCE_M = 1e-9
-_MOST_DRAWN = 800
+"""Largest difference between the ends of neighbouring segments, metres and unit vectors."""
+MOST_DRAWN = 800
+"""Largest number of waypoints in a notebook's drawing."""
 
 
 class SegmentKind(StrEnum):
-    """What a segment is for: cut (process on), link (on feed, not cutting), rapid (clear of the part)."""
+    """Kind of motion: cut (process on), link (on feed, not cutting), rapid (clear of the part)."""
 
     CUT = "cut"
     LINK = "link"
@@ -35,13 +37,12 @@ _STYLES = {SegmentKind.CUT: "-", SegmentKind.LINK: "--", SegmentKind.RAPID: ":"}
 
 @dataclass(frozen=True, eq=False)
 class Segment(Value):
-    """A run of tool poses of one kind.
+    """Tool poses of one kind of motion.
 
-    tips (N, 3): tool tips, metres, workpiece frame. axes (N, 3): unit, tip → spindle. feed: speed of the
-    tip in m/s that the process wants; infinite on rapids (the machine's rapid rate holds there). power: share of
-    full laser (or spindle) power while cutting, 0 to 1. dwell: seconds for which the tool stands at the segment's end,
-    0 for an exact stop without waiting, None where it passes on without a stop. N ≥ 2. Raises ToolpathError for
-    an empty segment, a bad feed, power or dwell, or an axis that is not of unit length.
+    tips (N, 3): tool tips, metres, workpiece frame, N ≥ 2. axes (N, 3): unit, tip → spindle. feed: requested speed of
+    the tip, m/s; infinite on rapids (the machine's rapid rate applies). power: share of full laser (or spindle) power
+    while cutting, 0 to 1. dwell: at the segment's end, seconds; 0 for an exact stop, None for no stop. Raises
+    ToolpathError for too few poses, a wrong feed, power or dwell, or an axis that is not of unit length.
     """
 
     summary = ("kind",)
@@ -61,11 +62,11 @@ class Segment(Value):
         lengths = np.linalg.norm(axes, axis=1)
         worst = int(np.abs(lengths - 1.0).argmax())
         if abs(lengths[worst] - 1.0) > 1e-9:
-            what = f"tool axis {worst} has not unit length"
+            what = f"tool axis {worst} is not of unit length"
             raise ToolpathError(what, key="axes", value=float(lengths[worst]), expected="1")
         if not self.feed > 0.0:
             raise ToolpathError(
-                "a feed is positive", key="feed", value=self.feed, expected="m/s, above 0; infinite on rapids"
+                "the feed must be positive", key="feed", value=self.feed, expected="m/s, above 0; infinite on rapids"
             )
         if not 0.0 <= self.power <= 1.0:
             raise ToolpathError("power must be a share of full power", key="power", value=self.power, expected="0 to 1")
@@ -77,11 +78,10 @@ class Segment(Value):
 class Toolpath(Value):
     """One continuous motion in the workpiece frame: each segment begins where the one before ends.
 
-    tilt_centre: distance in metres from the tip along the axis to the point about which the tool may tilt
-    without leaving the surface: the ball's radius for a ball cutter, −stand-off for a beam or spray
-    (the spot on the surface), 0 for a fixed tip. wait: seconds for which the tool stands at the first waypoint before
-    it sets off. Waypoints are the poses of all segments, joints once. Raises ToolpathError where two segments do not
-    join, or for a bad wait.
+    tilt_centre: distance in metres from the tip along the axis to the point about which the tool may tilt without
+    leaving the surface: the ball's radius for a ball cutter, −stand-off for a beam or spray (the spot on the surface),
+    0 for a fixed tip. wait: dwell at the first waypoint, seconds. Waypoints are the poses of all segments; the common
+    pose of two segments counts once. Raises ToolpathError where two segments do not join, or for a wrong wait.
     """
 
     summary = ("waypoints", "cut_length")
@@ -127,7 +127,7 @@ class Toolpath(Value):
 
     @cached_property
     def dwells(self) -> tuple[float | None, ...]:
-        """Seconds for which the tool stands at each segment's first waypoint, and at the end (S + 1); None: no stop."""
+        """Dwell in seconds at each segment's first waypoint and at the end (S + 1); None: no stop."""
         return (self.wait or None, *(s.dwell for s in self.segments))
 
     def __len__(self) -> int:
@@ -135,7 +135,7 @@ class Toolpath(Value):
 
     @property
     def waypoints(self) -> int:
-        """How many waypoints there are."""
+        """Number of waypoints."""
         return len(self)
 
     @property
@@ -144,9 +144,9 @@ class Toolpath(Value):
         return sum(float(arc_length(s.tips)[-1]) for s in self.segments if s.kind is SegmentKind.CUT)
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw the tip's path in millimetres into matplotlib axes with three dimensions, and return them.
+        """Draw the tip's path in millimetres into three-dimensional matplotlib axes, and return them.
 
-        Cuts are drawn through, links and rapids broken. Raises InputError where matplotlib is not installed.
+        Cuts are solid, links dashed, rapids dotted. Raises InputError if matplotlib is not installed.
         """
         (drawn,) = plot_axes(axes, projection="3d")
         for kind, style in _STYLES.items():
@@ -159,7 +159,7 @@ class Toolpath(Value):
         return drawn
 
     def _repr_html_(self) -> str:
-        """Return what notebooks show: what it is made of, its bounds, and the path seen from above."""
+        """Return what notebooks show: number of segments, bounds, and the path seen from above."""
         kinds = [s.kind for s in self.segments]
         low, high = 1e3 * self.tips.min(axis=0), 1e3 * self.tips.max(axis=0)
         rows = (
@@ -167,19 +167,19 @@ class Toolpath(Value):
             ("cut", f"{1e3 * self.cut_length:,.1f} mm"),
             ("x, y, z, mm", ", ".join(f"{a:.2f} to {b:.2f}" for a, b in zip(low, high, strict=True))),
         )
-        return html_table(f"Toolpath: {len(self):,} waypoints", rows, more=_seen_from_above(self.tips))
+        return html_table(f"Toolpath: {len(self):,} waypoints", rows, more=_top_view(self.tips))
 
     def _joined(self, name: str) -> Floats:
         parts = [getattr(s, name) for s in self.segments]
         return frozen(np.concatenate([parts[0], *(p[1:] for p in parts[1:])]), name)
 
     def transformed(self, transform: RigidTransform) -> Toolpath:
-        """Return the same motion seen after a rigid transform."""
+        """Return the same motion after a rigid transform."""
         moved = (replace(s, tips=transform.apply(s.tips), axes=transform.rotate(s.axes)) for s in self.segments)
         return replace(self, segments=tuple(moved))
 
     def stopping(self, dwell: float) -> Toolpath:
-        """Return the same motion, standing `dwell` seconds (0: an exact stop) wherever a cut ends without a stop."""
+        """Return the same motion with a dwell, seconds (0: an exact stop), wherever a cut ends without a stop."""
         kinds = [s.kind for s in self.segments]
         ends = [
             a is SegmentKind.CUT and b is not SegmentKind.CUT for a, b in zip(kinds, [*kinds[1:], None], strict=True)
@@ -196,9 +196,9 @@ def _check_seconds(name: str, seconds: float) -> None:
         raise ToolpathError("must be a time", key=name, value=seconds, expected="seconds, 0 or more")
 
 
-def _seen_from_above(tips: Floats) -> str:
-    """Return a small drawing (SVG) of a path (N, 3) in the colour of the text around it."""
-    points = tips[:: max(1, len(tips) // _MOST_DRAWN), :2] - tips[:, :2].min(axis=0)
+def _top_view(tips: Floats) -> str:
+    """Return a small drawing (SVG) of a path (N, 3), in the colour of the surrounding text."""
+    points = tips[:: max(1, len(tips) // MOST_DRAWN), :2] - tips[:, :2].min(axis=0)
     points *= 180.0 / max(float(np.ptp(tips[:, :2], axis=0).max()), 1e-9)
     line = " ".join(f"{x:.1f},{180.0 - y:.1f}" for x, y in points)
     path = f'<polyline points="{line}" fill="none" stroke="currentColor" stroke-width="0.7"/>'

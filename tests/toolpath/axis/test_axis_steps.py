@@ -1,4 +1,4 @@
-"""Waypoints put in where the axis turns by too much: what they keep of the toolpath, and how they divide a turn."""
+"""Waypoints inserted where the axis turns by too much: what stays of the toolpath, and how a turn is divided."""
 
 from itertools import pairwise
 
@@ -26,7 +26,7 @@ def turning(tilt_centre=3e-3):
     return Toolpath((cut, back), tilt_centre, wait=0.4)
 
 
-def test_all_but_the_turns_stays_as_it_was():
+def test_stepped_keeps_waypoints_and_properties_of_segments():
     before, after = turning(), stepped(turning(), STEP)
     assert (after.wait, after.tilt_centre) == (before.wait, before.tilt_centre)
     assert after.dwells == before.dwells == (0.4, 0.25, 0.0)
@@ -37,7 +37,7 @@ def test_all_but_the_turns_stays_as_it_was():
     assert [len(segment.tips) for segment in after.segments] == [3 + 2, 2 + 2]
 
 
-def test_a_toolpath_that_keeps_the_step_is_the_same():
+def test_stepped_returns_a_toolpath_that_keeps_the_step_itself():
     path = turning()
     assert stepped(path, np.radians(10.1)) is path
 
@@ -48,7 +48,7 @@ def test_a_toolpath_that_keeps_the_step_is_the_same():
     st.floats(0.02, 1.0),
     st.sampled_from([-5e-3, 0.0, 3e-3]),
 )
-def test_turns_are_divided_evenly_about_a_tilt_centre_that_goes_straight(leans, step, tilt_centre):
+def test_stepped_divides_turns_evenly_and_moves_the_tilt_centre_straight(leans, step, tilt_centre):
     axes = np.array([axis(*lean) for lean in leans])
     tips = np.linspace([0.0, 0.0, 0.0], [0.05, 0.02, 0.01], len(axes))
     path = stepped(Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),), tilt_centre), step)

@@ -1,4 +1,4 @@
-"""Tool axes: modes, lead and tilt, smoothing within its tolerance, the cap on turning."""
+"""Tool axes: modes, lead and tilt, smoothing within its tolerance, rate limit, axis steps."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 
 from pentapod.base.errors import InputError
 from pentapod.geometry import angle_between
-from pentapod.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.toolpath.axis.modes import Between, Fixed, Normal, Pointed, leaned
-from pentapod.toolpath.axis.orientation import Orientation
-from pentapod.toolpath.axis.smoothing import rate_capped, smoothed
+from pentapod.toolpath import BallCutter, Mesh, RasterOptions, Segment, SegmentKind, StandOff, Toolpath, make_toolpath
+from pentapod.toolpath.axis.modes import Between, Fixed, Normal, Pointed, with_lead_and_tilt
+from pentapod.toolpath.axis.orientation import Orientation, oriented
+from pentapod.toolpath.axis.smoothing import rate_limited, smoothed
 from pentapod.toolpath.axis.steps import stepped
+from toolpath_surfaces import grid
 
 
 def grid_of_passes(noise=0.0, seed=0, passes=9, points=60):
@@ -30,7 +31,7 @@ def grid_of_passes(noise=0.0, seed=0, passes=9, points=60):
     return runs
 
 
-def test_modes_point_where_they_say():
+def test_axis_modes_against_their_formulas():
     contacts, normals = grid_of_passes()[0]
     np.testing.assert_array_equal(Normal().axes(contacts, normals), normals)
     np.testing.assert_allclose(Fixed((0, 3, 4)).axes(contacts, normals), np.tile([0, 0.6, 0.8], (len(contacts), 1)))
@@ -48,7 +49,7 @@ def test_modes_point_where_they_say():
         Pointed(contacts[3]).axes(contacts, normals)
 
 
-def test_interpolated_directions_are_exact_at_their_places_and_stay_between():
+def test_between_is_exact_at_its_places_and_monotone_between():
     places = np.array([[-0.03, 0, 0], [0.03, 0, 0], [0, 0.02, 0]])
     directions = np.array([[-0.3, 0, 1], [0.3, 0, 1], [0, 0.4, 1.0]])
     mode = Between(places, directions)
@@ -68,7 +69,7 @@ def test_lead_and_tilt_are_the_angles_seen_from_the_side_and_from_behind(lead, t
     rng = np.random.default_rng(seed)
     axis, feed = rng.normal(size=(2, 1, 3))
     axis /= np.linalg.norm(axis)
-    found = leaned(axis, feed, lead, tilt)[0]
+    found = with_lead_and_tilt(axis, feed, lead, tilt)[0]
     forwards = feed[0] - (feed[0] @ axis[0]) * axis[0]
     forwards /= np.linalg.norm(forwards)
     left = np.cross(axis[0], forwards)
@@ -77,8 +78,9 @@ def test_lead_and_tilt_are_the_angles_seen_from_the_side_and_from_behind(lead, t
     assert np.linalg.norm(found) == pytest.approx(1.0)
 
 
-def test_a_feed_along_the_axis_has_no_forwards():
-    np.testing.assert_allclose(leaned(np.array([[0, 0, 1.0]]), np.array([[0, 0, 2.0]]), 0.3, 0.2), [[0, 0, 1.0]])
+def test_lead_and_tilt_keep_an_axis_along_its_feed():
+    axis, feed = np.array([[0, 0, 1.0]]), np.array([[0, 0, 2.0]])
+    np.testing.assert_allclose(with_lead_and_tilt(axis, feed, 0.3, 0.2), [[0, 0, 1.0]])
 
 
 def test_smoothing_removes_noise_along_and_across_and_keeps_its_tolerance():
@@ -99,7 +101,7 @@ def test_smoothing_removes_noise_along_and_across_and_keeps_its_tolerance():
     assert np.mean(across[8:]) < 0.75 * np.mean(across[:8])
 
 
-def test_a_tight_tolerance_binds_at_a_crease_and_nowhere_else():
+def test_smoothing_reaches_its_tolerance_at_a_crease_only():
     x = np.linspace(-0.02, 0.02, 81)
     points = np.stack([x, 0 * x, -np.abs(x)], 1)
     axes = np.stack([np.sign(x) * 0.3, 0 * x, np.ones(81)], 1)
@@ -113,7 +115,7 @@ def test_a_tight_tolerance_binds_at_a_crease_and_nowhere_else():
 
 @settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 10_000), degrees=st.floats(0.5, 20.0))
-def test_the_cap_on_turning_holds_between_all_neighbours(seed, degrees):
+def test_rate_limit_holds_between_all_neighbours(seed, degrees):
     rng = np.random.default_rng(seed)
     points = np.cumsum(rng.uniform(0.2e-3, 2e-3, (50, 1)) * [1, 0.3, 0], axis=0)
     axes = (
@@ -123,14 +125,14 @@ def test_the_cap_on_turning_holds_between_all_neighbours(seed, degrees):
     )
     axes /= np.linalg.norm(axes, axis=1)[:, None]
     rate = np.radians(degrees) / 1e-3
-    found = rate_capped(points, axes, rate)
+    found = rate_limited(points, axes, rate)
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     assert (angle_between(found[1:], found[:-1]) <= rate * steps * (1 + 1e-6)).all()
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0)
-    np.testing.assert_array_equal(rate_capped(points, found, rate), found)
+    np.testing.assert_array_equal(rate_limited(points, found, rate), found)
 
 
-def test_a_path_within_the_cap_is_left_alone():
+def test_rate_limit_leaves_slower_axes_unchanged():
     runs = grid_of_passes()
     axes = Orientation(rate=np.radians(5.0) / 1e-3).axes(runs)
     for found, (_, normals) in zip(axes, runs, strict=True):
@@ -138,15 +140,15 @@ def test_a_path_within_the_cap_is_left_alone():
 
 
 @pytest.mark.parametrize("bad", [{"lead": 1.5}, {"tilt": -1.5}, {"smoothing": -0.1}, {"reach": 0.0}, {"rate": 0.0}])
-def test_nonsense_is_refused(bad):
+def test_orientation_refuses_values_out_of_range(bad):
     with pytest.raises(InputError):
         Orientation(**bad)
 
 
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10_000), tilt_centre=st.sampled_from([3e-3, 0.0, -5e-3]), degrees=st.floats(0.5, 30.0))
-def test_the_cap_on_steps_holds_and_the_tilt_centre_keeps_its_way(seed, tilt_centre, degrees):
-    """Waypoints stay; what comes between lies evenly on the straight way of the tilt_centre."""
+def test_axis_step_holds_and_the_tilt_centre_moves_straight(seed, tilt_centre, degrees):
+    """Waypoints stay; inserted ones lie evenly on the straight path of the tilt centre."""
     rng = np.random.default_rng(seed)
     tips = np.cumsum(rng.normal(size=(9, 3)), axis=0) * 1e-3
     axes = rng.normal(size=(9, 3))
@@ -172,12 +174,7 @@ def test_the_cap_on_steps_holds_and_the_tilt_centre_keeps_its_way(seed, tilt_cen
     assert stepped(found, step * (1 + 1e-6)) is found
 
 
-def test_a_finished_toolpath_is_turned_and_stays_whole():
-    from pentapod.cutters.ball import BallCutter
-    from pentapod.cutters.stand_off import StandOff
-    from pentapod.toolpath import Mesh, RasterOptions, make_toolpath
-    from pentapod.toolpath.axis.orienting import oriented
-    from toolpath_surfaces import grid
+def test_oriented_toolpath_keeps_its_contacts_and_segments():
 
     mesh = Mesh.of(*grid(lambda x, y: -(x**2 + y**2) / 0.2, width=0.05, cells=20))
     for tool in (BallCutter(3e-3), StandOff(5e-3)):
@@ -187,7 +184,7 @@ def test_a_finished_toolpath_is_turned_and_stays_whole():
         np.testing.assert_allclose(turned.axes, np.tile([0.1, 0, 1], (len(path), 1)) / np.hypot(0.1, 1), atol=1e-12)
         cut = np.concatenate([[s.kind == "cut"] * (len(s.tips) - 1) for s in path.segments] + [[False]])
         np.testing.assert_allclose(turned.tilt_centres[cut], path.tilt_centres[cut], atol=1e-15)
-        leaned_path = oriented(path, tool, Orientation(lead=np.radians(10)))
-        leads = angle_between(leaned_path.axes, path.axes)[cut]
+        led_path = oriented(path, tool, Orientation(lead=np.radians(10)))
+        leads = angle_between(led_path.axes, path.axes)[cut]
         np.testing.assert_allclose(np.sort(leads)[len(leads) // 10 :], np.radians(10), atol=1e-9)
-        assert [s.kind for s in leaned_path.segments] == [s.kind for s in path.segments]
+        assert [s.kind for s in led_path.segments] == [s.kind for s in path.segments]

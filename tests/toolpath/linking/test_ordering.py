@@ -29,9 +29,9 @@ def best_of_all(first, last):
 
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10_000), count=st.integers(2, 5))
-def test_against_all_orders_of_a_few(seed, count):
+def test_tour_of_a_few_lines_against_all_orders(seed, count):
     first, last = np.random.default_rng(seed).uniform(size=(2, count, 3))
-    order, backwards = tour(first, last, np.ones(count, bool))
+    order, backwards = tour(first, last, reversible=True)
     assert sorted(order) == list(range(count))
     found, best = travel(*in_order(first, last, order, backwards)), best_of_all(first, last)
     assert travel_bound(first, last) <= best + 1e-9
@@ -40,20 +40,20 @@ def test_against_all_orders_of_a_few(seed, count):
 
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 10_000))
-def test_many_lines_stay_near_the_bound(seed):
+def test_tour_of_many_lines_is_near_the_bound(seed):
     random = np.random.default_rng(seed)
     first = random.uniform(size=(150, 3)) * [1, 1, 0]
     last = first + 0.05 * random.normal(size=(150, 3)) * [1, 1, 0]
-    order, backwards = tour(first, last, np.ones(150, bool))
+    order, backwards = tour(first, last, reversible=True)
     assert sorted(order) == list(range(150))
     bound = travel_bound(first, last)
     assert bound <= travel(*in_order(first, last, order, backwards)) <= 1.7 * bound
 
 
-def test_what_cannot_run_backwards_does_not():
+def test_tour_reverses_no_line_that_is_not_reversible():
     random = np.random.default_rng(5)
     first, last = random.uniform(size=(2, 40, 3))
-    order, backwards = tour(first, last, np.zeros(40, bool))
+    order, backwards = tour(first, last, reversible=False)
     assert sorted(order) == list(range(40))
     assert not backwards.any()
     naive = travel(first, last)
@@ -61,5 +61,5 @@ def test_what_cannot_run_backwards_does_not():
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_nothing_to_order(count):
+def test_travel_bound_of_no_line_and_of_one_is_zero(count):
     assert travel_bound(np.zeros((count, 3)), np.zeros((count, 3))) == 0.0

@@ -45,12 +45,12 @@ def cut_chords(path: Toolpath) -> list[tuple]:
     ]
 
 
-def test_passes_end_where_cutting_does(path):
+def test_pass_ends_are_the_ends_of_cuts(path):
     np.testing.assert_allclose(path.tips[pass_ends(path)], [[0.02, 0, 0], [0, 0.01, 0], [0.02, 0.02, 0]])
 
 
 @pytest.mark.parametrize("at", [2, 3, 5, 6, 11, 12])
-def test_two_pieces_in_a_row_cut_what_the_whole_does(path, at):
+def test_two_consecutive_pieces_make_the_cuts_of_the_whole(path, at):
     parts = [part_of(path, Piece(*ends), STYLE) for ends in ((0, at), (at, len(path) - 1))]
     assert cut_chords(parts[0]) + cut_chords(parts[1]) == cut_chords(path)
     first, second = parts
@@ -70,7 +70,7 @@ def test_two_pieces_in_a_row_cut_what_the_whole_does(path, at):
 
 
 @pytest.mark.parametrize("x", [0.001, 0.01, 0.012])
-def test_two_slabs_cut_what_the_whole_does(path, x):
+def test_two_boxed_pieces_make_the_cuts_of_the_whole(path, x):
     left, right = (Piece(0, len(path) - 1, high=(x, INF, INF)), Piece(0, len(path) - 1, low=(x, -INF, -INF)))
     if x < 0.005:  # all middles are to its right
         with pytest.raises(ToolpathError, match="no cut in this piece"):
@@ -86,7 +86,7 @@ def test_two_slabs_cut_what_the_whole_does(path, x):
     assert all(part.tips[:, 2].max() == pytest.approx(0.04) for part in parts)
 
 
-def test_the_whole_is_a_piece_of_itself(path):
+def test_piece_of_all_waypoints_is_the_whole(path):
     whole = part_of(path, Piece(0, len(path) - 1), STYLE)
     np.testing.assert_array_equal(whole.tips, path.tips)
     assert [s.kind for s in whole.segments] == [s.kind for s in path.segments]
@@ -102,7 +102,7 @@ def test_impossible_pieces_are_errors(path):
         part_of(path, Piece(6, 10), STYLE)
 
 
-def test_pieces_in_words():
+def test_str_of_pieces():
     assert str(Piece(3, 17)) == "waypoints 3 to 17"
     box = Piece(0, 9, (-INF, 0.01, 0.5e-3), (0.02, 0.03, INF))
     assert str(box) == "x up to 20 mm, y 10 to 30 mm, z from 0.5 mm"

@@ -75,7 +75,7 @@ def check_laws(mesh, toolpath, options):
 
 @pytest.mark.parametrize("pattern", ["zigzag", "one-way"])
 @pytest.mark.parametrize("direction", [0.0, 0.7, np.pi / 2])
-def test_waves_are_covered_on_the_surface(pattern, direction):
+def test_raster_covers_waves_on_the_surface(pattern, direction):
     mesh = Mesh.of(*surfaces.grid(waves))
     options = RasterOptions(stepover=2e-3, direction=direction, pattern=pattern)
     toolpath, report = toolpath_with_report(mesh, BALL, options)
@@ -105,7 +105,7 @@ def test_one_way_passes_all_run_one_way_and_zigzag_alternates():
         assert pattern == "one-way" or np.all(np.diff(ways) != 0)
 
 
-def test_links_that_stay_down_stay_on_the_surface():
+def test_stay_down_links_are_on_the_surface():
     mesh = Mesh.of(*surfaces.grid(waves))
     toolpath, report = toolpath_with_report(mesh, BALL, RasterOptions(stepover=2e-3))
     assert report.retracts == 1
@@ -115,7 +115,7 @@ def test_links_that_stay_down_stay_on_the_surface():
     assert surfaces.surface_distance(mesh, np.concatenate([s.tips for s in inner])).max() < 1e-6
 
 
-def test_of_a_closed_ball_only_the_upper_side_is_cut():
+def test_raster_of_a_closed_ball_cuts_its_upper_side_only():
     mesh = Mesh.of(*surfaces.sphere())
     options = RasterOptions(stepover=2e-3, region=UPPER)
     cuts, axes = check_laws(mesh, make_toolpath(mesh, BALL, options), options)
@@ -126,7 +126,7 @@ def test_of_a_closed_ball_only_the_upper_side_is_cut():
     assert cKDTree(cuts).query(cap)[0].max() < 3e-3
 
 
-def test_the_region_may_face_anywhere():
+def test_region_may_face_any_direction():
     mesh = Mesh.of(*surfaces.sphere())
     for direction in ((1, 0, 0), (0, -1, 0), (0, 0, -1), (1, 2, -2)):
         region = Region(direction=direction, angle=np.radians(40.0))
@@ -146,7 +146,7 @@ def test_torus_upper_side_against_the_formula():
     assert cuts[:, 2].min() > 0.007
 
 
-def test_a_hole_is_respected_and_each_side_finished_in_one_go():
+def test_raster_leaves_a_hole_out_and_finishes_each_side_in_one_go():
     vertices, faces = surfaces.grid(waves, cells=100)
     centres = vertices[faces].mean(axis=1)
     mesh = Mesh.of(vertices, faces[np.hypot(centres[:, 0], centres[:, 1]) > 0.02])
@@ -172,7 +172,7 @@ def test_a_box_bounds_the_region():
     assert 0.009 <= cuts[:, 1].max() < 0.01
 
 
-def test_what_the_part_itself_hides_is_left_out():
+def test_waypoints_that_the_part_hides_are_left_out():
     vertices, faces = surfaces.grid(lambda x, y: 0 * x, cells=40)
     table = vertices * [0.4, 0.4, 1.0] + [0.0, 0.0, 0.03]
     mesh = Mesh.of(np.concatenate([vertices, table]), np.concatenate([faces, faces + len(vertices)]))
@@ -194,7 +194,7 @@ def test_stand_off_keeps_its_distance_and_tilt_centres_on_the_surface():
     np.testing.assert_allclose(surfaces.surface_distance(mesh, tips), 5e-3, rtol=5e-3)
 
 
-def test_ball_tilts_about_its_centre():
+def test_tilt_centres_of_a_ball_are_its_centres():
     toolpath = make_toolpath(Mesh.of(*surfaces.sphere()), BALL, RasterOptions(stepover=5e-3, region=UPPER))
     assert toolpath.tilt_centre == 3e-3
     cuts = np.concatenate([[s.kind is SegmentKind.CUT] * (len(s.tips) - 1) for s in toolpath.segments])
@@ -202,7 +202,7 @@ def test_ball_tilts_about_its_centre():
     np.testing.assert_allclose(np.linalg.norm(centres, axis=1), 0.053, atol=7e-5)  # facets sag by 60 um
 
 
-def test_a_leaning_ball_still_touches():
+def test_ball_tip_at_a_tilted_axis():
     normal, axis = np.array([[0, 0, 1.0]]), np.array([[0.6, 0, 0.8]])
     tip = BALL.tips(np.zeros((1, 3)), normal, axis)
     np.testing.assert_allclose(tip + 3e-3 * axis, [[0, 0, 3e-3]], atol=1e-15)
@@ -229,12 +229,12 @@ def test_scallops_on_a_slope_are_as_high_as_asked_for(slope_deg):
     assert min(left, ridge) == pytest.approx(scallop, rel=0.1)
 
 
-def test_hollows_narrower_than_the_ball_are_told():
+def test_concave_radii_below_the_balls_are_reported():
     hollow = Mesh.of(*surfaces.grid(lambda x, y: 300 * 0.5 * x**2, width=0.01))  # radius 3.3 mm at the bottom
     for radius, expected in ((3e-3, False), (5e-3, True)):
         report = toolpath_with_report(hollow, BallCutter(radius), RasterOptions(stepover=1e-3))[1]
         assert (report.tight > 0) == expected
-        assert ("hollower" in str(report)) == expected
+        assert ("concave radius" in str(report)) == expected
 
 
 def test_short_passes_are_dropped_and_reported():
@@ -325,7 +325,7 @@ def test_regions_and_tools_that_make_no_sense():
         StandOff(-1e-3)
 
 
-def test_what_cannot_be_machined_is_said():
+def test_errors_of_regions_and_steps_that_cannot_be_machined():
     mesh = Mesh.of(*surfaces.grid(waves))
     with pytest.raises(ToolpathError, match="100 % of the surface faces away"):
         make_toolpath(mesh, BALL, RasterOptions(stepover=1e-3, region=Region(direction=(0, 0, -1))))

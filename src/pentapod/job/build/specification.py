@@ -8,7 +8,7 @@ from hashlib import sha256
 from pentapod.base.errors import InputError, MachineError
 from pentapod.base.files import sha256_of
 from pentapod.job.build.placement import job_constraints
-from pentapod.job.build.toolpath import job_options, job_region, job_sink, job_tool, job_toolpath
+from pentapod.job.build.toolpath import job_depth, job_options, job_region, job_tool, job_toolpath
 from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import Component
 from pentapod.machine.clearance.collision_world import CollisionWorld
@@ -81,7 +81,7 @@ def job_cutting(job: Job, collision_world: CollisionWorld) -> Cutting | None:
     The tolerance of the gouge check, and the depth of an engraving, count as no gouge. Raises JobError where the tool's
     sizes make no tool.
     """
-    depth = job.gouge.si.tolerance + job_sink(job)
+    depth = job.gouge.si.tolerance + job_depth(job)
     for obstacle in collision_world.obstacles:
         if obstacle.name == "part":
             mesh = obstacle.surface.mesh

@@ -24,8 +24,7 @@ from pentapod.mesh.region import Region
 from pentapod.program import read_header
 from pentapod.toolpath import toolpath_with_report
 from pentapod.toolpath.axis.modes import AxisMode, Between, Fixed, Normal, Pointed
-from pentapod.toolpath.axis.orientation import Orientation
-from pentapod.toolpath.axis.orienting import oriented
+from pentapod.toolpath.axis.orientation import Orientation, oriented
 from pentapod.toolpath.axis.steps import fastest_turn, stepped
 from pentapod.toolpath.formats import read_toolpath
 from pentapod.toolpath.gouge.gouge import without_gouges
@@ -81,10 +80,10 @@ def job_region(job: Job) -> Region:
     return Region(**fields_from(Region, job.part))
 
 
-def job_sink(job: Job) -> float:
+def job_depth(job: Job) -> float:
     """Return the depth below the surface at which the job's strategy cuts on purpose, metres."""
     strategy = job.toolpath.strategy
-    return STRATEGIES[strategy].options.sink_of(job.toolpath.si) if strategy in STRATEGIES else 0.0
+    return STRATEGIES[strategy].options.depth_of(job.toolpath.si) if strategy in STRATEGIES else 0.0
 
 
 def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Toolpath, Reports]:
@@ -104,7 +103,7 @@ def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Too
         # By default, nothing is taken out of a toolpath that was read from a file.
         tuple(Remedy(name) for name in job.gouge.remedy or ("report" if from_file else "drop",)),
         # An engraving lies below the surface on purpose.
-        **{**gouge, "tolerance": gouge["tolerance"] + job_sink(job)},
+        **{**gouge, "tolerance": gouge["tolerance"] + job_depth(job)},
         links=None if from_file else job_link_style(job, mesh, toolpath),
     )
     toolpath, gouges = without_gouges(toolpath, tool, mesh, options, progress)

@@ -1,4 +1,4 @@
-"""Axis modes: which way the tool points at a contact, before lead and tilt. Axes point from the tip to the spindle."""
+"""Axis modes: direction of the tool axis at a contact, before lead and tilt. Axes point from the tip to the spindle."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ class AxisMode(Protocol):
     """Contacts and unit normals (N, 3) → unit axes (N, 3)."""
 
     def axes(self, contacts: Floats, normals: Floats) -> Floats:
-        """Return unit axes. Raises ToolpathError where a contact leaves the direction open."""
+        """Return unit axes. Raises ToolpathError where the mode does not determine one."""
         ...
 
 
 @dataclass(frozen=True)
 class Normal(Value):
-    """Along the surface's normal."""
+    """Along the surface normal."""
 
     def axes(self, contacts: Floats, normals: Floats) -> Floats:
         """Return the normals."""
@@ -33,7 +33,7 @@ class Normal(Value):
 
 @dataclass(frozen=True, eq=False)
 class Fixed(Value):
-    """The same everywhere. direction (3,): any length."""
+    """A fixed direction. direction (3,): any length."""
 
     direction: Floats | tuple[float, float, float]
 
@@ -41,17 +41,17 @@ class Fixed(Value):
         set_frozen(self, direction=frozen(normalised(self.direction), "direction", (3,)))
 
     def axes(self, contacts: Floats, normals: Floats) -> Floats:
-        """Return the direction, N times."""
+        """Return the direction for every contact."""
         del normals
         return np.tile(np.asarray(self.direction), (len(contacts), 1))
 
 
 @dataclass(frozen=True, eq=False)
 class Pointed(Value):
-    """Toward or from a point, or a line where `along` is given: the tool stands square to the line.
+    """Toward or from a point; with `along`, toward or from a line, at right angles to it.
 
-    point, along (3,): metres, workpiece frame. toward: the tip points there, as into a hollow; otherwise it points
-    away, as from within a tube.
+    point, along (3,): metres, workpiece frame. toward: the tip points there, as on the outside of a tube; otherwise it
+    points away from there, as on the inside of a tube.
     """
 
     point: Floats | tuple[float, float, float]
@@ -64,24 +64,24 @@ class Pointed(Value):
             set_frozen(self, along=frozen(normalised(self.along), "along", (3,)))
 
     def axes(self, contacts: Floats, normals: Floats) -> Floats:
-        """Return axes from the point or line through the contacts, or against that."""
+        """Return the directions from the point or line to the contacts, or their opposites."""
         del normals
-        away = contacts - self.point
+        outwards = contacts - self.point
         if self.along is not None:
             along = np.asarray(self.along)
-            away = away - (away @ along)[:, None] * along
-        length = np.linalg.norm(away, axis=1)
+            outwards = outwards - (outwards @ along)[:, None] * along
+        length = np.linalg.norm(outwards, axis=1)
         if (length < 1e-9).any():
             raise ToolpathError(
                 "a contact lies on the point or line that sets the axis", key="axis", value=int(np.argmin(length)),
                 remedy="move the point, or choose another axis mode",
             )  # fmt: skip
-        return (away if self.toward else -away) / length[:, None]
+        return (outwards if self.toward else -outwards) / length[:, None]
 
 
 @dataclass(frozen=True, eq=False)
 class Between(Value):
-    """Interpolated between directions given at places (K, 3), metres: exact there, smooth between (Shepard 1968)."""
+    """Interpolated between directions given at places (K, 3), metres: inverse distance weighting (Shepard 1968)."""
 
     places: Floats
     directions: Floats
@@ -91,7 +91,7 @@ class Between(Value):
         set_frozen(self, directions=frozen(normalised(self.directions, "directions"), "directions", (None, 3)))
         if self.places.shape != self.directions.shape or self.places.ndim != 2:
             raise ToolpathError(
-                "every direction needs its place", key="directions", value=self.directions.shape, expected="(K, 3) both"
+                "each direction needs its place", key="directions", value=self.directions.shape, expected="(K, 3) both"
             )
 
     def axes(self, contacts: Floats, normals: Floats) -> Floats:
@@ -107,11 +107,10 @@ class Between(Value):
         return mixed / length
 
 
-def leaned(axes: Floats, feeds: Floats, lead: float, tilt: float) -> Floats:
-    """Return axes (N, 3) leaned by `lead` radians forwards along the feeds (N, 3), and `tilt` to their left.
+def with_lead_and_tilt(axes: Floats, feeds: Floats, lead: float, tilt: float) -> Floats:
+    """Return axes (N, 3) tilted by `lead` radians forwards along the feeds (N, 3), and by `tilt` to their left.
 
-    Both are angles seen square to the axis: lead in the plane of axis and feed, tilt in the plane across. A feed
-    along the axis has no forwards: such axes stay.
+    Lead is the angle in the plane of axis and feed, tilt in the plane across the feed. An axis along its feed stays.
     """
     flat = feeds - np.einsum("ni,ni->n", feeds, axes)[:, None] * axes
     length = np.linalg.norm(flat, axis=1, keepdims=True)

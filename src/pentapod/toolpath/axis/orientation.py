@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Bools, Floats
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import Key, check_fields
 from pentapod.base.values import Value
+from pentapod.cutters.tool import Tool
+from pentapod.geometry.directions import partway
+from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import run_starts
-from pentapod.toolpath.axis.modes import AxisMode, Normal, leaned
-from pentapod.toolpath.axis.smoothing import rate_capped, smoothed, tangents
+from pentapod.toolpath.axis.modes import AxisMode, Normal, with_lead_and_tilt
+from pentapod.toolpath.axis.smoothing import rate_limited, smoothed, tangents
+from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 
 @dataclass(frozen=True)
 class Orientation(Value):
-    """The nominal tool axis along the passes. mode: the direction from which lead and tilt count.
+    """The nominal tool axis along the passes. mode: the direction from which lead and tilt are measured.
 
-    smoothing: 0 for none. rate: radians per metre, None for no cap. Raises ToolpathError for values out of range.
+    smoothing: 0 for none. rate: radians per metre, None for no limit. Raises ToolpathError for values out of range.
     """
 
     mode: AxisMode = field(default_factory=Normal)
@@ -29,7 +33,8 @@ class Orientation(Value):
     tilt: Annotated[float, Key("deg", "side tilt: to the left of the feed", name="side", ge=-80.0, le=80.0)] = 0.0
     smoothing: Annotated[float, Key("deg", "largest angle by which smoothing may turn an axis", ge=0.0, le=45.0)] = 0.0
     reach: Annotated[
-        float, Key("mm", "distance over which it works, along and across the passes", name="smoothing_reach", gt=0.0)
+        float,
+        Key("mm", "distance over which axes are smoothed, along and across", name="smoothing_reach", gt=0.0),
     ] = 5e-3
     rate: Annotated[float | None, Key("deg_mm", "largest turn of the axis per mm of a cut", gt=0.0)] = None
 
@@ -39,7 +44,7 @@ class Orientation(Value):
     def axes(self, runs: list[tuple[Floats, Floats]]) -> list[Floats]:
         """Return unit axes (n, 3) for each run of contacts and unit normals (n, 3), in the order and sense of travel.
 
-        Raises ToolpathError where the mode leaves an axis open or no smoothing keeps the cap.
+        Raises ToolpathError if the mode does not determine an axis, or no smoothing keeps the rate.
         """
         if not runs:
             return []
@@ -47,9 +52,51 @@ class Orientation(Value):
         contacts, normals = (np.concatenate([run[k] for run in runs]) for k in range(2))
         axes = self.mode.axes(contacts, normals)
         if self.lead or self.tilt:
-            axes = leaned(axes, tangents(contacts, starts), self.lead, self.tilt)
+            axes = with_lead_and_tilt(axes, tangents(contacts, starts), self.lead, self.tilt)
         axes = smoothed(contacts, axes, self.reach, self.smoothing)
         parts = [axes[a:b] for a, b in pairwise(starts)]
         if self.rate is not None:
-            parts = [rate_capped(c, part, self.rate) for (c, _), part in zip(runs, parts, strict=True)]
+            parts = [rate_limited(c, part, self.rate) for (c, _), part in zip(runs, parts, strict=True)]
         return parts
+
+
+def oriented(toolpath: Toolpath, tool: Tool, orientation: Orientation) -> Toolpath:
+    """Return a toolpath with the axes of an orientation instead of the surface's normals.
+
+    Cuts keep their contacts. On links and rapids the axis turns evenly from the end of one cut to the start of the
+    next, and the tips move with the ends; before the first cut and after the last the axis is constant. Raises
+    ToolpathError as `Orientation.axes`.
+    """
+    cuts = [k for k, segment in enumerate(toolpath.segments) if segment.kind is SegmentKind.CUT]
+    if orientation == Orientation() or not cuts:
+        return toolpath
+    # With the axis along the normal, every cutter's tip is its contact; that of a stand-off tool is above it.
+    drop = min(tool.tilt_centre, 0.0)
+    chosen = [toolpath.segments[k] for k in cuts]
+    runs = [(segment.tips + drop * segment.axes, segment.axes) for segment in chosen]
+    tips, axes = toolpath.tips.copy(), toolpath.axes.copy()
+    known = np.zeros(len(tips), dtype=np.bool_)
+    for k, run, new in zip(cuts, runs, orientation.axes(runs), strict=True):
+        rows = slice(int(toolpath.starts[k]), int(toolpath.starts[k + 1]) + 1)
+        tips[rows], axes[rows], known[rows] = tool.tips(*run, new), new, True
+    _interpolate(toolpath.tips, tips, axes, known)
+    segments = [
+        replace(segment, tips=tips[a : b + 1], axes=axes[a : b + 1])
+        for segment, (a, b) in zip(toolpath.segments, pairwise(toolpath.starts), strict=True)
+    ]
+    return replace(toolpath, segments=tuple(segments))
+
+
+def _interpolate(old: Floats, tips: Floats, axes: Floats, known: Bools) -> None:
+    """Interpolate the waypoints between known (N,) ones, in place. old (N, 3): the tips before."""
+    rows = np.flatnonzero(known)
+    first, last = int(rows[0]), int(rows[-1])
+    tips[:first] += tips[first] - old[first]
+    tips[last + 1 :] += tips[last] - old[last]
+    axes[:first], axes[last + 1 :] = axes[first], axes[last]
+    for a, b in pairwise(rows):
+        if b > a + 1:
+            path = arc_length(old[a : b + 1])
+            share = (path / path[-1])[1:-1] if path[-1] > 0.0 else np.full(b - a - 1, 0.5)
+            tips[a + 1 : b] += np.outer(1.0 - share, tips[a] - old[a]) + np.outer(share, tips[b] - old[b])
+            axes[a + 1 : b] = partway(axes[a], axes[b], share)

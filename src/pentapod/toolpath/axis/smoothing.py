@@ -1,7 +1,8 @@
-"""Smoothing of tool axes along and across a path, and a cap on how fast they may turn per metre of path."""
+"""Smoothing of tool axes along and across passes, and a limit of their turn per metre of path."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -12,85 +13,100 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import ToolpathError
 from pentapod.geometry.directions import angle_between, partway
 
-_ROUNDS = 2
-_SAME_SIDE = 0.5
-_NEIGHBOURS = 64
-_BISECTIONS = 20
+
+@dataclass(frozen=True)
+class SmoothingOptions:
+    """How axes are averaged.
+
+    rounds: of Gaussian averaging. similar: cosine of the angle between axes up to which they are averaged: sides of a
+    crease are not. neighbours: largest number of axes in a mean. bisections: for the shortest moving mean.
+    """
+
+    rounds: int = 2
+    similar: float = 0.5
+    neighbours: int = 64
+    bisections: int = 20
 
 
-def smoothed(points: Floats, axes: Floats, reach: float, tolerance: float) -> Floats:
-    """Return axes (N, 3) smoothed over their collision_world, none turned by more than `tolerance` radians.
+def smoothed(
+    points: Floats, axes: Floats, reach: float, tolerance: float, options: SmoothingOptions = SmoothingOptions()
+) -> Floats:
+    """Return axes (N, 3) smoothed along and across the passes, none turned by more than `tolerance` radians.
 
-    points (N, 3): where they stand, of all passes, metres. Each becomes the Gaussian mean of those within `reach`
-    metres, on its own pass and the passes beside it, whose axes differ by less than 60°; what leaves the tolerance
-    comes back to its edge. So a crease keeps to its tolerance, and noise below it vanishes.
+    points (N, 3): of all passes, metres. Each axis becomes the Gaussian mean of those within `reach` metres, on its own
+    pass and on passes beside it, whose directions differ by less than 60°; an axis beyond the tolerance is turned back
+    to its limit. So axes at a crease keep to the tolerance, and noise below it vanishes.
     """
     if tolerance <= 0.0 or len(points) < 2:
         return axes
-    weights = _weights(points, axes, reach)
+    weights = _weights(points, axes, reach, options)
     result = axes
-    for _ in range(_ROUNDS):
-        mixed = weights @ result
-        mixed = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
-        angle = angle_between(mixed, axes)
-        share = np.minimum(1.0, tolerance / np.maximum(angle, 1e-300))
-        result = partway(axes, mixed, share)
+    for _ in range(options.rounds):
+        mean = weights @ result
+        mean = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+        share = np.minimum(1.0, tolerance / np.maximum(angle_between(mean, axes), 1e-300))
+        result = partway(axes, mean, share)
     return result
 
 
-def _weights(points: Floats, axes: Floats, reach: float) -> csr_array:
+def _weights(points: Floats, axes: Floats, reach: float, options: SmoothingOptions) -> csr_array:
     """Return the matrix (N, N) of normalised Gaussian weights; a standard deviation is half the reach."""
-    count = min(_NEIGHBOURS, len(points))
+    count = min(options.neighbours, len(points))
     found = KDTree(points).query(points, k=count, distance_upper_bound=reach)
     distance, index = np.asarray(found[0]), np.asarray(found[1])
     known = np.isfinite(distance)
     row = np.broadcast_to(np.arange(len(points))[:, None], distance.shape)[known]
     column, d = index[known], distance[known]
-    alike = np.einsum("ni,ni->n", axes[row], axes[column]) > _SAME_SIDE
-    row, column, d = row[alike], column[alike], d[alike]
+    similar = np.einsum("ni,ni->n", axes[row], axes[column]) > options.similar
+    row, column, d = row[similar], column[similar], d[similar]
     matrix = coo_array((np.exp(-2.0 * (d / reach) ** 2), (row, column)), shape=(len(points), len(points))).tocsr()
     total = np.asarray(matrix.sum(axis=1)).ravel()
     return csr_array(matrix.multiply(1.0 / total[:, None]))
 
 
-def rate_capped(points: Floats, axes: Floats, rate: float) -> Floats:
-    """Return the axes (n, 3) of one pass turned no faster than `rate` radians per metre between any neighbours.
+def rate_limited(points: Floats, axes: Floats, rate: float, options: SmoothingOptions = SmoothingOptions()) -> Floats:
+    """Return the axes (n, 3) of one pass turned by no more than `rate` radians per metre between neighbours.
 
-    points (n, 3): along which the pass goes. Where axes turn faster, the whole pass takes the moving mean over the
-    shortest stretch that is long enough; a pass that keeps the cap is returned as it is. Raises ToolpathError
-    where no mean keeps it, which only opposite axes can bring about.
+    points (n, 3): of the pass, metres. Where axes turn faster, the whole pass takes the moving mean over the shortest
+    width that keeps the rate; a pass that keeps it is returned unchanged. Raises ToolpathError if no mean keeps the
+    rate, which only happens with opposite axes.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if len(points) < 2 or (_rates(axes, steps) <= rate).all():
         return axes
     place = np.concatenate([[0.0], np.cumsum(steps)])
+
+    def kept(width: float) -> Floats | None:
+        """Return the moving mean if it keeps the rate."""
+        mean = _moving_mean(place, axes, width)
+        return mean if mean is not None and (_rates(mean, steps) <= rate).all() else None
+
     short, long = 0.0, float(np.pi / rate)
-    for _ in range(_BISECTIONS):
-        trial = _mean(place, axes, long)
-        if trial is not None and (_rates(trial, steps) <= rate).all():
+    for _ in range(options.bisections):
+        result = kept(long)
+        if result is not None:
             break
         short, long = long, 2.0 * long
     else:
-        raise ToolpathError("the axes turn over: no smoothing keeps the cap", key="axis_rate", value=rate)
-    result = trial
-    for _ in range(_BISECTIONS):
+        raise ToolpathError("no smoothing keeps the rate: opposite tool axes on one pass", key="axis_rate", value=rate)
+    for _ in range(options.bisections):
         middle = 0.5 * (short + long)
-        trial = _mean(place, axes, middle)
-        if trial is not None and (_rates(trial, steps) <= rate).all():
-            long, result = middle, trial
-        else:
+        trial = kept(middle)
+        if trial is None:
             short = middle
+        else:
+            long, result = middle, trial
     return result
 
 
 def _rates(axes: Floats, steps: Floats) -> Floats:
-    """Return the turn per metre (n − 1,) between neighbours; a hair less, so that what is set to the cap keeps it."""
+    """Return the turn per metre (n − 1,) between neighbours, less rounding: axes at the limit keep it."""
     return angle_between(axes[1:], axes[:-1]) / np.maximum(steps, 1e-12) * (1.0 - 1e-9)
 
 
-def _mean(place: Floats, axes: Floats, width: float) -> Floats | None:
-    """Return the exact moving mean over `width` metres of the axes between which lines run; None where it vanishes."""
-    # The integral of a polyline is a parabola in each step; beyond the ends the end axes go on.
+def _moving_mean(place: Floats, axes: Floats, width: float) -> Floats | None:
+    """Return the exact moving mean over `width` metres of axes that change linearly between places; None if it is 0."""
+    # The integral of a polyline is a parabola in each step; beyond the ends the axes are constant.
     steps = np.diff(place)
     slopes = np.diff(axes, axis=0) / np.maximum(steps, 1e-300)[:, None]
     sums = np.vstack([np.zeros(3), np.cumsum(0.5 * steps[:, None] * (axes[1:] + axes[:-1]), axis=0)])
@@ -110,10 +126,8 @@ def tangents(points: Floats, starts: Ints) -> Floats:
     """Return unit directions of travel (N, 3) along passes; pass k holds points starts[k] to starts[k + 1] − 1."""
     result = np.empty_like(points)
     for a, b in pairwise(starts.tolist()):
-        rows = points[a:b]
-        ahead = np.empty_like(rows)
+        rows, ahead = points[a:b], result[a:b]
         ahead[1:-1] = rows[2:] - rows[:-2]
         ahead[0], ahead[-1] = rows[1] - rows[0], rows[-1] - rows[-2]
-        result[a:b] = ahead
     length = np.linalg.norm(result, axis=1, keepdims=True)
     return result / np.where(length > 0.0, length, 1.0)

@@ -14,12 +14,12 @@ from pentapod.base.values import Value
 from pentapod.geometry.solids import KINDS
 from pentapod.toolpath.linking.links import LinkStyle
 
-_NAMED = 6
-"""Most waypoints that a message names."""
+MOST_NAMED = 6
+"""Largest number of waypoints that a message names."""
 
 
 class Remedy(StrEnum):
-    """What is done about a gouge: tilt the tool clear within a cone, lift it along its axis, drop the cut, nothing."""
+    """What is done about a gouge: tilt the tool within a cone, lift it along its axis, drop the cut, or only report."""
 
     TILT = "tilt"
     LIFT = "lift"
@@ -32,8 +32,8 @@ class RemedySearch(Value):
     """How remedies are searched for.
 
     rings, spokes: directions tried within the cone, from the middle outwards. fade: share of a tilt that a neighbour
-    takes over. rounds: of tilting, and lifts: of lifting, at most. rises: heights tried for a link that stands for a
-    dropped cut, as shares of the most that lifting may lift.
+    gets at least. rounds, lifts: largest number of rounds of tilting and of lifting. rises: heights tried for the link
+    over a dropped cut, as shares of `GougeOptions.highest`.
     """
 
     rings: int = 4
@@ -46,14 +46,14 @@ class RemedySearch(Value):
 
 @dataclass(frozen=True)
 class GougeOptions(Value):
-    """What is done about gouges. remedies: tried in this order on what still gouges.
+    """What is done about gouges. remedies: tried in this order on the motions that still gouge.
 
-    links: how ways between cuts are led anew where the old ones meet the part; None: they stay, and are told.
-    search: see `RemedySearch`. Raises ToolpathError for values that make no sense.
+    links: style of new links where old ones collide with the part; None: they stay, and are reported. search: see
+    `RemedySearch`. Raises ToolpathError for values out of range.
     """
 
     remedies: tuple[Remedy, ...] = (Remedy.REPORT,)
-    tolerance: Annotated[float, Key("mm", "depth that counts as none", gt=0.0)] = 50e-6
+    tolerance: Annotated[float, Key("mm", "depth up to which the tool does not count as gouging", gt=0.0)] = 50e-6
     cone: Annotated[float, Key("deg", "tilt: largest angle by which an axis may turn", gt=0.0, lt=90.0)] = float(
         np.radians(30.0)
     )
@@ -67,13 +67,13 @@ class GougeOptions(Value):
 
 @dataclass(frozen=True)
 class GougeReport(Value):
-    """What the check found. motions: cuts' motions between waypoints that were checked.
+    """Result of the gouge check. motions: number of cutting motions between waypoints.
 
-    gouging: of them too deep at first; depths: the deepest of cutter, shank and holder at first, metres, −inf for none.
-    tilted, lifted: waypoints changed; dropped: motions taken out of the cut; most_lifted: metres.
-    left: motions still too deep, left_depth how deep, metres; places: the first waypoint of each run of those.
-    relinked: ways between cuts led anew. unclear: links deeper than the tolerance and rapids that touch,
-    unclear_places likewise.
+    gouging: how many of them gouged at first; depths: of the deepest gouge of cutter, shank and holder, metres, −inf
+    for none. tilted, lifted: number of waypoints changed; most_lifted: metres. dropped: number of motions taken out of
+    the cut. left: number of motions that still gouge; left_depth: how deep, metres; places: first waypoint of each run
+    of them. relinked: number of links replaced. unclear: number of links that gouge and rapids that touch;
+    unclear_places: first waypoint of each run of them.
     """
 
     motions: int
@@ -93,7 +93,7 @@ class GougeReport(Value):
     def __str__(self) -> str:
         text = f"gouge check: {self.motions:,} motions"
         if not self.gouging:
-            return text + ", none gouges" + self._unclear()
+            return text + ", no gouge" + self._unclear()
         deep = ", ".join(f"{k} {1e3 * d:.3g} mm" for k, d in zip(KINDS, self.depths, strict=True) if d > 0.0)
         text += f", {self.gouging:,} gouged: {deep} deep"
         if self.tilted:
@@ -109,12 +109,15 @@ class GougeReport(Value):
         return text + self._unclear()
 
     def _unclear(self) -> str:
-        text = f"\n  note: {self.relinked:,} ways between cuts led over the clearance level" if self.relinked else ""
+        text = f"\n  note: {self.relinked:,} links replaced by links over the clearance level" if self.relinked else ""
         if not self.unclear:
             return text
         where = _some(self.unclear_places)
-        return text + f"\n  problem: {self.unclear:,} motions of links and rapids meet the part, from waypoints {where}"
+        return (
+            text
+            + f"\n  problem: {self.unclear:,} motions of links and rapids collide with the part, from waypoints {where}"
+        )
 
 
 def _some(places: tuple[int, ...]) -> str:
-    return ", ".join(str(place) for place in places[:_NAMED]) + (", ..." if len(places) > _NAMED else "")
+    return ", ".join(str(place) for place in places[:MOST_NAMED]) + (", ..." if len(places) > MOST_NAMED else "")

@@ -1,97 +1,107 @@
-"""Offset lines over a surface at a constant stepover, and lines that fill the gaps that others leave.
+"""Gap filling: additional lines wherever the passes on a surface leave more than half a stepover.
 
-With the distance counted in steps (a step being how far apart passes may be there), lines half a step from the source
-and then a step apart cover all but the ridges where fronts meet: there the last line may be up to a step away. What is
-further than half a step from every line is covered by one more line around it, half a step from those.
+Distances are geodesic and counted in stepovers. Lines half a step from the source and then a step apart cover the
+surface except for the ridges where fronts meet: there the last line may be up to a step away. Whatever is further than
+half a step from every line gets one more line around it, half a step from the others.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats
+from pentapod.cutters.tool import Tool
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.geodesic import border_vertices, distances, seeds_along
 from pentapod.mesh.query.slicing import LevelSet
 from pentapod.mesh.topology import components
-
-FACETS_PER_STEP = 3.5
-FACETS_PER_FRONT = 5.0
-"""Lines that are a distance apart themselves turn sharp corners: finer facets keep these sharp."""
-
-_SLACK = 1.04
-CRUMBS, CRUMBS_OF_FRONTS = 5e-4, 2e-4
-"""Share of the area that gaps may have together without lines of their own; less where corners leave more."""
+from pentapod.toolpath.lines.scallop import surface_steps
+from pentapod.toolpath.options import CoverOptions
 
 
-def edge_for(steps: Floats, facets_per_step: float = FACETS_PER_STEP) -> float:
-    """Return how long edges may be, metres, for distances that are good to a few percent of the least step (F,)."""
-    return float(steps.min()) / facets_per_step
+@dataclass(frozen=True)
+class GapOptions:
+    """How gaps are found.
 
-
-def gaps_filled(patch: Patch, steps: Floats, seeds: Floats, parts: list[Passes]) -> Passes:
-    """Return lines on a patch, and further ones wherever these leave more than half a step.
-
-    steps (F,): how far apart lines may be on each facet, metres; the facets must be small against them. seeds (V,):
-    how many steps vertices near the lines are from them.
+    facets_per_step: facet edges in a stepover, for distances that are good to a few percent. negligible: share of the
+    area that gaps without lines of their own may have in total. slack: a gap counts from this many half steps on.
     """
-    gaps = gap_lines(patch, seeds, 1.0 / steps, crumbs=CRUMBS_OF_FRONTS)
-    return Passes.joined([part for part in (*parts, gaps) if len(part)])
+
+    facets_per_step: float = 3.5
+    negligible: float = 5e-4
+    slack: float = 1.04
+
+    def longest_edge(self, steps: Floats) -> float:
+        """Return how long facet edges may be, metres, for stepovers (F,)."""
+        return float(steps.min()) / self.facets_per_step
+
+
+FRONTS = GapOptions(facets_per_step=5.0, negligible=2e-4)
+"""For lines that are themselves at a geodesic distance: they turn sharp corners, which finer facets keep sharp."""
+
+
+def refined_for_fronts(patch: Patch, tool: Tool, options: CoverOptions) -> tuple[Patch, float]:
+    """Return a patch in facets that are small compared with the stepover, and the length of their edges, metres."""
+    sides = patch.vertices[patch.faces[:, 1]] - patch.vertices[patch.faces[:, 0]]
+    edge = FRONTS.longest_edge(surface_steps(patch, tool, sides, options))
+    return patch.refined(edge), edge
 
 
 def gap_lines(
     patch: Patch,
     seeds: Floats,
     slowness: Floats,
+    options: GapOptions = FRONTS,
     *,
     where: Bools | None = None,
     area: float | None = None,
-    crumbs: float = CRUMBS,
 ) -> Passes:
-    """Return lines half a step from where seeds (V,) are, around what is further away than that.
+    """Return lines around everything that is more than half a step from the passes.
 
-    What no seed reaches gets a line midway between its borders, and others a step from it. Gaps that together are less
-    than `crumbs` of the area are left alone. where (V,): the only vertices that may lie in a gap; area: of
-    the whole region, square metres, where the patch is but a part of it.
+    seeds (V,): distance in steps of vertices near the passes, infinite elsewhere. slowness (F,): steps per metre; the
+    facets must be small compared with a step. where (V,): the only vertices that may lie in a gap. area: of the whole
+    region, square metres, if the patch is a part of it. What no seed reaches gets a line midway between its borders,
+    and others a step from it.
     """
-    away = distances(patch, seeds, slowness)
+    distance = distances(patch, seeds, slowness)
     parts: list[Passes] = []
-    if not np.isfinite(away).all():
-        ridge = _ridges(patch, away, slowness)
-        parts.append(ridge.lines())
-        away = distances(patch, np.minimum(away, seeds_along(ridge, slowness)), slowness)
-    away = np.where(np.isfinite(away) & (True if where is None else where), away, 0.0)
-    levels: Floats = np.arange(0.5, float(away.max(initial=0.0)), 1.0)
+    if not np.isfinite(distance).all():
+        middle = _middle_lines(patch, distance, slowness)
+        parts.append(middle.lines())
+        distance = distances(patch, np.minimum(distance, seeds_along(middle, slowness)), slowness)
+    distance = np.where(np.isfinite(distance) & (True if where is None else where), distance, 0.0)
+    levels: Floats = np.arange(0.5, float(distance.max(initial=0.0)), 1.0)
     if len(levels):
-        lines = LevelSet(patch, away, levels).lines()
-        least = crumbs * (float(patch.areas.sum()) if area is None else area)
-        parts.append(lines.where(_worth_while(patch, away, lines, least)))
-    return Passes.joined([part for part in parts if len(part)])
+        lines = LevelSet(patch, distance, levels).lines()
+        negligible = options.negligible * (float(patch.areas.sum()) if area is None else area)
+        parts.append(lines.where(_needed(patch, distance > 0.5 * options.slack, lines, negligible)))
+    return Passes.joined(parts)
 
 
-def _ridges(patch: Patch, away: Floats, slowness: Floats) -> LevelSet:
-    """Return the lines midway from the border to what is furthest from it, on bodies that `away` does not reach."""
-    inner = distances(patch, np.where(border_vertices(patch) & ~np.isfinite(away), 0.0, np.inf), slowness)
+def _middle_lines(patch: Patch, distance: Floats, slowness: Floats) -> LevelSet:
+    """Return the lines midway between the border and the innermost point of each body that `distance` (V,) misses."""
+    inner = distances(patch, np.where(border_vertices(patch) & ~np.isfinite(distance), 0.0, np.inf), slowness)
     body = components(len(patch.vertices), *patch.topology.edges.T)[1]
-    lost = ~np.isfinite(away) & np.isfinite(inner)
+    missed = ~np.isfinite(distance) & np.isfinite(inner)
     furthest = np.zeros(int(body.max()) + 1)
-    np.maximum.at(furthest, body[lost], inner[lost])
-    share = np.where(lost, inner / np.where(furthest[body] > 0.0, furthest[body], 1.0), 0.0)
+    np.maximum.at(furthest, body[missed], inner[missed])
+    share = np.where(missed, inner / np.where(furthest[body] > 0.0, furthest[body], 1.0), 0.0)
     return LevelSet(patch, share, np.array([0.5]))
 
 
-def _worth_while(patch: Patch, away: Floats, lines: Passes, crumbs: float) -> Bools:
-    """Return which lines (P,) to keep: all but those around the smallest gaps, as long as these are next to nothing."""
+def _needed(patch: Patch, in_gap: Bools, lines: Passes, negligible: float) -> Bools:
+    """Return which lines (P,) are needed: all but those around the smallest gaps, of `negligible` area together."""
     area = np.zeros(len(patch.vertices))
     np.add.at(area, patch.faces.ravel(), np.repeat(patch.areas / 3.0, 3))
-    beyond = np.flatnonzero(away > 0.5 * _SLACK)
-    if not len(beyond) or not len(lines):
+    if not in_gap.any() or not len(lines):
         return np.zeros(len(lines), dtype=np.bool_)
-    nearest = np.asarray(KDTree(lines.points).query(patch.vertices[beyond])[1])
-    served = np.bincount(lines.pass_of_point[nearest], weights=area[beyond], minlength=len(lines))
+    nearest = np.asarray(KDTree(lines.points).query(patch.vertices[in_gap])[1])
+    served = np.bincount(lines.pass_of_point[nearest], weights=area[in_gap], minlength=len(lines))
     order = np.argsort(served, kind="stable")
-    worth = np.empty(len(lines), dtype=np.bool_)
-    worth[order] = np.cumsum(served[order]) > crumbs
-    return worth
+    needed = np.empty(len(lines), dtype=np.bool_)
+    needed[order] = np.cumsum(served[order]) > negligible
+    return needed

@@ -1,37 +1,39 @@
-"""Approaches, retracts, ramps and rapids: how the tool comes to a pass, leaves it, and travels between passes.
+"""Link segments: approaches, retracts and rapids between passes.
 
-A *rapid* leaves along the tool axis, rises along the view to the clearance level, crosses, and comes down the
-same way; its corners are blended, and the axis turns along the great circle, gently at both ends. The last
-stretch to the surface and the first away from it, `approach` high, is a link on feed. A *hop* is a rapid that crosses
-close above the part instead of at the clearance level. A link to a pass close by stays on the
-surface (see `stay_down`).
+A *rapid* leaves along the tool axis, rises along the view to the clearance level, crosses, and comes down the same way;
+its corners are blended, and the axis turns along the great circle, slowly at both ends. The first stretch away from the
+surface and the last one to it, `approach` high, are links on feed. A *hop* is a rapid that crosses just above the part
+instead of at the clearance level. Links that stay on the surface are made in `stay_down_links`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Bools, Floats
 from pentapod.base.values import Value
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length, spaced
 from pentapod.toolpath.options import Entry
-from pentapod.toolpath.toolpath import Segment, SegmentKind
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
-RAPID_SPACING_M = 5e-3
-RAPID_AXIS_STEP = np.radians(3.0)
-_SAME_CORNER_M = 1e-4
+Poses = tuple[Floats, Floats]
+"""Tips (n, 3), metres, and unit axes (n, 3)."""
+Pose = tuple[Floats, Floats]
+"""A tip (3,), metres, and a unit axis (3,)."""
 
 
 @dataclass(frozen=True)
 class LinkStyle(Value):
-    """How links are made. view (3,): unit, towards the tool. level: metres along it at which rapids cross.
+    """How links are made. view (3,): unit, towards the tool. level: height of rapids along the view, metres.
 
-    approach, spacing: metres. feed: of links on feed, m/s. entry: their form. axis_step: radians between waypoints of
-    rapids, rapid_spacing: metres between them. blend: metres of each leg, at most, that the arc at a corner takes.
-    arc_step: radians between points of arcs.
+    approach, spacing: metres. feed: of links on feed, m/s. entry: their form. axis_step: largest turn between waypoints
+    of rapids, radians. rapid_spacing: largest distance between them, metres. blend: largest length of each leg that the
+    arc at a corner takes, metres. arc_step: turn between points of arcs, radians. same_corner: corners nearer than this
+    are one, metres.
     """
 
     view: Floats
@@ -40,18 +42,20 @@ class LinkStyle(Value):
     spacing: float
     feed: float
     entry: Entry = Entry.AXIS
-    axis_step: float = RAPID_AXIS_STEP
-    rapid_spacing: float = RAPID_SPACING_M
+    axis_step: float = float(np.radians(3.0))
+    rapid_spacing: float = 5e-3
     blend: float = 5e-3
     arc_step: float = float(np.radians(6.0))
+    same_corner: float = 1e-4
 
 
-def approach(tip: Floats, axis: Floats, ahead: Floats, style: LinkStyle) -> Segment:
-    """Return the link on feed to a pass that begins at `tip` (3,) with `axis` (3,) and goes `ahead` (3,).
+def approach(tips: Floats, axes: Floats, style: LinkStyle) -> Segment:
+    """Return the link on feed to the beginning of a pass with tips and axes (n, 3), n ≥ 2.
 
-    Along the axis; or straight down a ramp against the way ahead, half as steep as long; or down a quarter of a
-    circle that ends along the way ahead. All begin `approach` metres above the tip along the axis.
+    Along the axis; or straight down a ramp in the direction of the pass, twice as long as high; or down a quarter of a
+    circle that ends in this direction. All begin `approach` metres above the tip along the axis.
     """
+    tip, axis, ahead = tips[0], axes[0], tips[1] - tips[0]
     flat = ahead - (ahead @ axis) * axis
     length = float(np.linalg.norm(flat))
     if style.entry is Entry.AXIS or length < 1e-12:
@@ -62,38 +66,71 @@ def approach(tip: Floats, axis: Floats, ahead: Floats, style: LinkStyle) -> Segm
         turn = np.linspace(0.5 * np.pi, 0.0, 2 + int(np.ceil(0.5 * np.pi / style.arc_step)))[:, None]
         corners = tip + style.approach * ((1.0 - np.cos(turn)) * axis - np.sin(turn) * flat / length)
         corners[-1] = tip
-    tips = spaced(corners, style.spacing)
-    return Segment(SegmentKind.LINK, tips, np.tile(axis, (len(tips), 1)), style.feed)
+    points = spaced(corners, style.spacing)
+    return Segment(SegmentKind.LINK, points, np.tile(axis, (len(points), 1)), style.feed)
 
 
-def retract(tip: Floats, axis: Floats, ahead: Floats, style: LinkStyle) -> Segment:
-    """Return the link on feed away from a pass that ends at `tip` (3,), going `ahead` (3,): an approach reversed."""
-    back = approach(tip, axis, -ahead, style)
+def retract(tips: Floats, axes: Floats, style: LinkStyle) -> Segment:
+    """Return the link on feed away from the end of a pass: an approach reversed."""
+    back = approach(tips[::-1], axes[::-1], style)
     return Segment(SegmentKind.LINK, back.tips[::-1], back.axes[::-1], style.feed)
 
 
-def rapid(start: Floats, start_axis: Floats, end: Floats, end_axis: Floats, style: LinkStyle) -> Segment:
-    """Return the rapid between two poses, off the surface by `approach`, over the clearance level."""
-    up = _rise(start, start_axis, style)
-    down = _rise(end, end_axis, style)[::-1]
-    way = blended(np.vstack([up, down]), style)
+def rapid(start: Pose | None, end: Pose | None, style: LinkStyle) -> Segment:
+    """Return the rapid from the end of a retract to the start of an approach, by way of the clearance level.
+
+    Without a start it comes from that level, without an end it stays there; one of them is given.
+    """
+    up = [] if start is None else [_rise(*start, style)]
+    down = [] if end is None else [_rise(*end, style)[::-1]]
+    path = blended(np.vstack([*up, *down]), style)
+    axes = [pose[1] for pose in (start, end) if pose is not None]
+    first, last = axes[0], axes[-1]
+    if start is None or end is None:
+        tips = spaced(path, style.rapid_spacing)
+        return Segment(SegmentKind.RAPID, tips, np.tile(first, (len(tips), 1)), np.inf)
     # Midway the axis turns 15/8 times as fast as on average.
-    turn = 1.875 * float(angle_between(start_axis, end_axis))
-    length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
-    tips = spaced(way, min(style.rapid_spacing, length * style.axis_step / max(turn, style.axis_step)))
-    return Segment(SegmentKind.RAPID, tips, _turning(start_axis, end_axis, tips), np.inf)
+    turn = 1.875 * float(angle_between(first, last))
+    length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+    tips = spaced(path, min(style.rapid_spacing, length * style.axis_step / max(turn, style.axis_step)))
+    return Segment(SegmentKind.RAPID, tips, _turning(first, last, tips), np.inf)
 
 
-def entry(tip: Floats, axis: Floats, style: LinkStyle) -> Segment:
-    """Return the rapid from the clearance level down to the start of an approach at `tip` (3,)."""
-    tips = spaced(blended(_rise(tip, axis, style)[::-1], style), style.rapid_spacing)
-    return Segment(SegmentKind.RAPID, tips, np.tile(axis, (len(tips), 1)), np.inf)
+def connection(before: Poses | None, after: Poses | None, style: LinkStyle) -> list[Segment]:
+    """Return retract, rapid and approach from the end of one pass to the beginning of the next.
+
+    Without a pass before, it begins at the clearance level; without a pass after, it ends there. One of them is given.
+    """
+    up = [] if before is None else [retract(*before, style)]
+    down = [] if after is None else [approach(*after, style)]
+    start = (up[0].tips[-1], up[0].axes[-1]) if up else None
+    end = (down[0].tips[0], down[0].axes[0]) if down else None
+    return [*up, rapid(start, end, style), *down]
 
 
-def leave(tip: Floats, axis: Floats, style: LinkStyle) -> Segment:
-    """Return the rapid from the end of a retract at `tip` (3,) up to the clearance level."""
-    tips = spaced(blended(_rise(tip, axis, style), style), style.rapid_spacing)
-    return Segment(SegmentKind.RAPID, tips, np.tile(axis, (len(tips), 1)), np.inf)
+def relinked(
+    path: Toolpath, colliding: Bools, style: LinkStyle, is_clear: Callable[[Segment], bool]
+) -> tuple[Toolpath, int]:
+    """Return a path with new links wherever a link or rapid collides with the part, and how many were replaced.
+
+    colliding (N − 1,): which motions collide. The new link is a `connection`; if `is_clear` rejects one of its
+    segments, the old one stays. Links collide where a cut was tilted, lifted or dropped after linking.
+    """
+    cuts = [k for k, segment in enumerate(path.segments) if segment.kind is SegmentKind.CUT]
+    if not cuts:
+        return path, 0
+    segments: list[Segment] = []
+    replaced = 0
+    for before, after in zip([None, *cuts], [*cuts, None], strict=True):
+        first, last = 0 if before is None else before + 1, len(path.segments) if after is None else after
+        link = list(path.segments[first:last])
+        if colliding[int(path.starts[first]) : int(path.starts[last])].any():
+            ends = [None if k is None else (path.segments[k].tips, path.segments[k].axes) for k in (before, after)]
+            new = connection(ends[0], ends[1], style)
+            if all(is_clear(segment) for segment in new):
+                link, replaced = new, replaced + 1
+        segments += link if after is None else [*link, path.segments[after]]
+    return replace(path, segments=tuple(segments)), replaced
 
 
 def _rise(tip: Floats, axis: Floats, style: LinkStyle) -> Floats:
@@ -122,15 +159,15 @@ def blended(corners: Floats, style: LinkStyle) -> Floats:
 
     An arc takes up to `blend` of each leg, less than half of it, so that arcs never meet.
     """
-    apart = np.linalg.norm(np.diff(corners, axis=0), axis=1) > _SAME_CORNER_M
-    keep = np.concatenate([[True], apart])
-    if not apart[-1] and keep[1:-1].any():
+    distinct = np.linalg.norm(np.diff(corners, axis=0), axis=1) > style.same_corner
+    keep = np.concatenate([[True], distinct])
+    if not distinct[-1] and keep[1:-1].any():
         keep[np.flatnonzero(keep)[-1]] = False
     keep[-1] = True
     corners = corners[keep]
     parts = [corners[:1]]
     for before, corner, after in zip(corners, corners[1:], corners[2:], strict=False):
-        turn = float(angle_between(corner - before, after - corner)) if len(corners) > 2 else 0.0
+        turn = float(angle_between(corner - before, after - corner))
         if turn < 1e-6:
             continue
         if turn > np.pi - 1e-3:  # straight back: an arc would run through the same points twice
@@ -138,9 +175,9 @@ def blended(corners: Floats, style: LinkStyle) -> Floats:
             continue
         back, ahead = before - corner, after - corner
         reach = min(style.blend, 0.45 * float(np.linalg.norm(back)), 0.45 * float(np.linalg.norm(ahead)))
-        enter = corner + reach * back / np.linalg.norm(back)
-        leave_at = corner + reach * ahead / np.linalg.norm(ahead)
+        arc_start = corner + reach * back / np.linalg.norm(back)
+        arc_end = corner + reach * ahead / np.linalg.norm(ahead)
         t = np.linspace(0.0, 1.0, 2 + int(np.ceil(turn / style.arc_step)))[:, None]
-        parts.append((1.0 - t) ** 2 * enter + 2.0 * t * (1.0 - t) * corner + t * t * leave_at)
+        parts.append((1.0 - t) ** 2 * arc_start + 2.0 * t * (1.0 - t) * corner + t * t * arc_end)
     parts.append(corners[-1:])
     return np.vstack(parts)

@@ -1,4 +1,4 @@
-"""Order and direction of passes."""
+"""Sequence and direction of passes: zigzag strips, by level, or the shortest tour."""
 
 from __future__ import annotations
 
@@ -7,64 +7,52 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats
+from pentapod.base.arrays import Floats
 from pentapod.mesh.passes import Passes
 from pentapod.toolpath.linking.tour import tour
+from pentapod.toolpath.strategy import Order
 
 
 @dataclass(frozen=True)
-class Turn:
-    """One pass in the order of work: its index, whether it is cut backwards, whether it goes on from the last."""
+class OrderedPass:
+    """One pass in the order of work: its index, whether it is cut backwards, whether it continues the previous one."""
 
     index: int
-    backwards: bool
-    near: bool
+    backwards: bool = False
+    near: bool = True
 
 
-def by_level(passes: Passes) -> list[Turn]:
-    """Return the passes level by level, each as it is; within a level in the direction they are cut."""
-    first, last = passes.points[passes.starts[:-1]], passes.points[passes.starts[1:] - 1]
-    mean = (last - first).sum(axis=0)
-    order = np.lexsort((first @ mean, passes.levels))
-    return [Turn(int(k), False, True) for k in order]
+def ordered(passes: Passes, order: Order, both_ways: bool, reach: float) -> list[OrderedPass]:
+    """Return the passes in the order of work.
 
-
-def given(passes: Passes) -> list[Turn]:
-    """Return the passes in the order they have."""
-    return [Turn(k, False, True) for k in range(len(passes))]
-
-
-def shortest(passes: Passes, both_ways: bool) -> list[Turn]:
-    """Return the passes in an order with little travel between them, turned round where that helps."""
-    first, last = passes.points[passes.starts[:-1]], passes.points[passes.starts[1:] - 1]
-    order, backwards = tour(first, last, np.full(len(passes), both_ways))
-    return [Turn(int(k), bool(b), True) for k, b in zip(order, backwards, strict=True)]
-
-
-def zigzag(passes: Passes, reach: float) -> list[Turn]:
-    """Return the passes to and fro: on to the next level while a pass there begins within `reach` metres.
-
-    So the strips on either side of a hole are each finished in one go. The strips follow each other such that
-    there is little travel between them. The loop is over passes, not waypoints.
+    by-level: in their own direction; within a level in that direction, too. shortest: with little travel, reversed
+    where that helps and `both_ways` allows. zigzag: on to the next level while a pass there begins within `reach`
+    metres, so the strips on either side of a hole are each finished in one go; strips in an order with little travel.
     """
-    strips = _strips(passes, reach)
     first, last = passes.points[passes.starts[:-1]], passes.points[passes.starts[1:] - 1]
+    if order is Order.BY_LEVEL:
+        mean = (last - first).sum(axis=0)
+        return [OrderedPass(int(k)) for k in np.lexsort((first @ mean, passes.levels))]
+    if order is Order.SHORTEST:
+        sequence, backwards = tour(first, last, both_ways)
+        return [OrderedPass(int(k), bool(b)) for k, b in zip(sequence, backwards, strict=True)]
+    if order is Order.GIVEN:
+        return [OrderedPass(k) for k in range(len(passes))]
+    strips = _strips(passes, np.stack([first, last], axis=1), reach)
     heads = np.stack([(last if s[0].backwards else first)[s[0].index] for s in strips])
     tails = np.stack([(first if s[-1].backwards else last)[s[-1].index] for s in strips])
-    order, backwards = tour(heads, tails, np.ones(len(strips), dtype=np.bool_))
-    turns: list[Turn] = []
-    for k, reverse in zip(order, backwards, strict=True):
-        strip = [Turn(t.index, not t.backwards, t.near) for t in strips[k][::-1]] if reverse else strips[k]
-        turns += [Turn(t.index, t.backwards, place > 0) for place, t in enumerate(strip)]
-    return turns
+    result: list[OrderedPass] = []
+    for k, reverse in zip(*tour(heads, tails, reversible=True), strict=True):
+        strip = strips[k][::-1] if reverse else strips[k]
+        result += [OrderedPass(p.index, p.backwards != bool(reverse), place > 0) for place, p in enumerate(strip)]
+    return result
 
 
-def _strips(passes: Passes, reach: float) -> list[list[Turn]]:
-    """Return runs of passes, each near the one before; a run begins in the lowest level that is not done."""
-    ends = np.stack([passes.points[passes.starts[:-1]], passes.points[passes.starts[1:] - 1]], axis=1)
+def _strips(passes: Passes, ends: Floats, reach: float) -> list[list[OrderedPass]]:
+    """Return runs of passes with ends (P, 2, 3), each near the one before; a run begins in the lowest waiting level."""
     waiting = {int(level): np.flatnonzero(passes.levels == level).tolist() for level in np.unique(passes.levels)}
     lowest = deque(sorted(waiting))
-    strips: list[list[Turn]] = []
+    strips: list[list[OrderedPass]] = []
     here, level = ends[0, 0], lowest[0]
     while lowest:
         following = waiting.get(level + 1, []) if strips else []
@@ -74,7 +62,7 @@ def _strips(passes: Passes, reach: float) -> list[list[Turn]]:
             index, backwards, _ = _nearest(ends, waiting[lowest[0]], here)
             strips.append([])
         level = int(passes.levels[index])
-        strips[-1].append(Turn(index, backwards, near))
+        strips[-1].append(OrderedPass(index, backwards, near))
         here = ends[index, 0 if backwards else 1]
         waiting[level].remove(index)
         while lowest and not waiting[lowest[0]]:
@@ -83,7 +71,7 @@ def _strips(passes: Passes, reach: float) -> list[list[Turn]]:
 
 
 def _nearest(ends: Floats, among: list[int], here: Floats) -> tuple[int, bool, float]:
-    """Return the pass among some with the end nearest to a point, whether the far end, and the distance."""
+    """Return the pass among some with the end nearest to a point, whether it is its last, and the distance."""
     if not among:
         return -1, False, np.inf
     distance = np.linalg.norm(ends[among] - here, axis=2)
@@ -91,20 +79,13 @@ def _nearest(ends: Floats, among: list[int], here: Floats) -> tuple[int, bool, f
     return int(among[best // 2]), best % 2 == 1, float(distance.flat[best])
 
 
-def rotated_to_meet(points: Floats, here: Floats | None, closed: Bools | bool) -> int:
-    """Return at which point (of n) a closed pass should begin: the one nearest to where the last one ended."""
-    if here is None or not closed:
-        return 0
-    return int(np.linalg.norm(points[:-1] - here, axis=1).argmin())
-
-
-def aligned(passes: Passes, towards: Floats) -> Passes:
-    """Return the passes with closed ones begun where they reach furthest `towards` (3,): neighbours' ends are near."""
+def aligned(passes: Passes, direction: Floats) -> Passes:
+    """Return the passes with closed ones begun at their furthest point along a direction (3,): then ends are near."""
     index = np.arange(len(passes.points))
-    reach = passes.points @ towards
+    along = passes.points @ direction
     for k in np.flatnonzero(passes.closed):
         rows = passes.rows(int(k))
-        begin = rows.start + int(reach[rows].argmax())
+        begin = rows.start + int(along[rows].argmax())
         around = np.concatenate([np.arange(begin, rows.stop - 1), np.arange(rows.start, begin)])
         index[rows] = np.concatenate([around, around[:1]])
     return Passes(passes.points[index], passes.normals[index], passes.starts, passes.levels)

@@ -1,17 +1,17 @@
-"""Partition of a toolpath into pieces, each with its own approach and retract."""
+"""Partition of a toolpath into pieces for several set-ups, each with its own approach and retract."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from pentapod.base.arrays import Bools, Ints
 from pentapod.base.errors import ToolpathError
 from pentapod.geometry.runs import marked_runs
-from pentapod.toolpath.linking import links
-from pentapod.toolpath.linking.links import LinkStyle
+from pentapod.toolpath.linking.links import LinkStyle, connection
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 Corner = tuple[float, float, float]
@@ -19,10 +19,10 @@ Corner = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Piece:
-    """Which cuts of a toolpath: those between two waypoints, first and last, whose middles are within a box.
+    """Cuts of a toolpath: those between two waypoints, first and last, whose middles are within a box.
 
-    low, high: the box's corners, metres, workpiece frame; what is on the high sides is outside. Raises ToolpathError
-    for a piece that can hold nothing.
+    low, high: the box's corners, metres, workpiece frame; points on the high sides are outside. Raises ToolpathError
+    for a piece that can hold no cut.
     """
 
     first: int
@@ -70,7 +70,7 @@ def cutting_intervals(toolpath: Toolpath) -> Bools:
 
 
 def missed_cuts(toolpath: Toolpath, pieces: Sequence[Piece]) -> tuple[int, int]:
-    """Return how many intervals of a toolpath are cuts, and how many of them are in no piece or in more than one."""
+    """Return the number of intervals that are cuts, and of those that are in no piece or in more than one."""
     times, cutting = np.sum([piece.cuts(toolpath) for piece in pieces], axis=0), cutting_intervals(toolpath)
     return int(cutting.sum()), int((times != cutting).sum())
 
@@ -83,65 +83,35 @@ def pass_ends(toolpath: Toolpath) -> Ints:
 def part_of(toolpath: Toolpath, piece: Piece, style: LinkStyle) -> Toolpath:
     """Return the motion that makes the cuts of a piece, in their order.
 
-    Between cuts that follow each other in the whole, and before its first and after its last, the ways are those of the
-    whole; where cuts are left out the tool retracts, crosses at the clearance level and comes down as `style` says.
+    Links between cuts that follow each other in the whole, before its first cut and after its last, are those of the
+    whole. Where cuts are left out, the tool retracts, crosses at the clearance level and comes down as `style` says.
     Raises ToolpathError where the piece holds no cut.
     """
-    chosen = piece.cuts(toolpath)
+    chosen, cutting = piece.cuts(toolpath), cutting_intervals(toolpath)
     if not chosen.any():
         raise ToolpathError("there is no cut in this piece", value=str(piece))
-    return _Partition(toolpath, style).toolpath(marked_runs(chosen).tolist())
+    begins, ends = marked_runs(chosen).T.tolist()
+    tips, axes = toolpath.tips, toolpath.axes
+    segments: list[Segment] = []
+    # From waypoint a, where a run of cuts ends, to waypoint b, where the next begins; then that run.
+    first, last = 0, len(toolpath) - 1
+    for a, b, stop in zip([first, *ends], [*begins, last], [*ends, last], strict=True):
+        if cutting[a:b].any():
+            before = None if a == first else (tips[a - 1 : a + 1], axes[a - 1 : a + 1])
+            after = None if b == last else (tips[b : b + 2], axes[b : b + 2])
+            segments += connection(before, after, style)
+        else:
+            segments += _stretch(toolpath, a, b)
+        segments += _stretch(toolpath, b, stop)
+    return replace(toolpath, segments=tuple(segments))
 
 
-class _Partition:
-    def __init__(self, toolpath: Toolpath, style: LinkStyle) -> None:
-        self.whole, self.style, self.cutting = toolpath, style, cutting_intervals(toolpath)
-
-    def toolpath(self, runs: list[list[int]]) -> Toolpath:
-        """Return what is made of runs of intervals, of which a run's end is its last waypoint."""
-        last = len(self.whole) - 1
-        segments = self._lead(runs[0][0])
-        for k, (a, b) in enumerate(runs):
-            segments += self._stretch(a, b)
-            if k + 1 < len(runs):
-                segments += self._between(b, runs[k + 1][0])
-        segments += self._tail(runs[-1][1], last)
-        return replace(self.whole, segments=tuple(segments))
-
-    def _stretch(self, a: int, b: int) -> list[Segment]:
-        """Return what the whole does from waypoint a to waypoint b."""
-        starts = self.whole.starts
-        found: list[Segment] = []
-        for segment, start, end in zip(self.whole.segments, starts[:-1].tolist(), starts[1:].tolist(), strict=True):
-            low, high = max(a, start) - start, min(b, end) - start
-            if high > low:
-                tips, axes = segment.tips[low : high + 1], segment.axes[low : high + 1]
-                dwell = segment.dwell if high == end - start else None
-                found.append(replace(segment, tips=tips, axes=axes, dwell=dwell))
-        return found
-
-    def _lead(self, a: int) -> list[Segment]:
-        if not self.cutting[:a].any():
-            return self._stretch(0, a)
-        down = self._approach(a)
-        return [links.entry(down.tips[0], down.axes[0], self.style), down]
-
-    def _tail(self, b: int, last: int) -> list[Segment]:
-        if not self.cutting[b:].any():
-            return self._stretch(b, last)
-        up = self._retract(b)
-        return [up, links.leave(up.tips[-1], up.axes[-1], self.style)]
-
-    def _between(self, b: int, a: int) -> list[Segment]:
-        if not self.cutting[b:a].any():
-            return self._stretch(b, a)
-        up, down = self._retract(b), self._approach(a)
-        return [up, links.rapid(up.tips[-1], up.axes[-1], down.tips[0], down.axes[0], self.style), down]
-
-    def _approach(self, a: int) -> Segment:
-        tips = self.whole.tips
-        return links.approach(tips[a], self.whole.axes[a], tips[a + 1] - tips[a], self.style)
-
-    def _retract(self, b: int) -> Segment:
-        tips = self.whole.tips
-        return links.retract(tips[b], self.whole.axes[b], tips[b] - tips[b - 1], self.style)
+def _stretch(toolpath: Toolpath, a: int, b: int) -> list[Segment]:
+    """Return the segments of a toolpath from waypoint a to waypoint b."""
+    found: list[Segment] = []
+    for segment, (start, end) in zip(toolpath.segments, pairwise(toolpath.starts.tolist()), strict=True):
+        low, high = max(a, start) - start, min(b, end) - start
+        if high > low:
+            tips, axes = segment.tips[low : high + 1], segment.axes[low : high + 1]
+            found.append(replace(segment, tips=tips, axes=axes, dwell=segment.dwell if high == end - start else None))
+    return found

@@ -1,13 +1,14 @@
-"""Adaptive resampling of passes: as few waypoints as the chord tolerances allow, evenly spread.
+"""Adaptive resampling of passes: as few waypoints as the tolerances allow, evenly spread.
 
-Density first: between waypoints at most `spacing`, at most `axis_step` of turning, and √(8 · chordal · R)
-where the surface curves with radius R; waypoints are spread evenly over the integral of that density. Then
-proof: wherever a corner of the mesh's own slice is further than `chordal` from the chord that passes it,
-the worst such corner becomes a waypoint, until there is none. So the result holds the tolerance on coarse
-meshes too.
+First the density: between waypoints at most `spacing`, at most `axis_step` of turning, and √(8 · chordal · R) where the
+surface curves with radius R; waypoints are spread evenly over the integral of that density. Then the check: wherever a
+corner of the line on the mesh is further than `chordal` from its chord, the worst such corner becomes a waypoint, until
+there is none. So the tolerance is kept on coarse meshes too.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,17 +17,30 @@ from pentapod.geometry.directions import angle_between
 from pentapod.geometry.runs import run_starts
 from pentapod.mesh.passes import Passes
 
-_MAX_ROUNDS = 64
-_SAME_POINT_M = 1e-9
+
+@dataclass(frozen=True)
+class ResamplingOptions:
+    """rounds: largest number of rounds in which corners are added. same_point: nearer points are one, metres."""
+
+    rounds: int = 64
+    same_point: float = 1e-9
 
 
-def resample(passes: Passes, *, chordal: float, spacing: float, axis_step: float, closest: float) -> Passes:
-    """Return the passes with their points chosen anew on the same lines; first and last points stay.
+def resample(
+    passes: Passes,
+    *,
+    chordal: float,
+    spacing: float,
+    axis_step: float,
+    closest: float,
+    options: ResamplingOptions = ResamplingOptions(),
+) -> Passes:
+    """Return the passes with new points on the same lines; first and last points stay.
 
-    chordal, spacing, closest: metres; axis_step: radians. No two points come closer than `closest`; what
-    lies closer to a waypoint than that may leave its chord by as much. Passes shorter than twice that vanish.
+    chordal, spacing, closest: metres; axis_step: radians. No two points are closer than `closest`; corners of the line
+    closer to a waypoint than that may leave its chord by as much. Passes shorter than twice that are left out.
     """
-    passes = without_duplicates(passes.where(passes.lengths >= 2.0 * closest), _SAME_POINT_M)
+    passes = without_duplicates(passes.where(passes.lengths >= 2.0 * closest), options.same_point)
     if not len(passes):
         return passes
     place = np.concatenate([[0.0], np.cumsum(np.where(passes.within, passes.steps, 1.0))])
@@ -34,12 +48,12 @@ def resample(passes: Passes, *, chordal: float, spacing: float, axis_step: float
     fixed = np.zeros(len(samples), dtype=np.bool_)
     fixed[np.searchsorted(samples, place[passes.starts[:-1]])] = True
     fixed[np.searchsorted(samples, place[passes.starts[1:] - 1])] = True
-    for _ in range(_MAX_ROUNDS):
+    for _ in range(options.rounds):
         worst = place[_worst_corners(passes, place, samples, samples[fixed], chordal, closest)]
         worst = worst[np.diff(worst, prepend=-np.inf) >= closest]
         if not len(worst):
             break
-        # Corners of the slice go in; waypoints that were only spread evenly make room for them.
+        # Corners become waypoints and replace evenly spread ones nearby.
         free = ~fixed & (_gap(worst, samples) >= closest)
         samples = np.concatenate([samples[fixed], worst, samples[free]])
         fixed = np.concatenate([np.ones(len(samples) - int(free.sum()), np.bool_), np.zeros(int(free.sum()), np.bool_)])
@@ -49,13 +63,13 @@ def resample(passes: Passes, *, chordal: float, spacing: float, axis_step: float
 
 
 def without_duplicates(passes: Passes, closest: float) -> Passes:
-    """Return the passes without points closer than `closest` to the one before; ends stay, unless they meet."""
+    """Return the passes without points closer than `closest` to the previous one; ends stay, unless they meet."""
     while len(passes):
         passes = passes.where(passes.lengths >= 2.0 * closest)
         short = np.concatenate([[False], passes.within & (passes.steps < closest)])
         if not short.any():
             break
-        # In a run of short steps every second point goes, so that what is left moves apart.
+        # In a run of short steps every second point is removed, so that the others move apart.
         index = np.arange(len(short))
         run = index - np.maximum.accumulate(np.where(short, -1, index))
         drop = short & (run % 2 == 1)
@@ -72,7 +86,7 @@ def without_duplicates(passes: Passes, closest: float) -> Passes:
 
 
 def _evenly(passes: Passes, place: Floats, chordal: float, spacing: float, axis_step: float) -> Floats:
-    """Return places of waypoints spread evenly over the density that the tolerances ask for."""
+    """Return the places of waypoints spread evenly over the density that the tolerances ask for."""
     turn = np.where(passes.within, angle_between(passes.normals[1:], passes.normals[:-1]), 0.0)
     needed = np.maximum(
         np.maximum(passes.steps / spacing, _turning(passes) / axis_step), np.sqrt(passes.steps * turn / (8.0 * chordal))
@@ -80,7 +94,7 @@ def _evenly(passes: Passes, place: Floats, chordal: float, spacing: float, axis_
     quantity = np.concatenate([[0.0], np.cumsum(np.where(passes.within, needed, 1.0))])
     first, last = passes.starts[:-1], passes.starts[1:] - 1
     total = quantity[last] - quantity[first]
-    # A hair's breadth of rounding must not cost a waypoint more.
+    # Rounding must not cost an additional waypoint.
     intervals = np.maximum(np.ceil(total * (1.0 - 1e-9)), 1.0).astype(np.intp)
     owner = np.repeat(np.arange(len(passes)), intervals + 1)
     number = np.arange(len(owner)) - np.repeat(np.cumsum(intervals + 1) - (intervals + 1), intervals + 1)
@@ -105,7 +119,7 @@ def _turning(passes: Passes) -> Floats:
 def _worst_corners(
     passes: Passes, place: Floats, samples: Floats, fixed: Floats, chordal: float, closest: float
 ) -> Ints:
-    """Return the points of the passes that are worst within their chord, where beyond `chordal`."""
+    """Return for each chord the point of the pass that is furthest from it, if that is more than `chordal`."""
     ends = _interpolated(passes.points, place, samples)
     chord = np.clip(np.searchsorted(samples, place, side="right") - 1, 0, len(samples) - 2)
     start, along = ends[chord], ends[chord + 1] - ends[chord]

@@ -1,1 +1,1 @@
-"""Strategies: each draws lines on a surface; a file for each, and the table of them."""
+"""Strategies: each makes contact paths on a surface; a file for each, and the table of them."""

@@ -11,30 +11,27 @@ from pentapod.base.keys import Key
 from pentapod.cutters.tool import Tool
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.passes import Passes
-from pentapod.toolpath.drawing import Drawing, Order
-from pentapod.toolpath.strategies.raster import Pattern, RasterOptions, draw_raster
-from pentapod.toolpath.strategies.strategy import Strategy
+from pentapod.toolpath.strategies.raster import RasterOptions, raster_paths
+from pentapod.toolpath.strategy import ContactPaths, Strategy
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CrossHatchOptions(RasterOptions):
     """Parallel plane slices, and others across them."""
 
-    angle: Annotated[float, Key("deg", "from the first passes to the second", ge=-360.0, le=360.0)] = float(
+    angle: Annotated[float, Key("deg", "angle from the first passes to the second", ge=-360.0, le=360.0)] = float(
         np.radians(90.0)
     )
 
 
-def draw_cross_hatch(mesh: Mesh, tool: Tool, options: CrossHatchOptions) -> Drawing:
+def cross_hatch_paths(mesh: Mesh, tool: Tool, options: CrossHatchOptions) -> ContactPaths:
     """Return the passes of a raster along `direction`, then those of one turned by `angle`. Raises as a raster."""
-    first = draw_raster(mesh, tool, options)
-    second = draw_raster(mesh, tool, replace(options, direction=options.direction + options.angle))
-    # A level of its own between both keeps the first raster's last pass from being followed as a neighbour.
+    first = raster_paths(mesh, tool, options)
+    second = raster_paths(mesh, tool, replace(options, direction=options.direction + options.angle)).passes
+    # An empty level between both: the second raster does not continue the last pass of the first.
     gap = int(first.passes.levels.max()) + 2
-    moved = Passes(second.passes.points, second.passes.normals, second.passes.starts, second.passes.levels + gap)
-    passes = Passes.joined([first.passes, moved])
-    order = Order.ZIGZAG if options.pattern is Pattern.ZIGZAG else Order.BY_LEVEL
-    return Drawing(passes, first.stepover, order, first.both_ways)
+    second = replace(second, levels=second.levels + gap)
+    return replace(first, passes=Passes.joined([first.passes, second]))
 
 
-STRATEGY = Strategy("cross-hatch", CrossHatchOptions, draw_cross_hatch)
+STRATEGY = Strategy("cross-hatch", CrossHatchOptions, cross_hatch_paths)

@@ -1,4 +1,4 @@
-"""Drawing: the lines of an SVG or DXF file laid on a surface."""
+"""Drawing: the lines of an SVG or DXF file on a surface."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import numpy as np
 from pentapod.base.arrays import Floats, set_frozen
 from pentapod.base.keys import Key
 from pentapod.toolpath.inputs.drawings import read_lines
-from pentapod.toolpath.options import positive
-from pentapod.toolpath.strategies.curves import CurveOptions, draw_curves
-from pentapod.toolpath.strategies.strategy import Strategy
+from pentapod.toolpath.options import check_positive
+from pentapod.toolpath.strategies.curves import CurveOptions, curve_paths
+from pentapod.toolpath.strategy import Strategy
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,7 +31,7 @@ class DrawingOptions(CurveOptions):
     centred: Annotated[bool, Key("", "the drawing's middle is its origin, not the file's own")] = True
 
     def __post_init__(self) -> None:
-        positive("scale", self.scale)
+        check_positive("scale", self.scale)
         lines = read_lines(self.file, 0.25 * self.chordal / self.scale)
         if self.centred:
             points = np.concatenate(lines)
@@ -40,4 +40,4 @@ class DrawingOptions(CurveOptions):
         super().__post_init__()
 
 
-STRATEGY = Strategy("drawing", DrawingOptions, draw_curves)
+STRATEGY = Strategy("drawing", DrawingOptions, curve_paths)

@@ -1,4 +1,4 @@
-"""Polyline: lines given point by point, taken to the surface straight down or to its nearest point."""
+"""Polyline: lines given point by point, projected along the view or moved to the nearest point of the surface."""
 
 from __future__ import annotations
 
@@ -10,24 +10,21 @@ from typing import Annotated
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, frozen, set_frozen
+from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import Key
 from pentapod.cutters.tool import Tool
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.closest import closest, normals_at
 from pentapod.mesh.query.heightfield import HeightField
-from pentapod.toolpath.drawing import Drawing, Order
 from pentapod.toolpath.inputs.points import read_points
-from pentapod.toolpath.lines.projection import projected, sunk
-from pentapod.toolpath.nothing_left import nothing_left
+from pentapod.toolpath.lines.projection import SurfaceHits, below, projected, topmost_in_region
 from pentapod.toolpath.options import PathOptions
-from pentapod.toolpath.strategies.strategy import Strategy
+from pentapod.toolpath.strategy import ContactPaths, Order, Strategy, region_patch
 
 
 class Towards(StrEnum):
-    """view: along the view, onto what is on top. nearest: to the nearest point of the region."""
+    """view: along the view, onto the topmost surface. nearest: to the nearest point of the region."""
 
     VIEW = "view"
     NEAREST = "nearest"
@@ -45,7 +42,7 @@ class PolylineOptions(PathOptions):
         ),
     ] = ()  # fmt: skip
     towards: Annotated[
-        Towards | str, Key("", "taken to the surface along the region's direction, or to its nearest point")
+        Towards | str, Key("", "projected along the region's direction, or moved to the nearest point of the region")
     ] = Towards.VIEW
     depth: Annotated[float, Key("mm", "below the surface, along the normal", ge=0.0, of_part=1.0)] = 0.0
 
@@ -57,32 +54,24 @@ class PolylineOptions(PathOptions):
         set_frozen(self, lines=lines)
 
 
-def draw_polyline(mesh: Mesh, tool: Tool, options: PolylineOptions) -> Drawing:
-    """Return the given lines on the surface, in their order. Raises ToolpathError where none meets the region."""
+def polyline_paths(mesh: Mesh, tool: Tool, options: PolylineOptions) -> ContactPaths:
+    """Return the given lines on the surface, in their order. Raises ToolpathError if none meets the region."""
     del tool
-    field = HeightField(mesh, options.up)
-    patch = Patch.of(mesh, options.region)
-    if not len(patch.faces):
-        raise nothing_left(mesh, options, 0)
-    low, high = options.region.bounds
+    field, patch = HeightField(mesh, options.up), region_patch(mesh, options)
+    visible = options.towards is Towards.VIEW
 
-    def land(points: Floats) -> tuple[Floats, Floats, Bools]:
-        if options.towards is Towards.NEAREST:
-            facets, found, weights = closest(patch, points)
-            return found, normals_at(patch, facets, weights), np.ones(len(points), dtype=np.bool_)
-        found, normals, _ = field.topmost(points)
-        landed = np.asarray(np.isfinite(found).all(axis=1))
-        found, normals = np.where(landed[:, None], found, 0.0), np.where(landed[:, None], normals, options.up)
-        landed &= (options.region.faces(normals) >= 0.0) & ((found >= low) & (found <= high)).all(axis=1)
-        return found, normals, landed
+    def mapped(points: Floats) -> SurfaceHits:
+        if visible:
+            return topmost_in_region(field, points, options)
+        facets, found, weights = closest(patch, points)
+        return found, normals_at(patch, facets, weights), np.ones(len(points), dtype=np.bool_)
 
     lines = [np.asarray(line) for line in options.lines if len(line) > 1]
-    landing = sunk(land, lambda points: np.full(len(points), options.depth))
-    passes, notes = projected(lines, landing, options, spacing=options.spacing, wrapped=False, sink=options.depth)
+    surface = below(mapped, lambda points: np.full(len(points), options.depth))
+    passes, notes = projected(lines, surface, options, spacing=options.spacing, wrapped=False, depth=options.depth)
     if not len(passes):
         raise ToolpathError("no line meets the surface", key="lines", remedy="check the unit and the view")
-    visible = options.towards is Towards.VIEW
-    return Drawing(passes, 0.0, Order.GIVEN, sink=options.depth, visible=visible, notes=notes)
+    return ContactPaths(passes, order=Order.GIVEN, depth=options.depth, visible=visible, notes=notes)
 
 
-STRATEGY = Strategy("polyline", PolylineOptions, draw_polyline)
+STRATEGY = Strategy("polyline", PolylineOptions, polyline_paths)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -18,18 +19,14 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.geodesic import seeds_along
-from pentapod.mesh.query.levels import spread
 from pentapod.mesh.query.slicing import LevelSet
-from pentapod.toolpath.drawing import Drawing, Order
-from pentapod.toolpath.lines.gap_filling import edge_for, gap_lines
-from pentapod.toolpath.lines.scallop import surface_steps
-from pentapod.toolpath.lines.slopes import monotone
-from pentapod.toolpath.nothing_left import nothing_left
+from pentapod.toolpath.lines.gap_filling import GapOptions, gap_lines
+from pentapod.toolpath.lines.scallop import level_values, surface_steps
 from pentapod.toolpath.options import CoverOptions
-from pentapod.toolpath.strategies.strategy import Strategy
+from pentapod.toolpath.strategy import ContactPaths, Order, Strategy, region_patch
 
 MOST_CROSSINGS = 30_000_000
-STEEPEST = 0.05
+"""Largest number of crossings of planes with facets: what memory and time allow."""
 
 
 class Pattern(StrEnum):
@@ -48,8 +45,8 @@ class Pattern(StrEnum):
 class RasterOptions(CoverOptions):
     """Parallel plane slices.
 
-    direction: of the passes, about the view from its x axis towards its y axis; for the view +z these are x and y, for
-    others they are carried along (`geometry.tangent_frame`). pattern: see `Pattern`.
+    direction: of the passes, about the view, from its x axis towards its y axis. For the view +z these are x and y; for
+    other views see `geometry.tangent_frame`. pattern: see `Pattern`.
     """
 
     direction: Annotated[float, Key("deg", "direction of the passes, from +x towards +y", ge=-360.0, le=360.0)] = 0.0
@@ -58,37 +55,31 @@ class RasterOptions(CoverOptions):
     )
 
 
-def draw_raster(mesh: Mesh, tool: Tool, options: RasterOptions) -> Drawing:
+def raster_paths(mesh: Mesh, tool: Tool, options: RasterOptions) -> ContactPaths:
     """Return parallel passes over the region of a mesh.
 
-    The passes lie in planes along the view, closer together where the surface is steep across them, so that
-    they are nowhere further apart on the surface than asked. The first and last lie half a step inside the
-    region. Raises ToolpathError where nothing is there to machine, the scallop does not suit the tool, or
-    the passes are so dense that there would be no end to it.
+    The passes lie in planes along the view, closer together where the surface is steep across them, so that the
+    stepover along the surface is nowhere exceeded. The first and last lie half a step inside the region. Raises
+    ToolpathError for an empty region, a scallop that does not suit the tool, or passes that are too dense.
     """
     x, y = tangent_frame(options.up)
     along = math.cos(options.direction) * x + math.sin(options.direction) * y
-    patch = Patch.of(mesh, options.region)
-    if not len(patch.faces):
-        raise nothing_left(mesh, options, 0)
+    patch = region_patch(mesh, options)
     passes, stepover = plane_lines(patch, tool, options, np.cross(options.up, along))
     if options.pattern is Pattern.ZIGZAG:
-        return Drawing(passes, stepover, Order.ZIGZAG)
+        return ContactPaths(passes, stepover, Order.ZIGZAG)
     if options.pattern is not Pattern.ONE_WAY:
-        passes = monotone(passes, options.up, upwards=options.pattern is Pattern.UPHILL, least=options.chordal)
-    return Drawing(passes, stepover, Order.BY_LEVEL, both_ways=False)
+        passes = _monotone(passes, options.up, upwards=options.pattern is Pattern.UPHILL, least=options.chordal)
+    return ContactPaths(passes, stepover, Order.BY_LEVEL, both_ways=False)
 
 
 def plane_lines(patch: Patch, tool: Tool, options: CoverOptions, across: Floats) -> tuple[Passes, float]:
-    """Return the lines in planes across a direction (3,), as near as the options ask, and the largest stepover."""
-    values = patch.vertices @ across
-    corners = values[patch.faces]
-    steps = surface_steps(
-        patch, tool, np.broadcast_to(across, patch.facet_normals.shape), options.stepover, options.scallop
-    )
-    slant = np.sqrt(np.maximum(1.0 - (patch.facet_normals @ across) ** 2, STEEPEST**2))
-    levels = spread(corners.min(axis=1), corners.max(axis=1), 1.0 / (steps * slant))
-    level_set = LevelSet(patch, values, levels)
+    """Return the slices of a patch by planes across a direction (3,), with gaps filled, and the largest stepover."""
+    heights = patch.vertices @ across
+    steps = surface_steps(patch, tool, across, options)
+    slope = np.sqrt(np.maximum(1.0 - (patch.facet_normals @ across) ** 2, 0.0))
+    levels = level_values(heights[patch.faces], slope, steps)
+    level_set = LevelSet(patch, heights, levels)
     if level_set.crossings > MOST_CROSSINGS:
         raise ToolpathError(
             "the passes are too dense for this mesh",
@@ -99,21 +90,52 @@ def plane_lines(patch: Patch, tool: Tool, options: CoverOptions, across: Floats)
         )
     passes = level_set.lines()
     if options.fill:
-        # Between planes that go on, no gap can be: only near borders.
-        gaps = _gaps(patch, steps, tool, options, across, levels)
-        passes = Passes.joined([passes, gaps]) if len(gaps) else passes
+        passes = Passes.joined([passes, _gaps(patch, steps, tool, options, across, levels)])
     return passes, float(steps.max())
 
 
 def _gaps(whole: Patch, steps: Floats, tool: Tool, options: CoverOptions, across: Floats, levels: Floats) -> Passes:
-    """Return lines around what planes at levels leave more than half a step from all of them, near borders."""
-    patch, near = whole.rim(1.25 * float(steps.max()), edge_for(steps))
+    """Return lines that fill the gaps between planes at levels (L,). Gaps can only be near borders and creases."""
+    gaps = GapOptions()
+    patch, near = whole.rim(1.25 * float(steps.max()), gaps.longest_edge(steps))
     if not len(patch.faces):
         return Passes.of([])
-    ways = np.broadcast_to(across, patch.facet_normals.shape)
-    slowness = 1.0 / surface_steps(patch, tool, ways, options.stepover, options.scallop)
+    slowness = 1.0 / surface_steps(patch, tool, across, options)
     seeds = seeds_along(LevelSet(patch, patch.vertices @ across, levels), slowness)
-    return gap_lines(patch, seeds, slowness, where=near, area=float(whole.areas.sum()))
+    return gap_lines(patch, seeds, slowness, gaps, where=near, area=float(whole.areas.sum()))
 
 
-STRATEGY = Strategy("raster", RasterOptions, draw_raster)
+def _monotone(passes: Passes, view: Floats, *, upwards: bool, least: float) -> Passes:
+    """Return passes that only rise along view (3,), or only fall: split at ridges and valleys, reversed where needed.
+
+    Rises and falls of less than `least` metres are taken for noise of the mesh.
+    """
+    pieces: list[tuple[Floats, Floats]] = []
+    levels: list[int] = []
+    for k, level in enumerate(passes.levels):
+        points, normals = passes.points[passes.rows(k)], passes.normals[passes.rows(k)]
+        height = points @ view
+        for a, b in pairwise(_turning_points(height, least)):
+            step = 1 if (height[b] >= height[a]) == upwards else -1
+            pieces.append((points[a : b + 1][::step], normals[a : b + 1][::step]))
+            levels.append(int(level))
+    return Passes.of(pieces, np.array(levels, dtype=np.intp))
+
+
+def _turning_points(height: Floats, least: float) -> list[int]:
+    """Return the indices of both ends and of the extrema between which height (n,) changes by more than `least`."""
+    rise = np.sign(np.diff(height))
+    extrema = np.flatnonzero(rise[1:] != rise[:-1]) + 1
+    last = len(height) - 1
+    found, sense = [0], 0
+    for k in [*extrema.tolist(), last]:
+        change = height[k] - height[found[-1]]
+        if sense and change * sense >= 0.0:
+            found[-1] = k
+        elif abs(change) > least:
+            found.append(k)
+            sense = 1 if change > 0.0 else -1
+    return [0, *found[1:-1], last]
+
+
+STRATEGY = Strategy("raster", RasterOptions, raster_paths)

@@ -1,4 +1,4 @@
-"""STRATEGIES: the strategies by the names that job files use. Each draws lines on a surface; assembly is shared."""
+"""STRATEGIES: the strategies by the names that job files use. Waypoints, order and links are the same for all."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.linking.assembly import assembled
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.path_report import PathReport
-from pentapod.toolpath.strategies.strategy import Strategy
+from pentapod.toolpath.strategy import Strategy
 from pentapod.toolpath.toolpath import Toolpath
 
 _NAMES = (
@@ -41,7 +41,7 @@ STRATEGIES = Registry(
 
 
 def strategy_of(options: PathOptions) -> Strategy:
-    """Return the strategy that takes options of this type. Raises ToolpathError where none does."""
+    """Return the strategy that takes options of this type. Raises ToolpathError if there is none."""
     for strategy in STRATEGIES.values():
         if type(options) is strategy.options:
             return strategy
@@ -51,14 +51,14 @@ def strategy_of(options: PathOptions) -> Strategy:
 
 
 def toolpath_with_report(mesh: Mesh, tool: Tool, options: PathOptions) -> tuple[Toolpath, PathReport]:
-    """Return the toolpath of the strategy that the options are for, and what it came to.
+    """Return the toolpath of the strategy that takes these options, and its report.
 
-    Raises ToolpathError where nothing is left to machine, or the options do not suit part or tool: lengths larger than
-    the part, as of options in millimetres, are refused.
+    Raises ToolpathError if nothing is left to machine, if the options do not suit part or tool, or if a length is much
+    larger than the part, as one in millimetres would be.
     """
     strategy = strategy_of(options)
     check_size(options, float(np.ptp(mesh.bounds, axis=0).max()), ToolpathError)
-    return assembled(strategy.name, mesh, tool, options, strategy.draw(mesh, tool, options))
+    return assembled(strategy.name, mesh, tool, options, strategy.paths(mesh, tool, options))
 
 
 def make_toolpath(mesh: Mesh, tool: Tool, options: PathOptions) -> Toolpath:

@@ -7,26 +7,22 @@ from typing import Annotated
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.arrays import Floats, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import VECTOR, Key
 from pentapod.cutters.tool import Tool
-from pentapod.geometry.directions import normalised
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.patch import Patch
-from pentapod.toolpath.drawing import Drawing, Order
-from pentapod.toolpath.nothing_left import nothing_left
-from pentapod.toolpath.options import CoverOptions
+from pentapod.toolpath.options import CoverOptions, unit_vector
 from pentapod.toolpath.strategies.raster import plane_lines
-from pentapod.toolpath.strategies.strategy import Strategy
+from pentapod.toolpath.strategy import ContactPaths, Order, Strategy, region_patch
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WaterlineOptions(CoverOptions):
     """Lines of constant height.
 
-    upright (3,): the view when None. Where the surface is flatter than `shallowest`, seen along `upright`, lines of
-    constant height would be far apart: it is left to another strategy.
+    upright (3,): direction of the heights; the view when None. shallowest: surface that is flatter, seen along
+    `upright`, is left out, because lines of constant height would be far apart there.
     """
 
     upright: Annotated[
@@ -37,38 +33,30 @@ class WaterlineOptions(CoverOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        upright = self.up if self.upright is None else self.upright
-        if not np.linalg.norm(frozen(upright, "upright", (3,))) > 0.0:
-            raise ToolpathError("the direction has no length", key="upright")
-        set_frozen(self, upright=frozen(normalised(upright), "upright"))
+        set_frozen(self, upright=unit_vector("upright", self.up if self.upright is None else self.upright))
 
 
-def draw_waterline(mesh: Mesh, tool: Tool, options: WaterlineOptions) -> Drawing:
+def waterline_paths(mesh: Mesh, tool: Tool, options: WaterlineOptions) -> ContactPaths:
     """Return lines of constant height over the region of a mesh, where it is steep enough.
 
-    Heights are closer together where the surface is flatter, so that the lines are nowhere further apart on
-    the surface than asked. Raises ToolpathError where nothing is there to machine or the scallop does not
-    suit the tool.
+    Heights are closer together where the surface is flatter, so that the stepover along the surface is nowhere
+    exceeded. Raises ToolpathError for an empty or flat region, or a scallop that does not suit the tool.
     """
     upright = np.asarray(options.upright)
-    whole = Patch.of(mesh, options.region)
-    if not len(whole.faces):
-        raise nothing_left(mesh, options, 0)
+    whole = region_patch(mesh, options)
     patch = whole.steeper(upright, options.shallowest)
     if not len(patch.faces):
         raise ToolpathError(
-            "the region is flatter everywhere than waterlines suit",
+            "the region is too flat for waterlines",
             key="shallowest",
             value=options.shallowest,
             remedy="use a raster, or turn the direction of the heights",
         )
     passes, stepover = plane_lines(patch, tool, options, upright)
-    left = 1.0 - float(patch.areas.sum() / whole.areas.sum())
+    flat = 1.0 - float(patch.areas.sum() / whole.areas.sum())
     degrees = np.degrees(options.shallowest)
-    notes = (
-        (f"{100.0 * left:.2g} % of the region is flatter than {degrees:.3g} deg and left out",) if left > 1e-6 else ()
-    )
-    return Drawing(passes, stepover, Order.ZIGZAG, notes=notes)
+    note = f"{100.0 * flat:.2g} % of the region is flatter than {degrees:.3g} deg and left out"
+    return ContactPaths(passes, stepover, Order.ZIGZAG, notes=(note,) if flat > 1e-6 else ())
 
 
-STRATEGY = Strategy("waterline", WaterlineOptions, draw_waterline)
+STRATEGY = Strategy("waterline", WaterlineOptions, waterline_paths)

@@ -16,7 +16,7 @@ from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
-from pentapod.toolpath.lines.scallop import ridge
+from pentapod.toolpath.lines.scallop import scallop_height
 from pentapod.toolpath.linking.partition import Piece, cutting_intervals
 from pentapod.toolpath.options import CoverOptions, PathOptions
 from pentapod.toolpath.strategies.waterline import WaterlineOptions
@@ -117,4 +117,4 @@ def _ridge(options: PathOptions, tool: Tool) -> float:
     scallop, stepover = getattr(options, "scallop", None), getattr(options, "stepover", None)
     if isinstance(tool, StandOff):
         return 0.5 * float(stepover or 0.0)
-    return ridge(float(stepover or 0.0), tool) if scallop is None else float(scallop)
+    return scallop_height(float(stepover or 0.0), tool) if scallop is None else float(scallop)

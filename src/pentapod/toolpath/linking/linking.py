@@ -1,0 +1,198 @@
+"""Linking of ordered passes by the shortest links that are free of collision."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.cutters.tool import Tool
+from pentapod.geometry.directions import angle_between
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.query.heightfield import HeightField
+from pentapod.mesh.query.swept_depth import sweep
+from pentapod.mesh.query.tree import FacetTree
+from pentapod.toolpath.linking import links
+from pentapod.toolpath.linking.links import LinkStyle, Pose
+from pentapod.toolpath.linking.stay_down_links import stay_down_links
+from pentapod.toolpath.options import Entry, PathOptions
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+
+
+@dataclass(frozen=True)
+class LinkingOptions:
+    """How links are chosen. touch, same_tip: metres.
+
+    touch: passes that meet within this distance, and radian, need no link. same_tip: tips within this distance are made
+    equal. straight: up to this gap a link is straight, as a share of the spacing. margin: gap to the part on rapids, as
+    a share of the approach height. hops: heights of hops that are tried, as shares of the clearance.
+    """
+
+    touch: float = 1e-9
+    same_tip: float = 1e-7
+    straight: float = 0.1
+    margin: float = 0.2
+    hops: tuple[float, ...] = (0.0, 0.5, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One pass in the order of work.
+
+    contacts, normals (n, 3): metres and unit. power: share of full power. stay: largest distance from the previous
+    pass, metres, for a link on the surface.
+    """
+
+    contacts: Floats
+    normals: Floats
+    power: float
+    stay: float
+
+
+class CollisionCheck:
+    """Collision check of tool, shank and holder against a part. view (3,): unit, towards the tool."""
+
+    def __init__(self, mesh: Mesh, tool: Tool, view: Floats) -> None:
+        self.mesh, self.tool, self.view = mesh, tool, view
+        self._top = float((mesh.vertices @ view).max())
+        # No point of the tool is further from its tip than this.
+        self._reach = max((s.top + s.low_radius + s.high_radius for s in tool.solids), default=0.0)
+
+    @cached_property
+    def _tree(self) -> FacetTree:
+        return FacetTree.of(self.mesh)
+
+    def is_clear(self, segment: Segment, margin: float) -> bool:
+        """Return whether the tool keeps a distance of `margin` metres from the part during the whole motion."""
+        if not self.tool.solids or (segment.tips @ self.view).min() > self._top + self._reach + margin:
+            return True
+        return not sweep(self._tree, self.tool, segment.tips, segment.axes, threshold=-margin).beyond(-margin).any()
+
+
+class Linker:
+    """Links between passes in their order of work.
+
+    A pass that begins where the previous one ends follows without a link; one within `stay` is reached over the
+    surface if the limits of `stay_down_links` allow; one within `hop` by a rapid just above the part; others by way of
+    the clearance level. `toolpath` counts how many passes are reached on the surface (stay_downs) and by a hop (hops),
+    and how many rapids the collision check does not prove to be clear of the part (unproven).
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        tool: Tool,
+        options: PathOptions,
+        *,
+        runs: list[Run],
+        field: HeightField,
+        stepover: float,
+        choice: LinkingOptions = LinkingOptions(),
+    ) -> None:
+        self.tool, self.options, self.runs, self.choice = tool, options, runs, choice
+        self.stay_downs = self.hops = self.unproven = 0
+        self.tips = [tool.tips(run.contacts, run.normals, run.normals) for run in runs]
+        view = options.up
+        highest = max(float((tips @ view).max()) for tips in self.tips)
+        top = max(float((mesh.vertices @ view).max()) + max(-tool.tilt_centre, 0.0), highest)
+        # The corner of a rapid is two approaches off the surface, and must not be above the level.
+        level = top + max(options.clearance, 2.0 * options.approach)
+        self.style = LinkStyle(
+            view,
+            level,
+            options.approach,
+            options.spacing,
+            options.link_feed,
+            Entry(options.entry),
+            min(options.axis_step, LinkStyle.axis_step),
+        )
+        self.collision = CollisionCheck(mesh, tool, view)
+        self.margin = choice.margin * options.approach
+        near = [
+            k
+            for k in range(1, len(runs))
+            if np.linalg.norm(runs[k].contacts[0] - runs[k - 1].contacts[-1]) <= runs[k].stay
+        ]
+        contacts = [(run.contacts, run.normals) for run in runs]
+        self.links_on_surface = stay_down_links(
+            field, options, stepover, {k: (contacts[k - 1], contacts[k]) for k in near}
+        )
+
+    def toolpath(self) -> Toolpath:
+        """Return the passes with their links. It begins and ends at the clearance level."""
+        segments: list[Segment] = []
+        for k, run in enumerate(self.runs):
+            segments += self._links_to(k)
+            segments.append(Segment(SegmentKind.CUT, self.tips[k], run.normals, self.options.feed, run.power))
+        up = self._lead(links.retract, len(self.runs) - 1)
+        rapid = links.rapid((up.tips[-1], up.axes[-1]), None, self.style)
+        return Toolpath((*segments, up, self._counted(rapid)), self.tool.tilt_centre)
+
+    def _links_to(self, k: int) -> list[Segment]:
+        """Return the segments from the end of the previous run to the beginning of run k."""
+        if k > 0:
+            direct = self._direct(k)
+            if direct is not None:
+                self.stay_downs += 1
+                return direct
+        down = self._lead(links.approach, k)
+        end = down.tips[0], down.axes[0]
+        if k == 0:
+            return [self._counted(links.rapid(None, end, self.style)), down]
+        up = self._lead(links.retract, k - 1)
+        start = up.tips[-1], up.axes[-1]
+        if np.linalg.norm(self.tips[k][0] - self.tips[k - 1][-1]) <= self.options.hop:
+            hop = self._hop(start, end)
+            if hop is not None:
+                self.hops += 1
+                return [up, hop, down]
+        return [up, self._counted(links.rapid(start, end, self.style)), down]
+
+    def _direct(self, k: int) -> list[Segment] | None:
+        """Return the segments on the surface from the previous run to run k; None where the tool must retract."""
+        before, after = self.runs[k - 1], self.runs[k]
+        gap = float(np.linalg.norm(self.tips[k][0] - self.tips[k - 1][-1]))
+        turn = float(angle_between(after.normals[0], before.normals[-1]))
+        if gap < self.choice.touch and turn < self.choice.touch:
+            return []
+        if gap <= self.choice.straight * self.options.spacing and turn <= self.options.axis_step:
+            # A retract and approach would be a needle; where the passes meet, the tool turns on the spot.
+            if gap < self.choice.same_tip:
+                self.tips[k][0] = self.tips[k - 1][-1]
+            tips = np.stack([self.tips[k - 1][-1], self.tips[k][0]])
+            axes = np.stack([before.normals[-1], after.normals[0]])
+        elif k in self.links_on_surface:
+            contacts, axes = self.links_on_surface[k]
+            tips = self.tool.tips(contacts, axes, axes)
+        else:
+            return None
+        return [Segment(SegmentKind.LINK, tips, axes, self.options.link_feed)]
+
+    def _lead(self, lead: Callable[..., Segment], k: int) -> Segment:
+        """Return the approach or retract of run k, along the axis if a ramp or arc would collide."""
+        tips, axes = self.tips[k], self.runs[k].normals
+        link = lead(tips, axes, self.style)
+        if self.style.entry is Entry.AXIS or self.collision.is_clear(link, 0.0):
+            return link
+        return lead(tips, axes, replace(self.style, entry=Entry.AXIS))
+
+    def _hop(self, start: Pose, end: Pose) -> Segment | None:
+        """Return the lowest rapid just above the part that is proven clear; None if there is none."""
+        base = max(float((tip + self.style.approach * axis) @ self.style.view) for tip, axis in (start, end))
+        for rise in self.choice.hops:
+            level = base + rise * self.options.clearance
+            if level >= self.style.level:
+                break
+            hop = links.rapid(start, end, replace(self.style, level=level))
+            if self.collision.is_clear(hop, self.margin):
+                return hop
+        return None
+
+    def _counted(self, rapid: Segment) -> Segment:
+        """Return a rapid, and count it if it is not proven clear."""
+        if not self.collision.is_clear(rapid, self.margin):
+            self.unproven += 1
+        return rapid
