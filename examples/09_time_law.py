@@ -1,9 +1,9 @@
-"""A time law drawn: how fast the tip may go, how fast it goes, what holds it back, and the knob being turned.
+"""A time law: speed along the path, its active limits, used shares of the legs' limits, and a feed override.
 
 A short raster with sharp corners on the shipped machine `desk`, its axis leaning to and fro. Above: speed along the
-path under the feed and the legs' own limits, coloured by the limit that holds the motion back. Middle: how much of
-the legs' limits the setpoints use in time, as the controller joins them. Below: the same motion with the feed override
-turned to 40 %, held, and turned up again.
+path under the feed and the legs' velocity limits, coloured by the active limit. Middle: how much of the legs' limits
+the interpolated setpoints use in time. Below: the same motion with the feed override set to 40 %, to a hold, and to
+130 %.
 
     python examples/09_time_law.py --out docs/time_law.png
 """
@@ -61,11 +61,11 @@ def checked(result: object) -> Trajectory:
 
 
 def draw(out: str) -> None:
-    """Plan, print what it says of itself, and draw."""
+    """Plan, print the explanation, and draw."""
     machine = Machine.load("desk")
     path, trajectory = planned(machine)
     print(explain(trajectory, machine, certify(trajectory, machine)))
-    figure, (along, shares, knob) = plt.subplots(3, 1, figsize=(9.0, 10.5), layout="constrained")
+    figure, (along, shares, overridden) = plt.subplots(3, 1, figsize=(9.0, 10.5), layout="constrained")
     profile = trajectory.profile
     s = 1e3 * profile.stations
     ceiling = (machine.legs.max_velocity / np.abs(path(profile.stations, 1))).min(axis=1)
@@ -90,13 +90,13 @@ def draw(out: str) -> None:
     held = checked(override(slow, machine, 1.2, 0.0))
     again = checked(override(held, machine, held.duration + 0.3, 1.3))
     fine = np.linspace(0.0, again.duration, 4000)
-    knob.plot(fine, 1e3 * trajectory.station(fine, 1), color="0.75", label="as planned")
-    knob.plot(fine, 1e3 * again.station(fine, 1), label="with the knob turned")
+    overridden.plot(fine, 1e3 * trajectory.station(fine, 1), color="0.75", label="as planned")
+    overridden.plot(fine, 1e3 * again.station(fine, 1), label="with overrides")
     for when, words in ((0.6, "40 %"), (1.2, "hold"), (held.duration + 0.3, "130 %")):
-        knob.axvline(when, color="0.5", linewidth=0.6, linestyle=":")
-        knob.text(when, 1.4e3 * FEED, f" {words}", fontsize=8, va="top")
-    knob.set(xlabel="time / s", ylabel="speed / mm/s", ylim=(0, 1.5e3 * FEED))
-    knob.legend(fontsize=7, loc="lower right")
+        overridden.axvline(when, color="0.5", linewidth=0.6, linestyle=":")
+        overridden.text(when, 1.4e3 * FEED, f" {words}", fontsize=8, va="top")
+    overridden.set(xlabel="time / s", ylabel="speed / mm/s", ylim=(0, 1.5e3 * FEED))
+    overridden.legend(fontsize=7, loc="lower right")
     figure.savefig(out, dpi=90)
     plt.close(figure)
 

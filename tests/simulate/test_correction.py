@@ -118,7 +118,7 @@ def test_correction_helps_other_drives(drives):
         assert before[1].max() >= 5.0 * after[1].max()
 
 
-def test_correction_holds_whatever_the_gains():
+def test_correction_works_with_random_gains():
     """Soft and stiff, quick and late, at the machine's largest accelerations: it never makes things much worse."""
     rng = np.random.default_rng(11)
     tried, ratios = 0, []
@@ -144,7 +144,7 @@ def test_correction_holds_whatever_the_gains():
     assert min(ratios) >= 3.0
 
 
-def test_correction_holds_where_its_model_is_wrong(monkeypatch):
+def test_correction_tolerates_a_wrong_model(monkeypatch):
     """The drives are a fifth stiffer or softer than the controller believes, and late twice as much."""
 
     def believes(drives, period, parts, delay):
@@ -163,7 +163,7 @@ def test_correction_holds_where_its_model_is_wrong(monkeypatch):
     assert rms(before[0]) >= 3.0 * rms(after[0])
 
 
-def test_nothing_is_enlarged_beyond_the_margin():
+def test_correction_amplifies_nothing_beyond_the_margin():
     """What ripple does across a straight pass: from pitches far below what the correction can answer to far above."""
     program, found = zigzag(), {}
     for margin in (1.4, 3.0):
@@ -181,7 +181,7 @@ def test_nothing_is_enlarged_beyond_the_margin():
 
 
 @pytest.mark.parametrize("late", [5e-3, 0.02])
-def test_drives_that_do_not_hold_are_not_corrected(late):
+def test_correction_of_unstable_drives_is_refused(late):
     result, _ = played(0.3, correct=True, dead_time=late)
     assert isinstance(result, Refusal)
     assert "no correction by the pose" in str(result)
@@ -189,7 +189,7 @@ def test_drives_that_do_not_hold_are_not_corrected(late):
 
 
 @pytest.mark.parametrize("margin", [1.0, 0.0, np.nan, np.inf])
-def test_a_margin_that_no_correction_can_keep_is_bad_input(margin):
+def test_contour_margin_that_no_correction_can_keep_is_bad_input(margin):
     with pytest.raises(MachineError, match="contour_margin"):
         Drives(contour_margin=margin)
 

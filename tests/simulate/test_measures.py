@@ -32,7 +32,7 @@ def by_name(tracking):
     return {measure.name: measure for measure in tracking.measures}
 
 
-def test_nothing_is_off(reference):
+def test_tracking_errors_of_an_exact_motion_are_zero(reference):
     exact = by_name(tracking(reference))
     for name in ("contour error", "tip error", "leg error"):
         assert exact[name].largest < 1e-12
@@ -41,7 +41,7 @@ def test_nothing_is_off(reference):
     assert 0.05 < exact["toolpath deviation"].largest < 1.0
 
 
-def test_a_shift_is_seen_in_full(reference):
+def test_tracking_errors_of_a_shift_are_its_length(reference):
     """Along the path it is lag; across it, contour error; never more than the shift."""
     exact, moved = by_name(tracking(reference)), by_name(tracking(reference, move=(0.0, 0.0, 1e-4)))
     assert moved["tip error"].values == pytest.approx(np.full(len(reference.program.legs), 0.1))
@@ -51,7 +51,7 @@ def test_a_shift_is_seen_in_full(reference):
     assert 0.0 < abs(change) <= 0.1
 
 
-def test_a_turn_is_seen_in_full(reference):
+def test_tracking_errors_of_a_rotation_are_its_angle(reference):
     twist = by_name(tracking(reference, turn=1e-3))["axis error"]
     lean = reference.directions[::2]
     about_x = np.hypot(lean[:, 1], lean[:, 2])  # what lies along the axis of turning does not move
@@ -59,7 +59,7 @@ def test_a_turn_is_seen_in_full(reference):
     assert twist.key == "axis_error_deg"
 
 
-def test_cuts_are_told_from_rapids(reference):
+def test_tracking_separates_cuts_from_rapids(reference):
     t = tracking(reference)
     # `placed` is a rapid, then a cut; the motion is slow at both ends and never stops between.
     assert not t.cutting[0]

@@ -15,8 +15,8 @@ from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.families.as_built_forward import as_built_pose
 from pentapod.kinematics.forces import leg_force_map
 from pentapod.program import Program
-from pentapod.simulate import Reference, cutting_forces, mujoco_engine, plant, simulate_mujoco
-from pentapod.simulate.load import leg_loads
+from pentapod.simulate import Reference, cutting_forces, load_mujoco, plant, simulate_mujoco
+from pentapod.simulate.forces import leg_loads
 
 sys.path.append(str(Path(__file__).parents[1] / "program"))
 from short_motion import motion
@@ -42,7 +42,7 @@ def off(physics, reference):
 
 
 @pytest.mark.parametrize(("duration", "interpolation"), [(1.2, "cubic"), (1.2, "linear"), (3.0, "cubic")])
-def test_nominal_programs_track(duration, interpolation):
+def test_mujoco_tracks_nominal_programs(duration, interpolation):
     """Loops closed by constraints, driven by forces, under gravity: 20 µm and 0.1 mrad are asked."""
     reference = reference_of(duration, interpolation)
     physics = play(reference)
@@ -54,7 +54,7 @@ def test_nominal_programs_track(duration, interpolation):
 
 
 @pytest.mark.parametrize("leg", range(5))
-def test_a_millimetre_at_a_base_joint_shows(leg):
+def test_mujoco_shows_a_base_joint_off_by_a_millimetre(leg):
     """Along its leg, where it counts in full; and our own forward kinematics as built says what MuJoCo finds."""
     reference = reference_of(0.8)
     machine, program = reference.machine, reference.program
@@ -72,13 +72,13 @@ def test_a_millimetre_at_a_base_joint_shows(leg):
     assert np.linalg.norm(physics.played.tips[::50] - tips, axis=1).max() <= 20e-6
 
 
-def test_a_millimetre_along_the_tool_shows():
+def test_mujoco_shows_a_platform_joint_off_by_a_millimetre():
     reference = reference_of(0.8)
     tip, _ = off(play(reference, offset_errors=[0.0, 1e-3, 0.0, 0.0, 0.0]), reference)
     assert tip.max() >= 0.5e-3
 
 
-def test_the_load_feeds_the_energy_of_the_bodies():
+def test_leg_loads_equal_the_power_of_the_bodies():
     """What the drives give beside their own inertia is what MuJoCo's bodies gain on the way, at all times.
 
     Energies of rigid bodies, their masses and inertias taken from the compiled model; virtual work knows none of them.
@@ -112,7 +112,7 @@ def test_the_load_feeds_the_energy_of_the_bodies():
     np.testing.assert_allclose(given, power, atol=2e-3 * np.abs(given).max())
 
 
-def test_the_load_fed_forward_lowers_the_error():
+def test_load_feedforward_lowers_the_error():
     errors = []
     for share in (0.0, 1.0):
         reference = reference_of(1.2)
@@ -143,7 +143,7 @@ def test_leg_forces_are_those_of_statics():
     np.testing.assert_allclose(physics.played.forces[-1], physics.leg_forces[-1], rtol=1e-3, atol=0.05)
 
 
-def test_without_loads_a_still_machine_carries_its_weight_alone():
+def test_leg_forces_at_rest_carry_the_weight_alone():
     weightless, heavy = (play(still(**m)) for m in ({"gravity": np.zeros(3)}, {}))
     assert np.abs(weightless.leg_forces[-1]).max() < 1e-3
     # The base is above, +z down: the five legs' pull along z is the weight of the platform and part of the legs'.
@@ -155,7 +155,7 @@ def test_without_loads_a_still_machine_carries_its_weight_alone():
     assert 3.0 * 9.81 < pull < (3.0 + 5 * 2.2) * 9.81
 
 
-def test_a_cutting_force_bends_the_way():
+def test_cutting_force_displaces_the_tip():
     reference = reference_of(1.2)
     forces = cutting_forces(reference, np.ones(len(reference.program.legs), dtype=bool), 60.0)
     speed = np.linalg.norm(np.gradient(reference.tips[::2], 1e-3, axis=0), axis=1)
@@ -168,7 +168,7 @@ def test_a_cutting_force_bends_the_way():
         cutting_forces(reference, np.ones(len(forces), dtype=bool), -1.0)
 
 
-def test_the_model_is_the_machine():
+def test_mjcf_model_has_the_geometry_of_the_machine():
     reference = reference_of(0.3)
     stands = plant(reference)
     model = mujoco.MjModel.from_xml_string(stands.xml)
@@ -189,7 +189,7 @@ def test_the_model_is_the_machine():
     assert (model.nv, model.neq) == (21, 5)
 
 
-def test_any_way_up():
+def test_mjcf_model_of_a_flipped_tool_tracks():
     """A machine whose tool points towards its own base plane's other side: the turn from z is half a turn."""
     reference = reference_of(0.3)
     program, machine = reference.program, reference.machine
@@ -205,7 +205,7 @@ def test_any_way_up():
     assert axis.max() < 1e-4
 
 
-def test_strokes_end_at_stops():
+def test_mjcf_slides_end_at_stops():
     """A program beyond the longest leg runs against the stop, and does not get there."""
     reference = reference_of(0.4)
     limits = replace(reference.machine.legs, max_length=float(reference.program.legs.max()) - 2e-3)
@@ -215,14 +215,14 @@ def test_strokes_end_at_stops():
     assert off(physics, short)[0].max() > 1e-3
 
 
-def test_errors_too_large_are_refused():
+def test_plant_with_errors_too_large_is_refused():
     reference = reference_of(0.3)
     found = plant(reference, base_errors=np.array([[0.9, 0, 0], [-0.9, 0, 0], [0, 0.9, 0], [0, 0, 0], [0, 0, 0]]))
     assert isinstance(found, Refusal)
-    assert "no pose" in str(found)
+    assert "no proven pose" in str(found)
 
 
-def test_bodies_that_fly_apart_are_refused(tmp_path, monkeypatch):
+def test_mujoco_divergence_is_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     reference = reference_of(0.3)
     wild = replace(reference.machine, drives=replace(reference.machine.drives, position_gain=1e5))
@@ -232,7 +232,7 @@ def test_bodies_that_fly_apart_are_refused(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_bad_input():
+def test_mujoco_bad_input_is_named():
     reference = reference_of(0.3)
     with pytest.raises(ArrayError, match="tip_forces"):
         play(reference, tip_forces=np.zeros((7, 3)))
@@ -240,7 +240,7 @@ def test_bad_input():
         plant(reference, base_errors=np.zeros((4, 3)))
 
 
-def test_without_mujoco_one_line_says_what_to_do(monkeypatch):
+def test_missing_mujoco_is_an_error_with_the_remedy(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(InputError, match=r'pip install "pentapod\[sim\]"'):
-        mujoco_engine.load_mujoco()
+        load_mujoco()

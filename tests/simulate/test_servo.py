@@ -25,7 +25,7 @@ from short_motion import motion
 
 
 @pytest.mark.parametrize(("delay", "shares"), [(0, (1.0, 1.0)), (2, (1.0, 1.0)), (3, (0.0, 0.0)), (1, (0.7, 0.4))])
-def test_sampled_drive_is_the_discrete_linear_system(delay, shares):
+def test_servo_equals_the_discrete_linear_system(delay, shares):
     gains = np.array([[80, 60, 90, 70, 100.0], [600, 500, 700, 650, 550.0], [50, 30, 0, 80, 120.0]])
     dt = 1.25e-4
     drives = LINEAR | {"dead_time": delay * dt, "period": dt}
@@ -59,7 +59,7 @@ def test_sampled_drive_is_the_discrete_linear_system(delay, shares):
         np.testing.assert_allclose(result.legs[:, leg], start + y[::8, 0], atol=1e-12, rtol=0)
 
 
-def test_fine_sampling_comes_to_the_continuous_drive():
+def test_servo_with_fine_sampling_converges_to_the_continuous_drive():
     """A loop sampled ever faster is the drive of the textbook, to first order in the period."""
     off = []
     for period in (5e-5, 2.5e-5):
@@ -78,7 +78,7 @@ def test_fine_sampling_comes_to_the_continuous_drive():
     assert off[0] / off[1] == pytest.approx(2.0, abs=0.1)
 
 
-def test_a_leg_that_stands_gives_way_to_the_ripple():
+def test_servo_at_rest_gives_way_to_the_ripple():
     program, machine = motion(0.3)
     still = Program(1e-3, np.tile(program.legs[:1], (400, 1)), "linear", COMPONENTS[0], program.placement,
                     program.provenance)  # fmt: skip
@@ -99,7 +99,7 @@ def test_a_leg_that_stands_gives_way_to_the_ripple():
         np.testing.assert_allclose(result.legs[-1, leg], x, atol=1e-12, rtol=0)
 
 
-def test_encoders_hold_within_a_few_steps():
+def test_servo_encoder_steps_stay_within_a_few_steps():
     result, reference = played(0.6, **(LINEAR | {"encoder_step": 1e-6}))
     smooth, _ = played(0.6, **LINEAR)
     off = np.abs(result.legs - smooth.legs).max()
@@ -107,7 +107,7 @@ def test_encoders_hold_within_a_few_steps():
     assert np.abs(smooth.legs - reference.program.legs).max() < 3e-5
 
 
-def test_the_seed_decides():
+def test_servo_seed_decides_the_ripple():
     same, other = (played(0.3, seed=3)[0] for _ in range(2)), played(0.3, seed=4)[0]
     first, second = same
     assert first.legs.tobytes() == second.legs.tobytes()
@@ -116,7 +116,7 @@ def test_the_seed_decides():
         played(0.3, seed=-1)
 
 
-def test_compiled_loops_do_what_python_does():
+def test_servo_compiled_loop_equals_python():
     code = (
         f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
         "from servo_runs import played\n"
@@ -129,14 +129,14 @@ def test_compiled_loops_do_what_python_does():
         np.testing.assert_allclose(found, played(0.2, correct=correct)[0].legs[::40], atol=1e-9, rtol=0)
 
 
-def test_loops_that_run_away_are_refused():
+def test_servo_unstable_loops_are_refused():
     result, _ = played(0.5, dead_time=0.02)
     assert isinstance(result, Refusal)
     assert "run away" in str(result)
     assert "[drives]" in str(result)
 
 
-def test_programs_without_a_pose_are_bad_input():
+def test_reference_without_a_pose_is_bad_input():
     program, machine = motion(0.2)
     legs = program.legs.copy()
     legs[50, 2] *= 3.0
@@ -158,7 +158,7 @@ def test_contour_errors_are_distances_to_the_curve():
     assert angle.max() == 0.0
 
 
-def test_a_neighbouring_pass_does_not_count():
+def test_contour_errors_ignore_a_neighbouring_pass():
     there = np.c_[np.linspace(0, 1, 101), np.zeros(101), np.zeros(101)]
     aside = np.array([0, 0.01, 0])
     path = np.concatenate([there, there[::-1] + aside])
@@ -168,7 +168,7 @@ def test_a_neighbouring_pass_does_not_count():
     np.testing.assert_allclose(distance, 0.009, atol=1e-12)
 
 
-def test_reference_is_the_program():
+def test_reference_interpolates_the_program():
     for interpolation in ("linear", "cubic"):
         program, machine = motion(1.2, interpolation)
         lengths, rates, accelerations = Reference(program, machine).at(4)

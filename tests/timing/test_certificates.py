@@ -30,7 +30,7 @@ def shares(uses):
     return {use.quantity: use for use in uses}
 
 
-def test_a_jerk_beyond_its_limit_says_why():
+def test_limit_use_above_the_jerk_limit_says_why():
     use = LimitUse("leg jerk", 207.4, 200.0, "m/s³", 4, 8.387, 0.2, 7, LegJerk.above)
     assert str(use).startswith("leg jerk 103.70 % (leg 4: 207.4 of 200 m/s³) at 8.387 s, segment 7: the spline")
     assert str(replace(use, value=199.0)).endswith("segment 7")
@@ -38,7 +38,7 @@ def test_a_jerk_beyond_its_limit_says_why():
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
-def test_uses_are_those_of_the_spline(interpolation):
+def test_limit_uses_are_extrema_of_the_interpolation(interpolation):
     m = machine(interpolation=interpolation)
     trajectory = timed(raster(lines=3, feed=0.2), m)
     tool = {"max_tip_acceleration": 2.0, "max_tip_jerk": 70.0, "max_axis_velocity": 3.0, "max_axis_acceleration": 9.0}
@@ -68,7 +68,7 @@ def test_uses_are_those_of_the_spline(interpolation):
     assert "segment 0" in str(found["feed"])
 
 
-def test_the_tip_itself_is_judged_where_it_is_given():
+def test_certified_feed_is_that_of_the_given_tips():
     """Tips on a circle, started at once: the spline overshoots between the first rows, to the maximum of a quartic."""
     m = machine(interpolation="cubic")
     trajectory = timed(straight([0.1, 0, 0, 0, 0], 0.05, 0.1), m)
@@ -117,7 +117,7 @@ def test_a_spot_is_judged_where_the_motion_begins_at_a_speed():
     assert found.value == pytest.approx(speeds.max(), rel=1e-3)
 
 
-def test_place_and_leg_are_named():
+def test_limit_use_names_place_and_leg():
     """Leg 4 is the one that moves most, and the second section is the fast one."""
     m = machine(a=50.0)
     sections = [(0.05, 0.05, SegmentKind.CUT, 7), (0.1, 0.2, SegmentKind.CUT, 8)]
@@ -130,7 +130,7 @@ def test_place_and_leg_are_named():
     assert set(found) == {"leg velocity", "leg acceleration", "leg jerk", "feed"}
 
 
-def test_a_program_that_exceeds_says_where():
+def test_limit_use_beyond_the_limit_says_where():
     m = machine()
     trajectory = timed(leaning(), m)
     legs = trajectory(np.arange(round(trajectory.duration / 1e-3) + 1) * 1e-3)
@@ -139,3 +139,14 @@ def test_a_program_that_exceeds_says_where():
     assert found["leg acceleration"].share > 20.0
     assert found["leg acceleration"].leg == 3
     assert found["leg acceleration"].time == pytest.approx(0.04)
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+def test_certified_feed_of_two_pieces_that_end_at_a_speed_is_the_feed(interpolation):
+    """The setpoints that continue the last piece follow on its stations along the whole path."""
+    m = machine(interpolation=interpolation)
+    first = straight([0.5, 0.2, 0, 0, 0], 0.05, 0.1)
+    second = straight([0.5, 0.2, 0, 0, 0], 0.05, 0.1, start=first(np.array([0.05]))[0])
+    trajectory = retime(Path((first, second)), m, end_speed=0.05)
+    assert isinstance(trajectory, Trajectory), str(trajectory)
+    assert 0.99 < shares(certify(trajectory, m))["feed"].share < 1.0

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from timing_paths import Path, machine, raster, straight
 
-from pentapod.timing import Trajectory, certify, explain, override, retime, unheld
-from pentapod.timing.explain import STANDING
+from pentapod.timing import Trajectory, certify, explain, override, retime, slow_cuts
+from pentapod.timing.explain import STANDSTILL
 
 PERIOD = 1e-3
 DWELLS = (0.2, 0.1504, 0.3)
@@ -29,7 +29,7 @@ def case(request):
     return m, timed(m, (0.0,) * 3), timed(m)
 
 
-def test_stands_as_long_as_asked_and_moves_as_before(case):
+def test_dwell_stands_as_long_as_asked_and_changes_no_motion(case):
     m, free, standing = case
     np.testing.assert_allclose(standing.dwells, [0.2, 0.151, 0.3], atol=1e-12)
     assert standing.duration == pytest.approx(free.duration + 0.651, abs=1e-9)
@@ -39,8 +39,8 @@ def test_stands_as_long_as_asked_and_moves_as_before(case):
     for begin, seconds in zip(np.append(0.0, standing.starts[1:] - standing.dwells[1:]), standing.dwells, strict=True):
         rows = slice(round(begin / PERIOD), round((begin + seconds) / PERIOD))
         assert still[rows].all()
-        assert standing.standing(t[rows]).all()
-    assert standing.standing(t).sum() == round(0.651 / PERIOD) + 1  # and the last moment
+        assert standing.dwelling(t[rows]).all()
+    assert standing.dwelling(t).sum() == round(0.651 / PERIOD) + 1  # and the last moment
     moved = np.arange(round(free.starts[1] / PERIOD) + 1) * PERIOD
     # A cubic controller's spline feels a start out of standing, and easing answers to that.
     away = 1e-12 if m.controller.interpolation == "linear" else 1e-4
@@ -51,18 +51,18 @@ def test_stands_as_long_as_asked_and_moves_as_before(case):
     assert shares["leg jerk"] <= 1.05
 
 
-def test_dwells_are_told_and_are_no_slow_cut(case):
+def test_dwells_are_explained_and_are_no_slow_cut(case):
     m, free, standing = case
     told = explain(standing, m)
     assert told.duration == pytest.approx(standing.duration)
     assert told.lower_bound == pytest.approx(explain(free, m).lower_bound)
-    stood = {cause.name: cause for cause in told.causes}[STANDING]
+    stood = {cause.name: cause for cause in told.causes}[STANDSTILL]
     assert stood.time == stood.cost == pytest.approx(0.651)
-    slow = [sum(u.seconds for u in unheld(trajectory, PERIOD)) for trajectory in (free, standing)]
+    slow = [sum(u.seconds for u in slow_cuts(trajectory, PERIOD)) for trajectory in (free, standing)]
     assert slow[1] == pytest.approx(slow[0], abs=6 * PERIOD)
 
 
-def test_dwells_about_a_piece_of_no_length_add_up():
+def test_dwells_around_a_piece_of_no_length_add_up():
     first, _ = pieces()
     end = first(np.array([first.length]))[0]
     spot = straight(np.zeros(5), 0.0, start=end)

@@ -18,7 +18,7 @@ def timed(path, m, **options):
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
-def test_times_and_costs_add_up(interpolation):
+def test_explained_times_and_costs_add_up(interpolation):
     m = machine(interpolation=interpolation)
     trajectory = timed(Path((raster(lines=4, feed=0.2), straight([0.5, 0, 0, 0, 0.2], 0.02, start=raster_end()))), m)
     story = explain(trajectory, m)
@@ -36,7 +36,7 @@ def raster_end():
     return piece(np.array([piece.length]))[0]
 
 
-def test_lower_bound_against_quadrature():
+def test_explained_lower_bound_against_quadrature():
     m = machine(v=0.05)
     knots = tuple(np.linspace(0, 0.05, 52)[1:-1])
     piece = Piece(by_tip(line(), nodding(0.02, 0.3)), 0.05, 0.03, inner_knots=knots)
@@ -49,7 +49,7 @@ def test_lower_bound_against_quadrature():
     assert explain(trajectory, m).lower_bound == pytest.approx(expected, rel=2e-4)
 
 
-def test_a_slow_leg_is_named_where_it_is_slow():
+def test_explanation_names_a_slow_leg_and_its_places():
     """Leg 3 alone moves in segments 4 and 6, and speeds up and slows down there; segment 5 is slow by its feed."""
     sections = [(0.1, 0.3, SegmentKind.CUT, 4), (0.12, 0.001, SegmentKind.LINK, 5), (0.22, 0.3, SegmentKind.CUT, 6)]
     m = machine(v=9.0, a=0.5)
@@ -62,13 +62,15 @@ def test_a_slow_leg_is_named_where_it_is_slow():
     assert sum(place.cost for place in told) > 0.95 * story.gap
     assert {segment for place in told for segment in place.segments} >= {4, 6}
     assert all(place.stations[1] <= 0.1 + 1e-3 or place.stations[0] >= 0.12 - 1e-3 for place in told)
-    assert str(told[0]).startswith("leg 3's acceleration costs ")
-    assert "in segment" in str(told[0])
+    assert str(told[0]).startswith("leg 3 acceleration: ")
+    assert " s lost in segment" in str(told[0])
+    assert "feed-limited for 19.9" in str(story) or "feed-limited for 20" in str(story)
+    assert str(costs["feed"]).endswith(f"; without this limit at most {costs['feed'].cost:.3g} s shorter")
     # By hand: from rest to 0.3 m/s and down to 0.001, twice, each time v²/2a at half the speed.
     assert story.gap == pytest.approx(4 * 0.5 * 0.3 / 0.5, rel=0.03)
 
 
-def test_neighbouring_places_are_one_and_far_ones_are_not():
+def test_explanation_combines_neighbouring_places_only():
     """Turns of a raster: each turn is a place of its own; the segment is the same."""
     m = machine()
     trajectory = timed(Path((raster(lines=4, width=0.08, feed=0.3),)), m)
@@ -80,7 +82,7 @@ def test_neighbouring_places_are_one_and_far_ones_are_not():
     assert starts[-1] - starts[0] > 0.1
 
 
-def test_the_value_is_ready_for_a_report():
+def test_explanation_is_json_for_a_report():
     m = machine()
     trajectory = timed(Path((raster(lines=3, feed=0.1),)), m)
     story = explain(trajectory, m, certify(trajectory, m))

@@ -36,7 +36,7 @@ def limited(legs, interpolation):
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
 @pytest.mark.parametrize("legs", [3, 5, 6])
-def test_rates_accelerations_and_jerks_hold(legs, interpolation):
+def test_limits_of_any_number_of_legs_hold(legs, interpolation):
     m, path = limited(legs, interpolation), Path((waving(legs),))
     trajectory = retime(path, m)
     assert isinstance(trajectory, Trajectory), str(trajectory)

@@ -68,7 +68,7 @@ def test_one_leg_straight_takes_the_time_of_the_trapezoid(length, slope):
     assert np.abs(trajectory(np.linspace(0, trajectory.duration, 999), 1)).max() <= top
 
 
-def test_the_slowest_leg_sets_the_pace():
+def test_retime_is_limited_by_the_slowest_leg():
     m = machine(v=[0.5, 0.4, 0.3, 0.2, 0.1], a=[5, 4, 3, 2, 1], rapid=99.0, period=FINE)
     trajectory = timed(Path((straight([0.1, 0.1, 0.1, 0.1, 0.1], 0.5),)), m, **TIGHT)
     assert trajectory.duration == pytest.approx(0.05 / 0.1 + 0.1 / 1, rel=6e-4)
@@ -224,7 +224,7 @@ def test_duration_agrees_with_plain_integration(name):
 
 
 @pytest.mark.parametrize("name", PATHS)
-def test_backwards_takes_as_long(name):
+def test_retime_of_a_reversed_path_takes_as_long(name):
     piece = PATHS[name]()
     m = machine(period=FINE)
 
@@ -239,7 +239,7 @@ def test_backwards_takes_as_long(name):
 
 @settings(max_examples=12, deadline=None)
 @given(k=st.floats(0.05, 20.0))
-def test_units_do_not_matter(k):
+def test_retime_does_not_depend_on_units(k):
     """Lengths times k take as long when every limit is times k."""
     piece = nod()
 
@@ -255,14 +255,14 @@ def test_units_do_not_matter(k):
 
 @settings(max_examples=12, deadline=None)
 @given(k=st.floats(0.3, 3.0))
-def test_time_scales_out(k):
+def test_retime_scales_with_time(k):
     """Velocities times k and accelerations times k² take 1/k of the time."""
     slow = timed(Path((nod(),)), machine(period=FINE))
     fast = timed(Path((nod(feed=0.2 * k),)), machine(v=0.5 * k, a=5 * k * k, rapid=0.3 * k, period=FINE / k))
     assert fast.duration * k == pytest.approx(slow.duration, rel=1e-3)
 
 
-def test_higher_limits_are_never_slower():
+def test_retime_with_higher_limits_is_never_slower():
     durations = [timed(Path((nod(),)), machine(a=a, period=FINE)).duration for a in (2.0, 4.0, 8.0, 16.0)]
     assert durations == sorted(durations, reverse=True)
 
@@ -304,14 +304,14 @@ def test_profile_is_ordered_and_named():
     assert p.shares.max() < 1.001
 
 
-def test_same_input_same_bits():
+def test_retime_same_input_same_bits():
     one, two = (timed(Path((raster(),)), machine()) for _ in range(2))
     t = np.linspace(0, one.duration, 1000)
     assert one.duration == two.duration
     assert np.array_equal(one(t), two(t))
 
 
-def test_progress_ends_at_one():
+def test_retime_progress_ends_at_one():
     seen = []
     timed(Path((nod(), nod_after(nod()))), machine(), progress=lambda stage, f, note="": seen.append((stage, f)))
     assert [s for s, _ in seen] == ["timing"] * 2
@@ -384,7 +384,7 @@ def test_a_failing_solver_is_a_refusal_that_names_the_gridpoint(monkeypatch):
 
 
 @pytest.mark.parametrize("margin", [0.0, -0.1, 0.5, np.nan])
-def test_margins_are_fractions(margin):
+def test_retime_margins_are_fractions(margin):
     with pytest.raises(InputError, match="margin"):
         retime(Path((nod(),)), machine(), velocity_margin=margin)
 
@@ -400,7 +400,7 @@ def test_corners_have_four_stages_from_knot_to_knot():
     assert counts[turns].min() >= 4
 
 
-def test_margin_leaves_room():
+def test_retime_margin_leaves_room():
     m = machine()
     trajectory = timed(Path((nod(),)), m, velocity_margin=0.1, acceleration_margin=0.2)
     v, a = used(trajectory, m)
@@ -408,7 +408,7 @@ def test_margin_leaves_room():
     assert 0.78 < a < 0.95
 
 
-def test_namespace_machine_is_enough():
+def test_retime_asks_a_machine_for_four_attributes_only():
     """Timing asks a machine for the limits of legs and tool, its rapid rate and its controller, and nothing else."""
     m = machine()
     assert isinstance(m, SimpleNamespace)

@@ -28,7 +28,7 @@ def motion(s, q, engine="core", period=1e-3, velocity=0.8, acceleration=5.0) -> 
 
 @given(st.integers(4, 60), st.integers(1, 7), st.integers(0, 10**6), st.sampled_from([1e-6, 1.0, 1e4]))
 @settings(max_examples=60, deadline=None)
-def test_samples_are_on_scipys_spline(count, columns, seed, scale):
+def test_waypoint_samples_are_on_scipys_spline(count, columns, seed, scale):
     rng = np.random.default_rng(seed)
     s = scale * np.cumsum(rng.uniform(0.1, 2.0, count))
     q = scale * rng.normal(size=(count, columns))
@@ -48,7 +48,7 @@ def test_four_waypoints_are_one_cubic():
     assert np.allclose(found.rows[:, 0], at**3 - 2 * at, rtol=0, atol=1e-14)
 
 
-def test_limits_hold_and_one_is_used_everywhere():
+def test_waypoint_motion_keeps_the_limits_and_uses_one_everywhere():
     s, q = waves(800)
     velocity, acceleration = np.array([0.4, 0.6, 0.5]), np.array([3.0, 4.0, 5.0])
     found = motion(s, q, velocity=velocity, acceleration=acceleration)
@@ -66,13 +66,13 @@ def test_limits_hold_and_one_is_used_everywhere():
     assert np.quantile(used, 0.05) > 0.99
 
 
-def test_engines_agree():
+def test_waypoint_motions_of_both_engines_agree():
     s, q = waves(500)
     core, peer = (motion(s, q, engine) for engine in ("core", "toppra"))
     assert peer.law.duration == pytest.approx(core.law.duration, rel=1e-5)
 
 
-def test_duration_is_that_of_toppras_own_chain():
+def test_waypoint_motion_lasts_as_long_as_by_toppra():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         toppra = pytest.importorskip("toppra")
@@ -114,7 +114,7 @@ def test_waypoints_that_do_not_move_are_refused():
         {"engine": "fast"},
     ],
 )
-def test_bad_input_is_said(changes):
+def test_waypoints_bad_input_is_named(changes):
     usual = {
         "stations": [0.0, 1.0, 2.0, 3.0],
         "waypoints": [[0.0], [1.0], [3.0], [2.0]],

@@ -28,7 +28,7 @@ from pentapod.planning.plan import PlacementOptions, fits
 from pentapod.planning.problem.constraints import FREE
 from pentapod.planning.setups import setups
 from pentapod.program import Program, Provenance, sample, write_csv
-from pentapod.timing import Explanation, Limit, Trajectory, certify, explain, retime, unheld
+from pentapod.timing import Explanation, Limit, Trajectory, certify, explain, retime, slow_cuts
 from pentapod.toolpath import Mesh, Toolpath
 from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.linking.partition import Piece, missed_cuts, part_of
@@ -247,7 +247,7 @@ class _Task:
         tips = position + self.machine.tool_length * direction
         # A beam or a spray needs constant speed on the surface; a cutter only has an upper bound.
         beam, period = self.toolpath.tilt_centre < 0.0, self.machine.controller.period
-        slow = unheld(trajectory, period, path.surface_rate) if beam else ()
+        slow = slow_cuts(trajectory, period, path.surface_rate) if beam else ()
         spot = self.toolpath.tilt_centre if beam else 0.0
         uses = certify(trajectory, self.machine, legs=program.legs, tips=tips, axes=-direction, spot=spot)
         return explain(trajectory, self.machine, uses, slow)

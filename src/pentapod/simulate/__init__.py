@@ -1,12 +1,10 @@
-"""Simulation: what a machine with real drives, or with masses and forces, makes of a program."""
+"""Simulation: tracking of a program by a machine with servo drives, or with masses and forces."""
 
-from pentapod.simulate.contour import contour_errors
-from pentapod.simulate.cutting import cutting_forces
-from pentapod.simulate.measures import Measure, Tracking
+from pentapod.simulate.forces import cutting_forces
+from pentapod.simulate.measures import Measure, Tracking, contour_errors
 from pentapod.simulate.mjcf import mjcf
 from pentapod.simulate.mujoco_engine import Physics, Plant, load_mujoco, plant, simulate_mujoco
-from pentapod.simulate.played import Played
-from pentapod.simulate.reference import Reference
+from pentapod.simulate.reference import Played, Reference
 from pentapod.simulate.servo import simulate_servo
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Bodies of the rigid-body model: capsules about legs and platform line, and what they weigh."""
+"""Bodies of the rigid-body model: capsules around legs and platform line, with their masses and inertias."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ from dataclasses import dataclass
 
 from pentapod.machine.machine import Machine
 
-_CYLINDER = 0.9  # the fixed part's share of the shortest leg
+CYLINDER_SHARE = 0.9
+"""Length of a leg's fixed part as a share of the shortest leg."""
+ROD_SHARE = 0.6
+"""Radius of a leg's moving part as a share of the leg's radius."""
 
 
 @dataclass(frozen=True)
 class Capsule:
-    """low, high: where on an axis its straight part begins and ends; radius, of the ends too. Metres, kilograms."""
+    """Capsule on an axis: a cylinder from low to high with half balls at its ends. Metres, kilograms."""
 
     low: float
     high: float
@@ -20,7 +23,7 @@ class Capsule:
 
     @property
     def inertia(self) -> float:
-        """About an axis across, through the middle, kg·m²: of a homogeneous cylinder with two half balls."""
+        """Transverse inertia about the middle, kg·m², of a homogeneous body."""
         length, r = self.high - self.low, self.radius
         cylinder, ball = length, 4.0 / 3.0 * r  # volumes over π r²
         of_cylinder = cylinder * (length**2 / 12.0 + r**2 / 4.0)
@@ -30,18 +33,18 @@ class Capsule:
 
 
 def leg_cylinder(machine: Machine, leg: int) -> Capsule:
-    """Return the fixed part of a leg; places are metres from the base joint."""
+    """Return the fixed part of a leg; positions from the base joint."""
     low = float(machine.legs.min_length[leg])
-    return Capsule(0.0, _CYLINDER * low, machine.bodies.leg_radius, machine.masses.cylinder)
+    return Capsule(0.0, CYLINDER_SHARE * low, machine.bodies.leg_radius, machine.masses.cylinder)
 
 
 def leg_rod(machine: Machine, leg: int) -> Capsule:
-    """Return the part that slides out of it; places are metres from the platform joint, towards the platform."""
+    """Return the part that slides out of it; positions from the platform joint, towards the platform."""
     low, high = float(machine.legs.min_length[leg]), float(machine.legs.max_length[leg])
-    return Capsule(_CYLINDER * low - high, 0.0, 0.6 * machine.bodies.leg_radius, machine.masses.rod)
+    return Capsule(CYLINDER_SHARE * low - high, 0.0, ROD_SHARE * machine.bodies.leg_radius, machine.masses.rod)
 
 
 def spindle(machine: Machine, top: float) -> Capsule:
-    """Return the spindle with all that it carries; places are offsets along the platform line, from `top` on."""
+    """Return spindle and tool holder; positions are offsets along the platform line, from `top` on."""
     end = machine.tool_length - machine.bodies.shaft_end
     return Capsule(top, end, machine.bodies.shaft_radius, machine.masses.platform)

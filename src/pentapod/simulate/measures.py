@@ -1,4 +1,4 @@
-"""Measures: how far a simulated machine was off, moment by moment."""
+"""Tracking errors of a simulated machine at each row of a program, contour errors among them."""
 
 from __future__ import annotations
 
@@ -8,18 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, frozen, set_frozen
+from pentapod.base.arrays import Bools, Floats, Ints, frozen, set_frozen
 from pentapod.base.values import Value
 from pentapod.geometry.directions import angle_between
-from pentapod.simulate.contour import contour_errors
-from pentapod.simulate.played import Played
-from pentapod.simulate.reference import Reference
+from pentapod.simulate.reference import Played, Reference
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 from pentapod.verify.replay.free_space import PosedPolyline
 from pentapod.verify.replay.path_matching import PathMatch, match
-
-_MM = 1e3
-_TIME_CONSTANTS = 3.0  # of the position loop: so much later than due the tool is looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +52,10 @@ class Measure(Value):
 
 @dataclass(frozen=True, eq=False)
 class Tracking(Value):
-    """A program as it was played, beside what it asks and the toolpath behind it.
+    """A simulated motion compared with its program and toolpath.
 
-    tolerance: metres, of the path; it tells the search how near to look. more: what else was measured.
+    tolerance: metres, of the path, for matching motion and toolpath. more: further measures. time_constants: how late
+    the tool may be, in time constants of the position loop, when its nearest point on the path is sought.
     """
 
     played: Played
@@ -67,13 +63,14 @@ class Tracking(Value):
     toolpath: Toolpath
     tolerance: float
     more: tuple[Measure, ...] = ()
+    time_constants: float = 3.0
 
     @cached_property
     def measures(self) -> tuple[Measure, ...]:
-        """Contour error, axis error, lag, and what the verdict would measure: deviation from the toolpath."""
+        """Contour errors, errors with lag, the deviation from the toolpath as the verdict measures it, leg errors."""
         played, reference = self.played, self.reference
         rows, drives = len(played.tips), reference.machine.drives
-        late = _TIME_CONSTANTS / float(drives.position_gain.min()) + drives.dead_time
+        late = self.time_constants / float(drives.position_gain.min()) + drives.dead_time
         window = 2 * max(4, round(late / reference.program.period))
         due = 2 * np.arange(rows)
         contour, turned = contour_errors(
@@ -82,17 +79,12 @@ class Tracking(Value):
         off = np.linalg.norm(played.tips - reference.tips[::2], axis=1)
         twist = angle_between(played.directions, reference.directions[::2])
         return (
-            Measure("contour error", "mm", _MM * contour, "tip to the programmed path, whenever it gets there"),
-            Measure("axis contour error", "deg", np.degrees(turned), "axis to the programmed one at that place"),
-            Measure("tip error", "mm", _MM * off, "tip to where it is due at that moment"),
-            Measure("axis error", "deg", np.degrees(twist), "axis to the one due at that moment"),
-            Measure(
-                "toolpath deviation",
-                "mm",
-                _MM * self._match.distances,
-                "tip (or tilt centre) to the toolpath, as verified",
-            ),
-            Measure("leg error", "mm", _MM * np.abs(played.legs - reference.program.legs).max(axis=1), "of any leg"),
+            Measure("contour error", "mm", 1e3 * contour, "tip to the programmed path, at any time"),
+            Measure("axis contour error", "deg", np.degrees(turned), "axis to the programmed one at that point"),
+            Measure("tip error", "mm", 1e3 * off, "tip to where it is due at that time"),
+            Measure("axis error", "deg", np.degrees(twist), "axis to the one due at that time"),
+            Measure("toolpath deviation", "mm", 1e3 * self._match.distances, "tip (or tilt centre) to the toolpath"),
+            Measure("leg error", "mm", 1e3 * np.abs(played.legs - reference.program.legs).max(axis=1), "of any leg"),
             *self.more,
         )
 
@@ -134,3 +126,29 @@ class Tracking(Value):
         axes = home.rotate(-self.played.directions)
         course = PosedPolyline(home.apply(self.played.tips) + self.toolpath.tilt_centre * axes, axes)
         return match(course, PosedPolyline(self.toolpath.tilt_centres, self.toolpath.axes), self.tolerance)
+
+
+def contour_errors(
+    tips: Floats, directions: Floats, path: Floats, path_directions: Floats, due: Ints, window: int
+) -> tuple[Floats, Floats]:
+    """Return contour errors: distances (N,), metres, from tips (N, 3) to a path (M, 3), and angles (N,), radians.
+
+    A tip is compared with the path's chords at most `window` before or after the sample due (N,) at its time, so that
+    neighbouring passes do not count. The angle is that between the directions (N, 3) and (M, 3) at the nearest point.
+    """
+    last = len(path) - 2
+    best, at = np.full(len(tips), np.inf), np.zeros(len(tips))
+    for shift in sorted(range(-window, window), key=abs, reverse=True):
+        k = np.clip(due + shift, 0, last)
+        step, offset = path[k + 1] - path[k], tips - path[k]
+        square = np.einsum("ij,ij->i", step, step)
+        along = np.clip(np.einsum("ij,ij->i", step, offset) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+        offset -= along[:, None] * step
+        distance = np.einsum("ij,ij->i", offset, offset)
+        # Where the tool stands several points are equally near: the one due counts, which comes last.
+        nearer = distance <= best
+        best, at = np.where(nearer, distance, best), np.where(nearer, k + along, at)
+    k = np.minimum(at.astype(np.intp), last)
+    f = (at - k)[:, None]
+    wanted = (1.0 - f) * path_directions[k] + f * path_directions[k + 1]
+    return np.sqrt(best), angle_between(directions, wanted)

@@ -1,4 +1,4 @@
-"""Rigid-body simulation: MuJoCo plays a program on the machine of `mjcf`, which shares no kinematics with ours."""
+"""Rigid-body simulation: MuJoCo plays a program on the model of `mjcf`, which shares no kinematics with pentapod."""
 
 from __future__ import annotations
 
@@ -17,24 +17,38 @@ from pentapod.base.values import Result
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.families.as_built_forward import as_built_pose
 from pentapod.kinematics.families.quadratic import as_quadratic
-from pentapod.simulate.load import leg_loads
+from pentapod.simulate.forces import leg_loads
 from pentapod.simulate.measures import Measure
 from pentapod.simulate.mjcf import mjcf
-from pentapod.simulate.played import Played
-from pentapod.simulate.reference import Reference
+from pentapod.simulate.reference import Played, Reference
 
-LONGEST_STEP_S = 5e-4
-_REST_S = 0.3  # so long the machine stands before the start, until the drives carry its weight
-_NEWS = 500  # rows between two reports of progress
+
+@dataclass(frozen=True)
+class PhysicsOptions:
+    """Options of the rigid-body simulation."""
+
+    longest_step: float = 5e-4
+    """Step in seconds at most; the controller's period is cut in equal steps."""
+    rest: float = 0.3
+    """Seconds at rest before the start, until the drives carry the weight."""
+    report_rows: int = 500
+    """Rows between two reports of progress."""
+
+    def steps(self, period: float) -> int:
+        """Return the steps in a period."""
+        return max(1, int(np.ceil(period / self.longest_step - 1e-9)))
+
+
+DEFAULTS = PhysicsOptions()
 
 
 @dataclass(frozen=True, eq=False)
 class Physics(Result):
     """A program as MuJoCo played it.
 
-    leg_forces (N, n): with which each leg pushes its platform joint away from its base joint, newtons: what bends and
-    buckles a leg; the drives' forces (`played.forces`) have to speed up motor and screw as well. closure (N,): the
-    largest gap of a loop that should be closed, metres: it tells how rigid the simulated joints are.
+    leg_forces (N, n): axial forces of the legs on the platform joints, newtons, a push is positive; the drives' forces
+    (`played.forces`) also accelerate motor and screw. closure (N,): the largest gap of the closed loops, metres, a
+    measure of how rigid the simulated joints are.
     """
 
     played: Played
@@ -50,7 +64,7 @@ class Physics(Result):
 
     @property
     def measures(self) -> tuple[Measure, ...]:
-        """What it measures beside the tool's errors."""
+        """Measures beside the tool's errors."""
         return (
             Measure("closure error", "mm", 1e3 * self.closure, "largest gap of the five loops"),
             Measure("leg force", "N", np.abs(self.leg_forces).max(axis=1), "push or pull of any leg"),
@@ -59,7 +73,7 @@ class Physics(Result):
 
 @dataclass(frozen=True, eq=False)
 class Plant(Result):
-    """The machine that stands there, at the start of a program. xml: as MJCF, standing at position, direction (3,)."""
+    """The machine as built at the start of a program. xml: as MJCF; position, direction (3,): its pose."""
 
     xml: str
     position: Floats
@@ -72,49 +86,46 @@ def load_mujoco() -> Any:
 
 
 def plant(reference: Reference, *, base_errors: ArrayLike = 0.0, offset_errors: ArrayLike = 0.0) -> Plant | Refusal:
-    """Return the machine as MJCF, its legs as long as the program's first row says; MuJoCo itself is not needed.
+    """Return the machine as MJCF, with the leg lengths of the program's first row; MuJoCo itself is not needed.
 
-    base_errors (n, 3) and offset_errors (n,): metres by which the real joints are off the machine file, or one number
-    for all. A Refusal says that the real machine has no pose there that can be trusted.
+    base_errors (n, 3) and offset_errors (n,): deviations of the real joints from the machine file, metres, or one
+    number for all. A Refusal says that the real machine has no proven pose there.
     """
     program, machine = reference.program, reference.machine
     robot = as_quadratic(machine.robot, "the rigid-body model")
     real = AsBuiltPentapod.of(robot, base_errors=base_errors, offset_errors=offset_errors)
     start = as_built_pose(real, robot, program.legs[0], program.component)
     if not start.proven:
-        return Refusal(
-            "simulation",
-            "the machine with these errors has no pose at the program's start that is sure to be the right",
-        )
-    step = program.period / _parts(program.period)
+        return Refusal("simulation", "the machine with these errors has no proven pose at the program's start")
+    step = program.period / DEFAULTS.steps(program.period)
     xml = mjcf(machine, real, start.position, start.direction, step=step)
     return Plant(xml, start.position, start.direction)
 
 
 @stage
 def simulate_mujoco(
-    reference: Reference, stands: Plant, *, tip_forces: ArrayLike = 0.0, progress: Progress = silent
+    reference: Reference, as_built: Plant, *, tip_forces: ArrayLike = 0.0, progress: Progress = silent
 ) -> Physics | Refusal:
-    """Return how MuJoCo plays a program on a machine.
+    """Return the motion of a machine in MuJoCo that plays a program.
 
-    tip_forces (N, 3), or one for all rows: newtons on the tip, machine frame. A Refusal says that the simulation broke
-    down. Raises InputError where MuJoCo is missing, ArrayError for forces of a wrong shape.
+    tip_forces (N, 3), or one for all rows: newtons on the tip, machine frame. A Refusal says that the simulation
+    diverged. Raises InputError where MuJoCo is missing, ArrayError for forces of a wrong shape.
     """
     mujoco = load_mujoco()
-    mujoco.set_mju_user_warning(_quiet)  # it would write a file into the folder it is called from
+    # MuJoCo would write warnings to a file in the working folder; it counts them too, and they become a refusal.
+    mujoco.set_mju_user_warning(lambda _warning: None)
     try:
-        return _run(mujoco, reference, stands, tip_forces, progress)
+        return _run(mujoco, reference, as_built, tip_forces, progress)
     finally:
         mujoco.set_mju_user_warning(None)
 
 
 def _run(
-    mujoco: Any, reference: Reference, stands: Plant, tip_forces: ArrayLike, progress: Progress
+    mujoco: Any, reference: Reference, as_built: Plant, tip_forces: ArrayLike, progress: Progress
 ) -> Physics | Refusal:
     program, machine = reference.program, reference.machine
-    (rows, legs), parts = program.legs.shape, _parts(program.period)
-    still = np.zeros(legs)
-    model = mujoco.MjModel.from_xml_string(stands.xml)
+    (rows, legs), parts = program.legs.shape, DEFAULTS.steps(program.period)
+    model = mujoco.MjModel.from_xml_string(as_built.xml)
     data = mujoco.MjData(model)
     try:
         force = np.broadcast_to(np.asarray(tip_forces, dtype=np.float64), (rows, 3))
@@ -123,88 +134,95 @@ def _run(
     body = model.body("platform").id
     lever = (machine.tool_length - model.body_ipos[body][2]) * reference.directions[::2]
     wrench = np.concatenate([force, np.cross(lever, force)], axis=1)
-    wanted = _wanted(reference, parts)
+    commands, at_rest = _commands(reference, parts), np.zeros(legs)
     drives = _Drives(reference, model, data)
+
+    def diverged() -> bool:
+        bad = data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number or not np.isfinite(data.qpos).all()
+        return bool(bad)
+
     data.xfrc_applied[body] = wrench[0]
-    for _ in range(int(np.ceil(_REST_S / model.opt.timestep))):
-        drives.tell(program.legs[0], still, still, wanted[3][0])
+    for _ in range(int(np.ceil(DEFAULTS.rest / model.opt.timestep))):
+        drives.set(program.legs[0], at_rest, at_rest, commands[3][0])
         mujoco.mj_step(model, data)
-    sites = [model.site(name).id for name in _sites(legs)]
-    places, axes = np.empty((rows, len(sites), 3)), np.empty((rows, 3))
-    lengths, pushes, loops = np.empty((rows, legs)), np.empty((rows, legs)), np.empty((rows, 3 * legs))
+    numbers = range(1, legs + 1)
+    names = ("tip", *(f"rod{leg}" for leg in numbers), *(f"platform{leg}" for leg in numbers))
+    sites = [model.site(name).id for name in names]
+    positions, axes = np.empty((rows, len(sites), 3)), np.empty((rows, 3))
+    lengths, drive_forces, loop_forces = np.empty((rows, legs)), np.empty((rows, legs)), np.empty((rows, 3 * legs))
     for row in range(rows):
         if row:
             data.xfrc_applied[body] = wrench[row - 1]
             for part in range((row - 1) * parts, row * parts):
-                drives.tell(*(values[part] for values in wanted))
+                drives.set(*(values[part] for values in commands))
                 mujoco.mj_step(model, data)
-        # A step leaves places and forces as they were at its start: they are told apart by where they are read.
-        pushes[row], loops[row] = data.actuator_force[:legs], data.efc_force[: 3 * legs]
+        # After a step forces are those of its start; positions are updated by mj_kinematics.
+        drive_forces[row], loop_forces[row] = data.actuator_force[:legs], data.efc_force[: 3 * legs]
         mujoco.mj_kinematics(model, data)
-        places[row], axes[row], lengths[row] = data.site_xpos[sites], data.xmat[body][2::3], drives.lengths
-        if row % _NEWS == 0:
+        positions[row], axes[row], lengths[row] = data.site_xpos[sites], data.xmat[body][2::3], drives.lengths
+        if row % DEFAULTS.report_rows == 0:
             progress("simulate", row / rows)
-            if data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number or not np.isfinite(data.qpos).all():
+            if diverged():
                 break
-    if data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number or not np.isfinite(data.qpos).all():
+    if diverged():
         return Refusal(
             "simulation",
-            f"the bodies fly apart before {data.time:.3f} s",
+            f"the simulation diverges before {data.time:.3f} s: the bodies fly apart",
             remedy="lower the gains in [drives], or look for a singularity near the path",
         )
     progress("simulate", 1.0)
-    return _physics(lengths, places, axes, pushes, loops, model.body_pos)
+    return _physics(lengths, positions, axes, drive_forces, loop_forces, model.body_pos)
 
 
-def _sites(legs: int) -> tuple[str, ...]:
-    numbers = range(1, legs + 1)
-    return ("tip", *(f"rod{leg}" for leg in numbers), *(f"platform{leg}" for leg in numbers))
-
-
-def _physics(lengths: Floats, places: Floats, axes: Floats, pushes: Floats, loops: Floats, bodies: Floats) -> Physics:
-    tips, (rods, joints) = places[:, 0], np.split(places[:, 1:], 2, axis=1)
+def _physics(
+    lengths: Floats, positions: Floats, axes: Floats, drive_forces: Floats, loop_forces: Floats, bodies: Floats
+) -> Physics:
+    tips, (rods, joints) = positions[:, 0], np.split(positions[:, 1:], 2, axis=1)
     # Bodies in the order of the model: the world, then cylinder and rod of each leg.
     legs = rods - bodies[1 : 2 * rods.shape[1] : 2]
     legs /= np.linalg.norm(legs, axis=2, keepdims=True)
-    # The constraint pushes the rod's end; the platform feels the opposite.
-    push = -np.einsum("nlc,nlc->nl", loops.reshape(*legs.shape), legs)
+    # The constraint drive_forces the rod's end; the platform feels the opposite.
+    push = -np.einsum("nlc,nlc->nl", loop_forces.reshape(*legs.shape), legs)
     gaps = np.linalg.norm(rods - joints, axis=2).max(axis=1)
-    return Physics(Played(lengths, tips, axes, pushes), push, gaps)
+    return Physics(Played(lengths, tips, axes, drive_forces), push, gaps)
 
 
 class _Drives:
-    """The drives' loops as MuJoCo's position actuators have them, and the integrators, which they have not."""
+    """Control of MuJoCo's position actuators, with the drives' feed-forward and integrators."""
 
     def __init__(self, reference: Reference, model: Any, data: Any) -> None:
         self._drives, self._data, self._step = reference.machine.drives, data, model.opt.timestep
         joints = [model.joint(f"leg{leg + 1}").id for leg in range(reference.machine.robot.n_legs)]
-        self._places, self._rates = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
-        self._held, self._ahead = np.zeros(len(joints)), np.zeros(len(joints))
+        self._addresses, self._rate_addresses = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        self._integral, self._feedforward = np.zeros(len(joints)), np.zeros(len(joints))
 
     @property
     def lengths(self) -> Floats:
         """Leg lengths (n_legs,) now, metres."""
-        return self._data.qpos[self._places]
+        return self._data.qpos[self._addresses]
 
-    def tell(self, length: Floats, rate: Floats, acceleration: Floats, load: Floats) -> None:
-        """Set what the drives want during the next step, and what they have to carry, each (n_legs,)."""
+    def set(self, length: Floats, rate: Floats, acceleration: Floats, load: Floats) -> None:
+        """Set the drives' set values and loads for the next step, each (n_legs,)."""
         d = self._drives
-        ahead = d.velocity_feedforward * rate
-        # What moves now moves as it was told for the step before.
-        self._held += self._step * (
-            d.position_gain * (length - self.lengths) + self._ahead - self._data.qvel[self._rates]
+        feedforward = d.velocity_feedforward * rate
+        # The present rate follows from the command of the step before.
+        self._integral += self._step * (
+            d.position_gain * (length - self.lengths) + self._feedforward - self._data.qvel[self._rate_addresses]
         )
-        self._ahead = ahead
-        push = d.velocity_gain * (ahead + d.velocity_integral * self._held) + d.acceleration_feedforward * acceleration
+        self._feedforward = feedforward
+        push = (
+            d.velocity_gain * (feedforward + d.velocity_integral * self._integral)
+            + d.acceleration_feedforward * acceleration
+        )
         push += d.load_feedforward * load / d.moving_mass
         self._data.ctrl[: len(length)] = length + push / (d.position_gain * d.velocity_gain)
 
 
-def _wanted(reference: Reference, parts: int) -> tuple[Floats, Floats, Floats, Floats]:
+def _commands(reference: Reference, parts: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Return lengths, rates, accelerations and loads (K, n_legs) for each step.
 
-    MuJoCo's steps set rates first and then move by the new rates. A leg that is to be at the next length after the step
-    needs the forward difference as its rate, and the second difference as its acceleration.
+    MuJoCo's steps set rates first and then move by the new rates: so the rate is the forward difference of the lengths,
+    the acceleration their second difference.
     """
     step = reference.program.period / parts
     lengths = reference.at(parts)[0]
@@ -213,11 +231,3 @@ def _wanted(reference: Reference, parts: int) -> tuple[Floats, Floats, Floats, F
     at_rows, share = leg_loads(reference), np.arange(parts)[:, None] / parts
     loads = at_rows[:-1, None] * (1.0 - share) + at_rows[1:, None] * share
     return lengths[:-1], rates, accelerations, loads.reshape(len(rates), -1)
-
-
-def _quiet(warning: object) -> None:
-    """Say nothing: what went wrong is counted by MuJoCo too, and told as a refusal."""
-
-
-def _parts(period: float) -> int:
-    return max(1, int(np.ceil(period / LONGEST_STEP_S - 1e-9)))

@@ -1,4 +1,4 @@
-"""Reference: what a program asks of the legs and of the tool, at any moment."""
+"""Reference motion of legs and tool that a program defines, and the simulated motion."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ProgramError
-from pentapod.base.values import Value
+from pentapod.base.values import Result, Value
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine.machine import Machine
 from pentapod.program.program import Program
@@ -17,7 +17,7 @@ from pentapod.program.program import Program
 
 @dataclass(frozen=True, eq=False)
 class Reference(Value):
-    """A program on its machine. Samples are the rows and the moments halfway between them: M = 2N − 1.
+    """A program on its machine. Samples are the rows and the times halfway between them: M = 2N − 1.
 
     Raises ProgramError where the program's leg lengths have no pose on this machine.
     """
@@ -32,7 +32,7 @@ class Reference(Value):
                 "these leg lengths have no pose on this machine",
                 key=f"row {lost[0] // 2}",
                 value=np.round(1e3 * self._motion.halves[lost[0]], 6).tolist(),
-                remedy="`pentapod verify` tells what is wrong with the program",
+                remedy="`pentapod verify` shows what is wrong with the program",
             )
 
     @cached_property
@@ -48,9 +48,9 @@ class Reference(Value):
 
     @cached_property
     def accelerations(self) -> Floats:
-        """Coefficients (N − 1, n_legs, 2) of the accelerations that drives are told, m/s².
+        """Coefficients (N − 1, n_legs, 2) of the accelerations for the drives' feed-forward, m/s².
 
-        Those of the cubics; between straight lines the second difference of the rows, held over the period.
+        With linear interpolation the second difference of the rows, held over the period.
         """
         coefficients = np.zeros((len(self.program.legs) - 1, self.program.legs.shape[1], 2))
         second = self._motion.second
@@ -71,7 +71,7 @@ class Reference(Value):
         return self._pose[1]
 
     def at(self, parts: int) -> tuple[Floats, Floats, Floats]:
-        """Return leg lengths, rates and accelerations (parts · (N − 1) + 1, n_legs), each period cut in equal parts."""
+        """Return leg lengths, rates and accelerations (parts · (N − 1) + 1, n_legs), `parts` samples in a period."""
         t = np.arange(parts) / parts
         c, a, period = self.lengths, self.accelerations, self.program.period
         lengths = c[..., :1] + t * (c[..., 1:2] + t * (c[..., 2:3] + t * c[..., 3:]))
@@ -91,3 +91,26 @@ class Reference(Value):
     @cached_property
     def _pose(self) -> tuple[Floats, Floats]:
         return self.machine.robot.pose(self._motion.halves, self.program.component)
+
+
+@dataclass(frozen=True, eq=False)
+class Played(Result):
+    """Simulated motion at each row of the program, machine frame.
+
+    legs (N, n): leg lengths; tips (N, 3), metres; directions (N, 3) of the platform. forces (N, n): of the drives,
+    newtons.
+    """
+
+    legs: Floats
+    tips: Floats
+    directions: Floats
+    forces: Floats
+
+    def __post_init__(self) -> None:
+        set_frozen(
+            self,
+            legs=frozen(self.legs, "legs", (None, None)),
+            tips=frozen(self.tips, "tips", (None, 3)),
+            directions=frozen(self.directions, "directions", (None, 3)),
+            forces=frozen(self.forces, "forces", (None, None)),
+        )

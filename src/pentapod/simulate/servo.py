@@ -1,11 +1,13 @@
-"""Servo simulation: each leg a mass under a position loop around a velocity loop, sampled as real drives are.
+"""Servo simulation: each leg a mass under cascaded position and velocity control, sampled as in real drives.
 
-The tool is where the closed-form forward kinematics puts it. With the correction by pose the controller does the same
-in the loop, from what the encoders see: the shortest way from tool back to path becomes, through the Jacobian, a
-correction of the leg commands (contouring control: errors along the path, being late, are left alone).
+The pose comes from the closed-form forward kinematics. The correction by pose is contouring control in the loop: the
+shortest displacement from the tool back to the path, seen by the encoders, becomes a correction of the leg commands
+through the Jacobian; lag along the path is not corrected.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,20 +17,30 @@ from pentapod.base.refusal import Refusal, stage
 from pentapod.kinematics.families.quadratic import as_quadratic
 from pentapod.kinematics.forward.quadratic import NEAR_W_SQUARED
 from pentapod.simulate.correction import NO_CORRECTION, correction_for
-from pentapod.simulate.played import Played
-from pentapod.simulate.reference import Reference
+from pentapod.simulate.reference import Played, Reference
 
-_REST_S = 0.25  # before the start the drives stand still and settle, as on a machine that is switched on
-_LARGEST = 100.0  # legs that are off by a hundred metres are beyond control
+
+@dataclass(frozen=True)
+class ServoOptions:
+    """Options of the servo simulation."""
+
+    rest: float = 0.25
+    """Seconds at rest before the start, in which the drives settle."""
+    largest_error: float = 100.0
+    """Error of a leg in metres beyond which the loop counts as unstable."""
+
+
+DEFAULTS = ServoOptions()
 
 
 @stage
-def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False) -> Played | Refusal:
-    """Return how five servo drives play a program; the same for the same seed, which gives the ripple's phases.
+def simulate_servo(
+    reference: Reference, *, seed: int = 0, correct: bool = False, options: ServoOptions = DEFAULTS
+) -> Played | Refusal:
+    """Return the motion of five servo drives that play a program; the seed sets the phases of the ripple.
 
-    correct: correct the leg commands by the pose. A Refusal says that the loops are unstable, that there is no
-    correction with the margin asked for, or that the legs come to lengths without a pose. Raises InputError for a
-    negative seed.
+    correct: correct the leg commands by the pose. A Refusal says that the loops are unstable, that no correction has
+    the margin asked for, or that the legs reach lengths without a pose. Raises InputError for a negative seed.
     """
     from pentapod.simulate.servo_kernels import drive  # noqa: PLC0415  kernels are loaded where they are used
 
@@ -46,13 +58,13 @@ def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False
             "no correction by the pose keeps its margin with these drives",
             remedy="lower the gains or the dead time in [drives], or raise its contour_margin",
         )
-    rest = int(np.ceil(_REST_S / program.period))
+    rest = int(np.ceil(options.rest / program.period))
     lengths, accelerations = _after_rest(reference.lengths, rest), _after_rest(reference.accelerations, rest)
     lengths[:rest, :, 0], lengths[:rest, :, 1:], accelerations[:rest] = program.legs[0], 0.0, 0.0
     legs, efforts = np.empty((2, len(lengths) + 1, robot.n_legs))
     limits = np.array([NEAR_W_SQUARED, robot.linear_part.near_s_squared])
     origin = np.append(robot.base_joints[2, :2], robot.offsets[2])
-    with np.errstate(all="ignore"):  # legs that run away, told below
+    with np.errstate(all="ignore"):  # unstable loops overflow; they are refused below
         drive(
             lengths,
             accelerations,
@@ -79,19 +91,19 @@ def simulate_servo(reference: Reference, *, seed: int = 0, correct: bool = False
             efforts,
         )
     legs, efforts = legs[rest:], efforts[rest:]
-    wild = np.logical_not(np.abs(legs - program.legs).max(axis=1) < _LARGEST)
-    position, direction = robot.pose(np.where(wild[:, None], np.nan, legs), program.component)
-    lost = wild | ~np.isfinite(position).all(axis=1)
+    unstable = np.logical_not(np.abs(legs - program.legs).max(axis=1) < options.largest_error)
+    position, direction = robot.pose(np.where(unstable[:, None], np.nan, legs), program.component)
+    lost = unstable | ~np.isfinite(position).all(axis=1)
     if lost.any():
         row = int(np.argmax(lost))
         return Refusal(
             "simulation",
             f"the legs run away from the program until they have no pose, at {row * program.period:.3f} s",
-            remedy="lower the gains or the dead time in [drives]; near a singularity a little error is enough",
+            remedy="lower the gains or the dead time in [drives]; near a singularity a small error is enough",
         )
     return Played(legs, position + machine.tool_length * direction, direction, efforts * drives.moving_mass)
 
 
 def _after_rest(values: Floats, rest: int) -> Floats:
-    """Return values (N, ...) with the first one `rest` more times before it."""
+    """Return values (N, ...) with the first one repeated `rest` times before it."""
     return np.concatenate([np.broadcast_to(values[:1], (rest, *values.shape[1:])), values])

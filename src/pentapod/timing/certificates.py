@@ -1,4 +1,4 @@
-"""Certificates: the largest share of each limit that a sampled program uses, by exact extrema of its interpolation."""
+"""Certificates: the largest used share of each limit, by exact extrema of the interpolated setpoints."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from pentapod.timing.time_law.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class LimitUse(Value):
-    """The largest share of one limit. quantity: "leg velocity", ...; value and bound in `unit` (SI).
+    """The largest used share of one limit. quantity: "leg velocity", ...; value and bound in `unit` (SI).
 
-    leg: from 1, where the limit is a leg's. time: seconds, of the row at or after which the share is reached; segment:
-    the toolpath's segment there; station: global s in metres. above: why the value may be above the bound by little.
+    leg: from 1, for limits of legs. time: seconds, of the row at or after which the share is reached; segment: the
+    toolpath's segment there; station: global s in metres. above: why the value may slightly exceed the bound.
     """
 
     quantity: str
@@ -58,14 +58,14 @@ def certify(
     axes: Floats | None = None,
     spot: float = 0.0,
 ) -> tuple[LimitUse, ...]:
-    """Return the largest share of every limit of the machine and of those added to it, as far as it is set.
+    """Return the largest used share of each limit that the machine sets or that was added to it.
 
-    Of the setpoints as the controller joins them: every polynomial's exact extrema, no samples between. legs (N, legs)
-    m, tips (N, 3) m and axes (N, 3): the program's rows, at the controller's period; without them the trajectory is
-    sampled, and for the feed its station stands for the tip, which is never faster. spot: metres from the given tips
-    along the given axes to where a tool with a stand-off meets the surface, whose speed the feed is; rapids are judged
-    by the tip. Jerk counts the step of acceleration at either end over one period. An interval that two sections share
-    is judged by the slower feed.
+    Judged are the setpoints as the controller interpolates them, by the exact extrema of every polynomial. legs
+    (N, legs) m, tips (N, 3) m and axes (N, 3): the program's rows, at the controller's period; by default the
+    trajectory is sampled, and the feed is judged by its station, since the tip is never faster. spot: metres from the
+    given tips along the given axes to the spot on the surface whose speed is the feed (tools with a stand-off); rapids
+    are judged by the tip. A step of acceleration at either end counts as jerk over one period. An interval with two
+    sections is judged by the slower feed.
     """
     period, interpolation = machine.controller.period, machine.controller.interpolation
     count = max(1, round(trajectory.duration / period)) if legs is None else len(legs) - 1
@@ -76,21 +76,21 @@ def certify(
     if of_tool and (tips is None or axes is None):
         posed = trajectory.pose(times)
         tips, axes = posed[0] if tips is None else tips, posed[1] if axes is None else axes
-    # A motion that starts or ends at a speed is part of a longer one, which the controller's spline goes through.
+    # A motion that starts or ends at a speed is part of a longer one: the controller's spline continues there.
     before, after = _paddings(trajectory, period, tool=tips is not None)
     rows = SetpointRows(trajectory(times) if legs is None else legs, stations, tips, axes)
     rows = SetpointRows.concatenated([part for part in (before, rows, after) if part is not None])
     first = 0 if before is None else len(before)
-    joined = InterpolatedSetpoints(
+    setpoints = InterpolatedSetpoints(
         rows, trajectory.path.pieces[trajectory.indices[0]], period, interpolation, first, count
     )
     uses: list[LimitUse] = []
     for limit in limits:
         if isinstance(limit, Feed):
-            found = _feed(trajectory, machine, joined, times, spot, of_tip=given is not None)
+            found = _feed(trajectory, machine, setpoints, times, spot, of_tip=given is not None)
         else:
             added = any(limit is one for one in trajectory.limits)
-            found = _piecewise(limit, trajectory, joined) if added else limit.largest(joined)
+            found = _piecewise(limit, trajectory, setpoints) if added else limit.largest(setpoints)
         if found is not None:
             leg = found.index + 1 if limit.of_legs else None
             where = (float(times[found.row]), float(stations[found.row]), int(segments[found.row]))
@@ -100,43 +100,54 @@ def certify(
 
 def _paddings(trajectory: Trajectory, period: float, *, tool: bool) -> tuple[SetpointRows | None, SetpointRows | None]:
     """Return the rows before the start and after the end, None where these are rests."""
-    first, last = (trajectory.path.pieces[k] for k in (trajectory.indices[0], trajectory.indices[-1]))
-    start, end = trajectory.laws[0].speeds[0], trajectory.laws[-1].speeds[-1]
-    before = spline_padding(first, start, period, start=True, tool=tool)[:-1] if start > 0.0 else None
-    after = spline_padding(last, end, period, start=False, tool=tool)[1:] if end > 0.0 else None
-    return before, after
+
+    def padding(law: int, speed: float, *, start: bool) -> SetpointRows | None:
+        index = trajectory.indices[law]
+        if speed <= 0.0:
+            return None
+        rows = spline_padding(trajectory.path.pieces[index], speed, period, start=start, tool=tool)
+        return rows.shifted(float(trajectory.path.starts[index]))[slice(-1) if start else slice(1, None)]
+
+    first, last = trajectory.laws[0].speeds[0], trajectory.laws[-1].speeds[-1]
+    return padding(0, first, start=True), padding(-1, last, start=False)
 
 
 def _feed(
-    trajectory: Trajectory, machine: Machine, joined: InterpolatedSetpoints, times: Floats, spot: float, *, of_tip: bool
+    trajectory: Trajectory,
+    machine: Machine,
+    setpoints: InterpolatedSetpoints,
+    times: Floats,
+    spot: float,
+    *,
+    of_tip: bool,
 ) -> Reading:
     """Return the largest share of the feed, or of the rapid rate on rapids."""
-    feeds, own = trajectory.feeds(times), joined.own_intervals
+    feeds, own = trajectory.feeds(times), setpoints.own_intervals
     speeds = np.where(np.isfinite(feeds), feeds, machine.rapid_velocity)
     slower = np.minimum(speeds[:-1], speeds[1:])
     if not of_tip:
         rates = trajectory.feed_rates(times)
-        steps = joined.station.steps[own] * np.maximum(rates[:-1], rates[1:])[:, None, None]
+        steps = setpoints.station.steps[own] * np.maximum(rates[:-1], rates[1:])[:, None, None]
     else:
-        steps = joined.tip.steps[own]
+        steps = setpoints.tip.steps[own]
         if spot != 0.0:
             on_feed = np.isfinite(feeds)
-            of_spot = steps + spot * joined.axis.steps[own]
+            of_spot = steps + spot * setpoints.axis.steps[own]
             steps = np.where((on_feed[:-1] | on_feed[1:])[:, None, None], of_spot, steps)
     share, row = largest_length(steps / slower[:, None, None])
     return Reading(share * float(slower[row]), float(slower[row]), row, 0)
 
 
-def _piecewise(limit: Limit, trajectory: Trajectory, joined: InterpolatedSetpoints) -> Reading | None:
-    """Return the largest share of a limit that asks for the path, piece by piece."""
+def _piecewise(limit: Limit, trajectory: Trajectory, setpoints: InterpolatedSetpoints) -> Reading | None:
+    """Return the largest share of a limit that depends on the path, judged piece by piece."""
     found: list[Reading] = []
-    starts = np.minimum(np.rint(trajectory.starts / joined.period).astype(int), joined.count)
+    starts = np.minimum(np.rint(trajectory.starts / setpoints.period).astype(int), setpoints.count)
     starts[0] = 0
     for index, low, high in zip(trajectory.indices, starts[:-1].tolist(), starts[1:].tolist(), strict=True):
-        piece, rows = trajectory.path.pieces[index], joined.rows.shifted(-float(trajectory.path.starts[index]))
-        own = rows.stations[joined.first + low : joined.first + high + 1]
+        piece, rows = trajectory.path.pieces[index], setpoints.rows.shifted(-float(trajectory.path.starts[index]))
+        own = rows.stations[setpoints.first + low : setpoints.first + high + 1]
         np.clip(own, 0.0, piece.length, out=own)
-        part = replace(joined, rows=rows, piece=piece, first=joined.first + low, count=high - low)
+        part = replace(setpoints, rows=rows, piece=piece, first=setpoints.first + low, count=high - low)
         reading = limit.largest(part)
         if reading is not None:
             found.append(replace(reading, row=reading.row + low))

@@ -42,44 +42,40 @@ def retime(
     limits: Sequence[Limit] = (),
     jerk_options: JerkOptions = DEFAULTS,
 ) -> Trajectory | Refusal:
-    """Return the fastest trajectory along a path, or the named cause why there is none.
+    """Return the fastest trajectory along a path within the machine's limits, or a refusal that names the cause.
 
-    Leg velocities, accelerations and (limit_jerk) jerks, the feed on cuts and links and the rapid rate on rapids
-    hold at and between the gridpoints, and on the setpoints as the controller joins them (`machine.controller`). Each
-    piece goes from rest to rest and lasts a whole number of periods; between them the machine stands as long as the
-    path asks (`dwells`), in whole periods. The margins are fractions of the limits that the plan leaves free; the
-    rounding of setpoints and what happens between gridpoints uses part of them. Pieces of no length are passed over.
-    Method: TOPP-RA (Pham and Pham 2018), by a compiled core; engine "toppra" takes the reference instead.
+    Leg velocities, accelerations and (limit_jerk) jerks, the feed on cuts and links and the rapid rate on rapids are
+    kept at and between the gridpoints, and by the setpoints as the controller interpolates them
+    (`machine.controller`). Each piece goes from rest to rest and lasts a whole number of periods; between pieces the
+    machine stands as long as the path asks (`dwells`), in whole periods. Pieces of no length are skipped. Method:
+    TOPP-RA (Pham and Pham 2018), by a compiled core; engine "toppra" takes the reference implementation instead.
 
-    Pieces that must be slower than their first law limited in jerk, so that their setpoints keep the limits, are told
-    in `Trajectory.slowed`; one that would last more than 20 times as long is refused.
-
+    velocity_margin, acceleration_margin: fractions of the limits that the plan leaves free; the rounding of setpoints
+    and what happens between gridpoints use part of them.
     start_speed, end_speed: ṡ in m/s at the path's start and end, where the motion is part of a longer one; with
-    limit_jerk there is no acceleration there. They must be below what the limits less the margins leave; where
-    they cannot be kept the refusal says so.
+    limit_jerk the acceleration there is 0. Speeds that the limits less the margins do not allow are refused.
+    limits: further ones (`Limit`), kept beside those of the machine, less the same margins. One that is exceeded at
+    rest is refused. jerk_options: how long faster laws within the jerk limits are searched for.
 
-    limits: further ones (`Limit`), which hold beside those of the machine, less the same margins. One that standing
-    still would exceed is a Refusal. jerk_options: how long faster laws within the jerk limits are searched for.
+    `Trajectory.slowed` lists pieces that must be slower than their first jerk-limited law, so that their setpoints keep
+    the limits; one that would last more than 20 times as long is refused.
 
     Raises InputError where a margin is not in (0, 0.5), for an unknown engine, for a speed below 0 or next to a dwell,
     or for a speed with a cubic controller whose jerks are not limited.
     """
-    _check_margins(velocity_margin, acceleration_margin)
-    cubic, goes_on = machine.controller.interpolation == "cubic", _goes_on(start_speed, end_speed)
-    if cubic and goes_on and not limit_jerk:
+    _check_options(
+        {"velocity_margin": velocity_margin, "acceleration_margin": acceleration_margin},
+        {"start_speed": start_speed, "end_speed": end_speed},
+    )
+    cubic, moving_ends = machine.controller.interpolation == "cubic", max(start_speed, end_speed) > 0.0
+    if cubic and moving_ends and not limit_jerk:
         raise InputError(
-            "given speeds need limited jerks where the controller joins setpoints by cubics, which ring where "
-            "accelerations jump", key="limit_jerk", value=limit_jerk, expected="true",
+            "start_speed and end_speed need limited jerks where the controller interpolates by cubic splines, which "
+            "overshoot where accelerations jump", key="limit_jerk", value=limit_jerk, expected="true",
         )  # fmt: skip
     period = machine.controller.period
-    added = tuple(limits)
-    kept = Limits.of(
-        machine,
-        velocity_margin,
-        acceleration_margin,
-        period * (1.5 + (WINDOW_PERIODS / 2 if cubic else 0.0)),
-        added,
-    )
+    added, guard = tuple(limits), period * (1.5 + (WINDOW_PERIODS / 2 if cubic else 0.0))
+    kept = Limits.of(machine, velocity_margin, acceleration_margin, guard, added)
     wrong = unfit(path)
     if wrong is not None:
         return wrong
@@ -98,49 +94,40 @@ def retime(
         profiles.append(profile)
         done += path.pieces[k].length
         progress("timing", done / total, f"piece {len(profiles)} of {len(indices)}")
-    if cubic or limit_jerk or goes_on:
+    if cubic or limit_jerk or moving_ends:
         smoothed = repaired_laws(profiles, machine, dwells, jerk_options if limit_jerk else None)
         if isinstance(smoothed, NotRepaired):
             return refusal(path, indices[smoothed.index], smoothed.failure)
         profiles, laws, firsts = smoothed.profiles, smoothed.laws, smoothed.firsts
     else:
-        firsts = laws = [_plain_law(p, period) for p in profiles]
+        plain = [MotionLaw.from_profile(profile.s, profile.x) for profile in profiles]
+        firsts = laws = [law.stretched(whole_periods(law.duration, period)) for law in plain]
     profile = _profile(path, indices, profiles, laws, dwells, smooth=limit_jerk)
-    told = (slowed(path, *both, period) for both in zip(indices, firsts, laws, strict=True)) if limit_jerk else ()
-    told = tuple(x for x in told if x is not None)
-    return Trajectory(path, tuple(indices), tuple(laws), profile, dwells, told, added)
+    reports = (slowed(path, *both, period) for both in zip(indices, firsts, laws, strict=True)) if limit_jerk else ()
+    slower = tuple(report for report in reports if report is not None)
+    return Trajectory(path, tuple(indices), tuple(laws), profile, dwells, slower, added)
 
 
-def _check_margins(velocity: float, acceleration: float) -> None:
-    for name, margin in (("velocity_margin", velocity), ("acceleration_margin", acceleration)):
+def _check_options(margins: dict[str, float], speeds: dict[str, float]) -> None:
+    """Raise InputError for margins or speeds out of range."""
+    for name, margin in margins.items():
         if not 0.0 < margin < 0.5:
             raise InputError("a margin is a fraction of a limit", key=name, value=margin, expected="0 < margin < 0.5")
-
-
-def _goes_on(start: float, end: float) -> bool:
-    """Return whether the motion is part of a longer one. Raises InputError for speeds that are none."""
-    for name, speed in (("start_speed", start), ("end_speed", end)):
+    for name, speed in speeds.items():
         if not 0.0 <= speed < np.inf:
             raise InputError("must be a speed", key=name, value=speed, expected="m/s, 0 or more")
-    return max(start, end) > 0.0
 
 
 def _check_standing(start: float, end: float, dwells: Floats) -> None:
-    """Raise InputError where there is a speed before the first of the dwells (L + 1,) or after the last."""
+    """Raise InputError for a start or end speed next to a dwell; dwells (L + 1,)."""
     for name, speed, dwell in (("start_speed", start, dwells[0]), ("end_speed", end, dwells[-1])):
         if speed > 0.0 and dwell > 0.0:
             what = f"the path stands there for {dwell:.6g} s"
             raise InputError(what, key=name, value=speed, expected="0 m/s", remedy="or take the dwell out of the path")
 
 
-def _plain_law(profile: PieceProfile, period: float) -> MotionLaw:
-    """Return the law of a profile as it is, in whole periods."""
-    law = MotionLaw.from_profile(profile.s, profile.x)
-    return law.stretched(whole_periods(law.duration, period))
-
-
 def _dwells(path: LegPathLike, indices: list[int], period: float) -> Floats:
-    """Return the seconds (L + 1,) of standing before each moving piece and after the last, in whole periods."""
+    """Return the seconds (L + 1,) of dwell before each moving piece and after the last, in whole periods."""
     owner = np.searchsorted(indices, np.arange(len(path.pieces) + 1), side="left")
     periods = np.bincount(owner, np.ceil(np.asarray(path.dwells) / period - 1e-9), len(indices) + 1)
     return np.asarray(periods * period, dtype=np.float64)
@@ -164,6 +151,6 @@ def _profile(
         speeds=np.concatenate([law(t, 1) for law, t in zip(laws, times, strict=True)]),
         active=np.concatenate([a for a, _ in active]),
         shares=np.concatenate([share for _, share in active]),
-        constraints=profiles[0].limits.constraints,
+        constraint_names=profiles[0].limits.names,
     )
-    return profile.standing(0.0, float(starts[-1]))
+    return profile.extended(0.0, float(starts[-1]))

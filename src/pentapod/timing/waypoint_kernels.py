@@ -1,7 +1,7 @@
-"""The cubic spline through waypoints and its rows along a law, as plain loops, compiled.
+"""Compiled kernels of the cubic spline through waypoints: slopes, limit rows, samples along a law.
 
-On stage i, with h = s[i + 1] − s[i] and the slopes m at its ends, the spline is the cubic that meets both waypoints and
-both slopes. All arrays with waypoints are (n, d), one column for each coordinate.
+On stage i, with h = s[i + 1] − s[i] and slopes m at its ends, the spline is the Hermite cubic. Arrays at the waypoints
+are (n, d), one column for each coordinate.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from pentapod.numerics.kernels import kernel
 def not_a_knot_slopes(s: Floats, y: Floats, m: Floats, share: Floats) -> None:
     """Fill the slopes m (n, d) of the C2 cubic spline through y (n, d) at rising s (n,), n ≥ 4.
 
-    One row for each inner waypoint says that the second derivatives of both stages agree there; the first and the last
-    row, that the third derivatives agree at the second waypoint and at the last but one ("not a knot"). share (n,) is
-    room for what elimination leaves beside the diagonal; no pivot is near zero: from the second row on it is above h.
+    Inner rows equate the second derivatives of both stages at a waypoint; the first and last row equate the third
+    derivatives at the second waypoint and at the last but one ("not a knot"). share (n,): working memory, the upper
+    diagonal after elimination; no pivot is near zero, since from the second row on it is above h.
     """
     n, d = y.shape
     h, k = s[1] - s[0], s[2] - s[1]
@@ -55,7 +55,7 @@ def limit_rows(
     second: Floats,
     ceiling: Floats,
 ) -> None:
-    """Fill the derivatives by the accelerations' limits, first and second (n, d), and the largest x (n,) by velocities.
+    """Fill the acceleration rows, first and second (n, d), and the largest x (n,) by velocities.
 
     velocity and acceleration (d,).
     """
@@ -89,7 +89,7 @@ def rows_along(s: Floats, y: Floats, m: Floats, times: Floats, speeds: Floats, p
             a += 1
         h, lasts = s[a + 1] - s[a], times[a + 1] - times[a]
         u = (t - times[a]) / lasts
-        # The share of the stage's length that is behind at its share u of time.
+        # p: travelled share of the stage's length at the share u of its time.
         p = min(max(u * lasts * (speeds[a] + 0.5 * u * (speeds[a + 1] - speeds[a])) / h, 0.0), 1.0)
         q = 1.0 - p
         for j in range(d):

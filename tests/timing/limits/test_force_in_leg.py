@@ -96,7 +96,7 @@ def test_a_force_in_legs_holds_and_is_named(name, jerk, interpolation):
     assert use.leg in range(1, 6)
 
 
-def test_engines_agree_with_an_offset():
+def test_limit_with_an_offset_by_both_engines_agrees():
     path, limit = Path((PATHS["nod"](),)), ForceInLeg(2.0, 1.0, 15.0)
     ours, theirs = (
         timed(path, machine(), limit_jerk=False, limits=(limit,), engine=engine).duration
@@ -124,7 +124,7 @@ def test_an_override_keeps_a_limit_that_was_added():
         assert np.abs(forces(limit, turned, t)).max() <= limit.most * 1.001
 
 
-def test_a_job_is_timed_explained_and_judged_by_it(tmp_path):
+def test_job_with_an_added_limit_is_timed_explained_and_judged(tmp_path):
     (tmp_path / "part.stl").write_bytes(dome_stl(cells=12))
     (tmp_path / "job.toml").write_text(job_text(), encoding="utf-8")
     job = Job.load(tmp_path / "job.toml")

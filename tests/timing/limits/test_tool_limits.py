@@ -79,7 +79,7 @@ def test_axis_velocity_and_acceleration_hold_on_setpoints(interpolation):
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
 @pytest.mark.parametrize("piece", [lambda: raster(lines=3, feed=0.3), lambda: nod(feed=0.3)], ids=["raster", "nod"])
-def test_all_together_hold_on_setpoints(piece, interpolation):
+def test_tool_limits_together_hold_on_setpoints(piece, interpolation):
     tool = {"max_tip_acceleration": 1.5, "max_tip_jerk": 60.0, "max_axis_velocity": 0.8, "max_axis_acceleration": 10.0}
     m = machine(interpolation=interpolation, **tool)
     trajectory = timed(Path((piece(),)), m)
@@ -94,20 +94,20 @@ def test_all_together_hold_on_setpoints(piece, interpolation):
     assert trajectory.duration > free.duration
 
 
-def test_engines_agree():
+def test_tool_limits_by_both_engines_agree():
     m = machine(**FREE, max_tip_acceleration=2.0, max_axis_acceleration=20.0, max_axis_velocity=1.5)
     path = Path((Piece(by_tip(circle(0.03), nodding(0.03, 0.15)), 0.08, 0.5),))
     ours, theirs = (timed(path, m, limit_jerk=False, engine=e).duration for e in ("core", "toppra"))
     assert ours == pytest.approx(theirs, rel=1e-5, abs=1.01e-3)
 
 
-def test_limits_that_are_far_away_change_no_bit():
+def test_tool_limits_far_away_change_no_bit():
     far = {"max_tip_acceleration": 1e9, "max_tip_jerk": 1e12, "max_axis_velocity": 1e9, "max_axis_acceleration": 1e9}
     path = Path((raster(lines=3, feed=0.3),))
     assert timed(path, machine(**far)).duration == timed(path, machine()).duration
 
 
-def test_an_override_keeps_them():
+def test_override_keeps_tool_limits():
     m = machine(interpolation="cubic", max_tip_acceleration=1.0, max_axis_acceleration=30.0)
     path = Path((Piece(by_tip(circle(0.05), nodding(0.05, 0.1)), 0.25, 0.1),))
     trajectory = timed(path, m)
@@ -145,7 +145,7 @@ def test_polyhedron_touches_the_sphere_from_outside(f, g, h, state):
     assert length / 1.13 * (1.0 - 1e-9) <= most <= length * (1.0 + 1e-9) + 1e-12
 
 
-def test_limits_are_positive_and_the_stricter_counts():
+def test_tool_limits_are_positive_and_the_stricter_counts():
     with pytest.raises(MachineError, match="positive"):
         ToolLimits(max_tip_jerk=0.0)
     both = ToolLimits(max_tip_acceleration=2.0).and_(ToolLimits(max_tip_acceleration=3.0, max_axis_velocity=1.0))

@@ -59,7 +59,7 @@ def steps(trajectory, start, stop):
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
 @pytest.mark.parametrize("share", [0.1, 0.6, 1.0, 1.5])
-def test_a_turn_of_the_knob(interpolation, share):
+def test_override_reaches_the_scaled_feed(interpolation, share):
     m = machine(interpolation=interpolation)
     trajectory = timed(two_pieces(), m)
     after = overridden(trajectory, m, 0.31, share)
@@ -74,7 +74,7 @@ def test_a_turn_of_the_knob(interpolation, share):
         assert after.duration > trajectory.duration
 
 
-def test_speed_and_acceleration_have_no_step():
+def test_override_has_no_step_of_speed_or_acceleration():
     """On a straight line at feed the old plan's acceleration is 0: the transition starts and ends without a step."""
     m = machine(interpolation="cubic")
     trajectory = timed(Path((straight([0.5, 0.2, 0, -0.3, 0.1], 0.2, 0.1),)), m)
@@ -86,7 +86,7 @@ def test_speed_and_acceleration_have_no_step():
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
-def test_hold_and_resume(interpolation):
+def test_override_holds_and_resumes(interpolation):
     m = machine(interpolation=interpolation)
     trajectory = timed(two_pieces(), m)
     held = overridden(trajectory, m, 0.4, 0.0)
@@ -101,7 +101,7 @@ def test_hold_and_resume(interpolation):
     assert resumed.duration < trajectory.duration + 0.25 + 2 * (held.duration - 0.4) + 0.3
 
 
-def test_stopping_on_a_straight_line_is_about_as_quick_as_the_legs_allow():
+def test_feed_hold_on_a_line_is_about_as_quick_as_the_legs_allow():
     """0.1 m/s, 5 m/s² on a leg that moves half as fast: 10 ms at full braking, smoothly 1.875 times that."""
     m = machine()
     trajectory = timed(Path((straight([0.5, 0, 0, 0, 0], 0.2, 0.1),)), m)
@@ -116,7 +116,7 @@ KNOB = st.just(0.0) | st.floats(0.1, 1.5)
 @given(st.floats(0.0, 1.2), KNOB, KNOB, st.sampled_from(["linear", "cubic"]))
 @example(0.0, 0.0, 0.5, "linear")
 @example(0.0, 0.0, 0.5, "cubic")
-def test_any_two_turns_at_any_time(when, one, two, interpolation):
+def test_two_overrides_at_any_time_keep_the_limits(when, one, two, interpolation):
     m = machine(interpolation=interpolation)
     trajectory = timed(Path((nod(),)), m)
     first = when * trajectory.duration / 1.3
@@ -128,7 +128,7 @@ def test_any_two_turns_at_any_time(when, one, two, interpolation):
         check(after, again, m, min(second, after.duration))
 
 
-def test_at_a_stop_and_at_the_start_the_new_plan_simply_follows():
+def test_override_at_a_stop_is_the_new_plan_from_rest():
     m = machine()
     trajectory = timed(two_pieces(), m)
     after = overridden(trajectory, m, float(trajectory.starts[1]), 0.5)
@@ -139,7 +139,7 @@ def test_at_a_stop_and_at_the_start_the_new_plan_simply_follows():
     assert overridden(trajectory, m, float(trajectory.starts[1]), 0.0).duration == pytest.approx(trajectory.starts[1])
 
 
-def test_too_late_to_matter_changes_nothing():
+def test_override_just_before_the_end_changes_nothing():
     m = machine()
     trajectory = timed(Path((nod(),)), m)
     after = overridden(trajectory, m, trajectory.duration - 5e-3, 0.5)
@@ -149,14 +149,14 @@ def test_too_late_to_matter_changes_nothing():
 @pytest.mark.parametrize(
     ("time", "share"), [(0.1, -0.1), (0.1, 1e-6), (0.1, 1.6), (-1.0, 1.0), (np.nan, 1.0), (0.1, np.nan)]
 )
-def test_bad_knobs(time, share):
+def test_override_out_of_range_is_an_error(time, share):
     m = machine()
     trajectory = timed(Path((nod(),)), m)
     with pytest.raises(InputError):
         override(trajectory, m, time, share)
 
 
-def test_after_the_end_there_is_nothing_to_override():
+def test_override_after_the_end_is_an_error():
     m = machine()
     trajectory = timed(Path((nod(),)), m)
     with pytest.raises(InputError, match="over"):

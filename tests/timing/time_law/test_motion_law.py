@@ -14,7 +14,7 @@ def profile(seed, n=30, length=0.3):
 
 
 @given(st.integers(0, 10_000))
-def test_speed_and_acceleration_are_derivatives_of_the_station(seed):
+def test_motion_law_speed_and_acceleration_are_derivatives_of_the_station(seed):
     plain = MotionLaw.from_profile(*profile(seed))
     for law in (plain, plain.smoothed(0.004), plain.stretched(1.7 * plain.duration)):
         t = np.linspace(0, law.duration, 501)[1:-1]
@@ -25,7 +25,7 @@ def test_speed_and_acceleration_are_derivatives_of_the_station(seed):
 
 
 @given(st.integers(0, 10_000))
-def test_squared_speed_is_linear_in_the_station_between_gridpoints(seed):
+def test_motion_law_squared_speed_is_linear_in_the_station(seed):
     s, x = profile(seed)
     law = MotionLaw.from_profile(s, x)
     t = np.linspace(0, law.duration, 2001)
@@ -34,7 +34,7 @@ def test_squared_speed_is_linear_in_the_station_between_gridpoints(seed):
 
 
 @given(st.integers(0, 10_000), st.floats(1e-4, 0.5))
-def test_smoothing_is_the_moving_average_and_keeps_rest_and_length(seed, window):
+def test_motion_law_smoothed_is_the_moving_average(seed, window):
     law = MotionLaw.from_profile(*profile(seed))
     smooth = law.smoothed(window)
     assert smooth.duration == pytest.approx(law.duration + window)
@@ -49,7 +49,7 @@ def test_smoothing_is_the_moving_average_and_keeps_rest_and_length(seed, window)
 
 @settings(max_examples=30)
 @given(st.integers(0, 10_000), st.floats(0.2, 5.0))
-def test_stretching_scales_time_only(seed, factor):
+def test_motion_law_stretched_scales_time_only(seed, factor):
     law = MotionLaw.from_profile(*profile(seed))
     slow = law.stretched(factor * law.duration)
     t = np.linspace(0, 1, 300)
@@ -57,7 +57,7 @@ def test_stretching_scales_time_only(seed, factor):
     assert np.allclose(slow(t * slow.duration, 1) * factor, law(t * law.duration, 1), atol=1e-9)
 
 
-def test_law_starts_as_half_a_t_squared():
+def test_motion_law_starts_as_half_a_t_squared():
     law = MotionLaw.from_profile(np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0, 0.0]))
     assert law.duration == pytest.approx(2 * np.sqrt(2.0))
     t = np.array([0.0, 1e-9, 1e-6, 0.1, 1.0])

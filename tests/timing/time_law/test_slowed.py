@@ -35,7 +35,7 @@ def timed(*shape):
     return retime(two_pieces(*shape), machine(interpolation="cubic"))
 
 
-def test_a_piece_that_is_slower_than_its_first_law_is_told_with_its_place_and_both_durations():
+def test_slowed_piece_is_reported_with_place_and_both_durations():
     trajectory = timed(300.0)
     assert isinstance(trajectory, Trajectory), str(trajectory)
     (told,) = trajectory.slowed
@@ -54,7 +54,7 @@ def test_a_piece_that_is_slower_than_its_first_law_is_told_with_its_place_and_bo
     assert max(use.share for use in certify(trajectory, machine(interpolation="cubic"))) < 1.0
 
 
-def test_what_is_told_reaches_the_explanation_that_a_plan_prints():
+def test_slowed_piece_is_in_the_explanation():
     trajectory = timed(300.0)
     assert isinstance(trajectory, Trajectory), str(trajectory)
     story = explain(trajectory, machine(interpolation="cubic"))
@@ -64,13 +64,13 @@ def test_what_is_told_reaches_the_explanation_that_a_plan_prints():
     assert told["piece"] == 1
 
 
-def test_nothing_is_told_of_pieces_that_keep_their_first_law():
+def test_slowed_is_empty_where_pieces_keep_their_first_law():
     trajectory = timed(0.0)
     assert isinstance(trajectory, Trajectory), str(trajectory)
     assert trajectory.slowed == ()
 
 
-def test_a_piece_that_would_last_more_than_20_times_its_first_law_is_refused_with_the_place():
+def test_piece_20_times_slower_than_its_first_law_is_refused_with_the_place():
     refusal = timed(0.0, 400.0)
     assert isinstance(refusal, Refusal)
     assert "times slower than the law it is made of; piece 1, " in refusal.cause

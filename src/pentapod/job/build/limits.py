@@ -6,7 +6,7 @@ from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.limits.margins import LIMITS
-from pentapod.timing.limits.limit import NOTHING_LEFT_FREE, Limit
+from pentapod.timing.limits.limit import NO_RESERVE, Limit
 from pentapod.timing.limits.limits import PLUGGED
 
 
@@ -17,5 +17,5 @@ def placement_limits(job: Job) -> tuple[LimitKind, ...]:
 
 def timing_limits(job: Job, machine: Machine) -> tuple[Limit, ...]:
     """Return the limits on the time law beside the machine's own. Raises InputError: one cannot be loaded."""
-    found = (PLUGGED.find(name).of(machine, NOTHING_LEFT_FREE) for name in job.limits.use if name in PLUGGED.added)
+    found = (PLUGGED.find(name).of(machine, NO_RESERVE) for name in job.limits.use if name in PLUGGED.added)
     return tuple(limit for limit in found if limit is not None)

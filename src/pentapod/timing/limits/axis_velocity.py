@@ -26,8 +26,7 @@ class AxisVelocity(MachineLimit):
     @classmethod
     def of(cls, machine: Machine, reserve: Reserve) -> AxisVelocity | None:
         """Return the machine's limit, None where it sets none."""
-        bound = np.atleast_1d(machine.tool_limits.max_axis_velocity)
-        return cls(bound * reserve.slower, bound) if np.isfinite(bound).all() else None
+        return cls.if_set(machine.tool_limits.max_axis_velocity, reserve)
 
     def speed_rows(self, path: PathDerivatives) -> Floats:
         """Return the largest ṡ (n, 1)."""
@@ -38,11 +37,11 @@ class AxisVelocity(MachineLimit):
         """Return the shares (n, 1)."""
         return np.linalg.norm(path.turn[0], axis=1, keepdims=True) * motion.v[:, None] / self.limit
 
-    def measured(self, joined: InterpolatedSetpoints) -> Floats:
+    def measured(self, setpoints: InterpolatedSetpoints) -> Floats:
         """Return bounds of the rates (intervals, 1), by the hull of the polynomials' coefficients."""
-        return np.linalg.norm(joined.axis.steps[joined.own_intervals], axis=1).max(axis=1, keepdims=True)
+        return np.linalg.norm(setpoints.axis.steps[setpoints.own_intervals], axis=1).max(axis=1, keepdims=True)
 
-    def largest(self, joined: InterpolatedSetpoints) -> Reading:
+    def largest(self, setpoints: InterpolatedSetpoints) -> Reading:
         """Return the largest rate, exactly."""
-        value, row = largest_length(joined.axis.steps[joined.own_intervals])
+        value, row = largest_length(setpoints.axis.steps[setpoints.own_intervals])
         return Reading(value, self.bound.item(), row, 0)

@@ -1,4 +1,4 @@
-"""Limit of the feed rate: the speed, on cuts and links, of the tip or of the spot that a beam meets."""
+"""Limit of the feed rate: on cuts and links, the speed of the tip or of a beam's spot on the surface."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
 @dataclass(frozen=True, eq=False)
 class Feed(MachineLimit):
-    """The feeds that the path's sections have; nothing on rapids.
+    """The feeds of the path's sections; no limit on rapids.
 
-    limit, bound (1,): shares of each. guard: seconds by which a section's feed reaches into its neighbours; rapid: m/s,
-    the tip's largest speed, by which that is metres.
+    limit, bound (1,): shares of these feeds. guard: seconds by which a section's feed extends into its neighbours;
+    rapid: m/s, the tip's largest speed, which bounds that distance.
     """
 
     quantity = "feed"
@@ -31,11 +31,11 @@ class Feed(MachineLimit):
 
     @classmethod
     def of(cls, machine: Machine, reserve: Reserve) -> Feed:
-        """Return the limit that the path itself sets."""
+        """Return the limit; the feeds are the path's."""
         return cls(np.array([reserve.slower]), np.ones(1), reserve.guard, machine.rapid_velocity * reserve.slower)
 
     def guarded_sections(self, piece: PieceLike) -> tuple[Floats, Floats, Floats]:
-        """Return where each section's feed holds, from and to (M,) in metres, and how fast s grows by it (M,)."""
+        """Return where each section's feed applies, from and to (M,) in metres, and the ṡ (M,) it allows there."""
         feeds = self._feeds(piece)
         ends = np.asarray(piece.section_ends, dtype=np.float64)
         begins = np.concatenate([[0.0], ends[:-1]])
@@ -49,7 +49,7 @@ class Feed(MachineLimit):
         speed, feeds = np.full(len(s), np.inf), self._feeds(piece)
         begins, ends, _ = self.guarded_sections(piece)
         first, last = np.searchsorted(s, begins, "left"), np.searchsorted(s, ends, "right")
-        for m, feed in enumerate(feeds.tolist()):  # sections are few, and overlap their neighbours
+        for m, feed in enumerate(feeds.tolist()):  # guarded sections overlap their neighbours
             here = slice(int(first[m]), int(last[m]))
             speed[here] = np.minimum(speed[here], feed)
         with np.errstate(divide="ignore"):
@@ -62,7 +62,7 @@ class Feed(MachineLimit):
         """Return the largest ṡ (n, 1)."""
         return self.speeds(path.piece, path.s)[:, None]
 
-    def measured(self, joined: InterpolatedSetpoints) -> Floats:
-        """Return the shares (intervals, 1) of the feeds themselves: a plan's reserve is there to be used up."""
-        speed = self.speeds(joined.piece, joined.rows.stations[joined.own_rows]) / self.limit
-        return (joined.station.rates[joined.own_intervals, 0] / np.minimum(speed[:-1], speed[1:]))[:, None]
+    def measured(self, setpoints: InterpolatedSetpoints) -> Floats:
+        """Return the shares (intervals, 1) of the feeds themselves, without the reserve."""
+        speed = self.speeds(setpoints.piece, setpoints.rows.stations[setpoints.own_rows]) / self.limit
+        return (setpoints.station.rates[setpoints.own_intervals, 0] / np.minimum(speed[:-1], speed[1:]))[:, None]

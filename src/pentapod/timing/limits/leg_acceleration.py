@@ -1,9 +1,9 @@
 """Limit of the legs' accelerations: |q′ s̈ + q″ ṡ²| ≤ a.
 
-A law with bounded jerk cannot push a leg harder than its velocities allow, whatever its acceleration limit is: a leg
-that accelerates by α with jerks up to J has changed its velocity by α² / 2J on either side of that moment, within
-α / J. So α ≤ √(J Δv), where Δv is the spread of the velocities that the speed limits leave it within that reach. No law
-within the jerk limits is lost by this cap; and above it a looser acceleration limit changes nothing.
+A law with bounded jerk cannot accelerate a leg more than its velocities allow, whatever its acceleration limit is: a
+leg that accelerates by α with jerks up to J changes its velocity by α² / 2J before and after that moment, within
+α / J each. So α ≤ √(J Δv), where Δv is the spread of the velocities that the speed limits allow within that reach. This
+cap excludes no law within the jerk limits; above it a looser acceleration limit changes nothing.
 """
 
 from __future__ import annotations
@@ -16,20 +16,35 @@ from scipy.ndimage import maximum_filter1d
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.limits.leg_jerk import LegJerk
-from pentapod.timing.limits.limit import AccelerationRows, MachineLimit, Motion, Reserve
-from pentapod.timing.limits.polytopes import common_push
+from pentapod.timing.limits.limit import AccelerationRows, MachineLimit, Motion, Reserve, acceleration_ceiling
 from pentapod.timing.path.path import PathDerivatives
 from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
-_ROUNDS = 2
-_MOST_CELLS = 400_000
-_LEAST_CAP = 1e-3
-"""Share of an acceleration limit below which there is no cap: a leg that rests at gridpoints may move between them."""
+
+@dataclass(frozen=True)
+class CapOptions:
+    """Options of the caps on accelerations."""
+
+    rounds: int = 2
+    """Rounds: a lower cap is reached in less time, within which the velocities spread less."""
+    least_share: float = 1e-3
+    """Least cap as a share of the limit: a leg that rests at the gridpoints may move between them."""
+    cells_in_reach: int = 4
+    """Cells of the moving maximum within the reach."""
+    least_cells: int = 64
+    """Cells of the moving maximum at least."""
+    most_cells: int = 400_000
+    """Cells of the moving maximum at most."""
+    cells_per_gridpoint: int = 20
+    """Cells of the moving maximum for each gridpoint at most, beside the least."""
+
+
+DEFAULT_CAPS = CapOptions()
 
 
 @dataclass(frozen=True, eq=False)
 class LegAcceleration(MachineLimit):
-    """limit, bound (legs,) m/s²; jerk (legs,) m/s³: the limit of jerks that is planned with."""
+    """limit, bound (legs,) m/s²; jerk (legs,) m/s³: the jerk limit that is planned with."""
 
     quantity = "leg acceleration"
     unit = "m/s²"
@@ -50,44 +65,37 @@ class LegAcceleration(MachineLimit):
 
     def ceiling(self, path: PathDerivatives) -> Floats:
         """Return the largest x (n,) for which one u suits all legs."""
-        return common_push(path.legs[0], path.legs[1], size=self.limit)
+        return acceleration_ceiling(path.legs[0], path.legs[1], size=self.limit)
 
-    def caps(self, path: PathDerivatives, ceiling: Floats, *, moving: bool) -> Floats:
-        """Return shares (n, legs) of the limit that no law within the jerk limits exceeds."""
-        caps = _acceleration_caps(path.s, path.legs[0], ceiling, self.limit, self.jerk, moving=moving)
-        return caps / self.limit
+    def caps(
+        self, path: PathDerivatives, ceiling: Floats, *, moving: bool, options: CapOptions = DEFAULT_CAPS
+    ) -> Floats:
+        """Return shares (n, legs) of the limit that no law within the jerk limits exceeds.
+
+        ceiling (n,): bounds of ṡ². moving: the path continues beyond an end, where only one side of a moment counts.
+        """
+        velocities = path.legs[0] * np.sqrt(ceiling)[:, None]
+        sides = 2.0 if moving else 1.0
+        caps = np.broadcast_to(self.limit, velocities.shape).astype(np.float64)
+        for _ in range(options.rounds):
+            reach = float(np.sqrt(ceiling.max()) * (caps / self.jerk).max())
+            caps = np.minimum(caps, np.sqrt(sides * self.jerk * _spread(path.s, velocities, reach, options)))
+        return np.maximum(caps, options.least_share * self.limit) / self.limit
 
     def share(self, path: PathDerivatives, motion: Motion) -> Floats:
         """Return the shares (n, legs)."""
         return np.abs(path.legs[0] * motion.u[:, None] + path.legs[1] * motion.x[:, None]) / self.limit
 
-    def measured(self, joined: InterpolatedSetpoints) -> Floats:
+    def measured(self, setpoints: InterpolatedSetpoints) -> Floats:
         """Return the accelerations (rows, legs)."""
-        return joined.legs.accelerations[joined.own_rows]
+        return setpoints.legs.accelerations[setpoints.own_rows]
 
 
-def _acceleration_caps(
-    s: Floats, one: Floats, ceiling: Floats, acceleration: Floats, jerk: Floats, *, moving: bool
-) -> Floats:
-    """Return accelerations (N + 1, R), at most those given (R,), that a law within the jerks (R,) does not exceed.
-
-    one (N + 1, R): the legs' derivatives by s; ceiling (N + 1,): bounds of ṡ². moving: whether the path goes on beyond
-    an end, where only what is on one side of a moment counts.
-    """
-    velocities = one * np.sqrt(ceiling)[:, None]
-    sides = 2.0 if moving else 1.0
-    caps = np.broadcast_to(acceleration, one.shape).astype(np.float64)
-    for _ in range(_ROUNDS):  # lower accelerations take less time to reach, in which less else is reached
-        reach = float(np.sqrt(ceiling.max()) * (caps / jerk).max())
-        caps = np.minimum(caps, np.sqrt(sides * jerk * _spread(s, velocities, reach)))
-    return np.maximum(caps, _LEAST_CAP * acceleration)
-
-
-def _spread(s: Floats, velocities: Floats, reach: float) -> Floats:
+def _spread(s: Floats, velocities: Floats, reach: float, options: CapOptions) -> Floats:
     """Return the spread (N + 1, R) of velocities between rest and these, within `reach` metres of each station."""
     length = float(s[-1])
-    least = 20 * len(s) + 64
-    cells = int(min(max(64.0, 4.0 * np.ceil(length / reach)), least, _MOST_CELLS))
+    most = min(options.cells_per_gridpoint * len(s) + options.least_cells, options.most_cells)
+    cells = int(min(max(options.least_cells, options.cells_in_reach * np.ceil(length / reach)), most))
     cell = np.minimum((s * (cells / length)).astype(np.intp), cells - 1)
     middles = (np.arange(cells) + 0.5) * (length / cells)
     width = 2 * int(min(np.ceil(reach * cells / length) + 1.0, cells)) + 1

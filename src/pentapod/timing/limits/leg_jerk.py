@@ -12,7 +12,7 @@ from pentapod.timing.limits.limit import MachineLimit, Motion, Reserve
 from pentapod.timing.path.path import PathDerivatives
 from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
-RINGS = "the spline through the setpoints overshoots where the law's jerk steps"
+OVERSHOOT = "the spline through the setpoints overshoots where the law's jerk steps"
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class LegJerk(MachineLimit):
     unit = "m/s³"
     group = "jerk"
     of_legs = True
-    above = RINGS
+    above = OVERSHOOT
 
     @classmethod
     def of(cls, machine: Machine, reserve: Reserve) -> LegJerk:
@@ -40,14 +40,8 @@ class LegJerk(MachineLimit):
         """Return the shares (n, legs), none where the motion's jerk is not known."""
         if motion.jerk is None:
             return np.zeros((len(path.s), len(self.limit)))
-        return np.abs(vector_jerk(path.legs, motion)) / self.limit
+        return np.abs(motion.jerk_of(path.legs)) / self.limit
 
-    def measured(self, joined: InterpolatedSetpoints) -> Floats:
+    def measured(self, setpoints: InterpolatedSetpoints) -> Floats:
         """Return the jerks (intervals, legs)."""
-        return joined.legs.jerks[joined.own_intervals]
-
-
-def vector_jerk(derivatives: tuple[Floats, ...], motion: Motion) -> Floats:
-    """Return the jerk (n, d) of what has these derivatives (n, d) by s, order 1 to 3."""
-    (one, two, three), v, a = derivatives, motion.v[:, None], motion.u[:, None]
-    return one * np.asarray(motion.jerk)[:, None] + 3.0 * two * v * a + three * v**3
+        return setpoints.legs.jerks[setpoints.own_intervals]

@@ -28,7 +28,7 @@ class LegVelocity(MachineLimit):
         return cls(machine.legs.max_velocity * reserve.slower, machine.legs.max_velocity)
 
     def speed_rows(self, path: PathDerivatives) -> Floats:
-        """Return the largest ṡ (n, legs): the limit over 0 is infinite, as it should be."""
+        """Return the largest ṡ (n, legs), infinite where a leg stands."""
         with np.errstate(divide="ignore"):
             return self.limit / np.abs(path.legs[0])
 
@@ -36,6 +36,6 @@ class LegVelocity(MachineLimit):
         """Return the shares (n, legs)."""
         return np.abs(path.legs[0]) * motion.v[:, None] / self.limit
 
-    def measured(self, joined: InterpolatedSetpoints) -> Floats:
+    def measured(self, setpoints: InterpolatedSetpoints) -> Floats:
         """Return the largest rates (intervals, legs)."""
-        return joined.legs.rates[joined.own_intervals]
+        return setpoints.legs.rates[setpoints.own_intervals]

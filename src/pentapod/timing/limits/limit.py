@@ -1,21 +1,21 @@
 """Limit: a constraint on the motion along a path, as rows that are linear in ṡ² and s̈.
 
-With x = ṡ² and u = s̈, a leg moves at q′ √x and accelerates with q′ u + q″ x; a force in a leg has an offset beside
-that, which is there at rest as well. A limit of one's own is a class with `names` and one of the three kinds of rows:
-`retime` takes it in `limits`, and everything else follows from the rows.
+With x = ṡ² and u = s̈, a leg moves at q′ √x and accelerates with q′ u + q″ x; the force in a leg has an offset too,
+which is present at rest as well. A further limit is a class with `names` and one of the three kinds of rows: `retime`
+takes it in `limits`, and everything else follows from the rows.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
+from functools import lru_cache
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, Self
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Floats, Ints
 from pentapod.base.values import Value
-from pentapod.timing.limits.polytopes import common_push
 from pentapod.timing.path.path import PathDerivatives
 from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
@@ -23,26 +23,26 @@ if TYPE_CHECKING:
     from pentapod.machine.machine import Machine
 
 Group = Literal["speed", "acceleration", "jerk"]
-"""What a limit is exceeded by: a motion run slower by the factor f uses less by f, f² or f³."""
+"""What is limited: a motion run slower by the factor f uses less of it by f, f² or f³."""
 
 
 @dataclass(frozen=True)
 class Reserve:
-    """What a plan leaves free of each limit.
-
-    velocity, acceleration: fractions of speeds, and of accelerations and jerks. ringing: share of a jerk limit that is
-    planned with, for where jerk steps the spline through setpoints rings above it. rounding: m/s³, the jerk that
-    rounding setpoints may add to a leg's; least_left: share of a jerk limit that is left for the plan at least, however
-    much that is. guard: seconds by which a slower section's feed reaches into its faster neighbours, so that no
-    interval between two setpoints straddles the step too fast.
-    """
+    """Reserve of a plan: how much of each limit it leaves free."""
 
     velocity: float = 0.0
+    """Fraction of speeds that is left free."""
     acceleration: float = 0.0
-    ringing: float = 1.0
+    """Fraction of accelerations and jerks that is left free."""
+    ringing: float = 0.975
+    """Share of a jerk limit that is planned with: where jerk steps, the spline through the setpoints overshoots."""
     rounding: float = 0.0
+    """Jerk in m/s³ that the rounding of setpoints may add to a leg's."""
     least_left: float = 0.25
+    """Share of a jerk limit that is planned with at least, however much rounding takes."""
     guard: float = 0.0
+    """Seconds by which a slower section's feed extends into its faster neighbours, so that no interval between two
+    setpoints crosses the step too fast."""
 
     @property
     def slower(self) -> float:
@@ -72,7 +72,7 @@ class Reserve:
         return np.maximum(np.asarray(limit) - rounded * self.rounding, self.least_left * np.asarray(limit))
 
 
-NOTHING_LEFT_FREE = Reserve()
+NO_RESERVE = Reserve(ringing=1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +89,41 @@ class AccelerationRows(Value):
         return cls(first, second, np.zeros((1, first.shape[1])))
 
     def over(self, share: Floats | float) -> AccelerationRows:
-        """Return the rows of a limit of which the motion may use a share (n, R) or (n, 1): the offset stays."""
+        """Return the rows where the motion may use a share (n, R) or (n, 1) of the limit; the offset stays."""
         return AccelerationRows(self.first / share, self.second / share, self.offset)
 
 
-def share_of_room(pushes: Floats, offset: Floats) -> Floats:
-    """Return which share (n, R) of the room beside the offset |pushes + offset| ≤ 1 leaves the pushes (n, R) take.
+def acceleration_ceiling(
+    first: Floats, second: Floats, offset: Floats | None = None, size: Floats | float = 1.0
+) -> Floats:
+    """Return the largest x (n,) for which one u keeps all |first u + second x + offset| ≤ size.
 
-    It is 1 where the limit is reached, and grows with the pushes, as the motion alone can change them.
+    first, second, offset (n, R); size (R,). Each row is a strip in the (u, x) plane: at one x it allows an interval of
+    u, and intervals have a common point if each two of them have. Hence the minimum over pairs of rows of
+    (size_i |first_j| + size_j |first_i|) / |second_i first_j − second_j first_i| where there is no offset.
+    """
+    size, (i, j) = np.broadcast_to(size, first.shape[1]), _pairs(first.shape[1])
+    one = np.abs(first)
+    above = size[i] * one[:, j] + size[j] * one[:, i]
+    across = second[:, i] * first[:, j] - second[:, j] * first[:, i]
+    if offset is not None and offset.any():
+        shift = first[:, j] * offset[:, i] - first[:, i] * offset[:, j]
+        above = np.maximum(above - np.sign(across) * shift, 0.0)
+    below = np.abs(across)
+    # A quotient that overflows is no bound, as it should be.
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return np.where(below > 0.0, above / below, np.inf).min(axis=1, initial=np.inf)
+
+
+@lru_cache
+def _pairs(count: int) -> tuple[Ints, Ints]:
+    return np.triu_indices(count, 1)
+
+
+def share_of_room(pushes: Floats, offset: Floats) -> Floats:
+    """Return the share (n, R) that pushes (n, R) use of what the offset leaves them of |pushes + offset| ≤ 1.
+
+    It is 1 at the limit and proportional to the pushes, since the motion cannot change the offset.
     """
     if not offset.any():
         return np.abs(pushes)
@@ -118,6 +145,11 @@ class Motion:
         """Return the motion with these squared speeds and accelerations."""
         return cls(x, np.sqrt(x), u)
 
+    def jerk_of(self, derivatives: tuple[Floats, ...]) -> Floats:
+        """Return the jerk (n, d) of a quantity with these derivatives (n, d) by s, order 1 to 3."""
+        (one, two, three), v, a = derivatives, self.v[:, None], self.u[:, None]
+        return one * np.asarray(self.jerk)[:, None] + 3.0 * two * v * a + three * v**3
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -129,20 +161,12 @@ class Reading:
     index: int
 
 
-@dataclass(frozen=True)
-class Constraint:
-    """A limit's name, and how a sentence calls it: "leg 1 jerk", "leg 1's jerk"."""
-
-    name: str
-    subject: str
-
-
 class Limit(Protocol):
-    """One limit. A subclass gives `names` and at least one kind of rows; the other methods have defaults made of them.
+    """One limit: a subclass defines `names` and at least one kind of rows; the other methods default to these.
 
-    quantity: its name in certificates; unit: of the values told there, SI. of_legs: one name for each leg.
-    of_tool: it asks for tip or axis of the setpoints. sectional: it is the same between two marks of the path (feeds),
-    so that nothing is to be looked for between gridpoints. above: why a value may exceed its bound by little.
+    quantity: its name in certificates; unit: SI, of the values there. of_legs: one name for each leg.
+    of_tool: it needs tip or axis of the setpoints. sectional: it is constant between two marks of the path (feeds), so
+    that nothing needs to be checked between gridpoints. above: why a value may slightly exceed its bound.
     """
 
     quantity: ClassVar[str]
@@ -155,12 +179,8 @@ class Limit(Protocol):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What is told of the limit, one name for each leg or one for all: "leg 1 velocity"."""
+        """Names in messages, one for each leg or one for all: "leg 1 velocity"."""
         ...
-
-    def explain(self, index: int) -> str:
-        """Return the name with this index as the subject of a sentence: "leg 1's velocity"."""
-        return self.names[index]
 
     @property
     def bounds(self) -> Floats:
@@ -183,10 +203,10 @@ class Limit(Protocol):
         """Return the largest x (n,) that this limit allows with the best u."""
         speeds, rows = self.speed_rows(path), self.acceleration_rows(path)
         x = np.full(len(path.s), np.inf) if speeds is None else np.square(speeds).min(axis=1)
-        return x if rows is None else np.minimum(x, common_push(rows.first, rows.second, rows.offset))
+        return x if rows is None else np.minimum(x, acceleration_ceiling(rows.first, rows.second, rows.offset))
 
     def share(self, path: PathDerivatives, motion: Motion) -> Floats:
-        """Return how much of the limit a motion uses (n, names), beside what it uses at rest (`share_of_room`)."""
+        """Return the share (n, names) of the limit that a motion uses, beside what is used at rest."""
         speeds, rows = self.speed_rows(path), self.acceleration_rows(path)
         shares: list[Floats] = [] if speeds is None else [motion.v[:, None] / speeds]
         if rows is not None:
@@ -198,27 +218,24 @@ class Limit(Protocol):
         one_each = (y if y.shape[1] == len(self.names) else y.max(axis=1, keepdims=True) for y in shares)
         return np.max([np.zeros((len(path.s), len(self.names))), *one_each], axis=0)
 
-    def measured(self, joined: InterpolatedSetpoints) -> Floats:
-        """Return the quantity (rows or intervals, names) of setpoints as the controller joins them.
-
-        By default the share, at their stations.
-        """
-        rows, station = joined.own_rows, joined.station
+    def measured(self, setpoints: InterpolatedSetpoints) -> Floats:
+        """Return the quantity (rows or intervals, names) of interpolated setpoints; by default the share there."""
+        rows, station = setpoints.own_rows, setpoints.station
         v, u = station.first[:, 0], station.second[rows, 0]
-        if joined.interpolation == "linear":  # the rate jumps at the row: the mean of both sides
+        if setpoints.interpolation == "linear":  # the rate jumps at the row: the mean of both sides
             v = 0.5 * (v + np.append(v[1:], 0.0))
         v = v[rows]
-        jerk = np.gradient(station.second[:, 0], joined.period)[rows] if self.group == "jerk" else None
-        path = PathDerivatives(joined.piece, joined.rows.stations[rows], 2 if jerk is None else 3)
+        jerk = np.gradient(station.second[:, 0], setpoints.period)[rows] if self.group == "jerk" else None
+        path = PathDerivatives(setpoints.piece, setpoints.rows.stations[rows], 2 if jerk is None else 3)
         return self.share(path, Motion(v * v, v, u, jerk))
 
-    def used(self, joined: InterpolatedSetpoints) -> Floats:
+    def used(self, setpoints: InterpolatedSetpoints) -> Floats:
         """Return the largest share (rows or intervals,) that setpoints use."""
-        return (self.measured(joined) / self.bounds).max(axis=1)
+        return (self.measured(setpoints) / self.bounds).max(axis=1)
 
-    def largest(self, joined: InterpolatedSetpoints) -> Reading | None:
-        """Return the largest share's value and place, None where it is not told in certificates."""
-        values = self.measured(joined)
+    def largest(self, setpoints: InterpolatedSetpoints) -> Reading | None:
+        """Return value and place of the largest share, None where certificates do not list the limit."""
+        values = self.measured(setpoints)
         row, index = np.unravel_index(int(np.argmax(values / self.bounds)), values.shape)
         bound = np.broadcast_to(self.bounds, values.shape[1])[index]
         return Reading(float(values[row, index]), float(bound), int(row), int(index))
@@ -226,9 +243,9 @@ class Limit(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class MachineLimit(Limit):
-    """A limit that machines set, one of `LIMITS`, in SI units, one number for each name.
+    """A limit that machines set, one of `LIMITS`, in SI units.
 
-    limit: what is planned with; bound: what setpoints must keep.
+    limit (names,): what is planned with; bound (names,): what setpoints must keep.
     """
 
     limit: Floats
@@ -239,16 +256,18 @@ class MachineLimit(Limit):
     def of(cls, machine: Machine, reserve: Reserve) -> MachineLimit | None:
         """Return the machine's limit, of which the plan leaves a reserve free; None where it sets none."""
 
+    @classmethod
+    def if_set(cls, bound: float, reserve: Reserve) -> Self | None:
+        """Return the limit with one bound, None where that is infinite."""
+        bounds = np.atleast_1d(bound)
+        return cls(bounds * reserve.kept(cls.group), bounds) if np.isfinite(bound) else None
+
     @property
     def names(self) -> tuple[str, ...]:
         """The quantity, for each leg where it is the legs': "leg 1 velocity"."""
         if not self.of_legs:
             return (self.quantity,)
         return tuple(f"leg {leg}{self.quantity.removeprefix('leg')}" for leg in range(1, len(self.limit) + 1))
-
-    def explain(self, index: int) -> str:
-        """Return "leg 1's velocity", or the quantity."""
-        return f"leg {index + 1}'s{self.quantity.removeprefix('leg')}" if self.of_legs else self.quantity
 
     @property
     def bounds(self) -> Floats:

@@ -1,4 +1,4 @@
-"""The set of limits of a plan: those that machines set, those added to them, and the rows of all together."""
+"""The limits of a plan: those that the machine sets, those added to them, and the rows of all."""
 
 from __future__ import annotations
 
@@ -18,9 +18,8 @@ from pentapod.timing.limits.leg_acceleration import LegAcceleration
 from pentapod.timing.limits.leg_jerk import LegJerk
 from pentapod.timing.limits.leg_velocity import LegVelocity
 from pentapod.timing.limits.limit import (
-    NOTHING_LEFT_FREE,
+    NO_RESERVE,
     AccelerationRows,
-    Constraint,
     Group,
     Limit,
     MachineLimit,
@@ -43,7 +42,7 @@ LIMITS: tuple[type[MachineLimit], ...] = (
     AxisVelocity,
     AxisAcceleration,
 )
-"""Every limit that a machine or a path sets, in the order of rows and certificates: a new one is added here."""
+"""Every limit that a machine or a path sets, in the order of rows and certificates; a new one is added here."""
 
 PLUGGED: Registry[type] = Registry("limit", "pentapod.timing_limits", type)
 """Limits of other packages, by entry points of this group: classes like those of `LIMITS`.
@@ -51,11 +50,8 @@ PLUGGED: Registry[type] = Registry("limit", "pentapod.timing_limits", type)
 They hold where a job names them (`[limits] use`), or `retime(limits=...)` is given one.
 """
 
-_RINGING = 0.975
-"""Share of a jerk limit that is planned with: where jerk steps, the spline through setpoints rings above it."""
 
-
-def machine_limits(machine: Machine, reserve: Reserve = NOTHING_LEFT_FREE) -> tuple[Limit, ...]:
+def machine_limits(machine: Machine, reserve: Reserve = NO_RESERVE) -> tuple[Limit, ...]:
     """Return the limits that a machine sets, less a reserve."""
     found = (limit.of(machine, reserve) for limit in LIMITS)
     return tuple(limit for limit in found if limit is not None)
@@ -63,9 +59,9 @@ def machine_limits(machine: Machine, reserve: Reserve = NOTHING_LEFT_FREE) -> tu
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """The limits that a plan keeps: those of the machine, less the reserve, and those added.
+    """The limits that a plan keeps, less the reserve: those of the machine, and those added.
 
-    reserve: what is left free of the added ones, too; period: seconds between setpoints.
+    period: seconds between setpoints.
     """
 
     of_machine: tuple[Limit, ...]
@@ -86,7 +82,7 @@ class Limits:
         """Return the machine's limits and those added, less the margins (fractions); guard: as in `Reserve`."""
         controller = machine.controller
         rounding = jerk_of_rounding(controller.period, controller.interpolation)
-        reserve = Reserve(velocity_margin, acceleration_margin, _RINGING, rounding, guard=guard)
+        reserve = Reserve(velocity_margin, acceleration_margin, rounding=rounding, guard=guard)
         own = machine_limits(machine, reserve)
         return cls(own, tuple(added), Feed.of(machine, reserve), reserve, controller.period)
 
@@ -96,13 +92,13 @@ class Limits:
         return (*self.of_machine, *self.added)
 
     @property
-    def constraints(self) -> tuple[Constraint, ...]:
-        """What is told of the columns of `shares`."""
-        return tuple(Constraint(name, limit.explain(k)) for limit in self.all for k, name in enumerate(limit.names))
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns of `shares`."""
+        return tuple(name for limit in self.all for name in limit.names)
 
     @property
     def of_tool(self) -> bool:
-        """Whether one asks for tip or axis of the setpoints."""
+        """Whether a limit needs tip or axis of the setpoints."""
         return any(limit.of_tool for limit in self.all)
 
     def rows(self, path: PathDerivatives) -> AccelerationRows:
@@ -118,7 +114,7 @@ class Limits:
         )
 
     def row_names(self, path: PathDerivatives) -> tuple[str, ...]:
-        """Return which constraint each row of `rows` belongs to."""
+        """Return the name of the limit to which each row of `rows` belongs."""
         names: list[str] = []
         for limit, rows in self._rows(path):
             count = rows.first.shape[1]
@@ -132,12 +128,12 @@ class Limits:
         return np.concatenate(parts, axis=1) if len(parts) > 1 else parts[0]
 
     def ceiling(self, path: PathDerivatives) -> Floats:
-        """Return the largest x (n,) that every limit allows with the u that suits it best."""
+        """Return the largest x (n,) that every limit allows by itself, with the best u."""
         own = [limit.ceiling(path) for limit in self.of_machine]
         return np.min([*own, *(limit.ceiling(path) * self.reserve.x(limit.group) for limit in self.added)], axis=0)
 
     def slowness(self, path: PathDerivatives) -> Floats:
-        """Return 1/ṡ (n,) in s/m where the first of the speeds is reached that change within a section."""
+        """Return 1/ṡ (n,) in s/m at the lowest of the speed limits that vary within a section."""
         unit = Motion.of(np.ones(len(path.s)), np.zeros(len(path.s)))
         speeds = (limit for limit in self.all if limit.group == "speed" and not limit.sectional)
         return np.max([self._share(limit, path, unit).max(axis=1) for limit in speeds], axis=0)
@@ -151,7 +147,7 @@ class Limits:
         return np.concatenate(parts, axis=1)
 
     def shares(self, path: PathDerivatives, motion: Motion) -> Floats:
-        """Return how much of each limit a motion uses (n, C), in the order of `constraints`."""
+        """Return the share (n, C) of each limit that a motion uses, in the order of `names`."""
         return np.concatenate([self._share(limit, path, motion) for limit in self.all], axis=1)
 
     def largest(self, group: Group, path: PathDerivatives, motion: Motion) -> Floats:

@@ -1,4 +1,4 @@
-"""Polyhedral approximation of norm limits: linear rows in the frame in which the path moves.
+"""Polyhedral approximation of limits on the length of a vector: linear rows in the frame in which the path moves.
 
 The acceleration of a point on the path is f u + g x, with f along the path: it stays in the plane of f and g. Its
 jerk needs a third direction. Rows say |n · vector| ≤ 1 for normals n spread over the half circle, or the half sphere.
@@ -6,14 +6,17 @@ jerk needs a third direction. Rows say |n · vector| ≤ 1 for normals n spread 
 
 from __future__ import annotations
 
-from functools import lru_cache
+from abc import abstractmethod
+from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Floats
+from pentapod.timing.limits.limit import AccelerationRows, MachineLimit, Motion
+from pentapod.timing.path.path import PathDerivatives
 
 DIRECTIONS = 8
-"""Normals of the half circle: a polygon with 16 sides, 1.9 % nearer than the circle where it is nearest."""
+"""Normals of the half circle: a polygon with 16 sides inside the circle; at most 1.9 % of the limit is given away."""
 
 _ANGLES = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
 _COS, _SIN = np.cos(_ANGLES), np.sin(_ANGLES)
@@ -21,12 +24,40 @@ _INSIDE = float(np.cos(0.5 * np.pi / DIRECTIONS))
 
 
 def _cube() -> Floats:
-    """Return the normals (13, 3) of half a sphere: through the faces, edges and corners of a cube."""
+    """Return normals (13, 3) that cover half a sphere: towards the faces, edges and corners of a cube."""
     signs = np.array(np.meshgrid([1, 0, -1], [1, 0, -1], [1, 0, -1], indexing="ij")).reshape(3, -1).T[:13]
     return signs / np.linalg.norm(signs, axis=1, keepdims=True)
 
 
 _NORMALS = _cube()
+
+
+@dataclass(frozen=True, eq=False)
+class VectorAcceleration(MachineLimit):
+    """Limit of the length of an acceleration f u + g x, where f and g (n, 3) are the first two `vectors`."""
+
+    group = "acceleration"
+    of_tool = True
+
+    @abstractmethod
+    def vectors(self, path: PathDerivatives) -> tuple[Floats, ...]:
+        """Return f and g, (n, 3) each."""
+
+    def acceleration_rows(self, path: PathDerivatives) -> AccelerationRows:
+        """Return the rows of a polygon inside the circle."""
+        f, g = self.vectors(path)[:2]
+        return AccelerationRows.of(*polygon(f, g, self.limit.item()))
+
+    def ceiling(self, path: PathDerivatives) -> Floats:
+        """Return the largest x (n,), by the part of g across f."""
+        f, g = self.vectors(path)[:2]
+        with np.errstate(divide="ignore"):
+            return self.limit / across_path(f, g)
+
+    def share(self, path: PathDerivatives, motion: Motion) -> Floats:
+        """Return the shares (n, 1)."""
+        f, g = self.vectors(path)[:2]
+        return np.linalg.norm(f * motion.u[:, None] + g * motion.x[:, None], axis=1, keepdims=True) / self.limit
 
 
 def polygon(f: Floats, g: Floats, limit: float) -> tuple[Floats, Floats]:
@@ -39,33 +70,8 @@ def polygon(f: Floats, g: Floats, limit: float) -> tuple[Floats, Floats]:
     return (size * _COS) * scale, (along * _COS + across * _SIN) * scale
 
 
-def common_push(first: Floats, second: Floats, offset: Floats | None = None, size: Floats | float = 1.0) -> Floats:
-    """Return the largest x (n,) for which one u keeps all of |first u + second x + offset| ≤ size.
-
-    first, second, offset (n, R); size (R,). Each row is a strip in the (u, x) plane: for one x it leaves an interval of
-    u, and intervals have a point in common when each two of them have. Hence the minimum over pairs of rows of
-    (size_i |first_j| + size_j |first_i|) / |second_i first_j − second_j first_i| where there is no offset.
-    """
-    size, (i, j) = np.broadcast_to(size, first.shape[1]), _pairs(first.shape[1])
-    one = np.abs(first)
-    above = size[i] * one[:, j] + size[j] * one[:, i]
-    across = second[:, i] * first[:, j] - second[:, j] * first[:, i]
-    if offset is not None and offset.any():
-        shift = first[:, j] * offset[:, i] - first[:, i] * offset[:, j]
-        above = np.maximum(above - np.sign(across) * shift, 0.0)
-    below = np.abs(across)
-    # Where rows hardly bend at all a quotient beyond all numbers is no bound, as it should be.
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        return np.where(below > 0.0, above / below, np.inf).min(axis=1, initial=np.inf)
-
-
-@lru_cache
-def _pairs(count: int) -> tuple[Ints, Ints]:
-    return np.triu_indices(count, 1)
-
-
 def across_path(f: Floats, g: Floats) -> Floats:
-    """Return the length (n,) of g's part across f: what no u takes away. f, g (n, 3)."""
+    """Return the length (n,) of g's part across f, which no u can cancel. f, g (n, 3)."""
     return _plane(f, g)[2][:, 0]
 
 
@@ -76,9 +82,9 @@ def polyhedron(f: Floats, g: Floats, h: Floats, limit: float) -> Floats:
     derivative of the point by s.
     """
     along, across = _unit(f), g
-    for _ in range(2):  # once more for what rounding left along the path
+    for _ in range(2):  # the second time removes what rounding left along the path
         across = across - _dot(across, along) * along
-    # Where the path is straight there is no second direction: any will do that is not the first.
+    # Where the path is straight any direction across it serves as the second one.
     straight = np.linalg.norm(across, axis=1) <= 1e-9 * np.linalg.norm(g, axis=1)
     across[straight] = np.cross(along[straight], np.eye(3)[np.abs(along[straight]).argmin(axis=1)])
     across = _unit(across)
@@ -97,7 +103,7 @@ def _plane(f: Floats, g: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _unit(v: Floats) -> Floats:
-    """Return v (n, 3) at length 1, nothing where it has none."""
+    """Return v (n, 3) scaled to length 1; zero vectors stay zero."""
     size = np.linalg.norm(v, axis=1, keepdims=True)
     return v / np.where(size > 0.0, size, 1.0)
 

@@ -32,10 +32,10 @@ class RapidRate(MachineLimit):
         """Return the largest ṡ (n, 1): the tip is never faster than s."""
         return np.broadcast_to(self.limit, (len(path.s), 1))
 
-    def measured(self, joined: InterpolatedSetpoints) -> Floats:
+    def measured(self, setpoints: InterpolatedSetpoints) -> Floats:
         """Return the largest rates (intervals, 1) of the station."""
-        return joined.station.rates[joined.own_intervals]
+        return setpoints.station.rates[setpoints.own_intervals]
 
-    def largest(self, joined: InterpolatedSetpoints) -> None:
-        """Return nothing: certificates tell of it with the feed."""
+    def largest(self, setpoints: InterpolatedSetpoints) -> None:
+        """Return None: certificates judge it with the feed."""
         return

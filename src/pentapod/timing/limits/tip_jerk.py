@@ -9,7 +9,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.machine.rounding import TIP_ROUNDING
-from pentapod.timing.limits.leg_jerk import RINGS, vector_jerk
+from pentapod.timing.limits.leg_jerk import OVERSHOOT
 from pentapod.timing.limits.limit import MachineLimit, Motion, Reserve
 from pentapod.timing.limits.polytopes import polyhedron
 from pentapod.timing.path.path import PathDerivatives
@@ -24,7 +24,7 @@ class TipJerk(MachineLimit):
     unit = "m/s³"
     group = "jerk"
     of_tool = True
-    above = RINGS
+    above = OVERSHOOT
 
     @classmethod
     def of(cls, machine: Machine, reserve: Reserve) -> TipJerk | None:
@@ -40,8 +40,8 @@ class TipJerk(MachineLimit):
         """Return the shares (n, 1), none where the motion's jerk is not known."""
         if motion.jerk is None:
             return np.zeros((len(path.s), 1))
-        return np.linalg.norm(vector_jerk(path.tip, motion), axis=1, keepdims=True) / self.limit
+        return np.linalg.norm(motion.jerk_of(path.tip), axis=1, keepdims=True) / self.limit
 
-    def measured(self, joined: InterpolatedSetpoints) -> Floats:
+    def measured(self, setpoints: InterpolatedSetpoints) -> Floats:
         """Return the jerks (intervals, 1)."""
-        return joined.tip.jerk_lengths[joined.own_intervals, None]
+        return setpoints.tip.jerk_lengths[setpoints.own_intervals, None]

@@ -1,1 +1,1 @@
-"""Time laws s(t) and trajectories; refusals of paths that have none."""
+"""Time laws s(t), trajectories, and refusals of paths that cannot be timed."""

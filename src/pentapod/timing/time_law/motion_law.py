@@ -1,4 +1,4 @@
-"""MotionLaw: arc length as a function of time, a piecewise cubic, from rest to rest."""
+"""MotionLaw: arc length as a function of time, a piecewise cubic."""
 
 from __future__ import annotations
 
@@ -13,11 +13,10 @@ from pentapod.base.values import Value
 
 @dataclass(frozen=True, eq=False)
 class MotionLaw(Value):
-    """s(t) as cubics in t between knots; s, ṡ continuous, ṡ ≥ 0.
+    """Piecewise cubic s(t): s and ṡ continuous, ṡ ≥ 0.
 
-    times (K,) seconds from 0; stations (K,) metres; speeds (K,) m/s; accelerations (K - 1,) m/s² just
-    after each knot; jerks (K - 1,) m/s³ between knots. Time-optimal laws have jerk 0: ṡ² is then
-    linear in s between knots.
+    times (K,) seconds from 0; stations (K,) metres; speeds (K,) m/s; accelerations (K - 1,) m/s² just after each knot;
+    jerks (K - 1,) m/s³ between knots. With jerk 0, as in time-optimal laws, ṡ² is linear in s between knots.
     """
 
     summary = ("duration",)
@@ -36,8 +35,7 @@ class MotionLaw(Value):
     def from_profile(cls, stations: Floats, squared_speeds: Floats) -> MotionLaw:
         """Return the law with ṡ² = `squared_speeds` (K,) at `stations` (K,) and constant s̈ between them.
 
-        A stage lasts 2 Δs / (ṡ_a + ṡ_b), which is exact also where it starts or ends at rest. At least
-        one end of each stage must move.
+        A stage lasts 2 Δs / (ṡ_a + ṡ_b), also where it starts or ends at rest; at least one of its ends must move.
         """
         speeds = np.sqrt(squared_speeds)
         steps = 2.0 * np.diff(stations) / (speeds[:-1] + speeds[1:])
@@ -48,8 +46,8 @@ class MotionLaw(Value):
     def through(cls, stations: Floats, squared_speeds: Floats, slopes: Floats) -> MotionLaw:
         """Return the law with ṡ² = `squared_speeds` (K,) and d(ṡ²)/ds = `slopes` (K,) at `stations` (K,).
 
-        Two cubics in each stage, equally long, meet both ends' station, speed and acceleration, so acceleration is
-        continuous. From or to a rest of slope 0 a ramp of constant jerk stays one. At least one end of each stage
+        In each stage two cubics of equal duration match station, speed and acceleration at both ends, so acceleration
+        is continuous. A ramp of constant jerk from or to a rest of slope 0 stays one. At least one end of each stage
         must move.
         """
         v, a, ds = np.sqrt(squared_speeds), 0.5 * slopes, np.diff(stations)
@@ -103,14 +101,14 @@ class MotionLaw(Value):
         return MotionLaw(times, self.stations, self.speeds * c, self.accelerations * c**2, self.jerks * c**3)
 
     def smoothed(self, window: float) -> MotionLaw:
-        """Return the moving average of a law without jerk over the last `window` seconds.
+        """Return the moving average over `window` seconds of a law without jerk, from rest to rest.
 
-        Still from rest to rest over the same length, `window` longer, the acceleration now continuous:
-        s̈(t) = (ṡ(t) − ṡ(t − window)) / window, piecewise linear with knots at those of ṡ and, later by
-        `window`, once more.
+        Its length stays, its duration grows by `window`, and its acceleration is continuous:
+        s̈(t) = (ṡ(t) − ṡ(t − window)) / window, piecewise linear
+        with knots at those of ṡ and the same later by `window`.
         """
         times = np.union1d(self.times, self.times + window)
-        # Knots closer than rounding would give wild jerks over no time at all.
+        # Knots closer than rounding would give arbitrary jerks.
         times = times[np.concatenate([[True], np.diff(times) > 1e-12 * times[-1]])]
         now, before = (np.interp(t, self.times, self.speeds, 0.0, 0.0) for t in (times, times - window))
         a = (now - before) / window
@@ -140,10 +138,10 @@ class SpeedNodes:
         return MotionLaw.through(self.s, self.x, self.slope)
 
     def slower(self, times: Floats, depths: Floats, widths: Floats) -> SpeedNodes:
-        """Return it slower about some of its times (n,): by the shares `depths` there, by less up to `widths` (n,).
+        """Return it slower around `times` (n,): by shares `depths` (n,) there, by less within `widths` (n,) seconds.
 
-        The speed is multiplied by f = 1 − depth (1 − u²)³, u = (t − time) / width, which has no step in the jerk; so x
-        by f², and x′ = 2 s̈ follows. Places that overlap multiply.
+        The speed is multiplied by f = 1 − depth (1 − u²)³, u = (t − time) / width, so x by f², without a step in the
+        jerk; x′ = 2 s̈ follows. Factors of overlapping places multiply.
         """
         law = self.law()
         clock, v = np.interp(self.s, law.stations, law.times), np.sqrt(self.x)

@@ -11,13 +11,14 @@ from pentapod.timing.path.path import LegPathLike, PieceLike
 from pentapod.timing.topp.stages import Failure
 
 STILL_M = 1e-12
-"""A piece shorter than this does not move."""
+"""A piece shorter than this, in metres, does not move."""
 
-_JOIN_M = 1e-9
+LARGEST_JUMP_M = 1e-9
+"""Largest difference of leg lengths, in metres, between the end of a piece and the start of the next."""
 
 
 def unfit(path: LegPathLike) -> Refusal | None:
-    """Return why a path cannot be timed at all: nothing moves, pieces do not join, or legs are not finite."""
+    """Return why a path cannot be timed: nothing moves, legs jump between pieces, or legs are not finite."""
     previous = None
     for k, piece in enumerate(path.pieces):
         if not math.isfinite(piece.length) or piece.length < 0.0:
@@ -28,13 +29,13 @@ def unfit(path: LegPathLike) -> Refusal | None:
         if bad.any():
             return refusal(path, k, Failure(-1, "the leg path or a derivative is not finite", station=float(s[bad][0])))
         ends = values[0][[0, -1]]
-        if previous is not None and np.abs(ends[0] - previous).max() > _JOIN_M:
+        if previous is not None and np.abs(ends[0] - previous).max() > LARGEST_JUMP_M:
             jump = np.abs(ends[0] - previous)
             leg, most = int(jump.argmax()), 1e3 * float(jump.max())
             reason = Failure(-1, f"the legs jump by {most:.3g} mm at an exact stop", station=0.0)
             return refusal(path, k, reason, (f"leg {leg + 1} jumps", most, "mm"))
-        if piece.length <= STILL_M and np.abs(ends[1] - ends[0]).max() > _JOIN_M:
-            return refusal(path, k, Failure(-1, "the tool turns about a tip that stands still", station=0.0))
+        if piece.length <= STILL_M and np.abs(ends[1] - ends[0]).max() > LARGEST_JUMP_M:
+            return refusal(path, k, Failure(-1, "the tool turns while its tip stands still", station=0.0))
         previous = ends[1]
     if not any(piece.length > STILL_M for piece in path.pieces):
         return Refusal("timing", "nothing moves: every piece of the leg path has no length")
@@ -42,9 +43,9 @@ def unfit(path: LegPathLike) -> Refusal | None:
 
 
 def refusal(path: LegPathLike, k: int, failure: Failure, short: tuple[str, float, str] | None = None) -> Refusal:
-    """Return the refusal of piece k: place, conflicting limits, tangent; and the waypoints to blame.
+    """Return the refusal of piece k: place, conflicting limits, tangent, and the waypoints there.
 
-    short: what falls short and by how much, (constraint, amount, unit), where that is known.
+    short: the shortfall where it is known: (constraint, amount, unit).
     """
     piece, s = path.pieces[k], failure.station
     where = f"piece {k}" if failure.gridpoint < 0 else f"piece {k}, gridpoint {failure.gridpoint}"

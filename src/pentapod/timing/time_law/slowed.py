@@ -1,4 +1,4 @@
-"""Report of pieces that had to be slower than their first law, so that the setpoints keep the limits."""
+"""Report of pieces whose law had to be slower than their first one, so that the setpoints keep the limits."""
 
 from __future__ import annotations
 
@@ -11,17 +11,15 @@ from pentapod.timing.path.path import LegPathLike
 from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.time_law.refusals import segment_at, waypoints_at
 
-TOLD = 1.02
-"""A piece that lasts longer than so many times its first law, and a period, is told."""
-
-_PARTS = 512
+REPORTED_FROM = 1.02
+"""A piece is reported that lasts more than this many times as long as its first law, and a period."""
 
 
 @dataclass(frozen=True)
 class Slowed(Value):
-    """A piece that lasts longer than its first law limited in jerk, so that its setpoints keep the limits.
+    """A piece that lasts longer than its first jerk-limited law, so that its setpoints keep the limits.
 
-    piece: its index in the path; first, duration: seconds of its first law and of the one it has; station: global s in
+    piece: its index in the path; first, duration: seconds of its first law and of its final one; station: global s in
     metres about which most of the time is lost; segment of the toolpath there; waypoints on both sides.
     """
 
@@ -45,17 +43,17 @@ class Slowed(Value):
 
 
 def slowed(path: LegPathLike, k: int, first: MotionLaw, law: MotionLaw, period: float) -> Slowed | None:
-    """Return what there is to tell of piece k of a path; None where its law is about as fast as its first one."""
-    if law.duration <= TOLD * first.duration + period:
+    """Return the report on piece k of a path; None where its law is about as fast as its first one."""
+    if law.duration <= REPORTED_FROM * first.duration + period:
         return None
     piece, s = path.pieces[k], most_lost(first, law)
     station = float(path.starts[k]) + s
     return Slowed(k, first.duration, law.duration, station, segment_at(piece, s), waypoints_at(piece, s))
 
 
-def most_lost(first: MotionLaw, law: MotionLaw) -> float:
-    """Return about which station of a piece a law loses most of the time against the one that it began with."""
-    s = np.linspace(0.0, law.length, _PARTS + 1)
+def most_lost(first: MotionLaw, law: MotionLaw, parts: int = 512) -> float:
+    """Return the middle of that one of equal parts of a piece in which a law loses most time against its first one."""
+    s = np.linspace(0.0, law.length, parts + 1)
     lost = np.diff(np.interp(s, law.stations, law.times) - np.interp(s, first.stations, first.times))
     worst = int(lost.argmax())
     return float((s[worst] + s[worst + 1]) / 2.0)

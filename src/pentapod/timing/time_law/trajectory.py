@@ -12,12 +12,10 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Bools, Floats, Ints, as_floats, frozen, set_frozen
 from pentapod.base.display import plot_axes
 from pentapod.base.values import Result, Value
-from pentapod.timing.limits.limit import Constraint, Limit
+from pentapod.timing.limits.limit import Limit
 from pentapod.timing.path.path import LegPathLike, PieceLike
 from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.time_law.slowed import Slowed
-
-_PLOTTED = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +23,8 @@ class Profile(Value):
     """Speed profile at the gridpoints, with the active limit at each.
 
     times (K,) s; stations (K,) global tip arc length, m; speeds (K,) tip, m/s; active (K,): index into
-    `constraints`; shares (K,): how much of that limit (less the margin) is used. Where smoothing
-    for a cubic controller follows, active and shares are those of the law before it.
+    `constraint_names`; shares (K,): used share of that limit (less the margin). Where laws are not limited in jerk but
+    averaged for a cubic controller, active and shares are those of the law before that.
     """
 
     times: Floats
@@ -34,20 +32,15 @@ class Profile(Value):
     speeds: Floats
     active: Ints
     shares: Floats
-    constraints: tuple[Constraint, ...]
-
-    @property
-    def constraint_names(self) -> tuple[str, ...]:
-        """Names of the constraints."""
-        return tuple(constraint.name for constraint in self.constraints)
+    constraint_names: tuple[str, ...]
 
     def at(self, rows: Ints | Bools) -> Profile:
         """Return some of its gridpoints."""
         times, stations, speeds, shares = (y[rows] for y in (self.times, self.stations, self.speeds, self.shares))
-        return Profile(times, stations, speeds, self.active[rows], shares, self.constraints)
+        return Profile(times, stations, speeds, self.active[rows], shares, self.constraint_names)
 
-    def standing(self, start: float, end: float) -> Profile:
-        """Return the profile from `start` to `end` seconds, with standing where it begins later or ends sooner."""
+    def extended(self, start: float, end: float) -> Profile:
+        """Return the profile from `start` to `end` seconds, at a stand where it begins later or ends sooner."""
         rows, times = np.arange(len(self.times)), self.times
         if start < times[0]:
             rows, times = np.append(0, rows), np.append(start, times)
@@ -58,13 +51,12 @@ class Profile(Value):
 
 @dataclass(frozen=True, eq=False)
 class Trajectory(Result):
-    """Legs as functions of time, at rest at each stop between pieces, and at the ends unless these have given speeds.
+    """Legs as functions of time, at rest at each stop between pieces, and at the ends unless speeds are given there.
 
-    path: the leg path; indices: those of its pieces that move; laws: their motion laws, one after the other.
-    Each lasts a whole number of the controller's periods, so that exact stops fall on setpoints. dwells (L + 1,):
-    seconds for which the machine stands before each law, and after the last; whole periods, too. slowed: pieces that
-    last more than 1.02 times as long as their first law limited in jerk. limits: those that were added to the
-    machine's.
+    path: the leg path; indices: those of its pieces that move; laws: their motion laws in order, each a whole number of
+    controller periods long, so that exact stops fall on setpoints. dwells (L + 1,): seconds of standing before each law
+    and after the last, whole periods too. slowed: pieces that last more than 1.02 times as long as their first
+    jerk-limited law. limits: those added to the machine's.
     """
 
     summary = ("duration",)
@@ -83,12 +75,12 @@ class Trajectory(Result):
 
     @property
     def starts(self) -> Floats:
-        """Time (L + 1,) in seconds at which each law sets off, and when all is over, standing at the end included."""
+        """Time (L + 1,) in seconds at which each law starts, and the end, final dwell included."""
         lasting = [law.duration for law in self.laws] + self.dwells[1:]
         return self.dwells[0] + np.concatenate([[0.0], np.cumsum(lasting)])
 
-    def standing(self, t: ArrayLike) -> Bools:
-        """Return at which times (n,) in seconds the machine stands because it was told to."""
+    def dwelling(self, t: ArrayLike) -> Bools:
+        """Return at which times (n,) in seconds the machine stands in a dwell."""
         time, starts = np.asarray(t, dtype=np.float64), self.starts
         ends = np.append(0.0, starts[:-1] + [law.duration for law in self.laws])
         begun = np.minimum(np.searchsorted(starts, time, side="right"), len(self.laws))
@@ -125,13 +117,13 @@ class Trajectory(Result):
         both = self._piecewise(t, lambda piece, law, time: np.hstack(piece.pose(law(time))), (6,))
         return both[:, :3], both[:, 3:]
 
-    def plot(self, axes: Any = None) -> Any:
+    def plot(self, axes: Any = None, samples: int = 2000) -> Any:
         """Draw tip speed and leg rates against time into two matplotlib axes, one below the other; return both.
 
         Raises InputError where matplotlib is not installed.
         """
         speed, rates = plot_axes(axes, rows=2)
-        times = np.linspace(0.0, self.duration, _PLOTTED)
+        times = np.linspace(0.0, self.duration, samples)
         speed.plot(times, 6e4 * self.station(times, 1), lw=1, label="tip")
         rates.plot(times, 1e3 * self(times, 1), lw=1)
         speed.set(ylabel="speed, mm/min")
@@ -157,7 +149,7 @@ class Trajectory(Result):
         return self._of_section(t, "section_feeds")
 
     def feed_rates(self, t: ArrayLike) -> Floats:
-        """Return how far (n,) the point whose speed the feed is moves for each metre of s, at each time."""
+        """Return `feed_rate` (n,) of the path at each time: travel of the feed's point for each metre of s."""
         return self._piecewise(t, lambda piece, law, time: piece.feed_rate(law(time)), ())
 
     def _of_section(self, t: ArrayLike, name: str) -> Floats:

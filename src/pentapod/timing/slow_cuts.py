@@ -1,4 +1,4 @@
-"""Constant surface speed for processes such as laser or spray: where it is not reached, and the active limit there."""
+"""Slow cuts: where the speed on the surface is below the feed, for processes such as laser or spray that need it."""
 
 from __future__ import annotations
 
@@ -13,16 +13,13 @@ from pentapod.geometry.runs import equal_runs, marked_runs
 from pentapod.timing.time_law.trajectory import Trajectory
 from pentapod.toolpath.toolpath import SegmentKind
 
-HELD = 0.98
-"""Share of the feed from which it counts as held."""
-
 
 @dataclass(frozen=True)
-class Unheld(Value):
+class SlowCut(Value):
     """A stretch of a cut whose surface speed is below the feed.
 
-    segment: of the toolpath; stations: from and to, global s in metres; seconds: how long; share: the least speed over
-    the feed; constraint: the active limit there.
+    segment: of the toolpath; stations: from and to, global s in metres; seconds: its duration; share: the least speed
+    over the feed; constraint: the active limit there.
     """
 
     segment: int
@@ -35,49 +32,42 @@ class Unheld(Value):
         low, high = (1e3 * s for s in self.stations)
         return (
             f"segment {self.segment}, {low:.1f} to {high:.1f} mm along the path: down to {100.0 * self.share:.0f} % "
-            f"of the feed, for {self.seconds:.3g} s, by {self.constraint}"
+            f"of the feed, for {self.seconds:.3g} s, limited by {self.constraint}"
         )
 
 
-def unheld(
+def slow_cuts(
     trajectory: Trajectory,
     period: float,
     surface_rate: Callable[[Floats], Floats] | None = None,
     *,
-    held: float = HELD,
-) -> tuple[Unheld, ...]:
-    """Return where on cuts the speed on the surface is below `held` of the feed, the longest first.
+    held: float = 0.98,
+) -> tuple[SlowCut, ...]:
+    """Return where cuts are slower on the surface than the share `held` of the feed, the longest first.
 
-    Judged every `period` seconds; standing that the toolpath asks for does not count. surface_rate: how far the spot on
-    the surface moves for each metre of global s, at stations (n,); without it the tip's own way counts.
+    Sampled every `period` seconds; dwells do not count. surface_rate: travel of the spot on the surface for each metre
+    of global s, at stations (n,); 1 by default.
     """
     times = np.arange(int(np.ceil(trajectory.duration / period)) + 1) * period
     stations, segments, profile = trajectory.station(times), trajectory.segment(times), trajectory.profile
     rate = np.ones(len(times)) if surface_rate is None else surface_rate(stations)
     feeds = trajectory.feeds(times)
-    wanted = np.isfinite(feeds) & ~trajectory.standing(times)
+    wanted = np.isfinite(feeds) & ~trajectory.dwelling(times)
     share = np.where(wanted, trajectory.station(times, 1) * rate / feeds, 1.0)
+    pieces = [trajectory.path.pieces[k] for k in trajectory.indices]
     cuts = {
         int(segment)
-        for k in trajectory.indices
-        for kind, segment in zip(
-            trajectory.path.pieces[k].section_kinds, trajectory.path.pieces[k].section_segments, strict=True
-        )
+        for piece in pieces
+        for kind, segment in zip(piece.section_kinds, piece.section_segments, strict=True)
         if kind == SegmentKind.CUT
     }
     slow = (share < held) & np.isin(segments, sorted(cuts))
-    found: list[Unheld] = []
+    found: list[SlowCut] = []
     for start, stop in marked_runs(slow).tolist():
         for a, b in (start + equal_runs(segments[start:stop])).tolist():
             worst = a + int(np.argmin(share[a:b]))
             gridpoint = min(int(np.searchsorted(profile.times, times[worst])), len(profile.times) - 1)
-            found.append(
-                Unheld(
-                    int(segments[worst]),
-                    (float(stations[a]), float(stations[b - 1])),
-                    (b - a) * period,
-                    float(share[worst]),
-                    profile.constraint_names[int(profile.active[gridpoint])],
-                )
-            )
-    return tuple(sorted(found, key=lambda u: -u.seconds))
+            name = profile.constraint_names[int(profile.active[gridpoint])]
+            reach = (float(stations[a]), float(stations[b - 1]))
+            found.append(SlowCut(int(segments[worst]), reach, (b - a) * period, float(share[worst]), name))
+    return tuple(sorted(found, key=lambda cut: -cut.seconds))

@@ -1,39 +1,38 @@
-"""Load: the forces with which drives have to push legs, spindle and tool along a program, beside their own inertia.
+"""Forces along a program: what legs, spindle and tool demand of the drives (inverse dynamics), and the cutting force.
 
-By virtual work: each body is three masses on its axis, placed so that mass, centre and inertia across the axis are
-those of the capsule that MuJoCo has. A mass that is to follow the program needs the force m (ẍ − g), and what each
-drive has to give for it is that force along the way that the mass goes per metre of the leg.
+By virtual work: each body is replaced by three masses on its axis with the mass, centre and transverse inertia of its
+capsule in MuJoCo. A mass that follows the program needs the force m (ẍ − g); each drive contributes that force times
+the displacement of the mass for each metre of the leg.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.errors import InputError
 from pentapod.kinematics.jacobian import pose_jacobian
 from pentapod.numerics.blocks import blocks
 from pentapod.simulate.bodies import Capsule, leg_cylinder, leg_rod, spindle
 from pentapod.simulate.reference import Reference
 
-_BLOCK = 1 << 13  # rows
 
+def leg_loads(reference: Reference, block: int = 1 << 13) -> Floats:
+    """Return the drives' forces (N, n_legs) at the rows without their own inertia, newtons; a push is positive.
 
-def leg_loads(reference: Reference) -> Floats:
-    """Return the forces (N, n_legs) at the rows, newtons, positive where a drive has to push its leg longer.
-
-    Accelerations are second differences of the rows, from rest and to rest.
+    Accelerations are second differences of the rows, from rest and to rest. block: rows at once, which bounds memory.
     """
     rows = reference.program.legs
     loads = np.empty(rows.shape)
-    for part in blocks(len(rows), _BLOCK):
-        # One row more on each side, where there is one: at the ends the machine stands.
+    for part in blocks(len(rows), block):
+        # One row more on each side; at the ends the machine stands.
         own = np.clip(np.arange(part.start - 1, part.stop + 1), 0, len(rows) - 1)
         loads[part] = _loads(reference, own)
     return loads
 
 
 def _loads(reference: Reference, rows: Ints) -> Floats:
-    """Return the loads (n, n_legs) at all these rows (n + 2,) but the first and the last."""
+    """Return the loads (n, n_legs) at rows (n + 2,) without the first and the last."""
     machine, period = reference.machine, reference.program.period
     gravity = machine.masses.gravity
     direction = reference.directions[::2][rows]
@@ -50,7 +49,7 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
     base = robot.base_joints
     middle = slice(1, -1)
     loads = np.zeros((len(rows) - 2, robot.n_legs))
-    # On the line: at offsets z that go with the platform. On the legs: across, as a share of the joint's way.
+    # Masses on the platform line at offsets z; masses of legs, across the leg, as a share of the joint's motion.
     at_p, at_i = np.zeros((2, len(loads), 3))
     for mass, z in _masses(spindle(machine, float(robot.offsets.min()))):
         force = needed(mass, position + z * direction)
@@ -65,12 +64,25 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
                 loads[:, leg] += push * float(slides)
                 across = (out / length)[middle] * (force - push[:, None] * u[middle])
                 at_p, at_i = at_p + across, at_i + robot.offsets[leg] * across
-    ways = pose_jacobian(robot, position[middle], direction[middle])
-    return loads + np.einsum("ni,nil->nl", at_p, ways[:, :3]) + np.einsum("ni,nil->nl", at_i, ways[:, 3:])
+    jacobian = pose_jacobian(robot, position[middle], direction[middle])
+    return loads + np.einsum("ni,nil->nl", at_p, jacobian[:, :3]) + np.einsum("ni,nil->nl", at_i, jacobian[:, 3:])
 
 
 def _masses(capsule: Capsule) -> tuple[tuple[float, float], ...]:
-    """Return three masses and their places on the axis that are as heavy and as hard to turn as a capsule."""
+    """Return three masses and their positions on the axis with the mass and inertia of a capsule."""
     third, middle = capsule.mass / 3.0, 0.5 * (capsule.low + capsule.high)
     apart = float(np.sqrt(1.5 * capsule.inertia / capsule.mass))
     return ((third, middle - apart), (third, middle), (third, middle + apart))
+
+
+def cutting_forces(reference: Reference, cutting: Bools, newtons: float, slow: float = 1e-3) -> Floats:
+    """Return forces (N, 3) on the tip, machine frame, against its motion at the rows that cut, `cutting` (N,).
+
+    slow: m/s, the speed below which the force fades, so that it reverses without a step. Raises InputError for a force
+    that is negative or not finite.
+    """
+    if not (np.isfinite(newtons) and newtons >= 0.0):
+        raise InputError("must not be negative", key="cutting force", value=newtons, expected="newtons")
+    velocity = np.gradient(reference.tips[::2], reference.program.period, axis=0)
+    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    return np.where(cutting[:, None], -newtons * velocity / np.hypot(speed, slow), 0.0)

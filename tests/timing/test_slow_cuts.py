@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from timing_paths import Path, machine, straight
 
-from pentapod.timing import Trajectory, certify, explain, retime, unheld
+from pentapod.timing import Trajectory, certify, explain, retime, slow_cuts
 from pentapod.toolpath.toolpath import SegmentKind
 
 
@@ -19,16 +19,16 @@ PERIOD = 1e-3
 CUT, LINK, RAPID = SegmentKind.CUT, SegmentKind.LINK, SegmentKind.RAPID
 
 
-def test_a_cut_between_links_is_held():
+def test_slow_cuts_of_a_cut_between_links_are_none():
     """Links at the same feed before and after take the ramps: the cut runs at its feed throughout."""
     sections = [(0.02, 0.1, LINK, 0), (0.12, 0.1, CUT, 1), (0.14, 0.1, LINK, 2)]
-    assert unheld(timed(sections, machine(), [0.2, 0.1, 0.5, 0, 0]), PERIOD) == ()
+    assert slow_cuts(timed(sections, machine(), [0.2, 0.1, 0.5, 0, 0]), PERIOD) == ()
 
 
-def test_a_cut_that_starts_at_rest_says_so():
+def test_slow_cuts_at_a_start_from_rest():
     m = machine(a=1.0)
     (first, second) = sorted(
-        unheld(timed([(0.1, 0.1, CUT, 7)], m, [0, 0, 0.5, 0, 0]), PERIOD), key=lambda u: u.stations
+        slow_cuts(timed([(0.1, 0.1, CUT, 7)], m, [0, 0, 0.5, 0, 0]), PERIOD), key=lambda u: u.stations
     )
     assert first.segment == second.segment == 7
     assert first.constraint == "leg 3 acceleration"
@@ -40,26 +40,26 @@ def test_a_cut_that_starts_at_rest_says_so():
     assert "segment 7" in str(first)
 
 
-def test_a_leg_too_slow_for_the_feed_is_named():
+def test_slow_cut_names_the_leg_that_limits():
     """Leg 2 allows 0.1 m/s along the path where 0.2 is asked for; the rapid before does not count."""
     m = machine(v=0.05)
     sections = [(0.1, np.inf, RAPID, 0), (0.3, 0.2, CUT, 1)]
     trajectory = timed(sections, m, [0, 0.5, 0, 0, 0])
-    places = unheld(trajectory, PERIOD)
+    places = slow_cuts(trajectory, PERIOD)
     assert [place.segment for place in places] == [1]
     assert places[0].constraint.startswith("leg 2")
     assert places[0].seconds == pytest.approx(2.0, rel=0.1)
-    middle = [place for place in unheld(trajectory, PERIOD, held=0.4) if place.share > 0.0]
+    middle = [place for place in slow_cuts(trajectory, PERIOD, held=0.4) if place.share > 0.0]
     assert middle == []
     assert "cutting below the feed for" in str(explain(trajectory, m, (), places))
 
 
-def test_the_spot_on_the_surface_is_what_counts():
+def test_slow_cuts_are_judged_by_the_spot_on_the_surface():
     """A beam whose spot moves 1.5 times as far as the tip is never too slow, at 0.6 times it always is."""
     sections = [(0.02, 0.1, LINK, 0), (0.12, 0.1, CUT, 1), (0.14, 0.1, LINK, 2)]
     trajectory = timed(sections, machine(), [0.2, 0.1, 0.5, 0, 0])
-    assert unheld(trajectory, PERIOD, lambda s: np.full(len(s), 1.5)) == ()
-    (slow,) = unheld(trajectory, PERIOD, lambda s: np.full(len(s), 0.6))
+    assert slow_cuts(trajectory, PERIOD, lambda s: np.full(len(s), 1.5)) == ()
+    (slow,) = slow_cuts(trajectory, PERIOD, lambda s: np.full(len(s), 0.6))
     assert slow.share == pytest.approx(0.6, rel=0.01)
     assert slow.seconds == pytest.approx(1.0, rel=0.15)
 
@@ -89,7 +89,7 @@ def test_the_feed_is_the_speed_of_the_spot(interpolation, limit_jerk):
     way = s - 0.3 * 0.004 * (np.cos(s / 0.004) - 1.0)
     rows = np.interp(np.arange(0.0, trajectory.duration, PERIOD), t, way)
     assert np.diff(rows).max() / PERIOD <= 0.05 * (1.0 + 1e-3)
-    assert all(place.constraint != "feed" for place in unheld(trajectory, PERIOD, wavy, held=0.97))
+    assert all(place.constraint != "feed" for place in slow_cuts(trajectory, PERIOD, wavy, held=0.97))
     uses = {use.quantity: use.share for use in certify(trajectory, m)}
     assert 0.98 < uses["feed"] < 1.01
     story = explain(trajectory, m)
