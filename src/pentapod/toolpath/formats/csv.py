@@ -34,24 +34,20 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
     for line, text in enumerate(lines[row + 1 :], start=row + 2):
         cells = text.split(",")
         if len(cells) != len(names):
-            raise ToolpathError(
-                "wrong number of columns", file=file, line=line, value=len(cells), expected=str(len(names))
-            )
+            raise moves.wrong("wrong number of columns", line, value=len(cells), expected=str(len(names)))
         values = [number(cell, file, line, name) for cell, name in zip(cells[:6], names[:6], strict=True)]
         kind, feed = _kind_and_feed(file, line, cells[6:8], defaults, first=not moves.tips)
         power = number(cells[8], file, line, "power") if len(cells) > 8 else 1.0
         if not 0.0 <= power <= 1.0:
-            raise ToolpathError("not a share", file=file, line=line, key="power", value=cells[8], expected="0 to 1")
+            raise moves.wrong("not a share", line, "power", value=cells[8], expected="0 to 1")
         moves.add([v * scale for v in values[:3]], values[3:], kind, feed, line, "i,j,k", power)
         if len(cells) > 9 and cells[9]:
             moves.add_dwell(seconds(cells[9], file, line, "dwell_s"))
     if "waypoints" in header:
         text, line = header["waypoints"]
         if number(text, file, line, "waypoints") != len(moves.tips):
-            raise ToolpathError(
-                "the number of rows is not that of the header: the file was cut off or rows were added",
-                file=file, line=len(lines), key="waypoints", value=len(moves.tips), expected=text,
-            )  # fmt: skip
+            what = "the number of rows is not that of the header: the file was cut off or rows were added"
+            raise moves.wrong(what, len(lines), "waypoints", value=len(moves.tips), expected=text)
     tilt_centre = defaults.tilt_centre
     for name in ("pivot_mm", "tilt_centre_mm"):  # the first is the name in files of earlier versions
         if name in header:

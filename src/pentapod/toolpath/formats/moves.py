@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -41,6 +42,10 @@ class Moves:
     dwells: list[float | None] = field(default_factory=list)
     wait: float = 0.0
 
+    def wrong(self, what: str, line: int, word: str | None = None, **details: Any) -> ToolpathError:
+        """Return the error of a word in a line of the file."""
+        return ToolpathError(what, file=self.file, line=line, key=word, **details)
+
     def add(
         self,
         tip: Sequence[float],
@@ -54,10 +59,7 @@ class Moves:
         """Add a pose. Raises ToolpathError where the axis is not of unit length."""
         length = float(np.linalg.norm(axis))
         if abs(length - 1.0) > AXIS_TOLERANCE:
-            raise ToolpathError(
-                "the tool axis has not unit length", file=self.file, line=line, key=word, value=round(length, 6),
-                expected="1",
-            )  # fmt: skip
+            raise self.wrong("the tool axis has not unit length", line, word, value=round(length, 6), expected="1")
         self.tips.append((tip[0], tip[1], tip[2]))
         self.axes.append((axis[0] / length, axis[1] / length, axis[2] / length))
         self.kinds.append(kind)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from pentapod.base.errors import ToolpathError
 from pentapod.base.files import number_in, read_bytes
@@ -88,9 +89,9 @@ class StatementReader:
         elif name in {TILT_CENTRE_REMARK, "pivot_mm"}:  # the second is the name in files of earlier versions
             self.tilt_centre = 1e-3 * number(value, self.file, line, name)
 
-    def wrong(self, what: str, line: int, word: str, **details: object) -> ToolpathError:
-        """Return the error of a word in a line."""
-        return ToolpathError(what, file=self.file, line=line, key=word, **details)  # type: ignore[arg-type]
+    def wrong(self, what: str, line: int, word: str, **details: Any) -> ToolpathError:
+        """Return the error of a word in a line of the file."""
+        return self.moves.wrong(what, line, word, **details)
 
     def gathered(self) -> Toolpath:
         """Return the toolpath of all moves."""

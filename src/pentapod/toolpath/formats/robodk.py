@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pentapod.base.errors import ToolpathError
 from pentapod.toolpath.formats.moves import Moves, plain, poses
 from pentapod.toolpath.formats.reading import number, read_lines
 from pentapod.toolpath.formats.registry import Defaults, Format, register
@@ -26,10 +25,8 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
             continue
         width = width or len(cells)
         if len(cells) != width or width not in (6, 7):
-            raise ToolpathError(
-                "wrong number of columns", file=file, line=line, value=len(cells),
-                expected=str(width) if width in (6, 7) else "6 or 7: X,Y,Z,NX,NY,NZ[,speed]",
-            )  # fmt: skip
+            expected = str(width) if width in (6, 7) else "6 or 7: X,Y,Z,NX,NY,NZ[,speed]"
+            raise moves.wrong("wrong number of columns", line, value=len(cells), expected=expected)
         values = [number(cell, file, line, name) for cell, name in zip(cells[:6], _NAMES, strict=False)]
         kind, feed = SegmentKind.CUT, defaults.feed
         if width == 7 and cells[6] == "":
@@ -37,9 +34,9 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
         elif width == 7:
             feed = 1e-3 * number(cells[6], file, line, "SPEED")
             if feed <= 0.0:
-                raise ToolpathError("the speed must be positive", file=file, line=line, key="SPEED", value=cells[6])
+                raise moves.wrong("the speed must be positive", line, "SPEED", value=cells[6])
         if feed is None:
-            raise ToolpathError("the speed is missing", file=file, line=line, key="SPEED", expected="a seventh column")
+            raise moves.wrong("the speed is missing", line, "SPEED", expected="a seventh column")
         moves.add(values[:3], values[3:], kind, 6e4 * feed, line, "NX,NY,NZ")
     return moves.toolpath(defaults.tilt_centre)
 
