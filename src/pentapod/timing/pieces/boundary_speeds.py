@@ -11,7 +11,7 @@ from pentapod.timing.pieces.piece import PieceProfile
 from pentapod.timing.time_law.motion_law import MotionLaw, SpeedNodes
 from pentapod.timing.topp.stages import Failure
 
-_MOST_LESS = 0.9
+LARGEST_REDUCTION = 0.9
 """Largest share of x that may be taken from the middle of the way."""
 
 
@@ -42,9 +42,9 @@ def law_between(
         return MotionLaw.through(s, x * kept, nodes.slope * kept - less * rise * x)
 
     goal = whole_periods(law(0.0).duration * slower, period)
-    if law(_MOST_LESS).duration < goal * (1.0 - 1e-12):
+    if law(LARGEST_REDUCTION).duration < goal * (1.0 - 1e-12):
         return Failure(-1, "no whole periods are filled without leaving the speeds that are given at the ends")
-    less = cast("float", brentq(lambda less: law(less).duration - goal, 0.0, _MOST_LESS, xtol=1e-15))
+    less = cast("float", brentq(lambda less: law(less).duration - goal, 0.0, LARGEST_REDUCTION, xtol=1e-15))
     return law(less).stretched(goal)
 
 
