@@ -1,4 +1,4 @@
-"""Arguments that come in batches: which of them belong together, and what is said where they do not."""
+"""Broadcasting of batched arguments, and the errors where their shapes do not fit."""
 
 from __future__ import annotations
 

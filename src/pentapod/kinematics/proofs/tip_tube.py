@@ -1,7 +1,7 @@
-"""Where a leg program takes the tool, at every time and not only at samples: tubes around polynomials.
+"""Tubes around the motion of a leg program: bounds of where the tool is at all times, not only at samples.
 
 On each interval the legs are polynomials in time. The pose that they give is not, but some polynomial x̃(t) in p and i
-comes close; that it does is proven afterwards. With the leg equations G(x, t) = (½(|p + z_j i − a_j|² − l_j(t)²),
+comes close, which is proven afterwards. With the leg equations G(x, t) = (½(|p + z_j i − a_j|² − l_j(t)²),
 ½(|i|² − 1)), J their Jacobian and C ≈ J⁻¹ in the middle of the interval, both
 
     y ≥ |C G(x̃(t), t)| for all t (G along x̃ is itself a polynomial: its Bernstein coefficients bound it),
@@ -153,7 +153,7 @@ def _prove(
     unit = (_sum(multiply(Ball.exact(i), Ball.exact(i)), 1) - 1.0) * 0.5
 
     middle = [blossom(x, [np.full(count, 0.5)] * (len(p) - 1)).mid for x in (joints, Ball.exact(i))]
-    inverse = invert(_jacobian(middle[0], middle[1], pentapod.offsets), np.nan)  # (N, 6, 6)
+    inverse = invert(_stacked(middle[0], pentapod.offsets[:, None, None] * middle[0], middle[1]), np.nan)  # (N, 6, 6)
     columns = Ball(
         np.concatenate([g.mid, unit.mid[:, None]], axis=1).transpose(2, 1, 0),
         np.concatenate([g.rad, unit.rad[:, None]], axis=1).transpose(2, 1, 0),
@@ -190,24 +190,16 @@ def _fitted(pentapod: PosedQuadraticLegs, legs: Ball, signs: Floats, m: int) -> 
     return fitted[0], fitted[1]
 
 
-def _jacobian(rows: Floats, i: Floats, offsets: Floats) -> Floats:
-    """Return (N, 6, 6): rows [d_j, z_j d_j], then [0, i], of d (5, 3, N) and i (3, N)."""
+def _stacked(rows: Floats, scaled: Floats, i: Floats) -> Floats:
+    """Return the Jacobian (N, 6, 6): rows [d_j, z_j d_j], then [0, i], of d and z d (5, 3, N) and i (3, N)."""
     last = np.concatenate([np.zeros_like(i), i])
-    top = np.concatenate([rows, offsets[:, None, None] * rows], axis=1)
-    return np.concatenate([top, last[None]]).transpose(2, 0, 1)
+    return np.concatenate([np.concatenate([rows, scaled], axis=1), last[None]]).transpose(2, 0, 1)
 
 
 def _ball_jacobian(rows: Ball, i: Ball, offsets: Floats) -> Ball:
-    """As `_jacobian`, of balls."""
+    """Return `_stacked` of balls."""
     scaled = rows * offsets[:, None, None]
-    return Ball(
-        np.concatenate(
-            [np.concatenate([rows.mid, scaled.mid], axis=1), np.concatenate([np.zeros_like(i.mid), i.mid])[None]]
-        ).transpose(2, 0, 1),
-        np.concatenate(
-            [np.concatenate([rows.rad, scaled.rad], axis=1), np.concatenate([np.zeros_like(i.rad), i.rad])[None]]
-        ).transpose(2, 0, 1),
-    )
+    return Ball(_stacked(rows.mid, scaled.mid, i.mid), _stacked(rows.rad, scaled.rad, i.rad))
 
 
 def _s(pentapod: PosedQuadraticLegs, p: Ball, i: Ball) -> Ball:

@@ -8,15 +8,13 @@ measure changes of x by ‖(p, i)‖ = max(|p_j| / scale, |i_j|). If
 
 then for every s the map x → x − C G(x, s) carries the ball of radius R around x̃(s) into its interior and contracts: it
 contains exactly one solution (Krawczyk 1969, Newton-Kantorovich; lemma 7 of docs/proofs.md). ∂G/∂x is regular
-throughout, so the solutions
-form one continuous curve, and no singularity lies on it or anywhere in the tube.
+throughout, so the solutions form one continuous curve, and no singularity lies in the tube.
 
 The balls at the shared end of two consecutive tubes have one centre and one shape, so one contains the other, and
 both their solutions are the same: tubes that meet end to end carry one continuous curve along (lemma 10).
 
 Y uses the mean value theorem, |C G(x̃(s), s)| ≤ |C G(x̃(½), ½)| + ½ |C dG/ds|, so it is of second order in the step.
-All
-bounds are computed in ball arithmetic: they are proofs in spite of rounding.
+All bounds are computed in ball arithmetic: they are proofs in spite of rounding.
 """
 
 from __future__ import annotations
