@@ -1,4 +1,4 @@
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS
+from pentapod.machine import Machine
 from pentapod.machine.parts import ControllerSettings
 from pentapod.program import Provenance, quantised, read_csv, sample, write_csv
 
@@ -23,7 +24,7 @@ def swinging(duration):
 
 
 def sampled(duration, period, interpolation="linear"):
-    machine = SimpleNamespace(guides=None, controller=ControllerSettings(period, interpolation))
+    machine = replace(Machine.load("desk"), controller=ControllerSettings(period, interpolation))
     source = Provenance("m", "d", "j", "v")
     return sample(swinging(duration), machine, RigidTransform.identity(), COMPONENTS[2], source)
 

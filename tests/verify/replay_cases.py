@@ -18,7 +18,10 @@ from pentapod.planning.problem.constraints import FREE
 from pentapod.program import Program, Provenance, quantised
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import Coverage, Cutting, Replay, Specification
+from pentapod.verify.replay.interval_bounds import IntervalBounds
+from pentapod.verify.replay.path_matching import PathMatch
 
+STAND = load_machine(Path(__file__).with_name("stand.toml"))
 BALL = 3e-3
 FEED = 0.03
 LINK_FEED = 0.02
@@ -195,9 +198,8 @@ class Case:
 
 def good_case(lean=0.0, interpolation="cubic", *, longer=0.0):
     """A case; with the program made for a tool so much longer than the machine has, metres."""
-    stand = load_machine(Path(__file__).with_name("stand.toml"))
-    controller = replace(stand.controller, interpolation=interpolation)
-    machine = replace(stand, rapid_velocity=RAPID, controller=controller)
+    controller = replace(STAND.controller, interpolation=interpolation)
+    machine = replace(STAND, rapid_velocity=RAPID, controller=controller)
     parts = strokes()
     tips, axes = timed(parts)
     return Case(
@@ -214,7 +216,59 @@ def asked_anew(replay, **changes):
     return replace(replay, specification=replace(replay.specification, **changes))
 
 
+def same_motion(replay, **changes):
+    """The same, with what was measured of the motion so far: it is not measured again."""
+    _, other = replay.match, asked_anew(replay, **changes)
+    names = ("interval_bounds", "match", "tilt_centres", "axes")
+    other.__dict__.update({name: replay.__dict__[name] for name in names if name in replay.__dict__})
+    return other
+
+
 def replay_of(case, program=None, toolpath=None, **changes):
     """The replay of a case's program, or of another, with some of what is asked of it changed."""
     asked = Specification(case.machine, toolpath or case.toolpath, **{**ASKED, **changes})
     return Replay(program or case.program, asked)
+
+
+def given_bounds(position, direction, deviations=0.0, axis_deviations=0.0, speeds=0.0, **extremes):
+    """Interval bounds of poses (M, 3) and of their chords, as they are given; scalars hold for all chords."""
+    chords = len(position) - 1
+    arrays = [np.zeros(chords) + deviations, np.zeros(chords) + axis_deviations, np.zeros((chords, 3)) + speeds]
+    return IntervalBounds(position, direction, *arrays, **extremes)
+
+
+def given_match(samples, waypoints, **given):
+    """A matching of that many samples with that many waypoints, as it is given; what is not is zero."""
+    of_waypoints = ("times", "waypoint_distances", "waypoint_angles")
+    of_samples = ("places", "arcs", "turned", "distances", "angles")
+    zeros = {name: np.zeros(waypoints) for name in of_waypoints} | {name: np.zeros(samples) for name in of_samples}
+    return PathMatch(**(zeros | {name: np.asarray(values) for name, values in given.items()}))
+
+
+def measured(toolpath, tilt_centres, axes=None, *, bounds=None, match=None, machine=STAND, legs=None, **changes):
+    """A replay whose measurements are given, not computed: M poses, what is proven of their chords, the matching.
+
+    The machine frame is the workpiece frame. changes: of the program or of what is asked of it.
+    """
+    tilt_centres = np.asarray(tilt_centres, float)
+    axes = np.tile([0.0, 0.0, 1.0], (len(tilt_centres), 1)) if axes is None else np.asarray(axes, float)
+    legs = np.full((max(len(tilt_centres) // 2 + 1, 2), 5), 0.7) if legs is None else legs
+    own = {"period": PERIOD, "interpolation": "cubic", "component": Component(1, 1)}
+    own |= {name: changes.pop(name) for name in (*own, "rail_positions") if name in changes}
+    provenance = Provenance(machine.name, machine.digest, "job-1", "0", changes.pop("piece", None))
+    program = Program(legs=legs, placement=RigidTransform.identity(), provenance=provenance, **own)
+    position = tilt_centres + (machine.tool_length - toolpath.tilt_centre) * axes
+    replay = Replay(program, Specification(machine, toolpath, **{**ASKED, **changes}))
+    replay.__dict__.update(
+        interval_bounds=given_bounds(position, -axes, **(bounds or {})),
+        match=given_match(len(tilt_centres), len(toolpath), **(match or {})),
+        tilt_centres=tilt_centres,
+        axes=axes,
+    )
+    return replay
+
+
+def along_x(metres):
+    """Points (M, 3) so far along x."""
+    metres = np.asarray(metres, float)
+    return np.stack([metres, 0.0 * metres, 0.0 * metres], axis=1)

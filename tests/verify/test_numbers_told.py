@@ -1,6 +1,6 @@
 """The numbers beside a value: what is allowed, where it is, how far the work is; each by its own arithmetic."""
 
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,12 +101,8 @@ def test_which_segment_sets_the_limit():
     cut, link, rapid = SegmentKind.CUT, SegmentKind.LINK, SegmentKind.RAPID
     path = path_of((cut, 1.0, 0.03), (link, 0.2, 0.05), (cut, 1.0, 0.02), (cut, 1.0, 0.5), (rapid, 1.0, np.inf))
     ends = np.array([0.0, 0.5, 0.8, 0.95, 1.05, 1.15, 1.35, 1.5, 2.05, 2.11, 3.05, 3.15, 3.5, 4.2])
-    replay = SimpleNamespace(
-        toolpath=path,
-        match=SimpleNamespace(arcs=ends),
-        machine=SimpleNamespace(rapid_velocity=0.4),
-        path_tolerance=0.1,
-    )
+    machine = replace(cases.STAND, rapid_velocity=0.4)
+    replay = cases.measured(path, cases.along_x(ends), match={"arcs": ends}, machine=machine, path_tolerance=0.1)
     limits, governing = speed_limits(replay)
     #  chord to:            0.5 0.8 .95 1.05 1.15 1.35 1.5 2.05 2.11 3.05 3.15 3.5 4.2
     assert governing.tolist() == [0, 0, 1, 1, 1, 1, 2, 2, 3, 3, 3, 3, 4]
@@ -118,12 +114,8 @@ def test_which_segment_sets_the_limit():
 def test_a_chord_over_many_segments_may_go_as_fast_as_the_fastest(fastest):
     cut = SegmentKind.CUT
     path = path_of(*((cut, 1.0, 0.03 if k == fastest else 0.01 + 0.002 * k) for k in range(5)))
-    replay = SimpleNamespace(
-        toolpath=path,
-        match=SimpleNamespace(arcs=np.array([0.0, 0.5, 4.5, 5.0])),
-        machine=SimpleNamespace(rapid_velocity=1.0),
-        path_tolerance=1e-3,
-    )
+    ends, machine = [0.0, 0.5, 4.5, 5.0], replace(cases.STAND, rapid_velocity=1.0)
+    replay = cases.measured(path, cases.along_x(ends), match={"arcs": ends}, machine=machine, path_tolerance=1e-3)
     limits, governing = speed_limits(replay)
     assert governing.tolist() == [0, fastest, 4]
     assert limits[1] == 0.03

@@ -46,7 +46,7 @@ def test_program_of_another_machine_passes_on_that_and_fails_on_the_nominal_one(
     failed = {c.claim for c in verdict.certificates if not c.passed}
     assert failed <= {"starts at the toolpath's start", "ends at the toolpath's end"}, failed
     found = {c.claim: c for c in verdict.certificates}
-    assert found["component kept"].method.startswith("held; component ")
+    assert found["component kept"].method.startswith("proven; component ")
     assert found["component kept"].value > 0.0
     nominal = verify(path, stand, cases.toolpath_of(parts), **asked)
     assert {"machine", "tip deviation"} <= {c.claim for c in nominal.certificates if not c.passed}

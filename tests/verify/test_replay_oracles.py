@@ -179,4 +179,4 @@ def test_accelerations_and_jerks_say_how_the_rows_are_joined(good, found):
     words = "difference of the rows" if linear else "derivative of the spline"
     assert words in found["leg accelerations"].method
     assert words in found["leg jerks"].method
-    assert found["leg jerks"].method.endswith("; 0.1% allowed")
+    assert found["leg jerks"].method.endswith("; 0.1% more is tolerated")

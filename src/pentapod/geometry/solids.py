@@ -46,6 +46,11 @@ class Solid:
         return self.high + self.rounding
 
     @property
+    def largest_radius(self) -> float:
+        """Largest distance of its points from the tool's axis."""
+        return max(self.low_radius, self.high_radius) + self.rounding
+
+    @property
     def thickness(self) -> float:
         """Upper bound, metres, on the depth of a point inside: at least the radius of the largest ball that fits in."""
         return min(max(self.low_radius, self.high_radius), 0.5 * (self.high - self.low)) + self.rounding

@@ -14,8 +14,7 @@ from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.program.program import Program
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.verify.claims.pieces import WHOLE
-from pentapod.verify.verdict.sources import UNTOLD, Sources
-from pentapod.verify.verdict.verdict import Certificate, Place, Verdict
+from pentapod.verify.verdict.verdict import NO_SOURCES, Certificate, Place, Sources, Verdict
 
 T = TypeVar("T")
 
@@ -169,7 +168,7 @@ def setups_verdict(verdicts: Sequence[tuple[int, Verdict]], cuts: int, missed: i
     parts = [(f"set-up {number}: ", verdict) for number, verdict in verdicts]
     certificates = (replace(c, claim=before + c.claim) for before, verdict in parts for c in verdict.certificates)
     unjudged = (replace(n, claim=before + n.claim) for before, verdict in parts for n in verdict.not_judged)
-    sources = replace(verdicts[0][1].sources, program=None) if verdicts else UNTOLD
+    sources = replace(verdicts[0][1].sources, program=None) if verdicts else NO_SOURCES
     return Verdict((whole, *certificates), tuple(unjudged), sources)
 
 

@@ -1,4 +1,4 @@
-"""Verify: judges the program that was emitted. Reads it, replays it, certifies it; knows no planner.
+"""Verification of a program file: it is read, replayed and judged claim by claim, independently of the planner.
 
 The package can be called like its function `verify`, since both have the name `pentapod.verify`.
 """
@@ -12,9 +12,8 @@ from pentapod.verify.replay.claim import Claim
 from pentapod.verify.replay.replay import Replay
 from pentapod.verify.verdict.coverage import Coverage
 from pentapod.verify.verdict.cutting import Cutting
-from pentapod.verify.verdict.sources import Sources
 from pentapod.verify.verdict.specification import Specification
-from pentapod.verify.verdict.verdict import Certificate, NotJudged, Place, Verdict
+from pentapod.verify.verdict.verdict import Certificate, NotJudged, Place, Sources, Verdict
 
 __all__ = [
     "CLAIMS",

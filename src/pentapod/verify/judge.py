@@ -23,6 +23,7 @@ from pentapod.verify.claims import (
     gouge,
     joints,
     legs,
+    path_deviation,
     pieces,
     placement,
     provenance,
@@ -30,10 +31,9 @@ from pentapod.verify.claims import (
     speed,
     stops_and_dwells,
     tool_motion,
-    tracking,
 )
 from pentapod.verify.replay.claim import Claim
-from pentapod.verify.replay.replay import SURVEY_SHARE, Replay
+from pentapod.verify.replay.replay import REPLAY_SHARE, Replay
 from pentapod.verify.surface import surface_left
 from pentapod.verify.verdict.specification import Asked, Specification
 from pentapod.verify.verdict.verdict import Certificate, NotJudged, Place, Verdict
@@ -49,21 +49,21 @@ CLAIMS: tuple[Claim, ...] = (
     *bodies.CLAIMS,
     *gouge.CLAIMS,
     *surface_left.CLAIMS,
-    *tracking.CLAIMS,
+    *path_deviation.CLAIMS,
     *speed.CLAIMS,
     *stops_and_dwells.CLAIMS,
     *slowness.CLAIMS,
     *tool_motion.CLAIMS,
     *collisions.CLAIMS,
 )
-"""Every claim that a verdict makes, in its order; "readable" comes before them where a file is judged.
+"""All claims of a verdict in their order; "readable" comes before them where a file is judged.
 
-After them come those about the collision_world, where there are any (`collisions`). A file of its own for each subject,
-with its claims in CLAIMS: a new one is added here and nowhere else.
+After them come those about the obstacles of the collision world (`collisions`). Each subject has a file with its own
+CLAIMS; a new one is added here and nowhere else.
 """
 
 CLAIM_NAMES = tuple(claim.name for claim in CLAIMS)
-"""What may be waived."""
+"""Names of the claims that may be waived."""
 
 
 @stage
@@ -79,13 +79,12 @@ def verify(
 ) -> Verdict:
     """Return the verdict on a program, or on a program file, from its rows alone.
 
-    asked: the other fields of `Specification`, which says what they mean: tilt, path_tolerance and axis_tolerance, and
-    what else the program is judged against: freedom, component, collision_world, cutting, job_digest. A claim that
-    needs what was not told is listed as "not judged"; the verdict fails then, unless the claim's name is among
-    `waived`. strict: claims that do not apply are listed too, with the reason. claims: further ones, which stand after
-    all others and may be waived as they may. A malformed file gives a failed verdict with the
-    one claim "readable". Raises ProgramError where there is no such file, ArrayError where a tolerance is not a
-    sensible number, InputError where a waived claim is not known.
+    asked: the other fields of `Specification`: tilt, path_tolerance and axis_tolerance, and what else the program is
+    judged against. A claim that needs a field that is not given is listed as "not judged"; then the verdict fails,
+    unless the claim's name is among `waived`. strict: claims that do not apply are listed too, with the reason. claims:
+    additional ones, judged after all others. A malformed file gives a failed verdict with the single claim "readable".
+    Raises ProgramError where there is no such file, ArrayError where a tolerance is not a positive number, InputError
+    where a waived claim is not known.
     """
     return judged(program, Specification(machine, toolpath, **asked), strict=strict, claims=claims, progress=progress)
 
@@ -113,21 +112,19 @@ def judged(
         try:
             program = read_csv(path)
         except InputError as error:
-            return Verdict((Certificate(READABLE, False, None, None, "", Place(), str(error)),), sources=sources)
-        method = f"{len(program.legs)} rows, {program.duration:.6g} s, {program.interpolation} between rows"
-        read = [Certificate(READABLE, True, None, None, "", Place(), method)]
+            return Verdict((_certificate(READABLE, False, str(error)),), sources=sources)
+        method = f"{len(program.legs)} rows, {program.duration:.6g} s, {program.interpolation} interpolation"
+        read = [_certificate(READABLE, True, method)]
     try:
         specification = replace(specification, machine=program.machine(specification.machine))
     except MachineError as error:
-        return Verdict(
-            (*read, Certificate(provenance.GUIDES, False, None, None, "", Place(), str(error))), sources=sources
-        )
+        return Verdict((*read, _certificate(provenance.GUIDES, False, str(error))), sources=sources)
     replay, unjudged = Replay(program, specification, progress), list[NotJudged]()
-    _ = replay.interval_bounds
+    _ = replay.interval_bounds  # first, because its progress is the first share
     around = collisions.claims(specification.collision_world, specification.machine.robot.n_legs)
     claims = (*CLAIMS, *around, *claims)
     for k, claim in enumerate(claims):
-        progress("verify", SURVEY_SHARE + (1.0 - SURVEY_SHARE) * k / len(claims), claim.name)
+        progress("verify", REPLAY_SHARE + (1.0 - REPLAY_SHARE) * k / len(claims), claim.name)
         answer = claim(replay)
         if isinstance(answer, Certificate):
             read.append(answer)
@@ -139,8 +136,12 @@ def judged(
     return Verdict(tuple(read), tuple(unjudged), sources)
 
 
+def _certificate(claim: str, passed: bool, method: str) -> Certificate:
+    return Certificate(claim, passed, None, None, "", Place(), method)
+
+
 def write_verdict(verdict: Verdict, path: str | Path) -> Path:
-    """Write verdict.json and return its path; an interruption leaves no half file. Raises InputError."""
+    """Write verdict.json atomically and return its path. Raises InputError."""
     with atomic_write(path) as temporary:
         text = json.dumps(verdict.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
         temporary.write_text(text + "\n", encoding="utf-8")

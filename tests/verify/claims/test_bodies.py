@@ -1,9 +1,8 @@
 """The clearance between bodies, with distances that are given: nothing near is passed over, and the place is right."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
+import replay_cases as cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,20 +13,12 @@ PERIOD = 0.002
 
 def judged(monkeypatch, gaps, chords):
     """The finding for gaps (M, 2) between two pairs at samples, and chords (M − 1,) of the faster end, metres."""
-    samples = np.arange(len(gaps), dtype=np.float64)
-    position = np.stack([samples, 0.0 * samples, 0.0 * samples], axis=1)
-    monkeypatch.setattr(bodies, "clearances", lambda _, where, __: gaps[where[:, 0].astype(int)])
+    # The distances are those of no machine: they are looked up by the number of the sample, which is its x.
+    monkeypatch.setattr(bodies, "clearances", lambda _, where, __: gaps[np.rint(where[:, 0]).astype(int)])
     monkeypatch.setattr(bodies, "pair_names", lambda _: ("first and second", "first and third"))
     speeds = np.stack([np.zeros(len(chords)), np.zeros(len(chords)), chords / (0.5 * PERIOD)], axis=1)
-    return bodies.clearance(
-        SimpleNamespace(
-            machine=None,
-            pose=(position, position),
-            program=SimpleNamespace(period=PERIOD),
-            interval_bounds=SimpleNamespace(speeds=speeds),
-            place=lambda sample: sample,
-        )
-    )
+    path, samples = cases.toolpath_of(cases.strokes()[:1]), cases.along_x(np.arange(len(gaps)))
+    return bodies.clearance(cases.measured(path, samples, bounds={"speeds": speeds}, period=PERIOD))
 
 
 @given(st.integers(0, 10_000), st.integers(2, 300), st.floats(0.1, 1.0))
@@ -44,7 +35,9 @@ def test_no_sample_that_comes_near_is_passed_over(seed, count, wildness):
     nearest = (gaps - around[:, None]).min(axis=1)
     assert finding.value <= 1e3 * gaps.min() + 1e-9
     assert finding.value >= 1e3 * nearest.min() - 1e-9
-    assert finding.value == pytest.approx(1e3 * nearest[finding.where])
+    around = nearest[2 * finding.where.row : 2 * finding.where.row + 2]
+    assert finding.value == pytest.approx(1e3 * around.min())
+    assert finding.where.time_s == pytest.approx(0.5 * PERIOD * int(np.argmin(nearest)), abs=1e-9)
     assert finding.passed
 
 
@@ -54,7 +47,7 @@ def test_the_nearest_sample_and_pair_are_named(monkeypatch, at):
     gaps = np.full((71, 2), 0.2)
     gaps[:, 1] = 0.01 + 1.5e-3 * np.abs(np.arange(71) - at)
     finding = judged(monkeypatch, gaps, chords)
-    assert finding.where == at
+    assert finding.where.time_s == pytest.approx(0.5 * PERIOD * at, abs=1e-9)
     assert finding.value == pytest.approx(10.0 - 1.0)
     assert finding.method.startswith("first and third come closest; ")
 
@@ -63,5 +56,5 @@ def test_what_may_touch_between_samples_does_not_pass(monkeypatch):
     gaps, chords = np.full((3, 2), 0.001), np.array([0.0, 0.0011])
     finding = judged(monkeypatch, gaps, chords)
     assert not finding.passed
-    assert (finding.where, finding.value) == (1, pytest.approx(-0.1))
+    assert (finding.where.time_s, finding.value) == (0.5 * PERIOD, pytest.approx(-0.1))
     assert judged(monkeypatch, gaps, np.array([0.0, 0.0009])).passed

@@ -1,7 +1,6 @@
 """Claims about gouges: proven depths are never below what dense samples find, and each corruption is caught."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,8 +19,8 @@ from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify import Cutting, verify
 from pentapod.verify.claims.gouge import gouge, rapid_chords
 from pentapod.verify.replay.claim import Idle
-from pentapod.verify.replay.gouge_bounds import Immersion, depth_resolution
-from pentapod.verify.replay.stretches import Stretches, strays
+from pentapod.verify.replay.gouge_bounds import GougeBound, depth_resolution
+from pentapod.verify.replay.stretches import Stretches, deviation_bounds
 
 CUTS, RAPIDS = "gouge on cuts and links", "gouge on rapids"
 LARGE = 1e3  # trimesh counts in units of about this many to the metre
@@ -111,7 +110,7 @@ def test_a_toolpath_that_gouges_is_caught_by_that_alone(good, rise):
     assert failed(good, raised(rise)) == {CUTS, RAPIDS}
     found = judged(good, raised(rise))[CUTS]
     assert 0.07 < found.value <= 1e3 * rise + 1e-3
-    assert "others may be worse" in found.method
+    assert "it may be deeper elsewhere" in found.method
 
 
 def test_what_is_engraved_is_no_gouge(good):
@@ -209,7 +208,7 @@ def test_a_cutter_that_begins_inside_is_caught(cubic):
     cutting = cases.cutting_of(np.asarray(box.vertices), np.asarray(box.faces))
     found = judged(cubic, cutting)
     assert not found[CUTS].passed
-    assert found[CUTS].method == "the cutter begins inside the part"
+    assert found[CUTS].method == "the cutter is inside the part at the start"
     assert found[CUTS].bound == pytest.approx(0.07)
     assert (found[CUTS].where.row, found[CUTS].where.time_s) == (0, 0.0)
 
@@ -217,15 +216,15 @@ def test_a_cutter_that_begins_inside_is_caught(cubic):
 @pytest.mark.parametrize(
     ("most", "met", "words"),
     [
-        (2e-4, True, "this deep is the cutter in the part at this moment; others may be worse"),
+        (2e-4, True, "depth of the cutter in the part at this moment; it may be deeper elsewhere"),
         (np.inf, False, "not proven: the tool turns too far within half a period"),
-        (2e-4, False, "proven bound for all times of the deepest mesh point inside the cutter: swept"),
-        (-2e-4, False, "proven bound for all times of the smallest gap of the cutter (negative): swept"),
-        (0.0, False, "proven bound for all times of the smallest gap of the cutter (negative): swept"),
+        (2e-4, False, "proven bound for all times on the depth of the deepest mesh point inside the cutter: exact"),
+        (-2e-4, False, "proven bound for all times on the smallest gap of the cutter (negative): exact"),
+        (0.0, False, "proven bound for all times on the smallest gap of the cutter (negative): exact"),
     ],
 )
 def test_a_depth_is_told_for_what_it_is(monkeypatch, cubic, most, met, words):
-    monkeypatch.setattr("pentapod.verify.claims.gouge.immersion", lambda *_, **__: Immersion(most, 0, met=met))
+    monkeypatch.setattr("pentapod.verify.claims.gouge.gouge_bound", lambda *_, **__: GougeBound(most, 0, attained=met))
     assert judged(cubic, cases.cutting_of(*cases.hill()))[CUTS].method.startswith(words)
 
 
@@ -236,8 +235,8 @@ def test_nothing_that_cuts_and_nothing_to_cut(cubic):
     assert strict[CUTS].passed
     assert strict[CUTS].method == "does not apply: the tool has no cutting part"
     assert not {CUTS, RAPIDS} & judged(cubic, None).keys()
-    left = {"surface left on the region": "nobody says which surface is to be machined"}
-    assert unjudged(cubic, None) == {**dict.fromkeys((CUTS, RAPIDS), "no part's mesh to compare with"), **left}
+    left = {"surface left on the region": "the surface to be machined is not given"}
+    assert unjudged(cubic, None) == {**dict.fromkeys((CUTS, RAPIDS), "the mesh of the part is not given"), **left}
 
 
 def test_a_negative_depth_is_bad_input():
@@ -274,24 +273,24 @@ def test_rapids_are_the_chords_that_meet_rapids_alone(replay):
     assert 0.1 < found.mean() < 0.9
 
 
-@pytest.mark.parametrize(("kind", "missing"), [(SegmentKind.CUT, "a rapid"), (SegmentKind.RAPID, "a cut or a link")])
+@pytest.mark.parametrize(
+    ("kind", "missing"), [(SegmentKind.CUT, "no rapid"), (SegmentKind.RAPID, "no cut and no link")]
+)
 def test_a_kind_that_is_missing_is_not_judged(replay, kind, missing):
     segments = tuple(replace(s, kind=kind, feed=cases.FEED) for s in replay.toolpath.segments)
-    other = cases.asked_anew(replay, toolpath=replace(replay.toolpath, segments=segments))
-    _ = replay.match
-    other.__dict__.update({k: v for k, v in replay.__dict__.items() if k in {"interval_bounds", "match"}})
-    assert gouge(other, rapid=kind is SegmentKind.CUT) == Idle(f"no moment belongs to {missing}")
+    other = cases.same_motion(replay, toolpath=replace(replay.toolpath, segments=segments))
+    assert gouge(other, rapid=kind is SegmentKind.CUT) == Idle(f"the program has {missing}")
     assert rapid_chords(other).all() == (kind is SegmentKind.RAPID)
 
 
 def test_what_the_claims_say_is_allowed(cubic):
     found = judged(cubic, raised(0.0, depth=3e-5))
-    assert found[RAPIDS].method.endswith("strays from them; allowed: 0.02 mm off the toolpath")
-    assert found[CUTS].method.endswith("off the toolpath, and 0.03 mm that count as none or are engraved")
+    assert found[RAPIDS].method.endswith("of the motion from them; allowed: 0.02 mm of path tolerance")
+    assert found[CUTS].method.endswith("of path tolerance and 0.03 mm of engraving depth or gouge tolerance")
 
 
 @pytest.mark.parametrize("lever", [0.0, 0.03])
-def test_strays_are_never_less_than_at_dense_moments(replay, cubic, lever):
+def test_deviation_bounds_are_never_less_than_at_dense_moments(replay, cubic, lever):
     """Each moment against the nearest of many places of the straight stretch, tool and tilt centre together."""
     parts = 6
     tips, axes = moments(cubic, parts=parts)
@@ -299,7 +298,7 @@ def test_strays_are_never_less_than_at_dense_moments(replay, cubic, lever):
     ends = len(replay.tilt_centres) - 1
     starts = np.array([200, 2600, 6900, 7060, 7400, 7700, 8200, ends - 64])
     counts = np.array([64, 8, 64, 300, 1, 64, 64, 64])
-    found = strays(replay, Stretches(starts, starts + counts), lever)
+    found = deviation_bounds(replay, Stretches(starts, starts + counts), lever)
     for k, (first, last) in enumerate(zip(starts, starts + counts, strict=True)):
         own = slice(first * parts // 2, last * parts // 2)
         start, end = (replay.tilt_centres[first], replay.axes[first]), (replay.tilt_centres[last], replay.axes[last])
@@ -324,9 +323,8 @@ def test_an_axis_that_swings_out_and_back_is_bounded_or_said_not_to_be(swing, bo
     """A stretch that ends as it began, the axis far away in between: a body's end is off by the chord of that swing."""
     lean = swing * np.array([0.0, 0.5, 1.0, 0.5, 0.0])
     axes = np.stack([np.sin(lean), 0.0 * lean, np.cos(lean)], axis=1)
-    survey = SimpleNamespace(away=np.zeros(4), turned=np.zeros(4))
-    swung = SimpleNamespace(tilt_centres=np.zeros((5, 3)), axes=axes, interval_bounds=survey)
-    found = strays(swung, Stretches(np.array([0]), np.array([4])), 0.03)[0]
+    swung = cases.measured(cases.toolpath_of(cases.strokes()[:1]), np.zeros((5, 3)), axes)
+    found = deviation_bounds(swung, Stretches(np.array([0]), np.array([4])), 0.03)[0]
     assert np.isfinite(found) == bounded
     assert found >= 0.06 * np.sin(0.5 * swing)
 

@@ -1,31 +1,35 @@
 """Claims about joints on angles that are given: which leg is closest to its own limit, and on which side."""
 
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import replay_cases as cases
 
 from pentapod.verify.claims.joints import CLAIMS, base_cones, platform_least, platform_most
-from pentapod.verify.verdict.verdict import Place
+from pentapod.verify.replay.interval_bounds import RunningMaximum
 
 ANGLES = np.radians([10.0, 20.0, 30.0, 40.0, 50.0])
 
 
-def replay(limits, closed=False):
-    """RunningMaximum angles (5,) of the legs, seen at the samples 2, 4, … 10, and limits (5,) in degrees on one
-    side."""
-    limits, at = np.radians(limits), 2 * np.arange(1, 6)
-    widest = SimpleNamespace(values=-np.cos(ANGLES), at=at)
-    return SimpleNamespace(
-        interval_bounds=SimpleNamespace(
-            base_widest=widest, platform_open=widest, platform_closed=SimpleNamespace(values=np.cos(ANGLES), at=at)
-        ),
-        machine=SimpleNamespace(
-            joints=SimpleNamespace(
-                base_cone=limits, platform_range=np.stack([limits - 9.0 * (not closed), limits + 9.0 * closed], axis=1)
-            )
-        ),
-        place=lambda sample: Place(None, sample // 2, None),
+def extreme(values):
+    """Values of the legs, found at the samples 2, 4, … 10."""
+    found = RunningMaximum()
+    for k in range(5):
+        found.update(np.where(np.arange(5) == k, values, -np.inf)[None], 2 * k + 2)
+    return found
+
+
+def replay(limits, closed=False, over=None):
+    """Largest and smallest angles (5,) of the legs, and limits (5,) in degrees on one side; over: cosines instead."""
+    limits = np.radians(limits)
+    widest, narrowest = (-np.cos(ANGLES), np.cos(ANGLES)) if over is None else (over, over)
+    sides = [limits, limits + np.radians(9.0)] if closed else [0.0 * limits, limits]
+    joints = replace(cases.STAND.joints, base_cone=limits, platform_range=np.stack(sides, axis=1))
+    bounds = {"base_widest": extreme(widest), "platform_open": extreme(widest), "platform_closed": extreme(narrowest)}
+    machine = replace(cases.STAND, joints=joints)
+    return cases.measured(
+        cases.toolpath_of(cases.strokes()[:1]), cases.along_x(np.zeros(13)), bounds=bounds, machine=machine
     )
 
 
@@ -45,10 +49,10 @@ def test_each_joint_has_a_limit_of_its_own(judge, sign, room, leg):
 
 def test_a_bound_beyond_a_cosine_is_the_straight_angle():
     """What is proven of a cosine may be beyond ±1 by a little."""
-    over = replay(np.full(5, 90.0))
-    over.interval_bounds.base_widest.values[2] = 1.0 + 1e-9
+    cosines = np.full(5, -1.0)
+    cosines[2] = 1.0 + 1e-9
+    over = replay(np.full(5, 90.0), over=cosines)
     assert base_cones(over).value == pytest.approx(180.0)
-    over.interval_bounds.platform_closed.values[3] = 1.0 + 1e-9
     assert platform_least(over).value == 0.0
 
 

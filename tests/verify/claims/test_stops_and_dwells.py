@@ -1,7 +1,6 @@
 """Claims about stops, on a program whose standing is made and taken away by hand."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import verify
 from pentapod.verify.claims.stops_and_dwells import CLAIMS, asked_stops, dwells, exact_stops
 from pentapod.verify.replay.claim import Idle
-from pentapod.verify.verdict.verdict import Place
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +97,15 @@ def leaning(angle):
     return [0.0, np.sin(angle), np.cos(angle)]
 
 
-def along(arcs=ARCS, turned=(0.0,) * 11, ends=(0.0, 1.0, 2.0, 3.0), leans=(0.0,) * 4, dwells=(0.2, 0.4, 0.3), wait=0.1):
+def along(
+    arcs=ARCS,
+    turned=(0.0,) * 11,
+    ends=(0.0, 1.0, 2.0, 3.0),
+    leans=(0.0,) * 4,
+    dwells=(0.2, 0.4, 0.3),
+    wait=0.1,
+    legs=None,
+):
     """What the claims look at, of a toolpath along x with so long dwells; 0.05 m and 0.05 rad are near."""
     segments = tuple(
         Segment(
@@ -111,16 +117,17 @@ def along(arcs=ARCS, turned=(0.0,) * 11, ends=(0.0, 1.0, 2.0, 3.0), leans=(0.0,)
         )
         for k in range(3)
     )
-    legs = np.cumsum(np.arange(11.0))[:, None] * np.array([1.0, 2.0, 1.0, 1.0, 1.0]) * 1e-3
-    match = SimpleNamespace(arcs=np.repeat(arcs, 2)[:-1], turned=np.repeat(turned, 2)[:-1])
-    return SimpleNamespace(
-        toolpath=Toolpath(segments, tilt_centre=0.0, wait=wait),
-        match=match,
-        program=SimpleNamespace(legs=legs, period=0.1),
-        machine=SimpleNamespace(legs=SimpleNamespace(max_acceleration=np.array([1.0, 10.0, 1.0, 1.0, 1.0]))),
+    legs = np.cumsum(np.arange(11.0))[:, None] * np.array([1.0, 2.0, 1.0, 1.0, 1.0]) * 1e-3 if legs is None else legs
+    acceleration = np.array([1.0, 10.0, 1.0, 1.0, 1.0])
+    return cases.measured(
+        Toolpath(segments, tilt_centre=0.0, wait=wait),
+        cases.along_x(np.zeros(21)),
+        match={"arcs": np.repeat(arcs, 2)[:-1], "turned": np.repeat(turned, 2)[:-1]},
+        machine=replace(cases.STAND, legs=replace(cases.STAND.legs, max_acceleration=acceleration)),
+        legs=legs,
+        period=0.1,
         path_tolerance=0.05,
         axis_tolerance=0.05,
-        place=lambda sample: Place(sample, sample // 2, None),
     )
 
 
@@ -147,33 +154,37 @@ def test_the_slowest_step_near_a_stop_is_its_speed():
     # Slowest near each: 1, 4, 8 and 10 mm; the last is worst: 10 mm in 0.1 s, where 1 m/s² changes 100 mm/s.
     assert (found.value, found.bound, found.unit) == (pytest.approx(100.0), pytest.approx(100.0), "mm/s")
     assert found.allowed == pytest.approx(100.1)
-    assert (found.passed, found.where.row, found.where.time_s) == (True, 9, 18)
-    assert found.method.startswith("of 4 stops ")
-    assert "leg 1's" in found.method
-    faster = along()
-    faster.program.legs = faster.program.legs * 1.002
-    assert not exact_stops(faster).passed
-    assert exact_stops(along(dwells=(None,) * 3, wait=0.0)) == Idle("the toolpath asks for no stop")
+    assert (found.passed, found.where.row, found.where.time_s) == (True, 9, pytest.approx(0.9))
+    assert found.method.startswith("largest leg speed at 4 exact stops")
+    assert "of leg 1 at" in found.method
+    assert not exact_stops(along(legs=along().program.legs * 1.002)).passed
+    assert exact_stops(along(dwells=(None,) * 3, wait=0.0)) == Idle("the toolpath has no exact stop")
 
 
 @pytest.mark.parametrize(("dwell", "passed"), [(0.2, True), (0.2 + 1e-6, False)])
 def test_a_dwell_lasts_as_long_as_no_leg_moves(dwell, passed):
     """Two steps of 0.1 s about the row at 1 m; a nanometre is no movement, two are."""
-    still = along(dwells=(dwell, 0.0, None), wait=0.0)
-    still.program.legs[4:6] = still.program.legs[3] + 1e-9 * np.array([[0.5], [0.0]])
-    found = dwells(still)
+    legs = along().program.legs.copy()
+    legs[4:6] = legs[3] + 1e-9 * np.array([[0.5], [0.0]])
+    found = dwells(along(dwells=(dwell, 0.0, None), wait=0.0, legs=legs))
     assert (found.passed, found.bound, found.unit) == (passed, dwell, "s")
     assert found.value == pytest.approx(0.2)
-    assert (found.where.row, found.where.time_s) == (3, 6)
-    assert found.method.startswith("of 1 dwells ")
+    assert (found.where.row, found.where.time_s) == (3, pytest.approx(0.3))
+    assert found.method.startswith("dwell with the largest shortfall, of 1: ")
     assert "more than 1e-06 mm" in found.method
-    still.program.legs[4] += 2e-9
-    assert dwells(still).value == 0.0
-    assert dwells(along(dwells=(0.0, 0.0, 0.0), wait=0.0)) == Idle("the toolpath asks for no dwell")
-    # Of two, the one that falls short by more: at 2 m nothing stands.
-    both = along(dwells=(0.1, 0.2, None), wait=0.0)
-    both.program.legs[4:6] = both.program.legs[3]
-    assert (dwells(both).value, dwells(both).bound, dwells(both).where.row) == (0.0, 0.2, 7)
+    moved = legs.copy()
+    moved[4] += 2e-9
+    assert dwells(along(dwells=(dwell, 0.0, None), wait=0.0, legs=moved)).value == 0.0
+    assert dwells(along(dwells=(0.0, 0.0, 0.0), wait=0.0)) == Idle("the toolpath has no dwell")
+
+
+@pytest.mark.parametrize(("asked", "value", "row"), [((0.1, 0.2), 0.0, 7), ((0.5, 0.2), 0.2, 3)])
+def test_the_dwell_with_the_largest_shortfall_is_named(asked, value, row):
+    """At 1 m the robot is at rest for 0.2 s, at 2 m not at all; shares of what is asked for do not count."""
+    legs = along().program.legs.copy()
+    legs[4:6] = legs[3]
+    found = dwells(along(dwells=(*asked, None), wait=0.0, legs=legs))
+    assert (found.value, found.bound, found.where.row) == (pytest.approx(value), asked[row == 7], row)
 
 
 def test_stops_need_poses_but_no_proof():

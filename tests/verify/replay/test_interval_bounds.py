@@ -1,13 +1,13 @@
 """The walk along the polynomials: the same in blocks as in one piece, and what it proves against dense moments."""
 
 from dataclasses import fields, replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import replay_cases as cases
 
 from pentapod.geometry.interpolant import Interpolant
+from pentapod.kinematics.answers import BranchProof
 from pentapod.verify.replay.interval_bounds import ComponentFindings, RunningMaximum, interval_bounds
 
 TILT_CENTRE, EVERY = 0.1, 5
@@ -33,18 +33,17 @@ def same(a, b):
 
 
 @pytest.mark.parametrize("block", [7, 1, 59, 58])
-def test_in_blocks_as_in_one_piece(turning, block, monkeypatch):
+def test_interval_bounds_in_blocks_are_those_in_one_piece(turning, block):
     program, machine, whole = turning
-    monkeypatch.setattr("pentapod.verify.replay.interval_bounds._BLOCK", block)
-    told = []
-    parts = interval_bounds(program, machine, TILT_CENTRE, 1e-6, told.append)
+    shares = []
+    parts = interval_bounds(program, machine, TILT_CENTRE, 1e-6, shares.append, block)
     for field in fields(whole):
         assert same(getattr(whole, field.name), getattr(parts, field.name)), field.name
-    np.testing.assert_allclose(told, np.arange(0, 59, block) / 59)
+    np.testing.assert_allclose(shares, np.arange(0, 59, block) / 59)
 
 
 def test_what_is_proven_of_chords_holds_at_dense_moments(turning):
-    """Speeds and strays of the tip, of the tilt centre and of the ends of what the platform's line carries."""
+    """Speeds and deviations of the tip, of the tilt centre and of the ends of what the platform's line carries."""
     program, machine, found = turning
     b = Interpolant.through(program.legs, program.period, program.interpolation).bernstein
     degree, t = b.shape[-1] - 1, np.linspace(0.0, 1.0, 41)
@@ -73,12 +72,12 @@ def test_what_is_proven_of_chords_holds_at_dense_moments(turning):
     off = np.linalg.norm(tilt_centres - (1 - share) * tilt_centres[:, :1] - share * tilt_centres[:, -1:], axis=2).max(
         axis=1
     )
-    assert (found.away >= off - 1e-13).all()
-    assert found.away.max() <= 2.2 * off.max()
+    assert (found.deviations >= off - 1e-13).all()
+    assert found.deviations.max() <= 2.2 * off.max()
     axes = halves(1.0) - halves(0.0)
     chords = (1 - share) * axes[:, :1] + share * axes[:, -1:]
     aside = np.linalg.norm(np.cross(axes, chords), axis=2).max(axis=1)
-    assert (found.turned >= aside * (1.0 - 1e-6) - 1e-13).all()
+    assert (found.axis_deviations >= aside * (1.0 - 1e-6) - 1e-13).all()
 
 
 def test_poses_and_extremes_of_joints_are_those_of_the_samples(turning):
@@ -118,7 +117,7 @@ def test_a_program_that_ends_at_speed_has_its_largest_acceleration_there(linear)
 
 
 def test_what_is_undecided_is_counted_and_the_first_is_kept():
-    findings, none = ComponentFindings(RunningMaximum(2)), np.zeros(3, dtype=bool)
+    findings, none = ComponentFindings(), np.zeros(3, dtype=bool)
     doubt = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])
     for first, undecided, refuted in (
         (0, none, none),
@@ -126,10 +125,8 @@ def test_what_is_undecided_is_counted_and_the_first_is_kept():
         (6, none | [1, 0, 0], none | [0, 0, 1]),
     ):
         lower = np.array([5.0, 4.0, 6.0]) - 0.1 * first
-        found = SimpleNamespace(
-            lower=np.stack([lower, 2.0 * lower], axis=1), refuted=refuted, undecided=undecided, doubt=doubt
-        )
-        findings.see(found, first)
+        proof = BranchProof(~(undecided | refuted), refuted, doubt, np.stack([lower, 2.0 * lower], axis=1))
+        findings.update(proof, first)
     assert (findings.undecided, findings.refuted) == (3, 1)
     assert findings.first_undecided == (4, 0.3, 0.4)
     assert findings.first_refuted == (8, 0.5, 0.6)

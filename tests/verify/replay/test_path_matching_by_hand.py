@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pentapod.verify.replay.free_space import PosedPolyline
-from pentapod.verify.replay.path_matching import interval_fractions, match, turns_on_spot
+from pentapod.verify.replay.free_space import PosedPolyline, SearchOptions
+from pentapod.verify.replay.path_matching import MatchOptions, interval_fractions, match, turns_on_spot
 
 
 def leaning(angle):
@@ -101,26 +101,24 @@ def test_axes_are_compared_where_a_waypoint_is_visited():
     np.testing.assert_allclose(found.waypoint_angles, expected, atol=1e-9)
 
 
-@pytest.fixture
-def no_memory(monkeypatch):
-    """Motion and path are so dense that the search would fill the memory: here that is soon."""
-    monkeypatch.setattr("pentapod.verify.replay.free_space._MOST_CELLS", 50_000)
+SMALL = MatchOptions(search=SearchOptions(cells=50_000))
+"""Motion and path are so dense that the search would need more cells."""
 
 
 def crowd(x, stands=0):
     """Motion and path of 2 m that are everywhere near each other, for a tolerance of 20 m."""
     motion = course(np.concatenate([np.full(stands, x[0]), x]))
-    return match(motion, course(2.0 * np.linspace(0.0, 1.0, 3001) ** 2), 20.0)
+    return match(motion, course(2.0 * np.linspace(0.0, 1.0, 3001) ** 2), 20.0, options=SMALL)
 
 
-def test_what_no_search_can_match_is_matched_by_the_way_gone(no_memory):
+def test_what_no_search_can_match_is_matched_by_the_way_gone():
     found = crowd(np.linspace(0.0, 3.0, 3001))
     np.testing.assert_allclose(found.times, 3000.0 * np.linspace(0.0, 1.0, 3001) ** 2, atol=1e-6)
     np.testing.assert_allclose(found.arcs, np.linspace(0.0, 2.0, 3001), atol=2e-3)
     assert found.distances.max() == pytest.approx(1.0)
 
 
-def test_while_it_stands_at_the_start_it_is_at_the_start(no_memory):
+def test_while_it_stands_at_the_start_it_is_at_the_start():
     found = crowd(np.linspace(0.0, 2.0, 3001), stands=100)
     assert (found.places[:100] == 0.0).all()
     assert found.distances.max() <= 2e-3

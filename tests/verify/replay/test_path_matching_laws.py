@@ -162,8 +162,8 @@ def test_what_the_motion_is_off_its_chords_counts():
     path = np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]])
     motion = densely(path, 40) + np.array([0.0, 0.5, 0.0])
     away = np.where(np.arange(40) == 17, 0.4, 0.0)
-    assert match(course(motion), course(path), 1.0, away=away).distances.max() == pytest.approx(0.5)
-    found = match(course(motion), course(path), 0.8, away=away)
+    assert match(course(motion), course(path), 1.0, chord_deviations=away).distances.max() == pytest.approx(0.5)
+    found = match(course(motion), course(path), 0.8, chord_deviations=away)
     assert found.distances.max() == pytest.approx(0.5)
 
 

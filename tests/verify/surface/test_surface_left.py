@@ -1,9 +1,8 @@
 """What a cutter leaves on a region: against closed forms, and against dense samples in plain NumPy."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
+import replay_cases as cases
 
 from pentapod.base.errors import ArrayError
 from pentapod.cutters.ball import BallCutter
@@ -21,7 +20,6 @@ from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import Coverage, Cutting
 from pentapod.verify.replay.claim import Idle
 from pentapod.verify.surface.surface_left import surface_left
-from pentapod.verify.verdict.verdict import Place
 
 R = 3e-3
 UP = np.array([0.0, 0.0, 1.0])
@@ -54,23 +52,14 @@ def pocket(depth=0.01, size=0.02):
     return Mesh.of(corners, facets)
 
 
-def along(*lines, tool, axes=None):
-    """A replay that goes along lines of tips (n, 3) in turn, jumping between them, as the claim sees one."""
+def along(*lines, tool, axes=None, piece=None):
+    """A replay that goes along lines of tips (n, 3) in turn, jumping between them."""
     tips = np.concatenate(lines)
     axes = np.tile(UP, (len(tips), 1)) if axes is None else np.concatenate(axes)
     kinds = [kind for line in lines for kind in [SegmentKind.CUT] * (len(line) - 1) + [SegmentKind.RAPID]][:-1]
     segments = [Segment(kind, tips[k : k + 2], axes[k : k + 2], 0.02) for k, kind in enumerate(kinds)]
     path = Toolpath(tuple(segments), tool.tilt_centre)
-    chords = len(tips) - 1
-    return SimpleNamespace(
-        tilt_centres=path.tilt_centres,
-        axes=axes,
-        toolpath=path,
-        interval_bounds=SimpleNamespace(away=np.zeros(chords), turned=np.zeros(chords)),
-        match=SimpleNamespace(arcs=arc_length(path.tilt_centres)),
-        program=SimpleNamespace(provenance=SimpleNamespace(piece=None)),
-        place=lambda sample: Place(None, int(sample), None),
-    )
+    return cases.measured(path, path.tilt_centres, axes, match={"arcs": arc_length(path.tilt_centres)}, piece=piece)
 
 
 def raster(step, low=-0.004, high=0.024, y0=0.0, y1=0.012, z=0.0, lift=0.02):
@@ -84,8 +73,7 @@ def raster(step, low=-0.004, high=0.024, y0=0.0, y1=0.012, z=0.0, lift=0.02):
 def judged(replay, mesh, tool, left, share=0.0, region=None, **more):
     patch = Patch.of(mesh, region or Region())
     cutting = Cutting(MeshDistance.of(mesh), tool.solids, 0.0, Coverage(patch, left, share, UP, **more))
-    replay.specification = SimpleNamespace(cutting=cutting)
-    return surface_left(replay)
+    return surface_left(cases.same_motion(replay, cutting=cutting))
 
 
 def deepest(finding):
@@ -253,7 +241,7 @@ def test_motion_that_is_not_known_exactly_counts_for_less():
     tool, step = BallCutter(R), 2e-3
     scallop = R - np.sqrt(R**2 - step**2 / 4)
     replay = along(*raster(step), tool=tool)
-    replay.interval_bounds.away[:] = 5e-5
+    replay.interval_bounds.deviations[:] = 5e-5
     assert not judged(replay, plate(), tool, 1.02 * scallop).passed
     assert judged(replay, plate(), tool, scallop + 6e-5).value == 0.0
 
@@ -266,8 +254,7 @@ def test_each_piece_answers_for_its_own_part():
     scallop = R - np.sqrt(R**2 - 1e-6)
 
     def part(rows, piece):
-        replay = along(*[lines[k] for k in rows], tool=tool)
-        replay.program.provenance.piece = piece
+        replay = along(*[lines[k] for k in rows], tool=tool, piece=piece)
         return judged(replay, plate(), tool, 1.1 * scallop, share=2e-3, whole=lambda: whole.toolpath)
 
     first, second = Piece(0, 7), Piece(8, len(whole.toolpath) - 1)
@@ -282,11 +269,10 @@ def test_lines_that_cover_nothing_are_not_judged_and_silence_is_not_consent():
     replay = along(*raster(1e-3), tool=tool)
     surface = MeshDistance.of(plate())
     cutting = Cutting(surface, tool.solids, 0.0, Coverage.nothing("it is text"))
-    replay.specification = SimpleNamespace(cutting=cutting)
-    assert surface_left(replay) == Idle("it is text")
+    assert surface_left(cases.same_motion(replay, cutting=cutting)) == Idle("it is text")
     for cutting in (None, Cutting(surface, tool.solids, 0.0)):
-        replay.specification = SimpleNamespace(cutting=cutting)
-        assert surface_left(replay) == Idle("nobody says which surface is to be machined", unknown=True)
+        unknown = Idle("the surface to be machined is not given", unknown=True)
+        assert surface_left(cases.same_motion(replay, cutting=cutting)) == unknown
 
 
 @pytest.mark.parametrize(("key", "options"), [("left", {"left": 0.0}), ("share", {"left": 1e-4, "share": 1.5})])

@@ -1,4 +1,4 @@
-"""Claims that legs, spindle and tool body keep clear of the part, its fixture and the table, and legs of the tool."""
+"""Claims that legs, spindle and tool body do not collide with part, fixture and table, nor legs with the tool."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from pentapod.machine.clearance.collision_world import (
 from pentapod.machine.clearance.tool_clearance import leg_tool_gaps
 from pentapod.machine.machine import Machine
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
-from pentapod.verify.replay.clearance_bounds import Stray, approach
+from pentapod.verify.replay.clearance_bounds import Displacement, clearance_bound
 from pentapod.verify.replay.replay import Replay
 
-_FAR_M, _TOOL_FAR_M = 0.1, 0.01
-"""Gaps are not looked at beyond these: farther is as good."""
+FAR_M, TOOL_FAR_M = 0.1, 0.01
+"""Gaps are not computed beyond these, metres."""
 
 _PROVEN = (
-    "less what the platform can move until the next moment looked at, by the leg equations (Banach): for all times, as "
-    "long as the component is kept"
+    "less the largest displacement of the platform until the next moment computed (fixed-point bound on the leg "
+    "equations): proven for all times, if the component is kept"
 )
 
 
 def claims(collision_world: CollisionWorld | None, legs: int) -> tuple[Claim, ...]:
-    """Return the claims about these surroundings of a machine with so many legs, in the order of a verdict; or none."""
+    """Return the claims for these surroundings of a machine with so many legs, in the order of the verdict."""
     if collision_world is None:
         return ()
     made: list[Claim] = []
@@ -45,10 +45,11 @@ def claims(collision_world: CollisionWorld | None, legs: int) -> tuple[Claim, ..
     return tuple(made)
 
 
-def told(replay: Replay) -> Idle:
-    """Judge nothing but whether the surroundings are known: each of them has claims of its own."""
-    known = replay.specification.collision_world is not None
-    return Idle("there is nothing more") if known else Idle("nobody told what is there", unknown=True)
+def surroundings_given(replay: Replay) -> Idle:
+    """Say that the surroundings are not given; where they are, each obstacle has claims of its own."""
+    if replay.specification.collision_world is not None:
+        return Idle("each obstacle has claims of its own")
+    return Idle("the surroundings (part, fixture, table) are not given", unknown=True)
 
 
 def _groups(collision_world: CollisionWorld, legs: int) -> tuple[tuple[str, list[int]], ...]:
@@ -57,7 +58,7 @@ def _groups(collision_world: CollisionWorld, legs: int) -> tuple[tuple[str, list
 
 
 def _clear(replay: Replay, *, obstacle: Obstacle, collision_world: CollisionWorld, columns: list[int]) -> Finding:
-    """Judge that some of what moves keeps clear of one obstacle."""
+    """Judge that some of the moving bodies do not touch one obstacle."""
     machine, legs = replay.machine, replay.machine.robot.n_legs
     frame = replay.program.placement if obstacle.clamped else None
     tool = collision_world.tool if legs + 1 in columns else ()
@@ -67,28 +68,30 @@ def _clear(replay: Replay, *, obstacle: Obstacle, collision_world: CollisionWorl
         position, direction = (x[samples] for x in replay.pose)
         bodies = MovingBodies.at(machine, position, direction, frame)
         if tool:
-            return obstacle.surface.bodies(tool, bodies.tips, bodies.axes, _TOOL_FAR_M)[0][:, None]
+            return obstacle.surface.bodies(tool, bodies.tips, bodies.axes, TOOL_FAR_M)[0][:, None]
         chosen = MovingBodies(
             bodies.starts[:, columns], bodies.ends[:, columns], bodies.tips, bodies.axes, bodies.radii[columns]
         )
-        return chosen.segments(obstacle.surface, _FAR_M).distance.reshape(-1, len(columns))
+        return chosen.segments(obstacle.surface, FAR_M).distance.reshape(-1, len(columns))
 
     offsets = line_offsets(machine, collision_world.tool)
-    found = approach(
-        replay, gaps, lambda stray: body_moves(stray, collision_world.tool, legs)[:, columns], offsets, bound=bound
-    )
-    name, most = collision_world.names(legs)[columns[found.column]], _TOOL_FAR_M if tool else _FAR_M
-    if found.least > bound and _enclosed(replay, obstacle, frame, columns):
+
+    def approaches(displacement: Displacement) -> Floats:
+        return body_displacements(displacement, collision_world.tool, legs)[:, columns]
+
+    found = clearance_bound(replay, gaps, approaches, offsets, bound=bound)
+    name, far = collision_world.names(legs)[columns[found.column]], TOOL_FAR_M if tool else FAR_M
+    if found.gap > bound and _enclosed(replay, obstacle, frame, columns):
         return Finding(False, None, MM * bound, "mm", replay.place(0), f"{name} is inside the {obstacle.name}")
-    method = f"{name} comes closest; exact distance of its body from the mesh's facets, {_PROVEN}"
+    method = f"{name} comes closest; exact distance of its body from the mesh, {_PROVEN}"
     if not found.proven:
         method = f"{name}: not proven; {method}"
-    elif found.least <= bound:
-        method = f"{name} is in the {obstacle.name}; exact at this moment, others may be worse"
-    elif found.least >= 0.5 * most:
-        method = f"nothing comes near; distances were looked at up to {MM * most:g} mm; {_PROVEN}"
-    value = MM * found.least
-    return Finding(found.least > bound, value, MM * bound, "mm", replay.place(found.sample), method)
+    elif found.gap <= bound:
+        method = f"{name} is in the {obstacle.name}; exact at this moment, it may be deeper elsewhere"
+    elif found.gap >= 0.5 * far:
+        method = f"nothing comes close; distances were computed up to {MM * far:g} mm; {_PROVEN}"
+    value = MM * found.gap
+    return Finding(found.gap > bound, value, MM * bound, "mm", replay.place(found.sample), method)
 
 
 def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
@@ -99,41 +102,41 @@ def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
         position, direction = (x[samples] for x in replay.pose)
         return leg_tool_gaps(machine, tool, position, direction)
 
-    def moves(stray: Stray) -> Floats:
-        both = body_moves(stray, tool, legs)
+    def approaches(displacement: Displacement) -> Floats:
+        both = body_displacements(displacement, tool, legs)
         return both[:, :legs] + both[:, legs + 1 :]
 
-    found = approach(replay, gaps, moves, line_offsets(machine, tool))
+    found = clearance_bound(replay, gaps, approaches, line_offsets(machine, tool))
     method = (
         f"leg {found.column + 1} comes closest; distance of its body from shank and holder in the plane of leg and "
         f"tool axis, {_PROVEN}"
     )
-    return Finding(found.least > 0.0, MM * found.least, 0.0, "mm", replay.place(found.sample), method)
+    return Finding(found.gap > 0.0, MM * found.gap, 0.0, "mm", replay.place(found.sample), method)
 
 
 def line_offsets(machine: Machine, tool: tuple[Solid, ...]) -> Floats:
-    """Return the offsets along the platform line that bodies move by: joints, spindle's ends, tool body's ends."""
+    """Return the offsets along the platform line of joints, ends of the spindle, ends of the tool body, metres."""
     ends = [machine.tool_length - height for solid in tool for height in (solid.low, solid.high)]
     return np.array([*machine.robot.offsets, *spindle_ends(machine), *([min(ends), max(ends)] if ends else [])])
 
 
-def body_moves(stray: Stray, tool: tuple[Solid, ...], legs: int) -> Floats:
-    """Return by how much (n, K) the bodies move at most: a point of a leg never more than its platform joint."""
-    line = stray.line
+def body_displacements(displacement: Displacement, tool: tuple[Solid, ...], legs: int) -> Floats:
+    """Return bounds (n, K) on the displacement of the bodies; points of a leg move no more than its platform joint."""
+    line = displacement.points
     moved = [line[:, :legs], line[:, legs : legs + 2].max(axis=1, keepdims=True)]
     if tool:
-        wide = max(max(s.low_radius, s.high_radius) + s.rounding for s in tool)
-        moved.append((line[:, legs + 2 :].max(axis=1) + wide * stray.turn)[:, None])
+        wide = max(solid.largest_radius for solid in tool)
+        moved.append((line[:, legs + 2 :].max(axis=1) + wide * displacement.turn)[:, None])
     return np.concatenate(moved, axis=1)
 
 
 def _enclosed(replay: Replay, obstacle: Obstacle, frame: RigidTransform | None, columns: list[int]) -> bool:
-    """Return whether a body is wholly inside, at the start: one that never touches the surface stays on its side."""
+    """Return whether a body is inside at the start: one that never touches the surface stays on its side of it."""
     position, direction = (x[:1] for x in replay.pose)
     bodies = MovingBodies.at(replay.machine, position, direction, frame)
     points = np.concatenate([bodies.starts[0], bodies.tips])[columns]
     return bool(obstacle.surface.contains(points).any())
 
 
-CLAIMS = (Claim("legs, spindle and tool clear of the surroundings", told, needs_pose=False),)
-"""One that stands for all where nobody told the surroundings; `claims` makes the others."""
+CLAIMS = (Claim("legs, spindle and tool clear of the surroundings", surroundings_given, needs_pose=False),)
+"""Not judged where the surroundings are not given; `claims` makes the others."""

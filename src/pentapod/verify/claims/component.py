@@ -1,6 +1,6 @@
-"""Claims about the component: proven in continuous time, for every interval between rows.
+"""Claims that the component is kept, proven for all times on every interval between rows.
 
-The robot says what its proof bounds: |w| and |S| in the quadratic family, elsewhere how firmly the legs hold the pose.
+The robot names what its proof bounds: |w| and |S| in the quadratic family, elsewhere the stiffness of the pose.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ _METHOD = (
 
 
 def kept(replay: Replay, *, measure: str) -> Finding | Idle:
-    """Judge that the measure of this name keeps the sign of the component; idle for a robot that proves another one."""
+    """Judge that the measure of this name keeps the sign of the component; idle for a robot with other measures."""
     for column, proven in enumerate(replay.machine.robot.proven_measures):
         if proven.name == measure:
             return _finding(replay, proven, column)
-    return Idle("this kind of robot has another proof")
+    return Idle("this kind of robot proves its component by another measure")
 
 
 def _finding(replay: Replay, measure: ProvenMeasure, column: int) -> Finding:
     found = replay.interval_bounds.component
     least, interval = -float(found.lower.values[column]), int(found.lower.at[column])
     least = math.degrees(math.asin(min(least, 1.0))) if measure.unit == "deg" else measure.scale * least
-    answer, passed = "held", least > 0.0
+    answer, passed = "proven", least > 0.0
     if not passed:
         doubtful = found.first_refuted or found.first_undecided
-        answer = "refuted: the legs have no pose" if found.first_refuted else "undecided: too near a singularity"
+        answer = "refuted: the leg lengths have no pose" if found.first_refuted else "undecided: too near a singularity"
         if doubtful is not None:
             interval, start, stop = doubtful
             period = replay.program.period

@@ -1,4 +1,4 @@
-"""Claims about the joints' angles: proven for all times."""
+"""Claims on the joint angles, proven for all times."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pentapod.verify.replay.interval_bounds import RunningMaximum
 from pentapod.verify.replay.replay import Replay
 
 _METHOD = (
-    "joint of leg {leg} is closest to its limit; proven bound for all times, rows and between: the cosine as a "
-    "quotient of polynomials, with what the motion strays from the chord between two samples (Krawczyk's operator)"
+    "joint of leg {leg} is closest to its limit; proven bound for all times: the cosine as a quotient of polynomials, "
+    "with the deviation of the motion from the chord between two samples (Krawczyk operator)"
 )
 
 
@@ -22,28 +22,28 @@ def base_cones(replay: Replay) -> Finding:
 
 
 def platform_least(replay: Replay) -> Finding:
-    """Judge that no leg folds too close to the tool axis."""
+    """Judge that the angle between each leg and the tool axis is not too small."""
     closed = replay.interval_bounds.platform_closed
     return _finding(replay, closed, _angles(closed.values), replay.machine.joints.platform_range[:, 0], sign=-1)
 
 
 def platform_most(replay: Replay) -> Finding:
-    """Judge that no leg opens too far from the tool axis."""
-    widest = replay.interval_bounds.platform_open
-    return _finding(replay, widest, _angles(-widest.values), replay.machine.joints.platform_range[:, 1], sign=1)
+    """Judge that the angle between each leg and the tool axis is not too large."""
+    opened = replay.interval_bounds.platform_open
+    return _finding(replay, opened, _angles(-opened.values), replay.machine.joints.platform_range[:, 1], sign=1)
 
 
-def _finding(replay: Replay, where: RunningMaximum, angles: Floats, limit: Floats, *, sign: int) -> Finding:
-    """Judge the extreme angles (n_legs,) against their limits, the largest (sign 1) or the least ones (sign −1)."""
+def _finding(replay: Replay, extreme: RunningMaximum, angles: Floats, limit: Floats, *, sign: int) -> Finding:
+    """Judge the extreme angles (n_legs,) against upper limits (sign 1) or lower ones (sign −1)."""
     leg = int(np.argmax(sign * (angles - limit)))
     value, bound = float(angles[leg]), float(limit[leg])
     passed = sign * value <= sign * bound
     method = _METHOD.format(leg=leg + 1)
-    return Finding(passed, np.degrees(value), np.degrees(bound), "deg", replay.place(int(where.at[leg])), method)
+    return Finding(passed, np.degrees(value), np.degrees(bound), "deg", replay.place(int(extreme.at[leg])), method)
 
 
 def _angles(cosines: Floats) -> Floats:
-    """Return the angles (n_legs,) in radians that have these cosines, which bounds may push beyond ±1."""
+    """Return the angles (n_legs,) in radians with these cosines; proven bounds of them may be beyond ±1."""
     return np.arccos(np.clip(cosines, -1.0, 1.0))
 
 

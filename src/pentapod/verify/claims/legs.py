@@ -1,31 +1,32 @@
-"""Claims about each leg: length, rate, acceleration, jerk. Exact on the interpolant."""
+"""Claims about each leg: length, rate, acceleration, jerk. Exact on the controller's polynomials."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.verify.replay.claim import ALLOWANCE, MM, Claim, Finding, with_allowance
+from pentapod.verify.replay.claim import MM, TOLERATED, Claim, Finding
 from pentapod.verify.replay.interval_bounds import RunningMaximum
 from pentapod.verify.replay.replay import Replay
+from pentapod.verify.verdict.verdict import Place
 
-_EXACT = "exact extrema of the controller's polynomials, rows and between"
+_EXACT = "exact extreme values of the controller's polynomials, at the rows and between them"
 
 
 def shortest(replay: Replay) -> Finding:
-    """Judge that no leg gets shorter than its stroke allows."""
+    """Judge that no leg is shorter than its stroke allows."""
     found, limit = replay.interval_bounds.shortest, replay.machine.legs.min_length
     leg = int(np.argmin(-found.values - limit))
     value, bound = -float(found.values[leg]), float(limit[leg])
-    return _finding(replay, value >= bound, (value, bound, "mm"), (int(found.at[leg]), leg), _EXACT)
+    return Finding(value >= bound, MM * value, MM * bound, "mm", _place(replay, found, leg), _method(leg, _EXACT))
 
 
 def longest(replay: Replay) -> Finding:
-    """Judge that no leg gets longer than its stroke allows."""
+    """Judge that no leg is longer than its stroke allows."""
     found, limit = replay.interval_bounds.longest, replay.machine.legs.max_length
     leg = int(np.argmax(found.values - limit))
     value, bound = float(found.values[leg]), float(limit[leg])
-    return _finding(replay, value <= bound, (value, bound, "mm"), (int(found.at[leg]), leg), _EXACT)
+    return Finding(value <= bound, MM * value, MM * bound, "mm", _place(replay, found, leg), _method(leg, _EXACT))
 
 
 def rate(replay: Replay) -> Finding:
@@ -36,7 +37,7 @@ def rate(replay: Replay) -> Finding:
 def acceleration(replay: Replay) -> Finding:
     """Judge the acceleration of every leg, with rest before the first row and after the last."""
     method = (
-        "second difference of the rows by the period squared, from rest and to rest: exact"
+        "second difference of the rows over the period squared, from rest and to rest: exact"
         if replay.program.interpolation == "linear"
         else "second derivative of the spline, linear between the rows: exact"
     )
@@ -47,7 +48,7 @@ def acceleration(replay: Replay) -> Finding:
 def jerk(replay: Replay) -> Finding:
     """Judge the jerk of every leg, with rest before the first row and after the last."""
     method = (
-        "third difference of the rows by the period cubed, in place of the impulses that lines between rows have; "
+        "third difference of the rows over the period cubed, instead of the impulses of linear interpolation; "
         if replay.program.interpolation == "linear"
         else "third derivative of the spline, constant between the rows: exact; "
     )
@@ -56,27 +57,18 @@ def jerk(replay: Replay) -> Finding:
 
 
 def _below(replay: Replay, found: RunningMaximum, limit: Floats, unit: str, method: str) -> Finding:
-    """Judge the largest of each leg against limits (n_legs,), both SI."""
+    """Judge the largest value of each leg against limits (n_legs,), both SI."""
     leg = int(np.argmax(found.values / limit))
     value, bound = float(found.values[leg]), float(limit[leg])
-    allowed = with_allowance(bound)
-    method += f"; {ALLOWANCE:.1%} allowed"
-    return _finding(replay, value <= allowed, (value, bound, unit), (int(found.at[leg]), leg), method, allowed)
+    return Finding.at_most(value, bound, MM, unit, _place(replay, found, leg), _method(leg, f"{method}; {TOLERATED}"))
 
 
-def _finding(
-    replay: Replay,
-    passed: bool,
-    found: tuple[float, float, str],
-    at: tuple[int, int],
-    method: str,
-    allowed: float | None = None,
-) -> Finding:
-    """Return the finding on (value, bound, unit), lengths in metres as in allowed, at (row, leg)."""
-    (value, bound, unit), (row, leg) = found, at
-    allowed = None if allowed is None else MM * allowed
-    method = f"leg {leg + 1} is closest to its limit; {method}"
-    return Finding(passed, MM * value, MM * bound, unit, replay.place(2 * row), method, allowed)
+def _place(replay: Replay, found: RunningMaximum, leg: int) -> Place:
+    return replay.place(2 * int(found.at[leg]))
+
+
+def _method(leg: int, method: str) -> str:
+    return f"leg {leg + 1} is closest to its limit; {method}"
 
 
 CLAIMS = (

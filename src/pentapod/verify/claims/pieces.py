@@ -1,4 +1,4 @@
-"""Claim that a program is the whole work, or one of several that together are."""
+"""Claim that a program does the whole job, or is one of several set-ups that do it together."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ from pentapod.verify.verdict.verdict import Place
 
 
 def whole(replay: Replay) -> Finding | Idle:
-    """Judge that a program of one of several set-ups may be such, and that all of them make each cut once."""
+    """Judge that the job allows several set-ups where this is one, and that each cut is made in exactly one of them."""
     asked, piece = replay.specification, replay.program.provenance.piece
     if piece is None:
         return Idle("the program is the whole job")
     if asked.setups < 2:
-        method = f"header: only a piece of the job ({piece}); the job is to be done in one set-up"
-        return Finding(False, None, None, "", Place(), method)
+        return Finding.without_value(False, f"header: one set-up of several ({piece}); the job allows only one set-up")
     if asked.missed is None:
-        why = f"this is one set-up ({piece}); what the others cut is known to the verdict on the folder of all set-ups"
+        why = f"this is one set-up of several ({piece}); only the verdict on the folder of all set-ups knows the others"
         return Idle(why, unknown=True)
-    method = "intervals between waypoints that should be cut and are cut in no set-up, or in more than one"
+    method = "number of intervals between waypoints that are cut in no set-up, or in more than one"
     return Finding(asked.missed == 0, asked.missed, 0.0, "", Place(), method)
 
 

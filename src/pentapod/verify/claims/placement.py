@@ -1,49 +1,47 @@
-"""Claim that the part stands where the job allows, by the placement of the program's header."""
+"""Claim that the placement in the program's header is one that the job allows."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
 from pentapod.verify.verdict.verdict import Place
 
 POSITION, ANGLE = 1e-6, 1e-6
-"""How far, metres and radians, a placement may be off one that is allowed: job files round both."""
+"""Tolerances of a placement, metres and radians: job files round both."""
 
 
 def placement(replay: Replay) -> Finding | Idle:
-    """Judge that the header's placement is one that the job allows."""
+    """Judge that the header's placement is allowed."""
     constraints, placed = replay.specification.constraints, replay.program.placement
     if constraints is None:
-        return Idle("nobody told where the part may stand", unknown=True)
+        return Idle("the allowed placements are not given", unknown=True)
     if constraints.poses:
-        offs = [(_distance(placed, pose), _angle(placed.rotation, pose.rotation)) for pose in constraints.poses]
-        away, turned = min(offs, key=_excess)
-        what = f"of {len(offs)} allowed placements the nearest"
+        offs = [
+            (float(np.linalg.norm(placed.translation - pose.translation)), _angle(placed.rotation, pose.rotation))
+            for pose in constraints.poses
+        ]
+        shift, turn = min(offs, key=_excess)
+        what = f"the nearest of {len(offs)} allowed placements"
     else:
         beyond = placed.translation - np.clip(placed.translation, constraints.low, constraints.high)
-        away, turned = float(np.linalg.norm(beyond)), _turned(placed.rotation, constraints)
-        what = "the placements that the box, the table and the largest turn allow"
-    passed = away <= POSITION and turned <= ANGLE
+        shift, turn = float(np.linalg.norm(beyond)), _turned(placed.rotation, constraints)
+        what = "the placements that the box, the table and the largest rotation allow"
+    passed = shift <= POSITION and turn <= ANGLE
     method = (
-        f"header's placement against {what}: the origin is off by {MM * away:.6g} mm, {MM * POSITION:g} mm allowed; "
-        f"the rotation by {np.degrees(turned):.6g} deg, {np.degrees(ANGLE):.2g} deg allowed"
+        f"placement in the header compared with {what}: the origin is off by {MM * shift:.6g} mm, {MM * POSITION:g} mm "
+        f"allowed; the rotation by {np.degrees(turn):.6g} deg, {np.degrees(ANGLE):.2g} deg allowed"
     )
-    if turned / ANGLE > away / POSITION:
-        return Finding(passed, np.degrees(turned), np.degrees(ANGLE), "deg", Place(), method)
-    return Finding(passed, MM * away, MM * POSITION, "mm", Place(), method)
+    if turn / ANGLE > shift / POSITION:
+        return Finding(passed, np.degrees(turn), np.degrees(ANGLE), "deg", Place(), method)
+    return Finding(passed, MM * shift, MM * POSITION, "mm", Place(), method)
 
 
 def _excess(off: tuple[float, float]) -> float:
     return max(off[0] / POSITION, off[1] / ANGLE)
-
-
-def _distance(a: RigidTransform, b: RigidTransform) -> float:
-    return float(np.linalg.norm(a.translation - b.translation))
 
 
 def _angle(a: Floats, b: Floats) -> float:
@@ -55,7 +53,7 @@ def _angle(a: Floats, b: Floats) -> float:
 
 
 def _turned(rotation: Floats, constraints: PlacementConstraints) -> float:
-    """Return by how much a rotation (3, 3) is beyond what a table or a largest turn allows, radians."""
+    """Return by how much a rotation (3, 3) exceeds what the table and the largest rotation allow, radians."""
     beyond = 0.0
     if constraints.turn_is_bounded:
         beyond = max(_angle(rotation, constraints.reference) - constraints.largest_turn, 0.0)

@@ -1,8 +1,9 @@
-"""Claims that the program is not slower than it has to be: a lowest feed, and no stop that nothing asks for."""
+"""Claims that the program is not slower than necessary: a lowest feed, and no stop without a reason."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -17,79 +18,84 @@ from pentapod.verify.replay.claim import Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
 
 LOWEST_SHARE = 0.9
-"""Of the feed, where the job says nothing: slower is a cut or a link only where a limit of machine or job is used."""
+"""Lowest share of the feed where the job has none; cuts and links may be slower where a limit is used."""
 
 LOWEST_SHARE_STANDOFF = 0.95
-"""The same for what works from a stand-off, a laser or a spray, where what it does depends on the feed."""
+"""The same for a laser or a spray, whose effect depends on the feed."""
 
-_USED = 0.5
-"""A limit of which this share is used explains why the motion is slower than the feed."""
 
-_AROUND_S, _AROUND_ROWS = 0.02, 5
-"""So near in time it must be used, or in so many rows where these are longer."""
+@dataclass(frozen=True)
+class SlownessOptions:
+    """What explains a slow motion, and what counts as a stop.
 
-_CORNER = math.radians(20.0)
-"""Where the toolpath turns by more within the path tolerance, the motion is next to rest for a moment however the
-corner is rounded; standing there longer than `_SPARE_S` has no reason. A job's angle for exact stops may be less."""
+    used: a limit of which this share is used explains it, within around_s seconds, or around_rows rows if that is
+    longer. corner: radians; where the toolpath turns by more within the path tolerance, the motion nearly stops however
+    the corner is blended, and may be at rest for up to spare_s seconds. A job's angle for exact stops may be less. A
+    dwell may be longer by spare_s too. creep: share of the slowest feed; a robot whose legs are all slower is at rest.
+    """
 
-_SPARE_S = 0.05
-"""By so much a robot may stand longer than asked."""
+    used: float = 0.5
+    around_s: float = 0.02
+    around_rows: int = 5
+    corner: float = math.radians(20.0)
+    spare_s: float = 0.05
+    creep: float = 0.01
 
-_CREEP = 0.01
-"""Of the slowest feed: what moves no leg faster is at rest."""
+
+OPTIONS = SlownessOptions()
 
 
 def lowest_feed(replay: Replay) -> Finding | Idle:
-    """Judge that cuts and links are not slower than the feed where no limit asks for it."""
+    """Judge that cuts and links reach the lowest share of the feed where no limit is used."""
     standoff, bound = replay.toolpath.tilt_centre < 0.0, replay.specification.lowest_share
     if bound is None:
         bound = LOWEST_SHARE_STANDOFF if standoff else LOWEST_SHARE
     if bound == 0.0:
-        return Idle("the job asks for no lowest feed")
+        return Idle("the job has no lowest feed")
     feeds = _feeds(replay)
     judged = np.isfinite(feeds)
     if not judged.any():
-        return Idle("no moment belongs to a cut or a link alone")
+        return Idle("the program has no cut and no link longer than twice the path tolerance")
     period = replay.program.period
     tip = _speeds(replay, 0.0)
     share = (_speeds(replay, replay.toolpath.tilt_centre) if standoff else tip) / feeds
     used = np.maximum(_used(replay), tip / replay.machine.rapid_velocity if standoff else 0.0)
-    around = max(math.ceil(_AROUND_S / period), _AROUND_ROWS)
-    judged &= maximum_filter1d(used, 2 * around + 1) < _USED
+    around = max(math.ceil(OPTIONS.around_s / period), OPTIONS.around_rows)
+    judged &= maximum_filter1d(used, 2 * around + 1) < OPTIONS.used
     row = int(np.argmin(np.where(judged, share, np.inf)))
     value = min(float(share[row]), 1.0) if judged[row] else 1.0
     slow = judged & (share < bound)
     whose = "the spot on the surface" if standoff else "the tip"
     method = (
-        f"least share of the feed at which {whose} moves from row to row, on cuts and links farther than the path "
-        f"tolerance from their ends, where within {1e3 * around * period:g} ms no leg and no tool limit (rate, "
-        f"acceleration, jerk) is used by more than {_USED:.0%}: such slowness has no cause in machine or job"
+        f"smallest ratio of the speed of {whose} from row to row to the feed, on cuts and links farther than the path "
+        f"tolerance from their ends, where within {1e3 * around * period:g} ms no limit of legs or tool (velocity, "
+        f"acceleration, jerk) is used by more than {OPTIONS.used:.0%}, so that none explains a slower motion"
     )
     if slow.any():
-        method += f"; slower than that for {np.count_nonzero(slow) * period:.3g} s in all"
+        method += f"; slower than the bound for {np.count_nonzero(slow) * period:.3g} s in all"
     return Finding(value >= bound, 100.0 * value, 100.0 * bound, "%", replay.place(2 * row), method)
 
 
 def unasked_stop(replay: Replay) -> Finding:
-    """Judge that the robot comes to rest only where the toolpath gives a reason, and no longer than it asks."""
+    """Judge that the robot stops only where the toolpath gives a reason, and no longer than it asks for."""
     period, legs = replay.program.period, replay.machine.legs
     feeds = [min(segment.feed, replay.machine.rapid_velocity) for segment in replay.toolpath.segments]
     # The row nearest to a stop is within half a period of it: by then a leg has gained at most this.
-    rest = np.minimum(legs.max_jerk * period**2, _CREEP * min(feeds))
+    rest = np.minimum(legs.max_jerk * period**2, OPTIONS.creep * min(feeds))
     steps = np.abs(np.diff(replay.program.legs, axis=0))
     runs = marked_runs(np.asarray((steps <= np.maximum(rest * period, STILL_M)).all(axis=1)))
-    corner = min(_CORNER, replay.specification.stop_angle or _CORNER)
+    corner = min(OPTIONS.corner, replay.specification.stop_angle or OPTIONS.corner)
     reasons, asked = _reasons(replay, runs, corner)
     seconds = (runs[:, 1] - runs[:, 0]) * period
-    beyond = np.where(reasons, np.maximum(seconds - asked - _SPARE_S, 0.0), seconds)
+    beyond = np.where(reasons, np.maximum(seconds - asked - OPTIONS.spare_s, 0.0), seconds)
     worst = int(np.argmax(beyond)) if len(beyond) else 0
     value = float(beyond[worst]) if len(beyond) else 0.0
     row = int(runs[worst, 0]) if value > 0.0 else 0
     method = (
-        f"longest time at rest without a reason: any at all, but at dwells, ends of segments and corners of more than "
-        f"{math.degrees(corner):g} deg within the path tolerance only what exceeds the dwell asked for and "
-        f"{_SPARE_S:g} s; at rest is what moves no leg faster than its jerk allows within a period, or than "
-        f"{_CREEP:.0%} of the slowest feed"
+        f"longest time at rest without a reason; within the path tolerance of dwells, ends of segments and corners of "
+        f"more than {math.degrees(corner):g} deg only the time beyond the dwell and {OPTIONS.spare_s:g} s counts; the "
+        "robot is at rest when no leg is faster than its jerk limit allows within a period, or than "
+        f"{OPTIONS.creep:.0%} of the slowest feed"
     )
     if value > 0.0:
         method += f"; {np.count_nonzero(beyond)} such stops"
@@ -97,13 +103,13 @@ def unasked_stop(replay: Replay) -> Finding:
 
 
 def _feeds(replay: Replay) -> Floats:
-    """Return the feed (N − 1,) from row to row, m/s; infinite where it is not a cut's or a link's alone."""
+    """Return the feed (N − 1,) from row to row, m/s; infinite where more than one cut or link is near, or a rapid."""
     toolpath, arcs = replay.toolpath, replay.match.arcs[::2]
     ends, rapid = arc_length(toolpath.tilt_centres)[toolpath.starts], replay.machine.rapid_velocity
     first = np.searchsorted(ends, arcs[:-1] - replay.path_tolerance, side="right")
     behind = np.searchsorted(ends, arcs[1:] + replay.path_tolerance, side="left")
     feeds = [np.inf if s.kind is SegmentKind.RAPID else min(s.feed, rapid) for s in toolpath.segments]
-    # Nothing before the first end and nothing behind the last one: there a program may stand.
+    # No feed before the first end and behind the last one: there a program may be at rest.
     of_gap = np.array([np.inf, *feeds, np.inf])
     return np.where(first == behind, of_gap[first], np.inf)
 
@@ -136,7 +142,7 @@ def _used(replay: Replay) -> Floats:
 
 
 def _differences(points: Floats, order: int, period: float) -> Floats:
-    """Return differences (N − order, K) of rows (N, K), by the period: the derivative of that order."""
+    """Return absolute differences (N − order, K) of rows (N, K) over the period: the derivative of that order."""
     return np.abs(np.diff(points, order, axis=0)) / period**order
 
 
@@ -148,7 +154,7 @@ def _raise(used: Floats, shares: Floats) -> None:
 
 
 def _reasons(replay: Replay, runs: Ints, least: float) -> tuple[Bools, Floats]:
-    """Return for each run of steps whether the robot may rest there at all, and for how many seconds it is asked to.
+    """Return for each run of steps whether there is a reason to be at rest, and the dwell asked for, seconds.
 
     least: corners of more radians are a reason.
     """
@@ -158,7 +164,7 @@ def _reasons(replay: Replay, runs: Ints, least: float) -> tuple[Bools, Floats]:
     low, high = arcs[runs[:, 0]] - within, arcs[np.minimum(runs[:, 1], len(arcs) - 1)] + within
     ends = way[path.starts]
     reasons = np.searchsorted(ends, high, "right") > np.searchsorted(ends, low, "left")
-    # How far the path turns between its waypoints, by direction and by axis, summed up to each of them.
+    # Turning of the path, of its direction and its axis, summed up to each waypoint.
     step = np.diff(path.tilt_centres, axis=0)
     moving = np.linalg.norm(step, axis=1) > 0.0
     corner = np.zeros(len(way))

@@ -1,4 +1,4 @@
-"""Claims about how fast the tool goes: feed on cuts and links, rapid rate, rest at both ends."""
+"""Claims on the speed of the tool: feed on cuts and links, rapid rate, rest at both ends."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.polyline import arc_length
 from pentapod.toolpath.toolpath import SegmentKind
-from pentapod.verify.replay.claim import ALLOWANCE, MM, Claim, Finding, Idle, with_allowance
+from pentapod.verify.replay.claim import MM, TOLERATED, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
 
-_MM_MIN = 60e3  # mm/min in 1 m/s
+MM_MIN = 60e3  # in a metre per second
 
 
 def feed(replay: Replay, kind: SegmentKind) -> Finding | Idle:
     """Judge the speed on the segments of one kind; idle where the program has no such motion.
 
-    A cutter's feed is the speed of its tip. What works from a stand-off meets the surface at the tilt centre: there the
-    feed is the speed of that spot, while the tip may go as fast as on rapids, and has to keep to that everywhere.
+    A cutter's feed is the speed of its tip. A stand-off tool works at the tilt centre, on the surface: its feed is the
+    speed of that spot, and its tip must not exceed the rapid rate anywhere.
     """
     limit, governing = speed_limits(replay)
     standoff, rapid = replay.toolpath.tilt_centre < 0.0, kind == SegmentKind.RAPID
@@ -28,28 +28,26 @@ def feed(replay: Replay, kind: SegmentKind) -> Finding | Idle:
     if standoff and rapid:
         chords, limit = np.arange(len(governing)), np.full(len(governing), replay.machine.rapid_velocity)
     if not len(chords):
-        return Idle(f"no moment belongs to a {kind}")
+        return Idle(f"the program has no {kind}")
     spot = standoff and not rapid
     linear = replay.program.interpolation == "linear"
     speed = (_between_rows(replay, spot=spot) if linear else replay.interval_bounds.speeds[:, 1 if spot else 0])[chords]
     worst = int(np.argmax(speed / limit[chords]))
     value, bound = float(speed[worst]), float(limit[chords[worst]])
-    whose = "the spot that the program's tool meets on the surface" if spot else "the program's own tip"
-    which = "on every segment" if standoff and rapid else f"where the matched place is on a {kind}"
+    whose = "the spot on the surface" if spot else "the tip"
+    which = "on every segment" if standoff and rapid else f"where the matched place of the toolpath is on a {kind}"
     method = (
-        f"speed of {whose}, {'from row to row' if linear else 'proven bound for all times'}, {which}; within the path "
-        f"tolerance of a segment's end the faster of both feeds counts; {ALLOWANCE:.1%} allowed"
+        f"speed of {whose}, {'mean from row to row' if linear else 'proven bound for all times'}, {which}; within the "
+        f"path tolerance of the end of a segment the faster feed of both applies; {TOLERATED}"
     )
-    allowed, where = with_allowance(bound), replay.place(int(chords[worst]))
-    told = (_MM_MIN * value, _MM_MIN * bound, "mm/min", where, method, _MM_MIN * allowed)
-    return Finding(value <= allowed, *told)
+    return Finding.at_most(value, bound, MM_MIN, "mm/min", replay.place(int(chords[worst])), method)
 
 
 def _between_rows(replay: Replay, *, spot: bool) -> Floats:
     """Return the mean speed (M − 1,) of tip or spot over the period that each chord belongs to.
 
-    With linear interpolation the legs' speeds step at each row, and the tip's wavers within each period about its mean:
-    that is the controller's doing, at its own pace, and no feed that anybody set.
+    With linear interpolation the leg speeds jump at each row, and the speed of the tip varies about its mean within
+    each period: an effect of the interpolation, not of the feed.
     """
     position, direction = replay.pose
     arm = replay.machine.tool_length - (replay.toolpath.tilt_centre if spot else 0.0)
@@ -60,8 +58,8 @@ def _between_rows(replay: Replay, *, spot: bool) -> Floats:
 def speed_limits(replay: Replay) -> tuple[Floats, Ints]:
     """Return the speed limit (M − 1,) in m/s between consecutive samples, and the segment that sets it.
 
-    A chord that comes within the path tolerance of another segment, along the path, may go at the faster
-    limit: which side of a rounded corner belongs to which segment is not defined more closely than that.
+    A chord within the path tolerance of another segment, along the path, may have the faster limit: at a blended corner
+    the boundary between two segments is not defined more precisely than that.
     """
     segments, arcs = replay.toolpath.segments, replay.match.arcs
     rapid = replay.machine.rapid_velocity
@@ -77,7 +75,7 @@ def speed_limits(replay: Replay) -> tuple[Floats, Ints]:
 
 
 def rest(replay: Replay, *, at_end: bool) -> Finding:
-    """Judge that the robot stands at one end of the program."""
+    """Judge that the robot is at rest at one end of the program."""
     rows = replay.program.legs
     step = rows[-1] - rows[-2] if at_end else rows[1] - rows[0]
     period, limit = replay.program.period, replay.machine.legs.max_acceleration
@@ -85,12 +83,10 @@ def rest(replay: Replay, *, at_end: bool) -> Finding:
     leg = int(np.argmax(speed / limit))
     value, bound = float(speed[leg]), float(limit[leg]) * period
     method = (
-        f"speed of leg {leg + 1} over the {'last' if at_end else 'first'} period; the bound is what its "
-        f"greatest acceleration changes in one period; {ALLOWANCE:.1%} allowed"
+        f"speed of leg {leg + 1} over the {'last' if at_end else 'first'} period; the bound is the change of speed at "
+        f"its largest acceleration in one period; {TOLERATED}"
     )
-    where = replay.place(2 * len(rows) - 2 if at_end else 0)
-    allowed = with_allowance(bound)
-    return Finding(value <= allowed, MM * value, MM * bound, "mm/s", where, method, MM * allowed)
+    return Finding.at_most(value, bound, MM, "mm/s", replay.place(2 * len(rows) - 2 if at_end else 0), method)
 
 
 CLAIMS = (

@@ -1,4 +1,4 @@
-"""Claims about where the toolpath asks for a stop: that the robot comes to rest there, and stands for so long."""
+"""Claims on exact stops and dwells: the robot is at rest where the toolpath asks for it, and for as long."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from pentapod.base.arrays import Bools
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import marked_runs
-from pentapod.verify.replay.claim import MM, Claim, Finding, Idle, with_allowance
+from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
 
 STILL_M = 1e-9
-"""A leg that moves by less from row to row stands: the resolution of the coarsest program files."""
+"""A leg that moves by no more from row to row is at rest: the resolution of the coarsest program files, metres."""
 
-_SECONDS = 1e-9
+DWELL_TOLERANCE_S = 1e-9
 
 
 def exact_stops(replay: Replay) -> Finding | Idle:
-    """Judge that the robot comes to rest wherever the toolpath stops."""
+    """Judge that the robot is at rest at every exact stop of the toolpath."""
     stops = asked_stops(replay)
     if not stops:
-        return Idle("the toolpath asks for no stop")
+        return Idle("the toolpath has no exact stop")
     period, limit = replay.program.period, replay.machine.legs.max_acceleration
     shares = (np.abs(np.diff(replay.program.legs, axis=0)) / limit).max(axis=1)
     slowest = [low + int(np.argmin(shares[low:high])) for low, high, _ in stops]
@@ -30,42 +30,40 @@ def exact_stops(replay: Replay) -> Finding | Idle:
     leg = int(np.argmax(step / limit))
     value, bound = float(step[leg]) / period, float(limit[leg]) * period
     method = (
-        f"of {len(stops)} stops the one where most is left of the legs' speed, over the slowest period within the path "
-        f"tolerance of it; the bound is what leg {leg + 1}'s greatest acceleration changes in one period"
+        f"largest leg speed at {len(stops)} exact stops, each in its slowest period within the path tolerance; the "
+        f"bound is the change of speed of leg {leg + 1} at its largest acceleration in one period"
     )
-    allowed = with_allowance(bound)
-    place = replay.place(2 * worst)
-    return Finding(value <= allowed, MM * value, MM * bound, "mm/s", place, method, MM * allowed)
+    return Finding.at_most(value, bound, MM, "mm/s", replay.place(2 * worst), method)
 
 
 def dwells(replay: Replay) -> Finding | Idle:
-    """Judge that the robot stands as long as the toolpath asks."""
+    """Judge that the robot is at rest as long as the toolpath asks for."""
     asked = [stop for stop in asked_stops(replay) if stop[2] > 0.0]
     if not asked:
-        return Idle("the toolpath asks for no dwell")
+        return Idle("the toolpath has no dwell")
     still = np.abs(np.diff(replay.program.legs, axis=0)).max(axis=1) <= STILL_M
     stood = [_longest_run(still[low:high]) * replay.program.period for low, high, _ in asked]
     worst = int(np.argmin(np.array(stood) - [seconds for _, _, seconds in asked]))
     value, bound = stood[worst], asked[worst][2]
     method = (
-        f"of {len(asked)} dwells the one that falls short most, or is exceeded least: the longest time without a leg "
-        f"moving more than {MM * STILL_M:g} mm from row to row, within the path tolerance of the place"
+        f"dwell with the largest shortfall, of {len(asked)}: longest time in which no leg moves more than "
+        f"{MM * STILL_M:g} mm from row to row, within the path tolerance of the place"
     )
-    return Finding(value >= bound - _SECONDS, value, bound, "s", replay.place(2 * asked[worst][0]), method)
+    return Finding(value >= bound - DWELL_TOLERANCE_S, value, bound, "s", replay.place(2 * asked[worst][0]), method)
 
 
 def asked_stops(replay: Replay) -> list[tuple[int, int, float]]:
-    """Return for each stop of the toolpath the steps from row to row, from and to before, near it; and its seconds."""
+    """Return (first, end, seconds) of each stop: the range of steps between rows near it, and its dwell."""
     path, match, count = replay.toolpath, replay.match, len(replay.program.legs) - 1
-    # Where the tool turns on the spot its way does not tell one waypoint from the next.
+    # Where the tool turns on the spot, arc length does not distinguish one waypoint from the next; turning does.
     turns = np.append(0.0, np.cumsum(angle_between(path.axes[:-1], path.axes[1:])))
-    courses = (
+    measures = (
         (match.arcs[::2], arc_length(path.tilt_centres)[path.starts], replay.path_tolerance),
-        (match.turned[::2], turns[path.starts], replay.axis_tolerance),
+        (match.turned[::2], turns[path.starts], replay.specification.axis_tolerance),
     )
-    low = np.maximum(*(np.searchsorted(course, places - within, "left") for course, places, within in courses))
-    high = np.minimum(*(np.searchsorted(course, places + within, "right") for course, places, within in courses))
-    # Where fewer than two rows are near, as where a program jumps over the place, all steps that touch it count.
+    low = np.maximum(*(np.searchsorted(measure, places - within, "left") for measure, places, within in measures))
+    high = np.minimum(*(np.searchsorted(measure, places + within, "right") for measure, places, within in measures))
+    # Where fewer than two rows are near, because the program jumps over the place, all steps that touch it count.
     few = high - low < 2
     first = np.clip(np.where(few, np.minimum(low, high) - 1, low), 0, count - 1)
     behind = np.clip(np.where(few, np.maximum(low, high), high - 1), first + 1, count)

@@ -1,4 +1,4 @@
-"""Claims about the tool's own motion, for machines and jobs that limit it: tip acceleration and jerk, axis turning."""
+"""Claims on the limits of the tool, where there are any: tip acceleration and jerk, axis velocity and acceleration."""
 
 from __future__ import annotations
 
@@ -9,51 +9,48 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.geometry.interpolant import Interpolant, largest_length
-from pentapod.verify.replay.claim import ALLOWANCE, MM, Claim, Finding, Idle, with_allowance
+from pentapod.verify.replay.claim import DEG, MM, TOLERATED, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
-
-_DEG = 180.0 / np.pi  # in a radian
 
 
 def acceleration(replay: Replay) -> Finding:
     """Judge the tip's acceleration."""
     limit = replay.machine.tool_limits.max_tip_acceleration
-    largest = _largest(np.linalg.norm(_tip(replay).second, axis=1))
-    method = f"second derivative of what joins the program's tips, at its rows; {ALLOWANCE:.1%} allowed"
-    return _below(replay, largest, limit, (MM, "mm/s²", with_allowance(limit)), method)
+    largest = np.linalg.norm(_tip(replay).second, axis=1)
+    return _below(replay, largest, limit, MM, "mm/s²", "second derivative of the interpolated tips at the rows")
 
 
 def jerk(replay: Replay) -> Finding:
     """Judge the tip's jerk."""
     limit = replay.machine.tool_limits.max_tip_jerk
-    method = f"third derivative of what joins the program's tips, between its rows; {ALLOWANCE:.1%} allowed"
-    allowed = with_allowance(limit)
-    return _below(replay, _largest(_tip(replay).jerk_lengths), limit, (MM, "mm/s³", allowed), method)
+    largest = _tip(replay).jerk_lengths
+    return _below(replay, largest, limit, MM, "mm/s³", "third derivative of the interpolated tips between the rows")
 
 
 def axis_velocity(replay: Replay) -> Finding:
-    """Judge how fast the tool axis turns."""
+    """Judge the angular velocity of the tool axis."""
     limit = replay.machine.tool_limits.max_axis_velocity
-    method = f"largest rate of what joins the program's tool axes, rows and between; {ALLOWANCE:.1%} allowed"
-    return _below(replay, largest_length(_axis(replay).steps), limit, (_DEG, "deg/s", with_allowance(limit)), method)
+    value, row = largest_length(_axis(replay).steps)
+    return _finding(replay, value, row, limit, DEG, "deg/s", "largest rate of the interpolated tool axes at any time")
 
 
 def axis_acceleration(replay: Replay) -> Finding:
     """Judge the angular acceleration of the tool axis."""
     limit = replay.machine.tool_limits.max_axis_acceleration
-    method = f"angular acceleration of what joins the program's tool axes, at its rows; {ALLOWANCE:.1%} allowed"
-    largest = _largest(_axis(replay).turn_accelerations)
-    return _below(replay, largest, limit, (_DEG, "deg/s²", with_allowance(limit)), method)
+    largest = _axis(replay).turn_accelerations
+    return _below(
+        replay, largest, limit, DEG, "deg/s²", "angular acceleration of the interpolated tool axes at the rows"
+    )
 
 
 def _tip(replay: Replay) -> Interpolant:
-    """Return what joins the tips at the rows (N, 3) as the controller joins the legs, machine frame."""
+    """Return the interpolant of the tips at the rows (N, 3), machine frame, of the kind that the controller uses."""
     position, direction = replay.pose
     return _joined(replay, position[::2] + replay.machine.tool_length * direction[::2])
 
 
 def _axis(replay: Replay) -> Interpolant:
-    """Return what joins the tool's directions at the rows (N, 3), likewise."""
+    """Return the interpolant of the tool's directions at the rows (N, 3), likewise."""
     return _joined(replay, replay.pose[1][::2])
 
 
@@ -61,24 +58,18 @@ def _joined(replay: Replay, rows: Floats) -> Interpolant:
     return Interpolant.through(rows, replay.program.period, replay.program.interpolation)
 
 
-def _largest(values: Floats) -> tuple[float, int]:
-    """Return the largest of values (N or N − 1,) and its row."""
+def _below(replay: Replay, values: Floats, limit: float, scale: float, unit: str, method: str) -> Finding:
+    """Judge the largest of values (N or N − 1,), one for each row, against a limit, both SI."""
     row = int(np.argmax(values))
-    return float(values[row]), row
+    return _finding(replay, float(values[row]), row, limit, scale, unit, method)
 
 
-def _below(
-    replay: Replay, found: tuple[float, int], limit: float, told: tuple[float, str, float], method: str
-) -> Finding:
-    """Judge a value and its row against a limit; told: factor and unit in which to tell both, and what is allowed."""
-    (value, row), (factor, unit, allowed) = found, told
-    return Finding(
-        value <= allowed, factor * value, factor * limit, unit, replay.place(2 * row), method, factor * allowed
-    )
+def _finding(replay: Replay, value: float, row: int, limit: float, scale: float, unit: str, method: str) -> Finding:
+    return Finding.at_most(value, limit, scale, unit, replay.place(2 * row), f"{method}; {TOLERATED}")
 
 
 def _where_limited(replay: Replay, *, name: str, judge: Callable[[Replay], Finding]) -> Finding | Idle:
-    return judge(replay) if name in replay.machine.tool_limits.given() else Idle("neither machine nor job limits it")
+    return judge(replay) if name in replay.machine.tool_limits.given() else Idle("neither machine nor job has a limit")
 
 
 CLAIMS = tuple(

@@ -12,19 +12,21 @@ from pentapod.verify.replay.replay import Replay
 from pentapod.verify.verdict.verdict import Certificate, Place
 
 ALLOWANCE = 1e-3
-"""Relative allowance on deviations, feeds, leg rates and accelerations: rounding, and limits met exactly."""
+"""Relative tolerance on deviations, feeds, leg rates and accelerations: for rounding, and limits met exactly."""
 
-MM = 1e3  # in a metre: verdicts are told in millimetres
+MM = 1e3  # in a metre: verdicts are in millimetres
+DEG = 180.0 / np.pi  # in a radian
+TOLERATED = f"{ALLOWANCE:.1%} more is tolerated"
 
 
 def with_allowance(bound: float) -> float:
-    """Return up to where a value passes that should not exceed a bound."""
+    """Return the largest value that passes where `bound` should not be exceeded."""
     return bound * (1.0 + ALLOWANCE)
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What a claim found: a certificate without its name."""
+    """The answer of a claim: a certificate without its name."""
 
     passed: bool
     value: float | None
@@ -34,12 +36,35 @@ class Finding:
     method: str
     allowed: float | None = None
 
+    @classmethod
+    def without_value(cls, passed: bool, method: str, where: Place | None = None) -> Finding:
+        """Return the finding of a claim that compares no numbers."""
+        return cls(passed, None, None, "", where or Place(), method)
+
+    @classmethod
+    def at_most(
+        cls,
+        value: float,
+        limit: float,
+        scale: float,
+        unit: str,
+        where: Place,
+        method: str,
+        allowed: float | None = None,
+    ) -> Finding:
+        """Return whether a value is at most `allowed`, by default the limit with its allowance.
+
+        All three are SI; scale: how many `unit` make one of SI.
+        """
+        most = with_allowance(limit) if allowed is None else allowed
+        return cls(value <= most, scale * value, scale * limit, unit, where, method, scale * most)
+
 
 @dataclass(frozen=True)
 class Idle:
     """A claim was not judged, and why. unknown: it should have been; a verdict passes then only if that is waived.
 
-    A claim that does not apply to the program (unknown is False) is not listed, but for a strict verdict.
+    A claim that does not apply to the program (unknown is False) is listed in a strict verdict only.
     """
 
     why: str
@@ -48,11 +73,11 @@ class Idle:
 
 @dataclass(frozen=True)
 class Claim(Value):
-    """name as a user reads it; judge returns what it found, or that there is nothing to judge.
+    """name: as the verdict lists it. judge: from a replay to a finding, or to why there is none.
 
-    needs_pose: the claim means something only where the leg lengths have a pose at every sample; it fails
-    without being judged where they have none. needs_proof: its value is a bound for all times, which exists only where
-    the motion between the samples is proven; else it is undecided, and fails.
+    needs_pose: the claim needs a pose at every sample; where the leg lengths have none it fails without being judged.
+    needs_proof: its value is a bound for all times, which needs a proof of the motion between the samples; where there
+    is none it is undecided, and fails.
     """
 
     name: str
@@ -62,25 +87,24 @@ class Claim(Value):
 
     def __call__(self, replay: Replay) -> Certificate | Idle:
         """Return the certificate of this claim, or why there is none."""
-        if self.needs_pose and len(replay.unposed):
-            first = int(replay.unposed[0])
-            method = f"not judged: the leg lengths have no pose at {len(replay.unposed)} of the samples"
-            return Certificate(self.name, False, None, None, "", replay.place(first), method)
-        if self.needs_proof and len(unproven := replay.interval_bounds.unproven):
-            first, count = int(unproven[0]), len(unproven)
-            method = f"undecided: too near a singularity to prove where the motion goes on {count} half periods"
-            return Certificate(self.name, False, None, None, "", replay.place(first), method)
-        found = self.judge(replay)
+        if self.needs_pose and len(samples := replay.unposed):
+            why = f"not judged: the leg lengths have no pose at {len(samples)} of the samples"
+            found = Finding.without_value(False, why, replay.place(int(samples[0])))
+        elif self.needs_proof and len(chords := replay.interval_bounds.unproven):
+            why = f"undecided: too near a singularity to prove the motion on {len(chords)} half periods"
+            found = Finding.without_value(False, why, replay.place(int(chords[0])))
+        else:
+            found = self.judge(replay)
         if isinstance(found, Idle):
             return found
         value, bound, allowed = _plain(found.value), _plain(found.bound), _plain(found.allowed)
         return Certificate(self.name, bool(found.passed), value, bound, found.unit, found.where, found.method, allowed)
 
     def inapplicable(self, idle: Idle) -> Certificate:
-        """Return the certificate that stands in a strict verdict where the claim does not apply."""
+        """Return the certificate of a strict verdict for a claim that does not apply."""
         return Certificate(self.name, True, None, None, "", Place(), f"does not apply: {idle.why}")
 
 
 def _plain(number: float | None) -> float | None:
-    """Return a plain float to 12 digits: 15 deg is not 14.999999999999998. What is no number has no value."""
+    """Return a plain float to 12 digits, so that 15 deg is not 14.999999999999998; None for NaN and infinities."""
     return None if number is None or not np.isfinite(number) else float(f"{number:.12g}")

@@ -1,8 +1,8 @@
-"""How near bodies come to each other at any time: proven from some moments, and how far bodies stray from there.
+"""Lower bound on the clearance between bodies at all times: branch and bound over stretches of rows.
 
-Time is cut into stretches of rows. In the middle of each the gaps are computed; from there on no body moves further
-than `enclose` proves of the platform (lemmas 9 and 13 of docs/proofs.md). Stretches that may hold a gap smaller than
-what is known are cut into eight.
+In the middle of each stretch the gaps are computed. From there no body moves farther than the proven displacement of
+the platform allows (`Robot.enclose`; lemmas 9 and 13 of docs/proofs.md). A stretch that may hold a gap smaller than the
+smallest one found is cut into eight.
 """
 
 from __future__ import annotations
@@ -17,99 +17,119 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.numerics.blocks import blocks
 from pentapod.verify.replay.replay import Replay
 
-_LONGEST, _CUT = 64, 8
-_AT_ONCE, _CHUNK = 4096, 512  # stretches: the bodies of all of a long program would fill the memory
-_NEAR_M, _NEAR = 2e-5, 0.3
-"""A proven gap is not improved on where it is this much, or this share, below one that is met."""
+
+@dataclass(frozen=True)
+class ClearanceOptions:
+    """Options of the search. They change how tight the bound is and what it costs, never whether it holds.
+
+    longest: rows of the first stretches; cuts: into how many pieces one is cut. near_m, near_share: a bound is not
+    tightened where it is this much, in metres or as a share, below a gap that was found. at_once: stretches whose gaps
+    are computed together; enclosed_at_once: stretches whose displacement is.
+    """
+
+    longest: int = 64
+    cuts: int = 8
+    near_m: float = 2e-5
+    near_share: float = 0.3
+    at_once: int = 4096
+    enclosed_at_once: int = 512
 
 
 @dataclass(frozen=True, eq=False)
-class Stray:
-    """How far, at most, things move from where they are in the middle of n stretches.
+class Displacement:
+    """Bounds on the displacement of the platform within n stretches, from where it is in the middle of each.
 
-    line (n, K): points of the platform line at the offsets asked for, metres. turn (n,): the line's direction.
+    points (n, K): of points on the platform line, metres. turn (n,): of unit vectors along the line.
     """
 
-    line: Floats
+    points: Floats
     turn: Floats
 
 
 Gaps = Callable[[Ints], Floats]
 """Gaps (n, C) in metres at samples (n,) of the replay."""
 
-Moves = Callable[[Stray], Floats]
-"""By how much (n, C) each of those gaps can shrink at most."""
+Approaches = Callable[[Displacement], Floats]
+"""Upper bounds (n, C), metres, on the decrease of those gaps for a displacement of the platform."""
 
 
 @dataclass(frozen=True)
-class Approach:
-    """The smallest gap, metres: none is smaller at any time. column: of which gap; sample: where. proven: or not."""
+class ClearanceBound:
+    """gap: metres; none is smaller at any time. column: of which gap; sample: where. proven: whether it is finite."""
 
-    least: float
+    gap: float
     column: int
     sample: int
     proven: bool
 
 
-def approach(replay: Replay, gaps: Gaps, moves: Moves, offsets: Floats, *, bound: float = 0.0) -> Approach:
-    """Return the smallest gap over all times. Ends early where a gap at a sample is not above `bound`.
+def clearance_bound(
+    replay: Replay,
+    gaps: Gaps,
+    approaches: Approaches,
+    offsets: Floats,
+    *,
+    bound: float = 0.0,
+    options: ClearanceOptions = ClearanceOptions(),
+) -> ClearanceBound:
+    """Return the lower bound of all gaps over all times. Ends early where a gap at a sample is not above `bound`.
 
-    offsets (K,): along the platform line, metres, of the points whose way `moves` goes by.
+    offsets (K,): metres along the platform line, of the points whose displacement `approaches` is given.
     """
     count = len(replay.program.legs) - 1
-    size, starts = _LONGEST, np.arange(0, count, _LONGEST)
-    met, found = np.inf, list[Approach]()
+    size, starts = options.longest, np.arange(0, count, options.longest)
+    met, decided = np.inf, list[ClearanceBound]()
     while True:
-        ends = np.minimum(starts + size, count)
-        samples = starts + ends
-        values = np.concatenate([gaps(samples[part]) for part in blocks(len(samples), _AT_ONCE)])
+        samples = starts + np.minimum(starts + size, count)
+        values = np.concatenate([gaps(samples[part]) for part in blocks(len(samples), options.at_once)])
         worst = np.unravel_index(int(values.argmin()), values.shape)
         if values[worst] < met:
             met = float(values[worst])
             if met <= bound:
-                return Approach(met, int(worst[1]), int(samples[worst[0]]), True)
-        if size == _LONGEST:
-            lower = values - moves(_first_stray(replay, starts, offsets))
+                return ClearanceBound(met, int(worst[1]), int(samples[worst[0]]), True)
+        if size == options.longest:
+            lower = values - approaches(_first_displacements(replay, starts, offsets, options))
         else:
-            strays = (moves(stray_of(replay, starts[part], size, offsets)) for part in blocks(len(starts), _AT_ONCE))
-            lower = values - np.concatenate(list(strays))
-        target = met - max(_NEAR_M, _NEAR * (met - bound))
+            parts = (starts[part] for part in blocks(len(starts), options.at_once))
+            decreases = [approaches(displacements(replay, part, size, offsets, options)) for part in parts]
+            lower = values - np.concatenate(decreases)
+        target = met - max(options.near_m, options.near_share * (met - bound))
         again = (lower.min(axis=1) < target) if size > 1 else np.zeros(len(starts), dtype=np.bool_)
         kept = np.where(again[:, None], np.inf, lower)
         row, column = np.unravel_index(int(kept.argmin()), kept.shape)
-        least = float(kept[row, column])
-        found.append(Approach(least, int(column), int(samples[row]), bool(np.isfinite(least))))
+        gap = float(kept[row, column])
+        decided.append(ClearanceBound(gap, int(column), int(samples[row]), bool(np.isfinite(gap))))
         if not again.any():
-            return min(found, key=lambda approach: approach.least)
-        size //= _CUT
-        starts = (starts[again, None] + size * np.arange(_CUT)).ravel()
+            return min(decided, key=lambda found: found.gap)
+        size //= options.cuts
+        starts = (starts[again, None] + size * np.arange(options.cuts)).ravel()
         starts = starts[starts < count]
 
 
-def _first_stray(replay: Replay, starts: Ints, offsets: Floats) -> Stray:
-    """Return how far the platform strays within the longest stretches: claims that ask the same share the answer."""
-    key = ("stray", offsets.tobytes())
+def _first_displacements(replay: Replay, starts: Ints, offsets: Floats, options: ClearanceOptions) -> Displacement:
+    """Return the displacements within the longest stretches; claims about the same points share them."""
+    key = ("displacements", options.longest, offsets.tobytes())
     if key not in replay.shared:
-        replay.shared[key] = stray_of(replay, starts, _LONGEST, offsets)
-    return cast("Stray", replay.shared[key])
+        replay.shared[key] = displacements(replay, starts, options.longest, offsets, options)
+    return cast("Displacement", replay.shared[key])
 
 
-def stray_of(replay: Replay, starts: Ints, size: int, offsets: Floats) -> Stray:
-    """Return how far the platform strays within `size` intervals from each start, seen from their middle."""
+def displacements(
+    replay: Replay, starts: Ints, size: int, offsets: Floats, options: ClearanceOptions = ClearanceOptions()
+) -> Displacement:
+    """Return the displacements within `size` intervals from each start, from the middle of each stretch."""
     (position, direction), last = replay.pose, len(replay.program.legs) - 2
-    line, turn = np.empty((len(starts), len(offsets))), np.empty(len(starts))
-    for first in range(0, len(starts), _CHUNK):
-        rows = slice(first, first + _CHUNK)
+    points, turn = np.empty((len(starts), len(offsets))), np.empty(len(starts))
+    for rows in blocks(len(starts), options.enclosed_at_once):
         intervals = np.minimum(starts[rows, None] + np.arange(size), last)
-        lengths = leg_control_points(replay, intervals)
         middle = starts[rows] + np.minimum(starts[rows] + size, last + 1)
-        ends = position[middle], direction[middle]
-        line[rows], turn[rows] = replay.machine.robot.enclose(ends, lengths, offsets)
-    return Stray(line, turn)
+        pose, lengths = (position[middle], direction[middle]), leg_control_points(replay, intervals)
+        points[rows], turn[rows] = replay.machine.robot.enclose(pose, lengths, offsets)
+    return Displacement(points, turn)
 
 
 def leg_control_points(replay: Replay, intervals: Ints) -> Floats:
-    """Return leg lengths (n, M, n_legs) whose hull holds the legs on intervals (n, m): the Bernstein coefficients."""
+    """Return Bernstein coefficients (n, M, n_legs) of the leg lengths on intervals (n, m); their hull holds them."""
     legs, slopes = replay.program.legs, replay.slopes
     if slopes is None:
         return np.concatenate([legs[intervals], legs[intervals[:, -1:] + 1]], axis=1)

@@ -1,4 +1,4 @@
-"""Whether a motion follows a path within a radius, in order, and where it passes which waypoint."""
+"""Free-space diagram of a motion and a path (Alt and Godau 1995): monotone matchings within a radius."""
 
 from __future__ import annotations
 
@@ -10,11 +10,18 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length
 
-_MOST_CELLS = 150_000_000
-"""Cells of the free-space diagram that one search may look at: five bytes each, and about ten seconds."""
 
-_ROUNDS, _WINDOW = 40, 32
-"""Of the search that widens the radius where the motion leaves the path; and how wide, in samples, at first."""
+@dataclass(frozen=True)
+class SearchOptions:
+    """Limits of a search in the free-space diagram.
+
+    cells: that one search may look at, of five bytes each; the default takes about ten seconds. rounds, window: of the
+    search that widens the radius where the motion leaves the path: how often, and how many samples at first.
+    """
+
+    cells: int = 150_000_000
+    rounds: int = 40
+    window: int = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +36,9 @@ class PosedPolyline:
 class Pairing:
     """A monotone matching of M samples with n waypoints, up to the places within the intervals.
 
-    intervals (M,): of the path, that each sample belongs to. lowest, highest (M,): from where to where, in waypoints,
-    its place keeps order and radius. times (n,): when each waypoint is passed, in samples. least: metres; no matching
-    of those that were searched has a smaller largest distance.
+    intervals (M,): of the path, that each sample belongs to. lowest, highest (M,): range of places, in waypoints, that
+    keep order and radius. times (n,): when each waypoint is passed, in samples. least: metres, a lower bound on the
+    largest distance of the matchings that were searched.
     """
 
     intervals: Ints
@@ -46,22 +53,23 @@ class Pairing:
 
 
 class FreeSpace:
-    """The free-space diagram of a motion and a path: which places of one are near which places of the other."""
+    """The free-space diagram of a motion and a path: which places of one are close to which places of the other."""
 
     def __init__(
         self,
         motion: PosedPolyline,
         path: PosedPolyline,
         weights: tuple[Floats, Floats, float],
-        away: Floats,
+        deviations: Floats,
         axis_bound: float,
+        options: SearchOptions,
     ) -> None:
-        """weights: m², of squared turns beside squared distances, of intervals (n − 1,) and waypoints (n,).
+        """weights: see `free_space_kernels.Weights`.
 
-        And m², the squared distance beyond which as few samples and waypoints as possible should be.
-        away (M − 1,): metres by which the motion may be off its chords. axis_bound: radians, where axes count.
+        deviations (M − 1,): bounds in metres on the deviation of the motion from its chords. axis_bound: radians, where
+        axes count.
         """
-        self.away = away
+        self._deviations, self._options = deviations, options
         self._motion, self._path = _curve(motion), _curve(path)
         self._weights = weights
         # Chords between unit vectors are as much shorter than the arc as it is high.
@@ -70,40 +78,36 @@ class FreeSpace:
         self._samples, self._waypoints = len(motion.points), len(path.points)
 
     def pairing(self, radius: float, *, by_axis: bool, more: float = 0.0) -> Pairing | None:
-        """Return a matching within the radius, metres, at the least sum of squared distances; None: there is none.
+        """Return the matching within the radius, metres, with the least sum of squared distances.
 
-        by_axis: also within the bound of the axes. more: metres, for the radius where axes have a weight. None as well
-        where too much is near everything to be searched.
+        None where there is none, or the diagram is too large. by_axis: also within the bound of the axes. more: metres
+        added to the radius where axes have a weight.
         """
         return self._search(np.full(self._samples - 1, radius), by_axis=by_axis, more=more)[1]
 
     def largest(self, pairing: Pairing, distances: Floats, waypoint_distances: Floats) -> float:
-        """Return the largest of distances (M,) and (n,), with what the motion may be off its chords.
+        """Return the largest of distances (M,) and (n,), each with the deviation of the motion from its chord.
 
         Without those where axes have a weight: there the nearest place is not the best one.
         """
-        chord = np.minimum(pairing.times.astype(np.intp), len(self.away) - 1)
-        at_samples = np.maximum(np.append(self.away, 0.0), np.append(0.0, self.away))
+        chord = np.minimum(pairing.times.astype(np.intp), len(self._deviations) - 1)
+        at_samples = np.maximum(np.append(self._deviations, 0.0), np.append(0.0, self._deviations))
         samples, waypoints = self._weights[0][pairing.intervals] == 0.0, self._weights[1] == 0.0
         samples[[0, -1]] = waypoints[[0, -1]] = True
-        return float(
-            max(
-                (distances + at_samples)[samples].max(),
-                (waypoint_distances + self.away[chord])[waypoints].max(),
-            )
-        )
+        of_waypoints = (waypoint_distances + self._deviations[chord])[waypoints]
+        return float(max((distances + at_samples)[samples].max(), of_waypoints.max()))
 
     def patched(self, radius: float) -> Pairing | None:
-        """Return a matching within the radius but where the motion leaves the path: there within what it takes.
+        """Return a matching within the radius, which is widened where the motion leaves the path.
 
         None where that would need too much memory.
         """
-        radii, wide, window, last = np.full(self._samples - 1, radius), radius, _WINDOW, -1
-        for _ in range(_ROUNDS):
+        radii, wide, window, last = np.full(self._samples - 1, radius), radius, self._options.window, -1
+        for _ in range(self._options.rounds):
             reached, found = self._search(radii, by_axis=False)
             if found is not None or reached < 0:
                 return found
-            # Where the search got on, the stretch is longer; where it did not, the motion is farther off.
+            # Where the search advanced, the window is too short; where it did not, the radius is too small.
             window *= 2
             wide = wide if reached > last + window // 4 else 4.0 * wide
             near = slice(max(reached - window, 0), reached + window)
@@ -112,7 +116,7 @@ class FreeSpace:
         return None
 
     def by_arc_length(self) -> Pairing:
-        """Return the matching by the fraction of the way: for motions that no search can match."""
+        """Return the matching by the fraction of arc length, for motions that no search can match."""
         way, arc = arc_length(self._motion[0]), arc_length(self._path[0])
         samples, waypoints = np.arange(float(self._samples)), np.arange(float(self._waypoints))
         times = np.interp(arc * way[-1], way * arc[-1], samples)
@@ -123,13 +127,18 @@ class FreeSpace:
         return Pairing(intervals, lowest, highest, times, 0.0)
 
     def _search(self, radii: Floats, *, by_axis: bool, more: float = 0.0) -> tuple[int, Pairing | None]:
-        """Return how many samples can be reached within radii (M − 1,), and the matching if all can; −1: too many."""
+        """Return the number of samples that are reached within radii (M − 1,), −1 for too many cells; and the matching.
+
+        The matching is None unless all samples are reached.
+        """
         from pentapod.verify.replay import free_space_kernels as kernels  # noqa: PLC0415  compiled: only where used
 
-        near = radii - self.away
+        near = radii - self._deviations
         at_samples = np.minimum(np.append(near, np.inf), np.append(np.inf, near))
         bounds = (near, at_samples, more, self._turns if by_axis else np.full(len(self._turns), np.inf))
-        reached, routed, spare, cells = kernels.walk(self._motion, self._path, bounds, self._weights, _MOST_CELLS)
+        reached, routed, spare, cells = kernels.walk(
+            self._motion, self._path, bounds, self._weights, self._options.cells
+        )
         if reached < self._samples:
             return reached, None
         intervals, chords = np.empty(self._samples, dtype=np.intp), np.empty(self._waypoints, dtype=np.intp)
@@ -145,7 +154,7 @@ class FreeSpace:
 
 
 def _curve(line: PosedPolyline) -> tuple[Floats, Floats]:
-    """Return points and axes as kernels take them: in one piece and, by their type, not read-only."""
+    """Return points and axes as the kernels take them: contiguous and, by their type, writable."""
     return np.require(line.points, np.float64, ["C", "W"]), np.require(line.axes, np.float64, ["C", "W"])
 
 

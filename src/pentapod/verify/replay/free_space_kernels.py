@@ -1,13 +1,13 @@
-"""The free-space diagram of two polylines, walked once along the motion: compiled.
+"""Kernels of the free-space diagram of two polylines (Alt and Godau 1995), in one pass along the motion.
 
 A motion of M samples and a path of n waypoints. Cell (i, k) belongs to chord i of the motion and interval k of the
-path. Its left side is sample i along interval k, its bottom is waypoint k along chord i. Free is the part of a side
-where both curves are near enough to each other; in each cell the free part is convex. So the places that a monotone
-matching can reach are an interval of each side, and follow from those of the sides before it (Alt and Godau 1995). Only
-sides that can be reached are ever looked at: for a motion that follows its path a few cells for each sample.
+path. Its left side is sample i along interval k, its bottom is waypoint k along chord i. The part of a side where both
+curves are close enough to each other is free; in each cell the free part is convex. So the places that a monotone
+matching can reach are an interval of each side, and follow from those of the previous sides. Only sides that can be
+reached are computed: for a motion that follows its path a few cells for each sample.
 
-Beside what can be reached at all, each side keeps the cheapest *route* to it: the order of sides whose sum of
-squared distances is least. A route can be dropped where a dearer one would have gone on; what can be reached is not.
+Each side also keeps the cheapest *route* to it: the order of sides with the least sum of squared distances. A route may
+be lost where a more expensive one would have continued; what can be reached is never lost.
 """
 
 from __future__ import annotations
@@ -24,34 +24,34 @@ Curve = tuple[Floats, Floats]
 """Points and axes (n, 3) of a polyline. A side is a vertex `at` of one of them along the chord `k` of the other."""
 
 Bounds = tuple[Floats, Floats, float, Floats]
-"""chords (M − 1,): how near, metres, path and motion must be on each chord; samples (M,): the same at each sample; by
-how much less near where axes have a weight; turns (n − 1,): how far apart the ends of the axes may be on each interval
-of the path, squared."""
+"""Largest distance, metres, of path and motion: chords (M − 1,) on each chord; samples (M,) at each sample; what is
+added where axes have a weight; and turns (n − 1,): the largest squared distance of the axes' ends on each interval of
+the path."""
 
 Weights = tuple[Floats, Floats, float]
-"""What a squared distance between axes costs beside one between points, m²: intervals (n − 1,), waypoints (n,); and the
-squared distance, m², that is tolerable."""
+"""Cost of a squared distance between axes relative to one between points, m²: intervals (n − 1,), waypoints (n,); and
+the tolerated squared distance, m², beyond which as few samples and waypoints as possible should be."""
 
 Reached = tuple[float, float, float]
-"""How a side can be reached: earliest place at all, earliest place of its route, cost of its route; or infinite."""
+"""How a side can be reached: earliest place of all, earliest place of its route, cost of its route; infinite if not."""
 
 Cells = tuple[Ints, NDArray[np.int32], NDArray[np.uint8]]
 """first (M,): where the cells of each chord begin; intervals (C,) of the cells; ways (C,): flags, from where the sides
 right (1 left, 2 bottom by the route; 16, 32 at all) and top (4, 8; 64, 128) are reached."""
 
 
-_DEAR = 100.0
-"""What a sample or a waypoint costs that is farther off than tolerable, beside one that is just tolerable."""
+BEYOND_COST = 100.0
+"""Cost of a sample or waypoint beyond the tolerated distance, relative to one at that distance."""
 
-_TURN = 1000.0
-"""What a waypoint counts where the path turns on the spot: there samples may be many, and tell little."""
+TURN_COST = 1000.0
+"""Factor on the cost of a waypoint where the path turns on the spot: there samples may be many, and say little."""
 
 
 @kernel
 def stretch(a: Floats, at: int, b: Floats, k: int, within: float) -> tuple[float, float]:
-    """Return from where to where, in [0, 1], b[k] to b[k + 1] is within a squared distance of a[at]; (1, 0): nowhere.
+    """Return the part in [0, 1] of b[k] to b[k + 1] that is within a squared distance of a[at]; (1, 0) for none.
 
-    An end is in or out by its own distance: sides that share a corner agree about it.
+    An end is in or out by its own distance, so that sides that share a corner agree about it.
     """
     square, along, first, last = 0.0, 0.0, 0.0, 0.0
     for q in range(3):
@@ -115,14 +115,14 @@ def apart(a: Floats, at: int, b: Floats, k: int, place: float) -> float:
 def cost_of(
     one: Curve, at: int, other: Curve, k: int, weights: tuple[float, float, float, float], low: float, high: float
 ) -> float:
-    """Return what a side within [low, high] costs: the squares; beyond what is tolerable far more, whatever the way.
+    """Return the cost of a side within [low, high]: the squared distances; far more beyond the tolerated distance.
 
     So as few samples and waypoints as possible are beyond it. weights: of a turn for the place, for the cost; of both;
-    and what is tolerable.
+    and the tolerated squared distance.
     """
     place, cost = closest(one, at, other, k, weights[0], low, high)
     if cost > weights[3]:
-        cost = _DEAR * weights[3] + math.sqrt(cost * weights[3])
+        cost = BEYOND_COST * weights[3] + math.sqrt(cost * weights[3])
     if weights[1] > 0.0:
         cost += weights[1] * apart(one[1], at, other[1], k, place)
     return weights[2] * cost
@@ -141,8 +141,8 @@ def reach(
 ) -> tuple[Reached, int, float]:
     """Return how a side can be reached from the opposite one (straight) and from the one beside it (across).
 
-    With flags (1 straight, 2 across for the route; 16, 32 at all), and the least distance there beyond what is near;
-    −∞ where axes have a weight. bounds: near, less near, turn. weights: as for `cost_of`.
+    Also flags (1 straight, 2 across for the route; 16, 32 for any matching), and the least distance there less `near`;
+    −∞ where axes have a weight. bounds: near, what is added to it, turn. weights: as for `cost_of`.
     """
     near, turn = bounds[0] + (bounds[1] if weights[0] > 0.0 else 0.0), bounds[2]
     nothing, way = math.inf, 0
@@ -164,11 +164,11 @@ def reach(
 
 @kernel
 def walk(motion: Curve, path: Curve, bounds: Bounds, weights: Weights, most: int) -> tuple[int, bool, float, Cells]:
-    """Return what can be reached: (samples reached, whether a route is among it, spare, cells).
+    """Return (samples reached, whether there is a route, spare, cells).
 
-    All M samples are reached where a matching within the bounds exists, and then only. spare: the largest, over all
-    samples and waypoints, of the least distance beyond the bound that any such matching has; not positive. More than
-    `most` cells are not looked at: −1 samples are reached then.
+    All M samples are reached if and only if a matching within the bounds exists. spare: largest, over all samples and
+    waypoints, of the least distance beyond the bound of any such matching; not positive. −1 samples are reached where
+    that would take more than `most` cells.
     """
     chords, samples, more, turns = bounds
     intervals, waypoints, fair = weights
@@ -191,7 +191,7 @@ def walk(motion: Curve, path: Curve, bounds: Bounds, weights: Weights, most: int
             if at < active and on[now, at] == k:
                 left = (reached[now, at, 0], reached[now, at, 1], reached[now, at, 2])
                 at += 1
-            # Beside a turn on the spot the axis counts as well, or else it were cheaper there than in the turn.
+            # The axis also counts next to a turn on the spot; otherwise that would be cheaper than the turn itself.
             counted = max(intervals[max(k - 1, 0)], intervals[k], intervals[min(k + 1, n - 2)])
             bound, cost = (samples[i + 1], more, turns[k]), (intervals[k], counted, 1.0, fair)
             right, way, beyond = reach(motion, i + 1, path, k, bound, cost, left, bottom)
@@ -203,7 +203,7 @@ def walk(motion: Curve, path: Curve, bounds: Bounds, weights: Weights, most: int
             if k + 2 < n:
                 bound = (chords[i], more, max(turns[k], turns[k + 1]))
                 counted = waypoints[k + 1]
-                cost = (counted, counted, _TURN if counted > 0.0 else 1.0, fair)
+                cost = (counted, counted, TURN_COST if counted > 0.0 else 1.0, fair)
                 top, above, beyond = reach(path, k + 1, motion, i, bound, cost, bottom, left)
                 least[k + 1] = min(least[k + 1], beyond)
                 # Of a top the bottom lies straight and the left across.
@@ -259,7 +259,7 @@ def trace(cells: Cells, by_route: bool, interval: Ints, chord: Ints) -> None:
 def free_sides(
     motion: Curve, path: Curve, bounds: Bounds, weights: Weights, interval: Ints, chord: Ints, sides: Floats
 ) -> None:
-    """Fill the free parts of the sides of a route: sides (M + n, 3) from, to, and of waypoints the cheapest place."""
+    """Fill sides (M + n, 3): from and to of the free part of each side of a route; of waypoints the cheapest place."""
     chords, samples, more, turns = bounds
     for i in range(len(interval)):
         k = interval[i]

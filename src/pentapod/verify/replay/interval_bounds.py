@@ -1,13 +1,14 @@
-"""IntervalBounds: one walk along the program, block by block, for all that needs the controller's polynomials.
+"""Interval bounds of the controller's polynomials: extremes of the legs, poses, proofs between the rows.
 
-The polynomials of a long program would fill the memory; a block of them fits the processor's cache. What stays is the
-worst value of each leg and its place, and for each sample and each chord between samples a few numbers.
+One walk along the program, block by block: the polynomials of a long program would fill the memory, and a block of them
+fits the processor's cache. What is kept is the worst value of each leg and its place, and a few numbers for each sample
+and each chord between samples.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,20 +17,19 @@ from pentapod.geometry.interpolant import Interpolant, clamped_slopes
 from pentapod.kinematics.proof_results import BranchProof, Chords
 from pentapod.machine.machine import Machine
 from pentapod.numerics.bernstein import split
+from pentapod.numerics.blocks import blocks
 from pentapod.program.program import Program
-
-_BLOCK = 4096  # intervals
 
 
 class RunningMaximum:
-    """The largest of a measure over the program, for each column: values (d,), and the places (d,) where they are."""
+    """The largest values (d,) of d measures over the program, and the places `at` (d,) where they are."""
 
-    def __init__(self, columns: int) -> None:
-        self.values: Floats = np.full(columns, -np.inf)
-        self.at: Ints = np.zeros(columns, dtype=np.intp)
+    def __init__(self) -> None:
+        self.values: Floats = np.array(-np.inf)
+        self.at: Ints = np.array(0, dtype=np.intp)
 
-    def see(self, measured: Floats, first: int) -> None:
-        """Take in what was measured (n, d) at the places first, first + 1, …; of equals the earliest counts."""
+    def update(self, measured: Floats, first: int) -> None:
+        """Add values (n, d) at the places first, first + 1, …; of equal ones the first counts."""
         best = np.argmax(measured, axis=0)
         values = measured[best, np.arange(measured.shape[1])]
         better = values > self.values
@@ -40,19 +40,19 @@ class RunningMaximum:
 class ComponentFindings:
     """What is proven of the component, over all intervals.
 
-    lower: the least values that are proven of the robot's `proven_measures`, as −`RunningMaximum`. refuted, undecided:
-    how many intervals; their first ones, and the doubtful part of those in [0, 1].
+    lower: −`RunningMaximum` of the proven lower bounds of the robot's `proven_measures`. refuted, undecided: numbers of
+    intervals. first_refuted, first_undecided: such an interval, and from where to where in [0, 1] it is in doubt.
     """
 
-    lower: RunningMaximum
+    lower: RunningMaximum = field(default_factory=RunningMaximum)
     refuted: int = 0
     undecided: int = 0
     first_refuted: tuple[int, float, float] | None = None
     first_undecided: tuple[int, float, float] | None = None
 
-    def see(self, proof: BranchProof, first: int) -> None:
-        """Take in the proof of the intervals from `first` on."""
-        self.lower.see(-proof.lower, first)
+    def update(self, proof: BranchProof, first: int) -> None:
+        """Add the proof of the intervals from `first` on."""
+        self.lower.update(-proof.lower, first)
         self.refuted += int(proof.refuted.sum())
         self.undecided += int(proof.undecided.sum())
         self.first_refuted = self.first_refuted or _first(proof, proof.refuted, first)
@@ -69,53 +69,63 @@ def _first(proof: BranchProof, which: Bools, first: int) -> tuple[int, float, fl
 
 @dataclass(eq=False)
 class IntervalBounds:
-    """What the walk found.
+    """Poses at the samples, bounds on each chord between samples, and extremes over the program.
 
-    shortest: −`RunningMaximum` of the legs' least lengths on each interval; longest, rates, jerks: `RunningMaximum` on
-    each interval; accelerations: at each row. Metres and seconds; exact on the controller's polynomials.
-    component: see there. position, direction (M, 3): the poses at the samples, NaN where there are none.
-    away (M − 1,) metres, turned (M − 1,) radians, speeds (M − 1, 3) m/s: proven of each chord between samples: how far
-    the tilt centre strays from it, how far the axis turns off it, how fast are the tip, the tilt centre and the faster
-    end of the platform's line with the tool. Infinite where not proven.
-    base_widest, platform_closed, platform_open: proven of each chord: −cos of the largest angle at the base joint, cos
-    of the least and −cos of the largest one at the platform joint.
+    position, direction (M, 3): the poses at the samples, NaN where there are none. Proven upper bounds on each chord,
+    infinite where there is no proof: deviations (M − 1,) of the tilt centre from the chord, metres; axis_deviations
+    (M − 1,) of the axis from it, radians; speeds (M − 1, 3) of the tip, the tilt centre and the faster end of the
+    platform's line with the tool, m/s.
+    shortest: of the negative leg lengths; longest, rates, jerks: of the legs on each interval; accelerations: at each
+    row. Metres and seconds; exact on the controller's polynomials. base_widest, platform_closed, platform_open: proven,
+    −cos of the largest angle at the base joint, cos of the smallest and −cos of the largest one at the platform joint.
     """
 
-    shortest: RunningMaximum
-    longest: RunningMaximum
-    rates: RunningMaximum
-    accelerations: RunningMaximum
-    jerks: RunningMaximum
-    component: ComponentFindings
     position: Floats
     direction: Floats
-    away: Floats
-    turned: Floats
+    deviations: Floats
+    axis_deviations: Floats
     speeds: Floats
-    base_widest: RunningMaximum
-    platform_closed: RunningMaximum
-    platform_open: RunningMaximum
+    component: ComponentFindings = field(default_factory=ComponentFindings)
+    shortest: RunningMaximum = field(default_factory=RunningMaximum)
+    longest: RunningMaximum = field(default_factory=RunningMaximum)
+    rates: RunningMaximum = field(default_factory=RunningMaximum)
+    accelerations: RunningMaximum = field(default_factory=RunningMaximum)
+    jerks: RunningMaximum = field(default_factory=RunningMaximum)
+    base_widest: RunningMaximum = field(default_factory=RunningMaximum)
+    platform_closed: RunningMaximum = field(default_factory=RunningMaximum)
+    platform_open: RunningMaximum = field(default_factory=RunningMaximum)
 
     @property
     def unproven(self) -> Ints:
-        """The chords of whose motion nothing is proven."""
-        return np.flatnonzero(~np.isfinite(self.away))
+        """The chords on which the motion is not proven."""
+        return np.flatnonzero(~np.isfinite(self.deviations))
 
 
 def interval_bounds(
-    program: Program, machine: Machine, tilt_centre: float, leg_error: float, progress: Callable[[float], None]
+    program: Program,
+    machine: Machine,
+    tilt_centre: float,
+    leg_error: float,
+    progress: Callable[[float], None],
+    block: int = 4096,
 ) -> IntervalBounds:
-    """Walk along a program.
+    """Return the interval bounds of a program.
 
-    tilt_centre: metres from the tip along the tool axis. leg_error: metres by which each leg may be off for the
-    component to be kept all the same: legs that pass through a singularity look like legs that turn back just before
-    it.
+    tilt_centre: metres from the tip along the tool axis. leg_error: metres; the component must be kept even if each leg
+    is off by so much, because legs that pass through a singularity look like legs that turn back just before it.
+    progress: is called with the share that is done. block: intervals of a block.
     """
     count = len(program.legs) - 1
     slopes = clamped_slopes(program.legs) if program.interpolation == "cubic" else None
-    found = _empty(count, machine.robot.n_legs, len(machine.robot.proven_measures))
-    for first in range(0, count, _BLOCK):
-        last = min(first + _BLOCK, count)
+    found = IntervalBounds(
+        position=np.empty((2 * count + 1, 3)),
+        direction=np.empty((2 * count + 1, 3)),
+        deviations=np.empty(2 * count),
+        axis_deviations=np.empty(2 * count),
+        speeds=np.empty((2 * count, 3)),
+    )
+    for intervals in blocks(count, block):
+        first, last = intervals.start, intervals.stop
         progress(first / count)
         # One interval more on each side: accelerations and jerks look across the rows.
         low, high = max(first - 1, 0), min(last + 1, count)
@@ -126,55 +136,35 @@ def interval_bounds(
         samples = slice(2 * first, 2 * last + 1)
         found.position[samples], found.direction[samples] = machine.robot.pose(part.halves, program.component)
         ends = found.position[samples][::2], found.direction[samples][::2]
-        found.component.see(machine.robot.prove(part.bernstein, ends, program.component, leg_error=leg_error), first)
+        found.component.update(machine.robot.prove(part.bernstein, ends, program.component, leg_error=leg_error), first)
         between = slice(2 * first, 2 * last)
         chords = _chords(found, machine, program, part, between, tilt_centre)
-        found.away[between], found.turned[between] = chords.deviations[:, 1], chords.angles
+        found.deviations[between], found.axis_deviations[between] = chords.deviations[:, 1], chords.angles
         found.speeds[between, :2] = chords.speeds[:, :2]
         found.speeds[between, 2] = chords.speeds[:, 2:].max(axis=1)
         found.speeds[between] /= 0.5 * program.period
-        found.base_widest.see(-chords.base_cosines, 2 * first)
-        found.platform_closed.see(chords.platform_cosines[..., 1], 2 * first)
-        found.platform_open.see(-chords.platform_cosines[..., 0], 2 * first)
+        found.base_widest.update(-chords.base_cosines, 2 * first)
+        found.platform_closed.update(chords.platform_cosines[..., 1], 2 * first)
+        found.platform_open.update(-chords.platform_cosines[..., 0], 2 * first)
     return found
 
 
-def _empty(count: int, legs: int, measures: int) -> IntervalBounds:
-    """Return a survey of `count` intervals of which nothing is known yet."""
-    return IntervalBounds(
-        shortest=RunningMaximum(legs),
-        longest=RunningMaximum(legs),
-        rates=RunningMaximum(legs),
-        accelerations=RunningMaximum(legs),
-        jerks=RunningMaximum(legs),
-        component=ComponentFindings(RunningMaximum(measures)),
-        position=np.empty((2 * count + 1, 3)),
-        direction=np.empty((2 * count + 1, 3)),
-        away=np.empty(2 * count),
-        turned=np.empty(2 * count),
-        speeds=np.empty((2 * count, 3)),
-        base_widest=RunningMaximum(legs),
-        platform_closed=RunningMaximum(legs),
-        platform_open=RunningMaximum(legs),
-    )
-
-
 def _legs(found: IntervalBounds, wide: Interpolant, first: int, inner: slice) -> None:
-    """Take in the legs of the inner intervals of a block, which begin at the interval `first`."""
+    """Add the legs on the inner intervals of a block, which begin at the interval `first`."""
     low, high = wide.ranges
-    found.shortest.see(-low[inner], first)
-    found.longest.see(high[inner], first)
-    found.rates.see(wide.rates[inner], first)
-    found.accelerations.see(wide.accelerations[inner.start : inner.stop + 1], first)
-    found.jerks.see(wide.jerks[inner], first)
+    found.shortest.update(-low[inner], first)
+    found.longest.update(high[inner], first)
+    found.rates.update(wide.rates[inner], first)
+    found.accelerations.update(wide.accelerations[inner.start : inner.stop + 1], first)
+    found.jerks.update(wide.jerks[inner], first)
 
 
 def _chords(
     found: IntervalBounds, machine: Machine, program: Program, part: Interpolant, between: slice, tilt_centre: float
 ) -> Chords:
-    """Return what is proven of the two chords of each interval, between poses that are known already.
+    """Return the proofs about the two chords of each interval, between poses that are known.
 
-    Of the tip, the tilt centre, and both ends of what the platform's line carries.
+    The points are the tip, the tilt centre, and both ends of the platform's line with the tool.
     """
     tip, heights = machine.tool_length, machine.robot.offsets
     halves = split(part.bernstein)

@@ -1,4 +1,4 @@
-"""Which place of the toolpath each moment of the program belongs to.
+"""Monotone matching of the program with the toolpath: which place of the path each moment belongs to.
 
 The program's tilt centre and axis, sampled, and the polyline of the toolpath's waypoints are matched by a monotone
 relation: each waypoint gets a time, each sample a place on the interval whose waypoints enclose it in time. Between two
@@ -6,14 +6,14 @@ neighbouring events (a sample, or a waypoint's time) both sides move along strai
 at most the larger of its values at the two events. Hence the largest distance over all events bounds the Fréchet
 distance of the two polylines from above, whatever the matching: soundness does not rest on the search.
 
-The search decides whether there is a matching within the tolerances at all (`free_space_kernels`), and then looks for
-the smallest largest distance that the order permits. So a good program does not look bad either.
+The search decides whether there is a matching within the tolerances at all (`free_space_kernels`), and then minimises
+the largest distance. So a good program is not judged to be bad either.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,21 +21,25 @@ from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import angle_between, arc_weights
 from pentapod.geometry.polyline import arc_length
 from pentapod.numerics.blocks import blocks
-from pentapod.verify.replay.free_space import FreeSpace, Pairing, PosedPolyline
+from pentapod.verify.replay.free_space import FreeSpace, Pairing, PosedPolyline, SearchOptions
 
-_BLOCK = 1 << 15  # samples that are measured at once
 
-_AXIS_SCALE_RAD = 0.05
-"""Where the path turns on the spot, an axis this far off counts as much as a tilt centre off by the tolerance."""
+@dataclass(frozen=True)
+class MatchOptions:
+    """Options of the matching.
 
-_ALLOWED = 1.0 + 0.999e-3
-"""Up to this share of the tolerance a matching is as good as within: claims allow a little more."""
+    within: share of the tolerance up to which a matching is within it; claims allow a little more. precision: relative,
+    of the smallest largest distance, which is searched for up to `wide` tolerances; beyond, the sum of squares is
+    minimised instead. axis_scale: radians; where the path turns on the spot, an axis this far off counts as much as a
+    tilt centre off by the tolerance. at_once: samples that are measured together.
+    """
 
-_EXACT = 1e-3
-"""How near, relatively, the largest distance comes to the least that the order permits."""
-
-_WIDER = 4.0
-"""Up to how many tolerances that holds. What is farther off is matched at the least sum of squares."""
+    within: float = 1.0 + 0.999e-3
+    precision: float = 1e-3
+    wide: float = 4.0
+    axis_scale: float = 0.05
+    at_once: int = 1 << 15
+    search: SearchOptions = field(default_factory=SearchOptions)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +48,9 @@ class PathMatch:
 
     times (n,): when each waypoint is passed, in samples (2.25 is a quarter of the way from sample 2 to 3),
     non-decreasing. places (M,): the place of each sample, in waypoints, non-decreasing. arcs (M,): the same as arc
-    length of the tilt centre's polyline, metres. turned (M,): how far the path's axis has turned up to there in all,
-    radians. distances (M,), waypoint_distances (n,) in metres and angles (M,), waypoint_angles (n,) in radians:
-    between the matched tilt centres and axes.
+    length of the tilt centre's polyline, metres. turned (M,): how far the path's axis turns up to there, radians.
+    distances (M,), waypoint_distances (n,) in metres and angles (M,), waypoint_angles (n,) in radians: between the
+    matched tilt centres and axes.
     """
 
     times: Floats
@@ -65,43 +69,51 @@ def match(
     tolerance: float,
     *,
     axis_bound: float = np.pi,
-    away: Floats | None = None,
+    chord_deviations: Floats | None = None,
+    options: MatchOptions = MatchOptions(),
 ) -> PathMatch:
-    """Return the matching of a sampled motion with a path whose largest distance is the least that the order permits.
+    """Return the monotone matching of a sampled motion with a path that minimises the largest distance.
 
     Within `tolerance` metres and axes within `axis_bound` radians of each other, where that is possible; else without
-    regard to the axes. away (M − 1,): metres by which the motion may be off its chords; it adds to the distances.
-    Beyond a few tolerances the matching has the least sum of squared distances instead, in order.
+    regard to the axes. chord_deviations (M − 1,): bounds in metres on the deviation of the motion from its chords; they
+    add to the distances. Where the motion is farther off, the matching minimises the sum of squared distances instead.
     """
-    turning = turns_on_spot(path, tolerance)
-    off = np.zeros(len(motion.points) - 1) if away is None else np.where(np.isfinite(away), away, 0.0)
+    turning = turns_on_spot(path, tolerance, options)
+    deviations = np.zeros(len(motion.points) - 1) if chord_deviations is None else chord_deviations
     near_turn = np.append(turning, False) | np.append(False, turning)
-    scale = (tolerance / _AXIS_SCALE_RAD) ** 2
-    weights = (np.where(turning, scale, 0.0), np.where(near_turn, scale, 0.0), (_ALLOWED * tolerance) ** 2)
-    space = FreeSpace(motion, path, weights, off, axis_bound)
+    scale, within, wide = (tolerance / options.axis_scale) ** 2, options.within * tolerance, options.wide * tolerance
+    weights = (np.where(turning, scale, 0.0), np.where(near_turn, scale, 0.0), within**2)
+    deviations = np.where(np.isfinite(deviations), deviations, 0.0)
+    space = FreeSpace(motion, path, weights, deviations, axis_bound, options.search)
 
     def measured(pairing: Pairing) -> PathMatch:
-        return _measure(motion, path, pairing, _places(motion, path, turning, tolerance, pairing))
+        return _measure(motion, path, pairing, _places(motion, path, turning, tolerance, pairing, options), options)
 
-    for radius, by_axis in ((_ALLOWED * tolerance, True), (_ALLOWED * tolerance, False), (_WIDER * tolerance, False)):
+    for radius, by_axis in ((within, True), (within, False), (wide, False)):
         pairing = space.pairing(radius, by_axis=by_axis)
         if pairing is not None:
-            return _least(space, pairing, measured, radius, by_axis=by_axis)
-    return measured(space.patched(_WIDER * tolerance) or space.by_arc_length())
+            return _least(space, pairing, measured, radius, by_axis=by_axis, precision=options.precision)
+    return measured(space.patched(wide) or space.by_arc_length())
 
 
 def _least(
-    space: FreeSpace, pairing: Pairing, measured: Callable[[Pairing], PathMatch], radius: float, *, by_axis: bool
+    space: FreeSpace,
+    pairing: Pairing,
+    measured: Callable[[Pairing], PathMatch],
+    radius: float,
+    *,
+    by_axis: bool,
+    precision: float,
 ) -> PathMatch:
-    """Return the matching with the least largest distance, beginning with a pairing within some radius, metres."""
+    """Return the matching with the smallest largest distance by bisection, from a pairing within a radius, metres."""
 
     def largest(pairing: Pairing, match: PathMatch) -> float:
         return space.largest(pairing, match.distances, match.waypoint_distances)
 
     best = measured(pairing)
     low, high = pairing.least, largest(pairing, best)
-    trial = low * (1.0 + _EXACT)
-    while high > low * (1.0 + _EXACT) and high > _EXACT * radius:
+    trial = low * (1.0 + precision)
+    while high > low * (1.0 + precision) and high > precision * radius:
         found = space.pairing(trial, by_axis=by_axis, more=radius - trial)
         if found is None:
             low = trial
@@ -112,34 +124,42 @@ def _least(
     return best
 
 
-def _places(motion: PosedPolyline, path: PosedPolyline, turning: Bools, tolerance: float, pairing: Pairing) -> Floats:
+def _places(
+    motion: PosedPolyline,
+    path: PosedPolyline,
+    turning: Bools,
+    tolerance: float,
+    pairing: Pairing,
+    options: MatchOptions,
+) -> Floats:
     """Return the place (M,) of each sample: the closest on its interval that keeps order and radius."""
     places, interval = np.empty(len(motion.points)), pairing.intervals
-    for part in blocks(len(places), _BLOCK):
+    for part in blocks(len(places), options.at_once):
         own = PosedPolyline(motion.points[part], motion.axes[part])
-        places[part] = interval[part] + interval_fractions(own, path, turning, tolerance, interval[part])
+        places[part] = interval[part] + interval_fractions(own, path, turning, tolerance, interval[part], options)
     return pairing.ordered_places(places)
 
 
-def turns_on_spot(path: PosedPolyline, tolerance: float) -> Bools:
-    """Return the intervals (n − 1,) on which the axis turns while the tilt centre (as good as) stands."""
+def turns_on_spot(path: PosedPolyline, tolerance: float, options: MatchOptions = MatchOptions()) -> Bools:
+    """Return the intervals (n − 1,) on which the axis turns while the tilt centre hardly moves."""
     length = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
     turn = np.linalg.norm(np.diff(path.axes, axis=0), axis=1)
-    return (length <= tolerance) & (turn * tolerance >= _AXIS_SCALE_RAD * length) & (turn > 1e-12)
+    return (length <= tolerance) & (turn * tolerance >= options.axis_scale * length) & (turn > 1e-12)
 
 
-def _measure(motion: PosedPolyline, path: PosedPolyline, pairing: Pairing, places: Floats) -> PathMatch:
-    """Return the matching that has these times (n,) and places (M,), measured."""
+def _measure(
+    motion: PosedPolyline, path: PosedPolyline, pairing: Pairing, places: Floats, options: MatchOptions
+) -> PathMatch:
+    """Return the matching with these places (M,), and its distances and angles."""
     times = pairing.times
     turns = angle_between(path.axes[:-1], path.axes[1:])
     distances, angles = np.empty(len(places)), np.empty(len(places))
-    for part in blocks(len(places), _BLOCK):
+    for part in blocks(len(places), options.at_once):
         points, axes = pose_at(path, turns, places[part])
         distances[part] = np.linalg.norm(motion.points[part] - points, axis=1)
         angles[part] = angle_between(motion.axes[part], axes)
     chord = np.minimum(times.astype(np.intp), len(motion.points) - 2)
     at = (times - chord)[:, None]
-    visited = motion.points[chord] * (1.0 - at) + motion.points[chord + 1] * at
     pointed = motion.axes[chord] * (1.0 - at) + motion.axes[chord + 1] * at
     waypoints = np.arange(len(path.points))
     return PathMatch(
@@ -148,16 +168,21 @@ def _measure(motion: PosedPolyline, path: PosedPolyline, pairing: Pairing, place
         arcs=np.interp(places, waypoints, arc_length(path.points)),
         turned=np.interp(places, waypoints, np.concatenate([[0.0], np.cumsum(turns)])),
         distances=distances,
-        waypoint_distances=np.linalg.norm(visited - path.points, axis=1),
+        waypoint_distances=np.linalg.norm(points_at(motion.points, times) - path.points, axis=1),
         angles=angles,
         waypoint_angles=angle_between(pointed, path.axes),
     )
 
 
 def interval_fractions(
-    motion: PosedPolyline, path: PosedPolyline, turning: Bools, tolerance: float, interval: Ints
+    motion: PosedPolyline,
+    path: PosedPolyline,
+    turning: Bools,
+    tolerance: float,
+    interval: Ints,
+    options: MatchOptions = MatchOptions(),
 ) -> Floats:
-    """Return how far along its interval, in [0, 1], each sample is: by its tilt centre, or its axis on the spot."""
+    """Return the fraction in [0, 1] of its interval at which each sample is: by tilt centre, in turns by axis too."""
     step = np.diff(path.points, axis=0)
     square = np.einsum("ij,ij->i", step, step)
     off = motion.points - path.points[interval]
@@ -167,13 +192,13 @@ def interval_fractions(
     if len(spot):
         k = interval[spot]
         turned, turn = _arc_fraction(motion.axes[spot], path.axes[k], path.axes[k + 1])
-        by_tilt_centre, by_axis = square[k] / tolerance**2, (turn / _AXIS_SCALE_RAD) ** 2
+        by_tilt_centre, by_axis = square[k] / tolerance**2, (turn / options.axis_scale) ** 2
         along[spot] = (by_tilt_centre * along[spot] + by_axis * turned) / (by_tilt_centre + by_axis)
     return along
 
 
 def _arc_fraction(axes: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
-    """Return how far in [0, 1] each axis (P, 3) is along the great arc from first to second; and the arc."""
+    """Return the fraction in [0, 1] of the great arc from first to second at which each axis (P, 3) is, and the arc."""
     angle = angle_between(first, second)
     cosine = np.einsum("ij,ij->i", first, second)[:, None]
     across = second - cosine * first
@@ -188,7 +213,12 @@ def pose_at(path: PosedPolyline, turns: Floats, places: Floats) -> tuple[Floats,
     turns (n − 1,): the angles of those arcs.
     """
     k = np.minimum(places.astype(np.intp), len(path.points) - 2)
-    f = places - k
-    points = path.points[k] * (1.0 - f)[:, None] + path.points[k + 1] * f[:, None]
-    a, b = arc_weights(turns[k], f)
-    return points, a[:, None] * path.axes[k] + b[:, None] * path.axes[k + 1]
+    a, b = arc_weights(turns[k], places - k)
+    return points_at(path.points, places), a[:, None] * path.axes[k] + b[:, None] * path.axes[k + 1]
+
+
+def points_at(points: Floats, places: Floats) -> Floats:
+    """Return the points (M, 3) at these places of a polyline (n, 3)."""
+    k = np.minimum(places.astype(np.intp), len(points) - 2)
+    f = (places - k)[:, None]
+    return points[k] * (1.0 - f) + points[k + 1] * f

@@ -1,4 +1,4 @@
-"""Replay: a program as the controller would run it, beside the toolpath it should follow."""
+"""Replay: a program as the controller runs it, beside the toolpath that it should follow."""
 
 from __future__ import annotations
 
@@ -23,19 +23,17 @@ from pentapod.verify.replay.path_matching import PathMatch, match
 from pentapod.verify.verdict.specification import Specification
 from pentapod.verify.verdict.verdict import Place
 
-_BLOCK = 1 << 15  # samples
-
-SURVEY_SHARE = 0.6
-"""Of the time that a verdict takes."""
+REPLAY_SHARE = 0.6
+"""Share of the time of a verdict that the interval bounds take, for progress bars."""
 
 
 @dataclass(frozen=True, eq=False)
 class Replay(Value):
     """What the claims look at. Derived values are computed when first asked for, and kept.
 
-    specification: what the program is judged against; its machine's guides stand where the program wants them.
+    specification: what the program is judged against; its machine has its guides where the program wants them.
     *Samples* are the rows and the moments halfway between them: M = 2N − 1, sample 2k is row k. *Chords* are the M − 1
-    stretches of time between them.
+    straight lines between consecutive samples.
     """
 
     program: Program
@@ -53,37 +51,27 @@ class Replay(Value):
         return self.specification.toolpath
 
     @property
-    def tilt(self) -> float:
-        """Half angle of the cone in which the tool may stand, radians."""
-        return self.specification.tilt
-
-    @property
     def path_tolerance(self) -> float:
-        """How far the program may be off the toolpath, metres."""
+        """Allowed deviation of the program from the toolpath, metres."""
         return self.specification.path_tolerance
-
-    @property
-    def axis_tolerance(self) -> float:
-        """By how much the axis may leave the cone, radians."""
-        return self.specification.axis_tolerance
 
     @cached_property
     def interval_bounds(self) -> IntervalBounds:
-        """What the walk along the controller's polynomials measures and proves."""
+        """Poses at the samples, and what is proven of the motion between them."""
 
-        def told(share: float) -> None:
-            self.progress("verify", SURVEY_SHARE * share, "between the rows")
+        def progress(share: float) -> None:
+            self.progress("verify", REPLAY_SHARE * share, "between the rows")
 
-        return interval_bounds(self.program, self.machine, self.toolpath.tilt_centre, self.path_tolerance, told)
+        return interval_bounds(self.program, self.machine, self.toolpath.tilt_centre, self.path_tolerance, progress)
 
     @cached_property
     def slopes(self) -> Floats | None:
-        """Slopes (N, n_legs) of the legs at the rows, metres a period; None where they go straight from row to row."""
+        """Slopes (N, n_legs) of the legs at the rows, metres a period; None for linear interpolation."""
         return clamped_slopes(self.program.legs) if self.program.interpolation == "cubic" else None
 
     @cached_property
     def shared(self) -> dict[Hashable, object]:
-        """What claims have reckoned that others ask as well."""
+        """Results that several claims use."""
         return {}
 
     @property
@@ -107,38 +95,37 @@ class Replay(Value):
 
     @cached_property
     def tilt_centres(self) -> Floats:
-        """The points (M, 3) about which the tool may tilt, workpiece frame, metres."""
+        """Tilt centres (M, 3) at the samples, workpiece frame, metres."""
         along = self.machine.tool_length - self.toolpath.tilt_centre
         return self._in_work(lambda inverse, position, direction: inverse.apply(position + along * direction))
 
     def _in_work(self, of: Callable[[RigidTransform, Floats, Floats], Floats]) -> Floats:
-        """Return what `of` makes (M, 3) of the transform into the workpiece frame and the poses, in blocks."""
+        """Return `of` (M, 3) the transform into the workpiece frame and the poses, computed in blocks."""
         (position, direction), inverse = self.pose, self.program.placement.inverse()
         made = np.empty_like(position)
-        for part in blocks(len(made), _BLOCK):
+        for part in blocks(len(made), 1 << 15):
             made[part] = of(inverse, position[part], direction[part])
         return made
 
-    @property
-    def chord_arcs(self) -> Floats:
-        """By how much (M − 1,) the toolpath's axis turns at most on each chord, in all, radians."""
-        return np.diff(self.match.turned)
-
     @cached_property
     def match(self) -> PathMatch:
-        """Which place of the toolpath each sample belongs to. Needs a pose at every sample."""
-        program, path = (
-            PosedPolyline(self.tilt_centres, self.axes),
+        """The matching of the samples with the toolpath. Needs a pose at every sample."""
+        return self.matched(self.tilt_centres)
+
+    def matched(self, tilt_centres: Floats) -> PathMatch:
+        """Return the matching of tilt centres (M, 3), with the axes of the samples, with the toolpath."""
+        return match(
+            PosedPolyline(tilt_centres, self.axes),
             PosedPolyline(self.toolpath.tilt_centres, self.toolpath.axes),
+            self.path_tolerance,
+            axis_bound=self.specification.tilt + self.specification.axis_tolerance,
+            chord_deviations=self.interval_bounds.deviations,
         )
-        bound = self.tilt + self.axis_tolerance
-        return match(program, path, self.path_tolerance, axis_bound=bound, away=self.interval_bounds.away)
 
     def place(self, sample: float) -> Place:
         """Return the place of a sample (or of a moment between samples)."""
+        segment = None
         if not len(self.unposed):
             waypoint = int(self.match.places[int(sample)])
             segment = int(self.toolpath.segment_of_interval[min(waypoint, len(self.toolpath) - 2)])
-        else:
-            segment = None
         return Place(round(float(sample) * 0.5 * self.program.period, 9), int(sample) // 2, segment)

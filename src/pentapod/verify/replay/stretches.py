@@ -1,4 +1,4 @@
-"""Stretches of a replay that count as straight: some chords between samples, and how far the motion is off them."""
+"""Stretches of a replay that are approximated by a straight motion, and the deviation of the motion from it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,19 @@ from pentapod.geometry.runs import marked_runs
 from pentapod.numerics.blocks import blocks
 from pentapod.verify.replay.replay import Replay
 
-LONGEST, CUT = 64, 8
-"""Chords of the longest stretch, and into how many pieces one is cut that is not good enough."""
-_WIDEST = 1.0
-"""Radians: arcs that turn farther are not taken for one stretch."""
-_BLOCK = 1 << 10  # stretches
+
+@dataclass(frozen=True)
+class StretchOptions:
+    """How a replay is cut into stretches.
+
+    longest: chords of the longest stretch; cuts: into how many pieces one is cut that is not straight enough.
+    largest_turn: radians; no bound is given for a stretch whose axis turns farther. at_once: stretches at a time.
+    """
+
+    longest: int = 64
+    cuts: int = 8
+    largest_turn: float = 1.0
+    at_once: int = 1 << 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,21 +51,21 @@ class Stretches:
         return Stretches(starts, np.minimum(starts + size, np.repeat(self.ends, parts)))
 
 
-def strays(replay: Replay, stretches: Stretches, lever: float) -> Floats:
-    """Return by how much (n,) points of the tool are at most off the straight stretch, at any time, metres.
+def deviation_bounds(
+    replay: Replay, stretches: Stretches, lever: float, options: StretchOptions = StretchOptions()
+) -> Floats:
+    """Return upper bounds (n,), metres, on the deviation of points of the tool from the straight stretch, at any time.
 
-    Infinite where the tool turns too far for that to be said. lever: how far they are from the tilt centre at most.
+    Infinite where the tool turns too far for a bound. lever: largest distance of the points from the tilt centre.
 
-    A moment is compared with the place of the stretch that is nearest to it. Between two samples that place goes
-    evenly, and unit vectors on an arc θ are off the line through two of them by no more than θ²/8.
+    A moment is compared with the nearest place of the stretch. Between two samples that place moves evenly, and unit
+    vectors on an arc θ are off the line through two of them by no more than θ²/8.
     """
-    found = np.empty(len(stretches.starts))
-    for part in blocks(len(found), _BLOCK):
-        found[part] = _stray(replay, stretches.where(part), lever)
-    return found
+    parts = [stretches.where(part) for part in blocks(len(stretches.starts), options.at_once)]
+    return np.concatenate([np.empty(0), *(_bounds(replay, part, lever, options.largest_turn) for part in parts)])
 
 
-def _stray(replay: Replay, of: Stretches, lever: float) -> Floats:
+def _bounds(replay: Replay, of: Stretches, lever: float, largest_turn: float) -> Floats:
     # Samples and the chords that they begin; the last sample of a stretch is where it ends.
     counts = of.ends - of.starts
     begins = np.cumsum(counts) - counts
@@ -72,13 +80,15 @@ def _stray(replay: Replay, of: Stretches, lever: float) -> Floats:
     share = np.divide(along, square[owner], out=np.zeros_like(along), where=square[owner] > 0.0)
     share = np.clip(share, 0.0, 1.0)[:, None]
     aside = np.maximum.reduceat(np.linalg.norm(off - share * way[owner], axis=1), begins)
-    away = np.maximum.reduceat(replay.interval_bounds.away[sample], begins)
+    deviation = np.maximum.reduceat(replay.interval_bounds.deviations[sample], begins)
     if lever == 0.0:
-        return aside + away
+        return aside + deviation
     angle = angle_between(first, last)
     a, b = arc_weights(angle[owner, None], share)
     swung = replay.axes[sample] - (a * first[owner] + b * last[owner])
     apart = np.maximum.reduceat(np.linalg.norm(swung, axis=1), begins) + 0.125 * angle**2
-    tilt = np.arcsin(np.minimum(apart, 1.0)) + np.maximum.reduceat(replay.interval_bounds.turned[sample], begins)
+    tilt = np.arcsin(np.minimum(apart, 1.0)) + np.maximum.reduceat(
+        replay.interval_bounds.axis_deviations[sample], begins
+    )
     # An axis as far as a radius from the arc may point anywhere.
-    return np.where((angle < _WIDEST) & (apart < 1.0), aside + away + lever * tilt, np.inf)
+    return np.where((angle < largest_turn) & (apart < 1.0), aside + deviation + lever * tilt, np.inf)

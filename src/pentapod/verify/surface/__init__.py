@@ -1,1 +1,1 @@
-"""What the replayed cutter leaves on the surface."""
+"""Material that the replayed cutter leaves on the surface."""

@@ -1,11 +1,13 @@
-"""Whether a cutter could clear a place at all: what its shape and the part's cannot let it reach, told apart.
+"""Reachability of points of the part for a cutter, without gouging.
 
-A cutter can clear a point where it holds the point while it stays out of the part, and can be lifted straight out
-along the view. For a ball that is a question about its centre alone: at least a radius from the part, at most a radius
-from the point. Such a centre is looked for by going to and fro between the two; others are tried in a few places.
+A cutter can clear a point if it can contain the point, stay out of the part, and be retracted straight along the view.
+For a ball only its centre counts: at least a radius from the part, at most a radius from the point. Such a centre is
+searched for by alternating projections. Other cutters are tried in a few positions.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,55 +17,77 @@ from pentapod.geometry.solids import Solid
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.mesh.query.swept_depth import TouchingBody, sweep, touch
 
-_ROUNDS = 24
-_SLACK_M = 1e-6
-_AROUND = 8
-_PLACES = ((0.0, 0.0), (1.0, 0.0), (1.0, 0.6), (1.0, 0.9), (0.5, 0.0))
-"""Where on a cutter's end a point is taken to: shares of its flat part, and of its rounding."""
-_TOUCH_M = 2e-5
-"""Depth of a cutter that is not a ball that counts as none here: its sweep is not exact."""
 
+@dataclass(frozen=True)
+class ReachOptions:
+    """Options of the searches.
 
-def ball_reaches(surface: MeshDistance, points: Floats, normals: Floats, radius: float, view: Floats) -> Bools:
-    """Return which points (N, 3) a ball can hold that stays out of the part and can leave along `view`.
-
-    normals (N, 3): unit, of the surface below each point; where the search begins.
+    projections: at most so many alternating projections for each start; slack_m: their tolerance. around: directions
+    about the normal, or about the axis, that are tried. places: positions on the end of the cutter that are tried, as
+    shares of its flat part and of its rounding. depth_m: depth of a cutter that is not a ball that counts as none, as
+    its sweep is not exact.
     """
+
+    projections: int = 24
+    slack_m: float = 1e-6
+    around: int = 8
+    places: tuple[tuple[float, float], ...] = ((0.0, 0.0), (1.0, 0.0), (1.0, 0.6), (1.0, 0.9), (0.5, 0.0))
+    depth_m: float = 2e-5
+
+
+def ball_reaches(
+    surface: MeshDistance,
+    points: Floats,
+    normals: Floats,
+    radius: float,
+    view: Floats,
+    options: ReachOptions = ReachOptions(),
+) -> Bools:
+    """Return which points (N, 3) a ball can contain without gouging the part, and be retracted along `view` from there.
+
+    normals (N, 3): unit, of the surface below each point; the search starts along them.
+    """
+    slack = options.slack_m
     reached = np.zeros(len(points), dtype=np.bool_)
-    for start in _starts(normals, view):
+    for start in _starts(normals, view, options.around):
         open_ = np.flatnonzero(~reached)
         if not len(open_):
             break
         x, c = points[open_], points[open_] + radius * start[open_]
         todo = np.arange(len(x))
-        for _ in range(_ROUNDS):
+        for _ in range(options.projections):
             gap = surface.points(c[todo], within=radius)
             short, way = radius - gap.distance, c[todo] - x[todo]
-            far = (short > _SLACK_M) | (np.linalg.norm(way, axis=1) > radius + _SLACK_M)
+            far = (short > slack) | (np.linalg.norm(way, axis=1) > radius + slack)
             todo, way = todo[far], way[far] + np.maximum(short, 0.0)[far, None] * gap.normal[far]
             if not len(todo):
                 break
             off = np.linalg.norm(way, axis=1, keepdims=True)
             c[todo] = x[todo] + np.where(off > radius, radius / np.maximum(off, 1e-300), 1.0) * way
-        held = surface.points(c, within=radius).distance >= radius - _SLACK_M
-        held &= np.linalg.norm(c - x, axis=1) <= radius + _SLACK_M
+        held = surface.points(c, within=radius).distance >= radius - slack
+        held &= np.linalg.norm(c - x, axis=1) <= radius + slack
         kept = np.flatnonzero(held)
         if len(kept):
             out = c[kept] + _way_out(surface, radius) * view
-            free = surface.segments(c[kept], out, within=radius).distance >= radius - 2.0 * _SLACK_M
+            free = surface.segments(c[kept], out, within=radius).distance >= radius - 2.0 * slack
             reached[open_[kept[free]]] = True
     return reached
 
 
 def body_reaches(
-    surface: MeshDistance, solids: tuple[Solid, ...], points: Floats, axes: Floats, normals: Floats
+    surface: MeshDistance,
+    solids: tuple[Solid, ...],
+    points: Floats,
+    axes: Floats,
+    normals: Floats,
+    options: ReachOptions = ReachOptions(),
 ) -> Bools:
-    """Return which points (N, 3) the end of a cutter can hold that stays out of the part and can leave along its axis.
+    """Return which points (N, 3) the end of a cutter can contain without gouging, and be retracted along its axis.
 
-    axes (N, 3): unit, of the tool; normals (N, 3): of the surface below. The point is taken to a few places of the end.
+    axes (N, 3): unit, of the tool; normals (N, 3): of the surface below. A few positions on the end are tried.
     """
     body = TouchingBody(solids)
-    wide = max(max(s.low_radius, s.high_radius) + s.rounding for s in solids)
+    wide = max(solid.largest_radius for solid in solids)
     length = _way_out(surface, wide)
     reached = np.zeros(len(points), dtype=np.bool_)
     first, second = tangent_frame(axes)
@@ -72,8 +96,8 @@ def body_reaches(
     lean = np.where(sine > 1e-6, flat / np.maximum(sine, 1e-300), first)
     end = min(solids, key=lambda solid: solid.low - solid.rounding)
     corner = end.rounding * (normals - axes)
-    turns = [lean, *(np.cos(a) * first + np.sin(a) * second for a in 2.0 * np.pi * np.arange(_AROUND) / _AROUND)]
-    for share, up in _PLACES:
+    turns = [lean, *(np.cos(a) * first + np.sin(a) * second for a in _angles(options.around))]
+    for share, up in options.places:
         # On the rounding, at a share `up` of its width, the end is higher than at its bottom.
         aside_by, drop = share * end.low_radius + up * end.rounding, end.rounding * (1.0 - np.sqrt(1.0 - up**2))
         for k, aside in enumerate(turns[: 1 if share == 0.0 else None]):
@@ -84,25 +108,28 @@ def body_reaches(
             if k == 0 and (share, up) == (1.0, 0.0):
                 tips += corner[open_]  # so that the rounding touches where the tool leans
             both = np.stack([tips, tips + length * axes[open_]], axis=1)
-            stands = ~touch(surface.tree, body, tips, axes[open_], threshold=_TOUCH_M).beyond(_TOUCH_M)
+            stands = ~touch(surface.tree, body, tips, axes[open_], threshold=options.depth_m).beyond(options.depth_m)
             open_, both = open_[stands], both[stands].reshape(-1, 3)
             if len(open_):
                 axis = np.repeat(axes[open_], 2, axis=0)
-                out = sweep(surface.tree, body, both, axis, threshold=_TOUCH_M, every=2)
-                reached[open_[~out.beyond(_TOUCH_M)]] = True
+                out = sweep(surface.tree, body, both, axis, threshold=options.depth_m, every=2)
+                reached[open_[~out.beyond(options.depth_m)]] = True
     return reached
 
 
-def _starts(normals: Floats, view: Floats) -> list[Floats]:
-    """Return directions (N, 3) in which to look first: along the normals, the view, and around the normals."""
+def _angles(count: int) -> Floats:
+    return 2.0 * np.pi * np.arange(count) / count
+
+
+def _starts(normals: Floats, view: Floats, count: int) -> list[Floats]:
+    """Return directions (N, 3) in which a search starts: the normals, the view, and `count` around the normals."""
     up = np.broadcast_to(view, normals.shape)
     between = normals + up
     first, second = tangent_frame(normals)
-    turns = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
-    around = [normalised(normals + np.cos(a) * first + np.sin(a) * second) for a in turns]
+    around = [normalised(normals + np.cos(a) * first + np.sin(a) * second) for a in _angles(count)]
     return [normals, up, normalised(np.where(np.linalg.norm(between, axis=1)[:, None] > 1e-9, between, up)), *around]
 
 
 def _way_out(surface: MeshDistance, wide: float) -> float:
-    """Return how far one must go to be clear of all of the part, metres."""
+    """Return the length of a retraction that clears all of the part, metres."""
     return float(np.linalg.norm(np.ptp(surface.bounds, axis=0))) + 4.0 * wide

@@ -1,8 +1,8 @@
-"""Claim that nothing is left on the region: from where the cutter of the replayed program has been.
+"""Claim on the material that is left on the region, from the swept volume of the replayed cutter.
 
-The region is cut into cells until each is proven covered: at the height that may be left, above every point of the
-cell, one and the same piece of the sweep has been, which is convex. Cells for which that cannot be shown are halved
-until they are small; then their middle decides. How much that is, is told.
+The region is subdivided into cells until each is proven covered: at the height that may be left, above every point of
+the cell, one convex piece of the swept volume has been. Cells for which this cannot be proven are halved until they are
+small; then their middle decides. The message gives the area of those cells.
 """
 
 from __future__ import annotations
@@ -24,27 +24,40 @@ from pentapod.verify.surface.swept_cutter import SweptSolid
 from pentapod.verify.verdict.coverage import Coverage
 from pentapod.verify.verdict.cutting import Cutting
 
-_COARSE, _HALVINGS = 0.25, 8.0
-"""Size of the first cells as a share of what one place of the cutter covers, and how much smaller the last may be."""
-_MOST_CELLS = 4e5
-"""No cell is asked to be smaller than so many of them would be."""
-_NEAR_M, _NEAR = 1e-6, 0.01
-"""A stretch counts as straight where the motion is this near, or within this share of what may be left."""
-_LOOKED_AT, _LOOKED_AT_BODIES = 2048, 256
-"""So many cells that are left are asked whether the cutter could reach them, each for its share of the area."""
-_FAR = 4.0
-"""Radii of the cutter along a normal after which nothing is looked for any more."""
-_ABOVE_M = 1e-5
+
+@dataclass(frozen=True)
+class SurfaceOptions:
+    """Options of the subdivision and of the search for what is left.
+
+    coarse: size of the first cells as a share of what one position of the cutter covers; finest: ratio to the smallest
+    ones; cells: no cell is smaller than the region divided by so many. near_m, near_share: deviation of the motion from
+    a straight stretch, in metres or as a share of what may be left. balls, bodies: at most so many cells that are left
+    are tested for reachability, for a ball and for other cutters, each for its share of the area. far: radii of the
+    cutter along the normal up to which material is measured. above_m: height of the points whose view is tested.
+    """
+
+    coarse: float = 0.25
+    finest: float = 8.0
+    cells: float = 4e5
+    near_m: float = 1e-6
+    near_share: float = 0.01
+    balls: int = 2048
+    bodies: int = 256
+    far: float = 4.0
+    above_m: float = 1e-5
+
+
+OPTIONS = SurfaceOptions()
 
 
 @dataclass(frozen=True, eq=False)
 class _Left:
     """What is left on a region.
 
-    Areas, square metres: missed, where the tool could have been; beyond, where it could not; between, where it is shown
-    at the middles of cells alone that no more is left. cell: how wide those are at most, metres.
-    deepest: metres that are left at most along the normal, where the tool could have been, looked for up to `far`;
-    place (3,): where. gap: how far the cutter stays at most from where it could have been, 0 where nothing is missed.
+    Areas, square metres: missed, where the tool could have been; beyond, where it could not; between, where only the
+    middles of cells show that no more is left. cell: largest width of those, metres. deepest: largest height along the
+    normal that is left where the tool could have been, metres, measured up to `far`; place (3,): where. gap: largest
+    distance of the cutter from where it could have been, 0 where nothing is missed.
     """
 
     missed: float
@@ -58,11 +71,11 @@ class _Left:
 
 
 def surface_left(replay: Replay) -> Finding | Idle:
-    """Judge on how much of the region more is left than the job allows, although the tool could have been there."""
+    """Judge the share of the region on which more is left than the job allows, although the tool could reach it."""
     cutting = replay.specification.cutting
     coverage = None if cutting is None else cutting.coverage
     if cutting is None or coverage is None:
-        return Idle("nobody says which surface is to be machined", unknown=True)
+        return Idle("the surface to be machined is not given", unknown=True)
     piece = replay.program.provenance.piece
     if piece is not None:
         coverage = coverage.of_piece(piece)
@@ -70,7 +83,7 @@ def surface_left(replay: Replay) -> Finding | Idle:
         return Idle(coverage.why)
     area = float(coverage.region.areas.sum())
     if not area > 0.0:
-        return Idle("the region holds no surface")
+        return Idle("the region has no surface")
     found = _left_on(replay, coverage, coverage.region, cutting)
     share, bound = 100.0 * found.missed / area, 100.0 * coverage.share
     place = replay.place(int(_nearest_samples(replay, found.place[None])[0]))
@@ -81,19 +94,19 @@ def surface_left(replay: Replay) -> Finding | Idle:
 def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting) -> _Left:
     solids, height = cutting.cutter, coverage.left
     chords = np.ones(len(replay.tilt_centres) - 1, dtype=np.bool_)
-    reach = max((_width(solid) for solid in solids), default=height)
-    # A ball holds a disc of this radius at that height over a plane.
+    reach = max((solid.largest_radius for solid in solids), default=height)
+    # At that height over a plane a ball covers a disc of this radius.
     disc = float(np.sqrt(height * max(2.0 * reach - height, height)))
-    least = float(np.sqrt(region.areas.sum() / _MOST_CELLS))
-    coarse, fine = max(_COARSE * disc, least), max(_COARSE * disc / _HALVINGS, least)
+    least = float(np.sqrt(region.areas.sum() / OPTIONS.cells))
+    coarse, fine = max(OPTIONS.coarse * disc, least), max(OPTIONS.coarse * disc / OPTIONS.finest, least)
     if not solids:
-        # What is within a ball about the spot, on cuts, is done.
+        # A beam or spray finishes what is within a ball about its spot, on cuts.
         spot = replay.toolpath.tilt_centre
         solids, chords, height = (Solid("cutter", spot, spot, 0.0, 0.0, coverage.left),), _on_cuts(replay), 0.0
     corners, normals = np.ascontiguousarray(region.vertices[region.faces]), np.ascontiguousarray(region.facet_normals)
     highest, swept = np.array([0.0, *corners[0].mean(axis=0)]), list[SweptSolid]()
     for solid in solids:
-        one = SweptSolid.of(replay, solid, chords, max(_NEAR_M, _NEAR * coverage.left))
+        one = SweptSolid.of(replay, solid, chords, max(OPTIONS.near_m, OPTIONS.near_share * coverage.left))
         if one is not None:
             swept.append(one)
             cells, at = one.uncovered(corners, normals, height, coarse, fine)
@@ -107,45 +120,48 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
     met = most <= height
     between = float(areas[met].sum())
     middles, normals, areas = middles[~met], normals[~met], areas[~met]
-    chosen = _chosen(areas, _LOOKED_AT if all(_is_end(replay, solid) for solid in solids[:1]) else _LOOKED_AT_BODIES)
+    by_ball = all(_is_ball_end(replay, solid) for solid in solids[:1])
+    chosen = _chosen(areas, OPTIONS.balls if by_ball else OPTIONS.bodies)
     middles, normals, weights = middles[chosen], normals[chosen], areas[chosen]
-    could = _could(replay, coverage, cutting, middles + height * normals, normals)
+    reachable = _reachable(replay, coverage, cutting, middles + height * normals, normals)
     weights = weights * (areas.sum() / max(weights.sum(), 1e-300))
-    missed = float(weights[could].sum())
-    heights, gaps = np.full(len(middles), _FAR * reach), np.full(len(middles), np.inf)
+    missed = float(weights[reachable].sum())
+    heights, gaps = np.full(len(middles), OPTIONS.far * reach), np.full(len(middles), np.inf)
     for one in swept:
         one.entries(middles, normals, heights)
         one.distances(middles, gaps)
     deepest, place, gap = float(highest[0]), highest[1:], 0.0
-    if could.any():
-        own = np.flatnonzero(could)
+    if reachable.any():
+        own = np.flatnonzero(reachable)
         worst = own[np.lexsort((gaps[own], heights[own] if cutting.cutter else gaps[own]))[-1]]
         gap = max(float(gaps[own].max()), 0.0)
         if heights[worst] > deepest:
             deepest, place = float(heights[worst]), middles[worst]
-    return _Left(missed, float(weights.sum()) - missed, between, 2.0 * fine, deepest, place, gap, _FAR * reach)
+    return _Left(missed, float(weights.sum()) - missed, between, 2.0 * fine, deepest, place, gap, OPTIONS.far * reach)
 
 
 def _chosen(areas: Floats, most: int) -> Ints:
-    """Return which cells stand for all, evenly by area; all where they are few."""
+    """Return a sample of the cells, evenly by area; all where they are few."""
     if len(areas) <= most:
         return np.arange(len(areas))
     edges = np.cumsum(areas)
     return np.unique(np.searchsorted(edges, (np.arange(most) + 0.5) * edges[-1] / most))
 
 
-def _could(replay: Replay, coverage: Coverage, cutting: Cutting, points: Floats, normals: Floats) -> Bools:
-    """Return at which points (N, 3), above the surface with these normals, the tool could have been."""
+def _reachable(replay: Replay, coverage: Coverage, cutting: Cutting, points: Floats, normals: Floats) -> Bools:
+    """Return which points (N, 3), above the surface with these normals, the tool can reach."""
     surface = cutting.surface
     if not len(points):
         return np.zeros(0, dtype=np.bool_)
     if not cutting.cutter:
-        # What the view does not see no beam along it can meet.
+        # A beam along the view reaches only what the view sees.
         size = float(np.linalg.norm(np.ptp(surface.bounds, axis=0)))
-        start = points + _ABOVE_M * normals
-        return np.asarray(surface.segments(start, start + 2.0 * size * coverage.up, within=_ABOVE_M).distance > 0.0)
+        start = points + OPTIONS.above_m * normals
+        return np.asarray(
+            surface.segments(start, start + 2.0 * size * coverage.up, within=OPTIONS.above_m).distance > 0.0
+        )
     for solid in cutting.cutter:
-        if _is_end(replay, solid):
+        if _is_ball_end(replay, solid):
             return ball_reaches(surface, points, normals, solid.rounding, coverage.up)
     axes = replay.axes[_nearest_samples(replay, points)]
     reached = body_reaches(surface, cutting.cutter, points, axes, normals)
@@ -155,17 +171,13 @@ def _could(replay: Replay, coverage: Coverage, cutting: Cutting, points: Floats,
     return reached
 
 
-def _is_end(replay: Replay, solid: Solid) -> bool:
-    """Return whether a solid is the ball about the tilt_centre."""
+def _is_ball_end(replay: Replay, solid: Solid) -> bool:
+    """Return whether a solid is the ball about the tilt centre."""
     return solid.is_ball and solid.low == replay.toolpath.tilt_centre
 
 
-def _width(solid: Solid) -> float:
-    return max(solid.low_radius, solid.high_radius) + solid.rounding
-
-
 def _on_cuts(replay: Replay) -> Bools:
-    """Return which chords (M − 1,) belong to a cut with its beam on, by their middle."""
+    """Return which chords (M − 1,) belong to a cut with the beam on, by their middle."""
     toolpath, arcs = replay.toolpath, replay.match.arcs
     ends = arc_length(toolpath.tilt_centres)[toolpath.starts]
     segment = np.searchsorted(ends, 0.5 * (arcs[:-1] + arcs[1:]), side="right") - 1
@@ -174,7 +186,7 @@ def _on_cuts(replay: Replay) -> Bools:
 
 
 def _nearest_samples(replay: Replay, points: Floats) -> Ints:
-    """Return the samples (N,) whose tilt_centres are nearest to points (N, 3)."""
+    """Return the samples (N,) whose tilt centres are nearest to points (N, 3)."""
     return np.asarray(KDTree(replay.tilt_centres).query(points)[1], dtype=np.intp)
 
 
@@ -182,17 +194,19 @@ def _method(found: _Left, coverage: Coverage, area: float, *, beam: bool) -> str
     x, y, z = MM * found.place
     where, left = f"x {x:.2f}, y {y:.2f}, z {z:.2f} mm", f"{MM * coverage.left:.4g} mm"
     if beam:
-        text = f"area of the region that is farther than {left} from the beam's line on cuts"
+        text = f"share of the region that is farther than {left} from the beam's line on cuts"
         text += f"; up to {MM * (found.gap + coverage.left):.3g} mm, at {where}" if found.missed > 0.0 else ""
         hidden = "is hidden from the view"
     else:
-        text = f"area of the region on which the swept cutter leaves more than {left} along the normal"
+        text = f"share of the region on which the swept cutter leaves more than {left} along the normal"
         deepest = "more than " if found.deepest >= found.far else ""
         text += f"; deepest found {deepest}{MM * found.deepest:.3g} mm at {where}"
-        text += f", the cutter stays up to {MM * found.gap:.3g} mm off" if found.gap > 0.0 else ""
-        hidden = "is out of reach for the cutter's shape, as far as a search finds"
+        text += f", where the cutter is up to {MM * found.gap:.3g} mm away" if found.gap > 0.0 else ""
+        hidden = "is out of reach for the cutter, as far as the search finds"
     if found.between > 0.0:
-        text += f"; {100.0 * found.between / area:.3g} % judged at the middles of cells of {MM * found.cell:.2g} mm"
+        text += (
+            f"; {100.0 * found.between / area:.3g} % judged only at the middles of cells of {MM * found.cell:.2g} mm"
+        )
     text += ", the rest proven at every point" if found.between > 0.0 else "; proven at every point"
     return text + (f"; {100.0 * found.beyond / area:.3g} % more {hidden}" if found.beyond > 0.0 else "")
 

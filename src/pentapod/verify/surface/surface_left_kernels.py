@@ -1,4 +1,4 @@
-"""Kernel for the material that a swept cutter leaves: cells of a surface, and which of them are proven covered."""
+"""Kernels for the material that a swept cutter leaves: adaptive subdivision of a surface into cells proven covered."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ from pentapod.verify.surface.swept_cutter_kernels import (
 
 @kernel
 def _covers(corners: Floats, rise: Floats, stretch: Floats, solid: Floats, is_ball: bool, share: float) -> bool:
-    """Return whether a solid on one stretch holds a whole triangle (3, 3), moved by `rise` (3,).
+    """Return whether a solid on one stretch contains a whole triangle (3, 3), moved by `rise` (3,).
 
-    A ball's sweep along a straight stretch is convex: corners may be held at different places. Others at one place.
+    The swept volume of a ball along a straight stretch is convex, so its corners may be inside at different places;
+    those of other solids must be inside at one place.
     """
     x = np.empty(3)
     for j in range(3):
@@ -58,7 +59,7 @@ def _halve(cells: Floats, count: int) -> None:
 
 @kernel
 def _middle(cell: Floats, middle: Floats) -> float:
-    """Write the middle (3,) of a triangle (3, 3), and return how far its corners are from there at most."""
+    """Write the middle (3,) of a triangle (3, 3), and return the largest distance of its corners from it."""
     for i in range(3):
         middle[i] = (cell[0, i] + cell[1, i] + cell[2, i]) / 3.0
     most = 0.0
@@ -71,16 +72,8 @@ def _middle(cell: Floats, middle: Floats) -> float:
 
 
 @kernel
-def _deepen(
-    q: Floats,
-    n: Floats,
-    most: float,
-    warm: int,
-    swept: Swept,
-    room: Room,
-    deepest: Floats,
-) -> None:
-    """Raise deepest (4,) to what is left above q, at most `most`, where that is more; and where."""
+def _deepen(q: Floats, n: Floats, most: float, warm: int, swept: Swept, room: Room, deepest: Floats) -> None:
+    """Raise deepest (4,), a height and its place, to the height that is left above q, at most `most`, if larger."""
     x = np.empty(3)
     for i in range(3):
         x[i] = q[i] + deepest[0] * n[i]
@@ -106,11 +99,10 @@ def uncovered(
 ) -> int:
     """Fill found (K, 12): corners and normal of the cells of triangles (N, 3, 3) that are not proven covered.
 
-    Covered: at `height` above every point of the cell, along the normal (N, 3), one and the same solid has been; so no
-    more than that is left there. Cells are halved until that is proven, or no point of them is farther from the middle
-    than `fine`; cells that the solid never comes near, until it is `coarse`. Returns how many there are, which may be
-    more than K: then not all were written. deepest (4,): raised to what is left at most at the middle of
-    a covered cell, and where that is.
+    Covered: the solid has contained every point at `height` above the cell, along the normal (N, 3), so no more is left
+    there. Cells are halved until that is proven or their radius is `fine`; `coarse` where the solid never comes close.
+    Returns how many there are; if that is more than K, not all were written. deepest (4,): raised to the largest height
+    that is left at the middle of a covered cell, and its place.
     """
     stretches, _, _, solid, _, is_ball = swept
     room, warm = (np.empty(STACK, dtype=np.intp), np.empty(STACK)), -1

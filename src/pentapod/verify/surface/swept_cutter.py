@@ -1,4 +1,4 @@
-"""SweptCutter: where a cutter has been in the course of a replay, for questions about what it leaves."""
+"""Swept volume of a solid of the cutter over a replay, in a tree of boxes, for queries about what it leaves."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.solids import Solid
 from pentapod.mesh.query.tree import along_morton_curve
 from pentapod.verify.replay.replay import Replay
-from pentapod.verify.replay.stretches import CUT, LONGEST, Stretches, strays
+from pentapod.verify.replay.stretches import Stretches, StretchOptions, deviation_bounds
 
 if TYPE_CHECKING:
     from pentapod.verify.surface.swept_cutter_kernels import Swept
 
-_PER_LEAF = 4
+PER_LEAF = 4
+"""Stretches in a leaf of the tree."""
 
 
 @dataclass(frozen=True, eq=False)
 class SweptSolid:
-    """The way of one solid, in straight stretches, in a tree of boxes.
+    """The swept volume of one solid, in straight stretches, in a tree of boxes.
 
-    stretches (S, 13): start and way of the point at the tip (of a ball: of its centre), axis at start and end, and by
-    how much the solid may be off. boxes (2 L − 1, 6): around the solid's axis. starts (L + 1,): of the leaves.
-    numbers (5,): of the solid, as `Solid.numbers`; wide: farthest that it reaches from its axis, metres.
+    stretches (S, 13): start and displacement of the tip (of a ball: of its centre), axis at start and end, and the
+    bound on the deviation of the motion. boxes (2 L − 1, 6): around the solid's axis. starts (L + 1,): of the leaves.
+    numbers (5,): of the solid, as `Solid.numbers`; wide: its largest distance from its axis, metres.
     """
 
     stretches: Floats
@@ -37,12 +38,12 @@ class SweptSolid:
 
     @classmethod
     def of(cls, replay: Replay, solid: Solid, chords: Bools, near: float) -> SweptSolid | None:
-        """Return the sweep of a solid over some chords (M − 1,) of a replay; None where nothing is known of any.
+        """Return the swept volume over some chords (M − 1,) of a replay; None where the motion has no useful bound.
 
-        near: stretches are cut until the motion is no farther off them, metres, or they are single chords.
+        near: stretches are cut until the motion deviates from them by no more, metres, or they are single chords.
         """
-        tilt_centre, wide = replay.toolpath.tilt_centre, max(solid.low_radius, solid.high_radius) + solid.rounding
-        # The path of a ball about the tilt centre does not know how the tool turns.
+        tilt_centre, wide = replay.toolpath.tilt_centre, solid.largest_radius
+        # The path of a ball about the tilt centre does not depend on how the tool turns.
         at_tilt_centre = solid.is_ball and solid.low == tilt_centre
         lever = 0.0 if at_tilt_centre else max(abs(solid.low - tilt_centre), abs(solid.high - tilt_centre)) + wide
         of, off = _stretches(replay, chords, lever, near)
@@ -58,7 +59,7 @@ class SweptSolid:
         middles = ends.mean(axis=0)
         order = along_morton_curve(middles, np.stack([middles.min(axis=0), middles.max(axis=0)]))
         rows = np.concatenate([start, end - start, first, last, off[:, None]], axis=1)[order]
-        # An axis that turns evenly bulges by no more than this out of the hull of its ends.
+        # An axis that turns evenly leaves the hull of its end positions by no more than this.
         bulge = 0.125 * max(abs(low), abs(high)) * float(np.sum((last - first) ** 2, axis=1).max())
         boxes, starts = _boxes(ends.min(axis=0)[order] - bulge, ends.max(axis=0)[order] + bulge)
         numbers = np.array((0.0, 0.0, 0.0, 0.0, wide) if solid.is_ball else solid.numbers)
@@ -69,13 +70,13 @@ class SweptSolid:
         return self.stretches, self.boxes, self.starts, self.numbers, self.wide, self.is_ball
 
     def entries(self, points: Floats, normals: Floats, heights: Floats) -> None:
-        """Lower heights (N,), metres, to where rays from points along unit normals (N, 3) first meet the solid."""
+        """Lower heights (N,), metres, to where rays from points along unit normals (N, 3) enter the swept volume."""
         from pentapod.verify.surface.swept_cutter_kernels import entries  # noqa: PLC0415  loads numba
 
         entries(points, normals, self._swept, heights)
 
     def distances(self, points: Floats, gaps: Floats) -> None:
-        """Lower gaps (N,), metres, to how far points (N, 3) are from where the solid has been."""
+        """Lower gaps (N,), metres, to the distances of points (N, 3) from the swept volume."""
         from pentapod.verify.surface.swept_cutter_kernels import distances  # noqa: PLC0415  loads numba
 
         distances(points, self._swept, gaps)
@@ -83,10 +84,9 @@ class SweptSolid:
     def uncovered(
         self, corners: Floats, normals: Floats, height: float, coarse: float, fine: float
     ) -> tuple[Floats, Floats]:
-        """Return the cells of triangles (N, 3, 3) with normals (N, 3) that are not proven covered, as (K, 12).
+        """Return the cells (K, 12), corners and normal, of triangles (N, 3, 3) that are not proven covered.
 
-        Corners and normal of each. Also what is left at most at the middles of the cells that are covered, metres, and
-        where (4,). See the kernel of the same name.
+        Also (4,) the largest height that is left at the middles of covered cells, metres, and where. See the kernel.
         """
         from pentapod.verify.surface.surface_left_kernels import uncovered  # noqa: PLC0415  loads numba
 
@@ -100,16 +100,17 @@ class SweptSolid:
 
 
 def _stretches(replay: Replay, chords: Bools, lever: float, near: float) -> tuple[Stretches, Floats]:
-    """Return the longest stretches that are near enough to the motion, and how far (n,) it is off them."""
-    size, todo = LONGEST, Stretches.along(chords).cut(LONGEST)
+    """Return the longest stretches that are near enough to the motion, and the deviations (n,) from them."""
+    options = StretchOptions()
+    size, todo = options.longest, Stretches.along(chords).cut(options.longest)
     starts, ends, off = list[Ints](), list[Ints](), list[Floats]()
     while len(todo.starts):
-        far = strays(replay, todo, lever)
+        far = deviation_bounds(replay, todo, lever, options)
         good = (far <= near) | (size == 1)
         starts.append(todo.starts[good])
         ends.append(todo.ends[good])
         off.append(far[good])
-        size = max(size // CUT, 1)
+        size = max(size // options.cuts, 1)
         todo = todo.where(~good).cut(size)
     if not starts:
         return todo, np.empty(0)
@@ -119,7 +120,7 @@ def _stretches(replay: Replay, chords: Bools, lever: float, near: float) -> tupl
 def _boxes(low: Floats, high: Floats) -> tuple[Floats, Ints]:
     """Return the boxes (2 L − 1, 6) of a complete tree over boxes (S, 3) to (S, 3), and where its leaves begin."""
     count = len(low)
-    leaves = 1 << max(0, (count // _PER_LEAF).bit_length() - 1)
+    leaves = 1 << max(0, (count // PER_LEAF).bit_length() - 1)
     starts = (np.arange(leaves + 1) * count) // leaves
     boxes = np.empty((2 * leaves - 1, 6))
     boxes[leaves - 1 :, :3] = np.minimum.reduceat(low, starts[:-1], axis=0)

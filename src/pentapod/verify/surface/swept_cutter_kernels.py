@@ -1,8 +1,7 @@
-"""Kernels for how far points are from where a solid of revolution has been, and where rays first meet that.
+"""Kernels for the swept volume of a solid of revolution: distances of points, and first hits of rays.
 
-The cutter is some convex solids of revolution. On each *stretch* of the motion a solid goes straight while its axis
-turns evenly. Every place looked at is one that the solid really takes, within the `stray` of its stretch, by which it
-is made smaller here. So what counts as removed is removed.
+On each *stretch* of the motion the solid moves straight while its axis turns evenly. The real motion deviates from that
+by at most the bound of the stretch, and the solid is shrunk by this bound. So what counts as removed is removed.
 """
 
 from __future__ import annotations
@@ -16,24 +15,27 @@ from pentapod.mesh.query.box_kernels import open_node
 from pentapod.numerics.kernels import kernel
 
 STACK = 128
-"""Nodes of a tree, or cells, that may wait to be looked at."""
+"""Largest number of waiting nodes of a tree, or of waiting cells."""
 Swept = tuple[Floats, Floats, Ints, Floats, float, bool]
-"""One solid and where it has been: stretches (S, 13), boxes (2 L − 1, 6), starts (L + 1,), the solid (5,), wide, and
-whether it is a ball. Boxes are around the axis of the solid; nothing of it is farther from there than `wide`."""
+"""The swept volume of one solid: stretches (S, 13), boxes (2 L − 1, 6), starts (L + 1,), the solid (5,), wide, and
+whether it is a ball. The boxes hold the axis of the solid, and no point of the solid is farther from it than `wide`."""
 
 Room = tuple[Ints, Floats]
-"""Of a search: nodes and their lower bounds, both (STACK,)."""
+"""Memory of a search: nodes and their lower bounds, both (STACK,)."""
 
-_GOLDEN = 0.6180339887498949
-_ROUNDS = 12
-_MET = 1e-7  # metres: a ray that comes so near has entered
-_STEPS = 200
-_WAY_Z = 5  # of a stretch: the z of its way
+GOLDEN = 0.6180339887498949
+GOLDEN_STEPS = 12
+"""Steps of the golden-section search for the nearest place of a stretch."""
+ENTERED_M = 1e-7
+"""A ray that comes so close has entered."""
+RAY_STEPS = 200
+WAY_Z = 5
+"""Index of z in the displacement of a stretch."""
 
 
 @kernel
 def _to_solid(h: float, out: float, solid: Floats) -> float:
-    """Return the signed distance from a solid (5,) of a point at height h, `out` from the axis; negative inside."""
+    """Return the signed distance from a solid (5,) of a point at height h and radius `out`; negative inside."""
     low, high, first, last = solid[0], solid[1], solid[2], solid[3]
     # The wall from (low, first) to (high, last) in the half plane through the axis.
     along, across = high - low, last - first
@@ -65,7 +67,7 @@ def at_share(x: Floats, stretch: Floats, solid: Floats, share: float) -> float:
     ax, ay, az = ax / length, ay / length, az / length
     dx = x[0] - stretch[0] - share * stretch[3]
     dy = x[1] - stretch[1] - share * stretch[4]
-    dz = x[2] - stretch[2] - share * stretch[_WAY_Z]
+    dz = x[2] - stretch[2] - share * stretch[WAY_Z]
     h = dx * ax + dy * ay + dz * az
     out = math.sqrt(max(dx * dx + dy * dy + dz * dz - h * h, 0.0))
     return _to_solid(h, out, solid)
@@ -75,29 +77,29 @@ def at_share(x: Floats, stretch: Floats, solid: Floats, share: float) -> float:
 def to_stretch(x: Floats, stretch: Floats, solid: Floats, is_ball: bool) -> tuple[float, float]:
     """Return the signed distance of a point from a solid on a stretch, and the share of it where that is least.
 
-    stretch (13,): start and way of the solid's origin, axis at start and end, stray.
+    stretch (13,): start and displacement of the solid's origin, axis at start and end, bound on the deviation.
     """
     if is_ball:
         dx, dy, dz = x[0] - stretch[0], x[1] - stretch[1], x[2] - stretch[2]
-        wx, wy, wz = stretch[3], stretch[4], stretch[_WAY_Z]
+        wx, wy, wz = stretch[3], stretch[4], stretch[WAY_Z]
         square = wx * wx + wy * wy + wz * wz
         t = 0.0
         if square > 0.0:
             t = min(max((dx * wx + dy * wy + dz * wz) / square, 0.0), 1.0)
         dx, dy, dz = dx - t * wx, dy - t * wy, dz - t * wz
         return math.sqrt(dx * dx + dy * dy + dz * dz) - solid[4] + stretch[12], t
-    # The distance from a convex body is convex along the way.
+    # The distance from a convex body is convex along a straight line.
     low, high = 0.0, 1.0
-    a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
     fa, fb = at_share(x, stretch, solid, a), at_share(x, stretch, solid, b)
-    for _ in range(_ROUNDS):
+    for _ in range(GOLDEN_STEPS):
         if fa <= fb:
             high, b, fb = b, a, fa
-            a = high - _GOLDEN * (high - low)
+            a = high - GOLDEN * (high - low)
             fa = at_share(x, stretch, solid, a)
         else:
             low, a, fa = a, b, fb
-            b = low + _GOLDEN * (high - low)
+            b = low + GOLDEN * (high - low)
             fb = at_share(x, stretch, solid, b)
     best, share = (fa, a) if fa <= fb else (fb, b)
     for end in range(2):
@@ -117,16 +119,10 @@ def _to_box(x: Floats, box: Floats) -> float:
 
 
 @kernel
-def nearest_stretch(
-    x: Floats,
-    warm: int,
-    enough: float,
-    swept: Swept,
-    room: Room,
-) -> tuple[float, int, float]:
-    """Return the signed distance of a point from the sweep of a solid, the stretch, and the share of it.
+def nearest_stretch(x: Floats, warm: int, enough: float, swept: Swept, room: Room) -> tuple[float, int, float]:
+    """Return the signed distance of a point from the swept volume, the nearest stretch, and the share of it.
 
-    Ends at the first place that is not farther than `enough`. warm: a stretch to look at first, −1 for none.
+    Ends at the first place that is not farther than `enough`. warm: a stretch to start with, −1 for none.
     """
     stretches, boxes, starts, solid, wide, is_ball = swept
     nodes, bounds = room
@@ -159,21 +155,14 @@ def nearest_stretch(
 
 
 @kernel
-def entry(
-    q: Floats,
-    n: Floats,
-    most: float,
-    warm: int,
-    swept: Swept,
-    room: Room,
-) -> tuple[float, int]:
-    """Return at which height along a normal a ray from q first enters the sweep, at most `most`; and the stretch."""
+def entry(q: Floats, n: Floats, most: float, warm: int, swept: Swept, room: Room) -> tuple[float, int]:
+    """Return the height along a normal at which a ray from q enters the swept volume, up to `most`; the stretch."""
     t, x = 0.0, np.empty(3)
-    for _ in range(_STEPS):
+    for _ in range(RAY_STEPS):
         for i in range(3):
             x[i] = q[i] + t * n[i]
-        gap, warm, _ = nearest_stretch(x, warm, _MET, swept, room)
-        if gap <= _MET:
+        gap, warm, _ = nearest_stretch(x, warm, ENTERED_M, swept, room)
+        if gap <= ENTERED_M:
             return t, warm
         t += gap
         if t >= most:
@@ -182,13 +171,8 @@ def entry(
 
 
 @kernel
-def entries(
-    points: Floats,
-    normals: Floats,
-    swept: Swept,
-    heights: Floats,
-) -> None:
-    """Lower heights (N,) to where rays from points along normals (N, 3) first enter the sweep of a solid."""
+def entries(points: Floats, normals: Floats, swept: Swept, heights: Floats) -> None:
+    """Lower heights (N,) to where rays from points along normals (N, 3) enter the swept volume."""
     room, warm = (np.empty(STACK, dtype=np.intp), np.empty(STACK)), -1
     for k in range(len(points)):
         height, warm = entry(points[k], normals[k], heights[k], warm, swept, room)
@@ -196,12 +180,8 @@ def entries(
 
 
 @kernel
-def distances(
-    points: Floats,
-    swept: Swept,
-    gaps: Floats,
-) -> None:
-    """Lower gaps (N,) to how far points (N, 3) are from the sweep of a solid; negative inside."""
+def distances(points: Floats, swept: Swept, gaps: Floats) -> None:
+    """Lower gaps (N,) to the signed distances of points (N, 3) from the swept volume."""
     room, warm = (np.empty(STACK, dtype=np.intp), np.empty(STACK)), -1
     for k in range(len(points)):
         gap, warm, _ = nearest_stretch(points[k], warm, -math.inf, swept, room)

@@ -1,1 +1,1 @@
-"""What a verdict is about, and what it says."""
+"""Specification and verdict: what a program is judged against, and the answer."""

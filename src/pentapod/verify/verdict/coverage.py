@@ -1,4 +1,4 @@
-"""Coverage: which surface a program is to machine, and how much it may leave there."""
+"""Coverage: the surface that a program must machine, and how much material it may leave there."""
 
 from __future__ import annotations
 
@@ -22,20 +22,22 @@ from pentapod.toolpath.options import CoverOptions, PathOptions
 from pentapod.toolpath.strategies.waterline import WaterlineOptions
 from pentapod.toolpath.toolpath import Toolpath
 
-_MOST_FACETS = 1_000_000
-_HIGHER = 1.25
-"""Ridges may be so much higher than on a plane before somebody must say so."""
+MOST_FACETS = 1_000_000
+"""Facets into which the region of a piece is refined at most."""
+
+RIDGE_FACTOR = 1.25
+"""Default of how much higher than on a plane ridges may be, because the surface is curved."""
 
 
 @dataclass(frozen=True, eq=False)
 class Coverage(Value):
-    """What a program is to machine, and what it may leave there.
+    """What a program must machine, and what it may leave there.
 
-    region: the surface, workpiece frame; None where the program draws lines and covers none, `why` says so. left:
-    height above it, along its normal, up to which it counts as finished, metres; of a tool that keeps its distance, how
-    far the surface may be from the line that its beam or spray draws. share: of the region's area, 0 to 1, on which
-    more may be left. view (3,): towards the tool, any length. whole: makes the toolpath that covers all of the region,
-    where a program may be a piece of it. Raises ArrayError unless `left` is positive and `share` from 0 to 1.
+    region: the surface, workpiece frame; None where the program draws lines and covers no surface: see `why`.
+    left: height of material, along the surface normal, up to which the surface is finished, metres; for a stand-off
+    tool the largest distance of the surface from the line of its beam or spray. share: of the region's area, 0 to 1, on
+    which more may be left. view (3,): towards the tool, any length. whole: makes the toolpath that covers all of the
+    region, where a program may be a piece of it. Raises ArrayError unless `left` is positive and `share` from 0 to 1.
     """
 
     region: Patch | None
@@ -54,7 +56,7 @@ class Coverage(Value):
 
     @classmethod
     def nothing(cls, why: str) -> Coverage:
-        """Return that there is no surface to cover, and why."""
+        """Return the coverage of a program that covers no surface, and why."""
         return cls(None, np.finfo(float).max, why=why)
 
     @classmethod
@@ -69,10 +71,10 @@ class Coverage(Value):
         share: float = 1e-3,
         whole: Callable[[], Toolpath] | None = None,
     ) -> Coverage:
-        """Return what a strategy with these options is to cover; nothing, where it draws lines, unless `left` is given.
+        """Return what a strategy with these options must cover; nothing, where it draws lines, unless `left` is given.
 
-        left: when None, the ridge between passes on a plane and a quarter of it, for what is curved, and tolerances of
-        chords and path; of a beam or spray half the distance between the lines instead of the ridge.
+        left: by default 1.25 times the ridge between passes on a plane, plus the tolerances of chords and path; for a
+        beam or spray half the distance between the lines replaces the ridge.
         """
         if left is None and not isinstance(options, CoverOptions):
             return cls.nothing(f"{type(options).__name__.removesuffix('Options').lower()}: lines that cover no region")
@@ -80,7 +82,7 @@ class Coverage(Value):
         if isinstance(options, WaterlineOptions):
             region = region.steeper(np.asarray(options.upright), options.shallowest)
         if left is None:
-            left = _HIGHER * _ridge(options, tool) + options.chordal + path_tolerance
+            left = RIDGE_FACTOR * _ridge(options, tool) + options.chordal + path_tolerance
         return cls(region, left, share, options.up, whole)
 
     @property
@@ -89,7 +91,7 @@ class Coverage(Value):
         return np.asarray(self.view)
 
     def of_piece(self, piece: Piece) -> Coverage:
-        """Return what a piece of the whole toolpath is to machine: where the nearest cut of the whole is the piece's.
+        """Return what a piece of the whole toolpath must machine: where the nearest cut of the whole is its own.
 
         Raises ArrayError where the whole is not known.
         """
@@ -98,7 +100,7 @@ class Coverage(Value):
         if self.whole is None:
             raise ArrayError("the whole toolpath is not known", key="whole", value=piece)
         whole = self.whole()
-        mine, size = piece.cuts(whole), max(0.5 * self.left, float(np.sqrt(self.region.areas.sum() / _MOST_FACETS)))
+        mine, size = piece.cuts(whole), max(0.5 * self.left, float(np.sqrt(self.region.areas.sum() / MOST_FACETS)))
         cutting = np.flatnonzero(cutting_intervals(whole))
         start, end = whole.tilt_centres[cutting], whole.tilt_centres[cutting + 1]
         counts = np.ceil(np.linalg.norm(end - start, axis=1) / size).astype(np.intp) + 1

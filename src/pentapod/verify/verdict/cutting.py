@@ -1,4 +1,4 @@
-"""Cutting: what cuts, into what, and how deep it may."""
+"""Cutting: the solids of the tool, the finished part, and the allowed depth."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from pentapod.verify.verdict.coverage import Coverage
 
 @dataclass(frozen=True, eq=False)
 class Cutting(Value):
-    """surface: of the finished part, workpiece frame. solids: of the tool; those of kind "cutter" cut.
+    """What cuts into which part, and how deep it may.
 
-    depth: metres by which cuts and links may go into the part: what counts as no gouge, and what is engraved on
-    purpose. coverage: what is to be machined, None where nobody says. Raises ArrayError where depth is negative.
+    surface: of the finished part, workpiece frame. solids: of the tool; those of kind "cutter" cut. depth: metres by
+    which cuts and links may go into the part: the gouge tolerance and the engraving depth. coverage: what must be
+    machined; None where it is not given. Raises ArrayError where depth is negative.
     """
 
     surface: MeshDistance

@@ -12,7 +12,7 @@ from pentapod.base.values import Value
 from pentapod.machine.machine import Machine
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify.verdict.cutting import Cutting
-from pentapod.verify.verdict.sources import UNTOLD, Sources
+from pentapod.verify.verdict.verdict import NO_SOURCES, Sources
 
 if TYPE_CHECKING:
     from pentapod.kinematics.component import Component
@@ -22,20 +22,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Specification(Value):
-    """What a program is judged against. A field that is None was told by nobody: what needs it is not judged.
+    """What a program is judged against. A field that is None is not given: claims that need it are not judged.
 
     machine: with its tool length and controller. toolpath: in the workpiece frame, as the job asks for it.
     tilt: half angle in radians of the cone about the nominal axis in which the tool may stand; axis_tolerance:
     radians beyond that; path_tolerance: metres. job_digest: of the job that the header must name. collision_world: what
-    legs, spindle and tool must not touch. cutting: what cuts, and into which part. constraints: where the part may be
-    placed. component: in which the program must be, None where any will do. lowest_share: of the feed, that cuts and
-    links must reach where no limit is used; None for the default of the tool, 0 where it does not matter.
-    stop_angle: radians; where the toolpath turns by more the program may stop (anyway from 20 degrees on); None where
-    nobody says. setups: most programs into which the work may be split; missed: how many intervals of the whole
-    toolpath should be cut and are
-    cut in none of them, or in more than one; None where the other programs are not known. waived: names of claims
-    without which the verdict may pass where they cannot be judged. sources: the files that all this is from.
-    Raises ArrayError where a tolerance is not a sensible number.
+    legs, spindle and tool must not touch. cutting: what cuts, and into which part. constraints: the allowed placements.
+    component: in which the program must be; None where any is allowed. lowest_share: of the feed, that cuts and links
+    must reach where no limit is used; None for the default of the tool, 0 for no lowest feed. stop_angle: radians;
+    where the toolpath turns by more the program may stop, as it may from 20 degrees on. setups: largest number of
+    programs into which the job may be split; missed: number of intervals of the whole toolpath that are cut in none of
+    them, or in more than one; None where the others are not known. waived: names of claims without which the verdict may
+    pass where they cannot be judged. sources: its files.
+    Raises ArrayError where a tolerance is not a positive number.
     """
 
     machine: Machine
@@ -53,7 +52,7 @@ class Specification(Value):
     setups: int = 1
     missed: int | None = None
     waived: tuple[str, ...] = ()
-    sources: Sources = UNTOLD
+    sources: Sources = NO_SOURCES
 
     def __post_init__(self) -> None:
         for name in ("tilt", "path_tolerance", "axis_tolerance"):
@@ -63,7 +62,7 @@ class Specification(Value):
         if self.lowest_share is not None and not 0.0 <= self.lowest_share <= 1.0:
             raise ArrayError("must be a share", key="lowest_share", value=self.lowest_share, expected="0 to 1")
         if self.stop_angle is not None and not 0.0 < self.stop_angle <= np.pi:
-            raise ArrayError("must be an angle", key="stop_angle", value=self.stop_angle, expected="0 to π, not 0")
+            raise ArrayError("must be an angle", key="stop_angle", value=self.stop_angle, expected="above 0, at most π")
 
 
 class Asked(TypedDict, total=False):

@@ -1,4 +1,4 @@
-"""Certificate: one claim about a program, judged. Verdict: all of them, and the answer."""
+"""Certificate: one judged claim about a program. Verdict: all certificates of a program, and the answer."""
 
 from __future__ import annotations
 
@@ -8,10 +8,31 @@ from typing import Any
 from pentapod.base.display import html_table, load_extra
 from pentapod.base.values import Result, Value
 from pentapod.base.version import __version__, library_versions, processor_kind
-from pentapod.verify.verdict.sources import UNTOLD, Sources
 
 _COLUMNS = ["claim", "answer", "value", "bound", "unit", "time_s", "row", "segment", "method"]
 _SHOWN = 12
+
+
+@dataclass(frozen=True)
+class Sources(Value):
+    """SHA-256 of each file that a verdict is about, as hex digits; None where there is none, or it is not known.
+
+    machine: of the machine's file, also of one that is shipped. fixture: of its mesh. toolpath_file and
+    toolpath_curve: what the job's [toolpath] names (a drawing, points, a picture, a toolpath; a guide curve).
+    """
+
+    program: str | None = None
+    job: str | None = None
+    machine: str | None = None
+    mesh: str | None = None
+    fixture: str | None = None
+    stock: str | None = None
+    toolpath_file: str | None = None
+    toolpath_curve: str | None = None
+
+
+NO_SOURCES = Sources()
+"""Where no file is known."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +48,9 @@ class Place(Value):
 class Certificate(Value):
     """One claim: what was measured, what it must not exceed (or fall below), where, and by which method.
 
-    unit is as in files: mm, deg, mm/s, ...; method says in words how value was computed, and what it
-    covers (at the rows, between the rows, proven or sampled). allowed: up to where a value beyond its bound passes all
-    the same, for the reason that method gives; None where it does not.
+    unit: as in files, mm, deg, mm/s, …. method: how the value was computed, and what it covers (at the rows or between
+    them, proven or sampled). allowed: largest value that passes although it is beyond its bound, for the reason in
+    `method`; None where there is no such tolerance.
     """
 
     summary = ("claim", "passed")
@@ -45,7 +66,7 @@ class Certificate(Value):
 
     @property
     def is_lenient(self) -> bool:
-        """Whether the value is beyond its bound, and passed by what is allowed."""
+        """Whether the value is beyond its bound, but within what is allowed."""
         if self.value is None or self.bound is None or self.allowed is None or not self.passed:
             return False
         return self.bound < self.value <= self.allowed
@@ -53,7 +74,7 @@ class Certificate(Value):
 
 @dataclass(frozen=True)
 class NotJudged(Value):
-    """A claim that the job implies and that could not be judged, and why. waived: the job lets it go unjudged."""
+    """A claim that the job needs but that could not be judged, and why. waived: the job does not ask for it."""
 
     summary = ("claim", "waived")
 
@@ -64,20 +85,17 @@ class NotJudged(Value):
 
 @dataclass(frozen=True)
 class Verdict(Result):
-    """All certificates of a program, what was not judged, and the files that it is about.
-
-    passed: there is at least one claim, every claim holds, and what was not judged is waived.
-    """
+    """All certificates of a program, the claims that were not judged, and the files that it is about."""
 
     summary = ("answer",)
 
     certificates: tuple[Certificate, ...]
     not_judged: tuple[NotJudged, ...] = ()
-    sources: Sources = UNTOLD
+    sources: Sources = NO_SOURCES
 
     @property
     def passed(self) -> bool:
-        """Whether the program is as the job asks, as far as nobody waived it."""
+        """Whether there is a claim, all claims hold, and those that were not judged are waived."""
         judged = bool(self.certificates) and all(c.passed for c in self.certificates)
         return judged and all(entry.waived for entry in self.not_judged)
 
@@ -112,7 +130,7 @@ class Verdict(Result):
         return pandas.DataFrame(entries, columns=_COLUMNS)
 
     def _repr_html_(self) -> str:
-        """Return what notebooks show: the answer, what failed or was not judged, and how many claims hold."""
+        """Return the HTML for notebooks: the answer, what failed or was not judged, and how many claims hold."""
         failed = [(c.claim, "fails", _measured(c), c.method) for c in self.certificates if not c.passed]
         open_ = [(n.claim, "waived" if n.waived else "not judged", "", n.why) for n in self.not_judged]
         rows = failed + open_
