@@ -32,8 +32,8 @@ class Specification(Value):
     must reach where no limit is used; None for the default of the tool, 0 for no lowest feed. stop_angle: radians;
     where the toolpath turns by more the program may stop, as it may from 20 degrees on. setups: largest number of
     programs into which the job may be split; missed: number of intervals of the whole toolpath that are cut in none of
-    them, or in more than one; None where the others are not known. waived: names of claims without which the verdict may
-    pass where they cannot be judged. sources: its files.
+    them, or in more than one; None where the others are not known. waived: names of claims without which the verdict
+    may pass where they cannot be judged. sources: its files.
     Raises ArrayError where a tolerance is not a positive number.
     """
 
