@@ -297,7 +297,7 @@ def test_no_damaged_byte_makes_a_traceback(tmp_path_factory, place, byte, how):
 @pytest.mark.parametrize("name", [name for name in BAD if name != "nul bytes"])
 def test_blocks_of_little_more_than_a_row_find_the_same(tmp_path, monkeypatch, name):
     """Where the file is cut into blocks cannot be told from what is read, nor from what is refused."""
-    monkeypatch.setattr("pentapod.program.csv_rows._BLOCK", 137)
+    monkeypatch.setattr("pentapod.program.csv_rows.BLOCK_BYTES", 137)
     good = program(placement=RigidTransform(np.eye(3), [0.1, 0.2, 0.3]))
     path = write_csv(good, tmp_path / "program.csv")
     same(good, read_csv(path))

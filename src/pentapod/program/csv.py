@@ -17,16 +17,16 @@ from pentapod.program.header import MAGIC, Header, header_text, parse_header
 from pentapod.program.program import FORMAT_VERSION, Program
 from pentapod.program.resolution import MM_DECIMALS, to_millimetres
 
-_CHUNK = 20_000
-_LONGEST, _MOST_LINES = 65_536, 1_000  # bytes of a line of the header, and its lines
+ROWS_AT_ONCE = 20_000
+LONGEST_LINE, MOST_LINES = 65_536, 1_000  # of the header: bytes, and lines
 
 
 @stage
 def write_csv(program: Program, path: str | Path) -> Path:
-    """Write a program and return its path. Same program, same bytes; an interruption leaves no half file.
+    """Write a program atomically and return its path. Same program, same bytes.
 
-    Lengths that are not at the file's resolution (1e-8 mm; `sample` makes only such) are rounded to it.
-    Raises InputError where the file cannot be written.
+    Lengths are rounded to the resolution of the file, 1e-8 mm; those of `sample` have it already. Raises InputError
+    where the file cannot be written.
     """
     with atomic_write(path) as temporary, temporary.open("wb") as out:
         out.writelines(_pieces(program))
@@ -41,19 +41,19 @@ def csv_bytes(program: Program) -> bytes:
 def read_csv(path: str | Path) -> Program:
     """Return the program in a file, exactly as it was sampled. Raises ProgramError with file and line.
 
-    Read in blocks, so that a long program is never in memory as text. Refused are: what is no program, an unknown
-    format version, a header with a key missing or wrong, a truncated file, a wrong number of columns or rows, NaN, and
-    rows whose time is not k · period.
+    Read in blocks, so that a long program is never in memory as text. Errors are: not a program, an unknown format
+    version, a header with a missing or wrong key, a truncated file, a wrong number of columns or rows, NaN, and rows
+    whose time is not k · period.
     """
     file = Path(path)
     with _opened(file) as source:
         header, first_line = _header(source, file)
-        legs = read_rows(source, header.rows, times_of(header.period), first_line, file)
+        legs = read_rows(source, header.rows, TimeCheck(header.period, _time_decimals(header.period)), first_line, file)
     return header.program(legs)
 
 
 def read_header(path: str | Path) -> Header:
-    """Return what stands before the rows of a program file. Raises ProgramError with file and line."""
+    """Return the header of a program file. Raises ProgramError with file and line."""
     file = Path(path)
     with _opened(file) as source:
         return _header(source, file)[0]
@@ -64,21 +64,16 @@ def _pieces(program: Program) -> Iterator[bytes]:
     decimals = _time_decimals(program.period)
     row = f"%.{decimals}f" + f",%.{MM_DECIMALS}f" * program.legs.shape[1] + "\n"
     yield (header_text(program) + COLUMNS + "\n").encode()
-    for start in range(0, len(program.legs), _CHUNK):
-        legs = to_millimetres(program.legs[start : start + _CHUNK])
+    for start in range(0, len(program.legs), ROWS_AT_ONCE):
+        legs = to_millimetres(program.legs[start : start + ROWS_AT_ONCE])
         times = np.arange(start, start + len(legs)) * program.period
         table = np.column_stack([times, legs])
         yield ((row * len(table)) % tuple(table.ravel().tolist())).encode()
 
 
 def _time_decimals(period: float) -> int:
-    """Return 6 where the period is a whole number of microseconds, else 9: enough to number the rows."""
+    """Return 6 decimals for a period of whole microseconds, else 9: enough to number the rows."""
     return 6 if abs(period * 1e6 - round(period * 1e6)) < 1e-9 else 9
-
-
-def times_of(period: float) -> TimeCheck:
-    """Return how the times of a program with this period are written."""
-    return TimeCheck(period, _time_decimals(period))
 
 
 @contextmanager
@@ -94,24 +89,24 @@ def _opened(file: Path) -> Generator[BufferedReader]:
 
 
 def _header(source: BufferedReader, file: Path) -> tuple[Header, int]:
-    """Return the header and the line number of the first row, where the source then stands."""
+    """Return the header and the line number of the first row, which is read next."""
     lines: list[str] = []
-    line = source.readline(_LONGEST)
+    line = source.readline(LONGEST_LINE)
     if not line.startswith(b"#"):
-        if not line.strip() and not source.read(_LONGEST).strip():
+        if not line.strip() and not source.read(LONGEST_LINE).strip():
             raise ProgramError("the file is empty", file=file, expected="a pentapod program")
         raise ProgramError("not a pentapod program", file=file, line=1, expected=f"# {MAGIC} = {FORMAT_VERSION}")
     while line.startswith(b"#"):
-        if len(line) >= _LONGEST or len(lines) >= _MOST_LINES:
+        if len(line) >= LONGEST_LINE or len(lines) >= MOST_LINES:
             what = "the header is longer than any"
-            raise ProgramError(what, file=file, line=len(lines) + 1, expected=f"at most {_MOST_LINES} lines")
+            raise ProgramError(what, file=file, line=len(lines) + 1, expected=f"at most {MOST_LINES} lines")
         if not line.endswith(b"\n"):
             raise ProgramError("the file ends within the header", file=file, line=len(lines) + 1)
         try:
             lines.append(line[:-1].decode())
         except UnicodeDecodeError as error:
             raise ProgramError("not a pentapod program: not UTF-8 text", file=file, line=len(lines) + 1) from error
-        line = source.readline(_LONGEST)
+        line = source.readline(LONGEST_LINE)
     header = parse_header(lines, file)
     names = line.decode(errors="replace").rstrip("\r\n")
     if names != COLUMNS:

@@ -1,9 +1,10 @@
-"""The rows of a program file, block by block: numbers by NumPy's text parser, and the first bad row by name."""
+"""Reader of the rows of a program file, block by block, by NumPy's text parser; errors name the first bad row."""
 
 from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BufferedReader
 from pathlib import Path
@@ -18,7 +19,7 @@ from pentapod.program.resolution import LARGEST_M, from_millimetres
 COLUMNS = "time_s,leg1_mm,leg2_mm,leg3_mm,leg4_mm,leg5_mm"
 _NAMES = COLUMNS.split(",")
 _WIDTH = len(_NAMES)
-_BLOCK = 1 << 22  # bytes
+BLOCK_BYTES = 1 << 22
 _SHORTEST = len("0,1,1,1,1,1\n")
 _PLAIN = b"0123456789+-.eE,\n\r"
 _TO_COMMAS = bytes.maketrans(b"\n", b",")
@@ -26,19 +27,19 @@ _TO_COMMAS = bytes.maketrans(b"\n", b",")
 
 @dataclass(frozen=True)
 class TimeCheck:
-    """Row k is due at k · period seconds, written with so many decimals and no more."""
+    """Row k has the time k · period seconds, written with so many decimals and no more."""
 
     period: float
     decimals: int
 
     def check(self, times: Floats, row: int, first_line: int, file: Path) -> None:
-        """Raise ProgramError at the first row whose time is not its own, to half a unit of the last digit.
+        """Raise ProgramError at the first row whose time is wrong by more than half a unit of the last digit.
 
-        times (n,): of the rows from `row` on; first_line: of the first row of all.
+        times (n,): of the rows from `row` on; first_line: line number of the first row of the file.
         """
         expected = np.arange(row, row + len(times)) * self.period
         tolerance = 0.51 * 10.0**-self.decimals + 1e-12 * expected
-        # More digits than are written would hide another period behind the rounding.
+        # More digits than are written could hide another period within the rounding.
         units = times * 10.0**self.decimals
         wrong = (np.abs(times - expected) > tolerance) | (np.abs(units - np.rint(units)) > 1e-6 + 1e-15 * np.abs(units))
         if not wrong.any():
@@ -54,24 +55,23 @@ class TimeCheck:
             what = f"{round(steps) - 1} rows are missing before this one"
         else:
             what = "the time is not a multiple of the period"
-        raise ProgramError(
-            what,
-            file=file,
-            line=first_line + row + k,
-            value=float(times[k]),
-            expected=f"{expected[k]:.9g} s",
-        )
+        line, value = first_line + row + k, float(times[k])
+        raise ProgramError(what, file=file, line=line, value=value, expected=f"{expected[k]:.9g} s")
 
 
 def read_rows(source: BufferedReader, rows: int, times: TimeCheck, first_line: int, file: Path) -> Floats:
-    """Return leg lengths (rows, n_legs) in metres from where the source stands to its end. Raises ProgramError."""
+    """Return leg lengths (rows, n_legs) in metres from the source's position to its end. Raises ProgramError."""
     size = os.fstat(source.fileno()).st_size - source.tell()
     legs = np.empty((0, _WIDTH - 1))
     count, rest = 0, b""
-    while block := source.read(_BLOCK):
+    while block := source.read(BLOCK_BYTES):
         end = block.rfind(b"\n") + 1
         if not end:
-            what = f"a row of more than {len(block):,} bytes" if len(block) == _BLOCK else "the file ends within a row"
+            what = (
+                f"a row of more than {len(block):,} bytes"
+                if len(block) == BLOCK_BYTES
+                else "the file ends within a row"
+            )
             remedy = "it was truncated, or is no program"
             raise ProgramError(what, file=file, line=first_line + count, remedy=remedy)
         data, rest = rest + block[:end], block[end:]
@@ -79,7 +79,7 @@ def read_rows(source: BufferedReader, rows: int, times: TimeCheck, first_line: i
         times.check(table[:, 0], count, first_line, file)
         _check_lengths(table, first_line + count, file)
         if not count:
-            # A header may promise more rows than there are; a file that holds no row at all costs nothing.
+            # The header may give more rows than the file can hold: no memory for those.
             legs = np.empty((min(rows, size // _SHORTEST + 1), _WIDTH - 1))
         kept = max(0, min(len(table), len(legs) - count))
         legs[count : count + kept] = from_millimetres(table[:kept, 1:])
@@ -89,19 +89,16 @@ def read_rows(source: BufferedReader, rows: int, times: TimeCheck, first_line: i
     if count == 0:
         raise ProgramError("there are no rows", file=file, line=first_line, expected=f"{rows} rows")
     if count != rows:
-        raise ProgramError(
+        what, line = (
             "the number of rows is not that of the header: the file was truncated or rows were added",
-            file=file,
-            line=first_line + count - 1,
-            key="rows",
-            value=count,
-            expected=str(rows),
+            count - 1,
         )
+        raise ProgramError(what, file=file, line=first_line + line, key="rows", value=count, expected=str(rows))
     return legs
 
 
 def _table(data: bytes, first_line: int, file: Path) -> Floats:
-    """Return the numbers (n, 1 + n_legs) of whole lines; what is out of the ordinary is read, or named, row by row."""
+    """Return the numbers (n, 1 + n_legs) of whole lines: fast where they are plain, else row by row."""
     letters = np.frombuffer(data, np.uint8)
     ends = letters[np.flatnonzero((letters == ord(",")) | (letters == ord("\n")))]
     plain = not data.translate(None, _PLAIN) and data.count(b"\r") == data.count(b"\r\n")
@@ -109,46 +106,38 @@ def _table(data: bytes, first_line: int, file: Path) -> Floats:
         columns = ends.reshape(-1, _WIDTH)
         if (columns[:, -1] == ord("\n")).all() and (columns[:, :-1] == ord(",")).all():
             with warnings.catch_warnings():
-                warnings.simplefilter("error", DeprecationWarning)  # what it says of text that is no number
+                warnings.simplefilter("error", DeprecationWarning)  # raised for text that is not a number
                 try:
                     numbers = np.fromstring(data.translate(_TO_COMMAS, b"\r"), sep=",")
                 except (DeprecationWarning, ValueError):
                     numbers = np.empty(0)
             if numbers.size == columns.size and np.isfinite(numbers).all():
                 return numbers.reshape(-1, _WIDTH)
-    return _row_by_row(data, first_line, file)
+    lines = [line.decode(errors="replace") for line in data.split(b"\n")[:-1]]
+    return numbers_in(lines, _NAMES, ",", first_line, file)
 
 
-def _row_by_row(data: bytes, first_line: int, file: Path) -> Floats:
-    """Return the numbers (n, 1 + n_legs) of whole lines. Raises ProgramError at the first other row."""
+def numbers_in(lines: list[str], names: Sequence[str], separator: str, first_line: int, file: Path) -> Floats:
+    """Return the numbers (n, k) of a table's lines, row by row. Raises ProgramError at the first bad row."""
     table: list[list[float]] = []
-    for number, line in enumerate(data.split(b"\n")[:-1], start=first_line):
-        fields = line.split(b",")
-        if len(fields) != _WIDTH:
-            raise ProgramError(
-                "wrong number of columns", file=file, line=number, value=len(fields), expected=str(_WIDTH)
-            )
-        table.append([_number(field, name, number, file) for name, field in zip(_NAMES, fields, strict=True)])
+    for line, text in enumerate(lines, start=first_line):
+        cells = text.split(separator)
+        if len(cells) != len(names):
+            what, expected = "wrong number of columns", str(len(names))
+            raise ProgramError(what, file=file, line=line, value=len(cells), expected=expected)
+        row: list[float] = []
+        for name, cell in zip(names, cells, strict=True):
+            value = number_in(cell.strip())
+            if value is None:
+                raise ProgramError("not a finite number", file=file, line=line, key=name, value=cell.strip()[:40])
+            row.append(value)
+        table.append(row)
     return np.array(table)
-
-
-def _number(field: bytes, name: str, line: int, file: Path) -> float:
-    text = field.decode(errors="replace").strip()
-    value = number_in(text)
-    if value is None:
-        raise ProgramError("not a finite number", file=file, line=line, key=name, value=text[:40])
-    return value
 
 
 def _check_lengths(table: Floats, first_line: int, file: Path) -> None:
     wrong = (table[:, 1:] <= 0.0) | (table[:, 1:] > 1e3 * LARGEST_M)
     if wrong.any():
         row, leg = np.argwhere(wrong)[0]
-        raise ProgramError(
-            "a leg length that no machine has",
-            file=file,
-            line=first_line + int(row),
-            key=_NAMES[leg + 1],
-            value=float(table[row, leg + 1]),
-            expected="between 0 and 10 km",
-        )
+        what, line, value = "a leg length that no machine has", first_line + int(row), float(table[row, leg + 1])
+        raise ProgramError(what, file=file, line=line, key=_NAMES[leg + 1], value=value, expected="between 0 and 10 km")

@@ -35,16 +35,16 @@ KEYS = (
     "rows",
 )
 GUIDES = "guides_mm"
-"""A key that only the programs of reconfigurable machines have."""
+"""Key of programs of reconfigurable machines."""
 WAYPOINTS, BOX = "setup_waypoints", "setup_box_mm"
-UNVERIFIED = "UNVERIFIED: no verdict has passed this program"
-"""The first line, behind the mark of a comment, of what was written for a controller without a passed verdict."""
 SETUP_KEYS = (WAYPOINTS, BOX)
-"""Keys that only the programs of several set-ups have."""
+"""Keys of programs of several set-ups."""
 MADE_ON = ("processor", "libraries")
-"""Keys that a program has which was planned: on another kind of processor or with other libraries bits may differ."""
+"""Keys of planned programs: on another kind of processor or with other libraries bits may differ."""
 OPTIONAL_KEYS = (GUIDES, *SETUP_KEYS, *MADE_ON)
-_MOST_COUNTED = 2**63
+UNVERIFIED = "UNVERIFIED: no verdict has passed this program"
+"""First line, after the comment mark, of files written for a controller without a passed verdict."""
+LARGEST_COUNT = 2**63 - 1
 _LINE = re.compile(r"# ([a-z0-9_]+) = (\S.*)")
 
 
@@ -62,41 +62,33 @@ class Header:
 
     def program(self, legs: Floats) -> Program:
         """Return the program of this header and its rows (N, n_legs), metres."""
-        return Program(
-            period=self.period,
-            legs=legs,
-            interpolation=self.interpolation,
-            component=self.component,
-            placement=self.placement,
-            provenance=self.provenance,
-            rail_positions=self.rail_positions,
-        )
+        before = (self.period, legs, self.interpolation)
+        return Program(*before, self.component, self.placement, self.provenance, self.rail_positions)
 
 
 def header_text(program: Program) -> str:
     """Return the header lines of a program, each ended by a newline."""
     source = program.provenance
-    values = (
-        str(FORMAT_VERSION),
-        _string(source.pentapod_version),
-        _string(source.machine),
-        _string(source.machine_digest),
-        _string(source.job_digest),
-        repr(float(program.period)),
-        _string(program.interpolation),
-        _string(str(program.component)),
-        _matrix(program.placement),
-        str(len(program.legs)),
-    )
-    lines = [f"# {UNVERIFIED}\n"] if source.unverified else []
-    lines += [f"# {key} = {value}\n" for key, value in zip(KEYS, values, strict=True)]
+    values = {
+        MAGIC: str(FORMAT_VERSION),
+        "pentapod_version": _string(source.pentapod_version),
+        "machine": _string(source.machine),
+        "machine_digest": _string(source.machine_digest),
+        "job_digest": _string(source.job_digest),
+        "period_s": repr(float(program.period)),
+        "interpolation": _string(program.interpolation),
+        "component": _string(str(program.component)),
+        "placement_mm": _matrix(program.placement),
+        "rows": str(len(program.legs)),
+    }
     if program.rail_positions is not None:
-        lines.append(f"# {GUIDES} = [{', '.join(_decimal(x, 3) for x in program.rail_positions)}]\n")
+        values[GUIDES] = f"[{', '.join(_decimal(x, 3) for x in program.rail_positions)}]"
     if source.piece is not None:
-        lines += [f"# {WAYPOINTS} = [{source.piece.first}, {source.piece.last}]\n", f"# {BOX} = {_box(source.piece)}\n"]
+        values |= {WAYPOINTS: f"[{source.piece.first}, {source.piece.last}]", BOX: _box(source.piece)}
     made_on = zip(MADE_ON, (source.processor, source.libraries), strict=True)
-    lines += [f"# {key} = {_string(value)}\n" for key, value in made_on if value]
-    return "".join(lines)
+    values |= {key: _string(value) for key, value in made_on if value}
+    mark = f"# {UNVERIFIED}\n" if source.unverified else ""
+    return mark + "".join(f"# {key} = {value}\n" for key, value in values.items())
 
 
 def parse_header(lines: list[str], file: Path) -> Header:
@@ -107,25 +99,24 @@ def parse_header(lines: list[str], file: Path) -> Header:
     for number, line in enumerate(lines[first - 1 :], start=first):
         entry = _entry(line)
         if number == first and (entry is None or entry[0] != MAGIC):
-            raise ProgramError(
-                "not a pentapod program", file=file, line=number, expected=f"# {MAGIC} = {FORMAT_VERSION}"
-            )
+            expected = f"# {MAGIC} = {FORMAT_VERSION}"
+            raise ProgramError("not a pentapod program", file=file, line=number, expected=expected)
         if entry is None:
-            value = line.strip()[:80]
-            expected = "# key = value, with one key and nothing else"
+            value, expected = line.strip()[:80], "# key = value, with one key and nothing else"
             raise ProgramError("cannot read this header line", file=file, line=number, value=value, expected=expected)
         key, value = entry
         if key in values:
-            raise ProgramError("this key stands in the header twice", file=file, line=number, key=key)
+            raise ProgramError("this key is in the header twice", file=file, line=number, key=key)
         values[key], places[key] = value, number
         # True and 1.0 equal 1, but no version is written like that.
         if key == MAGIC and (type(value) is not int or value != FORMAT_VERSION):
             shown, known = str(value)[:80], str(FORMAT_VERSION)
             raise ProgramError("unknown format version", file=file, line=number, key=key, value=shown, expected=known)
         if key not in (*KEYS, *OPTIONAL_KEYS):
-            remedy = "it is no key of this format version: a newer pentapod wrote the file, or it was edited"
+            remedy = "not a key of this format version: a newer pentapod wrote the file, or it was edited"
             raise ProgramError("unknown key in the header", file=file, line=number, key=key, remedy=remedy)
-    for key in KEYS:
+    setup = SETUP_KEYS if any(key in values for key in SETUP_KEYS) else ()
+    for key in (*KEYS, *setup):
         if key not in values:
             raise ProgramError("the header lacks this key", file=file, key=key, remedy="plan the job again")
     return _Reader(values, places, file, unverified).header()
@@ -137,7 +128,7 @@ def _entry(line: str) -> tuple[str, Any] | None:
     if not parts:
         return None
     try:
-        # In brackets that end behind it a second key, a comment and a second value do not pass for a part of the value.
+        # As an entry of a list, so that a second key, a comment or a second value is not read as a part of the value.
         alone = tomllib.loads(f"x = {parts[2]}", parse_float=Decimal)
         between = tomllib.loads(f"x = [{parts[2]}]", parse_float=Decimal)["x"]
     except (ValueError, ArithmeticError, RecursionError):  # not TOML, a number too large, nested too deep
@@ -171,84 +162,65 @@ class _Reader:
             rail_positions=self._rail_positions(),
         )
 
-    def _wrong(self, key: str, expected: str) -> ProgramError:
-        value = self.values[key]
-        shown = float(value) if isinstance(value, Decimal) else value
-        return ProgramError("bad value", file=self.file, line=self.places[key], key=key, value=shown, expected=expected)
+    def _check(self, key: str, holds: bool, expected: str) -> None:
+        if not holds:
+            value = self.values[key]
+            shown = float(value) if isinstance(value, Decimal) else value
+            line = self.places[key]
+            raise ProgramError("bad value", file=self.file, line=line, key=key, value=shown, expected=expected)
 
     def _text(self, key: str) -> str:
-        if not isinstance(self.values[key], str):
-            raise self._wrong(key, "a string")
+        self._check(key, isinstance(self.values[key], str), "a string")
         return self.values[key]
 
     def _one_of(self, key: str, known: tuple[str, ...]) -> str:
-        if self.values[key] not in known:
-            raise self._wrong(key, " or ".join(f'"{name}"' for name in known))
+        self._check(key, self.values[key] in known, " or ".join(f'"{name}"' for name in known))
         return self.values[key]
 
     def _period(self) -> float:
         period = _number(self.values["period_s"])
-        if not (period > 0.0 and math.isfinite(period)):
-            raise self._wrong("period_s", "a positive number of seconds")
+        self._check("period_s", 0.0 < period < math.inf, "a positive number of seconds")
         return period
 
     def _rail_positions(self) -> tuple[float, ...] | None:
         if GUIDES not in self.values:
             return None
-        given = self.values[GUIDES]
-        rail_positions = (
-            [_number(entry, shift=-3) for entry in cast("list[Any]", given)] if isinstance(given, list) else []
-        )
-        if len(rail_positions) != FiveLegs.n_legs or not all(map(math.isfinite, rail_positions)):
-            raise self._wrong(GUIDES, "five numbers of mm, one for each guide")
-        return tuple(rail_positions)
+        positions = tuple(_number(entry, shift=-3) for entry in _list(self.values[GUIDES]))
+        good = len(positions) == FiveLegs.n_legs and all(map(math.isfinite, positions))
+        self._check(GUIDES, good, "five numbers of mm, one for each guide")
+        return positions
 
     def _piece(self) -> Piece | None:
-        present = [key for key in SETUP_KEYS if key in self.values]
-        if not present:
+        if WAYPOINTS not in self.values:
             return None
-        if len(present) < len(SETUP_KEYS):
-            missing = next(key for key in SETUP_KEYS if key not in self.values)
-            raise ProgramError("the header lacks this key", file=self.file, key=missing, remedy="plan the job again")
-        pair, corners = self.values[WAYPOINTS], self.values[BOX]
-        if not isinstance(pair, list) or [type(k) for k in cast("list[Any]", pair)] != [int, int]:
-            raise self._wrong(WAYPOINTS, "the first and the last waypoint")
-        if max(map(abs, cast("list[int]", pair))) >= _MOST_COUNTED:
-            raise self._wrong(WAYPOINTS, "the first and the last waypoint")
+        pair, corners = _list(self.values[WAYPOINTS]), _list(self.values[BOX])
+        good = [type(k) for k in pair] == [int, int] and max(map(abs, pair)) <= LARGEST_COUNT
+        self._check(WAYPOINTS, good, "the first and the last waypoint")
         expected = "two opposite corners, [[x, y, z], [x, y, z]]"
-        if not isinstance(corners, list) or [_length(c) for c in cast("list[Any]", corners)] != [3, 3]:
-            raise self._wrong(BOX, expected)
-        low, high = ([_bound(entry) for entry in corner] for corner in corners)
+        self._check(BOX, [len(_list(corner)) for corner in corners] == [3, 3], expected)
+        low, high = ((_bound(x), _bound(y), _bound(z)) for x, y, z in corners)
         try:
-            return Piece(pair[0], pair[1], (low[0], low[1], low[2]), (high[0], high[1], high[2]))
-        except ToolpathError as error:
-            raise self._wrong(BOX, f"{expected}, and waypoints that rise") from error
+            return Piece(pair[0], pair[1], low, high)
+        except ToolpathError:
+            self._check(BOX, False, f"{expected}, and increasing waypoints")
+            raise
 
     def _rows(self) -> int:
         rows = self.values["rows"]
-        if type(rows) is not int or not 2 <= rows < _MOST_COUNTED:
-            raise self._wrong("rows", "a count of at least 2")
+        self._check("rows", type(rows) is int and 2 <= rows <= LARGEST_COUNT, "a count of at least 2")
         return rows
 
     def _placement(self) -> RigidTransform:
         expected = "a rigid 4x4 matrix, translation in mm"
-        matrix = np.full((4, 4), np.nan)
-        rows: Any = self.values["placement_mm"]
-        if not isinstance(rows, list) or [len(r) if isinstance(r, list) else 0 for r in rows] != [4, 4, 4, 4]:
-            raise self._wrong("placement_mm", expected)
-        for k, row in enumerate(rows):
-            for j, entry in enumerate(row):
-                matrix[k, j] = _number(entry, shift=-3 if j == 3 and k < 3 else 0)
+        rows = [_list(row) for row in _list(self.values["placement_mm"])]
+        self._check("placement_mm", [len(row) for row in rows] == [4, 4, 4, 4], expected)
+        shift = [[-3 if j == 3 and k < 3 else 0 for j in range(4)] for k in range(4)]
+        matrix = [[_number(x, n) for x, n in zip(row, by, strict=True)] for row, by in zip(rows, shift, strict=True)]
         try:
-            return RigidTransform.from_matrix(matrix)
+            return RigidTransform.from_matrix(np.array(matrix))
         except ArrayError as error:
-            raise ProgramError(
-                error.what,
-                file=self.file,
-                line=self.places["placement_mm"],
-                key="placement_mm",
-                expected=expected,
-            ) from error
+            key, line = "placement_mm", self.places["placement_mm"]
+            raise ProgramError(error.what, file=self.file, line=line, key=key, expected=expected) from error
 
 
 def _number(value: Any, shift: int = 0) -> float:
@@ -262,8 +234,9 @@ def _number(value: Any, shift: int = 0) -> float:
     return float(exact.scaleb(shift)) if exact.adjusted() > -400 else 0.0
 
 
-def _length(value: Any) -> int:
-    return len(cast("list[Any]", value)) if isinstance(value, list) else 0
+def _list(value: Any) -> list[Any]:
+    """Return a list as it is, and an empty one for anything else."""
+    return cast("list[Any]", value) if isinstance(value, list) else []
 
 
 def _bound(value: Any) -> float:
@@ -284,11 +257,8 @@ def _string(text: str) -> str:
 
 def _matrix(placement: RigidTransform) -> str:
     shifts = [[3 if j == 3 and k < 3 else 0 for j in range(4)] for k in range(4)]
-    rows = (
-        "[" + ", ".join(_decimal(float(x), n) for x, n in zip(row, shift, strict=True)) + "]"
-        for row, shift in zip(placement.matrix, shifts, strict=True)
-    )
-    return "[" + ", ".join(rows) + "]"
+    rows = (", ".join(map(_decimal, row.tolist(), shift)) for row, shift in zip(placement.matrix, shifts, strict=True))
+    return "[" + ", ".join(f"[{row}]" for row in rows) + "]"
 
 
 def _box(piece: Piece) -> str:

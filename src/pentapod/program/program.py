@@ -23,11 +23,10 @@ FORMAT_VERSION = 1
 
 @dataclass(frozen=True)
 class Provenance(Value):
-    """What a program was made from: names and hashes, as they stand in its header.
+    """What a program was made from: names and hashes of its header.
 
-    piece: of the toolpath, where the program is one of several set-ups. processor, libraries: on which it was made; the
-    same of both give the same bits.
-    unverified: it was written for a controller though no verdict has passed it.
+    piece: of the toolpath, where the program is one of several set-ups. processor, libraries: with which it was made;
+    with the same ones it is the same to the bit. unverified: it was written for a controller without a passed verdict.
     """
 
     machine: str
@@ -44,10 +43,9 @@ class Provenance(Value):
 class Program(Result):
     """Setpoints for the legs.
 
-    legs (N, n_legs): lengths in metres, row k is due at k · period seconds. interpolation: how the controller
-    moves between rows: "linear", or "cubic": the C2 cubic spline through the rows with zero end
-    velocities. component: in which the motion must stay. placement: workpiece → machine. rail_positions: where the
-    guides of a reconfigurable machine stand, metres; None for other machines.
+    legs (N, n_legs): lengths in metres; row k has the time k · period seconds. interpolation: of the controller between
+    rows, "linear", or "cubic": the C2 cubic spline with zero end velocities. component: in which the motion must stay.
+    placement: workpiece → machine. rail_positions: of the guides of a reconfigurable machine, metres; None for others.
     """
 
     summary = ("duration",)
@@ -68,7 +66,7 @@ class Program(Result):
             raise ProgramError("the period must be positive", value=self.period)
 
     def machine(self, machine: Machine) -> Machine:
-        """Return a machine as the program wants it: its guides where they are to stand. Raises MachineError."""
+        """Return a machine with its guides at the positions of the program. Raises MachineError."""
         return machine if self.rail_positions is None or machine.guides is None else machine.at(self.rail_positions)
 
     @cached_property
@@ -82,13 +80,13 @@ class Program(Result):
         return (len(self.legs) - 1) * self.period
 
     def to_frame(self) -> Any:
-        """Return leg lengths by `time_s` as a pandas DataFrame, `leg1_mm` and so on. Raises InputError without it."""
+        """Return leg lengths `leg1_mm`, … by `time_s` as a pandas DataFrame. Raises InputError without pandas."""
         pandas = load_extra("pandas", "pandas", "frames need pandas", key="to_frame")
         names = [f"leg{leg}_mm" for leg in range(1, self.legs.shape[1] + 1)]
         return pandas.DataFrame(to_millimetres(self.legs), pandas.Index(self.times, name="time_s"), names)
 
     def _repr_html_(self) -> str:
-        """Return what notebooks show: how long it is, how it is played, and what it was made from."""
+        """Return the HTML for notebooks: duration, interpolation and provenance."""
         low, high = to_millimetres(self.legs).min(axis=0), to_millimetres(self.legs).max(axis=0)
         ranges = ", ".join(f"{a:.3f} to {b:.3f}" for a, b in zip(low, high, strict=True))
         rows = (

@@ -1,9 +1,8 @@
-"""The resolution of leg lengths in programs: a whole number of hundred-millionths of a millimetre.
+"""Resolution of leg lengths in programs: 1e-8 mm.
 
-A length is a count k of quanta, k · 1e-8 mm. In memory it is the float nearest to k · 1e-11 m, in a file the
-decimal digits of k: so what was sampled, what is written and what is read back are the same bits. The
-quantum is that fine because controllers and the verdict take second differences: at a period of 0.1 ms
-half a quantum is 0.002 m/s².
+A length is a count k of quanta of 1e-8 mm. In memory it is the float nearest to k · 1e-11 m, in a file the decimal
+digits of k, so sampled, written and read lengths are the same bits. The quantum is that small because controllers and
+the verdict take second differences: at a period of 0.1 ms half a quantum is 0.002 m/s².
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from pentapod.machine.rounding import QUANTA_PER_M
 QUANTA_PER_MM = 1e8
 MM_DECIMALS = 8
 LARGEST_M = 10_000.0
-"""Beyond it counts come near 2^53 and would no longer be exact."""
+"""Beyond it counts approach 2^53 and are no longer exact."""
 
 
 def quantised(legs: ArrayLike) -> Floats:

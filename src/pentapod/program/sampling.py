@@ -1,4 +1,4 @@
-"""From a trajectory to setpoints."""
+"""Sampling of a trajectory at the controller's period, which gives the program."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pentapod.program.program import Program, Provenance
 from pentapod.program.resolution import quantised
 from pentapod.timing.time_law.trajectory import Trajectory
 
-_CHUNK = 100_000
+ROWS_AT_ONCE = 100_000
 
 
 @stage
@@ -31,21 +31,20 @@ def sample(
 ) -> Program:
     """Return the program: the trajectory at the controller's period, at the resolution of program files.
 
-    `retime` gives trajectories that last a whole number of the machine's periods; of any other the last
-    row is the end point, reached within the last period. placement: what `plan` returned; or workpiece → machine, and
-    the component with it. provenance: without it the program names the machine and no job. Raises InputError where the
-    component is missing.
+    The duration of trajectories of `retime` is a whole number of periods; of any other the last row is the end point,
+    reached within the last period. placement: the result of `plan`; or workpiece → machine, together with the
+    component. provenance: by default the machine and no job. Raises InputError where the component is missing.
     """
     if not isinstance(placement, RigidTransform):
         placed = placement.unwrap()
         placement, component = placed.placement.transform, component or placed.component
     if component is None:
-        raise InputError("a placement alone does not say the component", key="component", expected="a Component")
+        raise InputError("a placement alone has no component", key="component", expected="a Component")
     period = machine.controller.period
     count = max(1, math.ceil(trajectory.duration / period - 1e-6))
     times = np.minimum(np.arange(count + 1) * period, trajectory.duration)
     times[-1] = trajectory.duration
-    legs: list[Floats] = [trajectory(times[k : k + _CHUNK]) for k in range(0, len(times), _CHUNK)]
+    legs: list[Floats] = [trajectory(times[k : k + ROWS_AT_ONCE]) for k in range(0, len(times), ROWS_AT_ONCE)]
     made_on = (processor_kind(), library_versions())
     return Program(
         period=period,

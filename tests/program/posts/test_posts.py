@@ -220,11 +220,11 @@ def test_posts_that_are_none(others):
 def test_a_coarse_table_says_what_it_loses(tmp_path):
     coarse = table_post("coarse", "", Table({"a.txt": leg_columns("L{leg}", "length", "mm", 3)}))
     assert coarse.loses == {"digits"}
-    with pytest.raises(InputError, match="in none of the files"):
+    with pytest.raises(InputError, match="length of a leg is missing"):
         Table({"a.txt": leg_columns("L{leg}", "length", "mm", 3)[:4]})
     with pytest.raises(InputError, match="unknown unit"):
         Column("t", "time", "mm", 3)
-    with pytest.raises(InputError, match="which leg"):
+    with pytest.raises(InputError, match="wrong leg"):
         Column("t", "length", "mm", 3)
 
 

@@ -58,7 +58,7 @@ def test_a_failed_program_is_refused(name, folder, capsys):
 @pytest.mark.parametrize(
     ("verdict", "words"),
     [
-        (None, "nothing says that this program was judged"),
+        (None, "there is no verdict on this program"),
         (b"{", "not a verdict, or a broken one"),
         (b"[" * 100_000, "not a verdict, or a broken one"),
         (b"[1]", "not a verdict"),
@@ -149,7 +149,7 @@ def test_who_insists_gets_files_that_say_so(name, tmp_path):
 
 @pytest.mark.parametrize("name", WITHOUT_COMMENTS)
 def test_what_has_no_comments_is_not_written_unverified(name, tmp_path):
-    with pytest.raises(InputError, match="no place to say that the program is unverified"):
+    with pytest.raises(InputError, match="no comments to say that the program is unverified"):
         write_post(given(duration=0.1), name, tmp_path / "x", unverified=True)
     assert not (tmp_path / "x").exists()
 
@@ -200,7 +200,7 @@ def test_the_mark_is_nowhere_else(tmp_path):
 
 def test_python_says_it_by_an_argument(tmp_path):
     what = given(duration=0.1)
-    with pytest.raises(InputError, match=r"verdict: nothing says.*unverified=True"):
+    with pytest.raises(InputError, match=r"verdict: there is no verdict.*unverified=True"):
         write_post(what, "pvt", tmp_path / "x")
     with pytest.raises(InputError, match="about another file"):
         write_post(what, "pvt", tmp_path / "x", verdict=passed(jumping(what.program)))

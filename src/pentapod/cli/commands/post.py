@@ -66,8 +66,8 @@ def post(
     from pentapod.base.files import sha256_of
     from pentapod.job.artefacts import ARRAYS, VERDICT
     from pentapod.program import read_csv
-    from pentapod.program.judged import check_passed
     from pentapod.program.posts import PostInput, find_post, placed_toolpath, write_post
+    from pentapod.program.posts.verified import check_passed
 
     takes_toolpath = find_post(name).takes_toolpath  # an unknown format fails at once
     note_changes(program.parent)

@@ -1,4 +1,4 @@
-"""Posts: a program as controllers and other programs take it; writer and reader of a format in one file."""
+"""Posts: files of a program for controllers and other software; writer and reader of a format in one file."""
 
 from pentapod.program.posts import csv, drives, hdf5, linuxcnc, npz, ros, toolpaths
 from pentapod.program.posts.registry import (

@@ -1,4 +1,4 @@
-"""Tables for drives: cubic segments (PVT), cam tables, and the streamer of LinuxCNC's HAL. All of it data."""
+"""Tables for drives: cubic segments (PVT), cam tables, and LinuxCNC's halstreamer."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CAM = register(
     table_post(
         "cam",
         "cam tables as Beckhoff's, one for each leg: equidistant master (time in ms) and slave (mm)",
-        # Cam tables hold numbers alone: master and slave, a tab between them.
+        # Cam tables hold numbers only: master and slave, separated by a tab.
         Table(
             {f"cam_leg{length.leg}.txt": (Column("master_ms", "time", "ms", 6), length) for length in _LENGTHS},
             separator="\t",

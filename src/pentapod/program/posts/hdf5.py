@@ -20,8 +20,9 @@ from pentapod.program.program import Program
 from pentapod.program.resolution import to_millimetres
 
 _FILE = "program.h5"
-_MOST_SECONDS, _TOO_LARGE = 8, 4  # of computing; the code with which the process below says so
-_MOST_MEMORY = 2 * MOST_UNPACKED + 2_000_000_000  # the array, its copy as it is written, and the libraries
+MOST_SECONDS = 8  # of computing
+TOO_LARGE = 4  # exit code of the process below
+MOST_MEMORY = 2 * MOST_UNPACKED + 2_000_000_000  # bytes: the array, its copy as it is written, and the libraries
 _CHILD = """
 import sys
 import h5py
@@ -60,22 +61,23 @@ def _write(given: PostInput) -> dict[str, bytes]:
 
 
 def _read(folder: Path) -> Program:
-    """Return the program. The library runs in a process of its own: there are files with which it does not end."""
+    """Return the program. h5py runs in a process of its own, because there are files for which it does not end."""
     file = folder / _FILE
     _h5py()
     read_bytes(file, ProgramError, "an HDF5 file")
     with tempfile.TemporaryDirectory() as place:
         unpacked = Path(place) / "arrays.npz"
-        limits = [str(MOST_UNPACKED), str(_MOST_SECONDS), str(_MOST_MEMORY)]
+        limits = [str(MOST_UNPACKED), str(MOST_SECONDS), str(MOST_MEMORY)]
         command = [sys.executable, "-c", _CHILD, str(file), str(unpacked), *limits]
         try:
-            done = subprocess.run(command, capture_output=True, check=False, timeout=12 * _MOST_SECONDS)
-        except subprocess.TimeoutExpired as error:
-            raise ProgramError("not an HDF5 file of a program, or a broken one", file=file) from error
-        if done.returncode == _TOO_LARGE:
+            done = subprocess.run(command, capture_output=True, check=False, timeout=12 * MOST_SECONDS)
+            code = done.returncode
+        except subprocess.TimeoutExpired:
+            code = None
+        if code == TOO_LARGE:
             expected = f"at most {MOST_UNPACKED / 1e6:,.0f} MB unpacked"
             raise ProgramError("the array is too large", file=file, key="legs_mm", expected=expected)
-        if done.returncode or not unpacked.exists():
+        if code != 0 or not unpacked.exists():
             raise ProgramError("not an HDF5 file of a program, or a broken one", file=file)
         arrays = read_arrays(unpacked, ("header", "legs_mm"), ProgramError)
     return of_archive(arrays["header"], arrays["legs_mm"], file)

@@ -1,4 +1,4 @@
-"""How the legs move between a program's rows: velocities and accelerations of the spline through them."""
+"""Motion of the legs between a program's rows: velocities and accelerations of the spline through them."""
 
 from __future__ import annotations
 
@@ -13,28 +13,24 @@ from pentapod.program.program import Program
 def velocities(program: Program) -> Floats:
     """Return leg velocities (N, n_legs) in m/s at the rows: of the C2 cubic spline through them, from rest to rest.
 
-    Drives that join positions and velocities by cubics follow that spline. Where the controller of the
-    machine joins the rows by straight lines there is no velocity at a row; the spline is the smooth curve nearest by.
+    Drives that interpolate positions and velocities by cubics follow that spline. With linear interpolation there is no
+    velocity at a row; then the spline is the smooth curve closest to the program.
     """
-    return _spline(program).first
+    return Interpolant.through(program.legs, program.period, "cubic").first
 
 
 def accelerations(program: Program) -> Floats:
     """Return leg accelerations (N, n_legs) in m/s² at the rows, of the same spline."""
-    return _spline(program).second
+    return Interpolant.through(program.legs, program.period, "cubic").second
 
 
 def lengths_at(program: Program, times: ArrayLike) -> Floats:
-    """Return leg lengths (M, n_legs) in metres at any times (M,) in seconds, joined as the program says."""
+    """Return leg lengths (M, n_legs) in metres at times (M,) in seconds, by the interpolation of the program."""
     joined = Interpolant.through(program.legs, program.period, program.interpolation)
     exact = np.asarray(times, dtype=np.float64) / program.period
     k = np.clip(np.floor(exact).astype(np.intp), 0, len(program.legs) - 2)
     values, t = joined.bernstein[k], np.clip(exact - k, 0.0, 1.0)[:, None]
-    # De Casteljau: stable, and the ends are met exactly.
+    # De Casteljau's algorithm: stable, and exact at the ends.
     while values.shape[-1] > 1:
         values = values[..., :-1] + t[..., None] * np.diff(values, axis=-1)
     return values[..., 0]
-
-
-def _spline(program: Program) -> Interpolant:
-    return Interpolant.through(program.legs, program.period, "cubic")

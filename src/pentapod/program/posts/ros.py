@@ -1,8 +1,8 @@
-"""ROS 2: a trajectory_msgs/JointTrajectory as JSON or YAML; metres and seconds, as ROS has it.
+"""ROS 2: a trajectory_msgs/JointTrajectory as JSON or YAML, in metres and seconds.
 
-With cubic interpolation each point has velocity and acceleration too: the quintics by which ROS controllers join
-such points are then the program's own cubics. With linear interpolation it has positions alone.
-The YAML is in flow style behind comments that hold the header; the JSON has its header in a file beside.
+With cubic interpolation each point has velocity and acceleration too: then the quintics with which ROS controllers
+interpolate are the program's own cubics. With linear interpolation it has positions only. The YAML begins with the
+header as comments, then flow style; the header of the JSON is a file of its own.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from pentapod.base.errors import ProgramError
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.program.header import UNVERIFIED, Header, header_text
 from pentapod.program.posts.motion import accelerations, velocities
-from pentapod.program.posts.registry import Post, PostInput, read_file, register
-from pentapod.program.posts.rows import check_legs, check_rows, header_of
+from pentapod.program.posts.registry import Post, PostInput, register
+from pentapod.program.posts.rows import check_legs, check_rows, header_of, read_file
 from pentapod.program.posts.tables import SIDECAR
 from pentapod.program.program import Program
 
 Style = Literal["json", "yaml"]
 _STEM = "joint_trajectory"
 _LEGS = [f"leg{leg}" for leg in range(1, 6)]
-_NANO = 1_000_000_000
+NANOSECONDS = 1_000_000_000  # in a second
 
 
 def _write(given: PostInput, style: Style) -> dict[str, bytes]:
@@ -46,7 +46,7 @@ def _message(program: Program) -> str:
     texts = {name: _lists(values, digits) for name, (values, digits) in columns.items()}
     points: list[str] = []
     for k in range(len(program.legs)):
-        seconds, nanoseconds = divmod(round(k * program.period * _NANO), _NANO)
+        seconds, nanoseconds = divmod(round(k * program.period * NANOSECONDS), NANOSECONDS)
         fields = "".join(f'"{name}": {rows[k]}, ' for name, rows in texts.items())
         points.append(f'{{{fields}"time_from_start": {{"sec": {seconds}, "nanosec": {nanoseconds}}}}}')
     frame = json.dumps(UNVERIFIED if program.provenance.unverified else "")
@@ -76,9 +76,8 @@ def _read(folder: Path, style: Style) -> Program:
     except (KeyError, IndexError, TypeError, ValueError, ArithmeticError, RecursionError) as error:
         if isinstance(error, ProgramError):
             raise
-        raise ProgramError(
-            "not a JointTrajectory", file=file, value=str(error)[:80], remedy="write it anew: pentapod post"
-        ) from error
+        remedy = "write it again: pentapod post"
+        raise ProgramError("not a JointTrajectory", file=file, value=str(error)[:80], remedy=remedy) from error
 
 
 def _program(message: Any, header: Header, file: Path) -> Program:
@@ -87,23 +86,21 @@ def _program(message: Any, header: Header, file: Path) -> Program:
     points = message["points"]
     check_rows(len(points), header, file)
     stamps = [point["time_from_start"] for point in points]
-    if not all(
-        type(stamp[part]) is int and 0 <= stamp[part] < _NANO for stamp in stamps for part in ("sec", "nanosec")
-    ):
+    parts = [stamp[part] for stamp in stamps for part in ("sec", "nanosec")]
+    if not all(type(part) is int and 0 <= part < NANOSECONDS for part in parts):
         raise ProgramError("a time is not in whole seconds and nanoseconds", file=file, key="time_from_start")
-    times = np.array([stamp["sec"] * _NANO + stamp["nanosec"] for stamp in stamps])
-    wrong = np.abs(times - np.arange(len(points)) * header.period * _NANO) > 0.51
+    times = np.array([stamp["sec"] * NANOSECONDS + stamp["nanosec"] for stamp in stamps])
+    wrong = np.abs(times - np.arange(len(points)) * header.period * NANOSECONDS) > 0.51
     if wrong.any():
         row = int(np.argmax(wrong))
         raise ProgramError(
             f"the time is not a multiple of the period (point {row + 1})", file=file, key="time_from_start",
-            value=times[row] / _NANO, expected=f"{row * header.period:.9g} s",
+            value=times[row] / NANOSECONDS, expected=f"{row * header.period:.9g} s",
         )  # fmt: skip
     legs = np.array([point["positions"] for point in points], dtype=np.float64)
     if legs.shape != (shape := (len(points), FiveLegs.n_legs)):
-        raise ProgramError(
-            "not a position for each leg", file=file, key="positions", value=legs.shape, expected=str(shape)
-        )
+        what = "not a position for each leg"
+        raise ProgramError(what, file=file, key="positions", value=legs.shape, expected=str(shape))
     return header.program(check_legs(legs, file))
 
 

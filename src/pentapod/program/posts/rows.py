@@ -1,4 +1,4 @@
-"""What every reader of a post checks: the header, the number of rows, lengths that a machine can have."""
+"""Checks of every reader of a post: header, number of rows, leg lengths."""
 
 from __future__ import annotations
 
@@ -11,42 +11,39 @@ from numpy.typing import NDArray
 from pentapod.base.archives import check_array
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ProgramError
+from pentapod.base.files import read_bytes
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.program.header import Header, parse_header
 from pentapod.program.program import Program
 from pentapod.program.resolution import LARGEST_M, quantised
 
 
+def read_file(path: Path) -> bytes:
+    """Return the bytes of a file of a post. Raises ProgramError where it cannot be read."""
+    return read_bytes(path, ProgramError, "a file of this post")
+
+
 def header_of(lines: list[str], file: Path) -> Header:
     """Return the header in lines that begin with "#". Raises ProgramError with file and line, also for no lines."""
     if not lines:
-        raise ProgramError("there is no header", file=file, line=1, remedy="write the program anew")
+        raise ProgramError("there is no header", file=file, line=1, remedy="write the post again")
     return parse_header(lines, file)
 
 
 def check_rows(rows: int, header: Header, file: Path) -> None:
     """Raise ProgramError where the number of rows is not that of the header."""
     if rows != header.rows:
-        raise ProgramError(
-            "the number of rows is not that of the header: the file was cut off or rows were added",
-            file=file,
-            value=rows,
-            expected=str(header.rows),
-        )
+        what = "the number of rows is not that of the header: the file was cut off or rows were added"
+        raise ProgramError(what, file=file, value=rows, expected=str(header.rows))
 
 
 def check_legs(legs: Floats, file: Path) -> Floats:
-    """Return leg lengths (N, n), metres, at the resolution of programs. Raises ProgramError: no machine has one so."""
+    """Return leg lengths (N, n), metres, at the resolution of programs. Raises ProgramError for impossible ones."""
     wrong = ~((legs > 0.0) & (legs <= LARGEST_M))
     if wrong.any():
         row, leg = (int(k) for k in np.argwhere(wrong)[0])
-        raise ProgramError(
-            f"a leg length that no machine has (row {row + 1})",
-            file=file,
-            key=f"leg {leg + 1}",
-            value=float(legs[row, leg]),
-            expected="between 0 and 10 km",
-        )
+        what, value = f"a leg length that no machine has (row {row + 1})", float(legs[row, leg])
+        raise ProgramError(what, file=file, key=f"leg {leg + 1}", value=value, expected="between 0 and 10 km")
     return quantised(legs)
 
 

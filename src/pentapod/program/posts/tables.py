@@ -1,6 +1,6 @@
-"""Posts described by data: text tables, one row for each setpoint; columns, units and number format are given.
+"""Posts described as tables: one row for each setpoint, with given columns, units and number format.
 
-Another controller's table takes a few lines in a file of one's own, named by an entry point of the group
+The table of another controller takes a few lines in a package of one's own, named by an entry point of the group
 "pentapod.posts":
 
     POST = table_post("mine", "the drives of my machine", Table({
@@ -16,19 +16,19 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import takewhile
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError, ProgramError
-from pentapod.base.files import number_in
 from pentapod.base.values import Value
 from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.program.csv_rows import numbers_in
 from pentapod.program.header import Header, header_text
 from pentapod.program.posts.motion import velocities
-from pentapod.program.posts.registry import Post, PostInput, read_file
-from pentapod.program.posts.rows import check_legs, check_rows, header_of
+from pentapod.program.posts.registry import Post, PostInput
+from pentapod.program.posts.rows import check_legs, check_rows, header_of, read_file
 from pentapod.program.program import Program
 from pentapod.program.resolution import QUANTA_PER_M
 
@@ -39,20 +39,20 @@ UNITS: dict[Kind, dict[str, float]] = {
     "length": {"m": 1.0, "mm": 1e3, "um": 1e6, "inch": 1.0 / 0.0254},
     "velocity": {"m/s": 1.0, "mm/s": 1e3, "mm/min": 6e4, "um/s": 1e6},
 }
-"""How many of a unit make one of SI."""
+"""Units by kind, and how many make one SI unit."""
 
 LEGS = range(1, FiveLegs.n_legs + 1)
 """The numbers of the legs of a program file."""
 
 SIDECAR = "program.header"
-"""Holds the header where a table has no place for comments."""
+"""File with the header where a table has no comments."""
 
 
 @dataclass(frozen=True)
 class Column(Value):
     """A column: title, kind, unit, decimals; leg 1 to 5 for lengths and velocities.
 
-    Raises InputError for an unknown kind, a unit that the kind does not have, or a leg missing or too much.
+    Raises InputError for an unknown kind or unit, and where the leg is missing, or given for a time.
     """
 
     title: str
@@ -67,16 +67,16 @@ class Column(Value):
         if self.unit not in UNITS[self.kind]:
             raise InputError("unknown unit", key=self.title, value=self.unit, expected=", ".join(UNITS[self.kind]))
         if (self.leg is None) != (self.kind == "time") or self.leg not in (None, *LEGS):
-            raise InputError("which leg?", key=self.title, value=self.leg, expected="1 to 5, none for time")
+            raise InputError("wrong leg", key=self.title, value=self.leg, expected="1 to 5; none for a time")
 
     @property
     def factor(self) -> float:
-        """How many of the unit make one of SI."""
+        """How many of the unit make one SI unit."""
         return UNITS[self.kind][self.unit]
 
     @property
     def exact(self) -> bool:
-        """Whether a leg length at a program's resolution is written digit for digit."""
+        """Whether leg lengths at the resolution of programs are written without rounding."""
         quantum = self.factor / QUANTA_PER_M
         return quantum >= 0.999 * 10.0**-self.decimals and self.unit != "inch"
 
@@ -86,17 +86,16 @@ class Column(Value):
             return program.times * self.factor
         if self.kind == "velocity":
             return velocities(program)[:, self.leg - 1] * self.factor
-        # Counts of the resolution first: then the digits are those of the program, not of a product's rounding.
+        # From counts of the resolution, so that the digits are those of the program.
         return np.rint(program.legs[:, self.leg - 1] * QUANTA_PER_M) / (QUANTA_PER_M / self.factor)
 
 
 @dataclass(frozen=True)
 class Table(Value):
-    """What the files of a post look like: columns by file name, and how rows are written.
+    """The files of a post: columns by file name, and how rows are written.
 
-    comment: begins a line that the controller skips; there the header goes, without it into a file beside.
-    titles: whether a row of titles comes before the numbers. Every leg's length must be in one of the files.
-    Raises InputError where it is not.
+    comment: mark of lines that the controller skips, for the header; None: the header is a file of its own. titles:
+    whether a row of titles precedes the numbers. Raises InputError unless every leg's length is in one of the files.
     """
 
     files: Mapping[str, tuple[Column, ...]]
@@ -108,8 +107,8 @@ class Table(Value):
         legs = {c.leg for columns in self.files.values() for c in columns if c.kind == "length"}
         if legs != set(LEGS):
             raise InputError(
-                "a leg's length is in none of the files", key="files", value=sorted(x for x in legs if x),
-                expected="a column of length for each of the legs 1 to 5",
+                "the length of a leg is missing", key="files", value=sorted(x for x in legs if x),
+                expected="a length column for each of the legs 1 to 5",
             )  # fmt: skip
 
 
@@ -126,18 +125,15 @@ def table_post(name: str, about: str, table: Table) -> Post:
 
 
 def _write(given: PostInput, table: Table) -> dict[str, bytes]:
-    header = header_text(given.program)
-    files: dict[str, bytes] = {}
-    if table.comment is None:
-        files[SIDECAR] = header.encode()
+    header, mark = header_text(given.program), table.comment
+    files = {SIDECAR: header.encode()} if mark is None else {}
     for name, columns in table.files.items():
-        text = "" if table.comment is None else _marked(header, table.comment)
+        text = "" if mark is None else "".join(f"{mark}{line.removeprefix('#')}\n" for line in header.splitlines())
         if table.titles:
             text += table.separator.join(column.title for column in columns) + "\n"
         row = table.separator.join(f"%.{column.decimals}f" for column in columns) + "\n"
-        # Rounded first, so that no "-0.000" comes out.
-        values = [np.round(c.values(given.program), c.decimals) + 0.0 for c in columns]
-        numbers = np.column_stack(values)
+        # Rounded first, so that there is no "-0.000".
+        numbers = np.column_stack([np.round(c.values(given.program), c.decimals) + 0.0 for c in columns])
         files[name] = (text + (row * len(numbers)) % tuple(numbers.ravel().tolist())).encode()
     return files
 
@@ -152,19 +148,20 @@ def _read(folder: Path, table: Table) -> Program:
         check_rows(len(numbers), header, file)
         for column, values in zip(columns, numbers.T, strict=True):
             if column.leg is None:
-                _check_times(values, column, header, file)
+                expected = header.period * column.factor * np.arange(len(values), dtype=np.float64)
+                _check_close(values, expected, column, file, "the time is not a multiple of the period")
             elif column.kind == "length":
                 legs[column.leg] = values / column.factor
             else:
                 rates.append((file, column, values))
     program = header.program(check_legs(np.column_stack([legs[leg] for leg in LEGS]), folder))
     for file, column, values in rates:
-        _check_rates(values, column, program, file)
+        _check_close(values, column.values(program), column, file, "not the velocity of the spline through the rows")
     return program
 
 
 def _header(folder: Path, texts: Mapping[Path, list[str]], table: Table) -> tuple[Header, int]:
-    """Return the header, and how many lines of comments stand above the rows of each file.
+    """Return the header, and the number of comment lines above the rows of each file.
 
     Raises ProgramError where the files are not of one program.
     """
@@ -172,20 +169,16 @@ def _header(folder: Path, texts: Mapping[Path, list[str]], table: Table) -> tupl
         sidecar = folder / SIDECAR
         return header_of(read_file(sidecar).decode(errors="replace").splitlines(), sidecar), 0
     mark = table.comment
-    told = {file: list(takewhile(lambda text: text.startswith(mark), lines)) for file, lines in texts.items()}
-    first, above = next(iter(told.items()))
-    for file, lines in told.items():
+    headers = {file: list(takewhile(lambda text: text.startswith(mark), lines)) for file, lines in texts.items()}
+    first, above = next(iter(headers.items()))
+    for file, lines in headers.items():
         if lines != above:
-            raise ProgramError(f"the header is not that of {first.name}", file=file, remedy="write them anew together")
+            raise ProgramError(f"the header is not that of {first.name}", file=file, remedy="write the post again")
     return header_of(["#" + line.removeprefix(mark) for line in above], first), len(above)
 
 
-def _marked(header: str, comment: str) -> str:
-    return "".join(comment + line.removeprefix("#") + "\n" for line in header.splitlines())
-
-
 def _numbers(lines: list[str], columns: tuple[Column, ...], table: Table, file: Path, first: int) -> Floats:
-    """Return the numbers (N, columns) below the header; first: the line that they begin with."""
+    """Return the numbers (N, columns) below the header; first: number of their first line."""
     if table.titles:
         titles = table.separator.join(column.title for column in columns)
         if not lines or lines[0] != titles:
@@ -193,35 +186,18 @@ def _numbers(lines: list[str], columns: tuple[Column, ...], table: Table, file: 
         lines, first = lines[1:], first + 1
     text = "\n".join(lines)
     try:
-        numbers: Any = np.loadtxt(io.StringIO(text), delimiter=table.separator, comments=None, ndmin=2)
-        good = numbers.shape == (len(lines), len(columns)) and bool(np.isfinite(numbers).all())
+        numbers = np.loadtxt(io.StringIO(text), delimiter=table.separator, comments=None, ndmin=2)
     except ValueError:
-        numbers, good = None, False
-    if good:
-        return np.asarray(numbers, dtype=np.float64)
-    for line, row in enumerate(lines, start=first):
-        cells = row.split(table.separator)
-        if len(cells) != len(columns):
-            raise ProgramError(
-                "wrong number of columns", file=file, line=line, value=len(cells), expected=str(len(columns))
-            )
-        for column, cell in zip(columns, cells, strict=True):
-            if number_in(cell) is None:
-                raise ProgramError("not a finite number", file=file, line=line, key=column.title, value=cell[:40])
-    raise ProgramError("there are no rows", file=file, line=first)
-
-
-def _check_times(values: Floats, column: Column, header: Header, file: Path) -> None:
-    expected = header.period * column.factor * np.arange(len(values), dtype=np.float64)
-    _check_close(values, expected, column, file, "the time is not a multiple of the period")
-
-
-def _check_rates(values: Floats, column: Column, program: Program, file: Path) -> None:
-    _check_close(values, column.values(program), column, file, "not the velocity of the spline through the rows")
+        numbers = np.empty((0, 0))
+    if numbers.size and numbers.shape == (len(lines), len(columns)) and np.isfinite(numbers).all():
+        return numbers
+    if not lines:
+        raise ProgramError("there are no rows", file=file, line=first)
+    return numbers_in(lines, [column.title for column in columns], table.separator, first, file)
 
 
 def _check_close(values: Floats, expected: Floats, column: Column, file: Path, what: str) -> None:
-    """Raise ProgramError at the first value that is not the expected one to half a unit of the last digit."""
+    """Raise ProgramError at the first value that is wrong by more than half a unit of the last digit."""
     wrong = np.abs(values - expected) > 0.51 * 10.0**-column.decimals + 1e-9 * np.abs(expected)
     if wrong.any():
         row = int(np.argmax(wrong))

@@ -1,4 +1,4 @@
-"""The toolpath as placed, machine frame, with the axes that were chosen: APT and RoboDK's CSV."""
+"""Posts of the placed toolpath, machine frame, with the planned axes: APT and RoboDK's CSV."""
 
 from __future__ import annotations
 
@@ -10,16 +10,18 @@ import numpy as np
 
 from pentapod.base.archives import check_array, read_arrays
 from pentapod.base.errors import InputError, ProgramError
-from pentapod.program.posts.registry import Post, PostInput, read_file, register
+from pentapod.program.posts.registry import Post, PostInput, register
+from pentapod.program.posts.rows import read_file
 from pentapod.program.program import Program
 from pentapod.toolpath.formats import FORMATS, read_toolpath
 from pentapod.toolpath.toolpath import Toolpath
 
-_SAME_M = 1e-11
+SAME_M = 1e-11
+"""Leg lengths are written with this resolution."""
 
 
 def placed_toolpath(plan: str | Path, program: Program) -> Toolpath:
-    """Return the toolpath as placed from a run's plan.npz: machine frame, chosen axes.
+    """Return the placed toolpath from a run's plan.npz: machine frame, planned axes.
 
     Raises InputError: not such a file, or of another run than the program.
     """
@@ -35,10 +37,10 @@ def placed_toolpath(plan: str | Path, program: Program) -> Toolpath:
         check_array(arrays[name], name, file, InputError, "f", shape)
     tips, axes = arrays["placed.tips_mm"] / 1e3, arrays["placed.axes"]
     legs = arrays["program.legs_mm"] / 1e3
-    if legs.shape != program.legs.shape or np.abs(legs - program.legs).max() > _SAME_M:
+    if legs.shape != program.legs.shape or np.abs(legs - program.legs).max() > SAME_M:
         raise ProgramError(
             "the program is not that of this plan", file=file, key="program.legs_mm",
-            remedy="give the plan.npz that was written with it",
+            remedy="give the plan.npz that was written with the program",
         )  # fmt: skip
     bounds = zip(given.segments, given.starts[:-1], given.starts[1:], strict=True)
     placed = (replace(s, tips=tips[a : b + 1], axes=axes[a : b + 1]) for s, a, b in bounds)

@@ -1,4 +1,4 @@
-"""LinuxCNC: a folder that runs as it is, in simulation at once, in three ways; its README says how."""
+"""LinuxCNC: a folder with three configurations that run in simulation as they are; see its README."""
 
 from __future__ import annotations
 

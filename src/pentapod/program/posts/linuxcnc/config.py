@@ -1,9 +1,8 @@
-"""What the ini and HAL files of both LinuxCNC configurations have in common."""
+"""Common parts of the ini and HAL files of both LinuxCNC configurations."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
@@ -19,18 +18,6 @@ LEGS = FiveLegs.n_legs
 """Joints of the kinematics that LinuxCNC is given."""
 
 
-@dataclass(frozen=True)
-class Axis:
-    """An [AXIS_…] of the ini: millimetres or degrees, per second and per second²."""
-
-    letter: str
-    home: float
-    low: float
-    high: float
-    velocity: float
-    acceleration: float
-
-
 def servo_period_ns(period: float) -> int:
     """Return a period in nanoseconds. Raises InputError where LinuxCNC has no such period."""
     nanoseconds = round(period * 1e9)
@@ -43,60 +30,54 @@ def servo_period_ns(period: float) -> int:
 
 
 def ini_text(
-    name: str, kinematics: str, program: str, axes: Sequence[Axis], joints: Sequence[Words], traj: Words, period_ns: int
+    name: str,
+    kinematics: str,
+    program: str,
+    axes: Mapping[str, Words],
+    joints: Sequence[Words],
+    traj: Words,
+    period_ns: int,
 ) -> str:
-    """Return the ini of a simulation that runs as it is."""
-    tables: list[tuple[str, Words]] = [
-        ("EMC", {"VERSION": "1.1", "MACHINE": name, "DEBUG": 0}),
-        ("DISPLAY", {"DISPLAY": "axis", "OPEN_FILE": program, "PROGRAM_PREFIX": ".", "MAX_FEED_OVERRIDE": 1.0}),
-        ("TASK", {"TASK": "milltask", "CYCLE_TIME": 0.001}),
-        ("RS274NGC", {"PARAMETER_FILE": "linuxcnc.var"}),
-        ("EMCMOT", {"EMCMOT": "motmod", "COMM_TIMEOUT": 4.0, "BASE_PERIOD": 0, "SERVO_PERIOD": period_ns}),
-        ("EMCIO", {"EMCIO": "io", "CYCLE_TIME": 0.1, "TOOL_TABLE": "tool.tbl"}),
-        ("HAL", {"HALFILE": "pentapod.hal", "# HALFILE": "record.hal"}),
-        ("TRAJ", {"COORDINATES": " ".join(a.letter for a in axes), "LINEAR_UNITS": "mm", "ANGULAR_UNITS": "degree",
-                  "NO_FORCE_HOMING": 1, "ARC_BLEND_ENABLE": 1, **traj}),
-        ("KINS", {"KINEMATICS": kinematics, "JOINTS": LEGS}),
-    ]  # fmt: skip
-    tables += [
-        (
-            f"AXIS_{axis.letter}",
-            {
-                "HOME": number(axis.home),
-                "MIN_LIMIT": number(axis.low),
-                "MAX_LIMIT": number(axis.high),
-                "MAX_VELOCITY": number(axis.velocity),
-                "MAX_ACCELERATION": number(axis.acceleration),
-            },
-        )
-        for axis in axes
-    ]
-    tables += [(f"JOINT_{k}", joint) for k, joint in enumerate(joints)]
+    """Return the ini of a simulation. axes: tables by letter, of `axis_words`; joints: tables of `joint_words`."""
+    tables: dict[str, Words] = {
+        "EMC": {"VERSION": "1.1", "MACHINE": name, "DEBUG": 0},
+        "DISPLAY": {"DISPLAY": "axis", "OPEN_FILE": program, "PROGRAM_PREFIX": ".", "MAX_FEED_OVERRIDE": 1.0},
+        "TASK": {"TASK": "milltask", "CYCLE_TIME": 0.001},
+        "RS274NGC": {"PARAMETER_FILE": "linuxcnc.var"},
+        "EMCMOT": {"EMCMOT": "motmod", "COMM_TIMEOUT": 4.0, "BASE_PERIOD": 0, "SERVO_PERIOD": period_ns},
+        "EMCIO": {"EMCIO": "io", "CYCLE_TIME": 0.1, "TOOL_TABLE": "tool.tbl"},
+        "HAL": {"HALFILE": "pentapod.hal", "# HALFILE": "record.hal"},
+        "TRAJ": {"COORDINATES": " ".join(axes), "LINEAR_UNITS": "mm", "ANGULAR_UNITS": "degree", "NO_FORCE_HOMING": 1,
+                 "ARC_BLEND_ENABLE": 1, **traj},
+        "KINS": {"KINEMATICS": kinematics, "JOINTS": LEGS},
+    }  # fmt: skip
+    tables |= {f"AXIS_{letter}": words for letter, words in axes.items()}
+    tables |= {f"JOINT_{k}": words for k, words in enumerate(joints)}
     lines: list[str] = []
-    for title, words in tables:
+    for title, words in tables.items():
         lines += [f"[{title}]", *(f"{key} = {value}" for key, value in words.items()), ""]
     return "\n".join(lines)
 
 
+def axis_words(home: float, low: float, high: float, velocity: float, acceleration: float) -> dict[str, object]:
+    """Return an [AXIS_…] table: millimetres or degrees, per second and per second²."""
+    return {
+        "HOME": number(home),
+        "MIN_LIMIT": number(low),
+        "MAX_LIMIT": number(high),
+        "MAX_VELOCITY": number(velocity),
+        "MAX_ACCELERATION": number(acceleration),
+    }
+
+
 def joint_words(home: Floats, low: Floats, high: Floats, velocity: Floats, acceleration: Floats) -> list[Words]:
-    """Return the [JOINT_…] tables of the legs, arrays (n,) in mm, mm/s and mm/s²; homing finds them where they are."""
-    return [
-        {
-            "TYPE": "LINEAR",
-            "HOME": number(home[k]),
-            "HOME_OFFSET": number(home[k]),
-            "HOME_SEARCH_VEL": 0,
-            "HOME_LATCH_VEL": 0,
-            "HOME_SEQUENCE": 0,
-            "MIN_LIMIT": number(low[k]),
-            "MAX_LIMIT": number(high[k]),
-            "MAX_VELOCITY": number(velocity[k]),
-            "MAX_ACCELERATION": number(acceleration[k]),
-            "FERROR": 1000,
-            "MIN_FERROR": 1000,
-        }
-        for k in range(LEGS)
-    ]
+    """Return the [JOINT_…] tables of the legs, arrays (n,) in mm, mm/s and mm/s²; homing leaves them where they are."""
+    joints: list[Words] = []
+    for values in zip(home, low, high, velocity, acceleration, strict=True):
+        words = axis_words(*values)
+        homing = {"HOME_OFFSET": words["HOME"], "HOME_SEARCH_VEL": 0, "HOME_LATCH_VEL": 0, "HOME_SEQUENCE": 0}
+        joints.append({"TYPE": "LINEAR", "HOME": words["HOME"], **homing, **words, "FERROR": 1000, "MIN_FERROR": 1000})
+    return joints
 
 
 def hal_text(parameters: Mapping[str, float] | None = None) -> str:

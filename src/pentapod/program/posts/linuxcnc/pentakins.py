@@ -1,13 +1,13 @@
-"""LinuxCNC's pentakins: the tool path as XYZAB, planned by the controller itself, with its ini and HAL.
+"""LinuxCNC's pentakins: the toolpath as XYZAB, planned by the controller itself, with its ini and HAL.
 
-pentakins has the point that XYZ tells on the tool's line, and the legs' joints along the line from it, towards the
+In pentakins XYZ is a point on the tool's line, and the joints of the legs are along the line from it towards the
 spindle. So the tip is that point, and joint i is at tool_length − z_i. The controller's frame has z along the upright
-tool and its zero in the middle of the work volume, so that home is machine zero, as its Newton iteration likes it.
+tool and its zero in the middle of the work volume: home is then machine zero, where its Newton iteration converges.
 """
 
 from __future__ import annotations
 
-import dataclasses
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.robot import Branch
 from pentapod.machine.machine import Machine
 from pentapod.program.posts.linuxcnc.config import (
-    Axis,
+    axis_words,
     files_of,
     hal_text,
     ini_text,
@@ -32,14 +32,27 @@ from pentapod.toolpath.formats.rotary import AB
 from pentapod.toolpath.toolpath import Toolpath
 
 FILE = "toolpath.ngc"
-_ROOM_MM, _ROOM_DEG = 5.0, 5.0
-_ROUNDING_MM = 0.01
-_SHARE = 0.2
-"""Of what a leg can do, what the tip may: legs that lean move faster than the tip."""
+
+
+@dataclass(frozen=True)
+class PentakinsOptions:
+    """Limits of the ini and of the G-code.
+
+    room_mm, room_deg: of the axes beyond the toolpath. blend_mm: tolerance of G64 at corners. share: limits of the tip
+    as a share of those of the legs, because inclined legs move faster than the tip.
+    """
+
+    room_mm: float = 5.0
+    room_deg: float = 5.0
+    blend_mm: float = 0.01
+    share: float = 0.2
+
+
+OPTIONS = PentakinsOptions()
 
 
 def pentakins_files(given: PostInput) -> dict[str, bytes]:
-    """Return G-code, ini, HAL and script. Raises InputError."""
+    """Return the files of the folder. Raises InputError."""
     machine = given.the_machine()
     frame = controller_frame(machine, given.program.component)
     path = given.the_toolpath().transformed(frame)
@@ -54,16 +67,15 @@ def pentakins_files(given: PostInput) -> dict[str, bytes]:
     tip = frame.inverse().apply([0.0, 0.0, 0.0])
     home = 1e3 * machine.robot.leg_lengths(tip + machine.tool_length * upright, -upright)
     velocity, acceleration = 1e3 * limits.max_velocity, 1e3 * limits.max_acceleration
-    rate, gain = 1e3 * machine.rapid_velocity, _SHARE * float(acceleration.min())
+    rate, gain = 1e3 * machine.rapid_velocity, OPTIONS.share * float(acceleration.min())
     turn = np.degrees(1e-3 / machine.tool_length)
-    low = np.minimum(0.0, 1e3 * path.tips.min(axis=0)) - _ROOM_MM
-    high = np.maximum(0.0, 1e3 * path.tips.max(axis=0)) + _ROOM_MM
-    axes = [Axis(letter, 0.0, low[k], high[k], rate, gain) for k, letter in enumerate("XYZ")]
-    axes += [
-        Axis(letter, 0.0, min(0.0, angles[:, k].min()) - _ROOM_DEG, max(0.0, angles[:, k].max()) + _ROOM_DEG,
-             _SHARE * float(velocity.min()) * turn, gain * turn)
-        for k, letter in enumerate("AB")
-    ]  # fmt: skip
+    low = np.minimum(0.0, 1e3 * path.tips.min(axis=0)) - OPTIONS.room_mm
+    high = np.maximum(0.0, 1e3 * path.tips.max(axis=0)) + OPTIONS.room_mm
+    axes = {letter: axis_words(0.0, low[k], high[k], rate, gain) for k, letter in enumerate("XYZ")}
+    turn_rate = OPTIONS.share * float(velocity.min()) * turn
+    for k, letter in enumerate("AB"):
+        ends = min(0.0, angles[:, k].min()) - OPTIONS.room_deg, max(0.0, angles[:, k].max()) + OPTIONS.room_deg
+        axes[letter] = axis_words(0.0, *ends, turn_rate, gain * turn)
     ini = ini_text(
         f"{machine.name} (pentakins)",
         "pentakins",
@@ -74,8 +86,8 @@ def pentakins_files(given: PostInput) -> dict[str, bytes]:
             "DEFAULT_LINEAR_VELOCITY": number(0.1 * rate),
             "MAX_LINEAR_VELOCITY": number(rate),
             "MAX_LINEAR_ACCELERATION": number(gain),
-            "DEFAULT_ANGULAR_VELOCITY": number(0.1 * float(axes[3].velocity)),
-            "MAX_ANGULAR_VELOCITY": number(axes[3].velocity),
+            "DEFAULT_ANGULAR_VELOCITY": number(0.1 * turn_rate),
+            "MAX_ANGULAR_VELOCITY": number(turn_rate),
         },
         servo_period_ns(given.program.period),
     )
@@ -85,7 +97,7 @@ def pentakins_files(given: PostInput) -> dict[str, bytes]:
 
 def controller_frame(machine: Machine, component: Branch) -> RigidTransform:
     """Return the transform machine frame → the controller's: z along the upright tool, zero in the work volume."""
-    # Where the direction points to +z the tool comes from −z: half a turn about x puts it upright.
+    # Where the direction points to +z, half a turn about x puts the tool upright.
     turned = np.diag([1.0, -1.0, -1.0]) if component.w > 0 else np.eye(3)
     return RigidTransform(turned, -turned @ machine.work.centre)
 
@@ -107,18 +119,18 @@ def parameters(machine: Machine, frame: RigidTransform) -> dict[str, float]:
             f"pentakins.effector.{k}.r": 1e3 * float(robot.radii[k]),
             f"pentakins.effector.{k}.z": float(joints[k]),
         }
-    # At the default of 100 nearly every start of the forward kinematics fails.
+    # With the default of 100 the forward kinematics fails at nearly every start.
     return {**found, "pentakins.max-error": 1e6}
 
 
 def _code(path: Toolpath) -> bytes:
-    """Return the toolpath as G-code, controller's frame, with a bound on how far the planner may round corners."""
+    """Return the toolpath as G-code, controller's frame, with a tolerance for blended corners."""
     head, separator, moves = FORMATS["xyzab"].write(path).partition(b"G94\n")
-    # Without P the planner rounds corners as far as speed wants it: 0.3 mm on a path of gentle turns.
-    return head + separator + f"G64 P{_ROUNDING_MM:g}\n".encode() + moves
+    # Without P the planner blends corners for speed: by 0.3 mm on a path of gentle turns.
+    return head + separator + f"G64 P{OPTIONS.blend_mm:g}\n".encode() + moves
 
 
 def _within(path: Toolpath, rapid: float) -> Toolpath:
-    """Return the toolpath with no feed beyond the machine's rapid rate; rapids stay rapids."""
-    segments = (s if np.isinf(s.feed) else dataclasses.replace(s, feed=min(s.feed, rapid)) for s in path.segments)
-    return dataclasses.replace(path, segments=tuple(segments))
+    """Return the toolpath with feeds limited to the machine's rapid rate; rapids stay rapids."""
+    segments = (s if np.isinf(s.feed) else replace(s, feed=min(s.feed, rapid)) for s in path.segments)
+    return replace(path, segments=tuple(segments))

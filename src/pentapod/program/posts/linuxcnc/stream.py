@@ -1,4 +1,4 @@
-"""LinuxCNC's HAL: setpoints at servo rate through `limit3`, one for each leg. No planner takes part."""
+"""LinuxCNC's HAL: setpoints at servo rate through one `limit3` for each leg, without LinuxCNC's planner."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from pentapod.program.posts.drives import HALSTREAMER
 from pentapod.program.posts.linuxcnc.config import LEGS, number, packaged, servo_period_ns
 from pentapod.program.posts.registry import PostInput
 
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
+"""Relative: good programs meet the limits to the last digit, and rounding must not be clipped."""
 
 
 def stream_files(given: PostInput) -> dict[str, bytes]:
-    """Return the setpoints, the HAL that plays them, and the script that does so. Raises InputError."""
+    """Return the setpoints, and HAL and script that play them. Raises InputError."""
     hal = _hal(given.the_machine(), servo_period_ns(given.program.period))
     return {**HALSTREAMER.write(given), "stream.hal": hal.encode(), "play.sh": packaged("play_stream.sh")}
 
@@ -28,7 +29,6 @@ def _hal(machine: Machine, period_ns: int) -> str:
         *(f"addf leg{leg} servo-thread" for leg in range(1, 6)),
         "addf sampler.0 servo-thread",
     ]
-    # The limits are met to the last digit by good programs: what rounding adds must not be clipped.
     limits = machine.legs
     for k in range(LEGS):
         leg = f"leg{k + 1}"
@@ -37,7 +37,7 @@ def _hal(machine: Machine, period_ns: int) -> str:
             f"net limited{k + 1} {leg}.out => sampler.0.pin.{k + LEGS}",
             f"setp {leg}.min {number(1e3 * limits.min_length[k])}",
             f"setp {leg}.max {number(1e3 * limits.max_length[k])}",
-            f"setp {leg}.maxv {number(1e3 * limits.max_velocity[k] * (1.0 + _ROUNDING))}",
-            f"setp {leg}.maxa {number(1e3 * limits.max_acceleration[k] * (1.0 + _ROUNDING))}",
+            f"setp {leg}.maxv {number(1e3 * limits.max_velocity[k] * (1.0 + ROUNDING))}",
+            f"setp {leg}.maxa {number(1e3 * limits.max_acceleration[k] * (1.0 + ROUNDING))}",
         ]
     return "\n".join(lines) + "\n"

@@ -1,14 +1,15 @@
 """LinuxCNC with the legs as axes X Y Z U V: G-code in inverse time, with its ini and HAL.
 
-LinuxCNC's planner looks one segment ahead and so never goes faster than √(ds·a/2), ds the way of one segment. A
-program is played in its own time only where a ≥ 2·v/dt, and where dt is at least ten servo periods. The planner uses
-what it is given: at the points, between which it moves straight, it commands far more than the program's accelerations.
+LinuxCNC's planner looks one segment ahead, so its speed is at most √(ds·a/2) for segments of length ds. A program keeps
+its own time only if a ≥ 2·v/dt and dt is at least ten servo periods. The planner uses this acceleration at the points,
+between which it moves straight: it commands far more than the program's accelerations.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.errors import ProgramError
 from pentapod.machine.machine import Machine
 from pentapod.program.posts.linuxcnc.config import (
-    Axis,
+    axis_words,
     files_of,
     hal_text,
     ini_text,
@@ -26,31 +27,45 @@ from pentapod.program.posts.linuxcnc.config import (
     servo_period_ns,
 )
 from pentapod.program.posts.motion import lengths_at
-from pentapod.program.posts.registry import PostInput, read_file
+from pentapod.program.posts.registry import PostInput
+from pentapod.program.posts.rows import read_file
 from pentapod.program.program import Program
 from pentapod.program.resolution import quantised
 
 LETTERS = "XYZUV"
 FILE = "program.ngc"
-_LEAST_DT = 0.01
-_SERVO_PERIODS = 10
-_HEADROOM = 1.25
 _BLOCK = re.compile("G1" + "".join(rf" {letter}([0-9]+\.[0-9]+)" for letter in LETTERS) + r" F([0-9]+\.[0-9]+)")
 
 
+@dataclass(frozen=True)
+class TrivkinsOptions:
+    """Spacing of the points, and the acceleration of the planner.
+
+    least_dt: seconds between points, and servo_periods between them, at least. headroom: factor on the acceleration
+    that the planner needs.
+    """
+
+    least_dt: float = 0.01
+    servo_periods: int = 10
+    headroom: float = 1.25
+
+
+OPTIONS = TrivkinsOptions()
+
+
 def trivkins_files(given: PostInput) -> dict[str, bytes]:
-    """Return G-code, ini, HAL and script. Raises InputError."""
+    """Return the files of the folder. Raises InputError."""
     program, machine = given.program, given.the_machine()
     times = knots(program)
     legs = 1e3 * lengths_at(program, times)
     dt = float(times[1])
-    limits = machine.legs
-    low, high = 1e3 * limits.min_length, 1e3 * limits.max_length
-    velocity = 1e3 * limits.max_velocity
+    low, high = 1e3 * machine.legs.min_length, 1e3 * machine.legs.max_length
+    velocity = 1e3 * machine.legs.max_velocity
     acceleration = planner_acceleration(program, machine)
-    # The speed of a block is that of X, Y and Z together: never the path, always the axes limit it.
+    # The speed of a block is that of X, Y and Z together: this high, only the axes limit it.
     fastest = 5.0 * float(velocity.max())
-    axes = [Axis(letter, legs[0, k], low[k], high[k], velocity[k], acceleration[k]) for k, letter in enumerate(LETTERS)]
+    limits = zip(legs[0], low, high, velocity, acceleration, strict=True)
+    axes = {letter: axis_words(*values) for letter, values in zip(LETTERS, limits, strict=True)}
     ini = ini_text(
         f"{machine.name} (trivkins)",
         f"trivkins coordinates={LETTERS} kinstype=BOTH",
@@ -68,19 +83,19 @@ def trivkins_files(given: PostInput) -> dict[str, bytes]:
 
 
 def planner_acceleration(program: Program, machine: Machine) -> Floats:
-    """Return the accelerations (n,) in mm/s² that the planner is given and may command: more than the legs have."""
+    """Return the accelerations (n,) in mm/s² of the planner's ini: more than those of the legs."""
     limits, dt = machine.legs, float(knots(program)[1])
-    return np.maximum(1e3 * limits.max_acceleration, _HEADROOM * 2.0 * 1e3 * limits.max_velocity.max() / dt)
+    return np.maximum(1e3 * limits.max_acceleration, OPTIONS.headroom * 2.0 * 1e3 * limits.max_velocity.max() / dt)
 
 
 def knots(program: Program) -> Floats:
-    """Return the times (M,), equally spaced, of the G-code's points: as dense as LinuxCNC's planner bears."""
-    count = max(1, math.floor(program.duration / max(_LEAST_DT, _SERVO_PERIODS * program.period) + 1e-9))
+    """Return the times (M,), equally spaced, of the G-code's points: as dense as LinuxCNC's planner allows."""
+    count = max(1, math.floor(program.duration / max(OPTIONS.least_dt, OPTIONS.servo_periods * program.period) + 1e-9))
     return np.linspace(0.0, program.duration, count + 1)
 
 
 def gcode(legs_mm: Floats, dt: float) -> bytes:
-    """Return G-code through leg lengths (M, n_legs) in mm, dt seconds apart. It starts where the legs stand."""
+    """Return G-code through leg lengths (M, n_legs) in mm, dt seconds apart, from the current lengths."""
     words = " ".join(f"{letter}%.8f" for letter in LETTERS)
     lines = ["G21 G90 G40 G49", "G64", "G93"]
     block = f"G1 {words} F{60.0 / dt:.9f}"
@@ -89,7 +104,7 @@ def gcode(legs_mm: Floats, dt: float) -> bytes:
 
 
 def read_gcode(file: Path) -> tuple[Floats, Floats]:
-    """Return times (M,) in seconds and leg lengths (M, n_legs) in metres of such G-code. Raises ProgramError."""
+    """Return times (M,) in seconds and leg lengths (M, n_legs) in metres of this G-code. Raises ProgramError."""
     lines = read_file(file).decode(errors="replace").splitlines()
     if not lines or lines[-1] != "M2":
         raise ProgramError("M2 is missing: the file was cut off", file=file, line=max(len(lines), 1))

@@ -1,21 +1,27 @@
-"""Whether a verdict has passed for exactly this program: asked before a program is written for a controller."""
+"""Posts are written for programs with a passed verdict only, or marked as unverified in their first line."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, cast
 
-from pentapod.base.errors import ProgramError
+from pentapod.base.errors import InputError, ProgramError
+from pentapod.program.header import UNVERIFIED
 
-Judgement = Mapping[str, Any] | str | Path
-"""The content of a verdict.json (`Verdict.to_dict`), or where that file is."""
+VerdictContent = Mapping[str, Any] | str | Path
+"""The content of a verdict.json (`Verdict.to_dict`), or the path of that file."""
 
 _REMEDY = "plan the job or verify the program (pentapod verify --json > verdict.json), or insist with --unverified"
+_COMMENTS = {
+    ".apt": "$$ {}", ".hal": "# {}", ".ini": "# {}", ".md": "**{}**", ".ngc": "({})", ".tbl": "; {}", ".var": "# {}",
+}  # fmt: skip
+_ARCHIVES = (".npz", ".h5")
+"""Their header begins with the mark."""
 
 
-def check_passed(verdict: Judgement, sha256: str, program: str | Path | None = None) -> None:
+def check_passed(verdict: VerdictContent, sha256: str, program: str | Path | None = None) -> None:
     """Raise ProgramError unless a verdict has passed for the program file with this SHA-256.
 
     program: the file's name, for the message.
@@ -35,7 +41,7 @@ def check_passed(verdict: Judgement, sha256: str, program: str | Path | None = N
 
 
 def _failure(content: Mapping[str, Any]) -> str:
-    """Return in words how far a verdict is from passed."""
+    """Return why a verdict has not passed, in words."""
     claims: Any = content.get("certificates")
     each = [c for c in claims if isinstance(c, dict)] if isinstance(claims, list) else []
     failed = [str(c.get("claim")) for c in each if c.get("passed") is not True]
@@ -46,10 +52,32 @@ def _content(file: Path, program: str | Path | None) -> Mapping[str, Any]:
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
-        what = "nothing says that this program was judged"
+        what = "there is no verdict on this program"
         raise ProgramError(what, file=program, expected=f"its verdict in {file}", remedy=_REMEDY) from error
     except (OSError, ValueError, RecursionError) as error:
         raise ProgramError("not a verdict, or a broken one", file=file, remedy=_REMEDY) from error
     if not isinstance(content, dict):
         raise ProgramError("not a verdict", file=file, remedy=_REMEDY)
     return cast("dict[str, Any]", content)
+
+
+def marked_unverified(name: str, content: bytes) -> bytes:
+    """Return the content of a file with the mark in its first line, unless it has it there.
+
+    In the second line where the first one is fixed: of scripts, and of G-code between two "%". Raises InputError where
+    the format has no comments.
+    """
+    mark, suffix = UNVERIFIED.encode(), PurePosixPath(name).suffix
+    first, _, rest = content.partition(b"\n")
+    if mark in first or suffix in _ARCHIVES:
+        return content
+    if first.startswith(b"#!"):
+        return first + b"\n# " + mark + b"\n" + rest
+    if suffix == ".ngc" and first.strip() == b"%":
+        return first + b"\n(" + mark + b")\n" + rest
+    if suffix not in _COMMENTS:
+        raise InputError(
+            "this format has no comments to say that the program is unverified", key=name,
+            remedy="choose a format with comments, or have the program verified",
+        )  # fmt: skip
+    return _COMMENTS[suffix].format(UNVERIFIED).encode() + b"\n" + content
