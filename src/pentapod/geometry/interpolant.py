@@ -11,6 +11,9 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.numerics.bernstein import multiply, split
 
+Interpolation = Literal["linear", "cubic"]
+"""How a controller moves between setpoints."""
+
 BISECTION_ROUNDS = 60
 """Rounds of `largest_length`; the precision of numbers is reached after about fifty."""
 
@@ -30,7 +33,7 @@ class Interpolant:
     period: float
 
     @classmethod
-    def through(cls, rows: Floats, period: float, interpolation: Literal["linear", "cubic"]) -> Interpolant:
+    def through(cls, rows: Floats, period: float, interpolation: Interpolation) -> Interpolant:
         """Return the interpolant of rows (N, d): straight lines, or the C2 cubic spline with zero end velocities."""
         return cls.along(rows, clamped_slopes(rows) if interpolation == "cubic" else None, period)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 
@@ -12,9 +12,8 @@ from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import MachineError
 from pentapod.base.keys import Key, check_fields
 from pentapod.base.values import Value
+from pentapod.geometry.interpolant import Interpolation
 from pentapod.machine.fields import FIVE_AXES, LIST_OF_3, PER_LEG, per_leg, positive
-
-Interpolation = Literal["linear", "cubic"]
 
 
 @dataclass(frozen=True, eq=False)

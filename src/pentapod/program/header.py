@@ -9,12 +9,13 @@ import tomllib
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, cast, get_args
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ArrayError, InputError, ProgramError, ToolpathError
+from pentapod.geometry.interpolant import Interpolation
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.kinematics.five_legs import FiveLegs
@@ -146,7 +147,7 @@ class _Reader:
     def header(self) -> Header:
         return Header(
             period=self._period(),
-            interpolation=self._one_of("interpolation", ("linear", "cubic")),
+            interpolation=self._one_of("interpolation", get_args(Interpolation)),
             component=Component.parse(self._one_of("component", ("++", "+-", "-+", "--"))),
             placement=self._placement(),
             provenance=Provenance(

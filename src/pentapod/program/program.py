@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.display import html_table, load_extra
 from pentapod.base.errors import ProgramError
 from pentapod.base.values import Result, Value
+from pentapod.geometry.interpolant import Interpolation
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.robot import Branch
 from pentapod.machine.machine import Machine
@@ -52,7 +53,7 @@ class Program(Result):
 
     period: float
     legs: Floats
-    interpolation: Literal["linear", "cubic"]
+    interpolation: Interpolation
     component: Branch
     placement: RigidTransform
     provenance: Provenance
