@@ -8,7 +8,7 @@ import replay_cases as cases
 
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import verify
-from pentapod.verify.claims.stops_and_dwells import CLAIMS, asked_stops, dwells, exact_stops
+from pentapod.verify.claims.stops_and_dwells import CLAIMS, dwells, exact_stops, required_stops
 from pentapod.verify.replay.claim import Idle
 
 
@@ -133,18 +133,18 @@ def along(
 
 def test_the_steps_near_a_stop():
     """Three rows at 1 m: both steps between; none at 2 m: the step over it; one at either end: the step beside it."""
-    assert asked_stops(along()) == [(0, 1, 0.1), (3, 5, 0.2), (7, 8, 0.4), (9, 10, 0.3)]
+    assert required_stops(along()) == [(0, 1, 0.1), (3, 5, 0.2), (7, 8, 0.4), (9, 10, 0.3)]
     two = (*ARCS[:4], 1.02, 1.3, *ARCS[6:])
-    assert asked_stops(along(two))[1] == (3, 4, 0.2)
+    assert required_stops(along(two))[1] == (3, 4, 0.2)
     one = (*ARCS[:3], 0.9, 1.0, 1.1, *ARCS[6:])
-    assert asked_stops(along(one))[1] == (3, 5, 0.2)
-    assert asked_stops(along(dwells=(None, 0.4, None), wait=0.0)) == [(7, 8, 0.4)]
+    assert required_stops(along(one))[1] == (3, 5, 0.2)
+    assert required_stops(along(dwells=(None, 0.4, None), wait=0.0)) == [(7, 8, 0.4)]
 
 
 def test_a_turn_on_the_spot_divides_the_rows_of_one_place():
     arcs = (0.0, 0.2, 0.6, 1.0, 1.0, 1.0, 1.0, 1.0, 1.4, 1.8, 2.0)
     turned = (0.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.6, 0.6, 0.6, 0.6, 0.6)
-    stops = asked_stops(along(arcs, turned, (0.0, 1.0, 1.0, 2.0), (0.0, 0.0, 0.6, 0.6)))
+    stops = required_stops(along(arcs, turned, (0.0, 1.0, 1.0, 2.0), (0.0, 0.0, 0.6, 0.6)))
     assert stops == [(0, 1, 0.1), (3, 4, 0.2), (6, 7, 0.4), (9, 10, 0.3)]
 
 

@@ -11,7 +11,7 @@ from pentapod.verify.replay.claim import MM, Claim, Finding
 from pentapod.verify.replay.replay import Replay
 
 STRETCH = 32
-"""Samples of the stretches of which only the middle is looked at first."""
+"""Samples of the stretches of which only the middle is evaluated first."""
 
 
 def clearance(replay: Replay) -> Finding:
@@ -19,7 +19,7 @@ def clearance(replay: Replay) -> Finding:
 
     Every point of a leg or of the shaft moves by no more than the faster of the platform line's two ends, whose speeds
     are proven; so the distance between two bodies changes by no more than twice the travel of that end. Stretches of
-    samples whose middle is farther apart than this bound can use up are not looked into.
+    samples whose middle is farther apart than this bound can use up are skipped.
     """
     machine, (position, direction) = replay.machine, replay.pose
     chords = 0.5 * replay.program.period * replay.interval_bounds.speeds[:, 2]

@@ -9,16 +9,16 @@ from pentapod.verify.verdict.verdict import Place
 
 def whole(replay: Replay) -> Finding | Idle:
     """Judge that the job allows several set-ups where this is one, and that each cut is made in exactly one of them."""
-    asked, piece = replay.specification, replay.program.provenance.piece
+    specification, piece = replay.specification, replay.program.provenance.piece
     if piece is None:
         return Idle("the program is the whole job")
-    if asked.setups < 2:
+    if specification.setups < 2:
         return Finding.without_value(False, f"header: one set-up of several ({piece}); the job allows only one set-up")
-    if asked.missed is None:
+    if specification.missed is None:
         why = f"this is one set-up of several ({piece}); only the verdict on the folder of all set-ups knows the others"
         return Idle(why, unknown=True)
     method = "number of intervals between waypoints that are cut in no set-up, or in more than one"
-    return Finding(asked.missed == 0, asked.missed, 0.0, "", Place(), method)
+    return Finding(specification.missed == 0, specification.missed, 0.0, "", Place(), method)
 
 
 WHOLE = "every cut is made in one set-up"

@@ -21,13 +21,13 @@ def machine(replay: Replay) -> Finding:
 
 def job(replay: Replay) -> Finding | Idle:
     """Judge that the program was made from this job, by digest; idle where there is no job on either side."""
-    made_from, asked = replay.program.provenance.job_digest, replay.specification.job_digest
-    if asked is None and not made_from:
+    made_from, required = replay.program.provenance.job_digest, replay.specification.job_digest
+    if required is None and not made_from:
         return Idle("the program was made without a job, and none is given")
-    if asked is None:
+    if required is None:
         return Idle(f"the program was made from job {made_from}; no job is given to compare with", unknown=True)
-    method = f"header: made from job {made_from or 'none'}, judged for job {asked}"
-    return Finding.without_value(made_from == asked, method)
+    method = f"header: made from job {made_from or 'none'}, judged for job {required}"
+    return Finding.without_value(made_from == required, method)
 
 
 def guides(replay: Replay) -> Finding | Idle:
@@ -48,10 +48,10 @@ def guides(replay: Replay) -> Finding | Idle:
 
 def component(replay: Replay) -> Finding | Idle:
     """Judge that the program is in the requested component; idle where any is allowed."""
-    asked, own = replay.specification.component, replay.program.component
-    if asked is None:
+    required, own = replay.specification.component, replay.program.component
+    if required is None:
         return Idle("any component is allowed")
-    return Finding.without_value(own == asked, f"header: component {own}, requested: {asked}")
+    return Finding.without_value(own == required, f"header: component {own}, requested: {required}")
 
 
 def controller(replay: Replay) -> Finding:
@@ -70,5 +70,5 @@ CLAIMS = (
     Claim(GUIDES, guides, needs_pose=False),
     Claim("controller", controller, needs_pose=False),
     Claim("job", job, needs_pose=False),
-    Claim("component as asked", component, needs_pose=False),
+    Claim("component as required", component, needs_pose=False),
 )

@@ -13,7 +13,8 @@ from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import marked_runs
 from pentapod.toolpath.toolpath import SegmentKind
-from pentapod.verify.claims.stops_and_dwells import STILL_M, asked_stops
+from pentapod.verify.claims.speed import row_speeds
+from pentapod.verify.claims.stops_and_dwells import STILL_M, required_stops
 from pentapod.verify.replay.claim import Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
 
@@ -57,8 +58,8 @@ def lowest_feed(replay: Replay) -> Finding | Idle:
     if not judged.any():
         return Idle("the program has no cut and no link longer than twice the path tolerance")
     period = replay.program.period
-    tip = _speeds(replay, 0.0)
-    share = (_speeds(replay, replay.toolpath.tilt_centre) if standoff else tip) / feeds
+    tip = row_speeds(replay, 0.0)
+    share = (row_speeds(replay, replay.toolpath.tilt_centre) if standoff else tip) / feeds
     used = np.maximum(_used(replay), tip / replay.machine.rapid_velocity if standoff else 0.0)
     around = max(math.ceil(OPTIONS.around_s / period), OPTIONS.around_rows)
     judged &= maximum_filter1d(used, 2 * around + 1) < OPTIONS.used
@@ -85,9 +86,9 @@ def unasked_stop(replay: Replay) -> Finding:
     steps = np.abs(np.diff(replay.program.legs, axis=0))
     runs = marked_runs(np.asarray((steps <= np.maximum(rest * period, STILL_M)).all(axis=1)))
     corner = min(OPTIONS.corner, replay.specification.stop_angle or OPTIONS.corner)
-    reasons, asked = _reasons(replay, runs, corner)
+    reasons, dwell = _reasons(replay, runs, corner)
     seconds = (runs[:, 1] - runs[:, 0]) * period
-    beyond = np.where(reasons, np.maximum(seconds - asked - OPTIONS.spare_s, 0.0), seconds)
+    beyond = np.where(reasons, np.maximum(seconds - dwell - OPTIONS.spare_s, 0.0), seconds)
     worst = int(np.argmax(beyond)) if len(beyond) else 0
     value = float(beyond[worst]) if len(beyond) else 0.0
     row = int(runs[worst, 0]) if value > 0.0 else 0
@@ -112,13 +113,6 @@ def _feeds(replay: Replay) -> Floats:
     # No feed before the first end and behind the last one: there a program may be at rest.
     of_gap = np.array([np.inf, *feeds, np.inf])
     return np.where(first == behind, of_gap[first], np.inf)
-
-
-def _speeds(replay: Replay, tilt_centre: float) -> Floats:
-    """Return the mean speed (N − 1,) from row to row of the point that far from the tip along the axis, m/s."""
-    position, direction = replay.pose
-    points = (position + (replay.machine.tool_length - tilt_centre) * direction)[::2]
-    return np.linalg.norm(np.diff(points, axis=0), axis=1) / replay.program.period
 
 
 def _used(replay: Replay) -> Floats:
@@ -154,29 +148,29 @@ def _raise(used: Floats, shares: Floats) -> None:
 
 
 def _reasons(replay: Replay, runs: Ints, least: float) -> tuple[Bools, Floats]:
-    """Return for each run of steps whether there is a reason to be at rest, and the dwell asked for, seconds.
+    """Return for each run of steps whether there is a reason to be at rest, and the required dwell, seconds.
 
     least: corners of more radians are a reason.
     """
     path, match = replay.toolpath, replay.match
-    way = arc_length(path.tilt_centres)
+    arc = arc_length(path.tilt_centres)
     arcs, within = match.arcs[::2], replay.path_tolerance
     low, high = arcs[runs[:, 0]] - within, arcs[np.minimum(runs[:, 1], len(arcs) - 1)] + within
-    ends = way[path.starts]
+    ends = arc[path.starts]
     reasons = np.searchsorted(ends, high, "right") > np.searchsorted(ends, low, "left")
     # Turning of the path, of its direction and its axis, summed up to each waypoint.
     step = np.diff(path.tilt_centres, axis=0)
     moving = np.linalg.norm(step, axis=1) > 0.0
-    corner = np.zeros(len(way))
+    corner = np.zeros(len(arc))
     at = np.flatnonzero(moving)
     corner[at[1:]] = angle_between(step[at[:-1]], step[at[1:]])
     turned = np.append(0.0, np.cumsum(corner + np.append(0.0, angle_between(path.axes[:-1], path.axes[1:]))))
-    first, behind = np.searchsorted(way, low, "left"), np.searchsorted(way, high, "right")
+    first, behind = np.searchsorted(arc, low, "left"), np.searchsorted(arc, high, "right")
     reasons |= turned[behind] - turned[np.minimum(first, behind)] > least
-    asked = np.zeros(len(runs))
-    for begin, end, seconds in asked_stops(replay):
-        asked += np.where((runs[:, 0] < end) & (runs[:, 1] > begin), seconds, 0.0)
-    return np.asarray(reasons), asked
+    dwell = np.zeros(len(runs))
+    for begin, end, seconds in required_stops(replay):
+        dwell += np.where((runs[:, 0] < end) & (runs[:, 1] > begin), seconds, 0.0)
+    return np.asarray(reasons), dwell
 
 
 CLAIMS = (

@@ -31,7 +31,9 @@ def feed(replay: Replay, kind: SegmentKind) -> Finding | Idle:
         return Idle(f"the program has no {kind}")
     spot = standoff and not rapid
     linear = replay.program.interpolation == "linear"
-    speed = (_between_rows(replay, spot=spot) if linear else replay.interval_bounds.speeds[:, 1 if spot else 0])[chords]
+    height = replay.toolpath.tilt_centre if spot else 0.0
+    bounds = replay.interval_bounds.speeds[:, 1 if spot else 0]
+    speed = (np.repeat(row_speeds(replay, height), 2) if linear else bounds)[chords]
     worst = int(np.argmax(speed / limit[chords]))
     value, bound = float(speed[worst]), float(limit[chords[worst]])
     whose = "the spot on the surface" if spot else "the tip"
@@ -43,16 +45,15 @@ def feed(replay: Replay, kind: SegmentKind) -> Finding | Idle:
     return Finding.at_most(value, bound, MM_MIN, "mm/min", replay.place(int(chords[worst])), method)
 
 
-def _between_rows(replay: Replay, *, spot: bool) -> Floats:
-    """Return the mean speed (M − 1,) of tip or spot over the period that each chord belongs to.
+def row_speeds(replay: Replay, height: float) -> Floats:
+    """Return the mean speed (N − 1,) from row to row of the point at a height above the tip along the axis, m/s.
 
     With linear interpolation the leg speeds jump at each row, and the speed of the tip varies about its mean within
     each period: an effect of the interpolation, not of the feed.
     """
     position, direction = replay.pose
-    arm = replay.machine.tool_length - (replay.toolpath.tilt_centre if spot else 0.0)
-    points = (position + arm * direction)[::2]
-    return np.repeat(np.linalg.norm(np.diff(points, axis=0), axis=1) / replay.program.period, 2)
+    points = (position + (replay.machine.tool_length - height) * direction)[::2]
+    return np.linalg.norm(np.diff(points, axis=0), axis=1) / replay.program.period
 
 
 def speed_limits(replay: Replay) -> tuple[Floats, Ints]:

@@ -19,7 +19,7 @@ DWELL_TOLERANCE_S = 1e-9
 
 def exact_stops(replay: Replay) -> Finding | Idle:
     """Judge that the robot is at rest at every exact stop of the toolpath."""
-    stops = asked_stops(replay)
+    stops = required_stops(replay)
     if not stops:
         return Idle("the toolpath has no exact stop")
     period, limit = replay.program.period, replay.machine.legs.max_acceleration
@@ -38,21 +38,21 @@ def exact_stops(replay: Replay) -> Finding | Idle:
 
 def dwells(replay: Replay) -> Finding | Idle:
     """Judge that the robot is at rest as long as the toolpath asks for."""
-    asked = [stop for stop in asked_stops(replay) if stop[2] > 0.0]
-    if not asked:
+    required = [stop for stop in required_stops(replay) if stop[2] > 0.0]
+    if not required:
         return Idle("the toolpath has no dwell")
     still = np.abs(np.diff(replay.program.legs, axis=0)).max(axis=1) <= STILL_M
-    stood = [_longest_run(still[low:high]) * replay.program.period for low, high, _ in asked]
-    worst = int(np.argmin(np.array(stood) - [seconds for _, _, seconds in asked]))
-    value, bound = stood[worst], asked[worst][2]
+    rests = [_longest_run(still[low:high]) * replay.program.period for low, high, _ in required]
+    worst = int(np.argmin(np.array(rests) - [seconds for _, _, seconds in required]))
+    value, bound = rests[worst], required[worst][2]
     method = (
-        f"dwell with the largest shortfall, of {len(asked)}: longest time in which no leg moves more than "
+        f"dwell with the largest shortfall, of {len(required)}: longest time in which no leg moves more than "
         f"{MM * STILL_M:g} mm from row to row, within the path tolerance of the place"
     )
-    return Finding(value >= bound - DWELL_TOLERANCE_S, value, bound, "s", replay.place(2 * asked[worst][0]), method)
+    return Finding(value >= bound - DWELL_TOLERANCE_S, value, bound, "s", replay.place(2 * required[worst][0]), method)
 
 
-def asked_stops(replay: Replay) -> list[tuple[int, int, float]]:
+def required_stops(replay: Replay) -> list[tuple[int, int, float]]:
     """Return (first, end, seconds) of each stop: the range of steps between rows near it, and its dwell."""
     path, match, count = replay.toolpath, replay.match, len(replay.program.legs) - 1
     # Where the tool turns on the spot, arc length does not distinguish one waypoint from the next; turning does.

@@ -117,9 +117,9 @@ class FreeSpace:
 
     def by_arc_length(self) -> Pairing:
         """Return the matching by the fraction of arc length, for motions that no search can match."""
-        way, arc = arc_length(self._motion[0]), arc_length(self._path[0])
+        travelled, arc = arc_length(self._motion[0]), arc_length(self._path[0])
         samples, waypoints = np.arange(float(self._samples)), np.arange(float(self._waypoints))
-        times = np.interp(arc * way[-1], way * arc[-1], samples)
+        times = np.interp(arc * travelled[-1], travelled * arc[-1], samples)
         times[[0, -1]] = 0.0, self._samples - 1.0
         intervals = np.clip(np.searchsorted(times, samples, side="right") - 1, 0, self._waypoints - 2)
         lowest, highest = waypoints[intervals], waypoints[intervals + 1]

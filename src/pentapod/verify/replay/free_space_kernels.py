@@ -145,7 +145,7 @@ def reach(
     −∞ where axes have a weight. bounds: near, what is added to it, turn. weights: as for `cost_of`.
     """
     near, turn = bounds[0] + (bounds[1] if weights[0] > 0.0 else 0.0), bounds[2]
-    nothing, way = math.inf, 0
+    nothing, flags = math.inf, 0
     low, high = free(one, at, other, k, near, turn)
     if low > high or (across[0] == nothing and max(low, straight[0]) > high):
         return (nothing, nothing, nothing), 0, nothing
@@ -153,13 +153,13 @@ def reach(
     _, square = closest(one, at, other, k, 0.0, earliest, high)
     begin, cost = nothing, nothing
     if across[2] < nothing:
-        begin, cost, way = low, across[2] + cost_of(one, at, other, k, weights, low, high), 2
+        begin, cost, flags = low, across[2] + cost_of(one, at, other, k, weights, low, high), 2
     if straight[2] < nothing and max(low, straight[1]) <= high:
         ahead = straight[2] + cost_of(one, at, other, k, weights, max(low, straight[1]), high)
         if ahead <= cost:
-            begin, cost, way = max(low, straight[1]), ahead, 1
+            begin, cost, flags = max(low, straight[1]), ahead, 1
     beyond = -nothing if weights[0] > 0.0 else math.sqrt(square) - near
-    return (earliest, begin, cost), way | (32 if across[0] < nothing else 16), beyond
+    return (earliest, begin, cost), flags | (32 if across[0] < nothing else 16), beyond
 
 
 @kernel
@@ -194,8 +194,8 @@ def walk(motion: Curve, path: Curve, bounds: Bounds, weights: Weights, most: int
             # The axis also counts next to a turn on the spot; otherwise that would be cheaper than the turn itself.
             counted = max(intervals[max(k - 1, 0)], intervals[k], intervals[min(k + 1, n - 2)])
             bound, cost = (samples[i + 1], more, turns[k]), (intervals[k], counted, 1.0, fair)
-            right, way, beyond = reach(motion, i + 1, path, k, bound, cost, left, bottom)
-            if way:
+            right, flags, beyond = reach(motion, i + 1, path, k, bound, cost, left, bottom)
+            if flags:
                 on[then, following], reached[then, following] = k, right
                 following += 1
                 nearest = min(nearest, beyond)
@@ -207,14 +207,14 @@ def walk(motion: Curve, path: Curve, bounds: Bounds, weights: Weights, most: int
                 top, above, beyond = reach(path, k + 1, motion, i, bound, cost, bottom, left)
                 least[k + 1] = min(least[k + 1], beyond)
                 # Of a top the bottom lies straight and the left across.
-                way |= ((above & 2) << 1) | ((above & 1) << 3) | ((above & 32) << 1) | ((above & 16) << 3)
-            if way:
+                flags |= ((above & 2) << 1) | ((above & 1) << 3) | ((above & 32) << 1) | ((above & 16) << 3)
+            if flags:
                 if cells == len(cell):
                     if cells >= most:
                         return -1, False, nothing, (first, cell, ways)
                     cell = np.concatenate((cell, np.empty(cells, dtype=np.int32)))
                     ways = np.concatenate((ways, np.empty(cells, dtype=np.uint8)))
-                cell[cells], ways[cells] = k, way
+                cell[cells], ways[cells] = k, flags
                 cells += 1
             bottom = top
         if following == 0:

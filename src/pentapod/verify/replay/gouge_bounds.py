@@ -27,7 +27,7 @@ class GougeOptions:
     """Options of the search. They change how tight the bound is and what it costs, never whether it holds.
 
     far_m: gaps are not computed beyond this. near_m, near_share: a bound is not tightened where it is this much, in
-    metres or as a share of what is allowed, above a depth that was found. samples: at most so many are looked at first.
+    metres or as a share of what is allowed, above a depth that was found. samples: how many are evaluated first.
     at_once: stretches swept together.
     """
 

@@ -29,9 +29,9 @@ REPLAY_SHARE = 0.6
 
 @dataclass(frozen=True, eq=False)
 class Replay(Value):
-    """What the claims look at. Derived values are computed when first asked for, and kept.
+    """The input of the claims. Derived values are computed once, when first needed.
 
-    specification: what the program is judged against; its machine has its guides where the program wants them.
+    specification: what the program is judged against; its guides are at the positions of the program.
     *Samples* are the rows and the moments halfway between them: M = 2N − 1, sample 2k is row k. *Chords* are the M − 1
     straight lines between consecutive samples.
     """

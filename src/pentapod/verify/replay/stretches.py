@@ -72,14 +72,14 @@ def _bounds(replay: Replay, of: Stretches, lever: float, largest_turn: float) ->
     sample = np.repeat(of.starts - begins, counts) + np.arange(counts.sum())
     start, end = replay.tilt_centres[of.starts], replay.tilt_centres[of.ends]
     first, last = replay.axes[of.starts], replay.axes[of.ends]
-    way, turn = end - start, last - first
-    square = np.einsum("ij,ij->i", way, way) + lever**2 * np.einsum("ij,ij->i", turn, turn)
+    chord, turn = end - start, last - first
+    square = np.einsum("ij,ij->i", chord, chord) + lever**2 * np.einsum("ij,ij->i", turn, turn)
     owner = np.repeat(np.arange(len(counts)), counts)
     off, turned = replay.tilt_centres[sample] - start[owner], replay.axes[sample] - first[owner]
-    along = np.einsum("ij,ij->i", off, way[owner]) + lever**2 * np.einsum("ij,ij->i", turned, turn[owner])
+    along = np.einsum("ij,ij->i", off, chord[owner]) + lever**2 * np.einsum("ij,ij->i", turned, turn[owner])
     share = np.divide(along, square[owner], out=np.zeros_like(along), where=square[owner] > 0.0)
     share = np.clip(share, 0.0, 1.0)[:, None]
-    aside = np.maximum.reduceat(np.linalg.norm(off - share * way[owner], axis=1), begins)
+    aside = np.maximum.reduceat(np.linalg.norm(off - share * chord[owner], axis=1), begins)
     deviation = np.maximum.reduceat(replay.interval_bounds.deviations[sample], begins)
     if lever == 0.0:
         return aside + deviation

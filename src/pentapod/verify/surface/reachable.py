@@ -57,13 +57,13 @@ def ball_reaches(
         todo = np.arange(len(x))
         for _ in range(options.projections):
             gap = surface.points(c[todo], within=radius)
-            short, way = radius - gap.distance, c[todo] - x[todo]
-            far = (short > slack) | (np.linalg.norm(way, axis=1) > radius + slack)
-            todo, way = todo[far], way[far] + np.maximum(short, 0.0)[far, None] * gap.normal[far]
+            short, offset = radius - gap.distance, c[todo] - x[todo]
+            far = (short > slack) | (np.linalg.norm(offset, axis=1) > radius + slack)
+            todo, offset = todo[far], offset[far] + np.maximum(short, 0.0)[far, None] * gap.normal[far]
             if not len(todo):
                 break
-            off = np.linalg.norm(way, axis=1, keepdims=True)
-            c[todo] = x[todo] + np.where(off > radius, radius / np.maximum(off, 1e-300), 1.0) * way
+            off = np.linalg.norm(offset, axis=1, keepdims=True)
+            c[todo] = x[todo] + np.where(off > radius, radius / np.maximum(off, 1e-300), 1.0) * offset
         held = surface.points(c, within=radius).distance >= radius - slack
         held &= np.linalg.norm(c - x, axis=1) <= radius + slack
         kept = np.flatnonzero(held)
@@ -108,8 +108,8 @@ def body_reaches(
             if k == 0 and (share, up) == (1.0, 0.0):
                 tips += corner[open_]  # so that the rounding touches where the tool leans
             both = np.stack([tips, tips + length * axes[open_]], axis=1)
-            stands = ~touch(surface.tree, body, tips, axes[open_], threshold=options.depth_m).beyond(options.depth_m)
-            open_, both = open_[stands], both[stands].reshape(-1, 3)
+            free = ~touch(surface.tree, body, tips, axes[open_], threshold=options.depth_m).beyond(options.depth_m)
+            open_, both = open_[free], both[free].reshape(-1, 3)
             if len(open_):
                 axis = np.repeat(axes[open_], 2, axis=0)
                 out = sweep(surface.tree, body, both, axis, threshold=options.depth_m, every=2)

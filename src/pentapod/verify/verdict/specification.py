@@ -25,7 +25,7 @@ class Specification(Value):
     """What a program is judged against. A field that is None is not given: claims that need it are not judged.
 
     machine: with its tool length and controller. toolpath: in the workpiece frame, as the job asks for it.
-    tilt: half angle in radians of the cone about the nominal axis in which the tool may stand; axis_tolerance:
+    tilt: half angle in radians of the cone about the nominal axis in which the tool may tilt; axis_tolerance:
     radians beyond that; path_tolerance: metres. job_digest: of the job that the header must name. collision_world: what
     legs, spindle and tool must not touch. cutting: what cuts, and into which part. constraints: the allowed placements.
     component: in which the program must be; None where any is allowed. lowest_share: of the feed, that cuts and links

@@ -155,5 +155,5 @@ class Verdict(Result):
 
 
 def _measured(claim: Certificate) -> str:
-    told = [f"{number:.4g} {claim.unit}".strip() for number in (claim.value, claim.bound) if number is not None]
-    return ", ".join(told)
+    numbers = [f"{number:.4g} {claim.unit}".strip() for number in (claim.value, claim.bound) if number is not None]
+    return ", ".join(numbers)
