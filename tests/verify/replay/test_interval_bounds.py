@@ -7,7 +7,7 @@ import pytest
 import replay_cases as cases
 
 from pentapod.geometry.interpolant import Interpolant
-from pentapod.kinematics.answers import BranchProof
+from pentapod.kinematics.proof_results import BranchProof
 from pentapod.verify.replay.interval_bounds import ComponentFindings, RunningMaximum, interval_bounds
 
 TILT_CENTRE, EVERY = 0.1, 5
