@@ -20,7 +20,7 @@ from pentapod.toolpath.options import CoverOptions, PathOptions
 from pentapod.toolpath.strategies.registry import STRATEGIES
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify import Coverage, Cutting, Specification
-from pentapod.verify.verdict.sources import Sources
+from pentapod.verify.verdict.verdict import Sources
 
 
 def job_specification(
