@@ -158,6 +158,6 @@ def test_mistakes_name_their_key(make_job, change, message):
         Job.load(make_job(change))
 
 
-def test_a_flat_end_may_not_lean(make_job):
-    with pytest.raises(JobError, match="cannot lean"):
+def test_a_flat_end_may_not_tilt(make_job):
+    with pytest.raises(JobError, match="cannot tilt"):
         Job.load(make_job((BALL, 'type = "flat"\ndiameter_mm = 6'), ("tilt_deg = 0", "tilt_deg = 5")))
