@@ -12,7 +12,7 @@ Vector: TypeAlias = Sequence[Any]
 """Three components, each a number, an array or an expression."""
 
 Joints: TypeAlias = tuple[Sequence[Sequence[Any]], Sequence[Any]]
-"""Base joints, two or three coordinates each, and the heights of the platform joints along the line, metres."""
+"""Base joints, two or three coordinates each, and the platform offsets along the line, metres."""
 
 
 @dataclass(frozen=True)

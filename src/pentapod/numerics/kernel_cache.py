@@ -49,7 +49,7 @@ OPTIONS = CacheOptions()
 def kernel_cache(given: str) -> Path | None:
     """Return the folder for these sources, which can be written to; None where there is none.
 
-    given: a folder that the user chose, or "". The folders of versions that nobody used for a month are removed.
+    given: a folder that the user chose, or "". Folders of versions that were not used for a month are removed.
     """
     sources = sorted(Path(__file__).parents[1].rglob("*_kernels.py"))
     digest = hashlib.sha256(b"\0".join(file.read_bytes() for file in sources)).hexdigest()
@@ -61,7 +61,7 @@ def kernel_cache(given: str) -> Path | None:
         with tempfile.TemporaryFile(dir=folder):
             pass
         _sweep(folder)
-    except (OSError, RuntimeError) as error:  # RuntimeError: nobody's home is known
+    except (OSError, RuntimeError) as error:  # RuntimeError: there is no home folder
         _log.warning(
             "the cache of compiled kernels cannot be written (%s): each run compiles them anew; "
             "NUMBA_CACHE_DIR names another folder",

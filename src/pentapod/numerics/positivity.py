@@ -19,7 +19,7 @@ DOUBT_HALVINGS = 6
 
 @dataclass(frozen=True, eq=False)
 class Positivity(Value):
-    """Answers about N polynomials on [0, 1].
+    """Positivity of N polynomials on [0, 1].
 
     low (N,): a proven positive lower bound, 0 where positivity is not proven. refuted (N,): proven to be
     negative somewhere. doubt (N, 2): the part of [0, 1] outside which positivity is proven; where it is proven
@@ -62,7 +62,7 @@ def positivity(
 
     A polynomial is between its least and its largest coefficient on an interval, and its end coefficients are
     its values there: a piece is done when all its coefficients exceed the error; the polynomial is refuted
-    by an end value below minus the rounding. A piece with no coefficient beyond the error is hopeless: its
+    by an end value below minus the rounding. A piece with no coefficient beyond the error cannot be decided: its
     polynomial stays undecided, and the doubtful part is found to 1/64. One that keeps touching zero to within
     the error would be halved without end: it is undecided once more than 2n + 8 of its pieces are open. So is
     one with non-finite coefficients.
@@ -91,12 +91,12 @@ def positivity(
         bad = ends < -(rounding[owner] + slack)
         refuted[owner[bad]] = True
         _include(doubt, pieces[bad])
-        hopeless = ~done & ~((pieces.coefficients.max(axis=-1) > error[owner] + slack) & np.isfinite(least))
-        lost[owner[hopeless]] = True
-        _include(doubt, pieces[hopeless & ~refuted[owner]])
-        pieces = pieces[~(done | hopeless | refuted[owner])]
-        crowd = np.bincount(pieces.owner, minlength=count)[pieces.owner]
-        given_up = (crowd > most) | (lost[pieces.owner] & (level >= DOUBT_HALVINGS))
+        undecidable = ~done & ~((pieces.coefficients.max(axis=-1) > error[owner] + slack) & np.isfinite(least))
+        lost[owner[undecidable]] = True
+        _include(doubt, pieces[undecidable & ~refuted[owner]])
+        pieces = pieces[~(done | undecidable | refuted[owner])]
+        still_open = np.bincount(pieces.owner, minlength=count)[pieces.owner]
+        given_up = (still_open > most) | (lost[pieces.owner] & (level >= DOUBT_HALVINGS))
         _include(doubt, pieces[given_up])
         pieces = pieces[~given_up]
     _include(doubt, pieces)

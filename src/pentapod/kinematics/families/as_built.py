@@ -27,7 +27,7 @@ from pentapod.kinematics.robot import Branch, SingularSurface
 class AsBuiltPentapod(Value, ProvenByLegEquations):
     """Five legs from a_k in space to rings around the platform line; all in metres, machine frame.
 
-    base (5, 3): where the base joints are, off the plane z = 0 too. offsets (5,): z_k, the heights of the platform
+    base (5, 3): where the base joints are, off the plane z = 0 too. offsets (5,): z_k, the positions of the platform
     joints along the line. radii (5,), none negative: leg k ends on a circle of this radius that turns freely about the
     line at z_k (LinuxCNC's pentakins; 0 is a joint on the line itself). zeros (5,): what a leg's scale reads is its
     length plus this. nominal: the machine that it was built to be; poses are named by its branches, and distances from

@@ -39,7 +39,7 @@ class BuiltLegs(Protocol):
 
     @property
     def offsets(self) -> Floats:
-        """The heights of the platform joints along the line (5,)."""
+        """The platform offsets along the line (5,)."""
         ...
 
     @property
@@ -49,7 +49,7 @@ class BuiltLegs(Protocol):
 
     @property
     def zeros(self) -> Floats:
-        """What the readings are more than the lengths (5,)."""
+        """Zero errors of the scales (5,): reading minus length."""
         ...
 
 

@@ -11,7 +11,7 @@ contains exactly one solution (Krawczyk 1969, Newton-Kantorovich; lemma 7 of doc
 throughout, so the solutions form one continuous curve, and no singularity lies in the tube.
 
 The balls at the shared end of two consecutive tubes have one centre and one shape, so one contains the other, and
-both their solutions are the same: tubes that meet end to end carry one continuous curve along (lemma 10).
+both their solutions are the same: tubes that meet end to end enclose one continuous curve (lemma 10).
 
 Y uses the mean value theorem, |C G(x̃(s), s)| ≤ |C G(x̃(½), ½)| + ½ |C dG/ds|, so it is of second order in the step.
 All bounds are computed in ball arithmetic: they are proofs in spite of rounding.

@@ -96,7 +96,7 @@ class _Solver(ConvexProgram):
         self.give = np.concatenate([np.zeros(self.hard + 2 * self.coefficients), 0.5 / soft.weight])
 
     def keeps(self, off: Floats) -> bool:
-        """Tell whether rows are met, and discs nearly: whoever asked scales back into the discs."""
+        """Return whether rows are met, and discs nearly: the caller scales back into the discs."""
         return (
             float(np.abs(off[: self.hard]).max(initial=0.0)) < self.options.off
             and float(np.abs(off).max()) < self.options.off_soft
