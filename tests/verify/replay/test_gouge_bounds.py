@@ -92,6 +92,15 @@ def test_one_that_only_the_sweep_meets():
     assert BOUND < found.depth <= depth + 1e-9
 
 
+def test_a_depth_that_only_the_sweep_meets_is_attained_less_the_deviation():
+    """Too deep by less than the chords may deviate: too deep perhaps, but not surely."""
+    depth, off = 1.05e-4, 1e-5
+    coarse, surface = moving(off=off, chords=CHORDS // 50), corner(-2.5e-3, -RADIUS + 1.05e-4)
+    found = gouge_bound(coarse, surface, BallCutter(RADIUS).solids, np.ones(6, dtype=bool), bound=BOUND)
+    assert not found.attained
+    assert found.depth >= depth + off
+
+
 @pytest.mark.parametrize("off", [1e-5, 3e-5])
 def test_the_deviation_of_the_motion_makes_it_deeper(off):
     found = ball(3e-5, off=off)
