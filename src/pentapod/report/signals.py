@@ -55,12 +55,12 @@ class Signals:
         trajectory: Trajectory,
         toolpath: Toolpath,
         collision_world: CollisionWorld = NOTHING,
-        limits: Sequence[LimitKind] | None = None,
+        limits: Sequence[LimitKind] = (),
     ) -> Signals:
         """Return the signals of a program. The trajectory gives the segment and the active limit at a time.
 
-        collision_world: what legs, spindle and tool must not touch. limits: kinds of limits on poses, pentapod's own by
-        default.
+        collision_world: what legs, spindle and tool must not touch. limits: kinds of limits on poses besides
+        pentapod's own.
         """
         times = program.times
         joined = Interpolant.through(program.legs, program.period, program.interpolation)
