@@ -17,7 +17,7 @@ from pydantic import ValidationError
 import pentapod
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import Key, check_fields, check_size, declared, fields_from, file_key
-from pentapod.base.tables import Table, table_of
+from pentapod.base.tables import TomlTable, table_of
 from pentapod.base.units import from_si, split_key, to_si
 from pentapod.cutters import CUTTERS
 from pentapod.job.schema.tables import JobTables, table_model
@@ -44,7 +44,7 @@ class Sample:
         check_fields(self, ToolpathError)
 
 
-TABLE = table_of(Sample, Table)
+TABLE = table_of(Sample, TomlTable)
 
 
 def test_a_table_has_the_declared_keys_in_the_unit_of_files():

@@ -12,14 +12,14 @@ from pentapod.cutters.ball import BallCutter
 from pentapod.cutters.bull_nose import BullNose
 from pentapod.geometry import RigidTransform
 from pentapod.geometry.solids import Solid
-from pentapod.view import Motion
+from pentapod.view import ToolMotion
 from pentapod.view.shapes import along, quaternion, revolved, rotation_of, solid_profile, tool_mesh
 
 UNITS = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1)
 
 
 def test_motion_at_the_time_of_a_row_has_its_legs(opened):
-    motion, program = Motion.of(opened), opened.program
+    motion, program = ToolMotion.of(opened), opened.program
     assert motion.duration == pytest.approx(program.duration)
     for row in (0, 1, len(program.legs) // 3, len(program.legs) - 1):
         machine_pose = motion.machine_pose(program.times[row], opened.machine, program.placement)
@@ -34,7 +34,7 @@ def test_motion_at_the_time_of_a_row_has_its_legs(opened):
 
 
 def test_motion_moves_with_the_part(opened):
-    motion, seconds = Motion.of(opened), 0.4 * opened.program.duration
+    motion, seconds = ToolMotion.of(opened), 0.4 * opened.program.duration
     before = motion.machine_pose(seconds, opened.machine, opened.placement)
     shift = np.array([0.3, 0.0, 0.2])
     after = motion.machine_pose(
@@ -49,7 +49,7 @@ def test_motion_moves_with_the_part(opened):
 
 
 def test_motion_without_a_program_follows_the_feeds(opened):
-    motion, toolpath = Motion.of_toolpath(opened.toolpath, opened.machine), opened.toolpath
+    motion, toolpath = ToolMotion.of_toolpath(opened.toolpath, opened.machine), opened.toolpath
     seconds = 0.0
     for segment in toolpath.segments:
         way = sum(float(np.linalg.norm(b - a)) for a, b in zip(segment.tips, segment.tips[1:], strict=False))

@@ -70,7 +70,7 @@ class RefusalError(PentapodError):
         return type(self), (self.refusal,)
 
 
-class Stage(Protocol[Given_contra, Options, Answer_co]):
+class StageFunction(Protocol[Given_contra, Options, Answer_co]):
     """A stage that returns a refusal of the stage before it unchanged."""
 
     @overload
@@ -79,11 +79,13 @@ class Stage(Protocol[Given_contra, Options, Answer_co]):
     def __call__(self, given: Refusal, /, *args: Options.args, **options: Options.kwargs) -> Refusal: ...
 
 
-def stage(function: Callable[Concatenate[Given_contra, Options], Answer_co]) -> Stage[Given_contra, Options, Answer_co]:
+def stage(
+    function: Callable[Concatenate[Given_contra, Options], Answer_co],
+) -> StageFunction[Given_contra, Options, Answer_co]:
     """Decorate a stage: if its first argument is a `Refusal`, it is returned and the stage does not run."""
 
     @wraps(function)
     def passed(*args: Any, **options: Any) -> Any:
         return args[0] if args and isinstance(args[0], Refusal) else function(*args, **options)
 
-    return cast("Stage[Given_contra, Options, Answer_co]", passed)
+    return cast("StageFunction[Given_contra, Options, Answer_co]", passed)

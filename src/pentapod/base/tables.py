@@ -21,7 +21,7 @@ Vector = tuple[float, float, float]
 Positive = Annotated[float, Field(gt=0.0)]
 
 
-class Table(BaseModel):
+class TomlTable(BaseModel):
     """A table of a file: unknown keys, wrong types, NaN and infinity are errors. Values are as in the file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
@@ -39,7 +39,7 @@ class Table(BaseModel):
         def __getattr__(self, key: str) -> Any: ...
 
 
-TableType = TypeVar("TableType", bound=Table)
+TableType = TypeVar("TableType", bound=TomlTable)
 
 
 def wrong(key: str, what: str, expected: str | None = None, **details: Any) -> NoReturn:
@@ -56,7 +56,7 @@ def table_fields(cls: type, *, optional: bool = False) -> dict[str, Any]:
 
 
 @cache
-def table_of(cls: type, base: type[TableType] = Table, *more: type) -> type[TableType]:
+def table_of(cls: type, base: type[TableType] = TomlTable, *more: type) -> type[TableType]:
     """Return the table whose keys a dataclass declares, and `more` of them; it pickles as a name of `cls`'s module.
 
     Its name is that of the dataclass with "Table" for "Options" or "Keys", its description the first sentence. Rules

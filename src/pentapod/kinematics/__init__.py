@@ -4,8 +4,8 @@ from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.families.as_built_forward import ProvenPoses, as_built_pose
 from pentapod.kinematics.families.assembly_obstacles import (
+    AssemblyObstacle,
     AssemblyObstacles,
-    Obstacle,
     assembly_obstacles,
     platform_obstacles,
 )
@@ -47,6 +47,7 @@ __all__ = [
     "COMPONENTS",
     "MODES",
     "AsBuiltPentapod",
+    "AssemblyObstacle",
     "AssemblyObstacles",
     "Branch",
     "Chords",
@@ -59,7 +60,6 @@ __all__ = [
     "LinearPentapod",
     "Mode",
     "MotionProof",
-    "Obstacle",
     "ProvenPoses",
     "ReconfigurablePentapod",
     "Robot",

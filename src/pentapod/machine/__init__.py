@@ -9,7 +9,7 @@ from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegL
 from pentapod.machine.reader import shipped_machines
 from pentapod.machine.report.report import (
     AMPLIFICATION_LIMIT,
-    Finding,
+    MachineFinding,
     MachineReport,
     check,
     explain,
@@ -25,10 +25,10 @@ __all__ = [
     "CollisionWorld",
     "ControllerSettings",
     "Drives",
-    "Finding",
     "JointLimits",
     "LegLimits",
     "Machine",
+    "MachineFinding",
     "MachineReport",
     "Masses",
     "Obstacle",

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, SerializeAsAny
 
 from pentapod.base.errors import InputError, MachineError
 from pentapod.base.registry import Registry
-from pentapod.base.tables import Table, wrong
+from pentapod.base.tables import TomlTable, wrong
 from pentapod.base.values import Value
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.fields import FIVE_NUMBERS, FIVE_PAIRS
@@ -18,7 +18,7 @@ from pentapod.machine.fields import FIVE_NUMBERS, FIVE_PAIRS
 QUADRATIC = "quadratic"
 
 
-class GeometryTable(Table):
+class GeometryTable(TomlTable):
     """Where the joints are. Of the quadratic family give delta, or platform_mm, or both if they agree."""
 
     family: str = Field(default=QUADRATIC, description="name of the robot family; packages can add families")

@@ -24,7 +24,7 @@ from pentapod.kinematics.robot import Robot
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.families import FAMILIES
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
-from pentapod.machine.tables import FILE_KEYS, GuideKeys, MachineTables, PlatformJointKeys, ToolKeys
+from pentapod.machine.tables import FILE_KEYS, GuideKeys, MachineTables, MachineToolKeys, PlatformJointKeys
 
 Made = TypeVar("Made")
 
@@ -110,7 +110,7 @@ def _fields(tables: Any) -> dict[str, Any]:
         "masses": Masses(**fields_from(Masses, tables.masses)),
         "tool_limits": ToolLimits(**fields_from(ToolLimits, tables.tool)),
         "guides": _guides(robot, **fields_from(GuideKeys, tables.guides)),
-        **fields_from(ToolKeys, tables.tool),
+        **fields_from(MachineToolKeys, tables.tool),
     }
 
 

@@ -9,7 +9,7 @@ from pydantic import Field, create_model
 
 from pentapod.base.arrays import Floats
 from pentapod.base.keys import Key, declared
-from pentapod.base.tables import Table, extended, table_of
+from pentapod.base.tables import TomlTable, extended, table_of
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.families import OfFamily
 from pentapod.machine.fields import FIVE_PAIRS, PER_LEG, each_leg
@@ -43,7 +43,7 @@ class PlatformJointKeys:
 
 
 @dataclass(frozen=True)
-class ToolKeys:
+class MachineToolKeys:
     """The tool that the machine comes with."""
 
     tool_length: Annotated[
@@ -57,7 +57,7 @@ PARTS: dict[str, tuple[type, ...]] = {
     "legs": (LegLimits,),
     "joints": (JointLimits, PlatformJointKeys),
     "bodies": (Bodies,),
-    "tool": (ToolKeys, ToolLimits),
+    "tool": (MachineToolKeys, ToolLimits),
     "controller": (ControllerSettings,),
     "work": (WorkVolume,),
     "drives": (Drives,),
@@ -66,7 +66,7 @@ PARTS: dict[str, tuple[type, ...]] = {
 """The dataclasses whose keys a table has, by the table's name."""
 
 
-class NamedTable(Table):
+class NamedTable(TomlTable):
     """A machine file."""
 
     name: Annotated[str, Field(min_length=1, pattern=r"^[\w .+-]+$")] = Field(description="name of the machine")
@@ -76,7 +76,7 @@ class NamedTable(Table):
 
 def _table(first: type, *more: type) -> Any:
     """Return type and field of the table of some dataclasses; it may be left out where all its keys have defaults."""
-    model: Any = table_of(first, Table)
+    model: Any = table_of(first, TomlTable)
     for part in more:
         model = extended(model.__name__, model, part)
     needed = any(item.is_needed for part in (first, *more) for item in declared(part))

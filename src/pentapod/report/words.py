@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.base.tables import Table
+from pentapod.base.tables import TomlTable
 from pentapod.geometry.rigid import RigidTransform
 
 
@@ -33,7 +33,7 @@ def opening(sentence: str, most: int = 100) -> str:
     return first[:most].rsplit(" ", 1)[0].rstrip(" ,:") + " …"
 
 
-def tool_sentence(tool: Table) -> str:
+def tool_sentence(tool: TomlTable) -> str:
     """Return the type of the job's tool and its sizes, as text."""
     measures = [f"{key.removesuffix('_mm')} {value:g} mm" for key, value in tool.sizes().items()]
     return ", ".join([f"{tool.type} tool", *measures])

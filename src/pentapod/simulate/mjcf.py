@@ -25,7 +25,7 @@ _STEEL, _ROD, _SPINDLE = "0.55 0.58 0.62 1", "0.85 0.86 0.88 1", "0.25 0.45 0.75
 
 
 @dataclass(frozen=True)
-class ModelOptions:
+class MujocoModelOptions:
     """Options of the rigid-body model."""
 
     constraint_steps: float = 2.0
@@ -34,7 +34,7 @@ class ModelOptions:
     """Damping of the tool's spin about its own line, N·m·s."""
 
 
-DEFAULTS = ModelOptions()
+DEFAULTS = MujocoModelOptions()
 
 
 def mjcf(
@@ -44,7 +44,7 @@ def mjcf(
     direction: Floats,
     *,
     step: float,
-    model: ModelOptions = DEFAULTS,
+    model: MujocoModelOptions = DEFAULTS,
 ) -> str:
     """Return the model as XML, standing at a pose: position p and direction i (3,), machine frame.
 

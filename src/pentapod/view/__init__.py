@@ -3,9 +3,9 @@
 Only `server`, `scene`, `panel` and `access` use viser (extra `view`).
 """
 
-from pentapod.view.motion import Motion
+from pentapod.view.motion import ToolMotion
 from pentapod.view.opened_run import OpenedRun, open_run
 from pentapod.view.server import Viewer
 from pentapod.view.study import Reach, Study
 
-__all__ = ["Motion", "OpenedRun", "Reach", "Study", "Viewer", "open_run"]
+__all__ = ["OpenedRun", "Reach", "Study", "ToolMotion", "Viewer", "open_run"]

@@ -1,4 +1,4 @@
-"""Motion: tool poses over time in the workpiece frame, so that they move with the part."""
+"""Tool motion: tool poses over time in the workpiece frame, so that they move with the part."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class MachinePose:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion(Value):
+class ToolMotion(Value):
     """Tool poses over time, workpiece frame: times (N,) in seconds, tips and axes (N, 3), tip → spindle."""
 
     times: Floats
@@ -45,14 +45,14 @@ class Motion(Value):
     axes: Floats
 
     @classmethod
-    def of(cls, run: OpenedRun) -> Motion:
+    def of(cls, run: OpenedRun) -> ToolMotion:
         """Return the motion of a run: of its program, else along its toolpath."""
         if run.program is None:
             return cls.of_toolpath(run.toolpath, run.machine)
         return cls.of_program(run.program, run.machine)
 
     @classmethod
-    def of_program(cls, program: Program, machine: Machine) -> Motion:
+    def of_program(cls, program: Program, machine: Machine) -> ToolMotion:
         """Return the motion of a program."""
         rows = np.unique(np.linspace(0, len(program.legs) - 1, min(len(program.legs), MOST_ROWS)).astype(np.intp))
         position, direction = machine.robot.pose(program.legs[rows], program.component)
@@ -61,7 +61,7 @@ class Motion(Value):
         return cls(program.times[rows], tips, back.rotate(-direction))
 
     @classmethod
-    def of_toolpath(cls, toolpath: Toolpath, machine: Machine) -> Motion:
+    def of_toolpath(cls, toolpath: Toolpath, machine: Machine) -> ToolMotion:
         """Return the motion along a toolpath at its feeds, without acceleration limits."""
         way = np.linalg.norm(np.diff(toolpath.tips, axis=0), axis=1)
         feeds = np.array([min(segment.feed, machine.rapid_velocity) for segment in toolpath.segments])

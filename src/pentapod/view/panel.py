@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.build.placement import rotation_angles_deg
 from pentapod.report.words import duration, number
-from pentapod.view.motion import MachinePose, Motion
+from pentapod.view.motion import MachinePose, ToolMotion
 from pentapod.view.opened_run import OpenedRun
 from pentapod.view.study import Reach
 
@@ -22,7 +22,7 @@ SLIDER_STEPS = 2000
 class Panel:
     """The controls; `server` connects them."""
 
-    def __init__(self, server: viser.ViserServer, run: OpenedRun, motion: Motion) -> None:
+    def __init__(self, server: viser.ViserServer, run: OpenedRun, motion: ToolMotion) -> None:
         gui = server.gui
         gui.set_panel_label(f"pentapod · {run.job.path.name}")
         gui.add_markdown(run_words(run))

@@ -34,7 +34,7 @@ SHAFT_SHARE = 0.25
 STEEL, DARK, PART_COLOUR, BEAM = (150, 156, 166), (84, 90, 100), (195, 206, 217), (224, 60, 40)
 
 
-class Scene:
+class ViewerScene:
     """One run in a viser scene. The part is dragged about its middle; all bodies of the tool move together."""
 
     def __init__(self, server: viser.ViserServer, run: OpenedRun, study: Study) -> None:

@@ -13,11 +13,11 @@ from pentapod.base.errors import PentapodError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.view.access import Access, open_server
-from pentapod.view.motion import Motion
+from pentapod.view.motion import ToolMotion
 from pentapod.view.opened_run import OpenedRun
 from pentapod.view.panel import Panel, machine_pose_words, place_words, reach_words
 from pentapod.view.replan import Replanned, replanned
-from pentapod.view.scene import Scene
+from pentapod.view.scene import ViewerScene
 from pentapod.view.study import Reach, Study
 
 if TYPE_CHECKING:
@@ -82,12 +82,12 @@ class Viewer:
 
     def _show(self, run: OpenedRun) -> None:
         """Draw a run, and connect its controls."""
-        study, motion = Study.of(run), Motion.of(run)
+        study, motion = Study.of(run), ToolMotion.of(run)
         with self._lock, self._server.atomic():
             self.run, self._study, self._motion = run, study, motion
             self._server.scene.reset()
             self._server.gui.reset()
-            self._scene = Scene(self._server, run, study)
+            self._scene = ViewerScene(self._server, run, study)
             self.panel = panel = Panel(self._server, run, motion)
         self._scene.part.on_update(lambda event: self._moved_part(thorough=event.phase == "end"))
         panel.time.on_update(lambda _: self._show_machine_pose())

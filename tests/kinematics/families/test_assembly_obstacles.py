@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pentapod.base.errors import ArrayError
-from pentapod.kinematics import MODES, GeneralPentapod, LinearPentapod, Obstacle, assembly_obstacles
+from pentapod.kinematics import MODES, AssemblyObstacle, GeneralPentapod, LinearPentapod, assembly_obstacles
 
 
 @pytest.fixture
@@ -34,14 +34,14 @@ def test_the_inequality_named_fails_everywhere_by_what_is_said(general: GeneralP
     assert (np.bincount(obstacles.obstacle, minlength=6)[[0, 2, 3, 4, 5]] > 3).all()
     for length, obstacle, shortfall in zip(legs, obstacles.obstacle, obstacles.shortfall, strict=True):
         direction, place, both, angle = (values.min() for values in sampled_line(general, length))
-        if obstacle == Obstacle.NONE:
+        if obstacle == AssemblyObstacle.NONE:
             assert shortfall == 0.0
             assert angle < 1e-3
-        elif obstacle == Obstacle.DIRECTION:
+        elif obstacle == AssemblyObstacle.DIRECTION:
             assert direction == pytest.approx(shortfall, rel=1e-3, abs=1e-5)
-        elif obstacle == Obstacle.POSITION:
+        elif obstacle == AssemblyObstacle.POSITION:
             assert place == pytest.approx(shortfall, rel=1e-3, abs=1e-5)
-        elif obstacle == Obstacle.APART:
+        elif obstacle == AssemblyObstacle.APART:
             assert direction < 0.0
             assert place < 0.0
             assert 0.0 < both <= shortfall + 1e-9
@@ -71,7 +71,7 @@ def test_it_says_so_in_a_sentence(general: GeneralPentapod) -> None:
     assert "0 ≤ l_i < ∞" in obstacles.explain(1)
     assert obstacles.explain(2).startswith("no assembly: violates u² + v² ≤ 1")
     assert "missed by" in obstacles.explain(2)
-    assert obstacles.obstacle[3] == Obstacle.NOT_A_LENGTH
+    assert obstacles.obstacle[3] == AssemblyObstacle.NOT_A_LENGTH
     assert assembly_obstacles(general, good).explain() == "a pose exists"
     with pytest.raises(ArrayError, match=r"legs has shape \(3,\)"):
         assembly_obstacles(general, [1.0, 2.0, 3.0])

@@ -9,9 +9,9 @@ from scipy.optimize import minimize_scalar
 
 from pentapod.base.errors import ArrayError, MachineError
 from pentapod.kinematics import (
+    AssemblyObstacle,
     GeneralPentapod,
     LinearPentapod,
-    Obstacle,
     SixLegPlatform,
     platform_obstacles,
     singularity_polynomial,
@@ -255,11 +255,11 @@ def test_legs_without_a_pose_are_explained(platform: SixLegPlatform) -> None:
     obstacles = platform_obstacles(platform, legs)
     assert list(obstacles.obstacle[[0, 1, 3, 4]]) == [
         0,
-        Obstacle.SIXTH_LEG,
-        Obstacle.NOT_A_LENGTH,
-        Obstacle.NOT_A_LENGTH,
+        AssemblyObstacle.SIXTH_LEG,
+        AssemblyObstacle.NOT_A_LENGTH,
+        AssemblyObstacle.NOT_A_LENGTH,
     ]
-    assert Obstacle.NOT_A_LENGTH < obstacles.obstacle[2] < Obstacle.SIXTH_LEG
+    assert AssemblyObstacle.NOT_A_LENGTH < obstacles.obstacle[2] < AssemblyObstacle.SIXTH_LEG
     positions, directions = platform.pentapod.assembly_modes(legs[1, :5])
     longest = platform.sixth_leg_range(positions, directions)[1].max()
     assert obstacles.shortfall[1] == pytest.approx((9.0 - longest) / 9.0)

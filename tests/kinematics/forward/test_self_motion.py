@@ -4,7 +4,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from pentapod.kinematics import LinearPentapod, Obstacle, assembly_obstacles
+from pentapod.kinematics import AssemblyObstacle, LinearPentapod, assembly_obstacles
 from pentapod.kinematics.forward.quadratic import reciprocal_condition
 
 BASE = 0.2 * np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)])
@@ -35,7 +35,7 @@ def test_poses_have_their_legs_or_are_named(delta: float, lever: float, count: i
     robot = LinearPentapod(BASE, lever + delta * BASE[:, 0], delta)
     legs = robot.leg_lengths(*beside_it(count, delta))
     obstacles = assembly_obstacles(robot, legs)
-    assert set(np.unique(obstacles.obstacle)) <= {Obstacle.NONE, Obstacle.SELF_MOTION}
+    assert set(np.unique(obstacles.obstacle)) <= {AssemblyObstacle.NONE, AssemblyObstacle.SELF_MOTION}
     assert obstacles.exists.mean() > 0.8
     for component in COMPONENTS:
         p, i = robot.pose(legs, component)
@@ -89,6 +89,6 @@ def test_on_the_self_motion_there_is_no_pose_and_that_is_said() -> None:
     assert np.ptp(legs, axis=0).max() < 1e-15, "leg 3's joint turns about an axis parallel to y, and no leg notices"
     assert np.isnan(robot.pose(legs, (1, 1))[0]).all()
     obstacles = assembly_obstacles(robot, legs)
-    assert (obstacles.obstacle == Obstacle.SELF_MOTION).all()
+    assert (obstacles.obstacle == AssemblyObstacle.SELF_MOTION).all()
     assert np.isnan(obstacles.shortfall).all()
     assert "self-motion" in obstacles.explain(0)

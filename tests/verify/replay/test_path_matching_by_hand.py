@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pentapod.verify.replay.free_space import PosedPolyline, SearchOptions
+from pentapod.verify.replay.free_space import FreeSpaceOptions, PosedPolyline
 from pentapod.verify.replay.path_matching import MatchOptions, interval_fractions, match, turns_on_spot
 
 
@@ -101,7 +101,7 @@ def test_axes_are_compared_where_a_waypoint_is_visited():
     np.testing.assert_allclose(found.waypoint_angles, expected, atol=1e-9)
 
 
-SMALL = MatchOptions(search=SearchOptions(cells=50_000))
+SMALL = MatchOptions(search=FreeSpaceOptions(cells=50_000))
 """Motion and path are so dense that the search would need more cells."""
 
 

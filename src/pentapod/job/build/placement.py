@@ -11,7 +11,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ArrayError
 from pentapod.base.keys import VECTOR
-from pentapod.base.tables import Table
+from pentapod.base.tables import TomlTable
 from pentapod.base.units import from_si, to_si
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.schema.job import Job
@@ -65,7 +65,7 @@ def _rounded(values: Floats, digits: int) -> VECTOR:
     return x, y, z
 
 
-def placement_toml(table: Table) -> str:
+def placement_toml(table: TomlTable) -> str:
     """Return a table [placement] in TOML, without keys that have their defaults."""
     content = table.model_dump(mode="json", exclude_defaults=True)
     lines = [f"{key} = {json.dumps(value)}" for key, value in content.items()]

@@ -16,7 +16,7 @@ from typing import Any, cast
 from pydantic import BaseModel, ValidationError
 
 from pentapod.base.errors import JobError, nearest
-from pentapod.base.tables import Table, problem_of
+from pentapod.base.tables import TomlTable, problem_of
 from pentapod.base.toml import line_of, parsed, read_toml
 from pentapod.base.values import Value
 from pentapod.cutters.registry import CUTTERS
@@ -33,8 +33,8 @@ class _TableOf:
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
 
-    def __get__(self, job: Job | None, owner: type) -> Table:
-        return cast(Table, self if job is None else getattr(job.tables, self.name))
+    def __get__(self, job: Job | None, owner: type) -> TomlTable:
+        return cast(TomlTable, self if job is None else getattr(job.tables, self.name))
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Job(Value):
     summary = ("path",)
 
     path: Path
-    tables: Table
+    tables: TomlTable
     mesh_path: Path
     machine_file: Path | None
     files: dict[str, Path] = field(default_factory=dict[str, Path])

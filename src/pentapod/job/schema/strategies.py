@@ -12,14 +12,14 @@ from pydantic import BeforeValidator, Field, SerializeAsAny, create_model
 
 from pentapod.base.errors import InputError, nearest
 from pentapod.base.keys import Key, declared
-from pentapod.base.tables import Table, table_of, wrong
+from pentapod.base.tables import TomlTable, table_of, wrong
 from pentapod.toolpath.strategies.registry import STRATEGIES
 
 FILE = "file"
 """The strategy that reads a toolpath instead of making one."""
 
 
-class StrategyTable(Table):
+class StrategyTable(TomlTable):
     """Toolpath strategy and its options."""
 
     strategy: str = "raster"

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import create_model, model_validator
 
 from pentapod.base.keys import VECTOR, Key
-from pentapod.base.tables import Table, table_of, wrong
+from pentapod.base.tables import TomlTable, table_of, wrong
 from pentapod.base.units import to_si
 from pentapod.job.schema.placement import FixtureTable, PlacementTable
 from pentapod.job.schema.strategies import ToolpathTable, strategy_table
@@ -221,18 +221,18 @@ class VerifyKeys:
     waive: Annotated[tuple[str, ...], Key("", "claims that may stay unjudged without failing the verdict")] = ()
 
 
-PartTable = table_of(PartKeys, Table, Region)
+PartTable = table_of(PartKeys, TomlTable, Region)
 MachineTable = table_of(MachineKeys)
-AxisTable = table_of(AxisKeys, Table, Orientation)
-GougeTable = table_of(GougeKeys, Table, GougeOptions)
-FeedTable = table_of(FeedKeys, Table, ToolLimits)
+AxisTable = table_of(AxisKeys, TomlTable, Orientation)
+GougeTable = table_of(GougeKeys, TomlTable, GougeOptions)
+FeedTable = table_of(FeedKeys, TomlTable, ToolLimits)
 ToleranceTable = table_of(ToleranceKeys)
 OutputTable = table_of(OutputKeys)
 LimitsTable = table_of(LimitsKeys)
 VerifyTable = table_of(VerifyKeys)
 
 
-class _JobRules(Table):
+class _JobRules(TomlTable):
     """All tables of a job file, in the order of the flow."""
 
     @model_validator(mode="after")
@@ -261,11 +261,11 @@ JobTables = create_model("JobTables", __base__=_JobRules, __module__=__name__, _
 """A whole job file."""
 
 
-def table_model(name: str, strategy: str = "raster", tool: str = "ball") -> type[Table]:
+def table_model(name: str, strategy: str = "raster", tool: str = "ball") -> type[TomlTable]:
     """Return the model of a table of job files. strategy: whose keys [toolpath] has; tool: type whose keys [tool] has.
 
     Raises KeyError: no such table.
     """
     if name == "toolpath":
         return strategy_table(strategy)
-    return tool_table(tool) if name == "tool" else cast("type[Table]", JobTables.model_fields[name].annotation)
+    return tool_table(tool) if name == "tool" else cast("type[TomlTable]", JobTables.model_fields[name].annotation)

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BeforeValidator, Field, SerializeAsAny, create_model
 
 from pentapod.base.keys import VECTOR, Key, declared
-from pentapod.base.tables import Table, table_fields, table_of, wrong
+from pentapod.base.tables import TomlTable, table_fields, table_of, wrong
 from pentapod.cutters.registry import CUTTERS, OWN_CUTTERS
 
 
@@ -47,7 +47,7 @@ class ToolKeys:
                     wrong(key, "an impossible piece", "[height, lower diameter, upper diameter], all positive")
 
 
-class ToolTable(Table):
+class ToolTable(TomlTable):
     """The table of a tool; its type says which sizes it has."""
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -22,7 +22,7 @@ from pentapod.numerics.blocks import blocks
 _EPS = float(np.finfo(np.float64).eps)
 
 
-class Obstacle(IntEnum):
+class AssemblyObstacle(IntEnum):
     """The first inequality, in this order, that no point of the solution line fulfils (kinematics notes, section 5)."""
 
     NONE = 0
@@ -41,20 +41,20 @@ class Obstacle(IntEnum):
 
 
 _INEQUALITIES = {
-    Obstacle.NONE: "none: a pose exists",
-    Obstacle.NOT_A_LENGTH: "0 ≤ l_i < ∞ for every leg",
-    Obstacle.DIRECTION: "u² + v² ≤ 1: the direction's horizontal part is too long",
-    Obstacle.POSITION: "px² + py² ≤ l_3²: leg 3 is too short for the horizontal position",
-    Obstacle.APART: "u² + v² ≤ 1 and px² + py² ≤ l_3² at once: each can hold, but not both together",
-    Obstacle.ANGLE: "|t − px u − py v| ≤ |pz w|: leg 3 and the line cannot include the angle",
-    Obstacle.SIXTH_LEG: "|M − r| ≤ √(l_6² − h²) ≤ M + r: the sixth leg does not reach the platform about any line",
-    Obstacle.SELF_MOTION: "w = 0 and u = 1/δ: a self-motion, a whole circle of poses has these lengths",
+    AssemblyObstacle.NONE: "none: a pose exists",
+    AssemblyObstacle.NOT_A_LENGTH: "0 ≤ l_i < ∞ for every leg",
+    AssemblyObstacle.DIRECTION: "u² + v² ≤ 1: the direction's horizontal part is too long",
+    AssemblyObstacle.POSITION: "px² + py² ≤ l_3²: leg 3 is too short for the horizontal position",
+    AssemblyObstacle.APART: "u² + v² ≤ 1 and px² + py² ≤ l_3² at once: each can hold, but not both together",
+    AssemblyObstacle.ANGLE: "|t − px u − py v| ≤ |pz w|: leg 3 and the line cannot include the angle",
+    AssemblyObstacle.SIXTH_LEG: "|M − r| ≤ √(l_6² − h²) ≤ M + r: the sixth leg never reaches the platform",
+    AssemblyObstacle.SELF_MOTION: "w = 0 and u = 1/δ: a self-motion, a whole circle of poses has these lengths",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class AssemblyObstacles(Value):
-    """What keeps legs (..., 5) from being assembled: an `Obstacle` (...) for each, and the shortfall (...).
+    """What keeps legs (..., 5) from being assembled: an `AssemblyObstacle` (...) for each, and the shortfall (...).
 
     The shortfall is by how much the inequality fails where it fails least, relative to its right-hand side; for
     ANGLE relative to l_3, for SIXTH_LEG by how much l_6 must change, relative to itself. 0 where a pose exists, NaN
@@ -68,14 +68,14 @@ class AssemblyObstacles(Value):
     @property
     def exists(self) -> Bools:
         """Whether a pose exists (...)."""
-        return self.obstacle == Obstacle.NONE
+        return self.obstacle == AssemblyObstacle.NONE
 
     def explain(self, *index: int) -> str:
         """Return a sentence on the element at this index."""
-        obstacle, shortfall = Obstacle(int(self.obstacle[index])), float(self.shortfall[index])
-        if obstacle is Obstacle.NONE:
+        obstacle, shortfall = AssemblyObstacle(int(self.obstacle[index])), float(self.shortfall[index])
+        if obstacle is AssemblyObstacle.NONE:
             return "a pose exists"
-        if obstacle is Obstacle.SELF_MOTION:
+        if obstacle is AssemblyObstacle.SELF_MOTION:
             return f"no isolated pose: {obstacle.inequality}"
         amount = "" if np.isnan(shortfall) else f" (missed by a relative {shortfall:.3g})"
         return f"no assembly: violates {obstacle.inequality}{amount}"
@@ -89,19 +89,19 @@ def assembly_obstacles(pentapod: LinearPentapod | GeneralPentapod, legs: ArrayLi
     """
     lengths = as_batch(legs, "legs", (5,))
     flat = lengths.reshape(-1, 5)
-    obstacle = np.full(len(flat), Obstacle.NOT_A_LENGTH, dtype=np.int8)
+    obstacle = np.full(len(flat), AssemblyObstacle.NOT_A_LENGTH, dtype=np.int8)
     shortfall = np.full(len(flat), np.nan)
     equations = LineEquations.of(pentapod.base, pentapod.offsets)
     for block in blocks(len(flat)):
         some, missed, part = obstacle[block], shortfall[block], flat[block]
         exists = np.isfinite(pentapod.assembly_modes(part)[0]).all(axis=(1, 2))
-        some[exists], missed[exists] = Obstacle.NONE, 0.0
+        some[exists], missed[exists] = AssemblyObstacle.NONE, 0.0
         lost = np.flatnonzero(np.isfinite(part).all(axis=-1) & (part >= 0.0).all(axis=-1) & ~exists)
         some[lost], missed[lost] = _judge(SolutionLine.of(equations, np.square(part[lost].T)))
         if isinstance(pentapod, LinearPentapod):
             with np.errstate(invalid="ignore", over="ignore", under="ignore"):
                 free = lost[self_motions(part[lost].T.copy(), pentapod.linear_part, pentapod.delta)]
-            some[free], missed[free] = Obstacle.SELF_MOTION, np.nan
+            some[free], missed[free] = AssemblyObstacle.SELF_MOTION, np.nan
     return AssemblyObstacles(obstacle.reshape(lengths.shape[:-1]), shortfall.reshape(lengths.shape[:-1]))
 
 
@@ -117,9 +117,9 @@ def platform_obstacles(platform: SixLegPlatform, legs: ArrayLike) -> AssemblyObs
         shortfall = shortfall / lengths[..., 5]
     bad = ~(np.isfinite(sixth[..., 0]) & (sixth[..., 0] >= 0.0))
     assembled = np.isfinite(platform.assembly_modes(lengths)[0]).all(axis=-1).any(axis=-1)
-    obstacle = np.where(line.exists & ~assembled, Obstacle.SIXTH_LEG, line.obstacle)
-    obstacle = np.where(bad, Obstacle.NOT_A_LENGTH, obstacle).astype(np.int8)
-    shortfall = np.where(obstacle == Obstacle.SIXTH_LEG, shortfall, line.shortfall)
+    obstacle = np.where(line.exists & ~assembled, AssemblyObstacle.SIXTH_LEG, line.obstacle)
+    obstacle = np.where(bad, AssemblyObstacle.NOT_A_LENGTH, obstacle).astype(np.int8)
+    shortfall = np.where(obstacle == AssemblyObstacle.SIXTH_LEG, shortfall, line.shortfall)
     return AssemblyObstacles(obstacle, np.where(bad, np.nan, shortfall))
 
 
@@ -144,4 +144,4 @@ def _judge(line: SolutionLine) -> tuple[NDArray[np.int8], Floats]:
     failed = np.concatenate([failed, [np.maximum(low1, low2) > np.minimum(high1, high2)], [np.ones_like(best.exists)]])
     first = np.argmax(failed, axis=0)
     shortfall = np.take_along_axis(missed, first[None], axis=0)[0]
-    return (first + Obstacle.DIRECTION).astype(np.int8), np.maximum(shortfall, _EPS)
+    return (first + AssemblyObstacle.DIRECTION).astype(np.int8), np.maximum(shortfall, _EPS)

@@ -97,7 +97,7 @@ class Legs(Generic[Q]):
 
 
 @dataclass(frozen=True, eq=False)
-class Rows(Generic[Q]):
+class LegEquationRows(Generic[Q]):
     """∂G_k/∂p and ∂G_k/∂i (3, 5, N) in metres and metres squared; e (3, 5, N) and ρ (5, N), metres.
 
     ρ is 0 for legs without a ring.
@@ -127,19 +127,19 @@ def cross(a: Q, b: Q) -> Q:
     return a[_NEXT] * b[_AFTER] - a[_AFTER] * b[_NEXT]
 
 
-def rows(position: Q, direction: Q, legs: Legs[Q]) -> Rows[Q]:
+def rows(position: Q, direction: Q, legs: Legs[Q]) -> LegEquationRows[Q]:
     """Return the derivatives of the leg equations at positions and directions (3, N)."""
     p, i = position[:, None], direction[:, None]
     d, z = p - legs.base, legs.offsets
     e = d + z * i
     if not legs.rings.any():
-        return Rows(e, z * e, e, masked(dot(e, e), legs.rings))
+        return LegEquationRows(e, z * e, e, masked(dot(e, e), legs.rings))
     normal = cross(d, i)
     rho = root(dot(normal, normal))
     n = normal / rho
     pull_p = masked(legs.radii * cross(i, n), legs.rings)
     pull_i = masked(legs.radii * cross(n, d), legs.rings)
-    return Rows(e - pull_p, z * e - pull_i, e, masked(rho, legs.rings))
+    return LegEquationRows(e - pull_p, z * e - pull_i, e, masked(rho, legs.rings))
 
 
 def residuals(position: Q, direction: Q, legs: Legs[Q]) -> Q:
@@ -170,7 +170,7 @@ def mids(legs: Legs[Ball]) -> Legs[Floats]:
     return Legs(legs.base.mid, legs.offsets.mid, legs.radii.mid, legs.lengths.mid, legs.rings)
 
 
-def float_jacobian(found: Rows[Floats], direction: Floats, scale: float) -> Floats:
+def float_jacobian(found: LegEquationRows[Floats], direction: Floats, scale: float) -> Floats:
     """Return ∂G/∂(p / scale, i) (N, 6, 6) of directions (3, N)."""
     matrix = np.zeros((direction.shape[-1], 6, 6))
     matrix[:, :5, :3] = np.moveaxis(scale * found.by_position, -1, 0).swapaxes(1, 2)
@@ -179,13 +179,13 @@ def float_jacobian(found: Rows[Floats], direction: Floats, scale: float) -> Floa
     return matrix
 
 
-def ball_jacobian(found: Rows[Ball], direction: Ball, scale: float) -> Ball:
+def ball_jacobian(found: LegEquationRows[Ball], direction: Ball, scale: float) -> Ball:
     """Return ∂G/∂(p / scale, i) (N, 6, 6) of directions (3, N); scale is a power of two."""
     mid = float_jacobian(
-        Rows(found.by_position.mid, found.by_direction.mid, found.e.mid, found.rho.mid), direction.mid, scale
+        LegEquationRows(found.by_position.mid, found.by_direction.mid, found.e.mid, found.rho.mid), direction.mid, scale
     )
     rad = float_jacobian(
-        Rows(found.by_position.rad, found.by_direction.rad, found.e.rad, found.rho.rad), direction.rad, scale
+        LegEquationRows(found.by_position.rad, found.by_direction.rad, found.e.rad, found.rho.rad), direction.rad, scale
     )
     return Ball(mid, rad)
 

@@ -26,8 +26,8 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.kinematics.jacobian import invert
 from pentapod.kinematics.tubes.leg_equations import (
+    LegEquationRows,
     Legs,
-    Rows,
     ball_jacobian,
     dot,
     float_jacobian,
@@ -165,7 +165,7 @@ def determinant_sign(matrices: Floats) -> Ints:
     return sign
 
 
-def _change(found: Rows[Ball], dp: Ball, di: Ball, i: Ball, family: LegFamily) -> Ball:
+def _change(found: LegEquationRows[Ball], dp: Ball, di: Ball, i: Ball, family: LegFamily) -> Ball:
     """Return dG_k/ds (5, N) along the line of poses, for all s."""
     hull, slope = family.hull, family.slope
     change = dot(found.by_position, dp[:, None] - slope.base) + dot(found.by_direction, di[:, None])

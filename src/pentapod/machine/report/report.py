@@ -23,7 +23,7 @@ AMPLIFICATION_LIMIT = 10.0
 
 
 @dataclass(frozen=True)
-class Finding(Value):
+class MachineFinding(Value):
     """The worst value of one quantity over the work volume.
 
     value and limit in `unit`; kind: "at most", "at least" or "more than". where: tip (mm) and tool axis of the worst
@@ -67,7 +67,7 @@ class MachineReport(Value):
     clearance: float
     clearance_pair: str
     component: Component | None
-    findings: tuple[Finding, ...]
+    findings: tuple[MachineFinding, ...]
 
     @property
     def passed(self) -> bool:
@@ -101,9 +101,9 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = 5
         at, along = ", ".join(f"{x:.0f}" for x in 1e3 * tips[pose]), ", ".join(f"{x:+.2f}" for x in axes[pose])
         return f"tip ({at}) mm, axis ({along})"
 
-    def worst(name: str, values: Floats, kind: str, limit: float, unit: str) -> Finding:
+    def worst(name: str, values: Floats, kind: str, limit: float, unit: str) -> MachineFinding:
         pose = int(np.argmax(values) if kind == "at most" else np.argmin(values))
-        return Finding(name, values[pose], kind, limit, unit, where(pose))
+        return MachineFinding(name, values[pose], kind, limit, unit, where(pose))
 
     nearest = int(np.argmin(np.minimum(np.abs(w), np.abs(s_distance))))
     return MachineReport(
@@ -121,22 +121,22 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = 5
         component=Component(*one) if 0 not in one else None,
         findings=(
             *_of_legs(machine, lengths, base, platform, worst),
-            Finding("components met", len(signs), "at most", 1, "", where(nearest)),
+            MachineFinding("components met", len(signs), "at most", 1, "", where(nearest)),
             worst("|w|", np.abs(w), "more than", 0.0, ""),
             worst("distance to S = 0", 1e3 * s_distance, "more than", 0.0, "mm"),
             worst("turn about the tip to a singularity", np.degrees(turn), "more than", 0.0, "deg"),
             worst("tip force to leg forces", force, "at most", AMPLIFICATION_LIMIT, "N/N"),
             worst(f"clearance, {pair}", 1e3 * gaps.min(axis=1), "more than", 0.0, "mm"),
-            Finding("architectural measure", machine.architecture, "at least", ARCHITECTURAL_LIMIT, ""),
+            MachineFinding("architectural measure", machine.architecture, "at least", ARCHITECTURAL_LIMIT, ""),
         ),
     )
 
 
 def _of_legs(
-    machine: Machine, lengths: Floats, base: Floats, platform: Floats, worst: Callable[..., Finding]
-) -> list[Finding]:
+    machine: Machine, lengths: Floats, base: Floats, platform: Floats, worst: Callable[..., MachineFinding]
+) -> list[MachineFinding]:
     """Return the worst values of strokes and joints. lengths, metres, and angles in the joints, radians: (N, n)."""
-    legs, joints, count, found = machine.legs, machine.joints, machine.robot.n_legs, list[Finding]()
+    legs, joints, count, found = machine.legs, machine.joints, machine.robot.n_legs, list[MachineFinding]()
     for k in range(count):
         low, high = 1e3 * legs.min_length[k], 1e3 * legs.max_length[k]
         found += [

@@ -14,7 +14,7 @@ from pentapod.mesh.mesh import Mesh
 
 
 @dataclass(frozen=True)
-class GridOptions:
+class HeightGridOptions:
     """facets_per_cell: on average. most_entries: of facets in cells; a coarser grid is made where there were more.
 
     sideways: metres to both sides of a point at which `hides` looks.
@@ -25,7 +25,7 @@ class GridOptions:
     sideways: float = 1e-7
 
 
-OPTIONS = GridOptions()
+OPTIONS = HeightGridOptions()
 
 
 class HeightField:

@@ -15,7 +15,7 @@ REACH = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
 
 
 @dataclass(frozen=True)
-class ModelOptions:
+class LinearModelOptions:
     """What enters the model.
 
     worst: local minima of each kind of margin. near: largest distance of a margin from the level. steepest: waypoints
@@ -30,7 +30,7 @@ class ModelOptions:
     tangents_deg: tuple[float, ...] = (-36.0, -22.0, -12.0, -5.0, 0.0, 5.0, 12.0, 22.0, 36.0)
 
 
-OPTIONS = ModelOptions()
+OPTIONS = LinearModelOptions()
 
 
 @dataclass(frozen=True, eq=False)

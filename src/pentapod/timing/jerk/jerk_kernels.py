@@ -30,7 +30,7 @@ LARGEST_RESIDUAL = 1e-7
 """Residual of a row below which the method may stop."""
 
 
-class Rows(NamedTuple):
+class JerkRows(NamedTuple):
     """Rows ±p·v + lean x ≤ bound: p (N, P, 3), lean (N, P), bound (N, P, 2)."""
 
     p: Floats
@@ -48,7 +48,7 @@ class Iterate(NamedTuple):
 
 
 @kernel
-def _rows(a0: Floats, a1: Floats, c: Floats, varies: int, jerks: Floats, x_k: Floats, top: Floats) -> Rows:
+def _rows(a0: Floats, a1: Floats, c: Floats, varies: int, jerks: Floats, x_k: Floats, top: Floats) -> JerkRows:
     """Return all rows; arguments as for `minimise_duration`."""
     count, rows = a0.shape
     more = jerks.shape[1]
@@ -67,11 +67,11 @@ def _rows(a0: Floats, a1: Floats, c: Floats, varies: int, jerks: Floats, x_k: Fl
         j = rows + more
         p[i, j, 0], p[i, j, 1], p[i, j, 2], lean[i, j] = 1.0 / top[i], 0.0, 0.0, 0.0
         bound[i, j, 0], bound[i, j, 1] = 1.0, -LEAST_SHARE * x_k[i] / top[i]
-    return Rows(p, lean, bound)
+    return JerkRows(p, lean, bound)
 
 
 @kernel
-def _start(rows: Rows, v: Floats, level: float) -> Iterate:
+def _start(rows: JerkRows, v: Floats, level: float) -> Iterate:
     """Return slacks and multipliers to start from, on a level, and room for the rest."""
     p, lean, bound = rows
     s, z, off, rest = np.empty_like(bound), np.empty_like(bound), np.empty_like(bound), np.empty_like(bound)
@@ -89,7 +89,7 @@ def _start(rows: Rows, v: Floats, level: float) -> Iterate:
 def _assemble(
     basis: Floats,
     first: Ints,
-    rows: Rows,
+    rows: JerkRows,
     weight: Floats,
     x_k: Floats,
     v: Floats,
@@ -159,7 +159,7 @@ def _fix(band: Floats, fixed: Ints) -> None:
 
 
 @kernel
-def _predict(rows: Rows, dv: Floats, iterate: Iterate) -> tuple[float, float]:
+def _predict(rows: JerkRows, dv: Floats, iterate: Iterate) -> tuple[float, float]:
     """Fill Δs Δz of the step to the boundary; return Σ s z now and after that step."""
     p, lean, _ = rows
     s, z, off, product = iterate
@@ -188,7 +188,7 @@ def _predict(rows: Rows, dv: Floats, iterate: Iterate) -> tuple[float, float]:
 
 
 @kernel
-def _correct(basis: Floats, first: Ints, rows: Rows, iterate: Iterate, aim: float, down: Floats) -> None:
+def _correct(basis: Floats, first: Ints, rows: JerkRows, iterate: Iterate, aim: float, down: Floats) -> None:
     """Fill the corrector's `down`, and the complementarity residual s z − aim + Δs Δz."""
     p, lean, _ = rows
     s, z, off, product = iterate
@@ -211,7 +211,7 @@ def _correct(basis: Floats, first: Ints, rows: Rows, iterate: Iterate, aim: floa
 
 
 @kernel
-def _step(rows: Rows, dv: Floats, iterate: Iterate) -> tuple[float, float]:
+def _step(rows: JerkRows, dv: Floats, iterate: Iterate) -> tuple[float, float]:
     """Turn the residuals into Δs and Δz; return how far each may go."""
     p, lean, _ = rows
     s, z, off, rest = iterate

@@ -15,7 +15,7 @@ from pentapod.geometry.directions import angle_between, partway
 
 
 @dataclass(frozen=True)
-class SmoothingOptions:
+class AxisSmoothingOptions:
     """How axes are averaged.
 
     rounds: of Gaussian averaging. similar: cosine of the angle between axes up to which they are averaged: sides of a
@@ -29,7 +29,7 @@ class SmoothingOptions:
 
 
 def smoothed(
-    points: Floats, axes: Floats, reach: float, tolerance: float, options: SmoothingOptions = SmoothingOptions()
+    points: Floats, axes: Floats, reach: float, tolerance: float, options: AxisSmoothingOptions = AxisSmoothingOptions()
 ) -> Floats:
     """Return axes (N, 3) smoothed along and across the passes, none turned by more than `tolerance` radians.
 
@@ -49,7 +49,7 @@ def smoothed(
     return result
 
 
-def _weights(points: Floats, axes: Floats, reach: float, options: SmoothingOptions) -> csr_array:
+def _weights(points: Floats, axes: Floats, reach: float, options: AxisSmoothingOptions) -> csr_array:
     """Return the matrix (N, N) of normalised Gaussian weights; a standard deviation is half the reach."""
     count = min(options.neighbours, len(points))
     found = KDTree(points).query(points, k=count, distance_upper_bound=reach)
@@ -64,7 +64,9 @@ def _weights(points: Floats, axes: Floats, reach: float, options: SmoothingOptio
     return csr_array(matrix.multiply(1.0 / total[:, None]))
 
 
-def rate_limited(points: Floats, axes: Floats, rate: float, options: SmoothingOptions = SmoothingOptions()) -> Floats:
+def rate_limited(
+    points: Floats, axes: Floats, rate: float, options: AxisSmoothingOptions = AxisSmoothingOptions()
+) -> Floats:
     """Return the axes (n, 3) of one pass turned by no more than `rate` radians per metre between neighbours.
 
     points (n, 3): of the pass, metres. Where axes turn faster, the whole pass takes the moving mean over the shortest

@@ -12,7 +12,7 @@ from pentapod.geometry.polyline import arc_length
 
 
 @dataclass(frozen=True)
-class SearchOptions:
+class FreeSpaceOptions:
     """Limits of a search in the free-space diagram.
 
     cells: that one search may look at, of five bytes each; the default takes about ten seconds. rounds, window: of the
@@ -62,7 +62,7 @@ class FreeSpace:
         weights: tuple[Floats, Floats, float],
         deviations: Floats,
         axis_bound: float,
-        options: SearchOptions,
+        options: FreeSpaceOptions,
     ) -> None:
         """weights: see `free_space_kernels.Weights`.
 

@@ -23,7 +23,7 @@ from pentapod.verify.replay.stretches import Stretches, StretchOptions, deviatio
 
 
 @dataclass(frozen=True)
-class GougeOptions:
+class GougeBoundOptions:
     """Options of the search. They change how tight the bound is and what it costs, never whether it holds.
 
     far_m: gaps are not computed beyond this. near_m, near_share: a bound is not tightened where it is this much, in
@@ -58,7 +58,7 @@ def gouge_bound(
     chords: Bools,
     *,
     bound: float,
-    options: GougeOptions = GougeOptions(),
+    options: GougeBoundOptions = GougeBoundOptions(),
 ) -> GougeBound:
     """Return the depth of solids of the tool in a mesh of the workpiece frame on some chords (M − 1,) of a replay.
 
@@ -102,7 +102,7 @@ def gouge_bound(
     return most if most.depth > _target(found, bound, options) else replace(most, sample=found.sample)
 
 
-def _target(found: GougeBound, bound: float, options: GougeOptions) -> float:
+def _target(found: GougeBound, bound: float, options: GougeBoundOptions) -> float:
     """Return the depth up to which a bound is not tightened."""
     return found.depth + max(options.near_m, options.near_share * (bound - found.depth))
 
@@ -113,7 +113,7 @@ def depth_resolution(depth: ArrayLike) -> Floats:
 
 
 def _deepest_sample(
-    replay: Replay, surface: MeshDistance, body: TouchingBody, chords: Bools, options: GougeOptions
+    replay: Replay, surface: MeshDistance, body: TouchingBody, chords: Bools, options: GougeBoundOptions
 ) -> GougeBound:
     """Return the largest depth at some samples; −far_m where nothing is nearer."""
     own = np.flatnonzero(chords)

@@ -21,7 +21,7 @@ from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import angle_between, arc_weights
 from pentapod.geometry.polyline import arc_length
 from pentapod.numerics.blocks import blocks
-from pentapod.verify.replay.free_space import FreeSpace, Pairing, PosedPolyline, SearchOptions
+from pentapod.verify.replay.free_space import FreeSpace, FreeSpaceOptions, Pairing, PosedPolyline
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class MatchOptions:
     wide: float = 4.0
     axis_scale: float = 0.05
     at_once: int = 1 << 15
-    search: SearchOptions = field(default_factory=SearchOptions)
+    search: FreeSpaceOptions = field(default_factory=FreeSpaceOptions)
 
 
 @dataclass(frozen=True, eq=False)
