@@ -20,7 +20,7 @@ MISTAKES = {  # what is replaced, and the pieces that the message must hold
         (STEP, f'{STEP}\nstrategy = "waterline"\npattern = "zigzag"'),
         ("job.toml:15", "toolpath.pattern", 'the strategy "waterline" has no such key', "take it out; known: "),
     ),
-    "no text": ((STEP, 'strategy = "text"'), ("toolpath.text", "missing", "what is written")),
+    "no text": ((STEP, 'strategy = "text"'), ("toolpath.text", "missing", "the text")),
     "no such drawing": (
         (STEP, 'strategy = "drawing"\nfile = "none.svg"'),
         ("job.toml:14", "toolpath.file", "none.svg", "no such file"),

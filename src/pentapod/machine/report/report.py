@@ -20,6 +20,8 @@ from pentapod.machine.parts import WorkVolume
 
 AMPLIFICATION_LIMIT = 10.0
 """Tip force → leg forces beyond which `check` calls a machine weak: 100 N of cutting become 1 kN of leg."""
+LEVELS = 5
+"""Heights at which `check` samples the work volume."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ class MachineReport(Value):
         return all(finding.passed for finding in self.findings)
 
 
-def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = 5) -> MachineReport:
+def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = LEVELS) -> MachineReport:
     """Sample the work volume and return the worst value of each quantity.
 
     rings, around, levels: density of the sample, see `sample_work_volume`. Never raises for a weak machine:

@@ -70,5 +70,5 @@ CLAIMS = (
     Claim(GUIDES, guides, needs_pose=False),
     Claim("controller", controller, needs_pose=False),
     Claim("job", job, needs_pose=False),
-    Claim("component as required", component, needs_pose=False),
+    Claim("component as asked", component, needs_pose=False),
 )
