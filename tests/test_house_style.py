@@ -36,7 +36,7 @@ def test_every_dependency_is_justified() -> None:
 
 
 def test_no_literal_number_of_legs_above_kinematics() -> None:
-    """Arrays have an entry for each leg of the robot: 5 stands in named constants and fields only, for something else."""
+    """Arrays have an entry for each leg of the robot: 5 stands in named constants and fields only, for other things."""
     found: list[str] = []
     for path in sorted((ROOT / "src" / "pentapod").rglob("*.py")):
         if path.relative_to(ROOT / "src" / "pentapod").parts[0] in ("kinematics", "theory"):
