@@ -11,6 +11,47 @@ from pentapod.numerics.kernels import kernel
 
 
 @kernel
+def _select(values: Floats, order: Ints, low: int, high: int, middle: int) -> None:
+    """Put order[low : high] so that the smaller values stand before `middle`, the others from there on: quickselect."""
+    high -= 1
+    while low < high:
+        bar, i, j = values[order[(low + high) // 2]], low, high
+        while i <= j:
+            while values[order[i]] < bar:
+                i += 1
+            while values[order[j]] > bar:
+                j -= 1
+            if i <= j:
+                order[i], order[j] = order[j], order[i]
+                i, j = i + 1, j - 1
+        if middle <= j:
+            high = j
+        elif middle >= i:
+            low = i
+        else:
+            break
+
+
+@kernel
+def split_by_medians(centres: Floats, starts: Ints, order: Ints) -> None:
+    """Order facets with centres (F, 3) for the complete tree with leaves starts (L + 1,), by medians."""
+    leaves, along = len(starts) - 1, np.ascontiguousarray(centres.T)
+    width = leaves
+    while width > 1:
+        for first in range(0, leaves, width):
+            low, middle, high = starts[first], starts[first + width // 2], starts[first + width]
+            longest, axis = -1.0, 0
+            for k in range(3):
+                least, most = math.inf, -math.inf
+                for f in range(low, high):
+                    least, most = min(least, along[k, order[f]]), max(most, along[k, order[f]])
+                if most - least > longest:
+                    longest, axis = most - least, k
+            _select(along[axis], order, low, high, middle)
+        width //= 2
+
+
+@kernel
 def fit_boxes(corners: Floats, starts: Ints, boxes: Floats) -> None:
     """Fill boxes (2 L − 1, 15) of the complete tree over facets (F, 3, 3) with leaves starts (L + 1,)."""
     leaves = len(starts) - 1
@@ -93,3 +134,21 @@ def open_node(node: int, near: float, far: float, best: float, count: int, nodes
         nodes[count], bounds[count] = first, near
         count += 1
     return count
+
+
+@kernel
+def fit_extents(corners: Floats, starts: Ints, extents: Floats) -> None:
+    """Fill extents (2 L − 1, 6), lowest and highest coordinates, of the complete tree with leaves starts (L + 1,)."""
+    leaves = len(starts) - 1
+    for node in range(2 * leaves - 2, -1, -1):
+        for k in range(3):
+            low, high = math.inf, -math.inf
+            if node >= leaves - 1:
+                leaf = node - leaves + 1
+                for f in range(starts[leaf], starts[leaf + 1]):
+                    for j in range(3):
+                        low, high = min(low, corners[f, j, k]), max(high, corners[f, j, k])
+            else:
+                low = min(extents[2 * node + 1, k], extents[2 * node + 2, k])
+                high = max(extents[2 * node + 1, 3 + k], extents[2 * node + 2, 3 + k])
+            extents[node, k], extents[node, 3 + k] = low, high

@@ -1,7 +1,8 @@
-"""Nearest facets of a mesh to linearly moving points, by branch and bound through the tree of boxes.
+"""Nearest facets of a mesh to points and to linearly moving points, by branch and bound through the tree of boxes.
 
 For short motions near the mesh the tangents at their ends bound the distance well (`ball_kernels`). For long or distant
-ones the distance of the segment from the sphere around each box is the better bound, until boxes are small.
+ones the distance of the segment from the sphere around each box is the better bound, until boxes are small. For points
+boxes along the axes are quicker than those along the surface.
 """
 
 from __future__ import annotations
@@ -131,3 +132,58 @@ def nearest_all(
                         distances[m], where[m, 0] = distance, t
                         for j in range(3):
                             where[m, 1 + j] = start[j] + t * travel[j] - g[j]
+
+
+@kernel
+def _box_distance(extent: Floats, x: float, y: float, z: float) -> float:
+    """Return the distance of a point from a box (6,)."""
+    dx = max(extent[0] - x, 0.0, x - extent[3])
+    dy = max(extent[1] - y, 0.0, y - extent[4])
+    dz = max(extent[2] - z, 0.0, z - extent[5])
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@kernel
+def closest(
+    x: float, y: float, z: float, within: float, corners: Floats, starts: Ints, extents: Floats,
+    nodes: Ints, bounds: Floats, away: Floats,
+) -> tuple[float, int]:  # fmt: skip
+    """Return the distance of a point and the facet that is nearest, −1 where none is nearer than `within`.
+
+    nodes, bounds (STACK,): room for the search. away (6,): the vector from the mesh to the point goes into the first
+    three; the others are room.
+    """
+    best, facet, leaves = within, -1, len(starts) - 1
+    nodes[0], bounds[0], count = 0, _box_distance(extents[0], x, y, z), 1
+    g = away[3:]
+    while count > 0:
+        count -= 1
+        node = nodes[count]
+        if bounds[count] >= best:
+            continue
+        leaf = node - (leaves - 1)
+        if leaf < 0:
+            near = _box_distance(extents[2 * node + 1], x, y, z)
+            far = _box_distance(extents[2 * node + 2], x, y, z)
+            count = open_node(node, near, far, best, count, nodes, bounds)
+        else:
+            for f in range(starts[leaf], starts[leaf + 1]):
+                distance = facet_distance(corners[f], x, y, z, g)
+                if distance < best:
+                    best, facet = distance, f
+                    away[0], away[1], away[2] = g[0], g[1], g[2]
+    return best, facet
+
+
+@kernel
+def closest_of_all(
+    points: Floats, within: float, corners: Floats, starts: Ints, extents: Floats,
+    distances: Floats, away: Floats, facets: Ints,
+) -> None:  # fmt: skip
+    """Fill distances (M,), vectors from the mesh (M, 3) and facets (M,) of points (M, 3), as `closest`."""
+    nodes, bounds, room = np.empty(STACK, dtype=np.intp), np.empty(STACK), np.zeros(6)
+    for m in range(len(points)):
+        p = points[m]
+        distances[m], facets[m] = closest(p[0], p[1], p[2], within, corners, starts, extents, nodes, bounds, room)
+        for k in range(3):
+            away[m, k] = room[k] if facets[m] >= 0 else 0.0

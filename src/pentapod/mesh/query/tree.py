@@ -1,13 +1,14 @@
 """FacetTree: bounding-volume hierarchy of oriented boxes over the facets of a mesh.
 
-Facets are sorted along a Morton curve through their centres. The tree above them is complete, so that node k has the
-children 2k + 1 and 2k + 2 without pointers. Each box is aligned with the mean normal of its facets: over a smooth
-surface it is thin, so that few boxes reach a tool that touches the surface.
+Facets are halved at the median of their centres along the longest side, again and again. The tree is complete, so that
+node k has the children 2k + 1 and 2k + 2 without pointers. Each box is aligned with the mean normal of its facets: over
+a smooth surface it is thin, so that few boxes reach a tool that touches the surface.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -37,15 +38,39 @@ class FacetTree:
     @classmethod
     def of(cls, mesh: Mesh) -> FacetTree:
         """Return the tree of a mesh's facets."""
-        from pentapod.mesh.query.box_kernels import fit_boxes  # noqa: PLC0415 - loads numba
+        from pentapod.mesh.query.box_kernels import fit_boxes, split_by_medians  # noqa: PLC0415 - loads numba
 
-        order = along_morton_curve(mesh.vertices[mesh.faces].mean(axis=1), mesh.bounds)
-        corners = np.ascontiguousarray(mesh.vertices[mesh.faces[order]])
+        order = np.arange(len(mesh.faces), dtype=np.intp)
         leaves = 1 << max(0, (len(order) // FACETS_PER_LEAF).bit_length() - 1)
         starts = (np.arange(leaves + 1) * len(order)) // leaves
+        split_by_medians(mesh.vertices[mesh.faces].mean(axis=1), starts, order)
+        corners = np.ascontiguousarray(mesh.vertices[mesh.faces[order]])
         boxes = np.empty((2 * leaves - 1, 15))
         fit_boxes(corners, starts, boxes)
         return cls(corners, order, boxes, starts)
+
+    @cached_property
+    def extents(self) -> Floats:
+        """Lowest and highest coordinates (2 L − 1, 6) of each node: what points, which have no direction, search."""
+        from pentapod.mesh.query.box_kernels import fit_extents  # noqa: PLC0415 - loads numba
+
+        extents = np.empty((len(self.boxes), 6))
+        fit_extents(self.corners, self.starts, extents)
+        return extents
+
+    def closest(self, points: Floats, within: float = np.inf) -> tuple[Floats, Floats, Ints]:
+        """Return distances (M,) of points (M, 3), vectors (M, 3) from the mesh to them, and facets (M,) in tree order.
+
+        What is no nearer than `within` metres counts as that far, with the facet −1.
+        """
+        from pentapod.mesh.query.segment_kernels import closest_of_all  # noqa: PLC0415 - loads numba
+
+        distances, away = np.empty(len(points)), np.empty((len(points), 3))
+        facets = np.empty(len(points), dtype=np.intp)
+        closest_of_all(
+            np.ascontiguousarray(points), within, self.corners, self.starts, self.extents, distances, away, facets
+        )
+        return distances, away, facets
 
 
 def along_morton_curve(points: Floats, bounds: Floats) -> Ints:
