@@ -1,0 +1,55 @@
+"""Where a level set of the distance from a mesh crosses straight lines, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.mesh.query.segment_kernels import STACK, closest
+from pentapod.numerics.kernels import kernel
+
+_ROUNDS = 60
+_ILLINOIS = 40
+_EXACT = 1e-9
+"""Of the distance: how near to the level a crossing is."""
+
+
+@kernel
+def cross_level(
+    starts: Floats, axes: Ints, step: float, level: float, corners: Floats, leaf_starts: Ints, extents: Floats,
+    points: Floats, normals: Floats,
+) -> None:  # fmt: skip
+    """Fill where (E, 3) the distance from the mesh is `level` on edges from starts (E, 3), and its gradient there.
+
+    axes (E,): along which the edges run, `step` metres. At one end the distance is above the level, at the other not.
+    Regula falsi with the Illinois rule; bisection where that does not end.
+    """
+    nodes, bounds, away = np.empty(STACK, dtype=np.intp), np.empty(STACK), np.zeros(6)
+    p = np.empty(3)
+    for m in range(len(starts)):
+        axis, low, high, side = axes[m], 0.0, step, 0
+        p[:] = starts[m]
+        at_low = closest(p[0], p[1], p[2], np.inf, corners, leaf_starts, extents, nodes, bounds, away)[0] - level
+        p[axis] = starts[m, axis] + step
+        at_high = closest(p[0], p[1], p[2], np.inf, corners, leaf_starts, extents, nodes, bounds, away)[0] - level
+        distance = level + at_high
+        for number in range(_ROUNDS):
+            x = 0.5 * (low + high)
+            if number < _ILLINOIS and at_low != at_high:
+                x = min(max((at_low * high - at_high * low) / (at_low - at_high), low), high)
+            p[axis] = starts[m, axis] + x
+            distance = closest(p[0], p[1], p[2], np.inf, corners, leaf_starts, extents, nodes, bounds, away)[0]
+            here = distance - level
+            if abs(here) < _EXACT * level or high - low < _EXACT * level:
+                break
+            if (here > 0.0) == (at_low > 0.0):
+                low, at_low = x, here
+                at_high = 0.5 * at_high if side == -1 else at_high
+                side = -1
+            else:
+                high, at_high = x, here
+                at_low = 0.5 * at_low if side == 1 else at_low
+                side = 1
+        points[m] = p
+        for k in range(3):
+            normals[m, k] = away[k] / distance

@@ -1,0 +1,145 @@
+"""Offset surface: the level set of the distance from a mesh, seen from outside, as a mesh of its own.
+
+It is where the centre of a ball is that rolls over the part without cutting into it. A sparse grid finds it: the
+distance changes by no more than the way, so a block of cells whose middle is further from the level than its corners
+are from the middle holds none of it. Nodes that are not reached from the grid's border are inside, whatever their
+distance: neither the mirrored sheet within a closed part nor cavities count. Any mesh will do, open ones and soups too.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.errors import MeshError
+from pentapod.mesh.offset.dual_contouring import Crossings, Grid, dual_contour
+from pentapod.mesh.query.tree import FacetTree
+
+MOST_NODES, MOST_BLOCKS = 30_000_000, 60_000_000
+_BLOCK, _GROUP = 4, 8
+"""Steps along the side of a block, blocks along that of a group: a group far from the level needs one query."""
+_SHIFT = np.array([0.3819660, 0.2679492, 0.4142136])
+"""Shares of a step by which the grid is off the part, so that flat faces do not lie in its planes."""
+_ROUNDS = 3
+"""How often a vertex is moved onto the level along the line to its closest point."""
+
+
+def offset_surface(tree: FacetTree, distance: float, step: float) -> tuple[Floats, Ints]:
+    """Return vertices (V, 3) and triangles (T, 3), facing outwards, of what is `distance` metres from a mesh's facets.
+
+    step: metres between the grid's nodes, at most a quarter of the distance; channels in which a ball of that radius
+    has less play than this may be closed. Vertices lie on the level, but near creases, where they are within a share of
+    a step of it. Raises MeshError where the grid would have more nodes than MOST_NODES.
+    """
+    grid, groups = _grid(tree, distance, step)
+    keys, outside, wide = _nodes(tree, grid, groups, distance)
+    outside = _reached(grid, keys, outside, wide)
+    rows, axes = _crossed(grid, keys, outside)
+    starts = grid.points(keys[rows])
+    points, normals = np.empty_like(starts), np.empty_like(starts)
+    from pentapod.mesh.offset.offset_kernels import cross_level  # noqa: PLC0415  loads numba
+
+    cross_level(starts, axes, grid.step, distance, tree.corners, tree.starts, tree.extents, points, normals)
+    crossings = Crossings(keys[rows], axes, outside[rows], points, normals)
+    vertices, triangles, _ = dual_contour(grid, keys, outside, crossings)
+    return onto_level(tree, vertices, distance, _ROUNDS), triangles
+
+
+def onto_level(tree: FacetTree, points: Floats, distance: float, rounds: int) -> Floats:
+    """Return points (N, 3) moved to `distance` from the mesh, each along the line to its closest point, repeatedly."""
+    for _ in range(rounds):
+        gap, away, _ = tree.closest(points)
+        points = points - away + (distance / np.where(gap > 0.0, gap, 1.0))[:, None] * away
+    return points
+
+
+def _grid(tree: FacetTree, distance: float, step: float) -> tuple[Grid, Ints]:
+    """Return the grid around all that is within the distance of a mesh, and its shape (3,) in groups of blocks."""
+    low = tree.extents[0, :3] - distance - (2.0 + _SHIFT) * step
+    size = tree.extents[0, 3:] + distance + 2.0 * step - low
+    groups = np.ceil(size / (_GROUP * _BLOCK * step))
+    if groups.prod() * _GROUP**3 > MOST_BLOCKS:
+        raise _too_fine(step)
+    return Grid(low, step, (_GROUP * _BLOCK * groups).astype(np.intp) + 1), groups.astype(np.intp)
+
+
+def _too_fine(step: float) -> MeshError:
+    return MeshError(
+        "the offset surface is too fine for this part", key="step", value=step,
+        expected=f"at most {MOST_NODES:,} nodes near the surface, {MOST_BLOCKS:,} blocks of {_BLOCK}³ around it",
+        remedy="check the unit of the mesh and the size of the tool",
+    )  # fmt: skip
+
+
+def _nodes(tree: FacetTree, grid: Grid, groups: Ints, level: float) -> tuple[Ints, Bools, Bools]:
+    """Return ascending keys (N,) of the nodes of blocks near the level, and whether they are outside.
+
+    And whether each block of the grid is outside and not near the level.
+    """
+
+    def classed(cells: Ints, size: int) -> tuple[Bools, Bools]:
+        """Return which cells (M, 3) of `size` steps may hold some of the level, and which are outside of it."""
+        half = 0.5 * math.sqrt(3.0) * size * grid.step
+        gap = tree.closest(grid.low + (cells + 0.5) * (size * grid.step), level + 1.01 * half)[0]
+        near = np.abs(gap - level) <= 1.001 * half
+        return near, (gap > level) & ~near
+
+    group = np.indices(tuple(groups)).reshape(3, -1).T
+    near, out = classed(group, _GROUP * _BLOCK)
+    wide = out.reshape(tuple(groups))
+    for axis in range(3):
+        wide = wide.repeat(_GROUP, axis=axis)
+    block = (_GROUP * group[near][:, None] + np.indices((_GROUP,) * 3).reshape(3, -1).T).reshape(-1, 3)
+    near, out = classed(block, _BLOCK)
+    wide[tuple(block.T)] = out
+    block = block[near]
+    if len(block) * _BLOCK**3 > MOST_NODES:
+        raise _too_fine(grid.step)
+    within = np.indices((_BLOCK + 1,) * 3).reshape(3, -1).T
+    keys = np.unique(grid.keys(_BLOCK * block)[:, None] + grid.keys(within))
+    return keys, tree.closest(grid.points(keys), level)[2] < 0, wide
+
+
+def _reached(grid: Grid, keys: Ints, outside: Bools, wide: Bools) -> Bools:
+    """Return which nodes (N,) outside are connected, along edges of the grid, with what is beyond its border."""
+    pairs: list[Ints] = []
+    for stride in grid.strides:
+        after = _index(keys, keys + stride)
+        first = np.flatnonzero((after >= 0) & outside)
+        pairs.append(np.stack([first, after[first]])[:, outside[after[first]]])
+    # Connected wide blocks are one node of the graph each; the first holds the border, which is padded around them.
+    label = np.zeros(np.array(wide.shape) + 2, dtype=np.int32)
+    count = int(ndimage.label(np.pad(wide, 1, constant_values=True), output=label))  # pyright: ignore[reportArgumentType]
+    for axis in range(3):
+        a, b = (label.take(range(k, label.shape[axis] - 1 + k), axis=axis) for k in (0, 1))
+        # A wide block and one near the level share a face. Its middle node is known, and outside.
+        one = (a > 0) != (b > 0)
+        face = _BLOCK * (np.argwhere(one) - 1) + _BLOCK // 2
+        face[:, axis] += _BLOCK // 2
+        index = _index(keys, grid.keys(face))
+        pairs.append(np.stack([index, len(keys) - 1 + np.maximum(a, b)[one]])[:, index >= 0])
+    joined = np.concatenate(pairs, axis=1)
+    size = len(keys) + count
+    graph = coo_array((np.ones(joined.shape[1], dtype=np.bool_), (joined[0], joined[1])), shape=(size, size))
+    piece = connected_components(graph, directed=False)[1]
+    return outside & (piece[: len(keys)] == piece[len(keys)])
+
+
+def _index(keys: Ints, wanted: Ints) -> Ints:
+    """Return where (M,) wanted keys stand among ascending ones, −1 where they do not."""
+    at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+    return np.where(keys[at] == wanted, at, -1)
+
+
+def _crossed(grid: Grid, keys: Ints, outside: Bools) -> tuple[Ints, Ints]:
+    """Return the edges with one end outside: rows (E,) of their lower nodes, and the axes (E,) along which they run."""
+    rows: list[Ints] = []
+    for stride in grid.strides:
+        after = _index(keys, keys + stride)
+        rows.append(np.flatnonzero((after >= 0) & (outside != outside[after])))
+    return np.concatenate(rows), np.repeat(np.arange(3), [len(r) for r in rows])
