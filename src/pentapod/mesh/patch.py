@@ -53,7 +53,7 @@ class Patch:
                 for bound, side in zip(region.bounds[:, axis], (1.0, -1.0), strict=True):
                     values = (side * (patch.vertices[:, axis] - float(bound)))[patch.faces]
                     patch = patch._trimmed(values, linear_root(values))
-        return patch._where(region.faces)
+        return patch.where_normals(region.faces)
 
     @cached_property
     def topology(self) -> Topology:
@@ -157,7 +157,7 @@ class Patch:
 
     def steeper(self, upright: Floats, angle: float) -> Patch:
         """Return the part whose normals are more than `angle` radians from `upright` (3,) and from its opposite."""
-        return self._where(lambda n: np.cos(angle) * np.linalg.norm(n, axis=-1) - np.abs(n @ upright))
+        return self.where_normals(lambda n: np.cos(angle) * np.linalg.norm(n, axis=-1) - np.abs(n @ upright))
 
     def above(self, values: Floats, bound: float) -> tuple[Patch, Floats]:
         """Return the part where a quantity (V,) is at least `bound`, and the quantity at its vertices."""
@@ -167,7 +167,7 @@ class Patch:
         vertices, faces, normals = trimmed(points, self.faces, self.normals, at, linear_root(at))
         return Patch(vertices[:, :3].copy(), faces, normals), vertices[:, 3].copy()
 
-    def _where(self, quantity: Callable[[Floats], Floats]) -> Patch:
+    def where_normals(self, quantity: Callable[[Floats], Floats]) -> Patch:
         """Return the part where a quantity of the normal, (..., 3) to (...), is not negative."""
         return self._trimmed(quantity(self.normals), normal_root(quantity, self.normals))
 

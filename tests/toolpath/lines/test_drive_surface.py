@@ -1,0 +1,114 @@
+"""Drive surface: lines of centres against closed forms, chords and links against densely sampled distances."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import trimesh
+
+from pentapod import Mesh, RasterOptions, Region
+from pentapod.cutters.ball import BallCutter
+from pentapod.mesh.passes import Passes
+from pentapod.toolpath.lines.drive_surface import DriveSurface, smoothed
+from pentapod.toolpath.strategies.raster import raster_paths
+
+R, CHORDAL = 3e-3, 5e-6
+
+
+def blocks(*bounds):
+    return trimesh.util.concatenate([trimesh.creation.box(bounds=b) for b in bounds])
+
+
+def part(shape):
+    return Mesh.of(np.asarray(shape.vertices), np.asarray(shape.faces))
+
+
+def gaps(mesh, points):
+    """Distances from the part by another library."""
+    return trimesh.proximity.closest_point(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False), points)[1]
+
+
+def dense(lines, count=8):
+    t = np.linspace(0.0, 1.0, count)[:, None]
+    return np.concatenate([a + t * (b - a) for line in lines for a, b in pairwise(line)])
+
+
+@pytest.fixture(scope="module")
+def pocket():
+    """A block of 40 × 30 × 12 mm with a pocket 6 mm deep that is open above."""
+    walls = [[(0, 0, 0), (40, 30, 6)], [(0, 0, 0), (8, 30, 12)], [(32, 0, 0), (40, 30, 12)],
+             [(0, 0, 0), (40, 7, 12)], [(0, 23, 0), (40, 30, 12)]]  # fmt: skip
+    return DriveSurface.of(part(blocks(*(1e-3 * np.array(b, dtype=float) for b in walls))), R)
+
+
+@pytest.fixture(scope="module")
+def passes(pocket):
+    """Raster passes over the pocket, put onto the offset."""
+    options = RasterOptions(stepover=2e-3, region=Region(angle=np.radians(89.0)))
+    drawn = raster_paths(pocket.mesh, BallCutter(1e-6), options).passes
+    return pocket.exact(drawn, CHORDAL, 1e-5)
+
+
+def lines_of(passes):
+    return [passes.points[passes.rows(k)] for k in range(len(passes))]
+
+
+def test_centres_lie_on_the_offset_and_chords_are_clear(pocket, passes):
+    np.testing.assert_allclose(gaps(pocket.part, passes.points), R, atol=1e-9)
+    assert gaps(pocket.part, dense(lines_of(passes))).min() >= R - CHORDAL
+
+
+def test_passes_reach_the_floor_and_the_feet_of_the_walls(passes):
+    """Centres over the floor are R above it and up to R from the walls."""
+    floor = passes.points[np.abs(passes.points[:, 2] - (6e-3 + R)) < 1e-8]
+    np.testing.assert_allclose(floor[:, 0].min(), 8e-3 + R, atol=1e-5)
+    np.testing.assert_allclose(floor[:, 0].max(), 32e-3 - R, atol=1e-5)
+
+
+def test_links_follow_the_surface_and_are_clear(pocket):
+    rng = np.random.default_rng(3)
+    vertices = pocket.mesh.vertices[pocket.mesh.vertices[:, 2] > 7e-3]
+    starts = pocket.on_level(vertices[rng.integers(len(vertices), size=60)])
+    ends = pocket.on_level(starts + rng.normal(size=starts.shape) * 2e-3)
+    found = pocket.links(starts, ends, 5e-4, CHORDAL, 1e-5)
+    links = [link for link in found if link is not None]
+    assert len(links) > 40
+    assert gaps(pocket.part, dense(links)).min() >= R - CHORDAL
+    for link, start, end in zip(found, starts, ends, strict=True):
+        if link is not None:
+            np.testing.assert_array_equal(link[[0, -1]], [start, end])
+            assert np.linalg.norm(np.diff(link, axis=0), axis=1).sum() <= 2.6 * np.linalg.norm(end - start) + 1e-3
+
+
+def test_region_box_bounds_the_contacts_not_the_centres(pocket):
+    box = ((0.0, 0.0, 0.0), (20e-3, 30e-3, 12e-3))
+    patch = pocket.patch(Region(box=box, angle=np.radians(89.0)))
+    contacts = pocket.contacts(patch.vertices)
+    assert contacts[:, 0].max() <= 20e-3 + 1e-5
+    assert patch.vertices[:, 0].max() == pytest.approx(20e-3, abs=1e-4)
+
+
+def test_the_ball_does_not_roll_around_an_open_border_but_bridges_a_small_hole():
+    x, y = (k.ravel() for k in np.meshgrid(np.linspace(0.0, 0.04, 41), np.linspace(0.0, 0.03, 31), indexing="ij"))
+    cell = np.array(
+        [[i * 31 + j, (i + 1) * 31 + j, (i + 1) * 31 + j + 1, i * 31 + j + 1] for i in range(40) for j in range(30)]
+    )
+    faces = np.concatenate([cell[:, [0, 1, 2]], cell[:, [0, 2, 3]]])
+    middle = np.stack([x, y], axis=1)[faces].mean(axis=1)
+    faces = faces[np.abs(middle - [0.02, 0.015]).max(axis=1) > 1e-3]
+    sheet = DriveSurface.of(Mesh.of(np.stack([x, y, 0.0 * x], axis=1), faces), R)
+    patch = sheet.patch(Region(angle=np.radians(90.0)))
+    assert patch.areas.sum() == pytest.approx(0.04 * 0.03, rel=0.02)
+    assert patch.topology.border_loops == 1
+    np.testing.assert_allclose(patch.vertices[:, :2].max(axis=0), [0.04, 0.03], atol=0.05 * R)
+
+
+def test_normals_turn_evenly_where_the_offset_has_a_crease():
+    """Along a line over a corner of 90° the smoothed normal turns over the window, not at once."""
+    t = np.linspace(-0.01, 0.01, 201)
+    points = np.stack([np.minimum(t, 0.0), 0.0 * t, np.maximum(t, 0.0)], axis=1)
+    normals = np.where(t[:, None] < 0.0, [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0])
+    turned = smoothed(Passes(points, normals, np.array([0, 201]), np.array([0])), 4e-3)
+    steps = np.arccos(np.clip((turned[1:] * turned[:-1]).sum(axis=1), -1.0, 1.0))
+    assert steps.max() < np.radians(4.0)
+    np.testing.assert_allclose(turned[np.abs(t) > 2.1e-3], normals[np.abs(t) > 2.1e-3], atol=1e-12)
