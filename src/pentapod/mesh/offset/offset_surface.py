@@ -60,8 +60,8 @@ def onto_level(tree: FacetTree, points: Floats, distance: float, rounds: int) ->
 
 def _grid(tree: FacetTree, distance: float, step: float) -> tuple[Grid, Ints]:
     """Return the grid around all that is within the distance of a mesh, and its shape (3,) in groups of blocks."""
-    low = tree.extents[0, :3] - distance - (2.0 + _SHIFT) * step
-    size = tree.extents[0, 3:] + distance + 2.0 * step - low
+    low = tree.extents[0, 0] - distance - (2.0 + _SHIFT) * step
+    size = tree.extents[0, 1] + distance + 2.0 * step - low
     groups = np.ceil(size / (_GROUP * _BLOCK * step))
     if groups.prod() * _GROUP**3 > MOST_BLOCKS:
         raise _too_fine(step)

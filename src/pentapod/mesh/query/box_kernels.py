@@ -138,7 +138,7 @@ def open_node(node: int, near: float, far: float, best: float, count: int, nodes
 
 @kernel
 def fit_extents(corners: Floats, starts: Ints, extents: Floats) -> None:
-    """Fill extents (2 L − 1, 6), lowest and highest coordinates, of the complete tree with leaves starts (L + 1,)."""
+    """Fill extents (2 L − 1, 2, 3), lowest and highest coordinates, of the complete tree with leaves starts (L + 1,)."""
     leaves = len(starts) - 1
     for node in range(2 * leaves - 2, -1, -1):
         for k in range(3):
@@ -149,6 +149,6 @@ def fit_extents(corners: Floats, starts: Ints, extents: Floats) -> None:
                     for j in range(3):
                         low, high = min(low, corners[f, j, k]), max(high, corners[f, j, k])
             else:
-                low = min(extents[2 * node + 1, k], extents[2 * node + 2, k])
-                high = max(extents[2 * node + 1, 3 + k], extents[2 * node + 2, 3 + k])
-            extents[node, k], extents[node, 3 + k] = low, high
+                low = min(extents[2 * node + 1, 0, k], extents[2 * node + 2, 0, k])
+                high = max(extents[2 * node + 1, 1, k], extents[2 * node + 2, 1, k])
+            extents[node, 0, k], extents[node, 1, k] = low, high

@@ -136,10 +136,10 @@ def nearest_all(
 
 @kernel
 def _box_distance(extent: Floats, x: float, y: float, z: float) -> float:
-    """Return the distance of a point from a box (6,)."""
-    dx = max(extent[0] - x, 0.0, x - extent[3])
-    dy = max(extent[1] - y, 0.0, y - extent[4])
-    dz = max(extent[2] - z, 0.0, z - extent[5])
+    """Return the distance of a point from a box (2, 3)."""
+    dx = max(extent[0, 0] - x, 0.0, x - extent[1, 0])
+    dy = max(extent[0, 1] - y, 0.0, y - extent[1, 1])
+    dz = max(extent[0, 2] - z, 0.0, z - extent[1, 2])
     return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 

@@ -51,10 +51,10 @@ class FacetTree:
 
     @cached_property
     def extents(self) -> Floats:
-        """Lowest and highest coordinates (2 L − 1, 6) of each node: what points, which have no direction, search."""
+        """Lowest and highest coordinates (2 L − 1, 2, 3) of each node: the boxes that points search."""
         from pentapod.mesh.query.box_kernels import fit_extents  # noqa: PLC0415 - loads numba
 
-        extents = np.empty((len(self.boxes), 6))
+        extents = np.empty((len(self.boxes), 2, 3))
         fit_extents(self.corners, self.starts, extents)
         return extents
 
