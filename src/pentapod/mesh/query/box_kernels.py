@@ -138,7 +138,7 @@ def open_node(node: int, near: float, far: float, best: float, count: int, nodes
 
 @kernel
 def fit_extents(corners: Floats, starts: Ints, extents: Floats) -> None:
-    """Fill extents (2 L − 1, 2, 3), lowest and highest coordinates, of the complete tree with leaves starts (L + 1,)."""
+    """Fill extents (2 L − 1, 2, 3), lowest and highest coordinates, of the tree with leaves starts (L + 1,)."""
     leaves = len(starts) - 1
     for node in range(2 * leaves - 2, -1, -1):
         for k in range(3):
