@@ -50,11 +50,19 @@ def offset_surface(tree: FacetTree, distance: float, step: float) -> tuple[Float
     return onto_level(tree, vertices, distance, _ROUNDS), triangles
 
 
-def onto_level(tree: FacetTree, points: Floats, distance: float, rounds: int) -> Floats:
-    """Return points (N, 3) moved to `distance` from the mesh, each along the line to its closest point, repeatedly."""
+def onto_level(tree: FacetTree, points: Floats, distance: float, rounds: int, accuracy: float = 0.0) -> Floats:
+    """Return points (N, 3) moved to `distance` from the mesh, each along the line to its closest point, repeatedly.
+
+    accuracy: error of the distance, as a share of it, at which a point is no longer moved.
+    """
+    points, rows = points.copy(), np.arange(len(points))
     for _ in range(rounds):
-        gap, away, _ = tree.closest(points)
-        points = points - away + (distance / np.where(gap > 0.0, gap, 1.0))[:, None] * away
+        gap, away, _ = tree.closest(points[rows])
+        off = np.abs(gap - distance) > accuracy * distance
+        rows, gap, away = rows[off], gap[off], away[off]
+        if not len(rows):
+            break
+        points[rows] += (distance / np.where(gap > 0.0, gap, 1.0) - 1.0)[:, None] * away
     return points
 
 

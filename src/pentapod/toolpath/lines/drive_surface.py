@@ -16,7 +16,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.offset.offset_surface import offset_surface
+from pentapod.mesh.offset.offset_surface import offset_surface, onto_level
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.tree import FacetTree
@@ -115,16 +115,7 @@ class DriveSurface:
 
     def on_level(self, points: Floats) -> Floats:
         """Return points (N, 3) moved onto the offset, along the lines to their closest points of the part."""
-        points = points.copy()
-        rows = np.arange(len(points))
-        for _ in range(self.options.rounds):
-            gap, away, _ = self.tree.closest(points[rows])
-            off = np.abs(gap - self.radius) > self.options.on_level * self.radius
-            rows, gap, away = rows[off], gap[off], away[off]
-            if not len(rows):
-                break
-            points[rows] += (self.radius / np.where(gap > 0.0, gap, 1.0) - 1.0)[:, None] * away
-        return points
+        return onto_level(self.tree, points, self.radius, self.options.rounds, self.options.on_level)
 
     def exact(self, passes: Passes, chordal: float, closest: float) -> Passes:
         """Return passes with their points on the offset, and with more where a chord leaves it by more than `chordal`.
