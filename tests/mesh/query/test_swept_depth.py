@@ -17,7 +17,7 @@ from pentapod.cutters.flat_end import FlatEnd
 from pentapod.cutters.lollipop import Lollipop
 from pentapod.cutters.stand_off import StandOff
 from pentapod.geometry.solids import Cone
-from pentapod.mesh.query.swept_depth import RESOLUTION_M, sweep, touch
+from pentapod.mesh.query.swept_depth import RESOLUTION_M, is_clear, meets, sweep, touch
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath import Mesh, load_mesh
 
@@ -177,6 +177,26 @@ def test_depth_of_random_motions_is_at_least_that_of_samples(seed, which):
     # And not deeper than the samples miss: 200 points a facet lie 2 mm apart, 20 steps 1 mm at most.
     assert (found[seen] <= depth[seen] + 2.5e-3).all()
     assert (found[~seen] <= -0.002 + 2.5e-3).all()
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    seed=st.integers(0, 100_000), which=st.integers(0, len(TOOLS) - 1), threshold=st.sampled_from([-5e-4, 0.0, 5e-5])
+)
+def test_meetings_are_where_the_depth_is_beyond_the_threshold(seed, which, threshold):
+    rng = np.random.default_rng(seed)
+    tree = tree_of(surfaces.grid(lambda x, y: 3e-3 * np.sin(200 * x) * np.cos(150 * y), width=0.04, cells=20))
+    tips = rng.uniform([-0.02, -0.02, -1e-3], [0.02, 0.02, 8e-3], (30, 3))
+    axes = UP + 0.5 * rng.standard_normal((30, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    tool = TOOLS[which]
+    depths = sweep(tree, tool, tips, axes, threshold=threshold - 1e-5).deepest
+    decided = np.abs(depths - threshold) > 4 * RESOLUTION_M
+    met = meets(tree, tool, tips, axes, threshold=threshold)
+    np.testing.assert_array_equal(met[decided], (depths > threshold)[decided])
+    for k in range(29):
+        assert is_clear(tree, tool, tips[k : k + 2], axes[k : k + 2], threshold=threshold) == (not met[k])
+    assert is_clear(tree, tool, tips, axes, threshold=threshold) == (not met.any())
 
 
 @pytest.mark.parametrize("name", ["1002_tray_bottom.STL", "octagonal_pocket.stl", "facade_infill_open_mid_res.stl"])

@@ -127,6 +127,7 @@ def _deepest_in_facet(
     best: Floats,
     work: Floats,
     eps: float,
+    enough: float,
     pose: Floats,
     g: Floats,
 ) -> bool:
@@ -146,6 +147,8 @@ def _deepest_in_facet(
         if g[VALUE] < best[0]:
             best[0], best[1], best[2], best[3], best[4] = g[VALUE], s, x, y, z
             found = True
+            if -best[0] >= enough:
+                return True
         lowest, size = 0.0, 0.0
         for p in (a, b, c):
             dx, dy, dz = p[0] - x, p[1] - y, p[2] - z
@@ -188,12 +191,14 @@ def deepest(
     nodes: Floats,
     work: Floats,
     eps: float,
+    enough: float,
 ) -> int:
     """Lower best (5,): f, time and point, over a whole tree; return the facet in tree order, −1 where nothing is lower.
 
     solid (5,). motion (18,): tilt centre and axis at the start (3 + 3), displacement of the tilt centre (3), the axis a
     quarter turn later (3), the angular velocity (3), the length of the displacement, the angle, and the height of the
     tilt centre above the tip. best[0] on entry is the threshold: only deeper points are searched. nodes, work: buffers.
+    enough: the search ends at a point this deep.
     """
     pose, g = np.empty(6), np.empty(6)
     leaves = len(starts) - 1
@@ -230,8 +235,10 @@ def deepest(
                 count += 1
         else:
             for k in range(starts[leaf], starts[leaf + 1]):
-                if _deepest_in_facet(solid, motion, corners[k], s, tau, best, work, eps, pose, g):
+                if _deepest_in_facet(solid, motion, corners[k], s, tau, best, work, eps, enough, pose, g):
                     facet = k
+                    if -best[0] >= enough:
+                        return facet
     return facet
 
 
@@ -244,15 +251,19 @@ def sweep_all(
     starts: Ints,
     threshold: float,
     eps: float,
+    enough: float,
     depths: Floats,
     where: Floats,
     facets: Ints,
 ) -> None:
-    """Fill depths (M,), where (M, 4): time and point, and facets (M,), −1 where none is deeper than the threshold."""
+    """Fill depths (M,), where (M, 4): time and point, and facets (M,), −1 where none is deeper than the threshold.
+
+    enough: a depth beyond which no deeper point is searched.
+    """
     nodes, work, best = np.empty((STACK, 3)), np.empty((STACK, 11)), np.empty(2 + 3)
     for m in range(len(motions)):
         best[0] = -threshold
-        facets[m] = deepest(solid, motions[m], corners, boxes, starts, best, nodes, work, eps)
+        facets[m] = deepest(solid, motions[m], corners, boxes, starts, best, nodes, work, eps, enough)
         if facets[m] >= 0:
             depths[m] = -best[0]
             for j in range(4):

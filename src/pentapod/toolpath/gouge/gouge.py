@@ -15,7 +15,7 @@ from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.polyline import spaced
 from pentapod.geometry.runs import equal_runs, marked_runs
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.query.swept_depth import RESOLUTION_M, sweep, touch
+from pentapod.mesh.query.swept_depth import RESOLUTION_M, is_clear, meets, sweep, touch
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath.gouge.report import GougeOptions, GougeReport, Remedy
 from pentapod.toolpath.linking.links import LinkStyle, relinked
@@ -90,7 +90,11 @@ class _GougeRemoval:
 
     def gouging(self) -> Bools:
         """Return which motions (N − 1,) gouge."""
-        return self.cut_depths().max(axis=1) > self.options.tolerance
+        rows = np.flatnonzero(self.cut & ~self.dropped)
+        pairs = (np.stack([poses[rows], poses[rows + 1]], axis=1).reshape(-1, 3) for poses in (self.tips, self.axes))
+        met = np.zeros(len(self.cut), dtype=np.bool_)
+        met[rows] = meets(self.tree, self.tool, *pairs, threshold=self.options.tolerance, every=2)
+        return met
 
     def all_depths(self, path: Toolpath) -> tuple[Floats, Bools]:
         """Return how deep (N − 1,) the tool collides on each motion of a path, −inf: not; and which motions cut."""
@@ -103,8 +107,8 @@ class _GougeRemoval:
 
     def is_clear(self, segment: Segment) -> bool:
         """Return whether a segment does not collide with the part."""
-        rows = np.arange(len(segment.tips) - 1)
-        return bool((self._depths(segment.tips, segment.axes, rows, self._tolerance(segment.kind)) == -np.inf).all())
+        threshold = self._tolerance(segment.kind)
+        return is_clear(self.tree, self.tool, segment.tips, segment.axes, threshold=threshold)
 
     def _tolerance(self, kind: SegmentKind) -> float:
         """Return the depth, metres, from which a motion of a kind collides: a rapid may not even touch."""
@@ -207,8 +211,7 @@ class _GougeRemoval:
                 down = spaced(np.stack([middle[-1], self.tips[last]]), LinkStyle.rapid_spacing)[1:-1]
                 tips, axes = [*tips, down], [*axes, np.tile(self.axes[last], (len(down), 1))]
             link = np.concatenate([*tips, ends[0][-1:]]), np.concatenate([*axes, ends[1][-1:]])
-            rows = np.arange(len(link[0]) - 1)
-            if (self._depths(*link, rows, self.options.tolerance) == -np.inf).all():
+            if is_clear(self.tree, self.tool, *link, threshold=self.options.tolerance):
                 break
         return link
 

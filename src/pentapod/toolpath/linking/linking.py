@@ -13,7 +13,7 @@ from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import angle_between
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.heightfield import HeightField
-from pentapod.mesh.query.swept_depth import sweep
+from pentapod.mesh.query.swept_depth import is_clear
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath.linking import links
 from pentapod.toolpath.linking.links import LinkStyle, Pose
@@ -69,7 +69,7 @@ class CollisionCheck:
         """Return whether the tool keeps a distance of `margin` metres from the part during the whole motion."""
         if not self.tool.solids or (segment.tips @ self.view).min() > self._top + self._reach + margin:
             return True
-        return not sweep(self._tree, self.tool, segment.tips, segment.axes, threshold=-margin).beyond(-margin).any()
+        return is_clear(self._tree, self.tool, segment.tips, segment.axes, threshold=-margin)
 
 
 class Linker:
