@@ -1,1 +1,1 @@
-"""Geometric queries on meshes: distances, swept penetration, geodesics, slices."""
+"""Geometric queries on meshes: distances, swept penetration, slices."""

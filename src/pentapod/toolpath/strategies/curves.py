@@ -14,9 +14,9 @@ from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import VECTOR, Key
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
+from pentapod.mesh.geodesic.tracing import SurfaceRays, neighbours, traced
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.closest import closest, normals_at
-from pentapod.mesh.query.geodesic_tracing import SurfaceRays, neighbours, traced
 from pentapod.mesh.query.heightfield import HeightField
 from pentapod.toolpath.lines.projection import SurfaceHits, SurfaceMap, below, projected, topmost_in_region
 from pentapod.toolpath.options import PathOptions, check_positive

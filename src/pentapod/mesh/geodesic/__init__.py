@@ -1,0 +1,1 @@
+"""Geodesics on meshes: distances along the surface, and straightest lines."""
