@@ -36,6 +36,43 @@ def test_noise_about_zero_is_welded():
     assert Mesh.of(loose, np.arange(len(loose)).reshape(-1, 3)).diagnosis.watertight
 
 
+def shaken(vertices, faces, by):
+    loose = vertices[faces].reshape(-1, 3)
+    noise = np.random.default_rng(1).uniform(-by, by, loose.shape)
+    return Mesh.of(loose + noise, np.arange(len(loose)).reshape(-1, 3)).diagnosis
+
+
+@pytest.mark.parametrize("by", [1e-9, 1e-8, 1e-7])
+def test_shaken_corners_are_merged_and_the_merge_is_listed(by):
+    vertices, faces = surfaces.sphere()
+    diagnosis = shaken(vertices, faces, by)
+    assert (diagnosis.facets, diagnosis.vertices, diagnosis.bodies) == (len(faces), len(vertices), 1)
+    assert diagnosis.watertight
+    assert any("vertices on borders merged with others less than 1 µm away" in text for text in diagnosis.repairs)
+    assert diagnosis.problems == ()
+
+
+def test_facets_that_do_not_join_are_a_problem():
+    vertices, faces = surfaces.sphere()
+    diagnosis = shaken(vertices, faces, 1e-5)
+    assert diagnosis.bodies > 0.9 * len(faces)
+    assert "the facets do not join" in str(diagnosis)
+    assert "do not join" not in str(Mesh.of(vertices, faces[:1]).diagnosis)
+
+
+def test_a_border_of_short_edges_keeps_its_shape():
+    """Each is shorter than the distance within which borders are merged; the border is not."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 2001)[:-1]
+    rim = 2e-4 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    k = np.arange(2000)
+    fan = np.stack([np.full(2000, 2000), k, (k + 1) % 2000], axis=1)
+    far = np.array([[0.1, 0, 0], [0.2, 0, 0], [0.1, 0.1, 0]])
+    mesh = Mesh.of(np.concatenate([rim, [[0, 0, 0]], far]), np.concatenate([fan, [[2001, 2002, 2003]]]))
+    near = np.linalg.norm(mesh.vertices, axis=1) < 1e-3
+    assert np.ptp(mesh.vertices[near], axis=0)[:2] == pytest.approx(4e-4, rel=1e-3)
+    assert mesh.diagnosis.area == pytest.approx(5e-3 + np.pi * 4e-8, rel=1e-4)
+
+
 def test_duplicated_and_degenerate_facets_are_dropped_and_listed():
     vertices, faces = surfaces.sphere()
     bad = np.concatenate([faces, faces[:10], faces[10:15, ::-1], [[0, 0, 1], [2, 3, 3]]])

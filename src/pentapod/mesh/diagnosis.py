@@ -12,6 +12,9 @@ from pentapod.mesh.normals import facet_cross
 from pentapod.mesh.repair import signed_volume, slivers
 from pentapod.mesh.topology import Topology
 
+SHATTERED = 0.5
+"""Ratio of bodies to facets above which the facets are said not to join."""
+
 
 @dataclass(frozen=True)
 class MeshDiagnosis(Value):
@@ -62,6 +65,11 @@ class MeshDiagnosis(Value):
             found.append("the closed surface is inside out: normals point inwards; load with repair = true")
         if self.non_manifold_edges:
             found.append(f"{_count(self.non_manifold_edges, 'edge')} with more than two facets: passes end there")
+        if self.facets > 1 and self.bodies > SHATTERED * self.facets:
+            found.append(
+                f"the facets do not join: {self.bodies:,} bodies of {self.facets:,} facets; "
+                "merge close vertices in the program that wrote the mesh"
+            )
         return tuple(found)
 
     def __str__(self) -> str:

@@ -58,6 +58,7 @@ class Mesh(Value):
     ) -> Mesh:
         """Return the mesh of vertices (V, 3) in metres and facets (F, 3), with equal vertices welded.
 
+        So are vertices on borders that are closer than 1e-5 of the largest extent; that is listed among the repairs.
         Duplicated and degenerate facets are dropped and listed among the repairs. With `repair`, all facets are also
         wound alike, and those of a closed surface outwards; without it, wrong winding is only diagnosed. Raises
         MeshError for no facets, zero area, indices beyond the vertices, and coordinates that are not finite.
@@ -65,26 +66,28 @@ class Mesh(Value):
         points, facets = _checked(vertices, faces, source)
         progress("mesh", 0.3, "welding")
         points, facets = repairing.weld(points, facets)
-        repairs: list[str] = []
-        degenerate = repairing.degenerate_facets(points, facets)
-        if degenerate.all():
-            raise MeshError("the mesh has zero area: no facet spans a surface", file=source)
-        if degenerate.any():
-            repairs.append(f"{int(degenerate.sum()):,} degenerate facets dropped")
-            facets = facets[~degenerate]
-        duplicated = repairing.duplicated_facets(facets, len(points))
-        if duplicated.any():
-            repairs.append(f"{int(duplicated.sum()):,} duplicated facets dropped")
-            facets = facets[~duplicated]
-        if repair:
-            facets, done = repairing.wind(points, facets)
-            repairs.extend(done)
-        if repairs:
+        facets, dropped = _without_useless(points, facets, source)
+        if dropped.any():
             points, facets = repairing.weld(points, facets)
         progress("mesh", 0.6, "edges")
+        repairs: list[str] = []
         topology = Topology(facets, len(points))
-        dropped = (int(duplicated.sum()), int(degenerate.sum()))
-        diagnosis = diagnose(points, topology, source, dropped, tuple(repairs), notes)
+        if (joined := repairing.joined_borders(points, topology)) is not None:
+            instead, near = joined
+            merged = int((instead != np.arange(len(instead))).sum())
+            repairs.append(f"{merged:,} vertices on borders merged with others less than {1e6 * near:.3g} µm away")
+            facets, more = _without_useless(points, instead[facets], source)
+            points, facets = repairing.weld(points, facets)
+            topology, dropped = Topology(facets, len(points)), dropped + more
+        names = zip(("degenerate", "duplicated"), dropped.tolist(), strict=True)
+        repairs += [f"{count:,} {name} facets dropped" for name, count in names if count]
+        if repair:
+            facets, done = repairing.wind(points, facets)
+            if done:
+                repairs.extend(done)
+                points, facets = repairing.weld(points, facets)
+                topology = Topology(facets, len(points))
+        diagnosis = diagnose(points, topology, source, (int(dropped[1]), int(dropped[0])), tuple(repairs), notes)
         mesh = cls(points, facets, diagnosis, crease_angle)
         mesh.__dict__["topology"] = topology  # fills the cached property: sorting a million edges takes a second
         return mesh
@@ -157,6 +160,20 @@ class Mesh(Value):
         from trimesh import Trimesh  # noqa: PLC0415  heavy: only for those who ask
 
         return Trimesh(self.vertices, self.faces, process=False)
+
+
+def _without_useless(points: Floats, facets: Ints, source: str) -> tuple[Ints, Ints]:
+    """Return the facets without degenerate and duplicated ones, and how many (2,) those were.
+
+    Raises MeshError where all are degenerate.
+    """
+    degenerate = repairing.degenerate_facets(points, facets)
+    if degenerate.all():
+        raise MeshError("the mesh has zero area: no facet spans a surface", file=source)
+    facets = facets[~degenerate] if degenerate.any() else facets
+    duplicated = repairing.duplicated_facets(facets, len(points))
+    facets = facets[~duplicated] if duplicated.any() else facets
+    return facets, np.array([degenerate.sum(), duplicated.sum()])
 
 
 def _checked(vertices: ArrayLike, faces: ArrayLike, source: str) -> tuple[Floats, Ints]:

@@ -47,13 +47,7 @@ class Patch:
     @classmethod
     def of(cls, mesh: Mesh, region: Region) -> Patch:
         """Return the part of a mesh within a region, cut exactly at its edges; empty where there is none."""
-        patch = cls.whole(mesh)
-        if region.box is not None:
-            for axis in range(3):
-                for bound, side in zip(region.bounds[:, axis], (1.0, -1.0), strict=True):
-                    values = (side * (patch.vertices[:, axis] - float(bound)))[patch.faces]
-                    patch = patch._trimmed(values, linear_root(values))
-        return patch.where_normals(region.faces)
+        return cls.whole(mesh).in_box(region).where_normals(region.faces)
 
     @cached_property
     def topology(self) -> Topology:
@@ -166,6 +160,16 @@ class Patch:
         points = np.concatenate([self.vertices, values[:, None]], axis=1)
         vertices, faces, normals = trimmed(points, self.faces, self.normals, at, linear_root(at))
         return Patch(vertices[:, :3].copy(), faces, normals), vertices[:, 3].copy()
+
+    def in_box(self, region: Region) -> Patch:
+        """Return the part within the box of a region, cut exactly at its sides; all where it has none."""
+        patch = self
+        if region.box is not None:
+            for axis in range(3):
+                for bound, side in zip(region.bounds[:, axis], (1.0, -1.0), strict=True):
+                    values = (side * (patch.vertices[:, axis] - float(bound)))[patch.faces]
+                    patch = patch._trimmed(values, linear_root(values))
+        return patch
 
     def where_normals(self, quantity: Callable[[Floats], Floats]) -> Patch:
         """Return the part where a quantity of the normal, (..., 3) to (...), is not negative."""

@@ -13,14 +13,17 @@ from pentapod.base.keys import VECTOR, Key
 from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
 
+WALL_SLACK = float(np.radians(0.5))
+"""By how much a region of 90° reaches further, so that rounding does not split upright walls; radians."""
+
 
 @dataclass(frozen=True, eq=False)
 class Region(Value):
     """Surface points within a box whose normal is within an angle of a direction, all in the mesh's frame.
 
-    direction (3,): any length; angle: radians in (0, π/2], so that only one side of a closed solid is machined.
-    box (2, 3): two opposite corners, metres, or None. Raises ToolpathError for a direction of no length, an angle out
-    of range, or a flat box.
+    direction (3,): any length; angle: radians in (0, π]. At π/2 upright walls belong to it, with `WALL_SLACK`; beyond
+    it overhangs do, of which strategies leave out what the view does not see. box (2, 3): two opposite corners, metres,
+    or None. Raises ToolpathError for a direction of no length, an angle out of range, or a flat box.
     """
 
     box: Annotated[
@@ -36,7 +39,13 @@ class Region(Value):
     ] = (0.0, 0.0, 1.0)
     angle: Annotated[
         float,
-        Key("deg", "machine only where the normal is within this angle of it", name="region_angle", gt=0.0, lt=90.0),
+        Key(
+            "deg",
+            "machine only where the normal is within this angle of it; 90 takes upright walls too",
+            name="region_angle",
+            gt=0.0,
+            le=180.0,
+        ),
     ] = float(np.radians(80.0))
 
     def __post_init__(self) -> None:
@@ -44,8 +53,8 @@ class Region(Value):
         if not np.linalg.norm(direction) > 0.0:
             raise ToolpathError("the direction has no length", key="region.direction")
         set_frozen(self, direction=frozen(normalised(direction), "region.direction"))
-        if not 0.0 < self.angle <= np.pi / 2:
-            raise ToolpathError("the angle is out of range", key="region.angle", value=self.angle, expected="(0, pi/2]")
+        if not 0.0 < self.angle <= np.pi:
+            raise ToolpathError("the angle is out of range", key="region.angle", value=self.angle, expected="(0, pi]")
         if self.box is not None:
             box = frozen(self.box, "region.box", (2, 3))
             if (box[0] == box[1]).any():
@@ -61,4 +70,6 @@ class Region(Value):
 
     def faces(self, normals: Floats) -> Floats:
         """Return n·d − cos(angle)·‖n‖ (...) of normals (..., 3), of any length: not negative inside."""
-        return normals @ self.direction - np.cos(self.angle) * np.linalg.norm(normals, axis=-1)
+        right = 0.5 * np.pi
+        angle = max(self.angle, right + WALL_SLACK) if self.angle >= right else self.angle
+        return normals @ self.direction - np.cos(angle) * np.linalg.norm(normals, axis=-1)

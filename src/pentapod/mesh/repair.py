@@ -1,8 +1,9 @@
-"""Mesh repair: vertex welding, degenerate and duplicated facets, consistent winding."""
+"""Mesh repair: vertex welding, joined borders, degenerate and duplicated facets, consistent winding."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.mesh.normals import CHUNK, facet_cross
@@ -10,6 +11,9 @@ from pentapod.mesh.topology import Topology
 
 WELD = 1e-8
 """Vertices closer than about this fraction of the largest extent are merged."""
+
+NEAR = 1e-5
+"""Vertices on borders that are closer than this fraction of the largest extent are merged, and it is reported."""
 
 DEGENERATE, SLIVER = 1e-9, 1e-3
 """Height of a facet, as a fraction of its longest side, up to which it is degenerate, or a sliver."""
@@ -31,6 +35,24 @@ def weld(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
     first, number = _distinct((x << bits) + y)
     first, number = _distinct((number << bits) + z)
     return points[first], number[np.cumsum(used)[faces] - 1]
+
+
+def joined_borders(vertices: Floats, topology: Topology) -> tuple[Ints, float] | None:
+    """Return the vertex (V,) that replaces each one, and the distance below which border vertices were merged.
+
+    None where no two vertices on borders are that close. A vertex is merged with one within this distance only, so that
+    a border of very short edges does not shrink to a point.
+    """
+    border = np.unique(topology.edges[topology.facets_at_edge == 1])
+    if not len(border):
+        return None
+    near = NEAR * float(np.ptp(vertices, axis=0).max())
+    pairs = border[np.sort(KDTree(vertices[border]).query_pairs(near, output_type="ndarray"), axis=1)]
+    if not len(pairs):
+        return None
+    instead = np.arange(len(vertices))
+    np.minimum.at(instead, pairs[:, 1], pairs[:, 0])
+    return instead, near
 
 
 def _distinct(keys: Ints) -> tuple[Ints, Ints]:

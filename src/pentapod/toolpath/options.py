@@ -83,7 +83,7 @@ class CoverOptions(PathOptions):
     """
 
     stepover: Annotated[
-        float | None, Key("mm", "largest distance between passes along the surface; or scallop_mm", gt=0.0, of_part=1.0)
+        float | None, Key("mm", "largest distance between passes along the surface; or scallop_mm", gt=0.0)
     ] = None
     scallop: Annotated[float | None, Key("mm", "height of the ridge left between passes", gt=0.0, of_part=1.0)] = None
     fill: Annotated[bool, Key("", "additional lines where regular passes leave gaps")] = True

@@ -17,6 +17,7 @@ from pentapod.cutters.tool import Tool
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
+from pentapod.mesh.region_share import why_empty
 from pentapod.toolpath.options import PathOptions
 
 
@@ -83,20 +84,9 @@ def region_patch(mesh: Mesh, options: PathOptions) -> Patch:
 
 def empty_region(mesh: Mesh, options: PathOptions, dropped: int = 0) -> ToolpathError:
     """Return the error of a region in which nothing is left to machine. dropped: passes left out as too short."""
-    facing_away = mesh.facet_normals @ options.region.direction < 0.0
-    share = float(mesh.facet_areas[facing_away].sum() / mesh.facet_areas.sum())
+    remedy = why_empty(mesh, options.region)
     if dropped:
-        shortest = 1e3 * options.shortest
-        remedy = f"all {dropped} passes are shorter than {shortest:.3g} mm; check the unit of the mesh"
-    elif options.region.box is not None:
-        low, high = 1e3 * mesh.bounds
-        extent = " x ".join(f"{a:.4g}..{b:.4g}" for a, b in zip(low, high, strict=True))
-        remedy = f"check the box against the part, which spans {extent} mm"
-    else:
-        remedy = (
-            f"{100.0 * share:.0f} % of the surface faces away from the direction; "
-            "turn the direction, or repair the winding"
-        )
+        remedy = f"all {dropped} passes are shorter than {1e3 * options.shortest:.3g} mm; check the unit of the mesh"
     return ToolpathError("the region holds nothing to machine", key="region", remedy=remedy)
 
 

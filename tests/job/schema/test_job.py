@@ -148,7 +148,8 @@ def test_digest_follows_the_meaning(make_job, tmp_path):
 
 def test_every_key_is_described_and_has_its_unit():
     unitless = {
-        "mesh", "unit", "scale", "repair", "region_direction", "name", "file", "type", "strategy", "pattern", "mode",
+        "mesh", "unit", "scale", "repair", "flip", "region_direction", "name", "file", "type", "strategy", "pattern",
+        "mode",
         "matrix", "component", "interpolation", "solver", "format", "direction", "line", "directions", "remedy", "up",
         "then", "setups", "weight_strokes", "weight_singularities", "weight_joints", "weight_bodies",
         "entry", "fill", "upright", "curve", "form", "which", "laying", "centred", "text", "letter_spacing", "align",

@@ -316,7 +316,7 @@ def test_options_that_make_no_sense(change, message):
 
 
 def test_regions_and_tools_that_make_no_sense():
-    for wrong in ({"direction": (0, 0, 0)}, {"angle": 0.0}, {"angle": 2.0}, {"box": ((0, 0, 0), (1, 0, 1))}):
+    for wrong in ({"direction": (0, 0, 0)}, {"angle": 0.0}, {"angle": 3.2}, {"box": ((0, 0, 0), (1, 0, 1))}):
         with pytest.raises(ToolpathError, match="region"):
             Region(**wrong)
     with pytest.raises(ToolpathError, match="radius"):
@@ -327,7 +327,7 @@ def test_regions_and_tools_that_make_no_sense():
 
 def test_errors_of_regions_and_steps_that_cannot_be_machined():
     mesh = Mesh.of(*surfaces.grid(waves))
-    with pytest.raises(ToolpathError, match="100 % of the surface faces away"):
+    with pytest.raises(ToolpathError, match=r"100 % of the surface faces away.*flip = true turns"):
         make_toolpath(mesh, BALL, RasterOptions(stepover=1e-3, region=Region(direction=(0, 0, -1))))
     make_toolpath(mesh.flipped(), BALL, RasterOptions(stepover=5e-3, region=Region(direction=(0, 0, -1))))
     with pytest.raises(ToolpathError, match="which spans"):

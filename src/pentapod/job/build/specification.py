@@ -8,7 +8,9 @@ from hashlib import sha256
 from pentapod.base.errors import InputError, MachineError
 from pentapod.base.files import sha256_of
 from pentapod.job.build.placement import job_constraints
-from pentapod.job.build.toolpath import job_depth, job_options, job_region, job_tool, job_toolpath
+from pentapod.job.build.reach import check_reach
+from pentapod.job.build.region import covers_region, job_region
+from pentapod.job.build.toolpath import job_depth, job_options, job_tool, job_toolpath
 from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import Component
 from pentapod.machine.clearance.collision_world import CollisionWorld
@@ -16,8 +18,7 @@ from pentapod.machine.machine import Machine
 from pentapod.machine.reader import machine_bytes
 from pentapod.mesh.io.load import load_mesh
 from pentapod.mesh.mesh import Mesh
-from pentapod.toolpath.options import CoverOptions, PathOptions
-from pentapod.toolpath.strategies.registry import STRATEGIES
+from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify import Coverage, Cutting, Specification
 from pentapod.verify.verdict.verdict import Sources
@@ -32,6 +33,7 @@ def job_specification(
     whether the machine is a value of the caller, of no file.
     Raises JobError where tables of the job do not go with the machine or the mesh.
     """
+    check_reach(job, machine, mesh)
     collision_world, constraints = job_collision_world(job, machine, mesh), job_constraints(job, machine, mesh)
     cutting, component = job_cutting(job, collision_world), job.placement.component
     return Specification(
@@ -95,7 +97,7 @@ def job_coverage(job: Job, mesh: Mesh) -> Coverage:
     With `left_mm` in the job, the region must be machined whatever the strategy.
     """
     strategy, tolerance = job.toolpath.strategy, job.tolerance.si
-    covers = strategy in STRATEGIES and issubclass(STRATEGIES[strategy].options, CoverOptions)
+    covers = covers_region(job)
     if not covers and tolerance.left is None:
         return Coverage.nothing(f'the strategy "{strategy}" covers no region')
     return Coverage.of(

@@ -17,10 +17,10 @@ from pentapod.cutters.registry import CUTTERS
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.solids import Cone
+from pentapod.job.build.region import covers_region, job_region, region_report
 from pentapod.job.schema.job import Job
 from pentapod.job.schema.strategies import FILE
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.region import Region
 from pentapod.program import read_header
 from pentapod.toolpath import toolpath_with_report
 from pentapod.toolpath.axis.modes import AxisMode, Between, Fixed, Normal, Pointed
@@ -75,11 +75,6 @@ def job_options(job: Job) -> PathOptions:
     )
 
 
-def job_region(job: Job) -> Region:
-    """Return the part of the surface that a job machines."""
-    return Region(**fields_from(Region, job.part))
-
-
 def job_depth(job: Job) -> float:
     """Return the depth below the surface at which the job's strategy cuts on purpose, metres."""
     strategy = job.toolpath.strategy
@@ -107,7 +102,7 @@ def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Too
         links=None if from_file else job_link_style(job, mesh, toolpath),
     )
     toolpath, gouges = without_gouges(toolpath, tool, mesh, options, progress)
-    reports: list[object] = [report, gouges]
+    reports: list[object] = [*([region_report(job, mesh)] if covers_region(job) else []), report, gouges]
     if gouges.tilted:  # the axes may turn faster than before
         toolpath = stepped(toolpath, np.inf if from_file else job.toolpath.si.axis_step)
         reports += _turns(toolpath, from_si(job.axis.si.rate, "deg_mm"))

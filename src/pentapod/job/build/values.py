@@ -52,7 +52,8 @@ def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
     """Return the job's mesh. Raises MeshError, or JobError where its unit, or lengths of the job, do not suit it."""
     part = job.part
     try:
-        mesh = load_mesh(job.mesh_path, part.unit, scale=part.scale, repair=part.repair, progress=progress)
+        turned = {"repair": part.repair, "flip": part.flip}
+        mesh = load_mesh(job.mesh_path, part.unit, scale=part.scale, **turned, progress=progress)
     except MeshError as error:
         if error.key != "unit":
             raise

@@ -154,6 +154,8 @@ class Job(Value):
         content = self.tables.model_dump(mode="json", exclude={"verify"})
         if not self.limits.use:
             del content["limits"]
+        if not self.part.flip:
+            del content["part"]["flip"]
         content["part"]["mesh"] = [self.mesh_path.suffix.lower(), _sha(self.mesh_path)]
         if self.machine_file is not None:
             content["machine"]["file"] = _sha(self.machine_file)

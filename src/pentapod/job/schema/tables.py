@@ -39,6 +39,9 @@ class PartKeys:
     repair: Annotated[
         bool, Key("", "wind all facets alike (double and degenerate ones are left out anyway, and reported)")
     ] = False
+    flip: Annotated[
+        bool, Key("", "turn the surface over: for an open sheet that shows its back to region_direction")
+    ] = False
 
     @staticmethod
     def rules(table: Any) -> None:

@@ -42,6 +42,7 @@ def load_mesh(
     *,
     scale: float = 1.0,
     repair: bool = False,
+    flip: bool = False,
     crease_angle: float = CREASE_ANGLE,
     progress: Progress = silent,
 ) -> Mesh:
@@ -49,9 +50,9 @@ def load_mesh(
 
     unit: of the file's numbers, one of `UNITS`; required. scale: factor after the unit. repair: also wind facets alike
     (see `Mesh.of`), and drop any number of useless facets; without it more than 1 % of degenerate or duplicated facets
-    is an error. crease_angle: radians. Raises MeshError of one line: no such file, a folder, too large, empty,
-    truncated, not a mesh, no facets, zero area, coordinates that are not finite, unit missing (with the size in each
-    unit) or unknown.
+    is an error. flip: turn all facets over. crease_angle: radians. Raises MeshError of one line: no such file, a
+    folder, too large, empty, truncated, not a mesh, no facets, zero area, coordinates that are not finite, unit missing
+    (with the size in each unit) or unknown.
     """
     path = Path(path)
     if unit is not None and unit not in UNITS:
@@ -60,6 +61,8 @@ def load_mesh(
         raise MeshError("the scale must be positive", file=path, key="scale", value=scale)
     progress("mesh", 0.0, "reading")
     vertices, faces, notes = _read(path, repair=repair)
+    if flip:
+        faces, notes = faces[:, ::-1], (*notes, "all facets turned over: flip = true")
     extents = _extents(vertices)
     sizes, likely = _sizes(extents)
     if unit is None:

@@ -1,0 +1,68 @@
+"""Is the region of a job too large for its machine, whatever is planned? It may have the wrong unit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.base.units import from_si
+from pentapod.cutters.tool import Tool
+from pentapod.job.build.region import covers_region, job_region
+from pentapod.job.build.toolpath import job_tool
+from pentapod.job.schema.job import Job
+from pentapod.machine.machine import Machine
+from pentapod.machine.reach import reach
+from pentapod.mesh.io.load import UNITS
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.patch import Patch
+
+
+def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
+    """Raise JobError for a region that no plan can cover: in more places than there are set-ups, too far apart.
+
+    In one set-up all tips are nearer to each other than `reach`. So the job cannot be done where the region has more
+    points, each farther than that from the others, than set-ups; twice the distance of tips from their contacts and a
+    stepover at each end are allowed for. Lines that cover no region may lie anywhere on the part, and pass.
+    """
+    if not covers_region(job):
+        return
+    stepover = getattr(job.toolpath.si, "stepover", None) or 0.0
+    apart = reach(machine) + 2.0 * (2.0 * _tip_distance(job_tool(job)) + stepover)
+    if np.linalg.norm(np.ptp(mesh.bounds, axis=0)) <= apart:
+        return
+    region = Patch.of(mesh, job_region(job))
+    points = region.vertices[np.unique(region.faces)]
+    if _far_apart(points, apart, job.placement.setups + 1) <= job.placement.setups:
+        return
+    extents = np.ptp(mesh.bounds, axis=0)
+    size, width = (f"{from_si(value, 'mm'):,.0f} mm" for value in (extents.max(), machine.work.diameter))
+    unit = job.part.unit
+    known = UNITS[unit or "mm"]
+    fitting = min(UNITS, key=lambda name: abs(np.log(extents.max() * UNITS[name] / known / machine.work.diameter)))
+    remedy = "machine a smaller region (region_box_mm), or set scale"
+    raise job.error(
+        "part", "unit", f"the part is {size} wide, the work volume {width}",
+        expected=f"places to machine that are at most {from_si(apart, 'mm'):,.0f} mm from each other",
+        remedy=remedy if fitting == unit or unit is None else f'unit = "{fitting}"?',
+    )  # fmt: skip
+
+
+def _far_apart(points: Floats, distance: float, most: int) -> int:
+    """Return how many points (N, 3), up to `most`, are chosen one after the other, each far from all before."""
+    if not len(points):
+        return 0
+    nearest, count = np.linalg.norm(points - points.mean(axis=0), axis=1), 0
+    chosen = int(nearest.argmax())
+    nearest = np.full(len(points), np.inf)
+    while count < most and nearest[chosen] > distance:
+        nearest = np.minimum(nearest, np.linalg.norm(points - points[chosen], axis=1))
+        count, chosen = count + 1, int(nearest.argmax())
+    return count
+
+
+def _tip_distance(tool: Tool) -> float:
+    """Return the largest distance of the tip from a contact, for axes up to a right angle from the normal, metres."""
+    angle = np.linspace(0.0, 0.5 * np.pi, 19)
+    normals = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
+    axes = np.tile([0.0, 0.0, 1.0], (len(angle), 1))
+    return float(np.linalg.norm(tool.tips(np.zeros_like(normals), normals, axes), axis=1).max())

@@ -1,0 +1,72 @@
+"""Region of a job: how much of the part it holds, with what a user would want to know before planning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pentapod.base.keys import fields_from
+from pentapod.base.units import from_si
+from pentapod.base.values import Value
+from pentapod.job.schema.job import Job
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.region import Region
+from pentapod.mesh.region_share import RegionShare
+from pentapod.toolpath.options import CoverOptions
+from pentapod.toolpath.strategies.registry import STRATEGIES
+
+LEAST_SHARE = 0.5
+"""Share of the surface that the direction sees, below which the region is called small."""
+
+
+@dataclass(frozen=True)
+class RegionReport(Value):
+    """How much of the surface a job machines. problems: sentences."""
+
+    share: RegionShare
+    problems: tuple[str, ...]
+
+    def __str__(self) -> str:
+        found = self.share
+        text = f"region: {_percent(found.inside)} of the surface"
+        if found.facing < 1.0:
+            text += f", {_percent(found.inside / max(found.facing, 1e-300))} of what faces its direction"
+        return "\n".join([text, *(f"  problem: {problem}" for problem in self.problems)])
+
+
+def job_region(job: Job) -> Region:
+    """Return the part of the surface that a job machines."""
+    return Region(**fields_from(Region, job.part))
+
+
+def covers_region(job: Job) -> bool:
+    """Return whether the job's strategy covers a region by passes side by side."""
+    strategy = job.toolpath.strategy
+    return strategy in STRATEGIES and issubclass(STRATEGIES[strategy].options, CoverOptions)
+
+
+def region_report(job: Job, mesh: Mesh) -> RegionReport:
+    """Return how much of the part's surface a job's region holds, and the problems that this suggests."""
+    found, problems = RegionShare.of(mesh, job_region(job)), list[str]()
+    if found.inside < LEAST_SHARE * found.facing:
+        outside, steep = (found.facing - found.boxed) / found.facing, (found.boxed - found.inside) / found.facing
+        why = [f"{_percent(outside)} is outside region_box_mm"] if job.part.region_box_mm is not None else []
+        angle = job.part.region_angle_deg
+        why += [f"{_percent(steep)} is steeper than region_angle_deg = {angle:g}"] if steep > 0.0 else []
+        problems.append(f"less than half of what faces the direction is machined: {' and '.join(why)}")
+    if found.facing < LEAST_SHARE and not mesh.diagnosis.watertight:
+        problems.append(
+            f"{_percent(1.0 - found.facing)} of this open surface faces away from region_direction: flip = true in "
+            "[part] turns it over"
+        )
+    stepover, narrow = getattr(job.toolpath.si, "stepover", None), min(found.widths)
+    if stepover is not None and stepover > narrow > 0.0:
+        mm = from_si(narrow, "mm")
+        problems.append(
+            f"stepover_mm = {job.toolpath.stepover_mm:g} is wider than the region, {mm:.3g} mm across: one pass may be "
+            "all there is"
+        )
+    return RegionReport(found, tuple(problems))
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
