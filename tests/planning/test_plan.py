@@ -1,9 +1,11 @@
 """plan: what it returns holds at every waypoint, is not beaten nearby, is repeatable, and refuses with reasons."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from domes import dome
 
 from pentapod.base.refusal import Refusal
 from pentapod.geometry.directions import angle_between
@@ -18,6 +20,7 @@ from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 TILT = np.radians(15.0)
+PLUS = Component(1, 1)
 
 
 @pytest.fixture(scope="module")
@@ -156,3 +159,44 @@ def test_a_fixed_part_is_told_where_to_move(desk, cap, placed):
     answer = plan(cap, desk, tilt=TILT, constraints=PlacementConstraints.fixture([off]), component=placed.component)
     assert isinstance(answer, Refusal)
     assert "move the part by (" in answer.remedy
+
+
+@pytest.mark.slow
+def test_a_common_axis_fits_what_normals_do_not_and_is_no_worse_than_a_fixed_axis(desk):
+    steep = dome(0.06, 80.0)
+    upright = tuple(replace(s, axes=np.tile([0.0, 0.0, 1.0], (len(s.axes), 1))) for s in steep.segments)
+    # A fixed axis keeps the ball's centre where it is.
+    tips = tuple(
+        replace(u, tips=s.tips + steep.tilt_centre * (s.axes - u.axes))
+        for u, s in zip(upright, steep.segments, strict=True)
+    )
+    fixed = plan(Toolpath(tips, steep.tilt_centre), desk, tilt=TILT, component=PLUS)
+    assert isinstance(plan(steep, desk, tilt=TILT, component=PLUS), Refusal)
+    auto = plan(steep, desk, tilt=np.radians(90.0), common_axis=True, component=PLUS)
+    assert isinstance(fixed, PlacedPath)
+    assert isinstance(auto, PlacedPath)
+    assert auto.smallest_margin > 0.98 * fixed.smallest_margin
+    np.testing.assert_allclose(auto.tilt_centres, auto.placement.transform.apply(steep.tilt_centres), atol=1e-12)
+    assert "of the part" in str(auto.common_axis)
+
+
+def test_a_common_axis_keeps_the_largest_lean_at_a_given_placement(desk, cap):
+    middle = RigidTransform(np.diag([1.0, -1.0, -1.0]), desk.work.centre)
+    pose = PlacementConstraints.fixture([middle])
+    answer = plan(cap, desk, tilt=np.radians(25.0), common_axis=True, component=PLUS, constraints=pose)
+    assert isinstance(answer, PlacedPath)
+    own = middle.rotate(cap.axes)
+    lean = np.degrees(angle_between(answer.axes, own))
+    assert 15.0 < lean.max() < 25.0
+    alone = plan(cap, desk, tilt=0.0, component=PLUS, constraints=pose)
+    smallest = alone.smallest_margin if isinstance(alone, PlacedPath) else alone.attempt.smallest_margin
+    assert answer.smallest_margin > smallest
+
+
+def test_a_small_lean_is_a_tilt_cone(desk):
+    cap = dome(0.06, 15.0, 100)
+    middle = PlacementConstraints.fixture([RigidTransform(np.diag([1.0, -1.0, -1.0]), desk.work.centre)])
+    auto = plan(cap, desk, tilt=0.1, common_axis=True, component=PLUS, constraints=middle)
+    cone = plan(cap, desk, tilt=0.1, component=PLUS, constraints=middle)
+    np.testing.assert_array_equal(auto.unwrap().axes, cone.unwrap().axes)
+    assert auto.unwrap().common_axis is None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -17,7 +17,13 @@ from pentapod.geometry.solids import Cone, Solid, stacked
 
 @dataclass(frozen=True, kw_only=True)
 class Mounted(Value, ABC):
-    """A tool with shank and holder: stacked cones above the cutting part, towards the spindle."""
+    """A tool with shank and holder: stacked cones above the cutting part, towards the spindle.
+
+    largest_lean: the largest angle of the axis from the surface's normal that suits the tool, radians; 0 for tools that
+    cannot tilt.
+    """
+
+    largest_lean: ClassVar[float] = 0.0
 
     shank: tuple[Cone, ...] = field(default=())
     holder: tuple[Cone, ...] = field(default=())
@@ -38,7 +44,9 @@ class Mounted(Value, ABC):
 
 @dataclass(frozen=True)
 class BallEnded(Mounted):
-    """A cutter with a ball end. radius: of the ball, metres."""
+    """A cutter with a ball end. radius: of the ball, metres. It may lean until its contact is on the ball's equator."""
+
+    largest_lean: ClassVar[float] = float(np.radians(90.0))
 
     radius: Annotated[
         float, Key("mm", "diameter of the cutter, or of its ball", name="diameter", share=0.5, gt=0.0, le=100.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -18,8 +18,11 @@ from pentapod.geometry.solids import Solid
 class StandOff(Mounted):
     """A laser, spray or water jet. distance: stand-off from the tip to the surface along the axis, metres, ≥ 0.
 
-    The shank, from the tip on, is the nozzle. Raises ToolpathError for a negative distance.
+    The shank, from the tip on, is the nozzle. It may lean a little only: the spot grows with the angle. Raises
+    ToolpathError for a negative distance.
     """
+
+    largest_lean: ClassVar[float] = float(np.radians(15.0))
 
     distance: Annotated[float, Key("mm", "from the tip to the surface", name="standoff", gt=0.0, le=200.0)]
 

@@ -218,6 +218,7 @@ class _Task:
     def _options(self) -> PlacementOptions:
         return {
             "tilt": self.specification.tilt,
+            "common_axis": self.job.axis.mode == "auto",
             "constraints": self.specification.constraints or FREE,
             "component": self.specification.component,
             "collision_world": self.specification.collision_world or NOTHING,
@@ -254,11 +255,12 @@ class _Task:
 
 
 def _remarks(placed: PlacedPath | Refusal) -> str:
-    """Return the positions of guides, and the result of an interrupted search."""
+    """Return the positions of guides, a common direction of the tool, and the result of an interrupted search."""
     if isinstance(placed, Refusal):
         return ""
     chosen = placed.placement
     lines = [f"guides 1 to 5 at {chosen.guides}"] if chosen.guides else []
+    lines += [f"tool axis: {placed.common_axis}; {placed.lean}"] if placed.common_axis is not None else []
     if "interrupted" in chosen.chosen_by:
         lines.append(f"placement: {chosen.chosen_by}; smallest margin {placed.smallest_margin:.3f}")
     return "\n".join(lines)

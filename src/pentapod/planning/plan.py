@@ -15,9 +15,11 @@ from pentapod.numerics.one_thread import on_one_thread
 from pentapod.planning.diagnosis import refusal
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.placement.base_reconfiguration import reconfigured
+from pentapod.planning.placement.common_axes import OPTIONS as COMMON_AXES
+from pentapod.planning.placement.common_axes import Searched, with_common_axis
 from pentapod.planning.placement.placed_path import PlacedPath, Placement, UnplacedPath
 from pentapod.planning.placement.sampling import best_tilted_margins
-from pentapod.planning.placement.search import SOLVERS, Search, Solver, SolverName, search
+from pentapod.planning.placement.search import SOLVERS, Solver, SolverName, search
 from pentapod.planning.placement.secondary_objective import SecondaryObjective, improved, objective_of
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.constraints import FREE, PlacementConstraints
@@ -37,6 +39,7 @@ class PlacementOptions(TypedDict):
     """The options of `plan` that `fits` takes, too."""
 
     tilt: float
+    common_axis: bool
     constraints: PlacementConstraints
     component: Branch | None
     collision_world: CollisionWorld
@@ -51,6 +54,7 @@ def plan(
     machine: Machine,
     *,
     tilt: float = 0.0,
+    common_axis: bool = False,
     constraints: PlacementConstraints = FREE,
     component: Branch | None = None,
     collision_world: CollisionWorld = NOTHING,
@@ -63,20 +67,21 @@ def plan(
 ) -> PlacedPath | Refusal:
     """Return placement, component and tool axes that maximise the smallest margin of the machine's limits on the path.
 
-    tilt: half angle in radians of the cone around the nominal axis within which the tool may lean. constraints: the
-    allowed placements. component: all are searched where none is given. collision_world: obstacles of legs, spindle and
-    tool. weights: of the groups of margins. The rail positions of a reconfigurable machine are optimised, too.
-    secondary_objective: up to a tenth of the margin is given up for it. limits: kinds of limits besides pentapod's
-    own. Deterministic for a seed.
+    tilt: half angle in radians of the cone around the nominal axis within which the tool may lean. common_axis: whether
+    nominal axes between the toolpath's and one common direction are found as well; `tilt` is then the largest angle
+    from the toolpath's axis. constraints: the allowed placements. component: all are searched where none is given.
+    collision_world: obstacles of legs, spindle and tool. weights: of the groups of margins. The rail positions of a
+    reconfigurable machine are optimised, too. secondary_objective: up to a tenth of the margin is given up for it.
+    limits: kinds of limits besides pentapod's own. Deterministic for a seed.
 
     Returns a Refusal that names limits, waypoints and shortfalls where the part does not fit. An interruption (Ctrl-C)
     ends the search with the best placement so far, if that fits; else KeyboardInterrupt is raised.
     """
     problem = PlacementProblem.of(
-        ToolpathSamples.of(toolpath, tilt), machine, constraints, weights,
+        _samples(toolpath, tilt, common_axis=common_axis), machine, constraints, weights,
         component=component, collision_world=collision_world, limits=limits,
     )  # fmt: skip
-    problem, found = _searched(problem, seed, solver, progress)
+    problem, found = _searched(problem, tilt if common_axis else 0.0, seed, solver, progress)
     best = found.best
     if best.smallest < NEEDED_MARGIN:
         progress("placement", 1.0, "it does not fit; trying changes that would help")
@@ -100,23 +105,34 @@ def fits(toolpath: Toolpath, machine: Machine, **options: Unpack[PlacementOption
 
     Raises KeyboardInterrupt where the search is interrupted.
     """
+    tilt, common_axis = options["tilt"], options["common_axis"]
     problem = PlacementProblem.of(
-        ToolpathSamples.of(toolpath, options["tilt"]), machine, options["constraints"], options["weights"],
+        _samples(toolpath, tilt, common_axis=common_axis), machine, options["constraints"], options["weights"],
         component=options["component"], collision_world=options["collision_world"], limits=options["limits"],
     )  # fmt: skip
-    _, found = _searched(problem, 0, options["solver"], silent)
+    _, found = _searched(problem, tilt if common_axis else 0.0, 0, options["solver"], silent)
     if found.interrupted:
         raise KeyboardInterrupt
     return found.best.smallest >= NEEDED_MARGIN
 
 
-def _searched(
-    problem: PlacementProblem, seed: int, solver: SolverName, progress: Progress
-) -> tuple[PlacementProblem, Search]:
-    """Return the search and its problem: that of a reconfigurable machine at the rail positions found."""
-    if problem.machine.guides is not None:
-        return reconfigured(problem, seed=seed, solver=solver, progress=progress)
-    return problem, search(problem, seed=seed, solver=solver, progress=progress)
+def _samples(toolpath: Toolpath, tilt: float, *, common_axis: bool) -> ToolpathSamples:
+    """Return the samples of a toolpath with the cone of its tilt field."""
+    return ToolpathSamples.of(toolpath, min(tilt, COMMON_AXES.tilt) if common_axis else tilt)
+
+
+def _searched(problem: PlacementProblem, limit: float, seed: int, solver: SolverName, progress: Progress) -> Searched:
+    """Return the search and its problem: that of a reconfigurable machine at the rail positions found.
+
+    limit: largest angle from the toolpath's axes where a common direction is chosen, radians; 0 where none is.
+    """
+
+    def searched(problem: PlacementProblem) -> Searched:
+        if problem.machine.guides is not None:
+            return reconfigured(problem, seed=seed, solver=solver, progress=progress)
+        return problem, search(problem, seed=seed, solver=solver, progress=progress)
+
+    return with_common_axis(problem, limit, searched, seed=seed, progress=progress)
 
 
 def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: Floats, chosen_by: str) -> PlacedPath:
@@ -125,7 +141,8 @@ def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: F
     rail_positions = None if problem.machine.guides is None else tuple(problem.machine.rail_positions.tolist())
     values = at.margins(tips, axes, at.transform)
     placement = Placement(at.transform, chosen_by, rail_positions)
-    return PlacedPath(toolpath, placement, at.margins.scene.branch, tips, axes, values, at.margins.limits)
+    branch, common_axis = at.margins.scene.branch, problem.samples.common_axis
+    return PlacedPath(toolpath, placement, branch, tips, axes, values, at.margins.limits, common_axis)
 
 
 def _refusal(

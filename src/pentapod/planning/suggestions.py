@@ -37,7 +37,9 @@ def suggestions(problem: PlacementProblem, best: Candidate, improve: Raise, need
     """Return the changes near the best candidate that make the part fit, as phrases for "Try to …"; maybe none."""
     phrases = [_move(problem, best, improve, needed)] if problem.constraints is not FREE else []
     if problem.constraints.moves:
-        phrases += [_cone(problem, best, improve, needed), _region(problem, best, improve, needed)]
+        # Around a common axis the tool may lean as far as the cutter allows.
+        wider = "" if problem.samples.common_axis is not None else _cone(problem, best, improve, needed)
+        phrases += [wider, _region(problem, best, improve, needed)]
     return tuple(phrase for phrase in phrases if phrase)
 
 

@@ -202,6 +202,8 @@ def _preparations(outcome: Outcome, signals: Signals | None) -> list[tuple[str, 
         sheet.append(
             (f"guides 1 to {machine.robot.n_legs}", f"set to {rail_positions} from the base joints of the machine file")
         )
+    if placed is not None and placed.common_axis is not None:
+        sheet.append(("tool axis", f"{placed.common_axis}; {placed.lean}".replace("-", "−")))
     mesh = outcome.find(Mesh)
     if mesh is not None:
         size = " × ".join(f"{value:.1f}" for value in 1e3 * np.ptp(mesh.bounds, axis=0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from pentapod.base.values import Value
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.build.limits import placement_limits
 from pentapod.planning.limits.margins import Margins
+from pentapod.planning.placement.common_axes import OPTIONS as COMMON_AXES
 from pentapod.planning.placement.sampling import best_tilted_margins
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.view.opened_run import OpenedRun
@@ -90,7 +91,9 @@ class Study(Value):
     @classmethod
     def of(cls, run: OpenedRun) -> Study:
         """Return the study of a run."""
-        samples = ToolpathSamples.of(run.toolpath, float(np.radians(run.job.axis.tilt_deg)))
+        samples = ToolpathSamples.of(run.toolpath, run.job.axis.si.tilt)
+        if run.job.axis.mode == "auto":  # the tool leans from the planned axes, and those from the normals
+            samples = replace(samples, nominal=run.axes, tilt=min(samples.tilt, COMMON_AXES.tilt))
         margins = Margins.of(run.machine, run.component, run.collision_world, placement_limits(run.job))
         return cls(samples, run.axes, margins, drawn_waypoints(run.toolpath.starts))
 

@@ -13,7 +13,7 @@ from pentapod.base.errors import JobError
 from pentapod.cli.main import run as run_cli
 from pentapod.geometry import angle_between
 from pentapod.job import Job, run
-from pentapod.job.build.toolpath import job_toolpath
+from pentapod.job.build.toolpath import job_toolpath, tool_in_world
 from pentapod.job.build.values import job_mesh
 from pentapod.toolpath import SegmentKind
 from pentapod.toolpath.formats import read_toolpath
@@ -161,3 +161,31 @@ def test_mistakes_name_their_key(make_job, change, message):
 def test_a_flat_end_may_not_tilt(make_job):
     with pytest.raises(JobError, match="cannot tilt"):
         Job.load(make_job((BALL, 'type = "flat"\ndiameter_mm = 6'), ("tilt_deg = 0", "tilt_deg = 5")))
+
+
+def test_auto_axes_start_from_normals_and_leave_stem_and_holder_to_the_planner(make_job):
+    thick = (BALL, f"{BALL}\nflute_mm = 30\nholder_mm = [[20, 40, 40]]")
+    normal = Job.load(make_job(thick, name="normal.toml"))
+    auto = Job.load(make_job(thick, ("tilt_deg = 0", 'mode = "auto"')))
+    mesh = job_mesh(auto)
+    made, plain = job_toolpath(auto, mesh)[0], job_toolpath(normal, mesh)[0]
+    cuts = [segment for segment in made.segments if segment.kind is SegmentKind.CUT]
+    others = [segment for segment in plain.segments if segment.kind is SegmentKind.CUT]
+    np.testing.assert_allclose(np.concatenate([s.axes for s in cuts]), np.concatenate([s.axes for s in others]))
+    kinds = [(solid.kind, solid.low, solid.high) for solid in tool_in_world(auto).solids]
+    assert [kind for kind, _, _ in kinds] == ["cutter", "shank", "holder"]
+    assert kinds[1][1:] == pytest.approx((10e-3, 30e-3))  # the flute above the ball must not touch the part
+    assert [solid.kind for solid in tool_in_world(normal).solids].count("shank") == 0
+
+
+@pytest.mark.slow
+def test_auto_axes_machine_a_steep_dome_and_the_verdict_judges_the_lean(make_job, tmp_path):
+    free = tuple((line, "") for line in ("rotation_deg = [180, 0, 0]\n", 'component = "++"\n'))
+    text = make_job(('mode = "fixed"', 'mode = "free"'), *free, ("tilt_deg = 0", 'mode = "auto"\ntilt_deg = 40'))
+    text.write_text(re.sub("position_mm = .*\n", "", text.read_text()))
+    outcome = run(Job.load(text), tmp_path / "out")
+    assert outcome.passed
+    judged = json.loads((tmp_path / "out" / "verdict.json").read_text())
+    (lean,) = [claim for claim in judged["certificates"] if claim["claim"] == "axis deviation"]
+    assert lean["value"] <= 40.5
+    assert "tilt cone 40 deg" in lean["method"]

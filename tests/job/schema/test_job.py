@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from pentapod.base.errors import JobError
@@ -50,6 +51,15 @@ MISTAKES = {  # what is replaced, and the pieces that the message must hold
     "fixed without a position": (("position_mm = ", "# "), ("placement.position_mm", "needs a position")),
     "free with numbers": (('mode = "fixed"', 'mode = "free"'), ("placement.position_mm", "means nothing")),
     "two numbers of three": (("[180, 0, 0]", "[180, 0]"), ("placement.rotation_deg[2]", "too few numbers")),
+    "a cone as wide as only auto has": (
+        ("tilt_deg = 0", "tilt_deg = 61"),
+        ("axis.tilt_deg", "too wide a cone", "got 61", 'at most 60, or mode = "auto"'),
+    ),
+    "auto with lead": (("tilt_deg = 0", 'mode = "auto"\nlead_deg = 5'), ("axis.lead_deg", "means nothing", "auto")),
+    "auto with a direction": (
+        ("tilt_deg = 0", 'mode = "auto"\ndirection = [0, 0, 1]'),
+        ("axis.direction", 'means nothing for axis mode "auto"'),
+    ),
     "no such fixture": (
         ("[feed]", '[fixture]\nmesh = "vise.stl"\nunit = "mm"\n[feed]'),
         ("fixture.mesh", "no such file"),
@@ -144,6 +154,46 @@ def test_digest_follows_the_meaning(make_job, tmp_path):
     changed = bytearray((tmp_path / "part.stl").read_bytes())
     changed[100] ^= 1
     assert Job.load(make_job(mesh=bytes(changed))).digest != digest
+
+
+AUTO = ("tilt_deg = 0", 'mode = "auto"')
+
+
+BEAM = (('"ball"', '"standoff"'), ("diameter_mm", "standoff_mm"))
+FLAT = (('"ball"', '"flat"'),)
+
+
+@pytest.mark.parametrize(("tool", "most"), [((), 90.0), (BEAM, 15.0), (FLAT, 0.0)])
+def test_auto_axes_lean_as_far_as_the_cutter_may(make_job, tool, most):
+    job = Job.load(make_job(AUTO, *tool))
+    assert job.axis.tilt_deg == pytest.approx(most)
+    assert job.axis.si.tilt == pytest.approx(np.radians(most))
+
+
+def test_a_lean_that_was_not_given_follows_the_cutter_and_one_that_was_is_the_limit(make_job):
+    job = Job.load(make_job(AUTO))
+    assert job.with_(tool={"type": "flat"}).axis.tilt_deg == 0.0
+    assert Job.load(make_job((AUTO[0], 'mode = "auto"\ntilt_deg = 90'))).digest == job.digest
+    limited = Job.load(make_job((AUTO[0], 'mode = "auto"\ntilt_deg = 60')))
+    assert limited.axis.tilt_deg == 60.0
+    assert limited.digest != job.digest
+
+
+@pytest.mark.parametrize(
+    ("changes", "pieces"),
+    [
+        ((*BEAM, (AUTO[0], 'mode = "auto"\ntilt_deg = 20')), ("axis.tilt_deg", '"standoff" may lean', "at most 15")),
+        ((*FLAT, (AUTO[0], 'mode = "auto"\ntilt_deg = 5')), ("axis.tilt_deg", '"flat" may lean', "at most 0")),
+        (
+            ((f"{STEP}\nspacing_mm = 4", 'strategy = "file"\nfile = "part.stl"'), AUTO),
+            ("axis.mode", "a toolpath from a file has axes of its own", 'mode = "normal"'),
+        ),
+    ],
+)
+def test_auto_axes_that_tool_or_file_do_not_allow(make_job, changes, pieces):
+    with pytest.raises(JobError) as caught:
+        Job.load(make_job(*changes))
+    assert all(piece in str(caught.value) for piece in pieces), str(caught.value)
 
 
 def test_every_key_is_described_and_has_its_unit():

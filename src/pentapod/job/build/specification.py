@@ -10,7 +10,7 @@ from pentapod.base.files import sha256_of
 from pentapod.job.build.placement import job_constraints
 from pentapod.job.build.reach import check_reach
 from pentapod.job.build.region import covers_region, job_region
-from pentapod.job.build.toolpath import job_depth, job_options, job_tool, job_toolpath
+from pentapod.job.build.toolpath import job_depth, job_options, job_tool, job_toolpath, tool_in_world
 from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import Component
 from pentapod.machine.clearance.collision_world import CollisionWorld
@@ -64,7 +64,7 @@ def job_collision_world(job: Job, machine: Machine, mesh: Mesh) -> CollisionWorl
     name = "fixture" if job.fixture.frame == "part" else "table"
     around = {} if held is None else {name: held}
     try:
-        return CollisionWorld.of(machine, job_tool(job), mesh, **around, allowance=job.gouge.si.tolerance)
+        return CollisionWorld.of(machine, tool_in_world(job), mesh, **around, allowance=job.gouge.si.tolerance)
     except MachineError as error:
         remedy = "a longer tool.length_mm, or a shorter holder"
         raise job.error("tool", "holder_mm", error.what, expected=error.expected, remedy=remedy) from error

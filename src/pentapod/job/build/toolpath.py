@@ -13,6 +13,8 @@ from pentapod.base.errors import InputError, ToolpathError
 from pentapod.base.keys import fields_from, file_key
 from pentapod.base.progress import Progress, silent
 from pentapod.base.units import from_si
+from pentapod.cutters.ball import BallCutter
+from pentapod.cutters.mounted import BallEnded
 from pentapod.cutters.registry import CUTTERS
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
@@ -60,6 +62,30 @@ def job_tool(job: Job) -> Tool:
         raise job.error("tool", key, error.what, expected=error.expected) from error
 
 
+def _judged_tool(job: Job) -> Tool:
+    """Return the tool that the toolpath is made for and judged with.
+
+    Where the planner chooses the axes, that is the ball alone: it is at the same place whatever the axis. The planner
+    keeps the rest of the tool clear of the part.
+    """
+    tool = job_tool(job)
+    return BallCutter(tool.radius) if job.axis.mode == "auto" and isinstance(tool, BallEnded) else tool
+
+
+def tool_in_world(job: Job) -> Tool:
+    """Return the tool whose shank and holder are kept clear of the part.
+
+    Where the planner chooses the axes, a ball's cutting length counts as shank: it would cut into the part sideways.
+    """
+    tool = job_tool(job)
+    if job.axis.mode == "auto" and isinstance(tool, BallCutter) and tool.flute is not None:
+        end = BallCutter(tool.radius)
+        beside = Cone(tool.flute - end.solids[-1].top, tool.radius, tool.radius)
+        if beside.height > 0.0:
+            return dataclasses.replace(end, shank=(beside, *tool.shank), holder=tool.holder)
+    return tool
+
+
 def job_options(job: Job) -> PathOptions:
     """Return the options of the job's strategy, its files read.
 
@@ -86,7 +112,7 @@ def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Too
 
     Raises ToolpathError where there is nothing to machine, or the toolpath file cannot be read.
     """
-    tool, from_file = job_tool(job), job.toolpath.strategy == FILE
+    tool, from_file = _judged_tool(job), job.toolpath.strategy == FILE
     if from_file:
         toolpath, report = _read(job, tool)
     else:

@@ -12,15 +12,15 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import create_model, model_validator
 
-from pentapod.base.keys import VECTOR, Key
+from pentapod.base.keys import Key
 from pentapod.base.tables import TomlTable, table_of, wrong
 from pentapod.base.units import to_si
+from pentapod.job.schema.axis import AxisTable, limited_lean
 from pentapod.job.schema.placement import FixtureTable, PlacementTable
 from pentapod.job.schema.strategies import ToolpathTable, strategy_table
 from pentapod.job.schema.tool import AnyTool, tool_table
 from pentapod.machine.parts import ToolLimits
 from pentapod.mesh.region import Region
-from pentapod.toolpath.axis.orientation import Orientation
 from pentapod.toolpath.gouge.report import GougeOptions
 
 
@@ -65,57 +65,6 @@ class MachineKeys:
         """Check that there is one machine."""
         if (table.name is None) == (table.file is None):
             wrong("name", "name the machine once", 'either name = "desk" or file = "machine.toml"')
-
-
-_AXIS_KEYS: dict[str, tuple[str, ...]] = {
-    "normal": (),
-    "fixed": ("direction",),
-    "toward": ("point_mm",),
-    "from": ("point_mm",),
-    "between": ("places_mm", "directions"),
-}
-"""The keys that each mode of the nominal axis needs."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class AxisKeys:
-    """Tool axis: nominal direction, tilt cone, lead and side angle, smoothing."""
-
-    tilt: Annotated[
-        float,
-        Key(
-            "deg",
-            "largest angle between tool axis and nominal axis (the normal, unless mode says otherwise)",
-            ge=0.0,
-            le=60.0,
-        ),
-    ] = to_si(15.0, "deg")
-    mode: Annotated[
-        Literal["normal", "fixed", "toward", "from", "between"],
-        Key("", 'nominal axis: "normal", "fixed", "toward" or "from" a point or line, "between" given directions'),
-    ] = "normal"
-    direction: Annotated[VECTOR | None, Key("", "fixed: from the tip to the spindle, mesh frame")] = None
-    point: Annotated[VECTOR | None, Key("mm", "toward, from: a point, mesh frame")] = None
-    line: Annotated[VECTOR | None, Key("", "toward, from: direction of a line through the point")] = None
-    places: Annotated[tuple[VECTOR, ...] | None, Key("mm", "between: where the directions hold")] = None
-    directions: Annotated[tuple[VECTOR, ...] | None, Key("", "between: one direction for each place")] = None
-
-    @staticmethod
-    def rules(table: Any) -> None:
-        """Check the keys that a mode needs, and those that it does not take."""
-        needed = _AXIS_KEYS[table.mode]
-        for key in ("direction", "point_mm", "places_mm", "directions"):
-            given = getattr(table, key) is not None
-            if given != (key in needed):
-                what = "missing for" if not given else "means nothing for"
-                wrong(key, f'{what} axis mode "{table.mode}"', ", ".join(needed) or "none of these keys")
-        if table.line is not None and table.mode not in ("toward", "from"):
-            wrong("line", f'means nothing for axis mode "{table.mode}"', 'mode = "toward" or "from"')
-        for key in ("direction", "line"):
-            if getattr(table, key) is not None and not any(getattr(table, key)):
-                wrong(key, "the direction is zero", "a direction such as [0, 0, 1]")
-        if table.places_mm is not None and len(table.places_mm) != len(table.directions or ()):
-            wrong("directions", "as many directions as places are needed", f"{len(table.places_mm)} directions")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -226,7 +175,6 @@ class VerifyKeys:
 
 PartTable = table_of(PartKeys, TomlTable, Region)
 MachineTable = table_of(MachineKeys)
-AxisTable = table_of(AxisKeys, TomlTable, Orientation)
 GougeTable = table_of(GougeKeys, TomlTable, GougeOptions)
 FeedTable = table_of(FeedKeys, TomlTable, ToolLimits)
 ToleranceTable = table_of(ToleranceKeys)
@@ -240,6 +188,8 @@ class _JobRules(TomlTable):
 
     @model_validator(mode="after")
     def _leaning(self) -> _JobRules:
+        if self.axis.mode == "auto":
+            vars(self).update(axis=limited_lean(self.axis, self.tool.type, self.toolpath.strategy))
         if self.tool.type in ("bull", "flat") and self.axis.tilt_deg > 0.0:
             wrong("axis.tilt_deg", f'a tool of type "{self.tool.type}" cannot tilt without gouging', "tilt_deg = 0")
         return self

@@ -15,7 +15,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.progress import Progress, silent
 from pentapod.machine.machine import Machine
 from pentapod.planning.placement.rail_positions import DIGITS, at_rail_positions, guides_of
-from pentapod.planning.placement.sampling import SamplingOptions, best_tilted_margins, first_guesses
+from pentapod.planning.placement.sampling import SamplingOptions, best_guess
 from pentapod.planning.placement.search import SOLVERS, Search, SolverName, search
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.problem import PlacementProblem
@@ -82,22 +82,15 @@ def _promising(
     problem: PlacementProblem, seed: int, progress: Progress, options: ReconfigurationOptions
 ) -> PlacementProblem:
     """Return the problem at the rail positions with the best first guess of the placement."""
-    scores = [(_best_guess(problem, seed, options), problem)]
+    guessing = SamplingOptions(tries=options.tries)
+    scores = [(best_guess(problem, seed, guessing, options.waypoints), problem)]
     for k, positions in enumerate(_spread(problem.machine, seed, options.spread)):
         progress("placement", k / options.spread, "guides")
         margins = at_rail_positions(problem.margins[0], positions)
         if margins is not None:
             there = problem.on(margins.scene.machine)
-            scores.append((_best_guess(there, seed, options), there))
+            scores.append((best_guess(there, seed, guessing, options.waypoints), there))
     return max(scores, key=lambda pair: pair[0])[1]
-
-
-def _best_guess(problem: PlacementProblem, seed: int, options: ReconfigurationOptions) -> float:
-    if problem.constraints.moves:
-        return max(guess.margin for guess in first_guesses(problem, seed, SamplingOptions(tries=options.tries)))
-    few = problem.samples.at(problem.samples.representatives(options.waypoints))
-    poses = problem.constraints.poses
-    return max(float(best_tilted_margins(few, m, pose)[0].min()) for m in problem.margins for pose in poses)
 
 
 def _spread(machine: Machine, seed: int, count: int) -> Floats:

@@ -103,8 +103,9 @@ class Curvature:
         rows = model.steep[active]
         length = problem.steepness(at.coefficients, rows)
         aside = np.cross(problem.samples.nominal[rows], problem.leans(at.coefficients, rows))
-        aside /= np.maximum(length * problem.cone, 1e-12)[:, None]
-        by_unknowns = by_field(problem.basis[rows], aside @ problem.domain.lean_plane.T)
+        room = problem.samples.room(rows)
+        aside /= np.maximum(length * problem.cone * room, 1e-12)[:, None]
+        by_unknowns = by_field(problem.basis[rows] / room[:, None], aside @ problem.domain.lean_plane.T)
         total[count:, count:] = (by_unknowns.T * (multipliers[active] / np.maximum(length, 1e-3))) @ by_unknowns
         return total
 

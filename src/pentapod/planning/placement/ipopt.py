@@ -166,7 +166,7 @@ class IpoptSolver:
         result = solver(
             x0=start,
             p=np.concatenate([
-                np.hstack([samples.tilt_centres[rows], samples.nominal[rows]]).ravel(),
+                np.hstack([samples.tilt_centres[rows], samples.nominal[rows], samples.room(rows)[:, None]]).ravel(),
                 basis.ravel(),
                 at.transform.rotation.T.ravel(),
                 at.transform.translation,
@@ -209,11 +209,11 @@ class IpoptSolver:
         step = ca.mtimes(ca.DM(self._motion), moves)
         leans = ca.MX.sym("a", 2, count) if tilts else ca.MX(2, count)
         coefficients = ca.MX.sym("c", 2, size)
-        points, basis = ca.MX.sym("points", 6, count), ca.MX.sym("basis", size, count)
+        points, basis = ca.MX.sym("points", 7, count), ca.MX.sym("basis", size, count)
         rotation, translation = ca.MX.sym("R", 3, 3), ca.MX.sym("t", 3)
         touching = ca.MX.sym("contacts", at.margins.contact_numbers, count)
         margins, square = point_function(problem, at.margins, kinds).map(count)(
-            ca.repmat(step, 1, count), leans, points[:3, :], points[3:, :],
+            ca.repmat(step, 1, count), leans, points[:3, :], points[3:6, :],
             np.tile(problem.domain.lean_plane.T, (1, count)),
             ca.repmat(rotation, 1, count), ca.repmat(translation, 1, count), touching,
         )  # fmt: skip
@@ -224,7 +224,7 @@ class IpoptSolver:
             c = ca.vec(coefficients)
             lean = ca.sumsqr(c) / problem.cone**2
             unknowns += [c, ca.vec(leans)]
-            left = 1.0 - square.T / problem.cone**2
+            left = 1.0 - square.T / (problem.cone * points[6, :].T) ** 2
             conditions = [ca.vec(leans - ca.mtimes(coefficients, basis)), *conditions, left]
         program = {
             "x": ca.vertcat(*unknowns),

@@ -11,9 +11,11 @@ from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.display import plot_axes
 from pentapod.base.refusal import Refusal
 from pentapod.base.values import Result, Value
+from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.robot import Branch
 from pentapod.planning.limits.limit import Limit
+from pentapod.planning.problem.common_axis import CommonAxis
 from pentapod.toolpath.toolpath import Toolpath
 
 
@@ -41,6 +43,7 @@ class PlacedPath(Result):
     """Tool poses in the machine frame, one for each waypoint of the toolpath.
 
     tips (N, 3) metres; axes (N, 3) unit, tip → spindle; margins (N, M) of the limits (M,), dimensionless, 0 at a limit.
+    common_axis: the direction towards which the tool leans from the toolpath's axes; None where none was chosen.
     """
 
     summary = ("smallest_margin", "active_limit")
@@ -52,6 +55,7 @@ class PlacedPath(Result):
     axes: Floats
     margins: Floats
     limits: tuple[Limit, ...]
+    common_axis: CommonAxis | None = None
 
     def __post_init__(self) -> None:
         for name in ("tips", "axes", "margins"):
@@ -71,6 +75,12 @@ class PlacedPath(Result):
     def active_limit(self) -> str:
         """The limit with the smallest margin."""
         return self.margin_names[int(self.margins.min(axis=0).argmin())]
+
+    @property
+    def lean(self) -> str:
+        """How far the tool leans from the toolpath's axes (from the surface's normal), in words."""
+        own = self.placement.transform.rotate(self.toolpath.axes)
+        return f"it leans by up to {np.degrees(angle_between(self.axes, own).max()):.0f} deg from the normal"
 
     @property
     def tilt_centres(self) -> Floats:

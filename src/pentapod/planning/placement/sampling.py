@@ -89,6 +89,18 @@ def first_guesses(problem: PlacementProblem, seed: int = 0, options: SamplingOpt
     return sorted(guesses, key=lambda g: -g.margin)
 
 
+def best_guess(problem: PlacementProblem, seed: int, options: SamplingOptions, waypoints: int) -> float:
+    """Return the margin of the best first guess.
+
+    waypoints: number that represents the path where the placements are given.
+    """
+    if problem.constraints.moves:
+        return max(guess.margin for guess in first_guesses(problem, seed, options))
+    few = problem.samples.at(problem.samples.representatives(waypoints))
+    poses = problem.constraints.poses
+    return max(float(best_tilted_margins(few, m, pose)[0].min()) for m in problem.margins for pose in poses)
+
+
 def first_candidate(problem: PlacementProblem, margins: Margins, transform: RigidTransform) -> Candidate:
     """Return the candidate with a smooth field fitted to the best tilts of single waypoints (least squares)."""
     coefficients, samples, domain = problem.upright, problem.samples, problem.domain
@@ -121,7 +133,7 @@ def best_tilted_margins(
     for start in range(0, len(out), block):
         rows = np.arange(start, min(start + block, len(out)))
         t1, t2 = tangent_frame(samples.nominal[rows])
-        b = grid[:, None, :1] * t1 + grid[:, None, 1:] * t2
+        b = samples.room(rows)[:, None] * (grid[:, None, :1] * t1 + grid[:, None, 1:] * t2)
         tips, axes = samples.machine_poses(placement, lean(samples.nominal[rows], b), rows)
         all_margins = margins(tips, axes, placement)
         choice = all_margins.min(axis=-1).argmax(axis=0)

@@ -131,8 +131,9 @@ def _cone_tangents(problem: PlacementProblem, at: Candidate, rows: Ints, extra: 
     steepness = problem.steepness(at.coefficients, rows)
     steep = np.union1d(valleys(-steepness[:, None], OPTIONS.steepest), extra)
     steep = steep[steepness[steep] > OPTIONS.steep]
-    nominal, basis = problem.samples.nominal[rows[steep]], problem.basis[rows[steep]]
-    outward = problem.leans(at.coefficients, rows[steep]) / (steepness[steep, None] * problem.cone)
+    room = problem.samples.room(rows[steep])[:, None]
+    nominal, basis = problem.samples.nominal[rows[steep]], problem.basis[rows[steep]] / room
+    outward = problem.leans(at.coefficients, rows[steep]) / (steepness[steep, None] * problem.cone * room)
     aside = np.cross(nominal, outward)
     shares, derivatives = [np.zeros(0)], [np.zeros((0, 2 * problem.basis.shape[1]))]
     for turn in tangents:

@@ -40,8 +40,8 @@ class Candidate:
 class PlacementProblem:
     """Maximise the smallest weighted margin over the placement of a part and the tilt field of the tool.
 
-    margins: one for each branch to choose from. basis (N, size): the tilt field's spline basis at the waypoints;
-    without a tilt cone it has size 0.
+    margins: one for each branch to choose from. basis (N, size): the tilt field's spline basis at the waypoints, times
+    the share of the cone that may be used there; without a tilt cone it has size 0.
     """
 
     samples: ToolpathSamples
@@ -129,8 +129,12 @@ class PlacementProblem:
         return margins.contacts(*self.samples.machine_poses(transform, lean(nominal, across), rows), transform)
 
     def steepness(self, coefficients: Floats, rows: Ints | slice = slice(None)) -> Floats:
-        """Return the share of the cone (n,) that each lean uses: 1 on its edge."""
-        return np.linalg.norm(self.leans(coefficients, rows), axis=1) / max(self.cone, 1e-12)
+        """Return the share of its longest lean (n,) that each lean uses: 1 on the edge of the cone."""
+        return np.linalg.norm(self.leans(coefficients, rows), axis=1) / self.longest(rows)
+
+    def longest(self, rows: Ints | slice = slice(None)) -> Floats:
+        """Return the longest lean (n,) (tangent of the angle) at waypoints `rows`, above 0."""
+        return max(self.cone, 1e-12) * self.samples.room(rows)
 
     def within_cone(self, coefficients: Floats) -> Floats:
         """Return coefficients scaled down until every waypoint keeps the cone; a lean is linear in them."""
@@ -145,5 +149,6 @@ class PlacementProblem:
 def _field(samples: ToolpathSamples) -> tuple[FieldDomain, Floats]:
     """Return the domain of the tilt field of a path, and its basis (N, size) at the waypoints."""
     domain = FieldDomain.around(samples.tilt_centres, samples.nominal, FIELD_CELLS)
-    tilts = samples.tilt > 0.0
-    return domain, domain.basis(samples.tilt_centres) if tilts else np.zeros((len(samples.tilt_centres), 0))
+    if samples.tilt == 0.0:
+        return domain, np.zeros((len(samples.tilt_centres), 0))
+    return domain, samples.room()[:, None] * domain.basis(samples.tilt_centres)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints, frozen, set_frozen
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.planning.problem.common_axis import CommonAxis
 from pentapod.toolpath.toolpath import Toolpath
 
 AXIS_LEVER_M = 0.1
@@ -21,19 +22,24 @@ MOST_SAMPLED = 20_000
 class ToolpathSamples:
     """Tilt centres and nominal axes (N, 3), workpiece frame.
 
-    tilt_centre: metres from the tip along the axis. tilt: half angle of the cone of axes, radians.
+    tilt_centre: metres from the tip along the axis. tilt: half angle of the cone of axes, radians. shares (N,): of that
+    cone (of the tangent of its angle) that may be used at each waypoint; all of it by default. common_axis: towards
+    which the nominal axes lean, None for those of the toolpath.
     """
 
     tilt_centres: Floats
     nominal: Floats
     tilt_centre: float
     tilt: float
+    shares: Floats | None = None
+    common_axis: CommonAxis | None = None
 
     def __post_init__(self) -> None:
         set_frozen(
             self,
             tilt_centres=frozen(self.tilt_centres, "tilt_centres", (None, 3)),
             nominal=frozen(self.nominal, "nominal", (None, 3)),
+            shares=None if self.shares is None else frozen(self.shares, "shares", (None,)),
         )
 
     @classmethod
@@ -41,9 +47,20 @@ class ToolpathSamples:
         """Return the samples of a toolpath with a tilt cone (half angle, radians)."""
         return cls(toolpath.tilt_centres, toolpath.axes, toolpath.tilt_centre, tilt)
 
+    def towards(self, common_axis: CommonAxis) -> ToolpathSamples:
+        """Return samples whose nominal axes lean from these ones towards a common direction."""
+        nominal = common_axis.axes(self.tilt_centres, self.nominal)
+        shares = common_axis.shares(self.tilt_centres, self.nominal, nominal, self.tilt)
+        return replace(self, nominal=nominal, shares=shares, common_axis=common_axis)
+
     def at(self, rows: Ints) -> ToolpathSamples:
         """Return the samples of the waypoints `rows` only."""
-        return ToolpathSamples(self.tilt_centres[rows], self.nominal[rows], self.tilt_centre, self.tilt)
+        shares = None if self.shares is None else self.shares[rows]
+        return replace(self, tilt_centres=self.tilt_centres[rows], nominal=self.nominal[rows], shares=shares)
+
+    def room(self, rows: Ints | slice = slice(None)) -> Floats:
+        """Return the longest lean (n,) at waypoints `rows`, as a share of the cone's."""
+        return np.ones(len(self.nominal[rows])) if self.shares is None else self.shares[rows]
 
     def machine_poses(
         self, placement: RigidTransform, axes: Floats, rows: Ints | slice = slice(None)

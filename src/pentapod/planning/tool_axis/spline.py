@@ -55,9 +55,10 @@ BANDS = 10
 class AxisSpline:
     """Leans along a path: those at its waypoints are cone · basis @ c, for coefficients c (K, 2) in the unit disc.
 
-    basis (N, K) sparse, four neighbours a row; frames (N, 2, 3): the frame at each waypoint, workpiece frame. nodes
-    (n,): waypoints at which the cost takes derivatives; stations (n,): their path lengths, metres. The cost of c is
-    cᵀHc/2 + gᵀc + constant, hessian (BANDS, 2K) in SciPy's lower banded form, in the order of c.ravel().
+    basis (N, K) sparse, four neighbours a row, times the share of the cone that may be used there; frames (N, 2, 3):
+    the frame at each waypoint, workpiece frame. nodes (n,): waypoints at which the cost takes derivatives; stations
+    (n,): their path lengths, metres. The cost of c is cᵀHc/2 + gᵀc + constant, hessian (BANDS, 2K) in SciPy's lower
+    banded form, in the order of c.ravel().
     """
 
     cone: float
@@ -79,6 +80,8 @@ class AxisSpline:
         # each knot where there are as many: at the knots alone the cost hardly depends on alternating coefficients.
         nodes = _spaced(stations, spacing / OPTIONS.nodes)
         basis = sparse.csr_matrix(BSpline.design_matrix(stations, _knots(stations[nodes], spacing), _DEGREE))
+        if samples.shares is not None:
+            basis.data *= np.repeat(samples.shares, np.diff(basis.indptr))
         frames = rotation_minimising_frames(samples.nominal)
         cost = _cost(samples.nominal[nodes], cone * frames[nodes], basis[nodes], stations[nodes])
         return cls(cone, basis, frames, nodes, stations[nodes], *cost)

@@ -80,7 +80,7 @@ def rate_limited(
 
     def kept(width: float) -> Floats | None:
         """Return the moving mean if it keeps the rate."""
-        mean = _moving_mean(place, axes, width)
+        mean = moving_mean(place, axes, width)
         return mean if mean is not None and (_rates(mean, steps) <= rate).all() else None
 
     short, long = 0.0, float(np.pi / rate)
@@ -106,7 +106,7 @@ def _rates(axes: Floats, steps: Floats) -> Floats:
     return angle_between(axes[1:], axes[:-1]) / np.maximum(steps, 1e-12) * (1.0 - 1e-9)
 
 
-def _moving_mean(place: Floats, axes: Floats, width: float) -> Floats | None:
+def moving_mean(place: Floats, axes: Floats, width: float) -> Floats | None:
     """Return the exact moving mean over `width` metres of axes that change linearly between places; None if it is 0."""
     # The integral of a polyline is a parabola in each step; beyond the ends the axes are constant.
     steps = np.diff(place)
