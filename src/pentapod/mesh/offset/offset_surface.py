@@ -25,8 +25,8 @@ _BLOCK, _GROUP = 4, 8
 """Steps along the side of a block, blocks along that of a group: a group far from the level needs one query."""
 _SHIFT = np.array([0.3819660, 0.2679492, 0.4142136])
 """Shares of a step by which the grid is off the part, so that flat faces do not lie in its planes."""
-_ROUNDS = 3
-"""How often a vertex is moved onto the level along the line to its closest point."""
+_ROUNDS, _ON_LEVEL = 3, 1e-11
+"""How often a vertex is moved onto the level along the line to its closest point, while it is off by this share."""
 
 
 def offset_surface(tree: FacetTree, distance: float, step: float) -> tuple[Floats, Ints]:
@@ -47,7 +47,7 @@ def offset_surface(tree: FacetTree, distance: float, step: float) -> tuple[Float
     cross_level(starts, axes, grid.step, distance, tree.corners, tree.starts, tree.extents, points, normals)
     crossings = Crossings(keys[rows], axes, outside[rows], points, normals)
     vertices, triangles, _ = dual_contour(grid, keys, outside, crossings)
-    return onto_level(tree, vertices, distance, _ROUNDS), triangles
+    return onto_level(tree, vertices, distance, _ROUNDS, _ON_LEVEL), triangles
 
 
 def onto_level(tree: FacetTree, points: Floats, distance: float, rounds: int, accuracy: float = 0.0) -> Floats:
@@ -109,8 +109,14 @@ def _nodes(tree: FacetTree, grid: Grid, groups: Ints, level: float) -> tuple[Int
     if len(block) * _BLOCK**3 > MOST_NODES:
         raise _too_fine(grid.step)
     within = np.indices((_BLOCK + 1,) * 3).reshape(3, -1).T
-    keys = np.unique(grid.keys(_BLOCK * block)[:, None] + grid.keys(within))
-    return keys, tree.closest(grid.points(keys), level)[2] < 0, wide
+    keys = (grid.keys(_BLOCK * block)[:, None] + grid.keys(within)).ravel()
+    keys.sort()
+    keys = keys[np.concatenate([[True], keys[1:] != keys[:-1]])]
+    from pentapod.mesh.offset.offset_kernels import all_within  # noqa: PLC0415  loads numba
+
+    inside = np.empty(len(keys), dtype=np.bool_)
+    all_within(grid.points(keys), level, tree.corners, tree.starts, tree.extents, inside)
+    return keys, ~inside, wide
 
 
 def _reached(grid: Grid, keys: Ints, outside: Bools, wide: Bools) -> Bools:

@@ -135,7 +135,7 @@ def nearest_all(
 
 
 @kernel
-def _box_distance(extent: Floats, x: float, y: float, z: float) -> float:
+def box_distance(extent: Floats, x: float, y: float, z: float) -> float:
     """Return the distance of a point from a box (2, 3)."""
     dx = max(extent[0, 0] - x, 0.0, x - extent[1, 0])
     dy = max(extent[0, 1] - y, 0.0, y - extent[1, 1])
@@ -145,17 +145,22 @@ def _box_distance(extent: Floats, x: float, y: float, z: float) -> float:
 
 @kernel
 def closest(
-    x: float, y: float, z: float, within: float, corners: Floats, starts: Ints, extents: Floats,
+    x: float, y: float, z: float, within: float, guess: int, corners: Floats, starts: Ints, extents: Floats,
     nodes: Ints, bounds: Floats, away: Floats,
 ) -> tuple[float, int]:  # fmt: skip
     """Return the distance of a point and the facet that is nearest, −1 where none is nearer than `within`.
 
-    nodes, bounds (STACK,): room for the search. away (6,): the vector from the mesh to the point goes into the first
-    three; the others are room.
+    guess: a facet that may be near, −1 for none; the search is quicker. nodes, bounds (STACK,): room for the search.
+    away (6,): the vector from the mesh to the point goes into the first three; the others are room.
     """
     best, facet, leaves = within, -1, len(starts) - 1
-    nodes[0], bounds[0], count = 0, _box_distance(extents[0], x, y, z), 1
+    nodes[0], bounds[0], count = 0, box_distance(extents[0], x, y, z), 1
     g = away[3:]
+    if guess >= 0:
+        distance = facet_distance(corners[guess], x, y, z, g)
+        if distance < best:
+            best, facet = distance, guess
+            away[0], away[1], away[2] = g[0], g[1], g[2]
     while count > 0:
         count -= 1
         node = nodes[count]
@@ -163,8 +168,8 @@ def closest(
             continue
         leaf = node - (leaves - 1)
         if leaf < 0:
-            near = _box_distance(extents[2 * node + 1], x, y, z)
-            far = _box_distance(extents[2 * node + 2], x, y, z)
+            near = box_distance(extents[2 * node + 1], x, y, z)
+            far = box_distance(extents[2 * node + 2], x, y, z)
             count = open_node(node, near, far, best, count, nodes, bounds)
         else:
             for f in range(starts[leaf], starts[leaf + 1]):
@@ -180,10 +185,14 @@ def closest_of_all(
     points: Floats, within: float, corners: Floats, starts: Ints, extents: Floats,
     distances: Floats, away: Floats, facets: Ints,
 ) -> None:  # fmt: skip
-    """Fill distances (M,), vectors from the mesh (M, 3) and facets (M,) of points (M, 3), as `closest`."""
-    nodes, bounds, room = np.empty(STACK, dtype=np.intp), np.empty(STACK), np.zeros(6)
+    """Fill distances (M,), vectors from the mesh (M, 3) and facets (M,) of points (M, 3), as `closest`.
+
+    Neighbours in the order of the points should be near to each other: what is near to one is tried first for the next.
+    """
+    nodes, bounds, room, last = np.empty(STACK, dtype=np.intp), np.empty(STACK), np.zeros(6), -1
     for m in range(len(points)):
         p = points[m]
-        distances[m], facets[m] = closest(p[0], p[1], p[2], within, corners, starts, extents, nodes, bounds, room)
+        distances[m], facets[m] = closest(p[0], p[1], p[2], within, last, corners, starts, extents, nodes, bounds, room)
+        last = facets[m] if facets[m] >= 0 else last
         for k in range(3):
             away[m, k] = room[k] if facets[m] >= 0 else 0.0
