@@ -125,3 +125,30 @@ def test_shank_and_holder_are_stacked_on_the_cutter():
 def test_impossible_tools_are_refused(make):
     with pytest.raises(ToolpathError):
         make()
+
+
+@pytest.mark.parametrize(
+    "tool", [BallCutter(3e-3), BallCutter(3e-3, flute=0.01), BullNose(5e-3, 1e-3), FlatEnd(4e-3), CUTTERS[3]]
+)
+def test_a_stem_continues_the_cutter_at_its_widest_without_a_gap(tool):
+    cutter = tool.solids
+    with_stem = tool.with_stem(0.05).solids
+    assert with_stem[:-1] == cutter
+    stem = with_stem[-1]
+    assert (stem.kind, stem.high) == ("shank", 0.05)
+    assert stem.low == cutter[-1].high
+    assert stem.low_radius == stem.high_radius == max(solid.largest_radius for solid in cutter)
+
+
+@pytest.mark.parametrize(
+    "tool",
+    [
+        BallCutter(3e-3, shank=SHANK),
+        FlatEnd(4e-3, holder=HOLDER),
+        StandOff(5e-3),
+        StandOff(5e-3, shank=SHANK),
+        BallCutter(3e-3, flute=0.06),
+    ],
+)
+def test_no_stem_is_assumed_beside_a_shank_or_holder_or_without_a_cutter(tool):
+    assert tool.with_stem(0.05) is tool

@@ -1,10 +1,10 @@
-"""Shank and holder, which all tools have, and cutters with a ball end."""
+"""Shank, holder and stem, which all tools have, and cutters with a ball end."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
-from typing import Annotated, ClassVar
+from dataclasses import dataclass, field, replace
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from pentapod.geometry.solids import Cone, Solid, stacked
 class Mounted(Value, ABC):
     """A tool with shank and holder: stacked cones above the cutting part, towards the spindle.
 
+    stem: height above the tip, metres, up to which a shank of the cutter's diameter reaches; None for no such shank.
     largest_lean: the largest angle of the axis from the surface's normal that suits the tool, radians; 0 for tools that
     cannot tilt.
     """
@@ -27,6 +28,7 @@ class Mounted(Value, ABC):
 
     shank: tuple[Cone, ...] = field(default=())
     holder: tuple[Cone, ...] = field(default=())
+    stem: float | None = None
 
     @property
     def solids(self) -> tuple[Solid, ...]:
@@ -34,8 +36,21 @@ class Mounted(Value, ABC):
         cutter = self._cutter()
         base = cutter[-1].top if cutter else 0.0
         shank = stacked("shank", self.shank, base)
+        if self.stem is not None and cutter:
+            wide = max(solid.largest_radius for solid in cutter if solid.kind == "cutter")
+            shank = (Solid("shank", cutter[-1].high, self.stem, wide, wide), *shank)
         holder = stacked("holder", self.holder, max([base, *(s.high for s in shank)]))
         return (*cutter, *shank, *holder)
+
+    def with_stem(self, top: float) -> Self:
+        """Return the tool with a shank of the cutter's diameter up to `top`, metres above the tip.
+
+        A tool with a shank or holder of its own, without a cutter, or as long as that, is returned as it is.
+        """
+        cutter = self._cutter()
+        if self.shank or self.holder or not cutter or cutter[-1].high >= top:
+            return self
+        return replace(self, stem=top)
 
     @abstractmethod
     def _cutter(self) -> tuple[Solid, ...]:

@@ -85,7 +85,7 @@ def run(
         used, own_machine = job_machine(job, machine), machine is not None
         mesh = runner.run("mesh", lambda: job_mesh(job, progress), remark=lambda mesh: str(mesh.diagnosis))
         specification = job_specification(
-            job, used, mesh, lambda: _toolpath(job, mesh, piece, runner), own_machine=own_machine
+            job, used, mesh, lambda: _toolpath(job, used, mesh, piece, runner), own_machine=own_machine
         )
         if piece is not None:  # the caller plans the other pieces elsewhere
             specification = dataclasses.replace(specification, setups=max(specification.setups, 2))
@@ -98,13 +98,13 @@ def run(
     return outcome
 
 
-def _toolpath(job: Job, mesh: Mesh, piece: Piece | None, runner: StageRunner) -> Toolpath:
+def _toolpath(job: Job, machine: Machine, mesh: Mesh, piece: Piece | None, runner: StageRunner) -> Toolpath:
     """Return the job's toolpath, or a piece of it, as a stage of the run."""
 
     def made() -> tuple[Toolpath, object]:
         if piece is None:
-            return job_toolpath(job, mesh, runner.progress)
-        return job_piece(job, mesh, piece, runner.progress), piece
+            return job_toolpath(job, mesh, runner.progress, machine=machine)
+        return job_piece(job, mesh, piece, runner.progress, machine=machine), piece
 
     return runner.run("toolpath", made, remark=lambda it: str(it[1]))[0]
 

@@ -39,11 +39,15 @@ def judge(
 
     if not path.is_dir() or (path / PROGRAM).is_file():
         specification = job_specification(
-            job, used, mesh, lambda: program_toolpath(job, mesh, files[0], progress), own_machine=own_machine
+            job,
+            used,
+            mesh,
+            lambda: program_toolpath(job, mesh, files[0], progress, machine=used),
+            own_machine=own_machine,
         )
         return judged(files[0], specification, strict=strict, progress=progress)
     specification = job_specification(
-        job, used, mesh, lambda: job_toolpath(job, mesh, progress)[0], own_machine=own_machine
+        job, used, mesh, lambda: job_toolpath(job, mesh, progress, machine=used)[0], own_machine=own_machine
     )
     toolpath = specification.toolpath
     style = job_link_style(job, mesh, toolpath)

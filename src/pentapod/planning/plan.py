@@ -23,6 +23,7 @@ from pentapod.planning.placement.search import SOLVERS, Solver, SolverName, sear
 from pentapod.planning.placement.secondary_objective import SecondaryObjective, improved, objective_of
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.constraints import FREE, PlacementConstraints
+from pentapod.planning.problem.idle_tool import without_idle_tool
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
@@ -77,6 +78,7 @@ def plan(
     Returns a Refusal that names limits, waypoints and shortfalls where the part does not fit. An interruption (Ctrl-C)
     ends the search with the best placement so far, if that fits; else KeyboardInterrupt is raised.
     """
+    collision_world = without_idle_tool(collision_world, machine, ToolpathSamples.of(toolpath, tilt))
     problem = PlacementProblem.of(
         _samples(toolpath, tilt, common_axis=common_axis), machine, constraints, weights,
         component=component, collision_world=collision_world, limits=limits,
@@ -106,9 +108,10 @@ def fits(toolpath: Toolpath, machine: Machine, **options: Unpack[PlacementOption
     Raises KeyboardInterrupt where the search is interrupted.
     """
     tilt, common_axis = options["tilt"], options["common_axis"]
+    collision_world = without_idle_tool(options["collision_world"], machine, ToolpathSamples.of(toolpath, tilt))
     problem = PlacementProblem.of(
         _samples(toolpath, tilt, common_axis=common_axis), machine, options["constraints"], options["weights"],
-        component=options["component"], collision_world=options["collision_world"], limits=options["limits"],
+        component=options["component"], collision_world=collision_world, limits=options["limits"],
     )  # fmt: skip
     _, found = _searched(problem, tilt if common_axis else 0.0, 0, options["solver"], silent)
     if found.interrupted:

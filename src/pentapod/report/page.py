@@ -13,6 +13,7 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.build.limits import placement_limits
 from pentapod.job.build.placement import job_at, placement_toml
 from pentapod.job.build.specification import job_collision_world
+from pentapod.job.build.toolpath import job_tool, stem_sentence
 from pentapod.job.outcome import Outcome, SetUps
 from pentapod.job.plan_arrays import matrix_mm
 from pentapod.job.schema.job import Job
@@ -193,7 +194,7 @@ def _preparations(outcome: Outcome, signals: Signals | None) -> list[tuple[str, 
     """Return names and values of what the operator has to prepare."""
     job, machine, toolpath = outcome.job, outcome.machine, outcome.find(Toolpath)
     sheet = [
-        ("tool", words.tool_sentence(job.tool)),
+        ("tool", "; ".join(filter(None, (words.tool_sentence(job.tool), stem_sentence(job_tool(job, machine)))))),
         ("tool length", f"{1e3 * machine.tool_length:.3f} mm from the platform's origin to the tip"),
     ]
     placed = outcome.find(PlacedPath)

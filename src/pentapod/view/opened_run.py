@@ -102,7 +102,7 @@ def open_run(folder: str | Path, job: str | Path | None = None, progress: Progre
     asked = COMPONENTS[0] if wanted is None else Component.parse(wanted)
     placement, component, axes = _placed(arrays, toolpath, machine, asked)
     return OpenedRun(
-        folder, loaded, machine, mesh, job_tool(loaded), toolpath, job_collision_world(loaded, machine, mesh),
+        folder, loaded, machine, mesh, job_tool(loaded, machine), toolpath, job_collision_world(loaded, machine, mesh),
         placement, component, axes, program, program is None or program.provenance.job_digest == loaded.digest,
         piece_in(arrays),
     )  # fmt: skip
@@ -116,8 +116,9 @@ def run_of(outcome: Outcome, folder: Path) -> OpenedRun | None:
         return None
     job, machine, placement = outcome.job, outcome.machine, placed.placement.transform
     return OpenedRun(
-        folder, job, machine, mesh, job_tool(job), toolpath, job_collision_world(job, machine, mesh), placement,
-        placed.component, placement.inverse().rotate(placed.axes), program, same_job=True, piece=outcome.find(Piece),
+        folder, job, machine, mesh, job_tool(job, machine), toolpath, job_collision_world(job, machine, mesh),
+        placement, placed.component, placement.inverse().rotate(placed.axes), program, same_job=True,
+        piece=outcome.find(Piece),
     )  # fmt: skip
 
 

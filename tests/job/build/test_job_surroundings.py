@@ -65,7 +65,7 @@ def test_what_stays_in_the_machine_is_called_table(make_job, meshes):
     job = Job.load(make_job(("[feed]", text)))
     made = job_collision_world(job, job_machine(job), job_mesh(job))
     assert [(o.name, o.clamped) for o in made.obstacles] == [("part", True), ("table", False)]
-    assert not made.tool
+    assert [(s.kind, s.high) for s in made.tool] == [("shank", job_machine(job).bodies.shaft_end)]  # the assumed stem
 
 
 def test_a_holder_above_the_joints_is_an_error(make_job):

@@ -35,7 +35,7 @@ def job_specification(
     """
     check_reach(job, machine, mesh)
     collision_world, constraints = job_collision_world(job, machine, mesh), job_constraints(job, machine, mesh)
-    cutting, component = job_cutting(job, collision_world), job.placement.component
+    cutting, component = job_cutting(job, collision_world, machine), job.placement.component
     return Specification(
         machine,
         make_toolpath(),
@@ -64,7 +64,8 @@ def job_collision_world(job: Job, machine: Machine, mesh: Mesh) -> CollisionWorl
     name = "fixture" if job.fixture.frame == "part" else "table"
     around = {} if held is None else {name: held}
     try:
-        return CollisionWorld.of(machine, tool_in_world(job), mesh, **around, allowance=job.gouge.si.tolerance)
+        allowance = job.gouge.si.tolerance + job_depth(job)  # an engraving lies below the surface on purpose
+        return CollisionWorld.of(machine, tool_in_world(job, machine), mesh, **around, allowance=allowance)
     except MachineError as error:
         remedy = "a longer tool.length_mm, or a shorter holder"
         raise job.error("tool", "holder_mm", error.what, expected=error.expected, remedy=remedy) from error
@@ -77,7 +78,7 @@ def job_fixture(job: Job) -> Mesh | None:
     return load_mesh(job.fixture_mesh, job.fixture.unit, scale=job.fixture.scale)
 
 
-def job_cutting(job: Job, collision_world: CollisionWorld) -> Cutting | None:
+def job_cutting(job: Job, collision_world: CollisionWorld, machine: Machine | None = None) -> Cutting | None:
     """Return the bodies that cut and the largest depth, for the part of a collision world; None without a part.
 
     The tolerance of the gouge check, and the depth of an engraving, count as no gouge. Raises JobError where the tool's
@@ -87,11 +88,12 @@ def job_cutting(job: Job, collision_world: CollisionWorld) -> Cutting | None:
     for obstacle in collision_world.obstacles:
         if obstacle.name == "part":
             mesh = obstacle.surface.mesh
-            return Cutting(obstacle.surface, job_tool(job).solids, depth, job_coverage(job, mesh))
+            solids = job_tool(job, machine).solids
+            return Cutting(obstacle.surface, solids, depth, job_coverage(job, mesh, machine))
     return None
 
 
-def job_coverage(job: Job, mesh: Mesh) -> Coverage:
+def job_coverage(job: Job, mesh: Mesh, machine: Machine | None = None) -> Coverage:
     """Return the region that a job's program must machine; none where its strategy covers no surface.
 
     With `left_mm` in the job, the region must be machined whatever the strategy.
@@ -102,12 +104,12 @@ def job_coverage(job: Job, mesh: Mesh) -> Coverage:
         return Coverage.nothing(f'the strategy "{strategy}" covers no region')
     return Coverage.of(
         mesh,
-        job_tool(job),
+        job_tool(job, machine),
         job_options(job) if covers else PathOptions(region=job_region(job)),
         path_tolerance=tolerance.path,
         left=tolerance.left,
         share=tolerance.left_share,
-        whole=lambda: job_toolpath(job, mesh)[0],
+        whole=lambda: job_toolpath(job, mesh, machine=machine)[0],
     )
 
 

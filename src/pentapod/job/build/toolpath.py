@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
@@ -14,14 +15,16 @@ from pentapod.base.keys import fields_from, file_key
 from pentapod.base.progress import Progress, silent
 from pentapod.base.units import from_si
 from pentapod.cutters.ball import BallCutter
-from pentapod.cutters.mounted import BallEnded
+from pentapod.cutters.mounted import BallEnded, Mounted
 from pentapod.cutters.registry import CUTTERS
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.solids import Cone
 from pentapod.job.build.region import covers_region, job_region, region_report
+from pentapod.job.build.values import job_machine
 from pentapod.job.schema.job import Job
 from pentapod.job.schema.strategies import FILE
+from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.program import read_header
 from pentapod.toolpath import toolpath_with_report
@@ -51,34 +54,53 @@ class Reports:
         return "\n".join(str(part) for part in self.parts)
 
 
-def job_tool(job: Job) -> Tool:
-    """Return the job's tool. Raises JobError where its sizes make no tool."""
+def job_tool(job: Job, machine: Machine | None = None) -> Tool:
+    """Return the job's tool, by default with a stem up to the spindle: see `Mounted.with_stem`.
+
+    machine: the one to use instead of the machine that the job names. Raises JobError where its sizes make no tool.
+    """
     cutter = CUTTERS[job.tool.type]
     mounted = {"shank": _cones(job.tool.si.shank), "holder": _cones(job.tool.si.holder)}
     try:
-        return cutter(**fields_from(cutter, job.tool), **mounted)
+        tool = cutter(**fields_from(cutter, job.tool), **mounted)
     except ToolpathError as error:
         key = file_key(cutter, error.key or "") or "type"
         raise job.error("tool", key, error.what, expected=error.expected) from error
+    if isinstance(tool, Mounted):
+        tool = cast(Any, tool).with_stem(job_machine(job, machine).bodies.shaft_end)
+    return tool
 
 
-def _judged_tool(job: Job) -> Tool:
+def stem_sentence(tool: Tool) -> str:
+    """Return a sentence about a stem that is assumed; empty where there is none."""
+    if not isinstance(tool, Mounted) or tool.stem is None:
+        return ""
+    wide = 2.0 * max(solid.largest_radius for solid in tool.solids)
+    return (
+        f"a stem of {from_si(wide, 'mm'):.4g} mm is assumed from the cutter up to the spindle, "
+        f"{from_si(tool.stem, 'mm'):.4g} mm above the tip; if it is another, give tool.shank_mm"
+    )
+
+
+def _judged_tool(job: Job, machine: Machine | None) -> Tool:
     """Return the tool that the toolpath is made for and judged with.
 
     Where the planner chooses the axes, that is the ball alone: it is at the same place whatever the axis. The planner
     keeps the rest of the tool clear of the part.
     """
-    tool = job_tool(job)
+    tool = job_tool(job, machine)
     return BallCutter(tool.radius) if job.axis.mode == "auto" and isinstance(tool, BallEnded) else tool
 
 
-def tool_in_world(job: Job) -> Tool:
+def tool_in_world(job: Job, machine: Machine) -> Tool:
     """Return the tool whose shank and holder are kept clear of the part.
 
     Where the planner chooses the axes, a ball's cutting length counts as shank: it would cut into the part sideways.
     """
-    tool = job_tool(job)
+    tool = job_tool(job, machine)
     if job.axis.mode == "auto" and isinstance(tool, BallCutter) and tool.flute is not None:
+        if tool.stem is not None:
+            return dataclasses.replace(tool, flute=None)
         end = BallCutter(tool.radius)
         beside = Cone(tool.flute - end.solids[-1].top, tool.radius, tool.radius)
         if beside.height > 0.0:
@@ -107,12 +129,14 @@ def job_depth(job: Job) -> float:
     return STRATEGIES[strategy].options.depth_of(job.toolpath.si) if strategy in STRATEGIES else 0.0
 
 
-def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Toolpath, Reports]:
-    """Return the job's toolpath, workpiece frame, and its reports.
+def job_toolpath(
+    job: Job, mesh: Mesh, progress: Progress = silent, *, machine: Machine | None = None
+) -> tuple[Toolpath, Reports]:
+    """Return the job's toolpath, workpiece frame, and its reports. machine: as for `job_tool`.
 
     Raises ToolpathError where there is nothing to machine, or the toolpath file cannot be read.
     """
-    tool, from_file = _judged_tool(job), job.toolpath.strategy == FILE
+    tool, from_file = _judged_tool(job, machine), job.toolpath.strategy == FILE
     if from_file:
         toolpath, report = _read(job, tool)
     else:
@@ -128,7 +152,9 @@ def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Too
         links=None if from_file else job_link_style(job, mesh, toolpath),
     )
     toolpath, gouges = without_gouges(toolpath, tool, mesh, options, progress)
+    stem = stem_sentence(job_tool(job, machine))
     reports: list[object] = [*([region_report(job, mesh)] if covers_region(job) else []), report, gouges]
+    reports += [f"  note: {stem}"] if stem else []
     if gouges.tilted:  # the axes may turn faster than before
         toolpath = stepped(toolpath, np.inf if from_file else job.toolpath.si.axis_step)
         reports += _turns(toolpath, from_si(job.axis.si.rate, "deg_mm"))
@@ -137,16 +163,22 @@ def job_toolpath(job: Job, mesh: Mesh, progress: Progress = silent) -> tuple[Too
     return toolpath, Reports(tuple(reports))
 
 
-def job_piece(job: Job, mesh: Mesh, piece: Piece, progress: Progress = silent) -> Toolpath:
+def job_piece(
+    job: Job, mesh: Mesh, piece: Piece, progress: Progress = silent, *, machine: Machine | None = None
+) -> Toolpath:
     """Return a piece of the job's toolpath, with approach and retract. Raises ToolpathError as `part_of`."""
-    toolpath, _ = job_toolpath(job, mesh, progress)
+    toolpath, _ = job_toolpath(job, mesh, progress, machine=machine)
     return part_of(toolpath, piece, job_link_style(job, mesh, toolpath))
 
 
-def program_toolpath(job: Job, mesh: Mesh, program: Path, progress: Progress = silent) -> Toolpath:
-    """Return the toolpath of a program file: the job's, or its set-up's piece of it."""
+def program_toolpath(
+    job: Job, mesh: Mesh, program: Path, progress: Progress = silent, *, machine: Machine | None = None
+) -> Toolpath:
+    """Return the toolpath of a program file: the job's, or its set-up's piece of it. machine: as for `job_tool`."""
     piece = program_piece(program)
-    return job_toolpath(job, mesh, progress)[0] if piece is None else job_piece(job, mesh, piece, progress)
+    if piece is None:
+        return job_toolpath(job, mesh, progress, machine=machine)[0]
+    return job_piece(job, mesh, piece, progress, machine=machine)
 
 
 def program_piece(program: Path) -> Piece | None:

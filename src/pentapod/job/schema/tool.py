@@ -23,7 +23,11 @@ class ToolKeys:
     ]
     shank: Annotated[
         tuple[VECTOR, ...] | None,
-        Key("mm", "shank or nozzle: [height, lower diameter, upper diameter] of each piece, upwards"),
+        Key(
+            "mm",
+            "shank or nozzle: [height, lower diameter, upper diameter] of each piece, upwards; without shank and "
+            "holder a cutter has a stem of its own diameter up to the spindle",
+        ),
     ] = None
     holder: Annotated[tuple[VECTOR, ...] | None, Key("mm", "holder: pieces as of the shank, above it")] = None
     length: Annotated[

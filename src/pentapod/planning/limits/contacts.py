@@ -22,7 +22,7 @@ from pentapod.machine.clearance.collision_world import (
     spindle_ends,
 )
 from pentapod.machine.machine import Machine
-from pentapod.planning.limits.limit import Scene
+from pentapod.planning.limits.limit import Comforts, Scene
 
 NUMBERS = 8
 """Numbers of a contact: place on the body's line, normal (3), mesh point (3), radius of the ball."""
@@ -50,8 +50,13 @@ class Contacts:
 def body_comforts(scene: Scene) -> tuple[float, ...]:
     """Return the gaps (K,) in metres that count as margin 1, in the order of `CollisionWorld.names`."""
     comforts = scene.comforts
-    tool = (comforts.tool_obstacle,) if scene.collision_world.tool else ()
+    tool = (tool_comfort(scene.collision_world.tool, comforts),) if scene.collision_world.tool else ()
     return (*[comforts.leg_obstacle] * scene.machine.robot.n_legs, comforts.spindle_obstacle, *tool)
+
+
+def tool_comfort(solids: tuple[Solid, ...], comforts: Comforts) -> float:
+    """Return the gap in metres from an obstacle that counts as margin 1 for these solids, shank and holder."""
+    return min(comforts.tool_obstacle, comforts.tool_share * min(solid.largest_radius for solid in solids))
 
 
 def contacts(scene: Scene, tips: Floats, axes: Floats, placement: RigidTransform) -> Contacts:
