@@ -92,7 +92,7 @@ def _judged_tool(job: Job, machine: Machine | None) -> Tool:
     return BallCutter(tool.radius) if job.axis.mode == "auto" and isinstance(tool, BallEnded) else tool
 
 
-def tool_in_world(job: Job, machine: Machine) -> Tool:
+def tool_in_world(job: Job, machine: Machine | None = None) -> Tool:
     """Return the tool whose shank and holder are kept clear of the part.
 
     Where the planner chooses the axes, a ball's cutting length counts as shank: it would cut into the part sideways.
