@@ -14,10 +14,13 @@ import signal
 import sys
 import tempfile
 import traceback
+import zipfile
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
+STEP = Path(__file__).parent / "mesh" / "io" / "plate_with_ball.step"
 MOST_SECONDS, MOST_BYTES = 10, 8_000_000_000
 
 
@@ -61,6 +64,37 @@ def _obj():
     points, faces = _grid()
     lines = ["# a", "o a"] + ["v {:.6g} {:.6g} {:.6g}".format(*p) for p in points]
     return ("\n".join([*lines, *("f {}//1 {} {}/1".format(*(f + 1)) for f in faces)]) + "\n").encode()
+
+
+def _threemf():
+    points, faces = _grid()
+    text = '<?xml version="1.0"?><model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">'
+    text += '<resources><object id="1"><mesh>\n<vertices>'
+    text += "".join('<vertex x="{:.6g}" y="{:.6g}" z="{:.6g}"/>\n'.format(*p) for p in points)
+    text += "</vertices><triangles>" + "".join('<triangle v1="{}" v2="{}" v3="{}"/>\n'.format(*f) for f in faces)
+    text += '</triangles></mesh></object><object id="2"><components><component objectid="1"/></components></object>'
+    return (text + '</resources><build><item objectid="2"/></build></model>').encode()
+
+
+def _packed_threemf(text):
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        archive.writestr("3D/3dmodel.model", text)
+    return packed.getvalue()
+
+
+def _glb():
+    import trimesh
+
+    return trimesh.Trimesh(*_grid(), process=False).export(file_type="glb")
+
+
+def _load_model(folder):
+    """Load the archive of a spoiled model: spoiled archives seldom get so far."""
+    from pentapod.toolpath import load_mesh
+
+    (folder / "a.3mf").write_bytes(_packed_threemf((folder / "3dmodel.model").read_bytes()))
+    return load_mesh(folder / "a.3mf")
 
 
 def _dxf():
@@ -149,6 +183,11 @@ def readers():
         "a.stl": _stl(), "b.stl": _ascii_stl(), "a.ply": _ply(binary=True), "b.ply": _ply(binary=False), "a.obj": _obj(),
     }.items():  # fmt: skip
         found[name] = (lambda folder, n=name: load_mesh(folder / n, "mm"), {name: data})
+    found["a.3mf"] = (lambda folder: load_mesh(folder / "a.3mf"), {"a.3mf": _packed_threemf(_threemf())})
+    found["3dmodel.model"] = (_load_model, {"3dmodel.model": _threemf()})
+    found["a.glb"] = (lambda folder: load_mesh(folder / "a.glb"), {"a.glb": _glb()})
+    if find_spec("OCP") is not None:  # of the extra step
+        found["a.step"] = (lambda folder: load_mesh(folder / "a.step", chordal=1e-4), {"a.step": STEP.read_bytes()})
     for name, data in {"a.svg": _SVG, "a.dxf": _dxf(), "b.dxf": _spline_dxf()}.items():
         found[name] = (lambda folder, n=name: read_lines(folder / n, 1e-5), {name: data})
     for name, form in {"a.png": "PNG", "a.jpg": "JPEG", "a.gif": "GIF", "a.tif": "TIFF", "a.pgm": "PPM"}.items():

@@ -330,14 +330,15 @@ def fuzz(seed: int, count: int, *names: str) -> None:
 
 
 def test_spoiled_files_get_an_error_of_input_and_nothing_else():
-    fuzz(7, 12, "a.stl", "b.stl", "a.ply", "b.ply", "a.obj", "points.csv", "path.csv", "path.npz", "path.ngc", "npz",
+    fuzz(7, 12, "a.stl", "b.stl", "a.ply", "b.ply", "a.obj", "a.3mf",
+         "3dmodel.model", "points.csv", "path.csv", "path.npz", "path.ngc", "npz",
          "program.csv", "job.toml", "machine.toml", "a.png")  # fmt: skip
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(fuzzed_files.readers()))
 def test_many_spoiled_files_get_an_error_of_input_and_nothing_else(name):
-    fuzz(11, 40 if name.endswith("dxf") else 400, name)
+    fuzz(11, 40 if name.endswith(("dxf", "glb", "step")) else 400, name)
 
 
 def test_messages_of_any_value_are_one_short_line():

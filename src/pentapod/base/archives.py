@@ -1,8 +1,14 @@
-"""NumPy archives (.npz): read arrays by name; every size is checked before memory is allocated."""
+"""NumPy archives (.npz): read arrays by name; every size is checked before memory is allocated.
+
+Readers that may not end, or end the interpreter, run in a process of their own, which writes such an archive.
+"""
 
 from __future__ import annotations
 
 import io
+import subprocess
+import sys
+import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterable
@@ -21,6 +27,20 @@ MOST_UNPACKED, MOST_TEXT = 1_000_000_000, 50_000_000
 MOST_ENTRIES = 1_000
 """Files in one archive."""
 
+REFUSED = 4
+"""Exit code of a process of `arrays_of_process` that says what is wrong."""
+
+_PROCESS = """
+import runpy, sys
+try:
+    import resource
+    resource.setrlimit(resource.RLIMIT_CPU, (int(sys.argv[2]), int(sys.argv[2])))
+    resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[3]), int(sys.argv[3])))
+except (ImportError, OSError, ValueError):  # Windows has no limits, macOS not all, and lower ones may be set
+    pass
+script, sys.argv = sys.argv[1], sys.argv[1:2] + sys.argv[4:]
+runpy.run_path(script, run_name="__main__")
+"""
 _VERSIONS = ((1, 0), (2, 0))
 _ENTRY = b"PK\x01\x02"
 _PLAIN = frozenset("biufU")
@@ -50,6 +70,36 @@ def read_arrays(
         raise _broken(path, wrong) from error
     except (ValueError, KeyError, TypeError, SyntaxError, IndexError, OverflowError) as error:
         raise _broken(path, wrong) from error
+
+
+def arrays_of_process(
+    script: Path,
+    source: Path,
+    arguments: Iterable[object],
+    names: Iterable[str],
+    wrong: type[InputError],
+    seconds: int,
+    memory: int,
+) -> dict[str, NDArray[Any]] | str:
+    """Return the arrays that a script writes, or what it says is wrong with `source`; "" where it ends otherwise.
+
+    It gets `source`, the .npz to write, and `arguments`; seconds: of computing; memory: bytes. With the exit code
+    `REFUSED` the last line of its stderr is the message.
+    """
+    with tempfile.TemporaryDirectory() as place:
+        target = Path(place) / "arrays.npz"
+        limits = (script, seconds, memory)
+        command = [sys.executable, "-P", "-c", _PROCESS, *map(str, (*limits, source, target, *arguments))]
+        try:
+            done = subprocess.run(command, capture_output=True, check=False, timeout=4 * seconds)
+        except subprocess.TimeoutExpired:
+            return ""
+        said = done.stderr.decode("utf-8", "replace").strip().splitlines()
+        if done.returncode == REFUSED and said:
+            return said[-1]
+        if done.returncode or not target.exists():
+            return ""
+        return read_arrays(target, names, wrong)
 
 
 def check_array(

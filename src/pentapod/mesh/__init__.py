@@ -2,7 +2,7 @@
 
 from pentapod.mesh.diagnosis import MeshDiagnosis
 from pentapod.mesh.io.load import UNITS, load_mesh
-from pentapod.mesh.io.registry import MESH_FORMATS, MeshFormat
+from pentapod.mesh.io.registry import MESH_FORMATS, MeshData, MeshFormat, ReadOptions
 from pentapod.mesh.io.stl import write_stl
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.heightfield import HeightField
@@ -13,8 +13,10 @@ __all__ = [
     "UNITS",
     "HeightField",
     "Mesh",
+    "MeshData",
     "MeshDiagnosis",
     "MeshFormat",
+    "ReadOptions",
     "Region",
     "load_mesh",
     "write_stl",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.base.arrays import Floats, Ints, as_batch, frozen, set_frozen
+from pentapod.base.arrays import Bools, Floats, Ints, as_batch, frozen, set_frozen
 from pentapod.base.errors import MeshError
 from pentapod.base.progress import Progress, silent
 from pentapod.base.values import Value
@@ -31,18 +31,22 @@ class Mesh(Value):
     """Triangle mesh. `Mesh.of` and `load_mesh` make one from unchecked data; the constructor checks nothing.
 
     vertices (V, 3): metres, workpiece frame. faces (F, 3): vertex indices, counterclockwise seen from outside.
-    diagnosis: faults found and repaired. crease_angle: radians, see `normals`.
+    diagnosis: faults found and repaired. crease_angle: radians, see `normals`. exact_normals (F, 3, 3): unit, at the
+    facets' corners, where they are known better than from the facets.
     """
 
     vertices: Floats
     faces: Ints
     diagnosis: MeshDiagnosis
     crease_angle: float = CREASE_ANGLE
+    exact_normals: Floats | None = None
 
     def __post_init__(self) -> None:
         faces = np.array(self.faces, dtype=np.intp)
         faces.flags.writeable = False
         set_frozen(self, vertices=frozen(self.vertices, "vertices", (None, 3)), faces=faces)
+        if self.exact_normals is not None:
+            set_frozen(self, exact_normals=frozen(self.exact_normals, "exact_normals", (len(faces), 3, 3)))
 
     @classmethod
     def of(
@@ -54,6 +58,7 @@ class Mesh(Value):
         source: str = "mesh",
         crease_angle: float = CREASE_ANGLE,
         notes: tuple[str, ...] = (),
+        exact_normals: Floats | None = None,
         progress: Progress = silent,
     ) -> Mesh:
         """Return the mesh of vertices (V, 3) in metres and facets (F, 3), with equal vertices welded.
@@ -66,9 +71,9 @@ class Mesh(Value):
         points, facets = _checked(vertices, faces, source)
         progress("mesh", 0.3, "welding")
         points, facets = repairing.weld(points, facets)
-        facets, dropped = _without_useless(points, facets, source)
+        kept, dropped = _useful(points, facets, source)
         if dropped.any():
-            points, facets = repairing.weld(points, facets)
+            points, facets = repairing.weld(points, facets[kept])
         progress("mesh", 0.6, "edges")
         repairs: list[str] = []
         topology = Topology(facets, len(points))
@@ -76,25 +81,28 @@ class Mesh(Value):
             instead, near = joined
             merged = int((instead != np.arange(len(instead))).sum())
             repairs.append(f"{merged:,} vertices on borders merged with others less than {1e6 * near:.3g} µm away")
-            facets, more = _without_useless(points, instead[facets], source)
-            points, facets = repairing.weld(points, facets)
-            topology, dropped = Topology(facets, len(points)), dropped + more
+            rows, more = _useful(points, instead[facets], source)
+            points, facets = repairing.weld(points, instead[facets[rows]])
+            topology, kept, dropped = Topology(facets, len(points)), kept[rows], dropped + more
         names = zip(("degenerate", "duplicated"), dropped.tolist(), strict=True)
         repairs += [f"{count:,} {name} facets dropped" for name, count in names if count]
+        exact = None if exact_normals is None else np.asarray(exact_normals)[kept]
         if repair:
-            facets, done = repairing.wind(points, facets)
+            wound, done = repairing.wind(points, facets)
             if done:
+                exact = exact if exact is None else _turned(exact, (wound != facets).any(axis=1))
                 repairs.extend(done)
-                points, facets = repairing.weld(points, facets)
+                points, facets = repairing.weld(points, wound)
                 topology = Topology(facets, len(points))
-        diagnosis = diagnose(points, topology, source, (int(dropped[1]), int(dropped[0])), tuple(repairs), notes)
-        mesh = cls(points, facets, diagnosis, crease_angle)
+        counts = (int(dropped[1]), int(dropped[0]))
+        diagnosis = diagnose(points, topology, source, counts, tuple(repairs), notes)
+        mesh = cls(points, facets, diagnosis, crease_angle, exact)
         mesh.__dict__["topology"] = topology  # fills the cached property: sorting a million edges takes a second
         return mesh
 
-    def _derived(self, vertices: Floats, faces: Ints, source: str) -> Mesh:
-        notes = self.diagnosis.notes
-        return Mesh.of(vertices, faces, source=source, crease_angle=self.crease_angle, notes=notes)
+    def _derived(self, vertices: Floats, faces: Ints, source: str, exact: Floats | None) -> Mesh:
+        notes, angle = self.diagnosis.notes, self.crease_angle
+        return Mesh.of(vertices, faces, source=source, crease_angle=angle, notes=notes, exact_normals=exact)
 
     @cached_property
     def topology(self) -> Topology:
@@ -118,11 +126,13 @@ class Mesh(Value):
 
     @cached_property
     def corner_normals(self) -> Floats:
-        """Unit normals (F, 3, 3) at the facets' corners, equal across edges except at creases and borders."""
+        """Unit normals (F, 3, 3) at the facets' corners, equal across edges except at creases and borders.
+
+        Means of the exact normals, where there are some, else of the facets' normals.
+        """
         smooth = normals.smooth_pairs(self.topology, self.facet_normals, self.crease_angle)
-        return frozen(
-            normals.corner_normals(self.vertices, self.topology, self.facet_normals, smooth), "corner_normals"
-        )
+        exact = self.facet_normals if self.exact_normals is None else self.exact_normals
+        return frozen(normals.corner_normals(self.vertices, self.topology, exact, smooth), "corner_normals")
 
     @property
     def bounds(self) -> Floats:
@@ -131,11 +141,13 @@ class Mesh(Value):
 
     def transformed(self, transform: RigidTransform) -> Mesh:
         """Return the mesh moved rigidly."""
-        return self._derived(transform.apply(self.vertices), self.faces, self.diagnosis.source)
+        exact = None if self.exact_normals is None else self.exact_normals @ transform.rotation.T
+        return self._derived(transform.apply(self.vertices), self.faces, self.diagnosis.source, exact)
 
     def flipped(self) -> Mesh:
         """Return the mesh with its other side out: for an open sheet that faces away from the tool."""
-        return self._derived(self.vertices, self.faces[:, ::-1], self.diagnosis.source)
+        exact = None if self.exact_normals is None else -self.exact_normals[:, ::-1]
+        return self._derived(self.vertices, self.faces[:, ::-1], self.diagnosis.source, exact)
 
     def body(self, number: int) -> Mesh:
         """Return one of the bodies that `diagnosis.bodies` counts, from 0. Raises MeshError for a larger number."""
@@ -143,7 +155,9 @@ class Mesh(Value):
         if not 0 <= number < count:
             raise MeshError("no such body", value=number, expected=f"0 to {count - 1}")
         source = f"{self.diagnosis.source}, body {number}"
-        return self._derived(self.vertices, self.faces[body_of_facet == number], source)
+        own = body_of_facet == number
+        exact = None if self.exact_normals is None else self.exact_normals[own]
+        return self._derived(self.vertices, self.faces[own], source, exact)
 
     @classmethod
     def from_trimesh(cls, shape: Trimesh, metres: float, *, repair: bool = False) -> Mesh:
@@ -162,18 +176,22 @@ class Mesh(Value):
         return Trimesh(self.vertices, self.faces, process=False)
 
 
-def _without_useless(points: Floats, facets: Ints, source: str) -> tuple[Ints, Ints]:
-    """Return the facets without degenerate and duplicated ones, and how many (2,) those were.
+def _useful(points: Floats, facets: Ints, source: str) -> tuple[Ints, Ints]:
+    """Return the facets (K,) that are neither degenerate nor duplicated, and how many (2,) are.
 
     Raises MeshError where all are degenerate.
     """
     degenerate = repairing.degenerate_facets(points, facets)
     if degenerate.all():
         raise MeshError("the mesh has zero area: no facet spans a surface", file=source)
-    facets = facets[~degenerate] if degenerate.any() else facets
-    duplicated = repairing.duplicated_facets(facets, len(points))
-    facets = facets[~duplicated] if duplicated.any() else facets
-    return facets, np.array([degenerate.sum(), duplicated.sum()])
+    rows = np.flatnonzero(~degenerate)
+    duplicated = repairing.duplicated_facets(facets[rows], len(points))
+    return rows[~duplicated], np.array([degenerate.sum(), duplicated.sum()])
+
+
+def _turned(normals: Floats, turned: Bools) -> Floats:
+    """Return the normals (F, 3, 3) of corners with those of turned facets reversed."""
+    return np.where(turned[:, None, None], -normals[:, ::-1], normals)
 
 
 def _checked(vertices: ArrayLike, faces: ArrayLike, source: str) -> tuple[Floats, Ints]:

@@ -48,14 +48,17 @@ def smooth_pairs(topology: Topology, facet_normals: Floats, crease_angle: float)
     return topology.pair_agrees & (cosine >= np.cos(crease_angle))
 
 
-def corner_normals(vertices: Floats, topology: Topology, facet_normals: Floats, smooth: Bools) -> Floats:
-    """Return unit normals (F, 3, 3) at the facets' corners, smooth across the pairs marked in `smooth`."""
+def corner_normals(vertices: Floats, topology: Topology, normals: Floats, smooth: Bools) -> Floats:
+    """Return unit normals (F, 3, 3) at the facets' corners, smooth across the pairs marked in `smooth`.
+
+    They are means of `normals`: of the facets (F, 3), or of their corners (F, 3, 3).
+    """
     faces, count = topology.faces, 3 * len(topology.faces)
     a, b = (side[smooth] for side in topology.side_pairs)
     # The pair's facets run along the edge in opposite senses: one's first corner is the other's second.
     after_a, after_b = (side - side % 3 + (side + 1) % 3 for side in (a, b))
     number, group = components(count, np.concatenate([a, after_a]), np.concatenate([after_b, b]))
-    return _grouped_means(vertices, faces, facet_normals, group, number)
+    return _grouped_means(vertices, faces, normals, group, number)
 
 
 def vertex_normals(vertices: Floats, faces: Ints, facet_normals: Floats) -> Floats:
@@ -66,15 +69,18 @@ def vertex_normals(vertices: Floats, faces: Ints, facet_normals: Floats) -> Floa
 
 
 def _grouped_means(vertices: Floats, faces: Ints, normals: Floats, group: Ints, number: int) -> Floats:
-    """Return the angle-weighted mean normal (F, 3, 3) of each corner's group (3F,), of unit length."""
+    """Return the angle-weighted mean normal (F, 3, 3) of each corner's group (3F,), of unit length.
+
+    normals: of the facets (F, 3), or of their corners (F, 3, 3).
+    """
     weights = corner_angles(vertices, faces).ravel()
-    facet = np.repeat(np.arange(len(faces)), 3)
+    own = np.repeat(normals, 3, axis=0) if normals.ndim == 2 else normals.reshape(-1, 3)
     total = np.zeros((number, 3))
     for k in range(3):
-        total[:, k] = np.bincount(group, weights=weights * normals[facet, k], minlength=number)
-    # Where the normals around a vertex cancel, each facet keeps its own.
+        total[:, k] = np.bincount(group, weights=weights * own[:, k], minlength=number)
+    # Where the normals around a vertex cancel, each corner keeps its own.
     length = np.linalg.norm(total, axis=1)
     scale = np.bincount(group, weights=weights, minlength=number)
     cancelled = (length <= 1e-9 * scale)[group]
-    means = np.where(cancelled[:, None], normals[facet], unit_or_zero(total)[group])
+    means = np.where(cancelled[:, None], own, unit_or_zero(total)[group])
     return means.reshape(-1, 3, 3)

@@ -7,7 +7,7 @@ import pytest
 
 import toolpath_surfaces as surfaces
 from pentapod.base.errors import InputError, MeshError
-from pentapod.mesh import MESH_FORMATS
+from pentapod.mesh import MESH_FORMATS, ReadOptions
 from pentapod.toolpath import UNITS, Mesh, load_mesh, write_stl
 from plugins import install
 
@@ -154,7 +154,7 @@ BAD = {
     "goes_on.obj": (lambda _: b"v 0 \\\r\n 0 \\\n0\n" + OBJ_POINTS + b"f 1 2 9\n", "goes_on.obj:7: f: .*not there"),
     "head.ply": (lambda _: PLY_HEAD.replace(b"float y", b"flo.at y") % 3 + PLY_FACES % 1, "head.ply:5: .*of a header"),
     "end.ply": (lambda _: PLY_HEAD % 3, 'end.ply:7: .*"end_header" is missing'),
-    "part.step": (lambda _: b"ISO-10303-21;", "not a mesh format"),
+    "part.iges": (lambda _: b"S 1", "not a mesh format"),
 }
 
 
@@ -220,7 +220,7 @@ def test_obj_with_the_words_of_other_programs(tmp_path):
 def test_obj_comments_end_at_a_backslash(tmp_path):
     path = tmp_path / "a.obj"
     path.write_bytes(b"# from C:\\parts\\\nv 0 0 0\nv 1 0 0 # in D:\\\r\nv 0 1 0\nf 1 2 3\n")
-    vertices, faces, notes = MESH_FORMATS["obj"].read(path, path.read_bytes(), False)
+    vertices, faces, notes, *_ = MESH_FORMATS["obj"].read(path, path.read_bytes(), ReadOptions())
     np.testing.assert_array_equal(vertices, [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
     np.testing.assert_array_equal(faces, [[0, 1, 2]])
     assert not notes
@@ -233,7 +233,7 @@ def test_obj_is_read_as_trimesh_reads_it(tmp_path, ball):
     shape = trimesh.Trimesh(*surfaces.sphere(50.0, 2), process=False)
     shape.export(path)
     again = trimesh.load(path, force="mesh", process=False)
-    vertices, faces, notes = MESH_FORMATS["obj"].read(path, path.read_bytes(), False)
+    vertices, faces, notes, *_ = MESH_FORMATS["obj"].read(path, path.read_bytes(), ReadOptions())
     np.testing.assert_array_equal(vertices, again.vertices)
     np.testing.assert_array_equal(faces, again.faces)
     assert not notes
@@ -338,11 +338,11 @@ def test_meshes_go_to_trimesh_and_back():
 
 RAW = """
 import numpy as np
-from pentapod.mesh import MeshFormat
+from pentapod.mesh import MeshData, MeshFormat
 
-def read(path, data, loose):
+def read(path, data, options):
     corners = np.frombuffer(data).reshape(-1, 3)
-    return corners, np.arange(len(corners)).reshape(-1, 3), ()
+    return MeshData(corners, np.arange(len(corners)).reshape(-1, 3))
 
 FORMAT = MeshFormat(read)
 """

@@ -13,6 +13,7 @@ from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.machine.reach import reach
 from pentapod.mesh.io.load import UNITS
+from pentapod.mesh.io.registry import states_unit
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
 
@@ -36,14 +37,15 @@ def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
         return
     extents = np.ptp(mesh.bounds, axis=0)
     size, width = (f"{from_si(value, 'mm'):,.0f} mm" for value in (extents.max(), machine.work.diameter))
-    unit = job.part.unit
-    known = UNITS[unit or "mm"]
-    fitting = min(UNITS, key=lambda name: abs(np.log(extents.max() * UNITS[name] / known / machine.work.diameter)))
-    remedy = "machine a smaller region (region_box_mm), or set scale"
+    key, remedy = "scale", "machine a smaller region, or set scale: 0.001 if the numbers are millimetres, not metres"
+    if not states_unit(job.mesh_path):
+        known = UNITS[job.part.unit]
+        unit = min(UNITS, key=lambda name: abs(np.log(extents.max() * UNITS[name] / known / machine.work.diameter)))
+        key = "scale" if unit == job.part.unit else "unit"
+        remedy = "machine a smaller region, or set scale" if unit == job.part.unit else f'unit = "{unit}"?'
     raise job.error(
-        "part", "unit", f"the part is {size} wide, the work volume {width}",
-        expected=f"places to machine that are at most {from_si(apart, 'mm'):,.0f} mm from each other",
-        remedy=remedy if fitting == unit or unit is None else f'unit = "{fitting}"?',
+        "part", key, f"the part is {size} wide, the work volume {width}",
+        expected=f"places to machine that are at most {from_si(apart, 'mm'):,.0f} mm from each other", remedy=remedy,
     )  # fmt: skip
 
 

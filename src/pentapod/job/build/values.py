@@ -52,8 +52,10 @@ def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
     """Return the job's mesh. Raises MeshError, or JobError where its unit, or lengths of the job, do not suit it."""
     part = job.part
     try:
-        turned = {"repair": part.repair, "flip": part.flip}
-        mesh = load_mesh(job.mesh_path, part.unit, scale=part.scale, **turned, progress=progress)
+        mesh = load_mesh(
+            job.mesh_path, part.unit, scale=part.scale, repair=part.repair, flip=part.flip,
+            chordal=job.tolerance.si.chordal, progress=progress,
+        )  # fmt: skip
     except MeshError as error:
         if error.key != "unit":
             raise

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pentapod.base.keys import VECTOR, Key
 from pentapod.base.tables import table_of, wrong
+from pentapod.mesh.io.registry import states_unit
 
 Pose = tuple[float, float, float, float, float, float]
 Row = tuple[float, float, float, float]
@@ -127,7 +128,8 @@ class FixtureKeys:
         str | None, Key("", "mesh file of a vise, clamps, a table; relative to this job file", min_length=1)
     ] = None
     unit: Annotated[
-        Literal["mm", "cm", "m", "inch"] | None, Key("", "unit of the numbers in its mesh file: compulsory with mesh")
+        Literal["mm", "cm", "m", "inch"] | None,
+        Key("", "unit of the numbers in its mesh file, unless the file states it"),
     ] = None
     scale: Annotated[float, Key("", "factor applied to it after its unit", gt=0.0)] = 1.0
     frame: Annotated[
@@ -138,7 +140,7 @@ class FixtureKeys:
     @staticmethod
     def rules(table: Any) -> None:
         """Check that a mesh comes with its unit."""
-        if table.mesh is not None and table.unit is None:
+        if table.mesh is not None and table.unit is None and not states_unit(table.mesh):
             wrong("unit", "the unit of the fixture's mesh is missing", "mm, cm, inch or m")
 
 

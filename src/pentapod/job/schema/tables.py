@@ -29,11 +29,16 @@ class PartKeys:
     """The workpiece: its mesh, and which side of it is machined."""
 
     mesh: Annotated[
-        str, Key("", "mesh file (.stl, .ply, .obj); relative to this job file, ${VARIABLE} is expanded", min_length=1)
+        str,
+        Key(
+            "",
+            "mesh file (.stl, .ply, .obj, .3mf, .glb, .step); relative to this job file, ${VARIABLE} is expanded",
+            min_length=1,
+        ),
     ]
     unit: Annotated[
         Literal["mm", "cm", "m", "inch"] | None,
-        Key("", "unit of the numbers in the mesh file: compulsory, for no format says it"),
+        Key("", "unit of the numbers in the mesh file: compulsory for STL, PLY and OBJ, which do not state it"),
     ] = None
     scale: Annotated[float, Key("", "factor applied to the mesh after its unit", gt=0.0)] = 1.0
     repair: Annotated[

@@ -1,4 +1,4 @@
-"""load_mesh: read a mesh file and convert it to metres; the unit must be given, as no format holds it."""
+"""load_mesh: read a mesh file and convert it to metres; its unit must be given where the format does not hold it."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Floats
 from pentapod.base.errors import MeshError, nearest
 from pentapod.base.files import read_bytes
 from pentapod.base.progress import Progress, silent
-from pentapod.mesh.io.registry import KNOWN, MESH_FORMATS, MeshFormat
+from pentapod.mesh.io.registry import KNOWN, MESH_FORMATS, MeshData, MeshFormat, ReadOptions
 from pentapod.mesh.io.stl import HEAD_BYTES
 from pentapod.mesh.mesh import CREASE_ANGLE, Mesh
 
@@ -43,39 +43,35 @@ def load_mesh(
     scale: float = 1.0,
     repair: bool = False,
     flip: bool = False,
+    chordal: float = ReadOptions.chordal,
     crease_angle: float = CREASE_ANGLE,
     progress: Progress = silent,
 ) -> Mesh:
-    """Return the mesh of an STL, PLY or OBJ file, or of a plug-in's format, in metres; the suffix names the format.
+    """Return the mesh of a file in metres: STL, PLY, OBJ, 3MF, GLB, STEP or a plug-in's format; the suffix names it.
 
-    unit: of the file's numbers, one of `UNITS`; required. scale: factor after the unit. repair: also wind facets alike
-    (see `Mesh.of`), and drop any number of useless facets; without it more than 1 % of degenerate or duplicated facets
-    is an error. flip: turn all facets over. crease_angle: radians. Raises MeshError of one line: no such file, a
-    folder, too large, empty, truncated, not a mesh, no facets, zero area, coordinates that are not finite, unit missing
-    (with the size in each unit) or unknown.
+    unit: of the file's numbers, one of `UNITS`; required where the file does not state it, else told if it differs.
+    scale: factor after the unit. repair: also wind facets alike (see `Mesh.of`), and drop any number of useless facets;
+    without it more than 1 % of degenerate or duplicated facets is an error. flip: turn all facets over. chordal:
+    largest distance of facets from the surface of a STEP file, metres. crease_angle: radians. Raises MeshError of one
+    line: no such file, a folder, too large, empty, truncated, not a mesh, no facets, zero area, coordinates that are
+    not finite, unit missing (with the size in each unit) or unknown.
     """
     path = Path(path)
     if unit is not None and unit not in UNITS:
         raise MeshError("unknown unit", file=path, key="unit", value=unit, remedy=nearest(unit, UNITS))
-    if not (np.isfinite(scale) and scale > 0.0):
-        raise MeshError("the scale must be positive", file=path, key="scale", value=scale)
+    for name, value in (("scale", scale), ("chordal", chordal)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise MeshError(f"the {name} must be positive", file=path, key=name, value=value)
     progress("mesh", 0.0, "reading")
-    vertices, faces, notes = _read(path, repair=repair)
+    read = _read(path, ReadOptions(loose=repair, chordal=chordal / scale))
+    faces, normals, notes = read.faces, read.normals, read.notes
     if flip:
         faces, notes = faces[:, ::-1], (*notes, "all facets turned over: flip = true")
-    extents = _extents(vertices)
-    sizes, likely = _sizes(extents)
-    if unit is None:
-        raise MeshError(
-            f"the unit of the mesh is missing; the part would be {sizes}", file=path, key="unit",
-            expected="one of " + ", ".join(UNITS), remedy=f'unit = "{likely}" is likely',
-        )  # fmt: skip
-    low, high = PLAUSIBLE.sizes
-    if extents.any() and not low <= float(extents.max()) * UNITS[unit] * scale <= high:
-        notes += (f'doubtful unit "{unit}": the part would be {sizes}; unit = "{likely}" is likely',)
+        normals = None if normals is None else -normals[:, ::-1]
+    metres, told = _metres(path, read, unit, scale)
     mesh = Mesh.of(
-        vertices * (UNITS[unit] * scale), faces, repair=repair, source=path.name, crease_angle=crease_angle,
-        notes=notes, progress=progress,
+        read.vertices * metres, faces, repair=repair, source=path.name, crease_angle=crease_angle,
+        notes=(*notes, *told), exact_normals=normals, progress=progress,
     )  # fmt: skip
     degenerate, duplicated = mesh.diagnosis.degenerate, mesh.diagnosis.duplicated
     if not repair and degenerate + duplicated > PLAUSIBLE.most_dropped * len(faces):
@@ -88,18 +84,38 @@ def load_mesh(
     return mesh
 
 
-def _read(path: Path, *, repair: bool) -> tuple[Floats, Ints, tuple[str, ...]]:
-    """Return vertices (V, 3) in the file's own unit, facets (F, 3) and notes."""
+def _metres(path: Path, read: MeshData, unit: str | None, scale: float) -> tuple[float, tuple[str, ...]]:
+    """Return the length of one in the file's numbers, scaled, and what to tell about its unit. Raises MeshError."""
+    extents = _extents(read.vertices)
+    sizes, likely = _sizes(extents)
+    if read.unit is not None:
+        ignored = unit is not None and unit != read.unit
+        told = (f'unit = "{unit}" is not used: the file states "{read.unit}"; scale changes the size',)
+        return UNITS[read.unit] * scale, told if ignored else ()
+    if unit is None:
+        raise MeshError(
+            f"the unit of the mesh is missing; the part would be {sizes}", file=path, key="unit",
+            expected="one of " + ", ".join(UNITS), remedy=f'unit = "{likely}" is likely',
+        )  # fmt: skip
+    low, high = PLAUSIBLE.sizes
+    metres = UNITS[unit] * scale
+    if extents.any() and not low <= float(extents.max()) * metres <= high:
+        return metres, (f'doubtful unit "{unit}": the part would be {sizes}; unit = "{likely}" is likely',)
+    return metres, ()
+
+
+def _read(path: Path, options: ReadOptions) -> MeshData:
+    """Return the content of a mesh file. Raises MeshError."""
     with contextlib.suppress(OSError), path.open("rb") as stream:  # where it fails, `read_bytes` tells why
         if head := stream.read(HEAD_BYTES):
             _format(path).check(path, head, path.stat().st_size)
     data = read_bytes(path, MeshError, f"a mesh: {KNOWN}")
     if not data.strip():
         raise MeshError("the file is empty", file=path)
-    vertices, faces, notes = _format(path).read(path, data, repair)
-    if not len(faces):
+    read = _format(path).read(path, data, options)
+    if not len(read.faces):
         raise MeshError("the mesh has no facets", file=path, expected="a surface made of triangles")
-    return vertices, faces, notes
+    return read
 
 
 def _format(path: Path) -> MeshFormat:

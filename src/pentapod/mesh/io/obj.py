@@ -16,7 +16,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import MeshError
-from pentapod.mesh.io.registry import MeshFormat
+from pentapod.mesh.io.registry import MeshData, MeshFormat, ReadOptions
 from pentapod.mesh.io.text import EXPORT_AGAIN, NUMBER, check_last_line, line_of, triangle_fans
 
 MOST_UNUSED = 0.01
@@ -43,10 +43,10 @@ _REST_OF_CORNER = re.compile(rb"/\S*")
 _COMMENT_OR_CONTINUATION = re.compile(rb"(#[^\n]*)|\\\r?\n")
 
 
-def _read(path: Path, data: bytes, loose: bool) -> tuple[Floats, Ints, tuple[str, ...]]:
-    """Return vertices (V, 3) in the file's own unit, facets (F, 3), and notes. Raises MeshError with the line.
+def _read(path: Path, data: bytes, options: ReadOptions) -> MeshData:
+    """Return the content of a file. Raises MeshError with the line.
 
-    loose: whether more than `MOST_UNUSED` of the vertices may belong to no facet.
+    With `options.loose` more than `MOST_UNUSED` of the vertices may belong to no facet.
     """
     text = _joined_lines(data)
     if strange := _UNKNOWN_LINE.search(text):
@@ -61,7 +61,7 @@ def _read(path: Path, data: bytes, loose: bool) -> tuple[Floats, Ints, tuple[str
     vertices, places = _vertices(text)
     faces = _facets(path, data, text, places)
     _check_announced(path, text, len(vertices), len(faces))
-    return vertices, faces, _unused(path, text, vertices, faces, loose=loose)
+    return MeshData(vertices, faces, _unused(path, text, vertices, faces, loose=options.loose))
 
 
 def _joined_lines(data: bytes) -> bytes:

@@ -20,7 +20,7 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import MeshError
 from pentapod.geometry.runs import members
 from pentapod.mesh.io.ply_header import Element, split_header, truncated
-from pentapod.mesh.io.registry import MeshFormat
+from pentapod.mesh.io.registry import MeshData, MeshFormat, ReadOptions
 from pentapod.mesh.io.text import EXPORT_AGAIN, NUMBER, check_last_line, line_of, triangle_fans
 
 MOST_UNEQUAL_ROWS = 5_000_000
@@ -40,8 +40,8 @@ class _Columns:
     lists: dict[str, tuple[NDArray[Any], Ints]] = field(default_factory=dict[str, tuple[NDArray[Any], Ints]])
 
 
-def _read(path: Path, data: bytes, _loose: bool) -> tuple[Floats, Ints, tuple[str, ...]]:
-    """Return vertices (V, 3) in the file's own unit, facets (F, 3), and no notes. Raises MeshError."""
+def _read(path: Path, data: bytes, _options: ReadOptions) -> MeshData:
+    """Return the content of a file. Raises MeshError."""
     order, elements, start = split_header(path, data)
     found = _read_binary(path, data, start, elements, order) if order else _read_text(path, data, start, elements)
     corners, counts = _corners(path, found["face"])
@@ -53,7 +53,7 @@ def _read(path: Path, data: bytes, _loose: bool) -> tuple[Floats, Ints, tuple[st
         what = f"facet {int(few[0])} has fewer than three corners"
         raise MeshError(what, file=path, key="face", value=int(counts[few[0]]), remedy=EXPORT_AGAIN)
     vertices = np.stack([numbers[axis].astype(np.float64) for axis in "xyz"], axis=1)
-    return vertices, triangle_fans(corners, counts), ()
+    return MeshData(vertices, triangle_fans(corners, counts))
 
 
 def _corners(path: Path, found: _Columns) -> tuple[Ints, Ints]:

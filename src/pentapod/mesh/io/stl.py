@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Floats
 from pentapod.base.errors import MeshError
-from pentapod.mesh.io.registry import MeshFormat
+from pentapod.mesh.io.registry import MeshData, MeshFormat, ReadOptions
 from pentapod.mesh.io.text import EXPORT_AGAIN, NUMBER, line_of
 
 HEADER_BYTES, HEAD_BYTES = 84, 4096
@@ -112,9 +112,9 @@ def _read_ascii(path: Path, data: bytes) -> Floats:
         ) from error
 
 
-def _read(path: Path, data: bytes, _loose: bool) -> tuple[Floats, Ints, tuple[str, ...]]:
+def _read(path: Path, data: bytes, _options: ReadOptions) -> MeshData:
     triangles = read_stl(path, data)
-    return triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), ()
+    return MeshData(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3))
 
 
 FORMAT = MeshFormat(_read, _check)
