@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TypedDict, Unpack
 
 from pentapod.base.arrays import Floats
@@ -19,7 +20,7 @@ from pentapod.planning.placement.common_axes import OPTIONS as COMMON_AXES
 from pentapod.planning.placement.common_axes import Searched, with_common_axis
 from pentapod.planning.placement.placed_path import PlacedPath, Placement, UnplacedPath
 from pentapod.planning.placement.sampling import best_tilted_margins
-from pentapod.planning.placement.search import SOLVERS, Solver, SolverName, search
+from pentapod.planning.placement.search import SOLVERS, SearchOptions, Solver, SolverName, search
 from pentapod.planning.placement.secondary_objective import SecondaryObjective, improved, objective_of
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.constraints import FREE, PlacementConstraints
@@ -78,7 +79,6 @@ def plan(
     Returns a Refusal that names limits, waypoints and shortfalls where the part does not fit. An interruption (Ctrl-C)
     ends the search with the best placement so far, if that fits; else KeyboardInterrupt is raised.
     """
-    collision_world = without_idle_tool(collision_world, machine, ToolpathSamples.of(toolpath, tilt))
     problem = PlacementProblem.of(
         _samples(toolpath, tilt, common_axis=common_axis), machine, constraints, weights,
         component=component, collision_world=collision_world, limits=limits,
@@ -108,10 +108,9 @@ def fits(toolpath: Toolpath, machine: Machine, **options: Unpack[PlacementOption
     Raises KeyboardInterrupt where the search is interrupted.
     """
     tilt, common_axis = options["tilt"], options["common_axis"]
-    collision_world = without_idle_tool(options["collision_world"], machine, ToolpathSamples.of(toolpath, tilt))
     problem = PlacementProblem.of(
         _samples(toolpath, tilt, common_axis=common_axis), machine, options["constraints"], options["weights"],
-        component=options["component"], collision_world=collision_world, limits=options["limits"],
+        component=options["component"], collision_world=options["collision_world"], limits=options["limits"],
     )  # fmt: skip
     _, found = _searched(problem, tilt if common_axis else 0.0, 0, options["solver"], silent)
     if found.interrupted:
@@ -129,11 +128,15 @@ def _searched(problem: PlacementProblem, limit: float, seed: int, solver: Solver
 
     limit: largest angle from the toolpath's axes where a common direction is chosen, radians; 0 where none is.
     """
+    world = problem.margins[0].scene.collision_world
+    bare = problem.in_world(replace(world, tool=())).margins
 
-    def searched(problem: PlacementProblem) -> Searched:
+    def searched(problem: PlacementProblem, options: SearchOptions) -> Searched:
+        if without_idle_tool(world, problem.machine, problem.samples) is not world:
+            problem = replace(problem, margins=bare)
         if problem.machine.guides is not None:
             return reconfigured(problem, seed=seed, solver=solver, progress=progress)
-        return problem, search(problem, seed=seed, solver=solver, progress=progress)
+        return problem, search(problem, seed=seed, solver=solver, progress=progress, options=options)
 
     return with_common_axis(problem, limit, searched, seed=seed, progress=progress)
 

@@ -14,7 +14,7 @@ from pentapod.geometry import angle_between
 from pentapod.toolpath import BallCutter, Mesh, RasterOptions, Segment, SegmentKind, StandOff, Toolpath, make_toolpath
 from pentapod.toolpath.axis.modes import Between, Fixed, Normal, Pointed, with_lead_and_tilt
 from pentapod.toolpath.axis.orientation import Orientation, oriented
-from pentapod.toolpath.axis.smoothing import rate_limited, smoothed
+from pentapod.toolpath.axis.smoothing import noise_tolerance, rate_limited, smoothed
 from pentapod.toolpath.axis.steps import stepped
 from toolpath_surfaces import grid
 
@@ -188,3 +188,41 @@ def test_oriented_toolpath_keeps_its_contacts_and_segments():
         leads = angle_between(led_path.axes, path.axes)[cut]
         np.testing.assert_allclose(np.sort(leads)[len(leads) // 10 :], np.radians(10), atol=1e-9)
         assert [s.kind for s in led_path.segments] == [s.kind for s in path.segments]
+
+
+def scan(noise_deg: float, shape: str = "wave", stepover: float = 4e-3, spacing: float = 0.4e-3):
+    """Passes over a surface, with normals that have normal noise on either direction across, degrees."""
+    rng = np.random.default_rng(5)
+    x = np.arange(-0.03, 0.03, spacing)
+    runs = []
+    for y in np.arange(-0.03, 0.03, stepover):
+        slope = {
+            "wave": 0.4 * np.cos(2.0 * np.pi * x / 0.03),
+            "roof": np.sign(np.sin(2.0 * np.pi * x / 0.013)) * 0.5,
+            "flat": 0.0 * x,
+            "arc": x / 0.035,
+        }[shape]
+        points = np.stack([x, np.full_like(x, y), np.cumsum(slope) * spacing], axis=1)
+        normals = np.stack([-slope, 0.3 * y / 0.03 + 0.0 * x, np.ones_like(x)], axis=1)
+        normals[:, :2] += np.tan(np.radians(noise_deg)) * rng.normal(size=(len(x), 2))
+        runs.append((points, normals / np.linalg.norm(normals, axis=1)[:, None]))
+    return runs
+
+
+@pytest.mark.parametrize("shape", ["wave", "roof", "flat", "arc"])
+def test_clean_axes_are_not_smoothed_by_default(shape):
+    runs = scan(0.0, shape)
+    for reach in (5e-3, 8e-3):
+        for found, (_, normals) in zip(Orientation(reach=reach).axes(runs), runs, strict=True):
+            np.testing.assert_array_equal(found, normals)
+
+
+@pytest.mark.parametrize(("shape", "noise"), [("wave", 4.0), ("flat", 1.0), ("flat", 4.0), ("arc", 1.0), ("arc", 4.0)])
+def test_noise_of_a_scan_is_measured_and_smoothed_by_default(shape, noise):
+    runs, clean = scan(noise, shape), scan(0.0, shape)
+    starts = np.cumsum([0, *(len(points) for points, _ in runs)])
+    points, normals = (np.concatenate([run[k] for run in runs]) for k in range(2))
+    assert np.degrees(noise_tolerance(points, normals, starts, 8e-3)) == pytest.approx(4.0 * noise, rel=0.3)
+    axes = Orientation(reach=8e-3).axes(runs)
+    turn = [np.degrees(angle_between(each[1:], each[:-1])).max() for each in (axes[7], runs[7][1], clean[7][1])]
+    assert turn[0] < 0.2 * turn[1] + turn[2]

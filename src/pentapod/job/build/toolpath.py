@@ -29,11 +29,12 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.program import read_header
 from pentapod.toolpath import toolpath_with_report
 from pentapod.toolpath.axis.modes import AxisMode, Between, Fixed, Normal, Pointed
-from pentapod.toolpath.axis.orientation import Orientation, oriented
+from pentapod.toolpath.axis.orientation import REACH_M, Orientation, oriented
 from pentapod.toolpath.axis.steps import fastest_turn, stepped
 from pentapod.toolpath.formats import read_toolpath
 from pentapod.toolpath.gouge.gouge import without_gouges
 from pentapod.toolpath.gouge.report import GougeOptions, Remedy
+from pentapod.toolpath.lines.scallop import stepover_for
 from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.linking.partition import Piece, part_of
 from pentapod.toolpath.options import PathOptions
@@ -141,8 +142,7 @@ def job_toolpath(
         toolpath, report = _read(job, tool)
     else:
         toolpath, report = toolpath_with_report(mesh, tool, job_options(job))
-        orientation = Orientation(mode=_mode(job), **fields_from(Orientation, job.axis))
-        toolpath = stepped(oriented(toolpath, tool, orientation), job.toolpath.si.axis_step)
+        toolpath = stepped(oriented(toolpath, tool, _orientation(job, tool)), job.toolpath.si.axis_step)
     gouge = fields_from(GougeOptions, job.gouge)
     options = GougeOptions(
         # By default, nothing is taken out of a toolpath that was read from a file.
@@ -214,6 +214,17 @@ def _turns(toolpath: Toolpath, most: float | None) -> list[str]:
     if not most or fastest <= most * RATE_SLACK:
         return []
     return [f"  problem: tilted to avoid a gouge, the axis turns by up to {fastest:.3g} deg/mm, the cap is {most:.3g}"]
+
+
+def _orientation(job: Job, tool: Tool) -> Orientation:
+    """Return the nominal axes that a job asks for; smoothed over two stepovers, where it does not say."""
+    orientation, path = Orientation(mode=_mode(job), **fields_from(Orientation, job.axis)), job.toolpath.si
+    if orientation.reach is not None:
+        return orientation
+    stepover, scallop, radius = (getattr(path, "stepover", None), getattr(path, "scallop", None), tool.scallop_radius)
+    if stepover is None and scallop is not None and radius is not None:
+        stepover = float(stepover_for(min(scallop, radius), radius))
+    return dataclasses.replace(orientation, reach=max(REACH_M, 2.0 * (stepover or 0.0)))
 
 
 def _mode(job: Job) -> AxisMode:

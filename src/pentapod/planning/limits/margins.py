@@ -78,9 +78,9 @@ class Margins:
         """Return the same margins of another machine."""
         return Margins.of(machine, self.scene.branch, self.scene.collision_world, self.kinds)
 
-    def without_collision_world(self) -> Margins:
-        """Return the same margins in an empty collision world."""
-        return Margins.of(self.scene.machine, self.scene.branch, NOTHING, self.kinds)
+    def in_world(self, collision_world: CollisionWorld) -> Margins:
+        """Return the same margins in another collision world."""
+        return Margins.of(self.scene.machine, self.scene.branch, collision_world, self.kinds)
 
     def __call__(self, tips: Floats, axes: Floats, placement: RigidTransform | None = None) -> Floats:
         """Return margins (..., M) of tool tips and axes (tip → spindle), both (..., 3), machine frame.

@@ -16,7 +16,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.progress import Progress, silent
 from pentapod.geometry.directions import angle_between, normalised
 from pentapod.planning.placement.sampling import SamplingOptions, best_guess
-from pentapod.planning.placement.search import Search
+from pentapod.planning.placement.search import Search, SearchOptions
 from pentapod.planning.problem.common_axis import CommonAxis
 from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.planning.problem.problem import PlacementProblem
@@ -33,8 +33,9 @@ class CommonAxesOptions:
     that nominal axes may fill around the common direction. apart_deg: smallest angle between two directions. cap_steps:
     of the iteration for the smallest cap. alike_deg: candidates whose axes differ by less are one. tries, ranked:
     random placements for each candidate, and how many of them are judged with the tilt field. waypoints: number that
-    represents the path where the placements are given. searched: candidates that are searched while their first guesses
-    are within `near` of the best one; until one fits, all within `hopeful` of it are.
+    represents the path where the placements are given. starts: of the search of each candidate, the most promising one
+    first; so many are searched while their first guesses are within `near` of the best one. Until one fits, all within
+    `hopeful` of it are searched.
     """
 
     tilt: float = float(np.radians(15.0))
@@ -45,7 +46,7 @@ class CommonAxesOptions:
     tries: int = 900
     ranked: int = 6
     waypoints: int = 48
-    searched: int = 2
+    starts: tuple[int, ...] = (3, 2)
     near: float = 0.1
     hopeful: float = 0.3
 
@@ -56,7 +57,7 @@ OPTIONS = CommonAxesOptions()
 def with_common_axis(
     problem: PlacementProblem,
     limit: float,
-    search: Callable[[PlacementProblem], Searched],
+    search: Callable[[PlacementProblem, SearchOptions], Searched],
     *,
     seed: int = 0,
     progress: Progress = silent,
@@ -69,7 +70,7 @@ def with_common_axis(
     the tilt field, only the path's own axes are searched.
     """
     if limit <= options.tilt:
-        return search(problem)
+        return search(problem, SearchOptions())
     progress("tool axis", 0.0, "comparing common directions")
     problems = [problem]
     for direction in directions(problem.samples.nominal, problem.constraints, options):
@@ -79,7 +80,7 @@ def with_common_axis(
             if min(apart) > np.radians(options.alike_deg):
                 problems.append(problem.along(samples))
     if len(problems) == 1:
-        return search(problem)
+        return search(problem, SearchOptions())
     guessing = SamplingOptions(tries=options.tries, ranked=options.ranked)
     scores = [best_guess(each, seed, guessing, options.waypoints) for each in problems]
     order = sorted(range(len(problems)), key=lambda k: -scores[k])
@@ -87,11 +88,11 @@ def with_common_axis(
     for tried, k in enumerate(order):
         behind = scores[order[0]] - scores[k]
         if best is not None and best[1].best.smallest >= NEEDED_MARGIN:
-            if tried >= options.searched or behind > options.near:
+            if tried >= len(options.starts) or behind > options.near:
                 break
         elif behind > options.hopeful:
             break
-        found = search(problems[k])
+        found = search(problems[k], SearchOptions(refined=options.starts[min(tried, len(options.starts) - 1)]))
         best = found if best is None or found[1].best.smallest > best[1].best.smallest else best
         if found[1].interrupted:
             break

@@ -81,9 +81,13 @@ class PlacementProblem:
         """Return the same problem on another machine."""
         return replace(self, machine=machine, margins=tuple(margins.on(machine) for margins in self.margins))
 
+    def in_world(self, collision_world: CollisionWorld) -> PlacementProblem:
+        """Return the same problem in another collision world."""
+        return replace(self, margins=tuple(margins.in_world(collision_world) for margins in self.margins))
+
     def without_collision_world(self) -> PlacementProblem:
         """Return the same problem in an empty collision world."""
-        return replace(self, margins=tuple(margins.without_collision_world() for margins in self.margins))
+        return self.in_world(NOTHING)
 
     @property
     def cone(self) -> float:

@@ -17,25 +17,43 @@ from pentapod.geometry.directions import partway
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import run_starts
 from pentapod.toolpath.axis.modes import AxisMode, Normal, with_lead_and_tilt
-from pentapod.toolpath.axis.smoothing import rate_limited, smoothed, tangents
+from pentapod.toolpath.axis.smoothing import noise_tolerance, rate_limited, smoothed, tangents
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
+
+REACH_M = 5e-3
+"""Distance over which axes are smoothed by default, and at least where the stepover says more, metres."""
 
 
 @dataclass(frozen=True)
 class Orientation(Value):
     """The nominal tool axis along the passes. mode: the direction from which lead and tilt are measured.
 
-    smoothing: 0 for none. rate: radians per metre, None for no limit. Raises ToolpathError for values out of range.
+    smoothing: 0 for none, None where the noise of the axes decides (`noise_tolerance`). reach: None for REACH_M. rate:
+    radians per metre, None for no limit. Raises ToolpathError for values out of range.
     """
 
     mode: AxisMode = field(default_factory=Normal)
     lead: Annotated[float, Key("deg", "lead angle: to the front, along the feed", ge=-80.0, le=80.0)] = 0.0
     tilt: Annotated[float, Key("deg", "side tilt: to the left of the feed", name="side", ge=-80.0, le=80.0)] = 0.0
-    smoothing: Annotated[float, Key("deg", "largest angle by which smoothing may turn an axis", ge=0.0, le=45.0)] = 0.0
+    smoothing: Annotated[
+        float | None,
+        Key(
+            "deg",
+            "largest angle by which smoothing may turn an axis; 0 for none; when left out, four times the noise of a "
+            "scan's normals, and 0 for clean surfaces",
+            ge=0.0,
+            le=45.0,
+        ),
+    ] = None
     reach: Annotated[
-        float,
-        Key("mm", "distance over which axes are smoothed, along and across", name="smoothing_reach", gt=0.0),
-    ] = 5e-3
+        float | None,
+        Key(
+            "mm",
+            "distance over which axes are smoothed, along and across; two stepovers, at least 5, when left out",
+            name="smoothing_reach",
+            gt=0.0,
+        ),
+    ] = None
     rate: Annotated[float | None, Key("deg_mm", "largest turn of the axis per mm of a cut", gt=0.0)] = None
 
     def __post_init__(self) -> None:
@@ -53,7 +71,9 @@ class Orientation(Value):
         axes = self.mode.axes(contacts, normals)
         if self.lead or self.tilt:
             axes = with_lead_and_tilt(axes, tangents(contacts, starts), self.lead, self.tilt)
-        axes = smoothed(contacts, axes, self.reach, self.smoothing)
+        reach, tolerance = REACH_M if self.reach is None else self.reach, self.smoothing
+        tolerance = noise_tolerance(contacts, axes, starts, reach) if tolerance is None else tolerance
+        axes = smoothed(contacts, axes, reach, tolerance)
         parts = [axes[a:b] for a, b in pairwise(starts)]
         if self.rate is not None:
             parts = [rate_limited(c, part, self.rate) for (c, _), part in zip(runs, parts, strict=True)]
@@ -68,15 +88,18 @@ def oriented(toolpath: Toolpath, tool: Tool, orientation: Orientation) -> Toolpa
     ToolpathError as `Orientation.axes`.
     """
     cuts = [k for k, segment in enumerate(toolpath.segments) if segment.kind is SegmentKind.CUT]
-    if orientation == Orientation() or not cuts:
+    if not cuts:
         return toolpath
     # With the axis along the normal, every cutter's tip is its contact; that of a stand-off tool is above it.
     drop = min(tool.tilt_centre, 0.0)
     chosen = [toolpath.segments[k] for k in cuts]
     runs = [(segment.tips + drop * segment.axes, segment.axes) for segment in chosen]
+    found = orientation.axes(runs)
+    if all(np.array_equal(new, normals) for new, (_, normals) in zip(found, runs, strict=True)):
+        return toolpath
     tips, axes = toolpath.tips.copy(), toolpath.axes.copy()
     known = np.zeros(len(tips), dtype=np.bool_)
-    for k, run, new in zip(cuts, runs, orientation.axes(runs), strict=True):
+    for k, run, new in zip(cuts, runs, found, strict=True):
         rows = slice(int(toolpath.starts[k]), int(toolpath.starts[k + 1]) + 1)
         tips[rows], axes[rows], known[rows] = tool.tips(*run, new), new, True
     _interpolate(toolpath.tips, tips, axes, known)

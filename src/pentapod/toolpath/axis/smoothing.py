@@ -19,13 +19,52 @@ class AxisSmoothingOptions:
     """How axes are averaged.
 
     rounds: of Gaussian averaging. similar: cosine of the angle between axes up to which they are averaged: sides of a
-    crease are not. neighbours: largest number of axes in a mean. bisections: for the shortest moving mean.
+    crease are not. neighbours: largest number of axes in a mean; thinned: least distance between them along a pass, as
+    a share of the reach. bisections: for the shortest moving mean. least_noise: standard deviation of the noise in
+    radians, on either direction across, below which axes are clean; noises: tolerance for noisy ones, as a multiple of
+    it, at most `widest` radians. fewest: places from which noise is estimated, at least. finer: axes between two places
+    whose turns are looked at; a median turn below the share `turning` of the noise is that of flat facets. median: of
+    the product of neighbouring fourth differences of normal noise, in variances, with the other sign.
     """
 
     rounds: int = 2
     similar: float = 0.5
-    neighbours: int = 64
+    neighbours: int = 96
+    thinned: float = 0.1
     bisections: int = 20
+    least_noise: float = float(np.radians(0.4))
+    noises: float = 4.0
+    widest: float = float(np.radians(30.0))
+    fewest: int = 30
+    finer: int = 4
+    turning: float = 0.1
+    median: float = 2.06
+
+
+def noise_tolerance(
+    points: Floats, axes: Floats, starts: Ints, reach: float, options: AxisSmoothingOptions = AxisSmoothingOptions()
+) -> float:
+    """Return the tolerance for `smoothed` that the noise of axes (N, 3) asks for, radians; 0 for clean ones.
+
+    points (N, 3): of all passes, metres; pass k holds points starts[k] to starts[k + 1] − 1. Noise is what is left in
+    fourth differences over half a reach: of a surface that bends, two neighbouring ones are alike, those of noise are
+    opposite. Medians leave out creases; flat facets between creases do not turn at all.
+    """
+    products, turns, step = [np.zeros(0)], [np.zeros(0)], 0.5 * reach / options.finer
+    for a, b in pairwise(starts.tolist()):
+        place = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[a:b], axis=0), axis=1))])
+        at = np.arange(0.0, place[-1], step)
+        few = np.stack([np.interp(at, place, axes[a:b, k]) for k in range(3)], axis=1)
+        turns.append(np.linalg.norm(np.diff(few, axis=0), axis=1))
+        off = np.diff(few[:: options.finer], 4, axis=0) / 6.0
+        products.append(np.einsum("ni,ni->n", off[1:], off[:-1]))
+    product = np.concatenate(products)
+    if len(product) < options.fewest:
+        return 0.0
+    noise = float(np.sqrt(max(-np.median(product) / options.median, 0.0)))
+    if noise < options.least_noise or float(np.median(np.concatenate(turns))) < options.turning * noise:
+        return 0.0
+    return min(options.noises * noise, options.widest)
 
 
 def smoothed(
@@ -51,12 +90,15 @@ def smoothed(
 
 def _weights(points: Floats, axes: Floats, reach: float, options: AxisSmoothingOptions) -> csr_array:
     """Return the matrix (N, N) of normalised Gaussian weights; a standard deviation is half the reach."""
-    count = min(options.neighbours, len(points))
-    found = KDTree(points).query(points, k=count, distance_upper_bound=reach)
-    distance, index = np.asarray(found[0]), np.asarray(found[1])
+    # Dense passes count no more than others: of the points along them, some stand for all.
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    chosen = np.unique(np.floor(along / (options.thinned * reach)), return_index=True)[1]
+    count = min(options.neighbours, len(chosen))
+    found = KDTree(points[chosen]).query(points, k=count, distance_upper_bound=reach)
+    distance, index = np.asarray(found[0]).reshape(len(points), -1), np.asarray(found[1]).reshape(len(points), -1)
     known = np.isfinite(distance)
     row = np.broadcast_to(np.arange(len(points))[:, None], distance.shape)[known]
-    column, d = index[known], distance[known]
+    column, d = chosen[index[known]], distance[known]
     similar = np.einsum("ni,ni->n", axes[row], axes[column]) > options.similar
     row, column, d = row[similar], column[similar], d[similar]
     matrix = coo_array((np.exp(-2.0 * (d / reach) ** 2), (row, column)), shape=(len(points), len(points))).tocsr()
