@@ -16,7 +16,7 @@ A task that *cannot be done* (a part out of reach, no time law) is not an except
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 LONGEST_SHOWN = 200
@@ -30,8 +30,11 @@ class PentapodError(Exception):
 class InputError(PentapodError, ValueError):
     """Bad input; the message is one line that names the place, the value and the remedy.
 
-    what: what is wrong. file, key, line, column: where. value: what was found. All are kept as attributes.
+    what: what is wrong. file, key, line, column: where. value: what was found. All are kept as attributes. others: what
+    else is wrong in the same file, where a reader goes on after the first error.
     """
+
+    others: tuple[InputError, ...] = ()
 
     def __init__(
         self,
@@ -49,6 +52,12 @@ class InputError(PentapodError, ValueError):
         self.line, self.column, self.value = line, column, value
         self.expected, self.remedy = expected, remedy
         super().__init__(self._message())
+
+    def add_others(self, others: Sequence[InputError]) -> None:
+        """Keep further errors of the same file; a traceback shows them as notes."""
+        self.others = (*self.others, *others)
+        for error in others:
+            self.add_note(str(error))
 
     def _message(self) -> str:
         place = "" if self.file is None else str(self.file)

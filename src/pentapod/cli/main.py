@@ -41,7 +41,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _answer(error: BaseException) -> tuple[int, str]:
-    """Return the exit code of an error, and its message of one line."""
+    """Return the exit code of an error, and its message: one line, and one for each further error of the file."""
     import click
 
     from pentapod.base.errors import InputError
@@ -59,7 +59,7 @@ def _answer(error: BaseException) -> tuple[int, str]:
         place = f"{error.filename}: " if error.filename else ""
         return EXIT_INPUT, _line(f"{place}{error.strerror or error}")
     if isinstance(error, InputError):
-        return EXIT_INPUT, _line(str(error))
+        return EXIT_INPUT, "\n".join(_line(str(one)) for one in (error, *error.others))
     hint = "this is an error of pentapod; --debug shows where"
     return EXIT_BUG, _line(f"{type(error).__name__}: {error} ({hint})")
 

@@ -41,8 +41,9 @@ class Segment(Value):
 
     tips (N, 3): tool tips, metres, workpiece frame, N ≥ 2. axes (N, 3): unit, tip → spindle. feed: requested speed of
     the tip, m/s; infinite on rapids (the machine's rapid rate applies). power: share of full laser (or spindle) power
-    while cutting, 0 to 1. dwell: at the segment's end, seconds; 0 for an exact stop, None for no stop. Raises
-    ToolpathError for too few poses, a wrong feed, power or dwell, or an axis that is not of unit length.
+    while cutting, 0 to 1. dwell: at the segment's end, seconds; 0 for an exact stop, None for no stop. words: what the
+    file that it was read from says before it: spindle, coolant, tool. Raises ToolpathError for too few poses, a wrong
+    feed, power or dwell, or an axis that is not of unit length.
     """
 
     summary = ("kind",)
@@ -53,6 +54,7 @@ class Segment(Value):
     feed: float
     power: float = 1.0
     dwell: float | None = None
+    words: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         tips, axes = frozen(self.tips, "tips", (None, 3)), frozen(self.axes, "axes", (None, 3))
@@ -80,8 +82,9 @@ class Toolpath(Value):
 
     tilt_centre: distance in metres from the tip along the axis to the point about which the tool may tilt without
     leaving the surface: the ball's radius for a ball cutter, −stand-off for a beam or spray (the spot on the surface),
-    0 for a fixed tip. wait: dwell at the first waypoint, seconds. Waypoints are the poses of all segments; the common
-    pose of two segments counts once. Raises ToolpathError where two segments do not join, or for a wrong wait.
+    0 for a fixed tip. wait: dwell at the first waypoint, seconds. end_words: what the file says after the last segment;
+    notes: sentences on how the file was read, for the report. Waypoints are the poses of all segments; the common pose
+    of two segments counts once. Raises ToolpathError where two segments do not join, or for a wrong wait.
     """
 
     summary = ("waypoints", "cut_length")
@@ -89,6 +92,8 @@ class Toolpath(Value):
     segments: tuple[Segment, ...]
     tilt_centre: float = 0.0
     wait: float = 0.0
+    end_words: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         set_frozen(self, segments=tuple(self.segments))

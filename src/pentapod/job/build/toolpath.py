@@ -32,6 +32,7 @@ from pentapod.toolpath.axis.modes import AxisMode, Between, Fixed, Normal, Point
 from pentapod.toolpath.axis.orientation import REACH_M, Orientation, oriented
 from pentapod.toolpath.axis.steps import fastest_turn, stepped
 from pentapod.toolpath.formats import read_toolpath
+from pentapod.toolpath.formats.rotary import RotaryAxes
 from pentapod.toolpath.gouge.gouge import without_gouges
 from pentapod.toolpath.gouge.report import GougeOptions, Remedy
 from pentapod.toolpath.lines.scallop import stepover_for
@@ -201,11 +202,17 @@ def job_link_style(job: Job, mesh: Mesh, toolpath: Toolpath) -> LinkStyle:
 
 def _read(job: Job, tool: Tool) -> tuple[Toolpath, str]:
     """Return the toolpath of the job's file, and a sentence about it."""
-    file = job.files["file"]
-    read = read_toolpath(file, job.toolpath.format, tilt_centre=tool.tilt_centre, feed=job.feed.si.cut)
+    file, keys = job.files["file"], job.toolpath
+    rotary = RotaryAxes.of(keys.rotary_axes, keys.si.rotary_centre, keys.si.pivot) if keys.rotary_axes else None
+    read = read_toolpath(
+        file, keys.format, tilt_centre=tool.tilt_centre, feed=job.feed.si.cut, chordal=job.tolerance.si.chordal,
+        rotary=rotary, tool=keys.tool,
+    )  # fmt: skip
     # The job's tool is used, whatever tool the file names.
     read = dataclasses.replace(read, tilt_centre=tool.tilt_centre)
-    return read, f"{file.name}: {len(read):,} waypoints in {len(read.segments):,} segments, read as they are"
+    notes = [note if note.startswith("problem: ") else f"note: {note}" for note in read.notes]
+    told = f"{file.name}: {len(read):,} waypoints in {len(read.segments):,} segments"
+    return read, "\n  ".join([told + ("" if notes else ", read as they are"), *notes])
 
 
 def _turns(toolpath: Toolpath, most: float | None) -> list[str]:

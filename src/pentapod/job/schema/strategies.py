@@ -10,9 +10,10 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, Field, SerializeAsAny, create_model
 
-from pentapod.base.errors import InputError, nearest
-from pentapod.base.keys import Key, declared
+from pentapod.base.errors import InputError, ToolpathError, nearest
+from pentapod.base.keys import VECTOR, Key, declared
 from pentapod.base.tables import TomlTable, table_of, wrong
+from pentapod.toolpath.formats.rotary import RotaryAxes
 from pentapod.toolpath.strategies.registry import STRATEGIES
 
 FILE = "file"
@@ -35,6 +36,28 @@ class FileOptions:
 
     file: Annotated[Path, Key("", "the toolpath (APT, G-code, CSV, npz), relative to this job file", kind=Path)]
     format: Annotated[str | None, Key("", "its format, where the suffix does not tell", min_length=1)] = None
+    rotary_axes: Annotated[
+        tuple[str, ...],
+        Key("", 'G-code: rotary axes of the file\'s machine, from the part to the tool: ["table C", "head A"]'),
+    ] = ()
+    rotary_centre: Annotated[
+        VECTOR | None, Key("mm", "where the axes of that machine's table meet, in the coordinates of the file")
+    ] = None
+    pivot: Annotated[
+        float | None, Key("mm", "distance from the tip to where the axes of that machine's head meet", gt=0.0)
+    ] = None
+    tool: Annotated[str | None, Key("", "G-code: number or name of the tool whose moves are read", min_length=1)] = None
+
+    @staticmethod
+    def rules(table: Any) -> None:
+        """Check that the rotary axes are those of a machine."""
+        try:
+            RotaryAxes.of(table.rotary_axes)
+        except ToolpathError as error:
+            wrong("rotary_axes", error.what, error.expected, value=error.value)
+        for key in ("rotary_centre_mm", "pivot_mm"):
+            if getattr(table, key) is not None and not table.rotary_axes:
+                wrong(key, f"{key} without rotary_axes", 'rotary_axes = ["table C", "head A"], for example')
 
 
 def job_strategies() -> tuple[str, ...]:

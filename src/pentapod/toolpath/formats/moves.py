@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -30,7 +31,8 @@ class Moves:
     """Poses in the order of a file. Millimetres, mm/min; a rapid's feed is infinite.
 
     Each pose has the kind, feed and power of the move that leads to it; those of the first are not used. dwells:
-    seconds of dwell at each pose, None where the tool does not stop; wait: seconds before the first pose.
+    seconds of dwell at each pose, None where the tool does not stop; wait: seconds before the first pose. words: what
+    the file says before the move to a pose, by its index, and after the last one: spindle, coolant, tool.
     """
 
     file: Path
@@ -41,6 +43,7 @@ class Moves:
     powers: list[float] = field(default_factory=list)
     dwells: list[float | None] = field(default_factory=list)
     wait: float = 0.0
+    words: dict[int, list[str]] = field(default_factory=dict[int, list[str]])
 
     def wrong(self, what: str, line: int, word: str | None = None, **details: Any) -> ToolpathError:
         """Return the error of a word in a line of the file."""
@@ -57,7 +60,7 @@ class Moves:
         power: float = 1.0,
     ) -> None:
         """Add a pose. Raises ToolpathError where the axis is not of unit length."""
-        length = float(np.linalg.norm(axis))
+        length = math.hypot(*axis)
         if abs(length - 1.0) > AXIS_TOLERANCE:
             raise self.wrong("the tool axis has not unit length", line, word, value=round(length, 6), expected="1")
         self.tips.append((tip[0], tip[1], tip[2]))
@@ -74,10 +77,27 @@ class Moves:
         else:
             self.wait += seconds
 
-    def toolpath(self, tilt_centre: float) -> Toolpath:
+    def add_words(self, words: str) -> None:
+        """Keep what the file says before the next pose."""
+        self.words.setdefault(len(self.tips), []).append(words)
+
+    def extend(self, other: Moves, begin: int, end: int) -> None:
+        """Add poses of other moves, with what is said before them."""
+        shift = len(self.tips) - begin
+        for name in ("tips", "axes", "kinds", "feeds", "powers", "dwells"):
+            getattr(self, name).extend(getattr(other, name)[begin:end])
+        self.words.update({k + shift: words for k, words in other.words.items() if begin <= k < end})
+
+    def replace(self, other: Moves) -> None:
+        """Take over all of other moves."""
+        for name, value in vars(other).items():
+            setattr(self, name, value)
+
+    def toolpath(self, tilt_centre: float, notes: tuple[str, ...] = ()) -> Toolpath:
         """Return the toolpath: consecutive moves of equal kind, feed and power are a segment; repeated poses go.
 
-        A dwell ends a segment. tilt_centre: metres. Raises ToolpathError for fewer than two poses.
+        A dwell ends a segment, words begin one. tilt_centre: metres; notes: how the file was read. Raises ToolpathError
+        for fewer than two poses.
         """
         tips, axes = np.array(self.tips).reshape(-1, 3) * 1e-3, np.array(self.axes).reshape(-1, 3)
         moved = np.ones(len(tips), dtype=np.bool_)
@@ -88,19 +108,30 @@ class Moves:
         feeds, powers = np.array(self.feeds)[rows], np.array(self.powers)[rows]
         kinds = [self.kinds[row] for row in rows]
         dwells = self._dwells(np.cumsum(moved) - 1, len(rows))
+        words: dict[int, tuple[str, ...]] = {}
+        for pose, said in sorted(self.words.items()):
+            at = max(int(np.searchsorted(rows, pose)), 1)
+            words[at] = (*words.get(at, ()), *said)
         breaks = [1]
         for k in range(2, len(rows)):
             same_feed = feeds[k] == feeds[k - 1] or abs(feeds[k] - feeds[k - 1]) <= SAME_FEED * feeds[k - 1]
             same = kinds[k] == kinds[k - 1] and same_feed and powers[k] == powers[k - 1]
-            if not same or dwells[k - 1] is not None:
+            if not same or dwells[k - 1] is not None or k in words:
                 breaks.append(k)
         segments = [
             Segment(
-                kinds[a], tips[rows[a - 1 : b]], axes[rows[a - 1 : b]], feeds[a] / 6e4, float(powers[a]), dwells[b - 1]
+                kinds[a],
+                tips[rows[a - 1 : b]],
+                axes[rows[a - 1 : b]],
+                feeds[a] / 6e4,
+                float(powers[a]),
+                dwells[b - 1],
+                words.get(a, ()),
             )
             for a, b in pairwise([*breaks, len(rows)])
         ]
-        return Toolpath(tuple(segments), tilt_centre, self.wait + (dwells[0] or 0.0))
+        wait = self.wait + (dwells[0] or 0.0)
+        return Toolpath(tuple(segments), tilt_centre, wait, words.get(len(rows), ()), notes)
 
     def _dwells(self, owner: Ints, count: int) -> list[float | None]:
         """Return the dwells of the `count` poses that are kept. owner: the kept pose that each pose repeats, or is."""

@@ -29,6 +29,9 @@ _FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
 }
 """Kinds of numbers, as NumPy names them, and shape of each array."""
 
+_WORDS = "toolpath.words"
+"""(S + 1,): what is said before each segment and after the last, a word a line; only where something is."""
+
 
 def toolpath_arrays(toolpath: Toolpath) -> dict[str, NDArray[Any]]:
     """Return the arrays of a toolpath, workpiece frame; a segment's first waypoint is its start.
@@ -45,7 +48,9 @@ def toolpath_arrays(toolpath: Toolpath) -> dict[str, NDArray[Any]]:
         np.array([s.power for s in toolpath.segments]),
         np.array([np.nan if dwell is None else dwell for dwell in toolpath.dwells]),
     )
-    return {f"toolpath.{name}": value for name, value in zip(_FORMS, values, strict=True)}
+    arrays = {f"toolpath.{name}": value for name, value in zip(_FORMS, values, strict=True)}
+    said = (*(s.words for s in toolpath.segments), toolpath.end_words)
+    return {**arrays, _WORDS: np.array(["\n".join(words) for words in said])} if any(said) else arrays
 
 
 def _read(file: Path, defaults: Defaults) -> Toolpath:
@@ -53,19 +58,21 @@ def _read(file: Path, defaults: Defaults) -> Toolpath:
     # The end of the file alone shows whether it is an archive, before all of it is read.
     if file.is_file() and not zipfile.is_zipfile(file):
         raise ToolpathError("not a NumPy archive, or cut off", file=file, expected="an .npz file")
-    found = read_arrays(file, [f"toolpath.{name}" for name in _FORMS], ToolpathError)
+    found = read_arrays(file, [f"toolpath.{name}" for name in _FORMS], ToolpathError, [_WORDS])
     arrays = {name: found[f"toolpath.{name}"] for name in _FORMS}
     for name, values in arrays.items():
         check_array(values, f"toolpath.{name}", file, ToolpathError, *_FORMS[name])
+    if _WORDS in found:
+        check_array(found[_WORDS], _WORDS, file, ToolpathError, "U", (len(arrays["segment_kinds"]) + 1,))
     try:
-        return _toolpath(arrays)
+        return _toolpath(arrays, [tuple(text.split("\n")) if text else () for text in found.get(_WORDS, ())])
     except InputError as error:
         raise ToolpathError(error.what, file=file, key=error.key, value=error.value, expected=error.expected) from error
     except (ValueError, TypeError, IndexError, OverflowError) as error:
         raise ToolpathError("the arrays do not make a toolpath", file=file, expected=", ".join(_FORMS)) from error
 
 
-def _toolpath(arrays: dict[str, NDArray[Any]]) -> Toolpath:
+def _toolpath(arrays: dict[str, NDArray[Any]], words: list[tuple[str, ...]]) -> Toolpath:
     tips, axes = arrays["tips_mm"] / _MM, arrays["axes"]
     starts = arrays["segment_starts"].astype(np.intp)
     kinds, feeds, powers = arrays["segment_kinds"], arrays["segment_feeds_mm_min"] / _MM_MIN, arrays["segment_powers"]
@@ -73,11 +80,14 @@ def _toolpath(arrays: dict[str, NDArray[Any]]) -> Toolpath:
     fits = len(starts) - 1 == len(kinds) == len(feeds) == len(powers) == len(dwells) - 1
     if not fits or starts[0] != 0 or starts[-1] != len(tips) - 1:
         raise ToolpathError("the segments do not fit the waypoints", key="toolpath.segment_starts")
+    words = words or [()] * (len(kinds) + 1)
     segments = [
-        Segment(SegmentKind(str(kind)), tips[a : b + 1], axes[a : b + 1], float(feed), float(power), dwell)
-        for kind, feed, power, dwell, (a, b) in zip(kinds, feeds, powers, dwells[1:], pairwise(starts), strict=True)
+        Segment(SegmentKind(str(kind)), tips[a : b + 1], axes[a : b + 1], float(feed), float(power), dwell, said)
+        for kind, feed, power, dwell, said, (a, b) in zip(
+            kinds, feeds, powers, dwells[1:], words[:-1], pairwise(starts), strict=True
+        )
     ]
-    return Toolpath(tuple(segments), float(arrays["tilt_centre_mm"].item()) / _MM, dwells[0] or 0.0)
+    return Toolpath(tuple(segments), float(arrays["tilt_centre_mm"].item()) / _MM, dwells[0] or 0.0, words[-1])
 
 
 def _write(toolpath: Toolpath) -> bytes:

@@ -16,10 +16,14 @@ MOST_BYTES = 500_000_000
 """Largest file that is read; ten million waypoints need less."""
 
 
-def read_lines(file: Path, what: str = "a toolpath", most: int = MOST_BYTES) -> list[str]:
+def read_lines(
+    file: Path, what: str = "a toolpath", most: int = MOST_BYTES, *, has_end_mark: bool = False
+) -> list[str]:
     """Return the lines of a UTF-8 text file. Raises ToolpathError: missing, empty, too large, not text, truncated.
 
-    what: the kind of file, for messages; most: bytes. A last line without its end counts as truncated.
+    what: the kind of file, for messages; most: bytes. A last line without its end counts as truncated. has_end_mark:
+    the language has a word for the end, which the caller looks for: the last line needs no end then, and comments may
+    be in Latin-1, as older programs write them.
     """
     data = read_bytes(file, ToolpathError, what, most)
     if not data.strip(b" \t\r\n\0"):
@@ -32,14 +36,22 @@ def read_lines(file: Path, what: str = "a toolpath", most: int = MOST_BYTES) -> 
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
+        if has_end_mark:
+            return _lines(data.decode("latin-1"), file, has_end_mark=True)
         line = data.count(b"\n", 0, error.start) + 1
         value = data[error.start : error.start + 1]
         raise ToolpathError("not UTF-8 text", file=file, line=line, value=value, remedy="save it as UTF-8") from error
+    return _lines(text, file, has_end_mark=has_end_mark)
+
+
+def _lines(text: str, file: Path, *, has_end_mark: bool) -> list[str]:
     if not text.endswith("\n"):
-        raise ToolpathError(
-            "the last line has no end: the file was cut off", file=file, line=text.count("\n") + 1,
-            remedy="export it again, or end the last line",
-        )  # fmt: skip
+        if not has_end_mark:
+            raise ToolpathError(
+                "the last line has no end: the file was cut off", file=file, line=text.count("\n") + 1,
+                remedy="export it again, or end the last line",
+            )  # fmt: skip
+        text += "\n"
     lines = text.replace("\r\n", "\n").split("\n")[:-1]
     if "\r" in text and (odd := next((k for k, line in enumerate(lines, start=1) if "\r" in line), None)):
         raise ToolpathError("a carriage return within a line", file=file, line=odd, remedy="end lines with a line feed")
@@ -93,6 +105,6 @@ class StatementReader:
         """Return the error of a word in a line of the file."""
         return self.moves.wrong(what, line, word, **details)
 
-    def gathered(self) -> Toolpath:
-        """Return the toolpath of all moves."""
-        return self.moves.toolpath(self.defaults.tilt_centre if self.tilt_centre is None else self.tilt_centre)
+    def gathered(self, notes: tuple[str, ...] = ()) -> Toolpath:
+        """Return the toolpath of all moves. notes: how the file was read."""
+        return self.moves.toolpath(self.defaults.tilt_centre if self.tilt_centre is None else self.tilt_centre, notes)

@@ -9,21 +9,30 @@ from pathlib import Path
 from pentapod.base.errors import ToolpathError, nearest
 from pentapod.base.files import atomic_write
 from pentapod.base.values import Value
+from pentapod.toolpath.formats.rotary import RotaryAxes
 from pentapod.toolpath.toolpath import Toolpath
 
 
 @dataclass(frozen=True)
 class Defaults:
-    """Values for what a file does not give: tilt_centre in metres, feed in m/s."""
+    """Values for what a file does not give: tilt_centre in metres, feed in m/s.
+
+    chordal: largest distance of a chord from an arc, metres. rotary: the rotary axes of the machine for which the file
+    was made; None for the usual ones. tool: read the moves of this tool only.
+    """
 
     tilt_centre: float = 0.0
     feed: float | None = None
+    chordal: float = 10e-6
+    rotary: RotaryAxes | None = None
+    tool: str | None = None
 
 
 @dataclass(frozen=True)
 class Format(Value):
     """A file format. suffixes: lower case. loses: properties of a toolpath that it has no words for.
 
+    names_machine: the reader takes rotary axes and a tool (`Defaults`).
     read: file → Toolpath, in metres, workpiece frame; raises ToolpathError with file, line and word.
     write: Toolpath → bytes; the same toolpath gives the same bytes.
     """
@@ -34,6 +43,7 @@ class Format(Value):
     read: Callable[[Path, Defaults], Toolpath]
     write: Callable[[Toolpath], bytes]
     loses: frozenset[str] = frozenset()
+    names_machine: bool = False
 
 
 FORMATS: dict[str, Format] = {}
@@ -59,15 +69,28 @@ def format_of(path: str | Path, name: str | None = None) -> Format:
 
 
 def read_toolpath(
-    path: str | Path, format_name: str | None = None, *, tilt_centre: float = 0.0, feed: float | None = None
+    path: str | Path,
+    format_name: str | None = None,
+    *,
+    tilt_centre: float = 0.0,
+    feed: float | None = None,
+    chordal: float = 10e-6,
+    rotary: RotaryAxes | None = None,
+    tool: str | None = None,
 ) -> Toolpath:
     """Return the toolpath of a file, workpiece frame, metres. Without a name the suffix decides on the format.
 
-    tilt_centre: metres, for formats without it (see `Toolpath`); feed: m/s, of moves without one. Raises ToolpathError
-    with file, line and word for anything that is not understood: nothing is guessed or left out.
+    tilt_centre: metres, for formats without it (see `Toolpath`); feed: m/s, of moves without one; chordal: metres by
+    which chords leave arcs. For G-code only: rotary: the rotary axes for which the file was made; tool: read the moves
+    of this tool only. Raises ToolpathError with file, line and word for anything that is not understood; `others` holds
+    what else is wrong in the file. What was left out, such as moves to the home position, is in `notes`.
     """
     file = Path(path)
-    return format_of(file, format_name).read(file, Defaults(tilt_centre, feed))
+    form = format_of(file, format_name)
+    for key, value in (("rotary_axes", rotary), ("tool", tool)):
+        if value is not None and not form.names_machine:
+            raise ToolpathError("only G-code takes this", file=file, key=key, value=value, remedy="leave it out")
+    return form.read(file, Defaults(tilt_centre, feed, chordal, rotary, tool))
 
 
 def write_toolpath(toolpath: Toolpath, path: str | Path, format_name: str | None = None) -> Path:

@@ -1,0 +1,1 @@
+"""Words of G-code: how controllers write them, and what they mean."""

@@ -1,0 +1,122 @@
+"""Words of G-code as Fanuc, LinuxCNC and their relatives write it: a letter and a number."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import NamedTuple
+
+from pentapod.base.errors import ToolpathError
+
+_WORD = re.compile(r"([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
+_SUBPROGRAM = re.compile(r"O\s*(?:<|[0-9]+\s*[A-Z<\[])")
+_SKIP = re.compile(r"/[0-9]?")
+_LONGEST_SHOWN = 20
+"""Characters of a word that a message shows."""
+
+
+class Word(NamedTuple):
+    """A word of a block: G1, X12.5, or a command with its arguments, such as CYCLE800(…), whose value is NaN.
+
+    how: how the value is meant where the word says it: AC, IC, DC, ACP or ACN. arguments: those of a command, as text.
+    """
+
+    address: str
+    value: float
+    how: str = ""
+    arguments: tuple[str, ...] = ()
+    text: str = ""
+
+    def __str__(self) -> str:
+        return self.text or f"{self.address}{self.value:g}"
+
+
+class Block(NamedTuple):
+    """The words of a line. skippable: it begins with a slash. comments: those of the line."""
+
+    line: int
+    words: list[Word]
+    skippable: bool = False
+    comments: tuple[str, ...] = ()
+
+
+Wrong = Callable[..., ToolpathError]
+"""Makes the error of a word: what, line, word."""
+
+
+def plain_block(text: str, line: int, wrong: Wrong) -> Block:
+    """Return the words of a line. Raises ToolpathError for anything but words with numbers, and for other scripts."""
+    comments: tuple[str, ...] = ()
+    if "(" in text or ";" in text or ")" in text:
+        text, comments = _without_comments(text, line, wrong)
+    code = ascii_only(text, line, wrong).upper().strip()
+    skippable = code.startswith("/")
+    if skippable:
+        code = _SKIP.sub("", code, count=1).strip()
+    if _SUBPROGRAM.match(code):
+        raise wrong(
+            "a loop or subprogram of the controller: the path depends on what it computes", line, code[:_LONGEST_SHOWN],
+            remedy="export without subprograms",
+        )  # fmt: skip
+    words: list[Word] = []
+    position, end = 0, len(code)
+    while position < end:
+        if code[position].isspace():
+            position += 1
+            continue
+        match = _WORD.match(code, position)
+        if match is None:
+            raise _no_word(code[position:].split(maxsplit=1)[0][:_LONGEST_SHOWN], line, wrong)
+        words.append(Word(match[1], float(match[2]), text=match[0]))
+        position = match.end()
+    return Block(line, words, skippable, comments)
+
+
+def ascii_only(text: str, line: int, wrong: Wrong) -> str:
+    """Return a text. Raises ToolpathError where it holds other letters than those of commands.
+
+    Capitals of some letters of other scripts are letters of commands.
+    """
+    if not text.isascii():
+        letter = next(letter for letter in text if not letter.isascii())
+        raise wrong("a letter or digit that G-code does not have", line, letter)
+    return text
+
+
+def _no_word(text: str, line: int, wrong: Wrong) -> ToolpathError:
+    if "#" in text or "[" in text:
+        what = "a variable or an expression: its value is known to the controller only"
+        return wrong(what, line, text, remedy="export numbers")
+    if text.startswith(","):
+        what = "a corner that the controller rounds or cuts off"
+        return wrong(what, line, text, remedy="export the arc or the line itself")
+    if "=" in text or text.startswith(("CYCLE", "TRA", "SUPA", "MSG")):
+        what = "not a word with a number"
+        return wrong(what, line, text, remedy='for a program of Sinumerik give format = "sinumerik"')
+    return wrong("not a word with a number", line, text, expected="words such as X12.5; no expressions")
+
+
+def _without_comments(text: str, line: int, wrong: Wrong) -> tuple[str, tuple[str, ...]]:
+    """Return a line without what stands in parentheses or after a semicolon, and these comments."""
+    kept: list[str] = []
+    comments: list[str] = []
+    depth = start = 0
+    for position, letter in enumerate(text):
+        if letter == "(":
+            if depth == 0:
+                kept.append(text[start:position])
+                start = position + 1
+            depth += 1
+        elif letter == ")":
+            depth -= 1
+            if depth < 0:
+                break
+            if depth == 0:
+                comments.append(text[start:position])
+                start = position + 1
+        elif letter == ";" and depth == 0:
+            kept.append(text[start:position])
+            return "".join(kept), (*comments, text[position + 1 :])
+    if depth:
+        raise wrong("a comment that does not end, or did not begin", line, "(" if depth > 0 else ")")
+    return "".join([*kept, text[start:]]), tuple(comments)
