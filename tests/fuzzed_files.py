@@ -126,6 +126,15 @@ def _spline_dxf():
     return text.getvalue().encode()
 
 
+_ROTARY = {
+    "table_table_no_tcp.nc": ["table C", "table A"],
+    "head_head_no_tcp.nc": ["head C", "head A"],
+    "head_table_no_tcp.nc": ["table C", "head B"],
+    "linuxcnc_dual_table.ngc": ["table A", "table B"],
+    "indexed_a.nc": ["table A"],
+}
+"""The rotary axes that files of CAM systems need, by name."""
+
 _SVG = b"""<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="50mm" viewBox="0 0 100 50">
 <style>.a{display:none} #b{transform:rotate(3)}</style><g id="g" transform="translate(2,3) rotate(4)">
 <path d="M 1 2 L 3 4 C 5 6 7 8 9 1 S 3 4 5 6 Q 1 2 3 4 T 5 6 A 3 4 10 0 1 20 20 Z"/><circle cx="9" cy="8" r="7"/>
@@ -175,6 +184,7 @@ def readers():
     from pentapod.program.posts import read_post
     from pentapod.toolpath import load_mesh, read_darkness, read_lines, read_points
     from pentapod.toolpath.formats import read_toolpath
+    from pentapod.toolpath.formats.rotary import RotaryAxes
     from usual_job import job_text
 
     library = Path(sys.modules["pentapod.machine"].__path__[0]) / "library" / "desk.toml"
@@ -194,9 +204,17 @@ def readers():
         found[name] = (lambda folder, n=name: read_darkness(folder / n), {name: _picture(form)})
     points = b"# points = 4\nline,x_mm,y_mm,z_mm\na,1,2,3\na,2.5,2e0,3\nb,0,0,0\nb,1,1,-1\n"
     found["points.csv"] = (lambda folder: read_points(folder / "points.csv"), {"points.csv": points})
-    for suffix in (".csv", ".npz", ".apt", ".ngc", ".nc", ".robodk.csv"):
+    for suffix in (".csv", ".npz", ".apt", ".ngc", ".nc", ".mpf", ".robodk.csv"):
         name = "path" + suffix
         found[name] = (lambda folder, n=name: read_toolpath(folder / n, feed=0.01), {name: _toolpath(suffix)})
+    for path in sorted((Path(__file__).parent / "toolpath" / "formats" / "cam").iterdir()):
+        if not path.name.startswith("refused"):
+            rotary = _ROTARY.get(path.name)
+            axes = None if rotary is None else RotaryAxes.of(rotary, (0.0, 0.0, 0.0), 0.1)
+            found[path.name] = (
+                lambda folder, n=path.name, r=axes: read_toolpath(folder / n, feed=0.01, rotary=r),
+                {path.name: path.read_bytes()},
+            )
     files = _post("csv")
     found["program.csv"] = (lambda folder, n=next(iter(files)): read_csv(folder / n), files)
     for post in ("npz", "hdf5", "ros2-json", "ros2-yaml", "halstreamer"):

@@ -165,6 +165,11 @@ def wedge_arc():
     return np.array([on_wedge(*p) for p in flat])
 
 
+def on_offset(x, y):
+    """Height of the tip of a ball cutter of 6 mm on the ball of 40 mm."""
+    return np.sqrt(43.0**2 - x * x - y * y) - 3.0
+
+
 INCH = 25.4
 RELIEF = [
     [x, 0.1 * row, -0.02 * (1 - np.cos(2 * np.pi * x)) / 2 - 0.001 * row]
@@ -253,6 +258,10 @@ EXPECTED = {
     "router.gcode": [[line((1, 1, 5), (1, 1, -0.5), (11, 1, -0.5), (11, 11, -0.5), (1, 11, -0.5), (1, 1, -0.5))]],
     "feeds.nc": [
         [line((0, 0, 5), (0, 0, 0), (10, 0, 0)), arc((10, 10, 0), 10, -90, 90), line((20, 30, 0), (0, 30, 0))],
+    ],
+    "ball_three_axes.nc": [
+        [line(*([x, y, z] for x, z in ((-side * 24, 45), *((-side * k, on_offset(k, y)) for k in range(24, -25, -2)))))]
+        for y, side in ((-20, 1), (-10, -1), (0, 1), (10, -1), (20, 1))
     ],
     "drilling.nc": [
         *([line((x, y, 2), (x, y, -5))] for x, y in ((10, 10), (20, 10), (20, 20), (10, 20))),

@@ -21,8 +21,8 @@ def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet
     """Write the toolpath of JOB.toml, without machine, placement and time law.
 
     Formats: apt (.apt .cls .cl .cldata), xyzab G-code of LinuxCNC's pentakins (.ngc), xyzbc G-code with G43.4 (.nc
-    .tap), both also as xyzab-g93 and xyzbc-g93 with inverse time feed, robodk (.robodk.csv), csv, npz. Axes point
-    from the tip to the spindle; the frame is that of the workpiece.
+    .tap), both also as xyzab-g93 and xyzbc-g93 with inverse time feed, sinumerik (.mpf), robodk (.robodk.csv), csv,
+    npz. Axes point from the tip to the spindle; the frame is that of the workpiece.
     """
     from pentapod.geometry import arc_length
     from pentapod.job.build.toolpath import job_toolpath

@@ -53,7 +53,7 @@ class Arc:
         radius = max(self.radii)
         if radius <= tolerance:
             return max(2, math.ceil(abs(self.sweep) / (0.5 * math.pi)))
-        step = 2.0 * math.acos(1.0 - tolerance / radius)
+        step = max(2.0 * math.acos(1.0 - tolerance / radius), 1e-12)
         return max(1, math.ceil(min(abs(self.sweep) / step - 1e-9, 1e12)))
 
 

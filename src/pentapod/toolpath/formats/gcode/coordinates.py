@@ -27,16 +27,20 @@ class Pose(NamedTuple):
 class Coordinates:
     """What the program's coordinates mean. Millimetres and degrees.
 
-    chain: the rotary axes of the machine. tcp: tool centre point programming is on. place: coordinates by letter, the
-    linear ones only where they are known. frame: a turned frame. fixed: the tool axis where it is not given by rotary
-    words (G53.1, vectors). shift: of G52 and G92. system: G54 and the like; offsets: where the file gives them.
+    chain: the rotary axes of the machine; named: letters of those in the file. tcp: tool centre point programming is
+    on. place: coordinates by letter, the linear ones only where they are known. frame: a turned frame. fixed: the tool
+    axis where it is not given by rotary words (G53.1, vectors). lost: rotary axes whose angle is not known, as the
+    controller found it (G53.1). shift: of G52 and G92. system: G54 and the like; offsets: where the file gives them.
+    first_system: the one in which the tool moved first, and its offset then.
     """
 
     chain: RotaryAxes
+    named: frozenset[str] = frozenset()
     tcp: bool = False
     place: dict[str, float] = field(default_factory=lambda: dict.fromkeys(LETTERS, 0.0))
     frame: Frame | None = None
     fixed: Vector | None = None
+    lost: frozenset[str] = frozenset()
     shift: Vector = _ORIGIN
     system: str = "G54"
     offsets: dict[str, Vector] = field(default_factory=dict[str, Vector])
@@ -57,13 +61,11 @@ class Coordinates:
         for letter in letters:
             self.place.pop(letter, None)
 
-    def axis(self, place: Mapping[str, float]) -> Vector:
-        """Return the tool axis at a place."""
-        return self.chain.axis(place) if self.fixed is None else self.fixed
-
     def pose(self, place: Mapping[str, float]) -> Pose | None:
         """Return the pose against the part; None where that depends on the machine, or a coordinate is not known."""
-        if any(letter not in place for letter in LINEAR) or (base := self._base()) is None:
+        if "X" not in place or "Y" not in place or "Z" not in place or (base := self._base()) is None:
+            return None
+        if self.lost and self.fixed is None:
             return None
         point: Vector | None = xyz(place)
         if self.frame is not None:
@@ -72,7 +74,7 @@ class Coordinates:
             point = None if self.fixed is not None else self.chain.tip(point, place)
         if point is None:
             return None
-        return Pose((point[0] + base[0], point[1] + base[1], point[2] + base[2]), self.axis(place))
+        return Pose((point[0] + base[0], point[1] + base[1], point[2] + base[2]), self.fixed or self.chain.axis(place))
 
     def why_unknown(self) -> tuple[str, str]:
         """Return why there is no pose, and the remedy."""
@@ -84,6 +86,8 @@ class Coordinates:
         if self._base() is None and self.first_system is not None:
             what = f"moves in {self.system} after moves in {self.first_system[0]}: the file does not say how far apart"
             return what, "export a file for each of them, or write their offsets into the file (G10 L2)"
+        if self.lost and self.fixed is None:
+            return f"the angle of {', '.join(sorted(self.lost))} is not known after G53.1", "give all rotary axes"
         if self.fixed is not None:
             return "the tool was turned by G53.1, and its frame is off", "cut in the frame, or with G43.4"
         return (
@@ -113,6 +117,7 @@ class Coordinates:
         self.frame = frame
         if oriented and frame is not None:
             self.fixed = frame.axis if math.dist(frame.axis, (0.0, 0.0, 1.0)) > 1e-12 else None
+            self.lost = self.named if self.fixed is not None else frozenset()
             self.place.update(dict.fromkeys(LETTERS, 0.0))
         base = self._base()
         upright = not oriented and (self.tcp or frame is not None or not self.tilted)

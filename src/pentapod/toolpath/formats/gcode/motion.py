@@ -82,14 +82,13 @@ def axis_targets(tracer: Tracer, words: Mapping[str, Word], line: int) -> dict[s
         if not abs(value) <= OPTIONS.farthest:
             raise tracer.wrong("a number beyond any machine", line, str(word)[:40])
         if word.how == "IC" or (not word.how and not tracer.modes.absolute):
-            if letter in place:
+            if letter in place and letter not in tracer.at.lost:
                 target[letter] = place[letter] + value
         elif linear:
             target[letter] = value
         else:
             target[letter] = place[letter] + _turn(place[letter], value, word.how)
-    if tracer.at.fixed is not None and any(letter not in LINEAR for letter in target):
-        tracer.at.fixed = None
+            tracer.turn_known(letter)
     return target
 
 

@@ -40,6 +40,8 @@ _ONCE: dict[float, Callable[[Tracer, _Words, int], None]] = {
 }  # fmt: skip
 """Codes that take the axis words of their block."""
 _HOME_NAMES = frozenset({"SUPA", "G153"})
+_LARGEST = 1e12
+"""Largest number of a word."""
 _ORIENT, _ORIENT_AND_MOVE = frozenset({53.1, 53.3, 53.6}), 53.3
 _TCP, _VECTOR_TCP = frozenset({43.4, 43.5, 234.0}), 43.5
 _DWELL, _STOP, _SMOOTHING = 4.0, 9.0, 187.0
@@ -62,7 +64,7 @@ class GCodeReader(StatementReader):
         lines = read_lines(self.file, has_end_mark=True)
         scan = Scan.of(lines, self.dialect)
         chain = self.defaults.rotary or scan.usual(self.dialect, self.file)
-        at = Coordinates(chain, tcp=scan.begins_with_tcp(self.dialect))
+        at = Coordinates(chain, scan.named, tcp=scan.begins_with_tcp(self.dialect))
         self.modes = Modes(self.dialect)
         self.tracer = Tracer(self.moves, at, self.modes, self.defaults)
         self.drill = Drill(self.tracer)
@@ -117,6 +119,9 @@ class GCodeReader(StatementReader):
             return
         if block.skippable:
             self.tracer.tell("skip", line)
+        for word in block.words:
+            if abs(word.value) > _LARGEST:
+                raise self.wrong("a number beyond any machine", line, word.address)
         codes = [round(word.value, 3) for word in block.words if word.address == "G"]
         names = [word for word in block.words if math.isnan(word.value) and word.address != "T"]
         words: dict[str, Word] = {}

@@ -15,7 +15,6 @@ from pentapod.toolpath.formats.gcode.language.options import OPTIONS
 from pentapod.toolpath.formats.gcode.modes import Modes
 from pentapod.toolpath.formats.moves import Moves
 from pentapod.toolpath.formats.registry import Defaults
-from pentapod.toolpath.formats.rotary import LETTERS
 from pentapod.toolpath.toolpath import SegmentKind
 
 
@@ -29,7 +28,8 @@ class Tracer:
 
     here: the pose, None where it is not known: before the first one, at home, or in moves that were left out. lifts:
     indices of the poses that are reached over the part. tool: the one in the spindle. swivel, programmed: the frame of
-    G68.2 or CYCLE800, and within it that of G68 or ROT. told: lines of what a user should know, by what it is.
+    G68.2 or CYCLE800, and within it that of G68 or ROT. jump: the angles at the start of the next move are not known.
+    told: lines of what a user should know, by what it is.
     """
 
     moves: Moves
@@ -39,6 +39,7 @@ class Tracer:
     kind: SegmentKind = SegmentKind.CUT
     exact: bool = False
     here: Pose | None = None
+    jump: bool = False
     lifts: list[int] = field(default_factory=list[int])
     tool: str = ""
     tools: dict[str, int] = field(default_factory=dict[str, int])
@@ -69,17 +70,25 @@ class Tracer:
             if letter in LINEAR:
                 self.at.forget(letter)
             else:
-                self.at.place[letter], self.at.fixed = 0.0, None
+                self.at.place[letter] = 0.0
+                self.turn_known(letter)
         self.here = None
         self.tell("home", line)
+
+    def turn_known(self, letter: str) -> None:
+        """Take the angle of a rotary axis as known: the file gives it."""
+        self.jump = self.jump or self.at.fixed is not None
+        self.at.fixed = None
+        self.at.lost -= {letter}
 
     def rapid(self, target: Mapping[str, float], line: int, word: str) -> None:
         """Move on rapid; left out where the place is not known, the way to the next one then leads over the part."""
         self.at.place.update(target)
+        self.jump = False
         pose = self.at.pose(self.at.place)
         if pose is None:
             self.here = None
-            if self.moves.tips:
+            if self.moves.tips and not self.at.unknown:
                 self.tell("positioning", line)
             return
         self._arrive(pose, line, word)
@@ -99,7 +108,8 @@ class Tracer:
                 raise self.wrong("an arc from an unknown place", line, word, "give all axes before it")
             self._arrive(pose, line, word)
             return
-        poses = self._chords(start, arc, line, word)
+        poses = self._chords(self.here, pose, start, arc, line, word)
+        self.jump = False
         tips = [self.here.tip, *(p.tip for p in poses)]
         length = sum(math.dist(a, b) for a, b in itertools.pairwise(tips))
         speed = self._speed(length, line, own_feed=own_feed)
@@ -129,7 +139,9 @@ class Tracer:
     def _other_tool(self) -> bool:
         return self.defaults.tool is not None and self.tool != self.defaults.tool
 
-    def _chords(self, start: Mapping[str, float], arc: Arc | None, line: int, word: str) -> list[Pose]:
+    def _chords(
+        self, first: Pose, last: Pose, start: Mapping[str, float], arc: Arc | None, line: int, word: str
+    ) -> list[Pose]:
         """Return the poses of a move, without its start."""
         end = self.at.place
 
@@ -145,9 +157,13 @@ class Tracer:
         count = 1 if arc is None else arc.chords(1e3 * self.defaults.chordal)
         if count > OPTIONS.chords:
             raise self.wrong(f"a move of more than {OPTIONS.chords:,} chords", line, word, "give a larger chordal_mm")
-        turning = self.at.fixed is None and any(start[letter] != end[letter] for letter in LETTERS)
-        if not turning or self.exact:
-            return [place((k + 1) / count) for k in range(count)]
+        turning = (
+            not (self.jump or self.exact)
+            and self.at.fixed is None
+            and (start["A"] != end["A"] or start["B"] != end["B"] or start["C"] != end["C"])
+        )
+        if not turning or (count == 1 and self._straight(first, place(0.5), last)):
+            return [*(place((k + 1) / count) for k in range(count - 1)), last]
         return self._refined(place, count, line, word)
 
     def _refined(self, place: Callable[[float], Pose], count: int, line: int, word: str) -> list[Pose]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from pentapod.base.errors import ToolpathError
 
-_WORD = re.compile(r"([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
+_WORD = re.compile(r"\s*([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
 _SUBPROGRAM = re.compile(r"O\s*(?:<|[0-9]+\s*[A-Z<\[])")
 _SKIP = re.compile(r"/[0-9]?")
 _LONGEST_SHOWN = 20
@@ -61,13 +61,10 @@ def plain_block(text: str, line: int, wrong: Wrong) -> Block:
     words: list[Word] = []
     position, end = 0, len(code)
     while position < end:
-        if code[position].isspace():
-            position += 1
-            continue
         match = _WORD.match(code, position)
         if match is None:
             raise _no_word(code[position:].split(maxsplit=1)[0][:_LONGEST_SHOWN], line, wrong)
-        words.append(Word(match[1], float(match[2]), text=match[0]))
+        words.append(Word(match[1], float(match[2]), text=match[0].lstrip()))
         position = match.end()
     return Block(line, words, skippable, comments)
 
