@@ -337,6 +337,48 @@ def test_files_that_depend_on_the_controller_are_refused(name):
     assert all("\n" not in str(error) and name in str(error) for error in every)
 
 
+def test_unit_tool_and_machine_are_asked_for_and_taken(tmp_path):
+    file = tmp_path / "two.ngc"
+    text = "G90 F100\nT1 M6\nG0 X0 Y0 Z1\nG1 Z0\nX1\nG0 Z1\nT2 M6\nG0 X2\nG1 Z0\nX3\nG0 Z1\nM2\n"
+    file.write_text(text)
+    with pytest.raises(ToolpathError, match=r'two\.ngc:3: X: the unit is missing; expected G20 or G21 .*unit = "mm"'):
+        read_toolpath(file)
+    both = read_toolpath(file, unit="inch")
+    assert any("2 tools cut: 1 (from line 4), 2 (from line 9)" in note for note in both.notes)
+    second = read_toolpath(file, unit="inch", tool="2")
+    np.testing.assert_allclose(runs(second)[0], np.array([[2, 0, 1], [2, 0, 0], [3, 0, 0]]) * INCH)
+    assert len(runs(second)) == 1
+    file.write_text(text.replace("X3", "X3 A20 B10").replace("X2", "X2 A10 B5").replace("M2", "#5=1\nM428"))
+    with pytest.raises(ToolpathError, match="rotary axes A and B: which of them") as caught:
+        read_toolpath(file, unit="mm")
+    assert [error.line for error in caught.value.others] == [12, 13]  # the variable, and the missing end
+    (tmp_path / "a.apt").write_text("FINI\n")
+    with pytest.raises(ToolpathError, match=r"rotary_axes: only G-code takes this"):
+        read_toolpath(tmp_path / "a.apt", rotary=MACHINES["indexed_a.nc"])
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (["table C", "desk A"], "unknown rotary axis"),
+        (["head C", "table A"], "a table behind a head"),
+        (["table C", "head C"], "a rotary axis is there twice"),
+    ],
+)
+def test_rotary_axes_that_no_machine_has(names, words):
+    with pytest.raises(ToolpathError, match=words):
+        RotaryAxes.of(names)
+
+
+def test_a_problem_is_told_once_with_all_its_lines(tmp_path):
+    file = tmp_path / "a.nc"
+    file.write_text("G21 G90 F100\nG0 X0 Y0 Z0\n" + "G41 D1\nG1 X1\nG40\n" * 9 + "M98 P1\nM30\n")
+    with pytest.raises(ToolpathError) as caught:
+        read_toolpath(file)
+    assert str(caught.value).endswith("(also in lines 6, 9, 12, 15, 18, 21 and 2 more)")
+    assert [error.key for error in caught.value.others] == ["M98"]
+
+
 def test_nearly_all_files_are_read():
     files = sorted(path.name for path in CAM.iterdir())
     assert files == sorted({*DOMES, *EXPECTED, *REFUSED})

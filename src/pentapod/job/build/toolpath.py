@@ -206,7 +206,7 @@ def _read(job: Job, tool: Tool) -> tuple[Toolpath, str]:
     rotary = RotaryAxes.of(keys.rotary_axes, keys.si.rotary_centre, keys.si.pivot) if keys.rotary_axes else None
     read = read_toolpath(
         file, keys.format, tilt_centre=tool.tilt_centre, feed=job.feed.si.cut, chordal=job.tolerance.si.chordal,
-        rotary=rotary, tool=keys.tool,
+        rotary=rotary, tool=keys.tool, unit=keys.unit,
     )  # fmt: skip
     # The job's tool is used, whatever tool the file names.
     read = dataclasses.replace(read, tilt_centre=tool.tilt_centre)

@@ -36,6 +36,9 @@ class FileOptions:
 
     file: Annotated[Path, Key("", "the toolpath (APT, G-code, CSV, npz), relative to this job file", kind=Path)]
     format: Annotated[str | None, Key("", "its format, where the suffix does not tell", min_length=1)] = None
+    unit: Annotated[Literal["mm", "inch"] | None, Key("", "unit of a G-code file that does not name it (G20, G21)")] = (
+        None
+    )
     rotary_axes: Annotated[
         tuple[str, ...],
         Key("", 'G-code: rotary axes of the file\'s machine, from the part to the tool: ["table C", "head A"]'),

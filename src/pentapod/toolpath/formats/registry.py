@@ -12,13 +12,16 @@ from pentapod.base.values import Value
 from pentapod.toolpath.formats.rotary import RotaryAxes
 from pentapod.toolpath.toolpath import Toolpath
 
+_UNITS = {"mm": 1.0, "inch": 25.4}
+
 
 @dataclass(frozen=True)
 class Defaults:
     """Values for what a file does not give: tilt_centre in metres, feed in m/s.
 
     chordal: largest distance of a chord from an arc, metres. rotary: the rotary axes of the machine for which the file
-    was made; None for the usual ones. tool: read the moves of this tool only.
+    was made; None for the usual ones. tool: read the moves of this tool only. scale: millimetres in the unit of a file
+    that does not name it.
     """
 
     tilt_centre: float = 0.0
@@ -26,6 +29,7 @@ class Defaults:
     chordal: float = 10e-6
     rotary: RotaryAxes | None = None
     tool: str | None = None
+    scale: float | None = None
 
 
 @dataclass(frozen=True)
@@ -77,20 +81,24 @@ def read_toolpath(
     chordal: float = 10e-6,
     rotary: RotaryAxes | None = None,
     tool: str | None = None,
+    unit: str | None = None,
 ) -> Toolpath:
     """Return the toolpath of a file, workpiece frame, metres. Without a name the suffix decides on the format.
 
     tilt_centre: metres, for formats without it (see `Toolpath`); feed: m/s, of moves without one; chordal: metres by
     which chords leave arcs. For G-code only: rotary: the rotary axes for which the file was made; tool: read the moves
-    of this tool only. Raises ToolpathError with file, line and word for anything that is not understood; `others` holds
-    what else is wrong in the file. What was left out, such as moves to the home position, is in `notes`.
+    of this tool only; unit: "mm" or "inch", of a file that does not name it. Raises ToolpathError with file, line and
+    word for anything that is not understood; `others` holds what else is wrong in the file. What was left out, such as
+    moves to the home position, is in `notes`.
     """
     file = Path(path)
     form = format_of(file, format_name)
-    for key, value in (("rotary_axes", rotary), ("tool", tool)):
+    for key, value in (("rotary_axes", rotary), ("tool", tool), ("unit", unit)):
         if value is not None and not form.names_machine:
             raise ToolpathError("only G-code takes this", file=file, key=key, value=value, remedy="leave it out")
-    return form.read(file, Defaults(tilt_centre, feed, chordal, rotary, tool))
+    if unit not in (None, *_UNITS):
+        raise ToolpathError("unknown unit", file=file, key="unit", value=unit, expected=" or ".join(_UNITS))
+    return form.read(file, Defaults(tilt_centre, feed, chordal, rotary, tool, _UNITS.get(unit or "")))
 
 
 def write_toolpath(toolpath: Toolpath, path: str | Path, format_name: str | None = None) -> Path:

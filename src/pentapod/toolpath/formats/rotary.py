@@ -135,6 +135,10 @@ class RotaryAxes(Value):
         return x, y, z
 
 
+ANY_AXES = RotaryAxes.of(["table C", "table B", "table A"])
+"""Every letter once: what to go on with where a machine is not known."""
+
+
 @dataclass(frozen=True)
 class Rotary:
     """words: the two letters. axis: angles (..., 2) in degrees → axes (..., 3). angles: axes (N, 3) → angles (N, 2)."""

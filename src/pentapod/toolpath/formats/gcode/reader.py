@@ -28,7 +28,7 @@ from pentapod.toolpath.formats.gcode.notes import notes
 from pentapod.toolpath.formats.gcode.switches import Switches
 from pentapod.toolpath.formats.gcode.tracer import TooManyError, Tracer
 from pentapod.toolpath.formats.reading import StatementReader, read_lines
-from pentapod.toolpath.formats.rotary import LETTERS
+from pentapod.toolpath.formats.rotary import ANY_AXES, LETTERS
 from pentapod.toolpath.toolpath import Toolpath
 
 _Words = Mapping[str, Word]
@@ -63,9 +63,13 @@ class GCodeReader(StatementReader):
         """Return the toolpath. Raises ToolpathError: the first problem of the file, the others in `others`."""
         lines = read_lines(self.file, has_end_mark=True)
         scan = Scan.of(lines, self.dialect)
-        chain = self.defaults.rotary or scan.usual(self.dialect, self.file)
+        try:
+            chain = self.defaults.rotary or scan.usual(self.dialect, self.file)
+        except ToolpathError as error:
+            self.problems.add(error)
+            chain = ANY_AXES
         at = Coordinates(chain, scan.named, tcp=scan.begins_with_tcp(self.dialect))
-        self.modes = Modes(self.dialect)
+        self.modes = Modes(self.dialect, self.defaults.scale)
         self.tracer = Tracer(self.moves, at, self.modes, self.defaults)
         self.drill = Drill(self.tracer)
         self.switches = Switches(self.tracer, self.problems, scan)
@@ -74,11 +78,11 @@ class GCodeReader(StatementReader):
             for line, text in enumerate(lines, start=1):
                 if self.switches.ended is None or text.strip():
                     self._line(text, line, block_of)
+            if self.switches.ended is None:
+                what = "M2 or M30 is missing: the file was cut off"
+                self.problems.add(self.wrong(what, len(lines), "M", expected="M2 or M30"))
         except TooManyError as error:
             self.problems.add(error)
-        if self.switches.ended is None and not self.problems.found:
-            what = "M2 or M30 is missing: the file was cut off"
-            self.problems.add(self.wrong(what, len(lines), "M", expected="M2 or M30"))
         self.problems.check()
         told = notes(self.tracer, self.moves)
         if self.moves.tips:
@@ -253,7 +257,8 @@ class GCodeReader(StatementReader):
         if not axes and not vector and not (self.modes.motion in (2.0, 3.0) and {"I", "J", "K"} & set(words)):
             return
         if self.modes.scale is None and any(letter in LINEAR for letter in axes):
-            raise self.wrong("the unit is missing", line, next(iter(axes)), expected=f"{self.dialect.units} before it")
+            expected = f'{self.dialect.units} before it, or unit = "mm" in [toolpath]'
+            raise self.wrong("the unit is missing", line, next(iter(axes)), expected=expected)
         target = axis_targets(self.tracer, axes, line)
         first = next(iter(axes), "I")
         if self.modes.cycle is not None:
