@@ -1,0 +1,185 @@
+"""Proposal: a job for a part, from its size and shape: unit, side, region, cutter, strategy and placement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import MeshError
+from pentapod.base.units import from_si
+from pentapod.base.values import Value
+from pentapod.geometry.directions import tangent_frame
+from pentapod.machine.machine import Machine
+from pentapod.machine.parts import WorkVolume
+from pentapod.mesh.io.load import UNITS, load_mesh
+from pentapod.mesh.io.registry import states_unit
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.patch import Patch
+from pentapod.mesh.region import Region
+
+
+@dataclass(frozen=True)
+class ProposalOptions:
+    """What is proposed. Lengths in mm, angles in degrees.
+
+    usual_mm: largest extents for which the unit mm is believed; else the unit whose part is nearest to the size of the
+    work volume is taken. diameters: of cutters; the largest that is not wider than `cutter` of the part is taken.
+    stepover: as a share of the diameter. steep_deg: slope from which surface counts as steep; waterlines where more
+    than `steep` of it is. sideways: by how much more of the surface another side must show than the top. backs: share
+    of an open surface that may face the top where it is turned over.
+    """
+
+    usual_mm: tuple[float, float] = (5.0, 2000.0)
+    diameters: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0)
+    cutter: float = 0.07
+    stepover: float = 0.4
+    feed_mm_min: float = 1500.0
+    steep_deg: float = 60.0
+    steep: float = 0.7
+    sideways: float = 1.2
+    backs: float = 0.05
+
+
+OPTIONS = ProposalOptions()
+_SIDES = {
+    f"{sign}{axis}": np.array([float(axis == other) for other in "xyz"]) * (1.0 if sign == "+" else -1.0)
+    for sign in "+-"
+    for axis in "xyz"
+}
+"""The directions that a side of a part can face, by name."""
+
+
+@dataclass(frozen=True)
+class Proposal(Value):
+    """A job for a part. tables: values by table and key; reasons: for some of them; remarks: sentences to print."""
+
+    tables: dict[str, dict[str, Any]]
+    reasons: dict[tuple[str, str], str]
+    remarks: tuple[str, ...]
+
+
+def propose(part: Path, machine: Machine, name: str) -> Proposal:
+    """Return a job for a mesh file on a machine, which the job calls `name`. Raises MeshError where it is unusable."""
+    unit = None if states_unit(part) else _unit(part, machine.work)
+    mesh = load_mesh(part, unit)
+    faults = mesh.diagnosis
+    table: dict[str, Any] = {} if unit is None else {"unit": unit}
+    reasons: dict[tuple[str, str], str] = {}
+    size = " x ".join(f"{from_si(extent, 'mm'):.4g}" for extent in faults.extents)
+    remarks = [f"the part is {size} mm" + ("" if unit is None else f", if its unit is {unit}: a guess from its size")]
+    if unit is not None:
+        reasons["part", "unit"] = f"a guess: the file does not say it; the part is {size} mm then"
+    if faults.inverted or not faults.consistent:
+        table["repair"], mesh = True, load_mesh(part, unit, repair=True)
+        reasons["part", "repair"] = "facets of this mesh are wound in opposite senses, or inside out"
+    side, flipped = _side(mesh)
+    if flipped:
+        table["flip"], mesh = True, mesh.flipped()
+        reasons["part", "flip"] = "this open surface shows its back to the top"
+        remarks.append("it is an open surface that shows its back to the top: flip = true turns it over")
+    direction = _SIDES[side]
+    if side != "+z":
+        table["region_direction"] = [float(v) + 0.0 for v in direction]
+        reasons["part", "region_direction"] = "the side that shows most of the surface"
+    remarks.append(f"machined from {side}")
+    box = _box(mesh, direction, machine.work)
+    if box is not None:
+        table["region_box_mm"] = [[_rounded(v) for v in corner] for corner in from_si(box, "mm")]
+        reasons["part", "region_box_mm"] = "the part is larger than the machine's work volume; this is its middle"
+        remarks.append("it is larger than the work volume: a box in its middle is machined (region_box_mm)")
+    region = Region(box=box, direction=direction)
+    patch = Patch.of(mesh, replace(region, angle=0.5 * np.pi))
+    if not len(patch.faces):
+        raise MeshError("no side of this surface can be machined", file=part, remedy="check the mesh")
+    toolpath, tool = _toolpath(patch, direction), _tool(patch, direction)
+    toolpath = {**toolpath, "stepover_mm": _rounded(OPTIONS.stepover * tool["diameter_mm"])}
+    remarks.append(
+        f"a ball of {tool['diameter_mm']:g} mm, {toolpath['strategy']}, {toolpath['stepover_mm']:g} mm apart"
+    )
+    reasons["placement", "table_z_mm"] = "in the middle of the work volume; set the height of your table"
+    tables = {
+        "part": table,
+        "machine": {"file" if name.endswith(".toml") else "name": name},
+        "tool": tool,
+        "toolpath": toolpath,
+        "axis": {"mode": "auto"},
+        "feed": {"cut_mm_min": OPTIONS.feed_mm_min},
+        "placement": _placement(mesh, patch, direction, machine.work),
+    }
+    return Proposal(tables, reasons, tuple(remarks))
+
+
+def _unit(part: Path, work: WorkVolume) -> str:
+    """Return the likely unit of a file's numbers."""
+    # In metres the numbers are as they are in the file.
+    largest = max(load_mesh(part, "m").diagnosis.extents)
+    low, high = (1e-3 * end for end in OPTIONS.usual_mm)
+    if low <= largest * UNITS["mm"] <= high:
+        return "mm"
+    return min(UNITS, key=lambda unit: abs(np.log(largest * UNITS[unit] / work.diameter)))
+
+
+def _side(mesh: Mesh) -> tuple[str, bool]:
+    """Return the side that shows most, the top unless another shows much more, and whether to turn the surface over."""
+    shown = {
+        name: float((mesh.facet_areas * np.maximum(mesh.facet_normals @ direction, 0.0)).sum())
+        for name, direction in _SIDES.items()
+    }
+    open_, most = not mesh.diagnosis.watertight, max(shown.values())
+    if open_ and shown["-z"] == most and shown["+z"] < OPTIONS.backs * most:
+        return "+z", True
+    best = max(shown, key=lambda name: shown[name])
+    return ("+z" if OPTIONS.sideways * shown["+z"] >= most else best), False
+
+
+def _box(mesh: Mesh, direction: Floats, work: WorkVolume) -> Floats | None:
+    """Return the box (2, 3) in the middle of a part that the work volume holds; None where it holds the part."""
+    frame = np.stack([*tangent_frame(direction), direction])
+    points = mesh.vertices @ frame.T
+    low, high = points.min(axis=0), points.max(axis=0)
+    share = min(work.diameter / float((high - low)[:2].max()), 1.0)
+    height = min(work.height, high[2] - low[2])
+    if share == 1.0 and height == high[2] - low[2]:
+        return None
+    middle, half = 0.5 * (low + high)[:2], 0.5 * share * (high - low)[:2]
+    # What lies above the middle; the highest of it is machined.
+    near = points[(np.abs(points[:, :2] - middle) <= half).all(axis=1)]
+    top = near[:, 2].max() if len(near) else high[2]
+    margin = 1e-3 * work.height
+    corners = np.array([[*(middle - half), top - height - margin], [*(middle + half), top + margin]]) @ frame
+    return np.sort(corners, axis=0)
+
+
+def _tool(patch: Patch, direction: Floats) -> dict[str, Any]:
+    """Return the cutter for a region: a ball of a share of its size."""
+    points = patch.vertices[np.unique(patch.faces)] @ np.stack(tangent_frame(direction)).T
+    widest = float(from_si(np.ptp(points, axis=0).max(), "mm"))
+    fitting = [size for size in OPTIONS.diameters if size <= OPTIONS.cutter * widest]
+    return {"type": "ball", "diameter_mm": max(fitting, default=OPTIONS.diameters[0])}
+
+
+def _toolpath(patch: Patch, direction: Floats) -> dict[str, Any]:
+    """Return the strategy for a region: waterlines where it is mostly steep, else a raster along its longer side."""
+    steep = patch.facet_normals @ direction < np.cos(np.radians(OPTIONS.steep_deg))
+    if patch.areas[steep].sum() > OPTIONS.steep * patch.areas.sum():
+        return {"strategy": "waterline"}
+    width, height = np.ptp(patch.vertices[np.unique(patch.faces)] @ np.stack(tangent_frame(direction)).T, axis=0)
+    return {"strategy": "raster", "direction_deg": 0.0 if width >= height else 90.0}
+
+
+def _placement(mesh: Mesh, patch: Patch, direction: Floats, work: WorkVolume) -> dict[str, Any]:
+    """Return the placement on a table at the height that brings the region to the middle of the work volume."""
+    heights = patch.vertices[np.unique(patch.faces)] @ direction
+    above = 0.5 * float(heights.min() + heights.max()) - float((mesh.vertices @ direction).min())
+    towards_base = -1.0 if work.centre[2] > 0.0 else 1.0
+    table = {"mode": "table", "table_z_mm": _rounded(from_si(work.centre[2] - towards_base * above, "mm"))}
+    return table | ({} if direction[2] == 1.0 else {"up": [float(v) + 0.0 for v in direction]})
+
+
+def _rounded(value: float) -> float:
+    """Return a length in mm with at most two digits after the point."""
+    return round(float(value), 2) + 0.0

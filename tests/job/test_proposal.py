@@ -1,0 +1,145 @@
+"""Jobs that `pentapod new PART` proposes: unit, side, region, cutter and strategy from size and shape."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+from pentapod.base.errors import MeshError
+from pentapod.cli.commands.new import dome_stl, job_text
+from pentapod.cli.main import run as run_cli
+from pentapod.job import Job, run
+from pentapod.job.build.placement import job_constraints
+from pentapod.job.build.reach import check_reach
+from pentapod.job.build.region import region_report
+from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.job.proposal import propose
+from pentapod.machine.machine import Machine
+
+DESK = Machine.load("desk")
+
+
+def dome(scale=1.0, turn=lambda facets: facets):
+    """Facets of a shallow dome over a square of 60 units."""
+    facets = trimesh.load_mesh(trimesh.util.wrap_as_stream(dome_stl(cells=12)), file_type="stl", process=False)
+    return trimesh.Trimesh(**trimesh.triangles.to_kwargs(turn(scale * facets.triangles)), process=False)
+
+
+def proposed(folder, shape, name="part.stl"):
+    shape.export(folder / name)
+    proposal = propose(folder / name, DESK, "desk")
+    tables = {**proposal.tables, "part": {"mesh": name, **proposal.tables["part"]}}
+    (folder / "part.toml").write_text(job_text(tables, proposal.reasons), encoding="utf-8")
+    return Job.load(folder / "part.toml"), proposal
+
+
+SHAPES = {
+    "dome": (dome, {}),
+    "dome in metres": (lambda: dome(1e-3), {"unit": "m"}),
+    "dome in inches": (lambda: dome(1 / 25.4), {"unit": "inch"}),
+    "dome wound downwards": (lambda: dome(turn=lambda facets: facets[:, ::-1]), {"flip": True}),
+    "dome on its side": (lambda: dome(turn=lambda f: f[..., [2, 0, 1]]), {"region_direction": (1.0, 0.0, 0.0)}),
+    "plate on edge": (lambda: trimesh.creation.box((90, 4, 70)), {"region_direction": (0.0, 1.0, 0.0)}),
+    "block": (lambda: trimesh.creation.box((80, 60, 31)), {}),
+    "block inside out": (lambda: inside_out(trimesh.creation.box((80, 60, 31))), {"repair": True}),
+}
+
+
+def inside_out(shape):
+    shape.invert()
+    return shape
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_unit_and_side_follow_from_size_and_shape(tmp_path, name):
+    make, expected = SHAPES[name]
+    job, proposal = proposed(tmp_path, make())
+    usual = {"unit": "mm", "flip": False, "repair": False, "region_direction": (0.0, 0.0, 1.0), "region_box_mm": None}
+    assert {key: getattr(job.part, key) for key in usual} == usual | expected
+    mesh, machine = job_mesh(job), job_machine(job)
+    assert mesh.diagnosis.problems == ()
+    assert "problem: less than half" not in str(region_report(job, mesh)) or "block" in name or "plate" in name
+    check_reach(job, machine, mesh)
+    assert job.axis.mode == "auto"
+    assert job.placement.mode == "table"
+    assert f"unit is {usual['unit'] if 'unit' not in expected else expected['unit']}: a guess" in proposal.remarks[0]
+    assert "a guess: the file does not say it" in job.path.read_text()
+
+
+def test_the_middle_of_the_region_stands_in_the_middle_of_the_work_volume(tmp_path):
+    for name in ("dome", "dome on its side", "block"):
+        job, _ = proposed(tmp_path, SHAPES[name][0]())
+        mesh = job_mesh(job)
+        constraints = job_constraints(job, DESK, mesh)
+        heights = mesh.vertices @ np.array(job.part.region_direction)
+        up = np.ptp(heights) * 0.5 * 1e3
+        assert DESK.work.centre[2] * 1e3 == pytest.approx(job.placement.table_z_mm - up, abs=0.02)
+        assert constraints.moves
+
+
+def test_steep_surfaces_get_waterlines_and_long_ones_passes_along_them(tmp_path):
+    assert proposed(tmp_path, trimesh.creation.cone(20, 50))[0].toolpath.strategy == "waterline"
+    job, _ = proposed(tmp_path, trimesh.creation.box((30, 90, 5)))
+    assert (job.toolpath.strategy, job.toolpath.direction_deg) == ("raster", 90.0)
+    assert proposed(tmp_path, trimesh.creation.box((90, 30, 5)))[0].toolpath.direction_deg == 0.0
+
+
+def test_cutter_and_stepover_grow_with_the_part(tmp_path):
+    sizes = [proposed(tmp_path, dome(scale))[0] for scale in (0.2, 0.7, 1.4, 2.4)]
+    diameters = [job.tool.diameter_mm for job in sizes]
+    assert diameters == sorted(set(diameters))
+    assert all(0.2 * job.tool.diameter_mm < job.toolpath.stepover_mm < job.tool.diameter_mm for job in sizes)
+
+
+def test_of_a_part_larger_than_the_machine_a_box_in_its_middle_is_machined(tmp_path):
+    job, proposal = proposed(tmp_path, dome(10.0))
+    box = np.array(job.part.region_box_mm)
+    assert np.ptp(box, axis=0)[:2].max() == pytest.approx(1e3 * DESK.work.diameter)
+    assert box.mean(axis=0)[:2] == pytest.approx([0.0, 0.0], abs=0.1)
+    report = str(region_report(job, job_mesh(job)))
+    assert "is outside region_box_mm" in report
+    assert any("larger than the work volume" in remark for remark in proposal.remarks)
+
+
+def test_a_file_that_states_its_unit_is_not_guessed(tmp_path):
+    job, proposal = proposed(tmp_path, trimesh.Scene(dome(1e-3)), "part.glb")
+    assert job.part.unit is None
+    assert job.part.flip is False
+    assert "guess" not in " ".join(proposal.remarks)
+    assert proposal.remarks[0].startswith("the part is 60 x 60 x")
+
+
+def test_new_writes_a_job_beside_the_part_or_elsewhere(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    dome().export("my part.stl")
+    assert run_cli(["new", "my part.stl"]) == 0
+    said = capsys.readouterr().out
+    assert "if its unit is mm: a guess" in said
+    assert "next: pentapod plan" in said
+    assert Job.load("my part.toml").mesh_path.resolve() == tmp_path / "my part.stl"
+    assert run_cli(["new", "my part.stl"]) == 2
+    (tmp_path / "jobs").mkdir()
+    assert run_cli(["new", "my part.stl", "-o", "jobs/a.toml", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["job"]["part"] == {"mesh": "../my part.stl", "unit": "mm"}
+    assert Job.load("jobs/a.toml").mesh_path.resolve() == tmp_path / "my part.stl"
+    assert run_cli(["new", "nowhere.stl"]) == 2
+    assert run_cli(["new", "my part.stl", "-o", "b.toml", "--machine", "nothing"]) == 2
+    assert not (tmp_path / "b.toml").exists()
+
+
+def test_a_broken_part_gets_no_job(tmp_path):
+    (tmp_path / "a.stl").write_bytes(b"solid text, not a mesh\n")
+    with pytest.raises(MeshError):
+        propose(tmp_path / "a.stl", DESK, "desk")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["dome", "dome in inches", "dome wound downwards", "dome on its side"])
+def test_a_proposed_job_plans(tmp_path, name):
+    job, _ = proposed(tmp_path, SHAPES[name][0]())
+    outcome = run(job, tmp_path / "out")
+    assert outcome.passed, outcome.refusal or [c for c in outcome.verdict.certificates if not c.passed]
