@@ -40,7 +40,7 @@ from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.linking.partition import Piece, part_of
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.strategies.registry import STRATEGIES
-from pentapod.toolpath.toolpath import Toolpath
+from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 RATE_SLACK = 1.05
 """Factor on the cap of the axis's turn: it holds along the contact points, not along the tilt centres."""
@@ -153,6 +153,11 @@ def job_toolpath(
         links=None if from_file else job_link_style(job, mesh, toolpath),
     )
     toolpath, gouges = without_gouges(toolpath, tool, mesh, options, progress)
+    if not any(segment.kind is SegmentKind.CUT for segment in toolpath.segments):
+        raise ToolpathError(
+            "no cut is left: cutter, shank or holder would cut into the part everywhere", key="gouge.remedy",
+            remedy="a thinner or longer tool, or another tool axis",
+        )  # fmt: skip
     stem = stem_sentence(job_tool(job, machine))
     reports: list[object] = [*([region_report(job, mesh)] if covers_region(job) else []), report, gouges]
     reports += [f"  note: {stem}"] if stem else []

@@ -18,7 +18,9 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.swept_depth import RESOLUTION_M, is_clear, meets, sweep, touch
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath.gouge.report import GougeOptions, GougeReport, Remedy
-from pentapod.toolpath.linking.links import LinkStyle, relinked
+from pentapod.toolpath.linking.clear_links import cleared
+from pentapod.toolpath.linking.links import LinkStyle
+from pentapod.toolpath.linking.ways_out import WaysOut
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 
@@ -56,9 +58,10 @@ def without_gouges(
     result = removal.toolpath() if report.gouging else toolpath
     depths, cutting = removal.all_depths(result)
     if options.links is not None and (depths[~cutting] > -np.inf).any():
-        result, changed = relinked(result, (depths > -np.inf) & ~cutting, options.links, removal.is_clear)
-        report = replace(report, relinked=changed)
-        depths, cutting = removal.all_depths(result) if changed else (depths, cutting)
+        ways = WaysOut(removal.tree, tool.solids, options.links, removal.is_clear, options.ways)
+        found = cleared(result, (depths > -np.inf) & ~cutting, ways, may_drop=Remedy.DROP in options.remedies)
+        result, report = found.path, replace(report, relinked=found.replaced, stuck=found.dropped)
+        depths, cutting = removal.all_depths(result)
     left, unclear = (depths > -np.inf) & cutting, (depths > -np.inf) & ~cutting
     return result, replace(
         report,
@@ -106,8 +109,9 @@ class _GougeRemoval:
         return depths, np.asarray(kinds == SegmentKind.CUT)
 
     def is_clear(self, segment: Segment) -> bool:
-        """Return whether a segment does not collide with the part."""
-        threshold = self._tolerance(segment.kind)
+        """Return whether a new segment does not collide with the part; a rapid keeps a gap to it."""
+        rapid = segment.kind is SegmentKind.RAPID
+        threshold = -self.options.ways.gap if rapid else self._tolerance(segment.kind)
         return is_clear(self.tree, self.tool, segment.tips, segment.axes, threshold=threshold)
 
     def _tolerance(self, kind: SegmentKind) -> float:

@@ -13,6 +13,7 @@ from pentapod.base.keys import Key, check_fields
 from pentapod.base.values import Value
 from pentapod.geometry.solids import KINDS
 from pentapod.toolpath.linking.links import LinkStyle
+from pentapod.toolpath.linking.ways_out import WayOutSearch
 
 MOST_NAMED = 6
 """Largest number of waypoints that a message names."""
@@ -48,8 +49,8 @@ class RemedySearch(Value):
 class GougeOptions(Value):
     """What is done about gouges. remedies: tried in this order on the motions that still gouge.
 
-    links: style of new links where old ones collide with the part; None: they stay, and are reported. search: see
-    `RemedySearch`. Raises ToolpathError for values out of range.
+    links: style of new links where old ones collide with the part; None: they stay, and are reported. search, ways: see
+    `RemedySearch`, `WayOutSearch`. Raises ToolpathError for values out of range.
     """
 
     remedies: tuple[Remedy, ...] = (Remedy.REPORT,)
@@ -60,6 +61,7 @@ class GougeOptions(Value):
     highest: Annotated[float, Key("mm", "lift: largest rise of a waypoint", gt=0.0)] = 20e-3
     links: LinkStyle | None = field(default=None, compare=False)
     search: RemedySearch = RemedySearch()
+    ways: WayOutSearch = field(default_factory=WayOutSearch)
 
     def __post_init__(self) -> None:
         check_fields(self, ToolpathError)
@@ -72,7 +74,8 @@ class GougeReport(Value):
     gouging: how many of them gouged at first; depths: of the deepest gouge of cutter, shank and holder, metres, −inf
     for none. tilted, lifted: number of waypoints changed; most_lifted: metres. dropped: number of motions taken out of
     the cut. left: number of motions that still gouge; left_depth: how deep, metres; places: first waypoint of each run
-    of them. relinked: number of links replaced. unclear: number of links that gouge and rapids that touch;
+    of them. relinked: number of links replaced. stuck: number of motions of
+    cuts that were left out, as the tool cannot leave them. unclear: number of links that gouge and rapids that touch;
     unclear_places: first waypoint of each run of them.
     """
 
@@ -87,6 +90,7 @@ class GougeReport(Value):
     left_depth: float = 0.0
     places: tuple[int, ...] = ()
     relinked: int = 0
+    stuck: int = 0
     unclear: int = 0
     unclear_places: tuple[int, ...] = ()
 
@@ -109,7 +113,9 @@ class GougeReport(Value):
         return text + self._unclear()
 
     def _unclear(self) -> str:
-        text = f"\n  note: {self.relinked:,} links replaced by links over the clearance level" if self.relinked else ""
+        text = f"\n  note: {self.relinked:,} links replaced by others that are clear" if self.relinked else ""
+        if self.stuck:
+            text += f"\n  note: {self.stuck:,} motions dropped: the tool cannot leave their cuts clear of the part"
         if not self.unclear:
             return text
         where = _some(self.unclear_places)

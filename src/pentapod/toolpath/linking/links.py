@@ -8,17 +8,16 @@ instead of at the clearance level. Links that stay on the surface are made in `s
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats
+from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length, spaced
 from pentapod.toolpath.options import Entry
-from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+from pentapod.toolpath.toolpath import Segment, SegmentKind
 
 Poses = tuple[Floats, Floats]
 """Tips (n, 3), metres, and unit axes (n, 3)."""
@@ -93,7 +92,8 @@ def rapid(start: Pose | None, end: Pose | None, style: LinkStyle) -> Segment:
     turn = 1.875 * float(angle_between(first, last))
     length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
     tips = spaced(path, min(style.rapid_spacing, length * style.axis_step / max(turn, style.axis_step)))
-    return Segment(SegmentKind.RAPID, tips, _turning(first, last, tips), np.inf)
+    along = arc_length(tips)
+    return Segment(SegmentKind.RAPID, tips, turning(first, last, along / along[-1]), np.inf)
 
 
 def connection(before: Poses | None, after: Poses | None, style: LinkStyle) -> list[Segment]:
@@ -108,41 +108,14 @@ def connection(before: Poses | None, after: Poses | None, style: LinkStyle) -> l
     return [*up, rapid(start, end, style), *down]
 
 
-def relinked(
-    path: Toolpath, colliding: Bools, style: LinkStyle, is_clear: Callable[[Segment], bool]
-) -> tuple[Toolpath, int]:
-    """Return a path with new links wherever a link or rapid collides with the part, and how many were replaced.
-
-    colliding (N − 1,): which motions collide. The new link is a `connection`; if `is_clear` rejects one of its
-    segments, the old one stays. Links collide where a cut was tilted, lifted or dropped after linking.
-    """
-    cuts = [k for k, segment in enumerate(path.segments) if segment.kind is SegmentKind.CUT]
-    if not cuts:
-        return path, 0
-    segments: list[Segment] = []
-    replaced = 0
-    for before, after in zip([None, *cuts], [*cuts, None], strict=True):
-        first, last = 0 if before is None else before + 1, len(path.segments) if after is None else after
-        link = list(path.segments[first:last])
-        if colliding[int(path.starts[first]) : int(path.starts[last])].any():
-            ends = [None if k is None else (path.segments[k].tips, path.segments[k].axes) for k in (before, after)]
-            new = connection(ends[0], ends[1], style)
-            if all(is_clear(segment) for segment in new):
-                link, replaced = new, replaced + 1
-        segments += link if after is None else [*link, path.segments[after]]
-    return replace(path, segments=tuple(segments)), replaced
-
-
 def _rise(tip: Floats, axis: Floats, style: LinkStyle) -> Floats:
     """Return the corners (3, 3) of the way up: on along the axis, then along the view to the level."""
     knee = tip + style.approach * axis
     return np.stack([tip, knee, knee + max(style.level - float(knee @ style.view), 0.0) * style.view])
 
 
-def _turning(start: Floats, end: Floats, tips: Floats) -> Floats:
-    """Return axes (N, 3) along the great circle from one axis to the other, at rest at both ends."""
-    length = arc_length(tips)
-    t = length / length[-1]
+def turning(start: Floats, end: Floats, t: Floats) -> Floats:
+    """Return axes (N, 3) along the great circle from one axis to the other at shares t (N,), at rest at both ends."""
     t = t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
     angle = float(angle_between(start, end))
     if angle < 1e-9:
