@@ -326,7 +326,7 @@ def test_files_that_depend_on_the_controller_are_refused(name):
             (11, "G84", "spindle"),
             (13, "M98", "another program"),
         ],
-        "refused_loop.ngc": [(4, "#1", "variable"), (5, "O100", "loop"), (6, "X[#1]", "variable")],
+        "refused_loop.ngc": [(7, "#1", "variable"), (5, "O100", "loop"), (6, "X[#1]", "variable")],
         "refused_program.mpf": [(2, "R2", "expression"), (4, "IF", "jump"), (5, "Z=R2", "expression")],
     }[name]
     for line, word, why in expected:
@@ -348,7 +348,7 @@ def test_unit_tool_and_machine_are_asked_for_and_taken(tmp_path):
     second = read_toolpath(file, unit="inch", tool="2")
     np.testing.assert_allclose(runs(second)[0], np.array([[2, 0, 1], [2, 0, 0], [3, 0, 0]]) * INCH)
     assert len(runs(second)) == 1
-    file.write_text(text.replace("X3", "X3 A20 B10").replace("X2", "X2 A10 B5").replace("M2", "#5=1\nM428"))
+    file.write_text(text.replace("X3", "X3 A20 B10").replace("X2", "X2 A10 B5").replace("M2", "#5=[1+1]\nM428"))
     with pytest.raises(ToolpathError, match="rotary axes A and B: which of them") as caught:
         read_toolpath(file, unit="mm")
     assert [error.line for error in caught.value.others] == [12, 13]  # the variable, and the missing end
@@ -368,6 +368,16 @@ def test_unit_tool_and_machine_are_asked_for_and_taken(tmp_path):
 def test_rotary_axes_that_no_machine_has(names, words):
     with pytest.raises(ToolpathError, match=words):
         RotaryAxes.of(names)
+
+
+def test_variables_that_hold_numbers(tmp_path):
+    file = tmp_path / "engraved.ngc"
+    file.write_text("G21 G90\n#2=-1.5\n#<feed> = 200\nT1 M6\nG0 Z5\n X3 Y4\nG1 Z#2 F#<feed>\n X-#2\nG0 Z5\nM2\n")
+    np.testing.assert_allclose(runs(read_toolpath(file))[0], [[3, 4, 5], [3, 4, -1.5], [1.5, 4, -1.5]])
+    file.write_text("G21 G90 F1\nG0 X0 Y0 Z5\nG1 Z#3\nX#<_x>\nX5 I1\nM2\n")
+    with pytest.raises(ToolpathError, match=r"engraved.ngc:3: Z#3: a variable or an expression") as caught:
+        read_toolpath(file)
+    assert [(error.line, error.key) for error in caught.value.others] == [(4, "X#<_X>"), (5, "I1")]
 
 
 def test_a_problem_is_told_once_with_all_its_lines(tmp_path):

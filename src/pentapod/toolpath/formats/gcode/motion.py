@@ -106,6 +106,10 @@ def _turn(now: float, value: float, how: str) -> float:
 def vector_axis(tracer: Tracer, words: Mapping[str, Word], by_centre: bool, line: int) -> bool:
     """Take the tool axis of a block that gives it as a vector: A3, B3, C3, or I, J, K after G43.5."""
     letters = _VECTORS[1] if by_centre else _VECTORS[0]
+    straight = tracer.modes.motion not in (_CLOCKWISE, _COUNTERCLOCKWISE) and tracer.modes.cycle is None
+    if straight and not by_centre and (word := next((words[k] for k in _VECTORS[1] if k in words), None)):
+        remedy = "as a tool axis it needs G43.5, as the centre of an arc G2 or G3"
+        raise tracer.wrong("I, J, K in a straight move", line, str(word), remedy)
     if not any(letter in words for letter in letters):
         return False
     vector = [words[letter].value if letter in words else 0.0 for letter in letters]

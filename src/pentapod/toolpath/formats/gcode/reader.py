@@ -10,7 +10,7 @@ from pentapod.base.errors import ToolpathError
 from pentapod.toolpath.formats.gcode import places, planes
 from pentapod.toolpath.formats.gcode.coordinates import LINEAR, Coordinates
 from pentapod.toolpath.formats.gcode.drilling import Drill
-from pentapod.toolpath.formats.gcode.language.blocks import Block, Word, plain_block
+from pentapod.toolpath.formats.gcode.language.blocks import Block, PlainLines, Word
 from pentapod.toolpath.formats.gcode.language.problems import Problems
 from pentapod.toolpath.formats.gcode.language.scan import Scan
 from pentapod.toolpath.formats.gcode.language.sinumerik import SinumerikLines
@@ -43,9 +43,11 @@ _HOME_NAMES = frozenset({"SUPA", "G153"})
 _LARGEST = 1e12
 """Largest number of a word."""
 _ORIENT, _ORIENT_AND_MOVE = frozenset({53.1, 53.3, 53.6}), 53.3
-_TCP, _VECTOR_TCP = frozenset({43.4, 43.5, 234.0}), 43.5
+_TCP, _VECTOR_TCP = frozenset({43.4, 43.5, 169.0, 234.0}), 43.5
 _DWELL, _STOP, _SMOOTHING = 4.0, 9.0, 187.0
-_TCP_OFF = frozenset({43.0, 43.1, 43.2, 49.0})
+_TCP_OFF = frozenset({43.0, 43.1, 43.2, 49.0, 168.0})
+_MORE_SYSTEMS = frozenset({54.1, 154.0})
+_SPLINE_OR_SPEED = 5.0
 _IGNORED = frozenset("NOHDLPQRKIJS")
 _FRAMES = ("TRANS", "ATRANS", "ROT", "AROT")
 _TCP_ON, _TCP_ENDS = ("TRAORI",), ("TRAFOOF",)
@@ -73,7 +75,7 @@ class GCodeReader(StatementReader):
         self.tracer = Tracer(self.moves, at, self.modes, self.defaults)
         self.drill = Drill(self.tracer)
         self.switches = Switches(self.tracer, self.problems, scan)
-        block_of = SinumerikLines(self.wrong).block if self.dialect.equals else self._plain
+        block_of = (SinumerikLines if self.dialect.equals else PlainLines)(self.wrong).block
         try:
             for line, text in enumerate(lines, start=1):
                 if self.switches.ended is None or text.strip():
@@ -89,9 +91,6 @@ class GCodeReader(StatementReader):
             home_last = self.tracer.here is None and "home" in self.tracer.told
             lift(self.moves, self.tracer.lifts, at_end=home_last)
         return self.gathered(told)
-
-    def _plain(self, text: str, line: int) -> Block:
-        return plain_block(text, line, self.wrong)
 
     def _line(self, text: str, line: int, block_of: Callable[[str, int], Block]) -> None:
         """Read a line; what is wrong with it is kept for later."""
@@ -210,9 +209,9 @@ class GCodeReader(StatementReader):
                 self.drill.end()
             if old not in (None, self.modes.scale) and self.moves.tips:
                 self.problems.add(self.wrong("the unit changes after the first move", line, f"G{code:g}"))
-        elif code in places.SYSTEMS or code == 54.1 or (self.dialect.equals and 505.0 <= code <= 599.0):
+        elif code in places.SYSTEMS or code in _MORE_SYSTEMS or (self.dialect.equals and 505.0 <= code <= 599.0):
             system = places.SYSTEMS.get(code, f"G{code:g}")
-            if code == 54.1 and "P" in words:
+            if code in _MORE_SYSTEMS and "P" in words:
                 system += f" {words['P']}"
             tracer.at.set_system(system)
         elif code in _TCP:
@@ -221,12 +220,12 @@ class GCodeReader(StatementReader):
             tracer.at.tcp, self.by_vector = tracer.at.tcp and not self.dialect.switched, False
         elif code == 69.0:
             tracer.set_frames(None, None)
-        elif code in REFUSED_G:
+        elif code in REFUSED_G and not (code == _SPLINE_OR_SPEED and self.dialect.switched and "X" not in words):
             what, remedy = REFUSED_G[code]
             self.problems.add(self.wrong(what, line, f"G{code:g}", remedy=remedy))
         elif code == _SMOOTHING:
             words.pop("E", None)
-        elif code not in IDLE_G and code != _STOP:
+        elif code not in IDLE_G and code not in (_STOP, _SPLINE_OR_SPEED):
             self.problems.add(self.wrong("a word that is not read", line, f"G{code:g}"))
 
     def _dwell(self, words: dict[str, Word], line: int) -> None:

@@ -1,14 +1,21 @@
-"""Words of G-code as Fanuc, LinuxCNC and their relatives write it: a letter and a number."""
+"""Words of G-code as Fanuc, LinuxCNC and their relatives write it: a letter and a number.
+
+A variable (#1, #<depth>) may be set to a number and used as a value; any other expression is an error.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from pentapod.base.errors import ToolpathError
 
 _WORD = re.compile(r"\s*([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
+_NAME = r"#([0-9]+|<[A-Z0-9_ ]+>)"
+_SET = re.compile(rf"\s*{_NAME}\s*=\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*$")
+_USED = re.compile(rf"\s*([A-Z])\s*([+-]?){_NAME}")
 _SUBPROGRAM = re.compile(r"O\s*(?:<|[0-9]+\s*[A-Z<\[])")
 _SKIP = re.compile(r"/[0-9]?")
 _LONGEST_SHOWN = 20
@@ -44,29 +51,44 @@ Wrong = Callable[..., ToolpathError]
 """Makes the error of a word: what, line, word."""
 
 
-def plain_block(text: str, line: int, wrong: Wrong) -> Block:
-    """Return the words of a line. Raises ToolpathError for anything but words with numbers, and for other scripts."""
-    comments: tuple[str, ...] = ()
-    if "(" in text or ";" in text or ")" in text:
-        text, comments = _without_comments(text, line, wrong)
-    code = ascii_only(text, line, wrong).upper().strip()
-    skippable = code.startswith("/")
-    if skippable:
-        code = _SKIP.sub("", code, count=1).strip()
-    if _SUBPROGRAM.match(code):
-        raise wrong(
-            "a loop or subprogram of the controller: the path depends on what it computes", line, code[:_LONGEST_SHOWN],
-            remedy="export without subprograms",
-        )  # fmt: skip
-    words: list[Word] = []
-    position, end = 0, len(code)
-    while position < end:
-        match = _WORD.match(code, position)
-        if match is None:
-            raise _no_word(code[position:].split(maxsplit=1)[0][:_LONGEST_SHOWN], line, wrong)
-        words.append(Word(match[1], float(match[2]), text=match[0].lstrip()))
-        position = match.end()
-    return Block(line, words, skippable, comments)
+@dataclass
+class PlainLines:
+    """Lines of a program as blocks. variables: those that were set to a number so far."""
+
+    wrong: Wrong
+    variables: dict[str, float] = field(default_factory=dict[str, float])
+
+    def block(self, text: str, line: int) -> Block:
+        """Return the words of a line. Raises ToolpathError for anything but words with numbers, and other scripts."""
+        comments: tuple[str, ...] = ()
+        if "(" in text or ";" in text or ")" in text:
+            text, comments = _without_comments(text, line, self.wrong)
+        code = ascii_only(text, line, self.wrong).upper().strip()
+        skippable = code.startswith("/")
+        if skippable:
+            code = _SKIP.sub("", code, count=1).strip()
+        if code.startswith(":"):  # the number of the program, as ISO has it
+            code = "O" + code[1:]
+        if _SUBPROGRAM.match(code):
+            raise self.wrong(
+                "a loop or subprogram of the controller: the path depends on what it computes", line,
+                code[:_LONGEST_SHOWN], remedy="export without subprograms",
+            )  # fmt: skip
+        words: list[Word] = []
+        position, end = 0, len(code)
+        while position < end:
+            match = _WORD.match(code, position)
+            if match is not None:
+                words.append(Word(match[1], float(match[2]), text=match[0].lstrip()))
+            elif match := _SET.match(code, position):
+                self.variables[match[1]] = float(match[2])
+            elif (match := _USED.match(code, position)) and match[3] in self.variables:
+                value = self.variables[match[3]]
+                words.append(Word(match[1], -value if match[2] == "-" else value, text=match[0].lstrip()))
+            else:
+                raise _no_word(code[position:].split(maxsplit=1)[0][:_LONGEST_SHOWN], line, self.wrong)
+            position = match.end()
+        return Block(line, words, skippable, comments)
 
 
 def ascii_only(text: str, line: int, wrong: Wrong) -> str:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 from pentapod.base.files import number_in
 from pentapod.toolpath.formats.gcode.language.blocks import Block, Word, Wrong, ascii_only
+from pentapod.toolpath.formats.gcode.language.vocabulary import IDLE_SETTINGS
 
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:EX[+-]?[0-9]+)?"
 _SET = re.compile(r"([A-Z_$][A-Z0-9_$]*(?:\[[A-Z0-9_]*\])?)\s*=\s*")
@@ -19,6 +20,7 @@ _CALL = re.compile(r"([A-Z_$][A-Z0-9_$]*)\s*\(")
 _WORD = re.compile(rf"([A-Z])({_NUMBER})")
 _NAME = re.compile(r"[A-Z_$][A-Z0-9_$]*:?")
 _VALUE = re.compile(_NUMBER)
+_DECLARED = re.compile(rf"([A-Z_][A-Z0-9_]*)(?:\s*=\s*({_NUMBER}))?")
 _HOW = ("AC", "IC", "DC", "ACP", "ACN")
 _FLOW = frozenset({
     "IF", "ELSE", "ENDIF", "GOTO", "GOTOF", "GOTOB", "GOTOC", "FOR", "ENDFOR", "WHILE", "ENDWHILE", "REPEAT", "REPEATB",
@@ -29,10 +31,11 @@ _LONGEST_SHOWN = 20
 
 @dataclass
 class SinumerikLines:
-    """Lines of a program as blocks. variables: those that were set to a number so far."""
+    """Lines of a program as blocks. variables: those that were set to a number so far; declared: names of others."""
 
     wrong: Wrong
     variables: dict[str, float] = field(default_factory=dict[str, float])
+    declared: set[str] = field(default_factory=set[str])
 
     def block(self, text: str, line: int) -> Block:
         """Return the words of a line. Raises ToolpathError for expressions, jumps and calls of other programs."""
@@ -68,6 +71,7 @@ class SinumerikLines:
         if match := _NAME.match(shown, position):
             name = match[0]
             if name == "DEF":
+                self._declare(shown[match.end() :])
                 return None, len(code)
             self._check_flow(name, line)
             return Word(name, math.nan, text=name), match.end()
@@ -106,8 +110,19 @@ class SinumerikLines:
             return Word("S", value, text=text), end
         if name.startswith("M") and name[1:].isdigit():
             return Word("M", value, text=text), end
-        self.variables[name] = value
+        base = name.partition("[")[0]
+        if base.startswith("_") or base in self.declared or (base[0] == "R" and base[1:].isdigit()):
+            self.variables[name] = value
+        elif base not in IDLE_SETTINGS:
+            raise self.wrong("a word that is not read", line, text[:_LONGEST_SHOWN])
         return Word("", math.nan), end
+
+    def _declare(self, text: str) -> None:
+        """Keep the names of a declaration such as DEF REAL depth=5, width, and their values."""
+        for name, value in _DECLARED.findall(text):
+            self.declared.add(name)
+            if value:
+                self.variables[name] = _number(value)
 
     def _arguments(self, code: str, start: int, line: int) -> tuple[list[str], int]:
         """Return the arguments of a call that begins before `start`, and where it ends."""

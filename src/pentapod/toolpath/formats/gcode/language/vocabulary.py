@@ -31,7 +31,7 @@ REFUSED_G: dict[float, tuple[str, str]] = {
 
 IDLE_G = frozenset({
     4.1, 5.1, 7.0, 8.0, 9.1, 10.6, 11.0, 13.1, 15.0, 22.0, 23.0, 25.0, 26.0, 40.0, 40.1, 40.2, 44.0, 45.1,
-    50.0, 62.0, 63.1, 64.2, 67.0, 97.0, 113.0, 187.0,
+    50.0, 62.0, 63.1, 64.2, 67.0, 97.0, 103.0, 113.0, 168.0,
 })  # fmt: skip
 """Codes that change nothing here: smoothing, limits, compensations off."""
 
@@ -62,6 +62,13 @@ IDLE_NAMES = frozenset({
     "GROUP_BEGIN", "GROUP_END", "F_HEAD",
 })  # fmt: skip
 """Names of Sinumerik that change nothing here: smoothing, orientation between points, messages."""
+
+
+IDLE_SETTINGS = frozenset({
+    "LIMS", "FL", "FGREF", "ACC", "ACCLIMA", "VELOLIMA", "JERKLIMA", "OVR", "OVRA", "SCC", "SPOS", "ADIS", "ADISPOS",
+    "CTOL", "OTOL", "ATOL", "SVC", "FZ",
+})  # fmt: skip
+"""Names of Sinumerik that are set to a number and change nothing here: limits, tolerances, the spindle's position."""
 
 
 @dataclass(frozen=True)
