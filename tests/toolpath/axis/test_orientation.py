@@ -212,7 +212,7 @@ def scan(noise_deg: float, shape: str = "wave", stepover: float = 4e-3, spacing:
 @pytest.mark.parametrize("shape", ["wave", "roof", "flat", "arc"])
 def test_clean_axes_are_not_smoothed_by_default(shape):
     runs = scan(0.0, shape)
-    for reach in (5e-3, 8e-3):
+    for reach in (7.5e-3, 12e-3):
         for found, (_, normals) in zip(Orientation(reach=reach).axes(runs), runs, strict=True):
             np.testing.assert_array_equal(found, normals)
 
@@ -222,7 +222,7 @@ def test_noise_of_a_scan_is_measured_and_smoothed_by_default(shape, noise):
     runs, clean = scan(noise, shape), scan(0.0, shape)
     starts = np.cumsum([0, *(len(points) for points, _ in runs)])
     points, normals = (np.concatenate([run[k] for run in runs]) for k in range(2))
-    assert np.degrees(noise_tolerance(points, normals, starts, 8e-3)) == pytest.approx(4.0 * noise, rel=0.3)
-    axes = Orientation(reach=8e-3).axes(runs)
+    assert np.degrees(noise_tolerance(points, normals, starts, 12e-3)) == pytest.approx(6.0 * noise, rel=0.3)
+    axes = Orientation(reach=12e-3).axes(runs)
     turn = [np.degrees(angle_between(each[1:], each[:-1])).max() for each in (axes[7], runs[7][1], clean[7][1])]
     assert turn[0] < 0.2 * turn[1] + turn[2]

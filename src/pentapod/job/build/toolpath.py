@@ -229,14 +229,14 @@ def _turns(toolpath: Toolpath, most: float | None) -> list[str]:
 
 
 def _orientation(job: Job, tool: Tool) -> Orientation:
-    """Return the nominal axes that a job asks for; smoothed over two stepovers, where it does not say."""
+    """Return the nominal axes that a job asks for; smoothed over three stepovers, where it does not say."""
     orientation, path = Orientation(mode=_mode(job), **fields_from(Orientation, job.axis)), job.toolpath.si
     if orientation.reach is not None:
         return orientation
     stepover, scallop, radius = (getattr(path, "stepover", None), getattr(path, "scallop", None), tool.scallop_radius)
     if stepover is None and scallop is not None and radius is not None:
         stepover = float(stepover_for(min(scallop, radius), radius))
-    return dataclasses.replace(orientation, reach=max(REACH_M, 2.0 * (stepover or 0.0)))
+    return dataclasses.replace(orientation, reach=max(REACH_M, 3.0 * (stepover or 0.0)))
 
 
 def _mode(job: Job) -> AxisMode:

@@ -20,7 +20,7 @@ from pentapod.toolpath.axis.modes import AxisMode, Normal, with_lead_and_tilt
 from pentapod.toolpath.axis.smoothing import noise_tolerance, rate_limited, smoothed, tangents
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
-REACH_M = 5e-3
+REACH_M = 7.5e-3
 """Distance over which axes are smoothed by default, and at least where the stepover says more, metres."""
 
 
@@ -39,7 +39,7 @@ class Orientation(Value):
         float | None,
         Key(
             "deg",
-            "largest angle by which smoothing may turn an axis; 0 for none; when left out, four times the noise of a "
+            "largest angle by which smoothing may turn an axis; 0 for none; when left out, six times the noise of a "
             "scan's normals, and 0 for clean surfaces",
             ge=0.0,
             le=45.0,
@@ -49,7 +49,7 @@ class Orientation(Value):
         float | None,
         Key(
             "mm",
-            "distance over which axes are smoothed, along and across; two stepovers, at least 5, when left out",
+            "distance over which axes are smoothed, along and across; three stepovers, at least 7.5, when left out",
             name="smoothing_reach",
             gt=0.0,
         ),

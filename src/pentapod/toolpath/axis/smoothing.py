@@ -11,30 +11,34 @@ from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import ToolpathError
-from pentapod.geometry.directions import angle_between, partway
+from pentapod.geometry.directions import angle_between, normalised, partway
 
 
 @dataclass(frozen=True)
 class AxisSmoothingOptions:
     """How axes are averaged.
 
-    rounds: of Gaussian averaging. similar: cosine of the angle between axes up to which they are averaged: sides of a
-    crease are not. neighbours: largest number of axes in a mean; thinned: least distance between them along a pass, as
-    a share of the reach. bisections: for the shortest moving mean. least_noise: standard deviation of the noise in
-    radians, on either direction across, below which axes are clean; noises: tolerance for noisy ones, as a multiple of
-    it, at most `widest` radians. fewest: places from which noise is estimated, at least. finer: axes between two places
-    whose turns are looked at; a median turn below the share `turning` of the noise is that of flat facets. median: of
-    the product of neighbouring fourth differences of normal noise, in variances, with the other sign.
+    rounds: of averaging. similar: cosine of the angle between axes up to which they are averaged: sides of a crease are
+    not. neighbours: largest number of axes in a mean; thinned: least distance between them along a pass, as a share of
+    the reach, as is ridge: distance over which axes do not turn by regression alone. bisections: for the shortest
+    moving mean. least_noise: standard deviation of the noise in radians, on either direction across, below which axes
+    are clean; noises: tolerance for noisy ones, as a multiple of it, at most `widest` radians. apart: of the places
+    between which noise is looked for, as a share of the reach. fewest: places from which noise is estimated, at least.
+    finer: axes between two places whose turns are looked at; a median turn below the share `turning` of the noise is
+    that of flat facets. median: of the product of neighbouring fourth differences of normal noise, in variances, with
+    the other sign.
     """
 
     rounds: int = 2
     similar: float = 0.5
-    neighbours: int = 96
+    neighbours: int = 128
     thinned: float = 0.1
+    ridge: float = 0.1
     bisections: int = 20
     least_noise: float = float(np.radians(0.4))
-    noises: float = 4.0
+    noises: float = 6.0
     widest: float = float(np.radians(30.0))
+    apart: float = 1.0 / 3.0
     fewest: int = 30
     finer: int = 4
     turning: float = 0.1
@@ -47,10 +51,10 @@ def noise_tolerance(
     """Return the tolerance for `smoothed` that the noise of axes (N, 3) asks for, radians; 0 for clean ones.
 
     points (N, 3): of all passes, metres; pass k holds points starts[k] to starts[k + 1] − 1. Noise is what is left in
-    fourth differences over half a reach: of a surface that bends, two neighbouring ones are alike, those of noise are
-    opposite. Medians leave out creases; flat facets between creases do not turn at all.
+    fourth differences over a share of the reach: of a surface that bends, two neighbouring ones are alike, those of
+    noise are opposite. Medians leave out creases; flat facets between creases do not turn at all.
     """
-    products, turns, step = [np.zeros(0)], [np.zeros(0)], 0.5 * reach / options.finer
+    products, turns, step = [np.zeros(0)], [np.zeros(0)], options.apart * reach / options.finer
     for a, b in pairwise(starts.tolist()):
         place = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[a:b], axis=0), axis=1))])
         at = np.arange(0.0, place[-1], step)
@@ -72,20 +76,31 @@ def smoothed(
 ) -> Floats:
     """Return axes (N, 3) smoothed along and across the passes, none turned by more than `tolerance` radians.
 
-    points (N, 3): of all passes, metres. Each axis becomes the Gaussian mean of those within `reach` metres, on its own
-    pass and on passes beside it, whose directions differ by less than 60°; an axis beyond the tolerance is turned back
-    to its limit. So axes at a crease keep to the tolerance, and noise below it vanishes.
+    points (N, 3): of all passes, metres. Each axis becomes that of a linear function fitted to those within `reach`
+    metres with Gaussian weights (local linear regression, which has no bias at the ends of passes), on its own pass and
+    on passes beside it, whose directions differ by less than 60°. An axis beyond the tolerance is turned back to its
+    limit. So axes at a crease keep to the tolerance, and noise below it vanishes.
     """
     if tolerance <= 0.0 or len(points) < 2:
         return axes
     weights = _weights(points, axes, reach, options)
     result = axes
     for _ in range(options.rounds):
-        mean = weights @ result
-        mean = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+        mean = normalised(_fitted(weights, points, result, options.ridge * reach))
         share = np.minimum(1.0, tolerance / np.maximum(angle_between(mean, axes), 1e-300))
         result = partway(axes, mean, share)
     return result
+
+
+def _fitted(weights: csr_array, points: Floats, axes: Floats, ridge: float) -> Floats:
+    """Return axes (N, 3) of weighted linear regressions around points (N, 3), evaluated there. ridge: metres."""
+    at = points - points.mean(axis=0)
+    centre, mean = weights @ at, weights @ axes
+    squares = (weights @ np.einsum("ni,nj->nij", at, at).reshape(-1, 9)).reshape(-1, 3, 3)
+    mixed = (weights @ np.einsum("ni,nj->nij", axes, at).reshape(-1, 9)).reshape(-1, 3, 3)
+    spread = squares - np.einsum("ni,nj->nij", centre, centre) + ridge**2 * np.eye(3)
+    both = mixed - np.einsum("ni,nj->nij", mean, centre)
+    return np.asarray(mean + np.einsum("nij,nj->ni", both, np.linalg.solve(spread, (at - centre)[..., None])[..., 0]))
 
 
 def _weights(points: Floats, axes: Floats, reach: float, options: AxisSmoothingOptions) -> csr_array:
@@ -100,7 +115,9 @@ def _weights(points: Floats, axes: Floats, reach: float, options: AxisSmoothingO
     row = np.broadcast_to(np.arange(len(points))[:, None], distance.shape)[known]
     column, d = chosen[index[known]], distance[known]
     similar = np.einsum("ni,ni->n", axes[row], axes[column]) > options.similar
-    row, column, d = row[similar], column[similar], d[similar]
+    own = np.flatnonzero(np.bincount(row[similar], minlength=len(points)) == 0)  # none is alike
+    row, column = np.concatenate([row[similar], own]), np.concatenate([column[similar], own])
+    d = np.concatenate([d[similar], np.zeros(len(own))])
     matrix = coo_array((np.exp(-2.0 * (d / reach) ** 2), (row, column)), shape=(len(points), len(points))).tocsr()
     total = np.asarray(matrix.sum(axis=1)).ravel()
     return csr_array(matrix.multiply(1.0 / total[:, None]))
