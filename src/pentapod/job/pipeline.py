@@ -15,9 +15,10 @@ from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, write
 from pentapod.job.build.limits import placement_limits, timing_limits
 from pentapod.job.build.placement import job_weights
 from pentapod.job.build.specification import job_specification
-from pentapod.job.build.toolpath import job_link_style, job_piece, job_toolpath
+from pentapod.job.build.toolpath import drops_gouges, job_link_style, job_part, job_piece, job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
+from pentapod.job.placed_check import Ranges, meetings, refusal_of
 from pentapod.job.plan_arrays import arrays_of
 from pentapod.job.run_folder import staged, unstaged
 from pentapod.job.schema.job import Job
@@ -30,9 +31,11 @@ from pentapod.planning.setups import setups
 from pentapod.program import Program, Provenance, sample, write_csv
 from pentapod.timing import Explanation, Limit, Trajectory, certify, explain, retime, slow_cuts
 from pentapod.toolpath import Mesh, Toolpath
-from pentapod.toolpath.linking.links import LinkStyle
-from pentapod.toolpath.linking.partition import Piece, missed_cuts, part_of
+from pentapod.toolpath.linking.partition import Piece, missed_cuts
 from pentapod.verify import Claim, Specification, Verdict, judged
+
+UPRIGHT = "the tool does not lean, as it would touch the part"
+"""What is said of a placement with the toolpath's axes."""
 
 Writer = Callable[[Outcome, Path], object]
 T = TypeVar("T")
@@ -93,8 +96,7 @@ def run(
         outcome = _planned(task, staging, writers or {})
         refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
         if refusal is not None and refusal.stage == "placement" and splits:
-            style = job_link_style(job, mesh, task.toolpath)
-            outcome = _split(task, style, refusal, staging, writers or {})
+            outcome = _split(task, mesh, refusal, staging, writers or {})
     return outcome
 
 
@@ -135,12 +137,13 @@ def _written(task: _Task, verdict: Verdict, staging: Path, writers: Mapping[str,
     return outcome
 
 
-def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+def _split(task: _Task, mesh: Mesh, refusal: Refusal, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
     """Split a job that one placement cannot reach into set-ups, each in a folder of its own; or refuse it."""
     job, toolpath, runner = task.job, task.toolpath, task.runner
     # The refusal is not part of the outcome.
     runner.stages = [stage for stage in runner.stages if stage.value is not refusal]
-    search = (task.toolpath, task.fits, style, job.placement.setups, refusal, runner.progress)
+    style = job_link_style(job, mesh, toolpath)
+    search = (toolpath, task.fits, style, job.placement.setups, refusal, runner.progress)
     found = runner.run("set-ups", lambda: setups(*search))
     if isinstance(found, Refusal):
         return _written(task, refusal_verdict(found, task.specification.sources), staging, writers)
@@ -149,7 +152,7 @@ def _split(task: _Task, style: LinkStyle, refusal: Refusal, staging: Path, write
     before = [stage for stage in runner.stages if stage.name not in ("toolpath", "set-ups")]
     for number, piece in enumerate(found, start=1):
         runner.progress("set-ups", (number - 1) / len(found), f"planning {number} of {len(found)}")
-        own, part = StageRunner(runner.progress), part_of(toolpath, piece, style)
+        own, part = StageRunner(runner.progress), job_part(job, mesh, toolpath, piece, machine=task.machine)
         own.stages += [*before, Stage("toolpath", 0.0, (part, piece), f"set-up {number} of {len(found)}: {piece}")]
         folder = staging / SetUp.folder_of(number)
         folder.mkdir()
@@ -212,8 +215,28 @@ class _Task:
         return fits(part, self.machine, **self._options())
 
     def _placed(self) -> PlacedPath | Refusal:
+        """Return the placed path. Where leaning makes the tool meet the part, the tool keeps the toolpath's axes."""
+        options = self._options()
+        placed = self._planned(options)
+        met = self._meetings(placed)
+        if met and options["tilt"] > 0.0 and not options["common_axis"]:
+            placed = self._planned({**options, "tilt": 0.0})
+            met = self._meetings(placed)
+            if isinstance(placed, PlacedPath):
+                chosen = f"{placed.placement.chosen_by}; {UPRIGHT}"
+                placed = dataclasses.replace(placed, placement=dataclasses.replace(placed.placement, chosen_by=chosen))
+        return refusal_of(met) if met else placed
+
+    def _planned(self, options: PlacementOptions) -> PlacedPath | Refusal:
         objective, progress = self.job.placement.then, self.runner.progress
-        return plan(self.toolpath, self.machine, **self._options(), secondary_objective=objective, progress=progress)
+        return plan(self.toolpath, self.machine, **options, secondary_objective=objective, progress=progress)
+
+    def _meetings(self, placed: PlacedPath | Refusal) -> Ranges:
+        """Return where the tool meets the part; nowhere for jobs that want gouges reported only."""
+        cutting = self.specification.cutting
+        if isinstance(placed, Refusal) or cutting is None or not drops_gouges(self.job):
+            return ()
+        return meetings(placed, cutting, self.specification.path_tolerance)
 
     def _options(self) -> PlacementOptions:
         return {
@@ -255,12 +278,12 @@ class _Task:
 
 
 def _remarks(placed: PlacedPath | Refusal) -> str:
-    """Return the positions of guides, a common direction of the tool, and the result of an interrupted search."""
+    """Return the positions of guides, a common direction of the tool, and what the choice of placement has to tell."""
     if isinstance(placed, Refusal):
         return ""
     chosen = placed.placement
     lines = [f"guides 1 to 5 at {chosen.guides}"] if chosen.guides else []
     lines += [f"tool axis: {placed.common_axis}; {placed.lean}"] if placed.common_axis is not None else []
-    if "interrupted" in chosen.chosen_by:
+    if "interrupted" in chosen.chosen_by or UPRIGHT in chosen.chosen_by:
         lines.append(f"placement: {chosen.chosen_by}; smallest margin {placed.smallest_margin:.3f}")
     return "\n".join(lines)

@@ -9,12 +9,12 @@ from pentapod.base.errors import ProgramError
 from pentapod.base.progress import Progress, silent
 from pentapod.job.artefacts import PROGRAM, SETUPS
 from pentapod.job.build.specification import job_specification
-from pentapod.job.build.toolpath import job_link_style, job_toolpath, program_piece, program_toolpath
+from pentapod.job.build.toolpath import job_part, job_toolpath, program_piece, program_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.outcome import setups_verdict
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
-from pentapod.toolpath.linking.partition import Piece, missed_cuts, part_of
+from pentapod.toolpath.linking.partition import Piece, missed_cuts
 from pentapod.verify import Verdict, judged
 
 
@@ -50,12 +50,11 @@ def judge(
         job, used, mesh, lambda: job_toolpath(job, mesh, progress, machine=used)[0], own_machine=own_machine
     )
     toolpath = specification.toolpath
-    style = job_link_style(job, mesh, toolpath)
     pieces = [program_piece(file) or Piece(0, len(toolpath) - 1) for file in files]
     cuts, missed = missed_cuts(toolpath, pieces)
     verdicts: list[tuple[int, Verdict]] = []
     for number, (file, piece) in enumerate(zip(files, pieces, strict=True), start=1):
-        own = replace(specification, toolpath=part_of(toolpath, piece, style), missed=missed)
+        own = replace(specification, toolpath=job_part(job, mesh, toolpath, piece, machine=used), missed=missed)
         verdicts.append((number, judged(file, own, strict=strict, progress=progress)))
     return setups_verdict(verdicts, cuts, missed, job.placement.setups)
 

@@ -98,7 +98,7 @@ def test_axes_and_remedies_of_the_job_are_used(make_job):
     path, report = job_toolpath(job, job_mesh(job))
     assert "holder" in str(report)
     assert "problem" not in str(report).splitlines()[-1]
-    assert "links replaced by links over" in str(report)
+    assert "links replaced by others that are clear" in str(report)
     assert any(segment.kind is SegmentKind.CUT for segment in path.segments)
 
 

@@ -144,14 +144,7 @@ def job_toolpath(
     else:
         toolpath, report = toolpath_with_report(mesh, tool, job_options(job))
         toolpath = stepped(oriented(toolpath, tool, _orientation(job, tool)), job.toolpath.si.axis_step)
-    gouge = fields_from(GougeOptions, job.gouge)
-    options = GougeOptions(
-        # By default, nothing is taken out of a toolpath that was read from a file.
-        tuple(Remedy(name) for name in job.gouge.remedy or ("report" if from_file else "drop",)),
-        # An engraving lies below the surface on purpose.
-        **{**gouge, "tolerance": gouge["tolerance"] + job_depth(job)},
-        links=None if from_file else job_link_style(job, mesh, toolpath),
-    )
+    options = _gouge_options(job, _remedies(job), None if from_file else job_link_style(job, mesh, toolpath))
     toolpath, gouges = without_gouges(toolpath, tool, mesh, options, progress)
     if not any(segment.kind is SegmentKind.CUT for segment in toolpath.segments):
         raise ToolpathError(
@@ -169,12 +162,42 @@ def job_toolpath(
     return toolpath, Reports(tuple(reports))
 
 
+def _remedies(job: Job) -> tuple[Remedy, ...]:
+    """Return what is done about gouges: by default, nothing is taken out of a toolpath that was read from a file."""
+    usual = "report" if job.toolpath.strategy == FILE else "drop"
+    return tuple(Remedy(name) for name in job.gouge.remedy or (usual,))
+
+
+def _gouge_options(job: Job, remedies: tuple[Remedy, ...], links: LinkStyle | None) -> GougeOptions:
+    """Return the options of the job's gouge check. links: style of links that replace others."""
+    gouge = fields_from(GougeOptions, job.gouge)
+    # An engraving lies below the surface on purpose.
+    return GougeOptions(remedies, **{**gouge, "tolerance": gouge["tolerance"] + job_depth(job)}, links=links)
+
+
+def drops_gouges(job: Job) -> bool:
+    """Return whether what gouges is taken out of the toolpath, so that no motion of it should meet the part."""
+    return Remedy.DROP in _remedies(job)
+
+
 def job_piece(
     job: Job, mesh: Mesh, piece: Piece, progress: Progress = silent, *, machine: Machine | None = None
 ) -> Toolpath:
-    """Return a piece of the job's toolpath, with approach and retract. Raises ToolpathError as `part_of`."""
+    """Return a piece of the job's toolpath, as `job_part`. Raises ToolpathError as `part_of`."""
     toolpath, _ = job_toolpath(job, mesh, progress, machine=machine)
-    return part_of(toolpath, piece, job_link_style(job, mesh, toolpath))
+    return job_part(job, mesh, toolpath, piece, machine=machine)
+
+
+def job_part(job: Job, mesh: Mesh, toolpath: Toolpath, piece: Piece, *, machine: Machine | None = None) -> Toolpath:
+    """Return a piece of the job's toolpath as `part_of`, with links that are clear of the part.
+
+    Raises ToolpathError as `part_of`.
+    """
+    style = job_link_style(job, mesh, toolpath)
+    part = part_of(toolpath, piece, style)
+    if not drops_gouges(job):
+        return part
+    return without_gouges(part, _judged_tool(job, machine), mesh, _gouge_options(job, (), style))[0]
 
 
 def program_toolpath(

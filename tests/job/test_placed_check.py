@@ -1,0 +1,67 @@
+"""Tool axes that lean into the part: found before a program is written, and planned without leaning."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import toolpath_surfaces as surfaces
+from pentapod.cli.commands.new import dome_stl
+from pentapod.geometry import RigidTransform
+from pentapod.job import Job, pipeline, run
+from pentapod.job.placed_check import meetings
+from pentapod.kinematics.component import COMPONENTS
+from pentapod.planning import PlacedPath, Placement, plan
+from pentapod.toolpath import BallCutter, Mesh, RasterOptions, make_toolpath
+from pentapod.verify import Cutting
+from usual_job import job_text
+
+TOO_FAR = np.radians(100.0)
+
+
+def leaned(placed: PlacedPath, angle: float) -> PlacedPath:
+    """The same path with all axes leaned by an angle about the balls' centres."""
+    across = np.cross(placed.axes, [0.0, 1.0, 0.0])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    axes = np.cos(angle) * placed.axes + np.sin(angle) * across
+    tips = placed.tilt_centres - placed.toolpath.tilt_centre * axes
+    return replace(placed, tips=tips, axes=axes)
+
+
+def test_meetings_are_where_a_leaning_stem_is_in_the_part():
+    mesh = Mesh.of(*surfaces.grid(lambda x, y: -3.0 * (x**2 + y**2), width=0.05, cells=12))
+    tool = BallCutter(3e-3).with_stem(0.06)
+    path = make_toolpath(mesh, tool, RasterOptions(stepover=8e-3))
+    there = RigidTransform(np.diag([1.0, -1.0, -1.0]), np.array([0.1, 0.2, 0.5]))
+    tips, axes = there.apply(path.tips), there.rotate(path.axes)
+    placed = PlacedPath(path, Placement(there, "test"), COMPONENTS[0], tips, axes, np.ones((len(path), 1)), ())
+    cutting = Cutting.of(mesh, tool)
+    assert meetings(placed, cutting, 2e-5) == ()
+    assert meetings(leaned(placed, np.radians(30.0)), cutting, 2e-5) == ()
+    first, last = meetings(leaned(placed, TOO_FAR), cutting, 2e-5)[0]
+    assert 0 <= first < last < len(path)
+
+
+@pytest.mark.slow
+def test_axes_that_lean_into_the_part_are_planned_again_without_leaning_or_refused(tmp_path, monkeypatch):
+    (tmp_path / "part.stl").write_bytes(dome_stl(cells=12))
+    (tmp_path / "job.toml").write_text(job_text().replace("tilt_deg = 0", "tilt_deg = 15"), encoding="utf-8")
+    job, asked, stubborn = Job.load(tmp_path / "job.toml"), [], False
+
+    def leaning(toolpath, machine, **options):
+        asked.append(options["tilt"])
+        placed = plan(toolpath, machine, **{**options, "tilt": 0.0})
+        return leaned(placed, TOO_FAR) if stubborn or options["tilt"] > 0.0 else placed
+
+    monkeypatch.setattr(pipeline, "plan", leaning)
+    outcome = run(job, tmp_path / "out")
+    assert outcome.passed
+    assert asked == [np.radians(15.0), 0.0]
+
+    stubborn = True
+    outcome = run(job, tmp_path / "refused")
+    assert outcome.refusal is not None
+    assert "the tool touches the part at waypoints" in str(outcome.refusal)
+    assert not (tmp_path / "refused" / "program.csv").exists()
