@@ -348,6 +348,8 @@ def test_unit_tool_and_machine_are_asked_for_and_taken(tmp_path):
     second = read_toolpath(file, unit="inch", tool="2")
     np.testing.assert_allclose(runs(second)[0], np.array([[2, 0, 1], [2, 0, 0], [3, 0, 0]]) * INCH)
     assert len(runs(second)) == 1
+    with pytest.raises(ToolpathError, match=r"tool: the file never takes this tool \(got '3'\); expected 1, 2"):
+        read_toolpath(file, unit="inch", tool="3")
     file.write_text(text.replace("X3", "X3 A20 B10").replace("X2", "X2 A10 B5").replace("M2", "#5=[1+1]\nM428"))
     with pytest.raises(ToolpathError, match="rotary axes A and B: which of them") as caught:
         read_toolpath(file, unit="mm")

@@ -85,6 +85,10 @@ class GCodeReader(StatementReader):
                 self.problems.add(self.wrong(what, len(lines), "M", expected="M2 or M30"))
         except TooManyError as error:
             self.problems.add(error)
+        if self.defaults.tool is not None and self.defaults.tool not in self.switches.seen:
+            known = ", ".join(dict.fromkeys(self.switches.seen)) or "none"
+            what = "the file never takes this tool"
+            self.problems.add(ToolpathError(what, file=self.file, key="tool", value=self.defaults.tool, expected=known))
         self.problems.check()
         told = notes(self.tracer, self.moves)
         if self.moves.tips:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from pentapod.toolpath.formats.gcode.language.blocks import Word
 from pentapod.toolpath.formats.gcode.language.problems import Problems
@@ -18,12 +18,17 @@ _SUBPROGRAM_ENDS = 17.0
 
 @dataclass
 class Switches:
-    """Takes M and T words. pending: the tool that the next M6 brings; ended: the line that ends the program."""
+    """Takes M and T words.
+
+    pending: the tool that the next M6 brings; seen: tools that were in the spindle; ended: the line that ends the
+    program.
+    """
 
     tracer: Tracer
     problems: Problems
     scan: Scan
     pending: str = ""
+    seen: list[str] = field(default_factory=list[str])
     ended: int | None = None
 
     def take(self, switches: Sequence[Word], words: Mapping[str, Word], line: int) -> None:
@@ -34,7 +39,7 @@ class Switches:
             self.pending = word.arguments[0] if word.arguments else f"{word.value:g}"
             tracer.moves.add_words(str(word))
             if not self.scan.changes_tools:
-                tracer.tool = self.pending
+                self._take_tool()
         for word in switches:
             code = word.value
             if self._ends(code):
@@ -57,11 +62,15 @@ class Switches:
     def _change_tool(self, word: Word, words: Mapping[str, Word], line: int) -> None:
         if word.value == _SET_TOOL and "Q" in words:
             self.pending = f"{words['Q'].value:g}"
-        self.tracer.tool = self.pending
+        self._take_tool()
         self.tracer.moves.add_words(str(word))
         if self.tracer.moves.tips and word.value == _CHANGE:
             self.tracer.here = None
             self.tracer.tell("tool change", line)
+
+    def _take_tool(self) -> None:
+        self.tracer.tool = self.pending
+        self.seen.append(self.pending)
 
     def _switch_tcp(self, *, on: bool) -> None:
         at = self.tracer.at
