@@ -360,6 +360,24 @@ def test_unit_tool_and_machine_are_asked_for_and_taken(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("axes", "remedy"),
+    [
+        (None, "give rotary_axes, with rotary_centre_mm .table. or pivot_mm .head., in"),
+        (RotaryAxes.of(["table C", "head B"], CENTRE), "give pivot_mm in"),
+        (RotaryAxes.of(["table C", "head B"]), "give rotary_centre_mm and pivot_mm in"),
+    ],
+)
+def test_what_a_file_without_tool_centre_point_programming_needs(axes, remedy):
+    with pytest.raises(ToolpathError, match=f"head_table_no_tcp.nc:12: X: .*depends on the machine; {remedy}"):
+        read_toolpath(CAM / "head_table_no_tcp.nc", rotary=axes)
+
+
+def test_every_axis_that_turns_is_listed():
+    with pytest.raises(ToolpathError, match=r"nx_bc_mixed.ptp:9: B: B is turned, and rotary_axes does not list it"):
+        read_toolpath(CAM / "nx_bc_mixed.ptp", rotary=RotaryAxes.of(["table C"]))
+
+
+@pytest.mark.parametrize(
     ("names", "words"),
     [
         (["table C", "desk A"], "unknown rotary axis"),

@@ -27,15 +27,16 @@ class Pose(NamedTuple):
 class Coordinates:
     """What the program's coordinates mean. Millimetres and degrees.
 
-    chain: the rotary axes of the machine; named: letters of those in the file. tcp: tool centre point programming is
-    on. place: coordinates by letter, the linear ones only where they are known. frame: a turned frame. fixed: the tool
-    axis where it is not given by rotary words (G53.1, vectors). lost: rotary axes whose angle is not known, as the
-    controller found it (G53.1). shift: of G52 and G92. system: G54 and the like; offsets: where the file gives them.
-    first_system: the one in which the tool moved first, and its offset then.
+    chain: the rotary axes of the machine; named: letters of those in the file; described: the user lists them. tcp:
+    tool centre point programming is on. place: coordinates by letter, the linear ones only where they are known. frame:
+    a turned frame. fixed: the tool axis where it is not given by rotary words (G53.1, vectors). lost: rotary axes whose
+    angle is not known, as the controller found it (G53.1). shift: of G52 and G92. system: G54 and the like; offsets:
+    where the file gives them. first_system: the one in which the tool moved first, and its offset then.
     """
 
     chain: RotaryAxes
     named: frozenset[str] = frozenset()
+    described: bool = False
     tcp: bool = False
     place: dict[str, float] = field(default_factory=lambda: dict.fromkeys(LETTERS, 0.0))
     frame: Frame | None = None
@@ -90,9 +91,15 @@ class Coordinates:
             return f"the angle of {', '.join(sorted(self.lost))} is not known after G53.1", "give all rotary axes"
         if self.fixed is not None:
             return "the tool was turned by G53.1, and its frame is off", "cut in the frame, or with G43.4"
+        keys = "rotary_axes, with rotary_centre_mm (table) or pivot_mm (head),"
+        if self.described:
+            moved = [axis for axis in self.chain.axes if self.place[axis.letter] % 360.0]
+            lacks_pivot = self.chain.pivot is None and not all(axis.in_table for axis in moved)
+            lacks_centre = self.chain.centre is None and any(axis.in_table for axis in moved)
+            keys = " and ".join(["rotary_centre_mm"] * lacks_centre + ["pivot_mm"] * lacks_pivot)
         return (
             "a rotary axis is turned without tool centre point programming: the place depends on the machine",
-            "give rotary_axes, rotary_centre_mm and pivot_mm in [toolpath], or export with G43.4 or TRAORI",
+            f"give {keys} in [toolpath], or export with G43.4 or TRAORI",
         )
 
     def use(self) -> None:

@@ -66,11 +66,11 @@ class GCodeReader(StatementReader):
         lines = read_lines(self.file, has_end_mark=True)
         scan = Scan.of(lines, self.dialect)
         try:
-            chain = self.defaults.rotary or scan.usual(self.dialect, self.file)
+            chain = scan.machine(self.dialect, self.file, self.defaults.rotary)
         except ToolpathError as error:
             self.problems.add(error)
             chain = ANY_AXES
-        at = Coordinates(chain, scan.named, tcp=scan.begins_with_tcp(self.dialect))
+        at = Coordinates(chain, scan.named, self.defaults.rotary is not None, tcp=scan.begins_with_tcp(self.dialect))
         self.modes = Modes(self.dialect, self.defaults.scale)
         self.tracer = Tracer(self.moves, at, self.modes, self.defaults)
         self.drill = Drill(self.tracer)

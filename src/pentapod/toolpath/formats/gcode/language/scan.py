@@ -50,8 +50,21 @@ class Scan:
                 switches = switches or _SWITCH.search(text) is not None
         return cls(letters, frozenset(named), changes, switches)
 
-    def usual(self, dialect: Dialect, file: Path) -> RotaryAxes:
-        """Return the usual rotary axes of these letters. Raises ToolpathError where there are several ways."""
+    def machine(self, dialect: Dialect, file: Path, given: RotaryAxes | None) -> RotaryAxes:
+        """Return the rotary axes of the file's machine: those that are given, or else the usual ones of its letters.
+
+        Raises ToolpathError where there are several usual ways, or a letter that is turned is not among the given ones.
+        """
+        if given is None:
+            return self._usual(dialect, file)
+        missing = next((letter for letter in self.letters if letter not in given.letters), None)
+        if missing is not None:
+            what = f"{missing} is turned, and rotary_axes does not list it"
+            remedy = "list all rotary axes, from the part to the tool"
+            raise ToolpathError(what, file=file, line=self.letters[missing], key=missing, remedy=remedy)
+        return given
+
+    def _usual(self, dialect: Dialect, file: Path) -> RotaryAxes:
         used = "".join(sorted(self.named))
         if used not in dialect.pairs:
             used = "".join(sorted(self.letters))
