@@ -131,6 +131,16 @@ def test_new_writes_a_job_beside_the_part_or_elsewhere(tmp_path, capsys, monkeyp
     assert not (tmp_path / "b.toml").exists()
 
 
+def test_a_part_that_needs_repair_is_repaired_and_that_is_told(tmp_path):
+    shape = trimesh.creation.box((80, 60, 31))
+    many = np.concatenate([shape.triangles, np.repeat(shape.triangles[:1, :1], 3, axis=1)])
+    flat = trimesh.Trimesh(**trimesh.triangles.to_kwargs(many), process=False)
+    job, proposal = proposed(tmp_path, flat)
+    assert job.part.repair
+    assert "1 span no surface" in " ".join(proposal.remarks)
+    job_mesh(job)
+
+
 def test_a_broken_part_gets_no_job(tmp_path):
     (tmp_path / "a.stl").write_bytes(b"solid text, not a mesh\n")
     with pytest.raises(MeshError):

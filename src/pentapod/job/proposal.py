@@ -35,8 +35,8 @@ class ProposalOptions:
 
     usual_mm: tuple[float, float] = (5.0, 2000.0)
     diameters: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0)
-    cutter: float = 0.07
-    stepover: float = 0.4
+    cutter: float = 0.1
+    stepover: float = 0.5
     feed_mm_min: float = 1500.0
     steep_deg: float = 60.0
     steep: float = 0.7
@@ -65,7 +65,7 @@ class Proposal(Value):
 def propose(part: Path, machine: Machine, name: str) -> Proposal:
     """Return a job for a mesh file on a machine, which the job calls `name`. Raises MeshError where it is unusable."""
     unit = None if states_unit(part) else _unit(part, machine.work)
-    mesh = load_mesh(part, unit)
+    mesh, broken = _loaded(part, unit)
     faults = mesh.diagnosis
     table: dict[str, Any] = {} if unit is None else {"unit": unit}
     reasons: dict[tuple[str, str], str] = {}
@@ -73,9 +73,9 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
     remarks = [f"the part is {size} mm" + ("" if unit is None else f", if its unit is {unit}: a guess from its size")]
     if unit is not None:
         reasons["part", "unit"] = f"a guess: the file does not say it; the part is {size} mm then"
-    if faults.inverted or not faults.consistent:
-        table["repair"], mesh = True, load_mesh(part, unit, repair=True)
-        reasons["part", "repair"] = "facets of this mesh are wound in opposite senses, or inside out"
+    if broken:
+        table["repair"], reasons["part", "repair"] = True, broken
+        remarks.append(f"repair = true, because {broken}")
     side, flipped = _side(mesh)
     if flipped:
         table["flip"], mesh = True, mesh.flipped()
@@ -113,10 +113,21 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
     return Proposal(tables, reasons, tuple(remarks))
 
 
+def _loaded(part: Path, unit: str | None) -> tuple[Mesh, str]:
+    """Return the mesh, repaired where it needs to be, and why. Raises MeshError where that does not help."""
+    try:
+        mesh, why = load_mesh(part, unit), ""
+    except MeshError as error:
+        mesh, why = None, error.what
+    if mesh is not None and (mesh.diagnosis.inverted or not mesh.diagnosis.consistent):
+        why = "facets are wound in opposite senses" if not mesh.diagnosis.inverted else "the surface is inside out"
+    return (load_mesh(part, unit, repair=True), why) if mesh is None or why else (mesh, "")
+
+
 def _unit(part: Path, work: WorkVolume) -> str:
     """Return the likely unit of a file's numbers."""
     # In metres the numbers are as they are in the file.
-    largest = max(load_mesh(part, "m").diagnosis.extents)
+    largest = max(load_mesh(part, "m", repair=True).diagnosis.extents)
     low, high = (1e-3 * end for end in OPTIONS.usual_mm)
     if low <= largest * UNITS["mm"] <= high:
         return "mm"
