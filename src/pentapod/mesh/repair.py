@@ -43,9 +43,10 @@ def joined_borders(vertices: Floats, topology: Topology) -> tuple[Ints, float] |
     None where no two vertices on borders are that close. A vertex is merged with one within this distance only, so that
     a border of very short edges does not shrink to a point.
     """
-    border = np.unique(topology.edges[topology.facets_at_edge == 1])
-    if not len(border):
+    open_ = topology.facets_at_edge == 1
+    if not open_.any():
         return None
+    border = np.unique(topology.edges[open_])
     near = NEAR * float(np.ptp(vertices, axis=0).max())
     pairs = border[np.sort(KDTree(vertices[border]).query_pairs(near, output_type="ndarray"), axis=1)]
     if not len(pairs):

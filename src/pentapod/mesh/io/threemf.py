@@ -36,13 +36,39 @@ Placed = tuple[str, str, Floats]
 """Part of the archive, object and transform (4, 3) of a component."""
 
 
+class _Numbers:
+    """Numbers from texts. Texts are converted by the hundred thousand: they take much more memory."""
+
+    batch = 100_000
+
+    def __init__(self) -> None:
+        self._texts: list[str] = []
+        self._blocks: list[Floats] = []
+
+    def add(self, *texts: str) -> None:
+        """Add texts. Raises ValueError for one that is no finite number."""
+        self._texts += texts
+        if len(self._texts) > self.batch:
+            self._convert()
+
+    def rows(self) -> Floats:
+        """Return the numbers (n, 3). Raises ValueError as `add`."""
+        self._convert()
+        return np.concatenate(self._blocks).reshape(-1, 3)
+
+    def _convert(self) -> None:
+        self._blocks.append(_floats(self._texts))
+        self._texts = []
+
+
 @dataclass
 class _Object:
-    """A body, or placed components. numbers, corners: texts of the coordinates and of the facets' vertices."""
+    """A body, or placed components. facets: how many the body has."""
 
     kind: str
-    numbers: list[str] = field(default_factory=list[str])
-    corners: list[str] = field(default_factory=list[str])
+    vertices: _Numbers = field(default_factory=_Numbers)
+    corners: _Numbers = field(default_factory=_Numbers)
+    facets: int = 0
     parts: list[Placed] = field(default_factory=list[Placed])
 
 
@@ -68,6 +94,10 @@ class _Model:
             raise self.wrong(str(error).split(":")[0]) from error
         except KeyError as error:
             raise self.wrong(f"an attribute is missing: {error.args[0]}") from error
+        except MeshError:
+            raise
+        except ValueError as error:
+            raise self.wrong("not a finite number", str(error)[:60]) from error
 
     def wrong(self, what: str, value: object = None) -> MeshError:
         """Return the error about the line that is being read."""
@@ -88,9 +118,10 @@ class _Model:
             return
         match tag:
             case "vertex":
-                self._object().numbers += (attributes["x"], attributes["y"], attributes["z"])
+                self._object().vertices.add(attributes["x"], attributes["y"], attributes["z"])
             case "triangle":
-                self._object().corners += (attributes["v1"], attributes["v2"], attributes["v3"])
+                self._object().corners.add(attributes["v1"], attributes["v2"], attributes["v3"])
+                self._object().facets += 1
             case "model":
                 self.unit = attributes.get("unit", self.unit)
                 if self.unit not in _UNITS:
@@ -118,7 +149,7 @@ class _Model:
         part = next((value for key, value in attributes.items() if key.rpartition("}")[2] == "path"), self.name)
         text = attributes.get("transform", "1 0 0 0 1 0 0 0 1 0 0 0")
         numbers = _floats(text.split())
-        if numbers is None or len(numbers) != 12:
+        if len(numbers) != 12:
             raise self.wrong("a transform is not twelve numbers", text[:60])
         return part.lstrip("/"), attributes["objectid"], numbers.reshape(4, 3)
 
@@ -158,7 +189,7 @@ class _Archive:
             if found is None:
                 raise MeshError("an object is missing", file=self.path, value=number, remedy=EXPORT_AGAIN)
             inside = sum(max(self.count(*placed[:2], (*above, key)), 1) for placed in found.parts)
-            self._counts[key] = len(found.corners) // 3 + inside
+            self._counts[key] = found.facets + inside
         return self._counts[key]
 
     def bodies(self, placed: Placed, at: Floats) -> list[tuple[Floats, Ints]]:
@@ -167,14 +198,18 @@ class _Archive:
         here = matrix @ at[:3]
         here[3] += at[3]
         found = self.model(part).objects[number]
-        own = [self._body(found, number, here)] if found.corners or found.numbers else []
+        own = [self._body(found, number, here)] if found.facets else []
         return [*own, *(body for inner in found.parts for body in self.bodies(inner, here))]
 
     def _body(self, found: _Object, number: str, matrix: Floats) -> tuple[Floats, Ints]:
-        points, corners = _floats(found.numbers), _floats(found.corners)
-        if points is None or corners is None or (corners != np.rint(corners)).any():
-            raise MeshError("a vertex or facet is not of numbers", file=self.path, value=number, remedy=EXPORT_AGAIN)
-        vertices, faces = points.reshape(-1, 3), corners.reshape(-1, 3)
+        try:
+            vertices, faces = found.vertices.rows(), found.corners.rows()
+        except ValueError as error:
+            what = f"cannot be read as 3MF: object {number}: not a finite number"
+            raise MeshError(what, file=self.path, value=str(error)[:60], remedy=EXPORT_AGAIN) from error
+        if (faces != np.rint(faces)).any():
+            what = f"cannot be read as 3MF: object {number}: a facet is not of whole numbers"
+            raise MeshError(what, file=self.path, remedy=EXPORT_AGAIN)
         if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
             what = f"a facet uses a vertex that is not there; object {number} has {len(vertices):,}"
             raise MeshError(what, file=self.path, remedy=EXPORT_AGAIN)
@@ -182,14 +217,15 @@ class _Archive:
         return vertices @ matrix[:3] + matrix[3], (faces[:, ::-1] if mirrored else faces).astype(np.intp)
 
 
-def _floats(texts: list[str]) -> Floats | None:
-    """Return numbers; None where one of the texts is none, or is not finite."""
-    try:
-        values = np.array(list(map(float, texts)), dtype=np.float64)
-    except ValueError:
-        return None
-    plain = not any("_" in text for text in texts) and "".join(texts).isascii()
-    return values if plain and np.isfinite(values).all() else None
+def _floats(texts: list[str]) -> Floats:
+    """Return finite numbers. Raises ValueError with the text that is none."""
+    for text in texts:
+        if "_" in text or not text.isascii():
+            raise ValueError(text)
+    values = np.array(list(map(float, texts)), dtype=np.float64)
+    if not np.isfinite(values).all():
+        raise ValueError(texts[int(np.flatnonzero(~np.isfinite(values))[0])])
+    return values
 
 
 def _read(path: Path, data: bytes, options: ReadOptions) -> MeshData:
