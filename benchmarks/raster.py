@@ -19,6 +19,7 @@ from pentapod.mesh.query.swept_depth import touch
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath import BallCutter, Mesh, RasterOptions, toolpath_with_report
 from pentapod.toolpath.strategies.raster import raster_paths
+from pentapod.toolpath.surfaces.part_surface import PartSurface
 
 WIDTH, STEPOVER = 0.3, 1.5e-3
 TOOL = BallCutter(3e-3)
@@ -62,7 +63,7 @@ def main() -> None:
     parser.add_argument("--finish-up-to", type=int, default=1_000_000)
     options = parser.parse_args()
     told = RasterOptions(stepover=STEPOVER, spacing=2e-3, chordal=10e-6)
-    raster_paths(wavy_sheet(10), TOOL, told)
+    raster_paths(PartSurface(wavy_sheet(10), TOOL, told.up), told)
     touch(FacetTree.of(wavy_sheet(10)), TOOL, np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
     print(f"NumPy {np.__version__}, Python {platform.python_version()}, {platform.machine()}, one thread")
     columns = ("facets", "mesh s", "planes s", "lines s", "ratio", "finished s", "tree s", "lines / n log n")
@@ -71,7 +72,7 @@ def main() -> None:
         mesh, loading = timed(lambda count=facets: wavy_sheet(round((count / 2) ** 0.5)))
         _ = mesh.corner_normals
         planes = planes_of(mesh)
-        lines = timed(lambda part=mesh: raster_paths(part, TOOL, told))[1]
+        lines = timed(lambda part=mesh: raster_paths(PartSurface(part, TOOL, told.up), told))[1]
         tree = timed(lambda part=mesh: FacetTree.of(part))[1]
         count = len(mesh.faces)
         finished = float("nan")

@@ -67,7 +67,7 @@ def random_points(mesh: Mesh, count, region, seed=7):
     normals = (mesh.corner_normals[facet] * weights).sum(axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     low, high = region.bounds
-    inside = (normals @ region.direction >= np.cos(region.angle)) & ((points >= low) & (points <= high)).all(axis=1)
+    inside = (normals @ region.direction >= np.cos(region.within)) & ((points >= low) & (points <= high)).all(axis=1)
     return points[inside], normals[inside]
 
 

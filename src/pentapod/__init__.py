@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from pentapod.toolpath import Normal as Normal
     from pentapod.toolpath import OffsetOptions as OffsetOptions
     from pentapod.toolpath import Orientation as Orientation
+    from pentapod.toolpath import PencilOptions as PencilOptions
     from pentapod.toolpath import Pointed as Pointed
     from pentapod.toolpath import PolylineOptions as PolylineOptions
     from pentapod.toolpath import RasterOptions as RasterOptions
@@ -107,8 +108,8 @@ _ROOMS = {
     "cutters": "BallCutter BullNose FlatEnd Lollipop StandOff",
     "kinematics": "Component LinearPentapod",
     "machine": "Machine CollisionWorld",
-    "toolpath": "Cone RasterOptions CrossHatchOptions WaterlineOptions OffsetOptions SpiralOptions EdgeOptions "
-    "CurveOptions DrawingOptions TextOptions PolylineOptions ImageOptions lettering read_lines read_points "
+    "toolpath": "Cone RasterOptions CrossHatchOptions WaterlineOptions OffsetOptions SpiralOptions PencilOptions "
+    "EdgeOptions CurveOptions DrawingOptions TextOptions PolylineOptions ImageOptions lettering read_lines read_points "
     "read_darkness make_toolpath toolpath_with_report Orientation Normal Fixed Pointed Between oriented stepped "
     "GougeOptions Remedy LinkStyle without_gouges Segment SegmentKind Toolpath",
     "toolpath.formats": "read_toolpath write_toolpath",

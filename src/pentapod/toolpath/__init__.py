@@ -32,6 +32,7 @@ from pentapod.toolpath.strategies.drawing import DrawingOptions
 from pentapod.toolpath.strategies.edges import EdgeOptions
 from pentapod.toolpath.strategies.image import ImageOptions
 from pentapod.toolpath.strategies.offset import OffsetOptions
+from pentapod.toolpath.strategies.pencil import PencilOptions
 from pentapod.toolpath.strategies.polyline import PolylineOptions
 from pentapod.toolpath.strategies.raster import Pattern, RasterOptions
 from pentapod.toolpath.strategies.registry import STRATEGIES, make_toolpath, toolpath_with_report
@@ -71,6 +72,7 @@ __all__ = [
     "PathOptions",
     "PathReport",
     "Pattern",
+    "PencilOptions",
     "Pointed",
     "PolylineOptions",
     "RasterOptions",

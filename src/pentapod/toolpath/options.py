@@ -58,6 +58,9 @@ class PathOptions(Value):
     feed: float = 0.02
     link_feed: float = 0.05
 
+    rolls: ClassVar[bool] = False
+    """Whether lines are drawn on the drive surface of a ball."""
+
     def __post_init__(self) -> None:
         for name in ("chordal", "feed", "link_feed"):
             check_positive(name, getattr(self, name))
@@ -87,6 +90,8 @@ class CoverOptions(PathOptions):
     ] = None
     scallop: Annotated[float | None, Key("mm", "height of the ridge left between passes", gt=0.0, of_part=1.0)] = None
     fill: Annotated[bool, Key("", "additional lines where regular passes leave gaps")] = True
+
+    rolls: ClassVar[bool] = True
 
     one_of: ClassVar[tuple[str, str]] = ("stepover", "scallop")
     """Fields of which exactly one is given."""

@@ -13,12 +13,12 @@ from typing import Any
 from pentapod.base.arrays import Floats, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.values import Value
-from pentapod.cutters.tool import Tool
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.region_share import why_empty
 from pentapod.toolpath.options import PathOptions
+from pentapod.toolpath.surface import Surface
 
 
 class Order(StrEnum):
@@ -62,7 +62,7 @@ class ContactPaths:
 
 @dataclass(frozen=True)
 class Strategy(Value):
-    """A strategy. paths: mesh, tool and options → `ContactPaths`.
+    """A strategy. paths: surface and options → `ContactPaths`.
 
     options: a dataclass; its fields with a `Key` are the keys of [toolpath] in job files. in_jobs: whether job files
     can ask for it.
@@ -70,15 +70,15 @@ class Strategy(Value):
 
     name: str
     options: type[PathOptions]
-    paths: Callable[[Mesh, Tool, Any], ContactPaths]
+    paths: Callable[[Surface, Any], ContactPaths]
     in_jobs: bool = True
 
 
-def region_patch(mesh: Mesh, options: PathOptions) -> Patch:
-    """Return the region of a mesh. Raises ToolpathError if it is empty."""
-    patch = Patch.of(mesh, options.region)
+def region_patch(surface: Surface, options: PathOptions) -> Patch:
+    """Return the region of a surface. Raises ToolpathError if it is empty."""
+    patch = surface.patch(options.region)
     if not len(patch.faces):
-        raise empty_region(mesh, options)
+        raise empty_region(surface.part, options)
     return patch
 
 

@@ -12,7 +12,7 @@ from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.slicing import LevelSet, chained
 from pentapod.mesh.topology import Topology
 from pentapod.toolpath import Mesh, Region
-from pentapod.toolpath.linking.resampling import resample, without_duplicates
+from pentapod.toolpath.lines.resampling import resample, without_duplicates
 
 ALL = Region(angle=np.pi / 2, direction=(0.0, 0.0, 1.0))
 WHOLE_BALL = ([0.0, 1.0, 0.0], -0.045, 0.005, 19)

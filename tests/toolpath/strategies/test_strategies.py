@@ -22,10 +22,12 @@ from pentapod.toolpath import (
     CurveOptions,
     DrawingOptions,
     EdgeOptions,
+    FlatEnd,
     HeightField,
     ImageOptions,
     Mesh,
     OffsetOptions,
+    PencilOptions,
     PolylineOptions,
     RasterOptions,
     Region,
@@ -77,6 +79,7 @@ def told(size, step=None, **more):
         "waterline": WaterlineOptions(**cover, shallowest=np.radians(5.0)),
         "offset": OffsetOptions(**cover),
         "spiral": SpiralOptions(**cover),
+        "pencil": PencilOptions(**lengths),
         "edges": EdgeOptions(**lengths),
         "curves": CurveOptions(**lengths, lines=lettering("Ag5", 0.2 * size), depth=1e-3 * size),
         "text": TextOptions(**lengths, text="Ag5", height=0.2 * size, depth=1e-3 * size),
@@ -144,10 +147,14 @@ IN_THE_HOLE = {(name, "torus") for name in ("curves", "text", "drawing", "image"
 """What is laid in the middle of a torus meets nothing; on its ring it does."""
 
 
+ON_PARTS = sorted(set(STRATEGIES) - {"pencil"})
+"""Strategies that draw on the part itself for a tool that does not roll."""
+
+
 @pytest.mark.parametrize("part", ["waves", "ball", "torus", "box", "bumps"])
-@pytest.mark.parametrize("name", STRATEGIES)
+@pytest.mark.parametrize("name", ON_PARTS)
 def test_every_strategy_on_every_generated_part(generated, name, part):
-    mesh, tool, options = generated[part], BallCutter(1e-3), told(0.1)[name]
+    mesh, tool, options = generated[part], FlatEnd(1e-3), told(0.1)[name]
     if (name, part) in NOTHING_THERE:
         with pytest.raises(ToolpathError):
             toolpath_with_report(mesh, tool, options)
@@ -164,12 +171,32 @@ def test_every_strategy_on_every_generated_part(generated, name, part):
         assert coverage(mesh, options, cuts, count=30_000) >= 0.999
 
 
+@pytest.mark.parametrize("part", ["waves", "box", "bumps"])
+@pytest.mark.parametrize("name", ["raster", "waterline", "offset", "spiral"])
+def test_balls_roll_over_generated_parts(generated, name, part):
+    """The ball's centre is a radius from the part at every waypoint of a cut, and never nearer by more than chordal."""
+    mesh, options, radius = generated[part], told(0.1)[name], 6e-3
+    toolpath, _ = toolpath_with_report(mesh, BallCutter(radius), options)
+    cuts = [s.tips + radius * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT]
+    np.testing.assert_allclose(surfaces.surface_distance(mesh, np.concatenate(cuts)), radius, atol=1e-8)
+    feeds = [s.tips + radius * s.axes for s in toolpath.segments if s.kind is not SegmentKind.RAPID]
+    middles = np.concatenate([0.5 * (line[1:] + line[:-1]) for line in feeds])
+    assert surfaces.surface_distance(mesh, middles).min() >= radius - options.chordal - 1e-9
+
+
+def test_pencil_needs_a_ball_and_a_corner(generated):
+    options = told(0.1)["pencil"]
+    for tool, message in ((FlatEnd(3e-3), "only a ball"), (BallCutter(6e-3), "no concave corner")):
+        with pytest.raises(ToolpathError, match=message):
+            toolpath_with_report(generated["box"], tool, options)
+
+
 @pytest.mark.parametrize("name", STRATEGIES)
 def test_every_strategy_refuses_lengths_in_millimetres(generated, name):
     options = told(0.1)[name]
     wrong = {"stepover": 3.0} if isinstance(options, CoverOptions) and options.stepover else {"clearance": 10.0}
     with pytest.raises(ToolpathError, match=r" m is .* the part \(0\.1 m\); lengths are in metres"):
-        toolpath_with_report(generated["waves"], BallCutter(1e-3), replace(options, **wrong))
+        toolpath_with_report(generated["waves"], FlatEnd(1e-3), replace(options, **wrong))
 
 
 REAL = [
@@ -184,7 +211,7 @@ QUICK = {("offset", "fandisk.obj"), ("spiral", "wavy_mesh_with_hole.ply"), ("cur
     ("name", "part"),
     [
         pytest.param(name, part, marks=() if (name, part) in QUICK else pytest.mark.slow)
-        for name in STRATEGIES
+        for name in ON_PARTS
         for part in REAL
     ],
 )
@@ -195,14 +222,14 @@ def test_every_strategy_on_every_real_part(parts, name, part):
     options = told(0.1)[name]
     toolpath, refusal = None, ""
     try:
-        toolpath, _ = toolpath_with_report(mesh, BallCutter(1e-3), options)
+        toolpath, _ = toolpath_with_report(mesh, FlatEnd(1e-3), options)
     except ToolpathError as error:
         refusal = str(error)
     if toolpath is None:
         assert "\n" not in refusal
         assert name in ("edges", "waterline", "polyline", "curves", "text", "drawing", "image")
         return
-    check_laws(mesh, BallCutter(1e-3), options, toolpath)
+    check_laws(mesh, FlatEnd(1e-3), options, toolpath)
 
 
 def bumpy_laws(name, seed, exponent):
@@ -216,7 +243,7 @@ def bumpy_laws(name, seed, exponent):
     options = replace(plain, region=region, view=None)
     if name == "polyline":
         options = replace(options, lines=[line @ turn.T for line in plain.lines])
-    tool = BallCutter(1e-3 * scale)
+    tool = FlatEnd(1e-3 * scale)
     toolpath, _ = toolpath_with_report(mesh, tool, options)
     cuts = check_laws(mesh, tool, options, toolpath)
     if isinstance(options, CoverOptions):
@@ -227,7 +254,7 @@ def bumpy_laws(name, seed, exponent):
 
 
 @settings(max_examples=9, deadline=None)
-@given(name=st.sampled_from(sorted(STRATEGIES)), seed=st.integers(0, 10_000), exponent=st.floats(-3.0, 3.0))
+@given(name=st.sampled_from(ON_PARTS), seed=st.integers(0, 10_000), exponent=st.floats(-3.0, 3.0))
 @example(name="edges", seed=4349, exponent=2.845)  # passes that meet, with axes that do not
 def test_bumpy_grids(name, seed, exponent):
     bumpy_laws(name, seed, exponent)
@@ -235,6 +262,6 @@ def test_bumpy_grids(name, seed, exponent):
 
 @pytest.mark.slow
 @settings(max_examples=120, deadline=None)
-@given(name=st.sampled_from(sorted(STRATEGIES)), seed=st.integers(0, 10_000), exponent=st.floats(-3.0, 3.0))
+@given(name=st.sampled_from(ON_PARTS), seed=st.integers(0, 10_000), exponent=st.floats(-3.0, 3.0))
 def test_many_bumpy_grids(name, seed, exponent):
     bumpy_laws(name, seed, exponent)

@@ -84,7 +84,8 @@ def oriented(toolpath: Toolpath, tool: Tool, orientation: Orientation) -> Toolpa
     """Return a toolpath with the axes of an orientation instead of the surface's normals.
 
     Cuts keep their contacts. On links and rapids the axis turns evenly from the end of one cut to the start of the
-    next, and the tips move with the ends; before the first cut and after the last the axis is constant. Raises
+    next; before the first cut and after the last it is constant. The tilt centre keeps its way there if the tool can
+    tilt about it: a ball that is clear stays clear. Other tips move with the ends. Raises
     ToolpathError as `Orientation.axes`.
     """
     cuts = [k for k, segment in enumerate(toolpath.segments) if segment.kind is SegmentKind.CUT]
@@ -103,6 +104,9 @@ def oriented(toolpath: Toolpath, tool: Tool, orientation: Orientation) -> Toolpa
         rows = slice(int(toolpath.starts[k]), int(toolpath.starts[k + 1]) + 1)
         tips[rows], axes[rows], known[rows] = tool.tips(*run, new), new, True
     _interpolate(toolpath.tips, tips, axes, known)
+    if tool.can_tilt:
+        free = ~known
+        tips[free] = toolpath.tilt_centres[free] - toolpath.tilt_centre * axes[free]
     segments = [
         replace(segment, tips=tips[a : b + 1], axes=axes[a : b + 1])
         for segment, (a, b) in zip(toolpath.segments, pairwise(toolpath.starts), strict=True)

@@ -13,14 +13,11 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats
-from pentapod.cutters.tool import Tool
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.geodesic import border_vertices, distances, seeds_along
 from pentapod.mesh.query.slicing import LevelSet
 from pentapod.mesh.topology import components
-from pentapod.toolpath.lines.scallop import surface_steps
-from pentapod.toolpath.options import CoverOptions
 
 
 @dataclass(frozen=True)
@@ -42,13 +39,6 @@ class GapOptions:
 
 FRONTS = GapOptions(facets_per_step=5.0, negligible=2e-4)
 """For lines that are themselves at a geodesic distance: they turn sharp corners, which finer facets keep sharp."""
-
-
-def refined_for_fronts(patch: Patch, tool: Tool, options: CoverOptions) -> tuple[Patch, float]:
-    """Return a patch in facets that are small compared with the stepover, and the length of their edges, metres."""
-    sides = patch.vertices[patch.faces[:, 1]] - patch.vertices[patch.faces[:, 0]]
-    edge = FRONTS.longest_edge(surface_steps(patch, tool, sides, options))
-    return patch.refined(edge), edge
 
 
 def gap_lines(

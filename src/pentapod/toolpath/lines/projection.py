@@ -67,7 +67,7 @@ def projected(
     steps = np.where(owner[1:] == owner[:-1], np.linalg.norm(np.diff(plane, axis=0), axis=1), 0.0)
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     crease = depth * np.linalg.norm(np.diff(normalised(normals), axis=0), axis=1)
-    steepest = min(1.1 / max(np.cos(options.region.angle), 1e-9), refinement.steepest)
+    steepest = min(1.1 / max(np.cos(options.region.within), 1e-9), refinement.steepest)
     stretch, bridge = (refinement.stretch, refinement.bridge * spacing) if wrapped else (steepest, options.chordal)
     near = gaps <= (stretch + depth_slope) * steps + bridge + crease
     kept = (owner[1:] == owner[:-1]) & hit[1:] & hit[:-1] & near

@@ -28,12 +28,14 @@ from pentapod.toolpath.options import CoverOptions
 class StepoverOptions:
     """Bounds of the computation.
 
-    most_concave: smallest curvature times ball radius; at −1 the ball fills the concave surface. least_slope: smallest
-    change of a level quantity per metre of surface, which bounds the density of levels.
+    most_concave: smallest curvature times ball radius; at −1 the ball fills the concave surface. widest: largest
+    stepover of centres around an edge, as a multiple of that over a plane. least_slope: smallest change of a level
+    quantity per metre of surface, which bounds the density of levels.
     """
 
     most_concave: float = -0.9
     least_slope: float = 0.05
+    widest: float = 2.0
 
 
 def stepover_for(
@@ -47,6 +49,21 @@ def stepover_for(
     k = np.maximum(as_floats(curvature, "curvature"), options.most_concave / radius)
     flat = np.sqrt(scallop * (2.0 * radius - scallop))
     chord = flat / np.sqrt((1.0 + k * scallop) * (1.0 + k * radius))
+    x = np.clip(0.5 * np.abs(k) * chord, 0.0, 1.0)
+    return 2.0 * chord * np.where(x > 1e-6, np.arcsin(x) / np.where(x > 1e-6, x, 1.0), 1.0)
+
+
+def offset_stepover_for(
+    scallop: float, radius: float, curvature: ArrayLike = 0.0, options: StepoverOptions = StepoverOptions()
+) -> Floats:
+    """Return the distance (...) along the offset surface, metres, between centres of a ball that leave a scallop.
+
+    curvature (...): of the offset surface across the passes, κ / (1 + κ r) for κ of the part; see `stepover_for`.
+    """
+    least = options.most_concave / (1.0 + options.most_concave)
+    most = (1.0 - options.widest**-2) / (radius - scallop)
+    k = np.clip(as_floats(curvature, "curvature"), least / radius, min(most, 1.0 / radius))
+    chord = np.sqrt(scallop * (2.0 * radius - scallop) / (1.0 - k * (radius - scallop)))
     x = np.clip(0.5 * np.abs(k) * chord, 0.0, 1.0)
     return 2.0 * chord * np.where(x > 1e-6, np.arcsin(x) / np.where(x > 1e-6, x, 1.0), 1.0)
 
@@ -77,21 +94,24 @@ def curvatures(patch: Patch, directions: Floats) -> Floats:
     return (change * flat).sum(axis=1)
 
 
-def surface_steps(patch: Patch, tool: Tool, across: Floats, options: CoverOptions) -> Floats:
+def surface_steps(
+    patch: Patch, radius: float | None, across: Floats, options: CoverOptions, *, offset: bool = False
+) -> Floats:
     """Return the stepover (F,) on each facet, metres. across (F, 3) or (3,): directions across the passes.
 
-    Raises ToolpathError for a scallop that does not suit the tool.
+    radius: of the rounding that leaves scallops, metres; None if there is none. offset: the patch is of the offset
+    surface of a ball of this radius, not of the part. Raises ToolpathError for a scallop that does not suit it.
     """
     if options.stepover is not None:
         return np.full(len(patch.faces), options.stepover)
-    height, radius = options.scallop or 0.0, tool.scallop_radius
+    height = options.scallop or 0.0
     if radius is None:
         raise ToolpathError("this tool leaves no scallop", key="scallop", value=height, remedy="give the stepover")
     if height >= radius:
         raise ToolpathError(
             "the scallop must be lower than the ball's radius", key="scallop", value=height, expected=f"< {radius}"
         )
-    return stepover_for(height, float(radius), curvatures(patch, across))
+    return (offset_stepover_for if offset else stepover_for)(height, radius, curvatures(patch, across))
 
 
 def level_values(corners: Floats, slope: Floats, steps: Floats, options: StepoverOptions = StepoverOptions()) -> Floats:

@@ -8,17 +8,16 @@ import numpy as np
 
 from pentapod.base.arrays import Ints
 from pentapod.cutters.tool import Tool
-from pentapod.geometry.directions import normalised, tangent_frame
-from pentapod.mesh.mesh import Mesh
+from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.passes import Passes
-from pentapod.mesh.query.heightfield import HeightField
+from pentapod.toolpath.lines.resampling import resample
 from pentapod.toolpath.linking.linking import Linker, Run
 from pentapod.toolpath.linking.ordering import aligned, ordered
-from pentapod.toolpath.linking.resampling import resample
 from pentapod.toolpath.linking.tour import travel, travel_bound
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.path_report import PathReport
 from pentapod.toolpath.strategy import ContactPaths, Order, empty_region
+from pentapod.toolpath.surface import Surface
 from pentapod.toolpath.toolpath import Toolpath
 
 
@@ -37,7 +36,7 @@ class AssemblyOptions:
 
 def assembled(
     strategy: str,
-    mesh: Mesh,
+    surface: Surface,
     tool: Tool,
     options: PathOptions,
     paths: ContactPaths,
@@ -48,16 +47,17 @@ def assembled(
     Nominal axes are the surface's smooth normals. The motion begins and ends at the clearance level. Raises
     ToolpathError if no pass is left.
     """
-    field = HeightField(mesh, options.up)
-    passes, source, hidden = _waypoints(paths, field, options, assembly)
+    passes, source, hidden = _waypoints(paths, surface, options, assembly)
     long = passes.lengths >= options.shortest
     dropped, dropped_length = int((~long).sum()), float(passes.lengths[~long].sum())
     passes, source = passes.where(long), source[long]
     if not len(passes):
-        raise empty_region(mesh, options, dropped)
-    passes = replace(passes, normals=normalised(passes.normals))
+        raise empty_region(surface.part, options, dropped)
+    passes = surface.waypoints(passes, options)
     power = np.ones(len(passes)) if paths.power is None else paths.power[source]
     reach = assembly.reach * paths.stepover if options.stay is None else options.stay
+    # A proven link may be of any length, but not back along a pass that is cut one way.
+    anywhere = surface.slides and paths.both_ways and options.stay is None
     runs: list[Run] = []
     for entry in ordered(passes, paths.order, paths.both_ways, reach):
         rows = np.arange(len(passes.points))[passes.rows(entry.index)]
@@ -67,9 +67,10 @@ def assembled(
             begin = int(np.linalg.norm(passes.points[rows[:-1]] - here, axis=1).argmin())
             rows = np.concatenate([rows[begin:-1], rows[: begin + 1]])
         rows = rows[::-1] if entry.backwards else rows
-        stay = reach if entry.near and paths.depth == 0.0 else 0.0
+        stay = np.inf if anywhere else reach if entry.near else 0.0
+        stay = stay if paths.depth == 0.0 else 0.0
         runs.append(Run(passes.points[rows], passes.normals[rows], float(power[entry.index]), stay))
-    linker = Linker(mesh, tool, options, runs=runs, field=field, stepover=paths.stepover or options.spacing)
+    linker = Linker(surface, tool, options, runs=runs, stepover=paths.stepover or options.spacing)
     toolpath = linker.toolpath()
     firsts, lasts = np.stack([r.contacts[0] for r in runs]), np.stack([r.contacts[-1] for r in runs])
     report = PathReport(
@@ -86,7 +87,7 @@ def assembled(
         dropped=dropped,
         dropped_length=dropped_length,
         hidden=hidden,
-        tight=_too_concave(passes, tool),
+        tight=surface.tight(passes),
         unproven=linker.unproven,
         notes=paths.notes,
     )
@@ -94,7 +95,7 @@ def assembled(
 
 
 def _waypoints(
-    paths: ContactPaths, field: HeightField, options: PathOptions, assembly: AssemblyOptions
+    paths: ContactPaths, surface: Surface, options: PathOptions, assembly: AssemblyOptions
 ) -> tuple[Passes, Ints, int]:
     """Return the waypoints without those that the part hides, the pass (P,) that each comes from, and how many hide."""
     passes, hidden = paths.passes, 0
@@ -111,15 +112,9 @@ def _waypoints(
     )
     if not paths.visible:
         # A line below the surface is hidden by the surface itself, up to its depth measured along the view.
-        slack = assembly.hidden_slack + paths.depth / max(np.cos(options.region.angle), assembly.least_cosine)
-        keep = ~field.hides(passes.points, slack)
+        slack = assembly.hidden_slack + paths.depth / max(np.cos(options.region.within), assembly.least_cosine)
+        keep = ~surface.hides(passes.points, slack)
         hidden = int((~keep).sum())
         passes = passes.split(keep) if hidden else passes
     source = passes.levels
     return replace(passes, levels=levels[source]), source, hidden
-
-
-def _too_concave(passes: Passes, tool: Tool) -> int:
-    """Return how many steps have a concave radius below the ball's radius or the stand-off."""
-    closing = -(np.diff(passes.points, axis=0) * np.diff(passes.normals, axis=0)).sum(axis=1)
-    return int((passes.within & (closing * abs(tool.tilt_centre) > passes.steps**2)).sum())

@@ -12,13 +12,12 @@ from pentapod.base.arrays import Floats
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import angle_between
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.query.heightfield import HeightField
 from pentapod.mesh.query.swept_depth import is_clear
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath.linking import links
 from pentapod.toolpath.linking.links import LinkStyle, Pose
-from pentapod.toolpath.linking.stay_down_links import stay_down_links
 from pentapod.toolpath.options import Entry, PathOptions
+from pentapod.toolpath.surface import Surface
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 
@@ -76,28 +75,27 @@ class Linker:
     """Links between passes in their order of work.
 
     A pass that begins where the previous one ends follows without a link; one within `stay` is reached over the
-    surface if the limits of `stay_down_links` allow; one within `hop` by a rapid just above the part; others by way of
+    surface if the limits of the surface allow; one within `hop` by a rapid just above the part; others by way of
     the clearance level. `toolpath` counts how many passes are reached on the surface (stay_downs) and by a hop (hops),
     and how many rapids the collision check does not prove to be clear of the part (unproven).
     """
 
     def __init__(
         self,
-        mesh: Mesh,
+        surface: Surface,
         tool: Tool,
         options: PathOptions,
         *,
         runs: list[Run],
-        field: HeightField,
         stepover: float,
         choice: LinkingOptions = LinkingOptions(),
     ) -> None:
-        self.tool, self.options, self.runs, self.choice = tool, options, runs, choice
+        self.surface, self.tool, self.options, self.runs, self.choice = surface, tool, options, runs, choice
         self.stay_downs = self.hops = self.unproven = 0
         self.tips = [tool.tips(run.contacts, run.normals, run.normals) for run in runs]
         view = options.up
         highest = max(float((tips @ view).max()) for tips in self.tips)
-        top = max(float((mesh.vertices @ view).max()) + max(-tool.tilt_centre, 0.0), highest)
+        top = max(float((surface.part.vertices @ view).max()) + max(-tool.tilt_centre, 0.0), highest)
         # The corner of a rapid is two approaches off the surface, and must not be above the level.
         level = top + max(options.clearance, 2.0 * options.approach)
         self.style = LinkStyle(
@@ -109,17 +107,16 @@ class Linker:
             Entry(options.entry),
             min(options.axis_step, LinkStyle.axis_step),
         )
-        self.collision = CollisionCheck(mesh, tool, view)
+        self.collision = CollisionCheck(surface.part, tool, view)
         self.margin = choice.margin * options.approach
         near = [
             k
             for k in range(1, len(runs))
             if np.linalg.norm(runs[k].contacts[0] - runs[k - 1].contacts[-1]) <= runs[k].stay
+            and (surface.slides or not self._is_straight(*self._gap(k)))
         ]
         contacts = [(run.contacts, run.normals) for run in runs]
-        self.links_on_surface = stay_down_links(
-            field, options, stepover, {k: (contacts[k - 1], contacts[k]) for k in near}
-        )
+        self.links_on_surface = surface.links({k: (contacts[k - 1], contacts[k]) for k in near}, options, stepover)
 
     def toolpath(self) -> Toolpath:
         """Return the passes with their links. It begins and ends at the clearance level."""
@@ -127,8 +124,8 @@ class Linker:
         for k, run in enumerate(self.runs):
             segments += self._links_to(k)
             segments.append(Segment(SegmentKind.CUT, self.tips[k], run.normals, self.options.feed, run.power))
-        up = self._lead(links.retract, len(self.runs) - 1)
-        rapid = links.rapid((up.tips[-1], up.axes[-1]), None, self.style)
+        up, start = self._lead(links.retract, len(self.runs) - 1)
+        rapid = links.rapid(start, None, self.style)
         return Toolpath((*segments, up, self._counted(rapid)), self.tool.tilt_centre)
 
     def _links_to(self, k: int) -> list[Segment]:
@@ -138,12 +135,10 @@ class Linker:
             if direct is not None:
                 self.stay_downs += 1
                 return direct
-        down = self._lead(links.approach, k)
-        end = down.tips[0], down.axes[0]
+        down, end = self._lead(links.approach, k)
         if k == 0:
             return [self._counted(links.rapid(None, end, self.style)), down]
-        up = self._lead(links.retract, k - 1)
-        start = up.tips[-1], up.axes[-1]
+        up, start = self._lead(links.retract, k - 1)
         if np.linalg.norm(self.tips[k][0] - self.tips[k - 1][-1]) <= self.options.hop:
             hop = self._hop(start, end)
             if hop is not None:
@@ -154,34 +149,58 @@ class Linker:
     def _direct(self, k: int) -> list[Segment] | None:
         """Return the segments on the surface from the previous run to run k; None where the tool must retract."""
         before, after = self.runs[k - 1], self.runs[k]
-        gap = float(np.linalg.norm(self.tips[k][0] - self.tips[k - 1][-1]))
-        turn = float(angle_between(after.normals[0], before.normals[-1]))
+        gap, turn = self._gap(k)
         if gap < self.choice.touch and turn < self.choice.touch:
             return []
-        if gap <= self.choice.straight * self.options.spacing and turn <= self.options.axis_step:
+        if k in self.links_on_surface:
+            contacts, axes = self.links_on_surface[k]
+            tips = self.tool.tips(contacts, axes, axes)
+        elif self._is_straight(gap, turn):
             # A retract and approach would be a needle; where the passes meet, the tool turns on the spot.
             if gap < self.choice.same_tip:
                 self.tips[k][0] = self.tips[k - 1][-1]
             tips = np.stack([self.tips[k - 1][-1], self.tips[k][0]])
             axes = np.stack([before.normals[-1], after.normals[0]])
-        elif k in self.links_on_surface:
-            contacts, axes = self.links_on_surface[k]
-            tips = self.tool.tips(contacts, axes, axes)
         else:
             return None
         return [Segment(SegmentKind.LINK, tips, axes, self.options.link_feed)]
 
-    def _lead(self, lead: Callable[..., Segment], k: int) -> Segment:
-        """Return the approach or retract of run k, along the axis if a ramp or arc would collide."""
-        tips, axes = self.tips[k], self.runs[k].normals
-        link = lead(tips, axes, self.style)
-        if self.style.entry is Entry.AXIS or self.collision.is_clear(link, 0.0):
-            return link
-        return lead(tips, axes, replace(self.style, entry=Entry.AXIS))
+    def _gap(self, k: int) -> tuple[float, float]:
+        """Return the distance of tips and the angle of axes from the previous run's end to run k."""
+        before, after = self.runs[k - 1], self.runs[k]
+        turn = float(angle_between(after.normals[0], before.normals[-1]))
+        return float(np.linalg.norm(self.tips[k][0] - self.tips[k - 1][-1])), turn
+
+    def _is_straight(self, gap: float, turn: float) -> bool:
+        """Return whether a link is so short that it is straight."""
+        return gap <= self.choice.straight * self.options.spacing and turn <= self.options.axis_step
+
+    def _lead(self, lead: Callable[..., Segment], k: int) -> tuple[Segment, Pose]:
+        """Return the approach or retract of run k, and the pose at its upper end.
+
+        It is along the axis if a ramp or arc would collide; if that would, too, along the view, or between them.
+        """
+        tips, axes, row = self.tips[k], self.runs[k].normals, 0 if lead is links.approach else -1
+        axis = axes[row]
+        if self.style.entry is not Entry.AXIS:
+            link = lead(tips, axes, self.style)
+            if self.collision.is_clear(link, 0.0):
+                return link, (link.tips[row], axis, axis)
+        style = replace(self.style, entry=Entry.AXIS)
+        between = axis + style.view
+        ways = [axis, style.view, between / max(float(np.linalg.norm(between)), 1e-9)]
+        leave = next((way for way in ways if self._leaves(tips[row], axis, way)), axis)
+        link = lead(tips, axes, style, leave)
+        return link, (link.tips[row], axis, leave)
+
+    def _leaves(self, tip: Floats, axis: Floats, leave: Floats) -> bool:
+        """Return whether the tool's tilt centre is clear on the way from a tip to the clearance level."""
+        corners = np.stack([tip, *links.rise(tip + self.style.approach * leave, leave, self.style)])
+        return self.surface.is_clear(corners + self.tool.tilt_centre * axis, self.options.chordal)
 
     def _hop(self, start: Pose, end: Pose) -> Segment | None:
         """Return the lowest rapid just above the part that is proven clear; None if there is none."""
-        base = max(float((tip + self.style.approach * axis) @ self.style.view) for tip, axis in (start, end))
+        base = max(float((tip + self.style.approach * leave) @ self.style.view) for tip, _, leave in (start, end))
         for rise in self.choice.hops:
             level = base + rise * self.options.clearance
             if level >= self.style.level:

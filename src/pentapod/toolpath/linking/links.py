@@ -21,8 +21,8 @@ from pentapod.toolpath.toolpath import Segment, SegmentKind
 
 Poses = tuple[Floats, Floats]
 """Tips (n, 3), metres, and unit axes (n, 3)."""
-Pose = tuple[Floats, Floats]
-"""A tip (3,), metres, and a unit axis (3,)."""
+Pose = tuple[Floats, Floats, Floats]
+"""A tip (3,), metres, a unit axis (3,), and the unit direction (3,) in which the tip leaves the surface."""
 
 
 @dataclass(frozen=True)
@@ -48,17 +48,18 @@ class LinkStyle(Value):
     same_corner: float = 1e-4
 
 
-def approach(tips: Floats, axes: Floats, style: LinkStyle) -> Segment:
+def approach(tips: Floats, axes: Floats, style: LinkStyle, leave: Floats | None = None) -> Segment:
     """Return the link on feed to the beginning of a pass with tips and axes (n, 3), n ≥ 2.
 
     Along the axis; or straight down a ramp in the direction of the pass, twice as long as high; or down a quarter of a
-    circle that ends in this direction. All begin `approach` metres above the tip along the axis.
+    circle that ends in this direction. All begin `approach` metres above the tip along the axis. leave (3,): unit, in
+    place of the axis where the entry is along it.
     """
     tip, axis, ahead = tips[0], axes[0], tips[1] - tips[0]
     flat = ahead - (ahead @ axis) * axis
     length = float(np.linalg.norm(flat))
     if style.entry is Entry.AXIS or length < 1e-12:
-        corners = np.stack([tip + style.approach * axis, tip])
+        corners = np.stack([tip + style.approach * (axis if leave is None else leave), tip])
     elif style.entry is Entry.STRAIGHT:
         corners = np.stack([tip + style.approach * (axis - 2.0 * flat / length), tip])
     else:
@@ -69,9 +70,9 @@ def approach(tips: Floats, axes: Floats, style: LinkStyle) -> Segment:
     return Segment(SegmentKind.LINK, points, np.tile(axis, (len(points), 1)), style.feed)
 
 
-def retract(tips: Floats, axes: Floats, style: LinkStyle) -> Segment:
+def retract(tips: Floats, axes: Floats, style: LinkStyle, leave: Floats | None = None) -> Segment:
     """Return the link on feed away from the end of a pass: an approach reversed."""
-    back = approach(tips[::-1], axes[::-1], style)
+    back = approach(tips[::-1], axes[::-1], style, leave)
     return Segment(SegmentKind.LINK, back.tips[::-1], back.axes[::-1], style.feed)
 
 
@@ -80,8 +81,8 @@ def rapid(start: Pose | None, end: Pose | None, style: LinkStyle) -> Segment:
 
     Without a start it comes from that level, without an end it stays there; one of them is given.
     """
-    up = [] if start is None else [_rise(*start, style)]
-    down = [] if end is None else [_rise(*end, style)[::-1]]
+    up = [] if start is None else [rise(start[0], start[2], style)]
+    down = [] if end is None else [rise(end[0], end[2], style)[::-1]]
     path = blended(np.vstack([*up, *down]), style)
     axes = [pose[1] for pose in (start, end) if pose is not None]
     first, last = axes[0], axes[-1]
@@ -103,14 +104,14 @@ def connection(before: Poses | None, after: Poses | None, style: LinkStyle) -> l
     """
     up = [] if before is None else [retract(*before, style)]
     down = [] if after is None else [approach(*after, style)]
-    start = (up[0].tips[-1], up[0].axes[-1]) if up else None
-    end = (down[0].tips[0], down[0].axes[0]) if down else None
+    start = (up[0].tips[-1], up[0].axes[-1], up[0].axes[-1]) if up else None
+    end = (down[0].tips[0], down[0].axes[0], down[0].axes[0]) if down else None
     return [*up, rapid(start, end, style), *down]
 
 
-def _rise(tip: Floats, axis: Floats, style: LinkStyle) -> Floats:
-    """Return the corners (3, 3) of the way up: on along the axis, then along the view to the level."""
-    knee = tip + style.approach * axis
+def rise(tip: Floats, leave: Floats, style: LinkStyle) -> Floats:
+    """Return the corners (3, 3) of the way up: on in the direction of leaving, then along the view to the level."""
+    knee = tip + style.approach * leave
     return np.stack([tip, knee, knee + max(style.level - float(knee @ style.view), 0.0) * style.view])
 
 

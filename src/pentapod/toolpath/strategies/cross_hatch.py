@@ -8,11 +8,10 @@ from typing import Annotated
 import numpy as np
 
 from pentapod.base.keys import Key
-from pentapod.cutters.tool import Tool
-from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.passes import Passes
 from pentapod.toolpath.strategies.raster import RasterOptions, raster_paths
 from pentapod.toolpath.strategy import ContactPaths, Strategy
+from pentapod.toolpath.surface import Surface
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -24,10 +23,10 @@ class CrossHatchOptions(RasterOptions):
     )
 
 
-def cross_hatch_paths(mesh: Mesh, tool: Tool, options: CrossHatchOptions) -> ContactPaths:
+def cross_hatch_paths(surface: Surface, options: CrossHatchOptions) -> ContactPaths:
     """Return the passes of a raster along `direction`, then those of one turned by `angle`. Raises as a raster."""
-    first = raster_paths(mesh, tool, options)
-    second = raster_paths(mesh, tool, replace(options, direction=options.direction + options.angle)).passes
+    first = raster_paths(surface, options)
+    second = raster_paths(surface, replace(options, direction=options.direction + options.angle)).passes
     # An empty level between both: the second raster does not continue the last pass of the first.
     gap = int(first.passes.levels.max()) + 2
     second = replace(second, levels=second.levels + gap)

@@ -12,15 +12,14 @@ import numpy as np
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import VECTOR, Key
-from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.geodesic.tracing import SurfaceRays, neighbours, traced
-from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.closest import closest, normals_at
 from pentapod.mesh.query.heightfield import HeightField
 from pentapod.toolpath.lines.projection import SurfaceHits, SurfaceMap, below, projected, topmost_in_region
 from pentapod.toolpath.options import PathOptions, check_positive
 from pentapod.toolpath.strategy import ContactPaths, Order, Strategy, bounds_centre, region_patch
+from pentapod.toolpath.surface import Surface
 
 
 class Laying(StrEnum):
@@ -64,15 +63,14 @@ class CurveOptions(PathOptions):
         check_positive("scale", self.scale)
 
 
-def curve_paths(mesh: Mesh, tool: Tool, options: CurveOptions) -> ContactPaths:
+def curve_paths(surface: Surface, options: CurveOptions) -> ContactPaths:
     """Return the lines on the surface, broken where they leave the region. Raises ToolpathError if none meets it."""
-    del tool
     rotation = rotation_matrix(options.rotation)
     lines = [options.scale * line @ rotation for line in options.lines]
-    surface = surface_map(mesh, options, options.laying, options.position)
-    surface = below(surface, lambda plane: np.full(len(plane), options.depth))
+    mapped = surface_map(surface, options, options.laying, options.position)
+    mapped = below(mapped, lambda plane: np.full(len(plane), options.depth))
     wrapped = options.laying is Laying.WRAP
-    passes, notes = projected(lines, surface, options, spacing=options.spacing, wrapped=wrapped, depth=options.depth)
+    passes, notes = projected(lines, mapped, options, spacing=options.spacing, wrapped=wrapped, depth=options.depth)
     if not len(passes):
         raise ToolpathError(
             "no line meets the surface",
@@ -90,7 +88,7 @@ def rotation_matrix(angle: float) -> Floats:
 
 
 def surface_map(
-    mesh: Mesh, options: PathOptions, laying: Laying | str, position: Floats | tuple[float, float, float] | None
+    surface: Surface, options: PathOptions, laying: Laying | str, position: Floats | tuple[float, float, float] | None
 ) -> SurfaceMap:
     """Return the map from the plane of the lines to the surface. Raises ToolpathError for an empty region.
 
@@ -98,10 +96,10 @@ def surface_map(
     along the view; "wrap" follows a straightest geodesic for x, then one square to it for y, from the surface point
     under the position, seen along the view, or nearest to it.
     """
-    field, x = HeightField(mesh, options.up), tangent_frame(options.up)[0]
-    origin = bounds_centre(region_patch(mesh, options)) if position is None else frozen(position, "position", (3,))
+    field, x = HeightField(surface.part, options.up), tangent_frame(options.up)[0]
+    origin = bounds_centre(region_patch(surface, options)) if position is None else frozen(position, "position", (3,))
     if laying is Laying.WRAP:
-        return _wrapping(mesh, options, origin, field.topmost(origin[None])[0], x)
+        return _wrapping(surface, options, origin, field.topmost(origin[None])[0], x)
     y = tangent_frame(options.up)[1]
 
     def project(plane: Floats) -> SurfaceHits:
@@ -111,9 +109,9 @@ def surface_map(
     return project
 
 
-def _wrapping(mesh: Mesh, options: PathOptions, origin: Floats, top: Floats, x: Floats) -> SurfaceMap:
+def _wrapping(surface: Surface, options: PathOptions, origin: Floats, top: Floats, x: Floats) -> SurfaceMap:
     """Return the map for wrapped lines. top (1, 3): surface over the origin (3,). x (3,): direction of the x axis."""
-    patch = region_patch(mesh, options)
+    patch = region_patch(surface, options)
     facet, _, weights = closest(patch, np.where(np.isfinite(top).all(), top, origin[None]))
     beside = neighbours(patch)
     normal = patch.facet_normals[facet[0]]

@@ -9,17 +9,17 @@ from typing import Annotated
 import numpy as np
 from scipy.spatial import KDTree
 
-from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import Key
-from pentapod.cutters.tool import Tool
-from pentapod.geometry.directions import angle_between
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.normals import unit_or_zero
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
+from pentapod.toolpath.lines.sharp_edges import edge_chains, other_end, sharp_edges
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.strategy import ContactPaths, Strategy, region_patch
+from pentapod.toolpath.surface import Surface
 
 
 @dataclass(frozen=True)
@@ -54,22 +54,22 @@ class EdgeOptions(PathOptions):
     )
 
 
-def edge_paths(mesh: Mesh, tool: Tool, options: EdgeOptions, tracing: EdgeTracing = EdgeTracing()) -> ContactPaths:
+def edge_paths(surface: Surface, options: EdgeOptions, tracing: EdgeTracing = EdgeTracing()) -> ContactPaths:
     """Return the edges of the region: borders of the mesh, and convex sharp edges.
 
     The tool axis is the mean of the normals on both sides of an edge. A line ends at a corner of the edge, and where it
     meets other edges. Raises ToolpathError if there is no edge.
     """
-    del tool
-    patch, whole = region_patch(mesh, options), Patch.whole(mesh)
+    mesh = surface.part
+    patch, whole = region_patch(surface, options), Patch.whole(mesh)
     topology = patch.topology
     wanted = np.zeros(len(whole.topology.edges), dtype=np.bool_)
     chosen = np.zeros(len(topology.edges), dtype=np.bool_)
     if options.which is not Which.SHARP:
         wanted |= whole.topology.facets_at_edge == 1
     if options.which is not Which.BORDER:
-        wanted |= _sharp(whole, options.sharpest)
-        chosen |= _sharp(patch, options.sharpest)
+        wanted |= sharp_edges(whole, options.sharpest)
+        chosen |= sharp_edges(patch, options.sharpest)
     # Where the region ends, an edge counts if it is one of the whole mesh: the other side may face away.
     rim = np.flatnonzero(topology.facets_at_edge == 1)
     middles = patch.vertices[topology.edges[rim]].mean(axis=1)
@@ -85,7 +85,7 @@ def edge_paths(mesh: Mesh, tool: Tool, options: EdgeOptions, tracing: EdgeTracin
         )
     normals = _edge_normals(patch)
     normals[rim] = _edge_normals(whole)[edge_of_rim]
-    chains = _edge_chains(patch.vertices, topology.edges, chosen, tracing.corner)
+    chains = edge_chains(patch.vertices, topology.edges, chosen, tracing.corner)
     return ContactPaths(Passes.of([_line(patch, normals, chain) for chain in chains]))
 
 
@@ -113,20 +113,6 @@ def _edges_at(points: Floats, mesh: Mesh, edges: Ints, tracing: EdgeTracing) -> 
     return np.where(distance[rows, best] < tracing.on_edge * size, edges[candidates[rows, best]], -1)
 
 
-def _sharp(patch: Patch, angle: float) -> Bools:
-    """Return which edges (E,) of the patch are convex, with an angle of more than `angle` between the normals."""
-    a, b = patch.topology.side_pairs
-    normal_a, normal_b = patch.facet_normals[a // 3], patch.facet_normals[b // 3]
-    # An edge is convex where the third corner of one facet lies behind the plane of the other.
-    corners = patch.faces.ravel()
-    third = patch.vertices[corners[b - b % 3 + (b + 2) % 3]]
-    convex = ((third - patch.vertices[corners[a]]) * normal_a).sum(axis=1) < 0.0
-    cosine = (normal_a * normal_b).sum(axis=1)
-    sharp = np.zeros(len(patch.topology.edges), dtype=np.bool_)
-    sharp[patch.topology.pair_edges] = convex & patch.topology.pair_agrees & (cosine < np.cos(angle))
-    return sharp
-
-
 def _edge_normals(patch: Patch) -> Floats:
     """Return the mean of the normals (E, 3) of the facets at each edge, of unit length unless they cancel."""
     total = np.zeros((len(patch.topology.edges), 3))
@@ -137,52 +123,10 @@ def _edge_normals(patch: Patch) -> Floats:
     return unit_or_zero(total)
 
 
-def _edge_chains(points: Floats, edges: Ints, marked: Bools, corner: float) -> list[list[tuple[int, int]]]:
-    """Return the marked edges in chains without corners or branches: each edge, and the vertex where it is entered."""
-    numbers = np.flatnonzero(marked)
-    at: dict[int, list[int]] = {}
-    for e in numbers.tolist():
-        for v in edges[e].tolist():
-            at.setdefault(v, []).append(e)
-
-    def next_edge(e: int, v: int) -> int | None:
-        """Return the edge that continues edge e beyond vertex v, if it is the only one and straight enough."""
-        others = [other for other in at[v] if other != e]
-        if len(others) != 1:
-            return None
-        arriving = points[v] - points[_other_end(edges, e, v)]
-        leaving = points[_other_end(edges, others[0], v)] - points[v]
-        return others[0] if float(angle_between(arriving, leaving)) < corner else None
-
-    done: set[int] = set()
-    chains: list[list[tuple[int, int]]] = []
-    for first in numbers.tolist():
-        if first in done:
-            continue
-        # Back to the beginning of the chain, or once round a closed one.
-        e, v = first, int(edges[first, 0])
-        while (back := next_edge(e, v)) is not None and back != first:
-            e, v = back, _other_end(edges, back, v)
-        chain: list[tuple[int, int]] = []
-        step: int | None = e
-        while step is not None and step not in done:
-            done.add(step)
-            chain.append((step, v))
-            v = _other_end(edges, step, v)
-            step = next_edge(step, v)
-        chains.append(chain)
-    return chains
-
-
-def _other_end(edges: Ints, e: int, v: int) -> int:
-    a, b = edges[e]
-    return int(b if a == v else a)
-
-
 def _line(patch: Patch, normals: Floats, chain: list[tuple[int, int]]) -> tuple[Floats, Floats]:
     """Return points and normals (n, 3) along a chain; the normal at a vertex is the mean of its edges'."""
     vertices = [v for _, v in chain]
-    vertices.append(_other_end(patch.topology.edges, *chain[-1]))
+    vertices.append(other_end(patch.topology.edges, *chain[-1]))
     own = normals[[e for e, _ in chain]]
     first, last = own[:1], own[-1:]
     if vertices[0] == vertices[-1]:

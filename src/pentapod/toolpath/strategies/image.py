@@ -14,14 +14,13 @@ from scipy.ndimage import map_coordinates
 from pentapod.base.arrays import Bools, Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import VECTOR, Key
-from pentapod.cutters.tool import Tool
 from pentapod.geometry.runs import equal_runs, marked_runs
-from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.inputs.pictures import read_darkness
 from pentapod.toolpath.lines.projection import below, projected
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.strategies.curves import Laying, rotation_matrix, surface_map
 from pentapod.toolpath.strategy import ContactPaths, Order, Strategy
+from pentapod.toolpath.surface import Surface
 
 
 class Effect(StrEnum):
@@ -74,12 +73,11 @@ class ImageOptions(PathOptions):
         set_frozen(self, darkness=darkness)
 
 
-def image_paths(mesh: Mesh, tool: Tool, options: ImageOptions) -> ContactPaths:
+def image_paths(surface: Surface, options: ImageOptions) -> ContactPaths:
     """Return lines over the dark parts of the picture, each point as deep as it is dark, or in runs of equal power.
 
     Raises ToolpathError if nothing of the picture is dark enough or meets the region.
     """
-    del tool
     darkness = np.asarray(options.darkness)
     rows, columns = darkness.shape
     pixel = options.width / columns
@@ -87,7 +85,10 @@ def image_paths(mesh: Mesh, tool: Tool, options: ImageOptions) -> ContactPaths:
     count = max(1, round(height / options.stepover))
     y = (0.5 * (count - 1) - np.arange(count)) * (height / count)
     x = (np.arange(columns) + 0.5 - 0.5 * columns) * pixel
-    surface, rotation = surface_map(mesh, options, options.laying, options.position), rotation_matrix(options.rotation)
+    mapped, rotation = (
+        surface_map(surface, options, options.laying, options.position),
+        rotation_matrix(options.rotation),
+    )
     powered = options.effect is Effect.POWER
     lines: list[Floats] = []
     powers: list[float] = []
@@ -102,11 +103,11 @@ def image_paths(mesh: Mesh, tool: Tool, options: ImageOptions) -> ContactPaths:
     if not lines:
         raise ToolpathError("nothing of the picture is dark enough", key="threshold", value=options.threshold)
     if not powered:
-        surface = below(surface, lambda plane: options.depth * _darkness_at(darkness, pixel, plane @ rotation.T))
+        mapped = below(mapped, lambda plane: options.depth * _darkness_at(darkness, pixel, plane @ rotation.T))
     depth = options.depth_of(options)
     passes, notes = projected(
         lines,
-        surface,
+        mapped,
         options,
         spacing=min(options.spacing, pixel),
         wrapped=options.laying is Laying.WRAP,

@@ -11,9 +11,7 @@ import numpy as np
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import Key
-from pentapod.cutters.tool import Tool
 from pentapod.geometry.polyline import spaced
-from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.closest import closest
@@ -21,10 +19,10 @@ from pentapod.mesh.query.geodesic import border_vertices, distances, seeds_along
 from pentapod.mesh.query.levels import gradients
 from pentapod.mesh.query.slicing import LevelSet
 from pentapod.toolpath.inputs.points import read_points
-from pentapod.toolpath.lines.gap_filling import gap_lines, refined_for_fronts
-from pentapod.toolpath.lines.scallop import surface_steps
+from pentapod.toolpath.lines.gap_filling import FRONTS, gap_lines
 from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.strategy import ContactPaths, Order, Strategy, region_patch
+from pentapod.toolpath.surface import Surface
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,13 +60,13 @@ class DistanceField:
     distance: Floats
 
 
-def offset_paths(mesh: Mesh, tool: Tool, options: OffsetOptions) -> ContactPaths:
+def offset_paths(surface: Surface, options: OffsetOptions) -> ContactPaths:
     """Return lines half a step from the border, or on the curve, and then a step apart along the surface.
 
     Where fronts meet and leave more than half a step, a further line fills the gap. Raises ToolpathError for an empty
     region, one without a border, or a scallop that does not suit the tool.
     """
-    field = distance_field(mesh, tool, options, options.curve)
+    field = distance_field(surface, options, options.curve)
     patch, slowness = field.patch, 1.0 / field.steps
     first = 0.5 if options.curve is None else 0.0
     reached = np.isfinite(field.distance)
@@ -82,15 +80,22 @@ def offset_paths(mesh: Mesh, tool: Tool, options: OffsetOptions) -> ContactPaths
     return ContactPaths(passes, float(field.steps.max()), Order.ZIGZAG, notes=(note,) if missed > 1e-9 else ())
 
 
+def refined_for_fronts(surface: Surface, patch: Patch, options: CoverOptions) -> tuple[Patch, float]:
+    """Return a patch in facets that are small compared with the stepover, and the length of their edges, metres."""
+    sides = patch.vertices[patch.faces[:, 1]] - patch.vertices[patch.faces[:, 0]]
+    edge = FRONTS.longest_edge(surface.steps(patch, sides, options))
+    return patch.refined(edge), edge
+
+
 def distance_field(
-    mesh: Mesh, tool: Tool, options: CoverOptions, curve: Floats | None, points_per_edge: float = 8.0
+    surface: Surface, options: CoverOptions, curve: Floats | None, points_per_edge: float = 8.0
 ) -> DistanceField:
     """Return the distance in steps from the region's border, or from a curve (n, 3), over the region.
 
     For a scallop, the steps follow from the curvature in the direction of growing distance. points_per_edge: of the
     curve in the length of a facet's edge. Raises ToolpathError for an empty region, or one without a border.
     """
-    patch, edge = refined_for_fronts(region_patch(mesh, options), tool, options)
+    patch, edge = refined_for_fronts(surface, region_patch(surface, options), options)
     metre = np.ones(len(patch.faces))
     facets, points = np.zeros(0, dtype=np.intp), np.zeros((0, 3))
     if curve is None:
@@ -107,7 +112,7 @@ def distance_field(
     if options.stepover is not None:
         return DistanceField(patch, np.full(len(patch.faces), options.stepover), metres / options.stepover)
     growing = gradients(patch, np.where(np.isfinite(metres), metres, 0.0)[patch.faces])
-    steps = surface_steps(patch, tool, growing, options)
+    steps = surface.steps(patch, growing, options)
     if curve is not None:
         seeds = seeds_at(patch, facets, points, 1.0 / steps)
     return DistanceField(patch, steps, distances(patch, seeds, 1.0 / steps))

@@ -13,14 +13,13 @@ import numpy as np
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import Key
-from pentapod.cutters.tool import Tool
-from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.closest import closest, normals_at
 from pentapod.mesh.query.heightfield import HeightField
 from pentapod.toolpath.inputs.points import read_points
 from pentapod.toolpath.lines.projection import SurfaceHits, below, projected, topmost_in_region
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.strategy import ContactPaths, Order, Strategy, region_patch
+from pentapod.toolpath.surface import Surface
 
 
 class Towards(StrEnum):
@@ -54,10 +53,9 @@ class PolylineOptions(PathOptions):
         set_frozen(self, lines=lines)
 
 
-def polyline_paths(mesh: Mesh, tool: Tool, options: PolylineOptions) -> ContactPaths:
+def polyline_paths(surface: Surface, options: PolylineOptions) -> ContactPaths:
     """Return the given lines on the surface, in their order. Raises ToolpathError if none meets the region."""
-    del tool
-    field, patch = HeightField(mesh, options.up), region_patch(mesh, options)
+    field, patch = HeightField(surface.part, options.up), region_patch(surface, options)
     visible = options.towards is Towards.VIEW
 
     def mapped(points: Floats) -> SurfaceHits:
@@ -67,8 +65,8 @@ def polyline_paths(mesh: Mesh, tool: Tool, options: PolylineOptions) -> ContactP
         return found, normals_at(patch, facets, weights), np.ones(len(points), dtype=np.bool_)
 
     lines = [np.asarray(line) for line in options.lines if len(line) > 1]
-    surface = below(mapped, lambda points: np.full(len(points), options.depth))
-    passes, notes = projected(lines, surface, options, spacing=options.spacing, wrapped=False, depth=options.depth)
+    deep = below(mapped, lambda points: np.full(len(points), options.depth))
+    passes, notes = projected(lines, deep, options, spacing=options.spacing, wrapped=False, depth=options.depth)
     if not len(passes):
         raise ToolpathError("no line meets the surface", key="lines", remedy="check the unit and the view")
     return ContactPaths(passes, order=Order.GIVEN, depth=options.depth, visible=visible, notes=notes)

@@ -13,17 +13,16 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import Key
-from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
-from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.geodesic import seeds_along
 from pentapod.mesh.query.slicing import LevelSet
 from pentapod.toolpath.lines.gap_filling import GapOptions, gap_lines
-from pentapod.toolpath.lines.scallop import level_values, surface_steps
+from pentapod.toolpath.lines.scallop import level_values
 from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.strategy import ContactPaths, Order, Strategy, region_patch
+from pentapod.toolpath.surface import Surface
 
 MOST_CROSSINGS = 30_000_000
 """Largest number of crossings of planes with facets: what memory and time allow."""
@@ -55,7 +54,7 @@ class RasterOptions(CoverOptions):
     )
 
 
-def raster_paths(mesh: Mesh, tool: Tool, options: RasterOptions) -> ContactPaths:
+def raster_paths(surface: Surface, options: RasterOptions) -> ContactPaths:
     """Return parallel passes over the region of a mesh.
 
     The passes lie in planes along the view, closer together where the surface is steep across them, so that the
@@ -64,8 +63,8 @@ def raster_paths(mesh: Mesh, tool: Tool, options: RasterOptions) -> ContactPaths
     """
     x, y = tangent_frame(options.up)
     along = math.cos(options.direction) * x + math.sin(options.direction) * y
-    patch = region_patch(mesh, options)
-    passes, stepover = plane_lines(patch, tool, options, np.cross(options.up, along))
+    patch = region_patch(surface, options)
+    passes, stepover = plane_lines(surface, patch, options, np.cross(options.up, along))
     if options.pattern is Pattern.ZIGZAG:
         return ContactPaths(passes, stepover, Order.ZIGZAG)
     if options.pattern is not Pattern.ONE_WAY:
@@ -73,10 +72,10 @@ def raster_paths(mesh: Mesh, tool: Tool, options: RasterOptions) -> ContactPaths
     return ContactPaths(passes, stepover, Order.BY_LEVEL, both_ways=False)
 
 
-def plane_lines(patch: Patch, tool: Tool, options: CoverOptions, across: Floats) -> tuple[Passes, float]:
+def plane_lines(surface: Surface, patch: Patch, options: CoverOptions, across: Floats) -> tuple[Passes, float]:
     """Return the slices of a patch by planes across a direction (3,), with gaps filled, and the largest stepover."""
     heights = patch.vertices @ across
-    steps = surface_steps(patch, tool, across, options)
+    steps = surface.steps(patch, across, options)
     slope = np.sqrt(np.maximum(1.0 - (patch.facet_normals @ across) ** 2, 0.0))
     levels = level_values(heights[patch.faces], slope, steps)
     level_set = LevelSet(patch, heights, levels)
@@ -90,17 +89,19 @@ def plane_lines(patch: Patch, tool: Tool, options: CoverOptions, across: Floats)
         )
     passes = level_set.lines()
     if options.fill:
-        passes = Passes.joined([passes, _gaps(patch, steps, tool, options, across, levels)])
+        passes = Passes.joined([passes, _gaps(surface, patch, steps, options, across, levels)])
     return passes, float(steps.max())
 
 
-def _gaps(whole: Patch, steps: Floats, tool: Tool, options: CoverOptions, across: Floats, levels: Floats) -> Passes:
+def _gaps(
+    surface: Surface, whole: Patch, steps: Floats, options: CoverOptions, across: Floats, levels: Floats
+) -> Passes:
     """Return lines that fill the gaps between planes at levels (L,). Gaps can only be near borders and creases."""
     gaps = GapOptions()
     patch, near = whole.rim(1.25 * float(steps.max()), gaps.longest_edge(steps))
     if not len(patch.faces):
         return Passes.of([])
-    slowness = 1.0 / surface_steps(patch, tool, across, options)
+    slowness = 1.0 / surface.steps(patch, across, options)
     seeds = seeds_along(LevelSet(patch, patch.vertices @ across, levels), slowness)
     return gap_lines(patch, seeds, slowness, gaps, where=near, area=float(whole.areas.sum()))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pentapod.base.errors import ToolpathError, nearest
@@ -9,10 +11,15 @@ from pentapod.base.keys import check_size
 from pentapod.base.registry import Registry
 from pentapod.cutters.tool import Tool
 from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.passes import Passes
+from pentapod.toolpath.lines.sharp_edges import crease_lines, uncrossed
 from pentapod.toolpath.linking.assembly import assembled
-from pentapod.toolpath.options import PathOptions
+from pentapod.toolpath.options import CoverOptions, PathOptions
 from pentapod.toolpath.path_report import PathReport
-from pentapod.toolpath.strategy import Strategy
+from pentapod.toolpath.strategy import ContactPaths, Strategy
+from pentapod.toolpath.surface import Surface
+from pentapod.toolpath.surfaces.drive_surface import DriveSurface
+from pentapod.toolpath.surfaces.part_surface import PartSurface
 from pentapod.toolpath.toolpath import Toolpath
 
 _NAMES = (
@@ -21,6 +28,7 @@ _NAMES = (
     "waterline",
     "offset",
     "spiral",
+    "pencil",
     "edges",
     "curves",
     "drawing",
@@ -58,7 +66,30 @@ def toolpath_with_report(mesh: Mesh, tool: Tool, options: PathOptions) -> tuple[
     """
     strategy = strategy_of(options)
     check_size(options, float(np.ptp(mesh.bounds, axis=0).max()), ToolpathError)
-    return assembled(strategy.name, mesh, tool, options, strategy.paths(mesh, tool, options))
+    surface = surface_for(mesh, tool, options)
+    return assembled(
+        strategy.name, surface, tool, options, with_creases(surface, strategy.paths(surface, options), options)
+    )
+
+
+def surface_for(mesh: Mesh, tool: Tool, options: PathOptions) -> Surface:
+    """Return the surface on which a strategy draws: for a ball that covers a part, its drive surface."""
+    ball = tool.tilt_centre > 0.0 and tool.scallop_radius == tool.tilt_centre
+    if ball and options.rolls:
+        return DriveSurface.of(mesh, tool.tilt_centre, options.up)
+    return PartSurface(mesh, tool, options.up)
+
+
+def with_creases(surface: Surface, paths: ContactPaths, options: PathOptions) -> ContactPaths:
+    """Return the paths with lines along concave corners between passes, if the strategy fills gaps and a ball rolls.
+
+    What a pass beside a corner leaves in it is much higher than the ridge between passes.
+    """
+    if not (surface.slides and isinstance(options, CoverOptions) and options.fill):
+        return paths
+    creases = crease_lines(surface.patch(options.region))
+    left = uncrossed(creases, paths.passes, paths.stepover, surface.radius)
+    return replace(paths, passes=Passes.joined([paths.passes, left])) if len(left) else paths
 
 
 def make_toolpath(mesh: Mesh, tool: Tool, options: PathOptions) -> Toolpath:

@@ -11,19 +11,18 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats, Ints, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import VECTOR, Key
-from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
-from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.geodesic import seeds_along
 from pentapod.mesh.query.levels import gradients
 from pentapod.mesh.query.slicing import LevelSet
-from pentapod.toolpath.lines.gap_filling import gap_lines, refined_for_fronts
-from pentapod.toolpath.lines.scallop import level_values, surface_steps
+from pentapod.toolpath.lines.gap_filling import gap_lines
+from pentapod.toolpath.lines.scallop import level_values
 from pentapod.toolpath.options import CoverOptions
-from pentapod.toolpath.strategies.offset import distance_field
+from pentapod.toolpath.strategies.offset import distance_field, refined_for_fronts
 from pentapod.toolpath.strategy import ContactPaths, Order, Strategy, bounds_centre, region_patch
+from pentapod.toolpath.surface import Surface
 
 
 class Form(StrEnum):
@@ -52,7 +51,7 @@ class SpiralOptions(CoverOptions):
             set_frozen(self, centre=frozen(self.centre, "centre", (3,)))
 
 
-def spiral_paths(mesh: Mesh, tool: Tool, options: SpiralOptions) -> ContactPaths:
+def spiral_paths(surface: Surface, options: SpiralOptions) -> ContactPaths:
     """Return a line that winds inwards from the region's border, or outwards in circles as seen along the view.
 
     If the region has no holes and appears star-shaped about the centre, seen along the view, it is one line; elsewhere
@@ -60,12 +59,12 @@ def spiral_paths(mesh: Mesh, tool: Tool, options: SpiralOptions) -> ContactPaths
     Raises ToolpathError for an empty region, or one without a border.
     """
     if options.form is Form.PLANAR:
-        return _planar(mesh, tool, options)
-    return _offset(mesh, tool, options)
+        return _planar(surface, options)
+    return _offset(surface, options)
 
 
-def _offset(mesh: Mesh, tool: Tool, options: SpiralOptions) -> ContactPaths:
-    field = distance_field(mesh, tool, options, None)
+def _offset(surface: Surface, options: SpiralOptions) -> ContactPaths:
+    field = distance_field(surface, options, None)
     distance = np.where(np.isfinite(field.distance), field.distance, 0.0)
     centre = field.patch.vertices[distance.argmax()] if options.centre is None else np.asarray(options.centre)
     patch, angle, turns, kept = _polar_angle(field.patch, centre, options.up)
@@ -83,16 +82,16 @@ def _offset(mesh: Mesh, tool: Tool, options: SpiralOptions) -> ContactPaths:
     return ContactPaths(passes, float(field.steps.max()), Order.ZIGZAG)
 
 
-def _planar(mesh: Mesh, tool: Tool, options: SpiralOptions) -> ContactPaths:
-    whole = region_patch(mesh, options)
-    patch, _ = refined_for_fronts(whole, tool, options)
+def _planar(surface: Surface, options: SpiralOptions) -> ContactPaths:
+    whole = region_patch(surface, options)
+    patch, _ = refined_for_fronts(surface, whole, options)
     centre = bounds_centre(whole) if options.centre is None else np.asarray(options.centre)
     flat = patch.vertices - centre
     flat = flat - (flat @ options.up)[:, None] * options.up
     radius = np.linalg.norm(flat, axis=1)
     corners = radius[patch.faces]
     outwards = gradients(patch, corners)
-    steps = surface_steps(patch, tool, outwards, options)
+    steps = surface.steps(patch, outwards, options)
     levels = level_values(corners, np.linalg.norm(outwards, axis=1), steps)
     if len(levels) < 2:
         raise ToolpathError("the region is too small for a spiral of this stepover", key="stepover")

@@ -10,11 +10,10 @@ import numpy as np
 from pentapod.base.arrays import Floats, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import VECTOR, Key
-from pentapod.cutters.tool import Tool
-from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.options import CoverOptions, unit_vector
 from pentapod.toolpath.strategies.raster import plane_lines
 from pentapod.toolpath.strategy import ContactPaths, Order, Strategy, region_patch
+from pentapod.toolpath.surface import Surface
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,14 +35,14 @@ class WaterlineOptions(CoverOptions):
         set_frozen(self, upright=unit_vector("upright", self.up if self.upright is None else self.upright))
 
 
-def waterline_paths(mesh: Mesh, tool: Tool, options: WaterlineOptions) -> ContactPaths:
+def waterline_paths(surface: Surface, options: WaterlineOptions) -> ContactPaths:
     """Return lines of constant height over the region of a mesh, where it is steep enough.
 
     Heights are closer together where the surface is flatter, so that the stepover along the surface is nowhere
     exceeded. Raises ToolpathError for an empty or flat region, or a scallop that does not suit the tool.
     """
     upright = np.asarray(options.upright)
-    whole = region_patch(mesh, options)
+    whole = region_patch(surface, options)
     patch = whole.steeper(upright, options.shallowest)
     if not len(patch.faces):
         raise ToolpathError(
@@ -52,7 +51,7 @@ def waterline_paths(mesh: Mesh, tool: Tool, options: WaterlineOptions) -> Contac
             value=options.shallowest,
             remedy="use a raster, or turn the direction of the heights",
         )
-    passes, stepover = plane_lines(patch, tool, options, upright)
+    passes, stepover = plane_lines(surface, patch, options, upright)
     flat = 1.0 - float(patch.areas.sum() / whole.areas.sum())
     degrees = np.degrees(options.shallowest)
     note = f"{100.0 * flat:.2g} % of the region is flatter than {degrees:.3g} deg and left out"

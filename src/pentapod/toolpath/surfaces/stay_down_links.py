@@ -11,11 +11,9 @@ from pentapod.base.arrays import Floats
 from pentapod.geometry.directions import angle_between, normalised
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.query.heightfield import HeightField
-from pentapod.toolpath.linking.resampling import resample
+from pentapod.toolpath.lines.resampling import resample
 from pentapod.toolpath.options import PathOptions
-
-Contacts = tuple[Floats, Floats]
-"""Contacts (n, 3), metres, and normals (n, 3) of a pass or link."""
+from pentapod.toolpath.surface import Contacts
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ def _allowed(
         or (rise > limits.rise * flat).any()
         or angle_between(normals[1:], normals[:-1]).sum() > limits.turn
         or leaves_box
-        or (slope > min(region.angle + limits.steeper, np.pi / 2)).any()
+        or (slope > min(region.within + limits.steeper, np.pi / 2)).any()
     )
 
 

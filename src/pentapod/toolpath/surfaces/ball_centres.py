@@ -1,8 +1,6 @@
-"""Drive surface: where the centre of a ball is that rolls over the part and cuts into it nowhere.
+"""Centres of a ball that rolls over a part: put exactly on its offset, with chords and links that are proven clear.
 
-It is the offset surface of the part at the ball's radius, seen from outside. Lines are drawn on it as on any mesh.
-Points are then put exactly on the offset, and chords between them are proven clear by their exact distance from the
-part. A ball is clear at a centre whatever its axis, so nothing of this depends on the tool axis.
+A ball is clear at a centre whatever its axis. Chords are proven by their exact distance from the part.
 """
 
 from __future__ import annotations
@@ -10,34 +8,29 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
-from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.offset.offset_surface import offset_surface, onto_level
+from pentapod.mesh.offset.offset_surface import onto_level
 from pentapod.mesh.passes import Passes
-from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.tree import FacetTree
-from pentapod.mesh.region import Region
-from pentapod.mesh.topology import components
 
 
 @dataclass(frozen=True)
 class DriveOptions(Value):
     """How a drive surface is made and used.
 
-    step: of the grid, as a share of the ball's radius; narrower channels may be closed. upright: radians beyond a right
-    angle to which a region reaches that reaches a right angle, so that walls are not split by rounding. on_level: as a
+    step: of the grid, as a share of the ball's radius; narrower channels may be closed. on_level: as a
     share of the radius, how near to the offset a point is put. rounds: of moving it there, and of halving chords.
     window: length over which normals are averaged along a line, as a share of the radius: at creases they jump.
     border: how exactly an open border is known, as a share of the radius; enters: how far beyond it the ball gets where
     it is no hole. longest: of a link on the surface, as a multiple of the straight way; uneven: of its longest step.
+    sideways: distance around a point at which the surface above must hide it, above: by which height, both as
+    shares of the radius: walls, and valleys between steep flanks, do not hide themselves.
     """
 
     step: float = 0.25
-    upright: float = float(np.radians(0.5))
     on_level: float = 1e-7
     rounds: int = 30
     window: float = 1.0
@@ -45,73 +38,17 @@ class DriveOptions(Value):
     enters: float = 0.5
     longest: float = 2.5
     uneven: float = 3.0
+    sideways: float = 0.01
+    above: float = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class DriveSurface:
-    """The drive surface of a ball of `radius` metres over a part; mesh: the surface itself, facing outwards."""
+class BallCentres:
+    """Where the centre of a ball of `radius` metres may be, over the facets of a tree."""
 
-    part: Mesh
     tree: FacetTree
     radius: float
-    mesh: Mesh
     options: DriveOptions
-
-    @classmethod
-    def of(cls, part: Mesh, radius: float, options: DriveOptions | None = None) -> DriveSurface:
-        """Return the drive surface of a part. Raises MeshError where the part is too large for the ball."""
-        options = options or DriveOptions()
-        tree = FacetTree.of(part)
-        vertices, faces = offset_surface(tree, radius, options.step * radius)
-        # A line goes on over creases of the drive surface: no edge of it parts passes.
-        mesh = Mesh.of(vertices, faces, source=part.diagnosis.source, crease_angle=np.pi)
-        return cls(part, tree, radius, mesh, options)
-
-    def patch(self, region: Region) -> Patch:
-        """Return the part of the drive surface from which the ball touches a region; empty where there is none.
-
-        A region that reaches a right angle reaches a little further, so that rounding does not split walls. Around an
-        open border the ball does not roll.
-        """
-        patch = Patch.whole(self.mesh)
-        if region.box is not None:
-            for bound, side in zip(region.bounds, (1.0, -1.0), strict=True):
-                for axis in range(3):
-                    contacts = self.contacts(patch.vertices)
-                    patch, _ = patch.above(side * (contacts[:, axis] - bound[axis]), 0.0)
-        more = self.options.upright if 0.5 * np.pi - region.angle < self.options.upright else 0.0
-        cosine = np.cos(region.angle + more)
-        patch = patch.where_normals(lambda n: n @ region.direction - cosine * np.linalg.norm(n, axis=-1))
-        return patch if self.part.topology.watertight else patch.above(-self._beyond_border(patch), 0.0)[0]
-
-    def contacts(self, centres: Floats) -> Floats:
-        """Return the points (N, 3) of the part that are nearest to centres (N, 3): where the ball touches."""
-        return centres - self.tree.closest(centres)[1]
-
-    def _beyond_border(self, patch: Patch) -> Floats:
-        """Return how far (V,) the ball's centre is beyond the part's open border at vertices; negative above facets.
-
-        Measured across the border in the plane of the facet there. Holes that the ball cannot enter are no border.
-        """
-        gap, away, facet = self.tree.closest(patch.vertices)
-        corners = self.part.vertices[self.part.topology.edges[self.part.topology.facets_at_edge == 1]]
-        step = self.options.border * self.radius
-        count = np.ceil(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1) / step).astype(np.intp) + 1
-        edge = np.repeat(np.arange(len(count)), count)
-        share = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)) / (count - 1)[edge]
-        border = corners[edge, 0] + share[:, None] * (corners[edge, 1] - corners[edge, 0])
-        near = KDTree(border).query(patch.vertices - away)[0]
-        upright = np.einsum("ni,ni->n", self.part.facet_normals[self.tree.facets[facet]], away)
-        over = np.sqrt(np.maximum(gap**2 - upright**2, 0.0))
-        beyond = np.where((near < step) & (over > step), over, -near)
-        # A ball over a hole smaller than itself is beyond its border, but not far.
-        sides = np.stack([patch.faces, np.roll(patch.faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-        sides = sides[(beyond[sides] > 0.0).all(axis=1)]
-        number, piece = components(len(beyond), sides[:, 0], sides[:, 1])
-        furthest = np.full(number, -np.inf)
-        np.maximum.at(furthest, piece, beyond)
-        bridged = (beyond > 0.0) & (furthest[piece] < self.options.enters * self.radius)
-        return np.where(bridged, -step, beyond)
 
     def on_level(self, points: Floats) -> Floats:
         """Return points (N, 3) moved onto the offset, along the lines to their closest points of the part."""
@@ -134,7 +71,7 @@ class DriveSurface:
                 break
             middles = 0.5 * (points[rows] + points[rows + 1])
             bad = self.tree.closest(middles)[0] > self.radius + chordal
-            bad |= self._clearances(points[rows], points[rows + 1]) < self.radius - chordal
+            bad |= self.clearances(points[rows], points[rows + 1]) < self.radius - chordal
             at = rows[bad] + 1
             live[rows[bad]] = True
             points = np.insert(points, at, self.on_level(middles[bad]), axis=0)
@@ -143,9 +80,7 @@ class DriveSurface:
         starts = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1, [len(owner)]])
         return Passes(points, self.normals(points), starts, passes.levels)
 
-    def links(
-        self, starts: Floats, ends: Floats, spacing: float, chordal: float, closest: float
-    ) -> list[Floats | None]:
+    def ways(self, starts: Floats, ends: Floats, spacing: float, chordal: float, closest: float) -> list[Floats | None]:
         """Return for each pair of centres (L, 3) the points (n, 3) of a way on or above the surface, ends included.
 
         It is the straight way, moved onto the surface where that is nearer to the part than the radius, its chords
@@ -179,7 +114,7 @@ class DriveSurface:
     def _cleared(self, points: Floats, chordal: float, closest: float) -> Floats | None:
         """Return a line with its chords halved until all are clear by radius − chordal; None where it jumps."""
         for _ in range(self.options.rounds):
-            bad = np.flatnonzero(self._clearances(points[:-1], points[1:]) < self.radius - chordal)
+            bad = np.flatnonzero(self.clearances(points[:-1], points[1:]) < self.radius - chordal)
             if not len(bad):
                 return points
             middles = 0.5 * (points[bad] + points[bad + 1])
@@ -192,7 +127,7 @@ class DriveSurface:
         """Return unit normals (N, 3) of the offset at points on it: away from the part's closest points."""
         return normalised(self.tree.closest(points)[1])
 
-    def _clearances(self, starts: Floats, ends: Floats) -> Floats:
+    def clearances(self, starts: Floats, ends: Floats) -> Floats:
         """Return the least distances (M,) of chords from the part, metres; what is over the radius counts as that."""
         from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415  loads numba
 

@@ -9,10 +9,12 @@ import trimesh
 from pentapod import Mesh, RasterOptions, Region
 from pentapod.cutters.ball import BallCutter
 from pentapod.mesh.passes import Passes
-from pentapod.toolpath.lines.drive_surface import DriveSurface, smoothed
 from pentapod.toolpath.strategies.raster import raster_paths
+from pentapod.toolpath.surfaces.ball_centres import smoothed
+from pentapod.toolpath.surfaces.drive_surface import DriveSurface
+from pentapod.toolpath.surfaces.part_surface import PartSurface
 
-R, CHORDAL = 3e-3, 5e-6
+R, CHORDAL, UP = 3e-3, 5e-6, np.array([0.0, 0.0, 1.0])
 
 
 def blocks(*bounds):
@@ -38,15 +40,15 @@ def pocket():
     """A block of 40 × 30 × 12 mm with a pocket 6 mm deep that is open above."""
     walls = [[(0, 0, 0), (40, 30, 6)], [(0, 0, 0), (8, 30, 12)], [(32, 0, 0), (40, 30, 12)],
              [(0, 0, 0), (40, 7, 12)], [(0, 23, 0), (40, 30, 12)]]  # fmt: skip
-    return DriveSurface.of(part(blocks(*(1e-3 * np.array(b, dtype=float) for b in walls))), R)
+    return DriveSurface.of(part(blocks(*(1e-3 * np.array(b, dtype=float) for b in walls))), R, UP)
 
 
 @pytest.fixture(scope="module")
 def passes(pocket):
     """Raster passes over the pocket, put onto the offset."""
     options = RasterOptions(stepover=2e-3, region=Region(angle=np.radians(89.0)))
-    drawn = raster_paths(pocket.mesh, BallCutter(1e-6), options).passes
-    return pocket.exact(drawn, CHORDAL, 1e-5)
+    drawn = raster_paths(PartSurface(pocket.mesh, BallCutter(1e-6), options.up), options).passes
+    return pocket.centres.exact(drawn, CHORDAL, 1e-5)
 
 
 def lines_of(passes):
@@ -68,9 +70,9 @@ def test_passes_reach_the_floor_and_the_feet_of_the_walls(passes):
 def test_links_follow_the_surface_and_are_clear(pocket):
     rng = np.random.default_rng(3)
     vertices = pocket.mesh.vertices[pocket.mesh.vertices[:, 2] > 7e-3]
-    starts = pocket.on_level(vertices[rng.integers(len(vertices), size=60)])
-    ends = pocket.on_level(starts + rng.normal(size=starts.shape) * 2e-3)
-    found = pocket.links(starts, ends, 5e-4, CHORDAL, 1e-5)
+    starts = pocket.centres.on_level(vertices[rng.integers(len(vertices), size=60)])
+    ends = pocket.centres.on_level(starts + rng.normal(size=starts.shape) * 2e-3)
+    found = pocket.centres.ways(starts, ends, 5e-4, CHORDAL, 1e-5)
     links = [link for link in found if link is not None]
     assert len(links) > 40
     assert gaps(pocket.part, dense(links)).min() >= R - CHORDAL
@@ -96,7 +98,7 @@ def test_the_ball_does_not_roll_around_an_open_border_but_bridges_a_small_hole()
     faces = np.concatenate([cell[:, [0, 1, 2]], cell[:, [0, 2, 3]]])
     middle = np.stack([x, y], axis=1)[faces].mean(axis=1)
     faces = faces[np.abs(middle - [0.02, 0.015]).max(axis=1) > 1e-3]
-    sheet = DriveSurface.of(Mesh.of(np.stack([x, y, 0.0 * x], axis=1), faces), R)
+    sheet = DriveSurface.of(Mesh.of(np.stack([x, y, 0.0 * x], axis=1), faces), R, UP)
     patch = sheet.patch(Region(angle=np.radians(90.0)))
     assert patch.areas.sum() == pytest.approx(0.04 * 0.03, rel=0.02)
     assert patch.topology.border_loops == 1

@@ -1,0 +1,183 @@
+"""Drive surface: where the centre of a ball is that rolls over the part and cuts into it nowhere.
+
+It is the offset surface of the part at the ball's radius, seen from outside. Lines are drawn on it as on any mesh.
+Points are then put exactly on the offset, and chords between them are proven clear by their exact distance from the
+part. A ball is clear at a centre whatever its axis, so nothing of this depends on the tool axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from pentapod.base.arrays import Bools, Floats
+from pentapod.geometry.directions import partway, tangent_frame
+from pentapod.geometry.polyline import arc_length
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.offset.offset_surface import offset_surface
+from pentapod.mesh.passes import Passes
+from pentapod.mesh.patch import Patch
+from pentapod.mesh.query.heightfield import HeightField
+from pentapod.mesh.query.tree import FacetTree
+from pentapod.mesh.region import Region
+from pentapod.mesh.topology import components
+from pentapod.toolpath.lines.scallop import surface_steps
+from pentapod.toolpath.options import CoverOptions, PathOptions
+from pentapod.toolpath.surface import Contacts
+from pentapod.toolpath.surfaces.ball_centres import BallCentres, DriveOptions, smoothed
+
+_KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, DriveOptions], tuple[FacetTree, Mesh]]] = WeakKeyDictionary()
+"""Drive surfaces of parts that are in use: planning and the verdict need the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class DriveSurface:
+    """The drive surface of a ball of `radius` metres over a part; mesh: the surface itself, facing outwards.
+
+    view (3,): unit, towards the tool.
+    """
+
+    part: Mesh
+    mesh: Mesh
+    centres: BallCentres
+    view: Floats
+    slides = True
+
+    @property
+    def radius(self) -> float:
+        """Radius of the ball, metres."""
+        return self.centres.radius
+
+    @property
+    def options(self) -> DriveOptions:
+        """How the surface is made and used."""
+        return self.centres.options
+
+    @classmethod
+    def of(cls, part: Mesh, radius: float, view: Floats, options: DriveOptions | None = None) -> DriveSurface:
+        """Return the drive surface of a part. Raises MeshError where the part is too large for the ball."""
+        options = options or DriveOptions()
+        known = _KNOWN.setdefault(part, {})
+        if (radius, options) not in known:
+            tree = FacetTree.of(part)
+            vertices, faces = offset_surface(tree, radius, options.step * radius)
+            # A line goes on over creases of the drive surface: no edge of it parts passes.
+            mesh = Mesh.of(vertices, faces, source=part.diagnosis.source, crease_angle=np.pi)
+            known[radius, options] = tree, mesh
+        tree, mesh = known[radius, options]
+        return cls(part, mesh, BallCentres(tree, radius, options), view)
+
+    @cached_property
+    def field(self) -> HeightField:
+        """Ray casting along the view."""
+        return HeightField(self.mesh, self.view)
+
+    def hides(self, points: Floats, slack: float) -> Bools:
+        """Return whether the drive surface lies above points (N, 3) on it by more than `slack` metres."""
+        height = points @ self.view + max(slack, self.options.above * self.radius)
+        # Walls and corners along the view do not hide themselves: one of four points around is free.
+        x, y = (self.options.sideways * self.radius * side for side in tangent_frame(self.view))
+        around = (0.83 * x + 0.56 * y, 0.56 * x - 0.83 * y)
+        hidden = np.ones(len(points), dtype=np.bool_)
+        for aside in (*around, *(-step for step in around)):
+            hidden[hidden] = self.field.topmost(points[hidden] + aside)[2] > height[hidden]
+        return hidden
+
+    def patch(self, region: Region) -> Patch:
+        """Return the part of the drive surface from which the ball touches a region; empty where there is none.
+
+        A region that reaches a right angle reaches a little further, so that rounding does not split walls. Around an
+        open border the ball does not roll.
+        """
+        patch = Patch.whole(self.mesh)
+        if region.box is not None:
+            for bound, side in zip(region.bounds, (1.0, -1.0), strict=True):
+                for axis in range(3):
+                    contacts = self.contacts(patch.vertices)
+                    patch, _ = patch.above(side * (contacts[:, axis] - bound[axis]), 0.0)
+        patch = patch.where_normals(lambda n: region.faces(n, 0.5 * np.pi))
+        return patch if self.part.topology.watertight else patch.above(-self._beyond_border(patch), 0.0)[0]
+
+    def steps(self, patch: Patch, across: Floats, options: CoverOptions) -> Floats:
+        """Return the stepover (F,) on each facet, along the drive surface. Raises ToolpathError as `surface_steps`."""
+        return surface_steps(patch, self.radius, across, options, offset=True)
+
+    def waypoints(self, passes: Passes, options: PathOptions) -> Passes:
+        """Return contacts and unit normals for lines on the drive surface, their centres put exactly on the offset.
+
+        The normals are averaged along each pass. Where they jump, at creases, a contact is the point of the ball in the
+        direction of the mean normal, so that the centre is where it should be.
+        """
+        exact = self.centres.exact(passes, options.chordal, min(options.closest, options.chordal))
+        normals = smoothed(exact, self.options.window * self.radius)
+        return replace(exact, points=exact.points - self.radius * normals, normals=normals)
+
+    def links(
+        self, ends: dict[int, tuple[Contacts, Contacts]], options: PathOptions, stepover: float
+    ) -> dict[int, Contacts]:
+        """Return the links on the surface between pairs of passes, by `BallCentres.ways`; axes turn evenly."""
+        del stepover
+        if not ends:
+            return {}
+        first, last = (
+            (
+                np.stack([pair[k][0][row] for pair in ends.values()]),
+                np.stack([pair[k][1][row] for pair in ends.values()]),
+            )
+            for k, row in ((0, -1), (1, 0))
+        )
+        starts, stops = (contacts + self.radius * normals for contacts, normals in (first, last))
+        ways = self.centres.ways(starts, stops, options.spacing, options.chordal, min(options.closest, options.chordal))
+        found: dict[int, Contacts] = {}
+        for row, (key, way) in enumerate(zip(ends, ways, strict=True)):
+            if way is not None:
+                length = arc_length(way)
+                share = length / length[-1] if length[-1] > 0.0 else np.linspace(0.0, 1.0, len(way))
+                normals = partway(first[1][row], last[1][row], share)
+                contacts = way - self.radius * normals
+                for end, (contact, normal) in ((0, (first[0][row], first[1][row])), (-1, (last[0][row], last[1][row]))):
+                    contacts[end], normals[end] = contact, normal
+                found[key] = contacts, normals
+        return found
+
+    def is_clear(self, centres: Floats, chordal: float) -> bool:
+        """Return whether the ball is clear of the part but for `chordal` metres along a line of centres (n, 3)."""
+        return bool((self.centres.clearances(centres[:-1], centres[1:]) >= self.radius - chordal).all())
+
+    def tight(self, passes: Passes) -> int:
+        """Return 0: the ball is clear of the part on the drive surface."""
+        del passes
+        return 0
+
+    def contacts(self, centres: Floats) -> Floats:
+        """Return the points (N, 3) of the part that are nearest to centres (N, 3): where the ball touches."""
+        return centres - self.centres.tree.closest(centres)[1]
+
+    def _beyond_border(self, patch: Patch) -> Floats:
+        """Return how far (V,) the ball's centre is beyond the part's open border at vertices; negative above facets.
+
+        Measured across the border in the plane of the facet there. Holes that the ball cannot enter are no border.
+        """
+        gap, away, facet = self.centres.tree.closest(patch.vertices)
+        corners = self.part.vertices[self.part.topology.edges[self.part.topology.facets_at_edge == 1]]
+        step = self.options.border * self.radius
+        count = np.ceil(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1) / step).astype(np.intp) + 1
+        edge = np.repeat(np.arange(len(count)), count)
+        share = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)) / (count - 1)[edge]
+        border = corners[edge, 0] + share[:, None] * (corners[edge, 1] - corners[edge, 0])
+        near = KDTree(border).query(patch.vertices - away)[0]
+        upright = np.einsum("ni,ni->n", self.part.facet_normals[self.centres.tree.facets[facet]], away)
+        over = np.sqrt(np.maximum(gap**2 - upright**2, 0.0))
+        beyond = np.where((near < step) & (over > step), over, -near)
+        # A ball over a hole smaller than itself is beyond its border, but not far.
+        sides = np.stack([patch.faces, np.roll(patch.faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+        sides = sides[(beyond[sides] > 0.0).all(axis=1)]
+        number, piece = components(len(beyond), sides[:, 0], sides[:, 1])
+        furthest = np.full(number, -np.inf)
+        np.maximum.at(furthest, piece, beyond)
+        bridged = (beyond > 0.0) & (furthest[piece] < self.options.enters * self.radius)
+        return np.where(bridged, -step, beyond)
