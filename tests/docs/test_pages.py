@@ -75,7 +75,7 @@ def serve_and_interrupt(words):
 def test_every_table_of_a_job_is_one(page, tmp_path):
     """The tables that a guide shows, in a job that needs nothing else; those of a machine file in one."""
     shutil.copy(ROOT / "toolpaths" / "dome.stl", tmp_path)
-    (tmp_path / "part.apt").write_text("", encoding="utf-8")
+    (tmp_path / "part.nc").write_text("", encoding="utf-8")
     library = ROOT / "src" / "pentapod" / "machine" / "library"
     shutil.copy(library / "desk.toml", tmp_path / "my_machine.toml")
     usual = {
