@@ -92,6 +92,7 @@ if TYPE_CHECKING:
     from pentapod.toolpath import stepped as stepped
     from pentapod.toolpath import toolpath_with_report as toolpath_with_report
     from pentapod.toolpath import without_gouges as without_gouges
+    from pentapod.toolpath.formats import RotaryAxes as RotaryAxes
     from pentapod.toolpath.formats import read_toolpath as read_toolpath
     from pentapod.toolpath.formats import write_toolpath as write_toolpath
     from pentapod.verify import Certificate as Certificate
@@ -112,7 +113,7 @@ _ROOMS = {
     "EdgeOptions CurveOptions DrawingOptions TextOptions PolylineOptions ImageOptions lettering read_lines read_points "
     "read_darkness make_toolpath toolpath_with_report Orientation Normal Fixed Pointed Between oriented stepped "
     "GougeOptions Remedy LinkStyle without_gouges Segment SegmentKind Toolpath",
-    "toolpath.formats": "read_toolpath write_toolpath",
+    "toolpath.formats": "read_toolpath write_toolpath RotaryAxes",
     "planning": "plan PlacementConstraints Weights Placement PlacedPath leg_path LegPath",
     "timing": "retime Trajectory explain Explanation override",
     "program": "sample Provenance Program write_csv read_csv",

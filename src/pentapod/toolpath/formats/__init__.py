@@ -2,10 +2,13 @@
 
 from pentapod.toolpath.formats import apt, csv, gcode, npz, robodk
 from pentapod.toolpath.formats.registry import FORMATS, Format, format_of, read_toolpath, write_toolpath
+from pentapod.toolpath.formats.rotary import RotaryAxes, RotaryAxis
 
 __all__ = [
     "FORMATS",
     "Format",
+    "RotaryAxes",
+    "RotaryAxis",
     "apt",
     "csv",
     "format_of",
