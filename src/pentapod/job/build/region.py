@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import fields_from
 from pentapod.base.units import from_si
 from pentapod.base.values import Value
 from pentapod.job.schema.job import Job
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.region import Region
-from pentapod.mesh.region_share import RegionShare
+from pentapod.mesh.region_share import RegionShare, why_empty
 from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.strategies.registry import STRATEGIES
 
@@ -44,14 +47,23 @@ def covers_region(job: Job) -> bool:
     return strategy in STRATEGIES and issubclass(STRATEGIES[strategy].options, CoverOptions)
 
 
-def region_report(job: Job, mesh: Mesh) -> RegionReport:
-    """Return how much of the part's surface a job's region holds, and the problems that this suggests."""
-    found, problems = RegionShare.of(mesh, job_region(job)), list[str]()
+def region_report(job: Job, mesh: Mesh, *, rolls: bool) -> RegionReport:
+    """Return how much of the part's surface a job's region holds, and the problems that this suggests.
+
+    rolls: whether a ball rolls over the part; it would roll over the back of a sheet, too. Raises ToolpathError where
+    the region holds nothing.
+    """
+    region, problems = job_region(job), list[str]()
+    angle = 0.5 * np.pi if rolls and region.angle is None else region.within
+    found = RegionShare.of(mesh, replace(region, angle=angle))
+    if found.inside <= 0.0:
+        what, why = "the region holds nothing to machine", why_empty(mesh, replace(region, angle=angle))
+        raise ToolpathError(what, key="region", remedy=why)
     if found.inside < LEAST_SHARE * found.facing:
         outside, steep = (found.facing - found.boxed) / found.facing, (found.boxed - found.inside) / found.facing
         why = [f"{_percent(outside)} is outside region_box_mm"] if job.part.region_box_mm is not None else []
-        angle = job.part.region_angle_deg
-        why += [f"{_percent(steep)} is steeper than region_angle_deg = {angle:g}"] if steep > 0.0 else []
+        degrees = from_si(angle, "deg")
+        why += [f"{_percent(steep)} is steeper than region_angle_deg = {degrees:g}"] if steep > 0.0 else []
         problems.append(f"less than half of what faces the direction is machined: {' and '.join(why)}")
     if found.facing < LEAST_SHARE and not mesh.diagnosis.watertight:
         problems.append(

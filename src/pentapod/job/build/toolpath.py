@@ -39,7 +39,7 @@ from pentapod.toolpath.lines.scallop import stepover_for
 from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.linking.partition import Piece, part_of
 from pentapod.toolpath.options import PathOptions
-from pentapod.toolpath.strategies.registry import STRATEGIES
+from pentapod.toolpath.strategies.registry import STRATEGIES, rolls_over
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 RATE_SLACK = 1.05
@@ -139,10 +139,14 @@ def job_toolpath(
     Raises ToolpathError where there is nothing to machine, or the toolpath file cannot be read.
     """
     tool, from_file = _judged_tool(job, machine), job.toolpath.strategy == FILE
+    region: list[object] = []
     if from_file:
         toolpath, report = _read(job, tool)
     else:
-        toolpath, report = toolpath_with_report(mesh, tool, job_options(job))
+        asked = job_options(job)
+        if covers_region(job):
+            region.append(region_report(job, mesh, rolls=rolls_over(tool, asked)))
+        toolpath, report = toolpath_with_report(mesh, tool, asked)
         toolpath = stepped(oriented(toolpath, tool, _orientation(job, tool)), job.toolpath.si.axis_step)
     options = _gouge_options(job, _remedies(job), None if from_file else job_link_style(job, mesh, toolpath))
     toolpath, gouges = without_gouges(toolpath, tool, mesh, options, progress)
@@ -152,7 +156,7 @@ def job_toolpath(
             remedy="a thinner or longer tool, or another tool axis",
         )  # fmt: skip
     stem = stem_sentence(job_tool(job, machine))
-    reports: list[object] = [*([region_report(job, mesh)] if covers_region(job) else []), report, gouges]
+    reports: list[object] = [*region, report, gouges]
     reports += [f"  note: {stem}"] if stem else []
     if gouges.tilted:  # the axes may turn faster than before
         toolpath = stepped(toolpath, np.inf if from_file else job.toolpath.si.axis_step)

@@ -72,10 +72,14 @@ def toolpath_with_report(mesh: Mesh, tool: Tool, options: PathOptions) -> tuple[
     )
 
 
+def rolls_over(tool: Tool, options: PathOptions) -> bool:
+    """Return whether a ball rolls over the part: the strategy draws on its drive surface."""
+    return tool.tilt_centre > 0.0 and tool.scallop_radius == tool.tilt_centre and options.rolls
+
+
 def surface_for(mesh: Mesh, tool: Tool, options: PathOptions) -> Surface:
     """Return the surface on which a strategy draws: for a ball that covers a part, its drive surface."""
-    ball = tool.tilt_centre > 0.0 and tool.scallop_radius == tool.tilt_centre
-    if ball and options.rolls:
+    if rolls_over(tool, options):
         return DriveSurface.of(mesh, tool.tilt_centre, options.up)
     return PartSurface(mesh, tool, options.up)
 
