@@ -34,8 +34,8 @@ class CommonAxesOptions:
     of the iteration for the smallest cap. alike_deg: candidates whose axes differ by less are one. tries, ranked:
     random placements for each candidate, and how many of them are judged with the tilt field. waypoints: number that
     represents the path where the placements are given. starts: of the search of each candidate, the most promising one
-    first; so many are searched while their first guesses are within `near` of the best one. Until one fits, all within
-    `hopeful` of it are searched.
+    first; so many are searched while their first guesses are within `near` of the best one; twice the starts where none
+    fits. Until a candidate fits, up to `most` are searched that are within `hopeful` of the best one.
     """
 
     tilt: float = float(np.radians(15.0))
@@ -49,6 +49,7 @@ class CommonAxesOptions:
     starts: tuple[int, ...] = (3, 2)
     near: float = 0.1
     hopeful: float = 0.3
+    most: int = 4
 
 
 OPTIONS = CommonAxesOptions()
@@ -90,9 +91,10 @@ def with_common_axis(
         if best is not None and best[1].best.smallest >= NEEDED_MARGIN:
             if tried >= len(options.starts) or behind > options.near:
                 break
-        elif behind > options.hopeful:
+        elif behind > options.hopeful or tried >= options.most:
             break
-        found = search(problems[k], SearchOptions(refined=options.starts[min(tried, len(options.starts) - 1)]))
+        starts = options.starts[min(tried, len(options.starts) - 1)]
+        found = search(problems[k], SearchOptions(refined=starts, tried=2 * starts))
         best = found if best is None or found[1].best.smallest > best[1].best.smallest else best
         if found[1].interrupted:
             break
