@@ -64,6 +64,7 @@ bench-planning: $(READY)  ## the planner's solver against IPOPT
 bench-gouge: $(READY)  ## contact points and gouge check against another library's drop cutter, rasters against bare sections
 	$(BIN)/python benchmarks/gouge.py
 	$(BIN)/python benchmarks/drop_cutter.py
+	$(BIN)/python benchmarks/drive_surface.py
 	$(BIN)/python benchmarks/raster.py
 
 bench-verify: $(READY)  ## the verdict on a million rows: seconds, memory, against numpy.loadtxt and ball arithmetic

@@ -119,8 +119,8 @@ class Left:
     """What a toolpath leaves on samples of the surface, in metres, and how it moves.
 
     limit: what the nearest reachable centre leaves. excess: above that. allowed: largest excess if a pass comes within
-    half a stepover of the nearest such centre. gouge: how deep the ball cuts into the part. cut, links, air: metres of
-    cuts, of links on feed, and of rapids; lifts: how often the tool leaves the part.
+    half a stepover of the nearest such centre. gouge: how deep the ball gets into the part, on any motion. cut, links,
+    air: metres of cuts, of links on feed, and of rapids; lifts: how often the tool leaves the part between cuts.
     """
 
     radius: float
@@ -137,9 +137,14 @@ class Left:
 
     @property
     def beyond(self) -> float:
-        """Share of the samples with an excess of more than 1.18 times the ridge between passes on a plane."""
-        ridge = self.radius - np.sqrt(self.radius**2 - 0.25 * self.stepover**2)
-        return float((self.excess > 1.18 * ridge).mean())
+        """Share of the samples with an excess of more than 1.18 times the ridge between passes on a plane.
+
+        In hollows that the ball touches the ridge is higher, as it is allowed there; at creases that it does not touch
+        it is not.
+        """
+        ridge = 1.18 * (self.radius - np.sqrt(self.radius**2 - 0.25 * self.stepover**2))
+        most = np.where(self.limit > 0.03 * self.radius, ridge, np.maximum(ridge, self.allowed))
+        return float((self.excess > most).mean())
 
     @property
     def over(self) -> float:
@@ -166,19 +171,21 @@ def left(samples: Samples, toolpath: Toolpath, stepover: float) -> Left:
     way = {kind: [line for line, k in lines if k is kind] for kind in SegmentKind}
     length = {k: sum(np.linalg.norm(np.diff(x, axis=0), axis=1).sum() for x in v) for k, v in way.items()}
     cuts = np.concatenate([np.empty((0, 3)), *(dense(line) for line in way[SegmentKind.CUT])])
-    on_feed = np.concatenate([cuts, *(dense(line) for line in way[SegmentKind.LINK])])
-    runs = [set(run) for cut, run in groupby((k for _, k in lines), lambda k: k is SegmentKind.CUT) if not cut]
+    moves = np.concatenate([cuts, *(dense(line) for kind in ("link", "rapid") for line in way[SegmentKind(kind)])])
+    kinds = [k for _, k in lines]
+    first, last = kinds.index(SegmentKind.CUT), len(kinds) - kinds[::-1].index(SegmentKind.CUT)
+    between = [set(run) for cut, run in groupby(kinds[first:last], lambda k: k is SegmentKind.CUT) if not cut]
     return Left(
         radius=reachable.radius,
         stepover=stepover,
         limit=samples.gap - reachable.radius,
         excess=KDTree(cuts).query(samples.points)[0] - samples.gap,
         allowed=samples.allowed(stepover),
-        gouge=reachable.radius - nearest_facet(reachable.part, on_feed),
+        gouge=reachable.radius - nearest_facet(reachable.part, moves),
         cut=length[SegmentKind.CUT],
         links=length[SegmentKind.LINK],
         air=length[SegmentKind.RAPID],
-        lifts=sum(SegmentKind.RAPID in run for run in runs),
+        lifts=sum(SegmentKind.RAPID in run for run in between),
         passes=len(way[SegmentKind.CUT]),
     )
 

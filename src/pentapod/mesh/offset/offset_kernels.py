@@ -1,54 +1,17 @@
-"""Which points are nearer to a mesh than a level, and where lines cross that level, compiled."""
+"""Where a level set of the distance from a mesh crosses straight lines, compiled."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, Ints
-from pentapod.mesh.query.ball_kernels import facet_distance
-from pentapod.mesh.query.segment_kernels import STACK, box_distance, closest
+from pentapod.base.arrays import Floats, Ints
+from pentapod.mesh.query.segment_kernels import STACK, closest
 from pentapod.numerics.kernels import kernel
 
 _ROUNDS = 60
 _ILLINOIS = 40
 _EXACT = 1e-6
 """Of the distance: how near to the level a crossing is."""
-
-
-@kernel
-def all_within(
-    points: Floats, level: float, corners: Floats, leaf_starts: Ints, extents: Floats, within: Bools
-) -> None:
-    """Fill which points (M, 3) are nearer than `level` to the mesh. The facet near to one is tried first for the next.
-
-    A search ends with the first such facet.
-    """
-    nodes, leaves, last, g = np.empty(STACK, dtype=np.intp), len(leaf_starts) - 1, 0, np.empty(3)
-    for m in range(len(points)):
-        x, y, z = points[m, 0], points[m, 1], points[m, 2]
-        found = facet_distance(corners[last], x, y, z, g) < level
-        nodes[0], count = 0, 1
-        while count > 0 and not found:
-            count -= 1
-            node = nodes[count]
-            leaf = node - (leaves - 1)
-            if leaf >= 0:
-                for f in range(leaf_starts[leaf], leaf_starts[leaf + 1]):
-                    if facet_distance(corners[f], x, y, z, g) < level:
-                        found, last = True, f
-                        break
-                continue
-            near, far = 2 * node + 1, 2 * node + 2
-            to_near, to_far = box_distance(extents[near], x, y, z), box_distance(extents[far], x, y, z)
-            if to_near > to_far:
-                near, far, to_near, to_far = far, near, to_far, to_near
-            if to_far < level:
-                nodes[count] = far
-                count += 1
-            if to_near < level:
-                nodes[count] = near
-                count += 1
-        within[m] = found
 
 
 @kernel

@@ -112,11 +112,7 @@ def _nodes(tree: FacetTree, grid: Grid, groups: Ints, level: float) -> tuple[Int
     keys = (grid.keys(_BLOCK * block)[:, None] + grid.keys(within)).ravel()
     keys.sort()
     keys = keys[np.concatenate([[True], keys[1:] != keys[:-1]])]
-    from pentapod.mesh.offset.offset_kernels import all_within  # noqa: PLC0415  loads numba
-
-    inside = np.empty(len(keys), dtype=np.bool_)
-    all_within(grid.points(keys), level, tree.corners, tree.starts, tree.extents, inside)
-    return keys, ~inside, wide
+    return keys, ~tree.within(grid.points(keys), level), wide
 
 
 def _reached(grid: Grid, keys: Ints, outside: Bools, wide: Bools) -> Bools:

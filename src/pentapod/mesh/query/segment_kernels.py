@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.mesh.query.ball_kernels import EXACT_M, ROUNDS, facet_distance, lower_bound, nearest_time, slope
 from pentapod.mesh.query.box_kernels import box_radius, open_node
 from pentapod.numerics.kernels import kernel
@@ -135,7 +135,7 @@ def nearest_all(
 
 
 @kernel
-def box_distance(extent: Floats, x: float, y: float, z: float) -> float:
+def _box_distance(extent: Floats, x: float, y: float, z: float) -> float:
     """Return the distance of a point from a box (2, 3)."""
     dx = max(extent[0, 0] - x, 0.0, x - extent[1, 0])
     dy = max(extent[0, 1] - y, 0.0, y - extent[1, 1])
@@ -154,7 +154,7 @@ def closest(
     away (6,): the vector from the mesh to the point goes into the first three; the others are room.
     """
     best, facet, leaves = within, -1, len(starts) - 1
-    nodes[0], bounds[0], count = 0, box_distance(extents[0], x, y, z), 1
+    nodes[0], bounds[0], count = 0, _box_distance(extents[0], x, y, z), 1
     g = away[3:]
     if guess >= 0:
         distance = facet_distance(corners[guess], x, y, z, g)
@@ -168,8 +168,8 @@ def closest(
             continue
         leaf = node - (leaves - 1)
         if leaf < 0:
-            near = box_distance(extents[2 * node + 1], x, y, z)
-            far = box_distance(extents[2 * node + 2], x, y, z)
+            near = _box_distance(extents[2 * node + 1], x, y, z)
+            far = _box_distance(extents[2 * node + 2], x, y, z)
             count = open_node(node, near, far, best, count, nodes, bounds)
         else:
             for f in range(starts[leaf], starts[leaf + 1]):
@@ -196,3 +196,37 @@ def closest_of_all(
         last = facets[m] if facets[m] >= 0 else last
         for k in range(3):
             away[m, k] = room[k] if facets[m] >= 0 else 0.0
+
+
+@kernel
+def all_within(points: Floats, distance: float, corners: Floats, starts: Ints, extents: Floats, within: Bools) -> None:
+    """Fill which points (M, 3) are nearer than `distance` to the mesh.
+
+    The facet near to one is tried first for the next. A search ends with the first such facet.
+    """
+    nodes, leaves, last, g = np.empty(STACK, dtype=np.intp), len(starts) - 1, 0, np.empty(3)
+    for m in range(len(points)):
+        x, y, z = points[m, 0], points[m, 1], points[m, 2]
+        found = facet_distance(corners[last], x, y, z, g) < distance
+        nodes[0], count = 0, 1
+        while count > 0 and not found:
+            count -= 1
+            node = nodes[count]
+            leaf = node - (leaves - 1)
+            if leaf >= 0:
+                for f in range(starts[leaf], starts[leaf + 1]):
+                    if facet_distance(corners[f], x, y, z, g) < distance:
+                        found, last = True, f
+                        break
+                continue
+            near, far = 2 * node + 1, 2 * node + 2
+            to_near, to_far = _box_distance(extents[near], x, y, z), _box_distance(extents[far], x, y, z)
+            if to_near > to_far:
+                near, far, to_near, to_far = far, near, to_far, to_near
+            if to_far < distance:
+                nodes[count] = far
+                count += 1
+            if to_near < distance:
+                nodes[count] = near
+                count += 1
+        within[m] = found

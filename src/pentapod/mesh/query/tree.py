@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.mesh.mesh import Mesh
 
 FACETS_PER_LEAF = 4
@@ -71,6 +71,14 @@ class FacetTree:
             np.ascontiguousarray(points), within, self.corners, self.starts, self.extents, distances, away, facets
         )
         return distances, away, facets
+
+    def within(self, points: Floats, distance: float) -> Bools:
+        """Return which points (M, 3) are nearer to the mesh than `distance` metres."""
+        from pentapod.mesh.query.segment_kernels import all_within  # noqa: PLC0415 - loads numba
+
+        found = np.empty(len(points), dtype=np.bool_)
+        all_within(np.ascontiguousarray(points), distance, self.corners, self.starts, self.extents, found)
+        return found
 
 
 def along_morton_curve(points: Floats, bounds: Floats) -> Ints:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Bools, Floats
 from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
 from pentapod.mesh.offset.offset_surface import onto_level
@@ -70,8 +70,8 @@ class BallCentres:
             if not len(rows):
                 break
             middles = 0.5 * (points[rows] + points[rows + 1])
-            bad = self.tree.closest(middles)[0] > self.radius + chordal
-            bad |= self.clearances(points[rows], points[rows + 1]) < self.radius - chordal
+            bad = ~self.tree.within(middles, self.radius + chordal)
+            bad |= ~self.clear(points[rows], points[rows + 1], self.radius - chordal)
             at = rows[bad] + 1
             live[rows[bad]] = True
             points = np.insert(points, at, self.on_level(middles[bad]), axis=0)
@@ -114,7 +114,7 @@ class BallCentres:
     def _cleared(self, points: Floats, chordal: float, closest: float) -> Floats | None:
         """Return a line with its chords halved until all are clear by radius − chordal; None where it jumps."""
         for _ in range(self.options.rounds):
-            bad = np.flatnonzero(self.clearances(points[:-1], points[1:]) < self.radius - chordal)
+            bad = np.flatnonzero(~self.clear(points[:-1], points[1:], self.radius - chordal))
             if not len(bad):
                 return points
             middles = 0.5 * (points[bad] + points[bad + 1])
@@ -127,17 +127,16 @@ class BallCentres:
         """Return unit normals (N, 3) of the offset at points on it: away from the part's closest points."""
         return normalised(self.tree.closest(points)[1])
 
-    def clearances(self, starts: Floats, ends: Floats) -> Floats:
-        """Return the least distances (M,) of chords from the part, metres; what is over the radius counts as that."""
+    def clear(self, starts: Floats, ends: Floats, least: float) -> Bools:
+        """Return which chords (M,) are nowhere nearer to the part than `least` metres."""
         from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415  loads numba
 
         count, tree = len(starts), self.tree
-        distances, where = np.full(count, self.radius), np.zeros((count, 4))
-        facets = np.full(count, -1, dtype=np.intp)
+        distances, where, facets = np.empty(count), np.empty((count, 4)), np.empty(count, dtype=np.intp)
         nearest_all(
-            starts, ends - starts, tree.corners, tree.boxes, tree.starts, self.radius, False, distances, where, facets
+            starts, ends - starts, tree.corners, tree.boxes, tree.starts, least, False, distances, where, facets
         )
-        return distances
+        return facets < 0
 
 
 def smoothed(passes: Passes, window: float) -> Floats:

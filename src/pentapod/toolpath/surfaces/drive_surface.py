@@ -146,7 +146,7 @@ class DriveSurface:
 
     def is_clear(self, centres: Floats, chordal: float) -> bool:
         """Return whether the ball is clear of the part but for `chordal` metres along a line of centres (n, 3)."""
-        return bool((self.centres.clearances(centres[:-1], centres[1:]) >= self.radius - chordal).all())
+        return bool(self.centres.clear(centres[:-1], centres[1:], self.radius - chordal).all())
 
     def tight(self, passes: Passes) -> int:
         """Return 0: the ball is clear of the part on the drive surface."""
