@@ -152,3 +152,11 @@ def test_a_stem_continues_the_cutter_at_its_widest_without_a_gap(tool):
 )
 def test_no_stem_is_assumed_beside_a_shank_or_holder_or_without_a_cutter(tool):
     assert tool.with_stem(0.05) is tool
+
+
+def test_a_reserve_makes_shank_and_holder_larger_all_around():
+    tool = BallCutter(3e-3, flute=0.01, shank=SHANK, holder=HOLDER)
+    plain, larger = tool.solids, BallCutter(3e-3, flute=0.01, shank=SHANK, holder=HOLDER, reserve=2e-5).solids
+    assert larger[:2] == plain[:2]  # ball and flute
+    for one, other in zip(plain[2:], larger[2:], strict=True):
+        assert other.numbers == (*one.numbers[:4], one.rounding + 2e-5)

@@ -18,8 +18,8 @@ MOST_ITEMS = 6
 
 _UNITS = {
     "m": "tips legs tilt_centres points vertices stations knots tilt_centre length radius stepover scallop spacing"
-    " chordal clearance approach hop closest shortest flute stem corner neck_radius height path_tolerance translation"
-    " tool_length offsets depth min_length max_length",
+    " chordal clearance approach hop closest shortest flute stem reserve corner neck_radius height path_tolerance"
+    " translation tool_length offsets depth min_length max_length",
     "s": "times period duration seconds dwells dwell wait",
     "m/s": "speeds feed link_feed max_velocity rapid",
     "m/s²": "max_acceleration",

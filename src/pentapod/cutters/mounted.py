@@ -19,6 +19,7 @@ from pentapod.geometry.solids import Cone, Solid, stacked
 class Mounted(Value, ABC):
     """A tool with shank and holder: stacked cones above the cutting part, towards the spindle.
 
+    reserve: by how much shank and holder count as larger all around, metres.
     stem: height above the tip, metres, up to which a shank of the cutter's diameter reaches; None for no such shank.
     largest_lean: the largest angle of the axis from the surface's normal that suits the tool, radians; 0 for tools that
     cannot tilt.
@@ -29,6 +30,7 @@ class Mounted(Value, ABC):
     shank: tuple[Cone, ...] = field(default=())
     holder: tuple[Cone, ...] = field(default=())
     stem: float | None = None
+    reserve: float = 0.0
 
     @property
     def solids(self) -> tuple[Solid, ...]:
@@ -40,7 +42,8 @@ class Mounted(Value, ABC):
             wide = max(solid.largest_radius for solid in cutter if solid.kind == "cutter")
             shank = (Solid("shank", cutter[-1].high, self.stem, wide, wide), *shank)
         holder = stacked("holder", self.holder, max([base, *(s.high for s in shank)]))
-        return (*cutter, *shank, *holder)
+        larger = (replace(solid, rounding=solid.rounding + self.reserve) for solid in (*shank, *holder))
+        return (*cutter, *larger)
 
     def with_stem(self, top: float) -> Self:
         """Return the tool with a shank of the cutter's diameter up to `top`, metres above the tip.

@@ -26,6 +26,11 @@ from pentapod.job.schema.job import Job
 from pentapod.job.schema.strategies import FILE
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.query.distance import TOOL_RESOLUTION_M
+from pentapod.mesh.query.swept_depth import RESOLUTION_M
+from pentapod.planning.limits.contacts import tool_comfort
+from pentapod.planning.limits.limit import Comforts
+from pentapod.planning.problem.weights import NEEDED_MARGIN
 from pentapod.program import read_header
 from pentapod.toolpath import toolpath_with_report
 from pentapod.toolpath.axis.modes import AxisMode, Between, Fixed, Normal, Pointed
@@ -88,10 +93,16 @@ def _judged_tool(job: Job, machine: Machine | None) -> Tool:
     """Return the tool that the toolpath is made for and judged with.
 
     Where the planner chooses the axes, that is the ball alone: it is at the same place whatever the axis. The planner
-    keeps the rest of the tool clear of the part.
+    keeps the rest of the tool clear of the part. Else shank and holder are larger, by the room that the planner needs.
     """
     tool = job_tool(job, machine)
-    return BallCutter(tool.radius) if job.axis.mode == "auto" and isinstance(tool, BallEnded) else tool
+    if job.axis.mode == "auto" and isinstance(tool, BallEnded):
+        return BallCutter(tool.radius)
+    body = [solid for solid in tool.solids if solid.kind != "cutter"]
+    if not body or not isinstance(tool, Mounted):
+        return tool
+    needed = NEEDED_MARGIN * tool_comfort(body, job.gouge.si.tolerance + job_depth(job), Comforts())
+    return cast(Any, dataclasses.replace(tool, reserve=needed + TOOL_RESOLUTION_M + RESOLUTION_M))
 
 
 def tool_in_world(job: Job, machine: Machine | None = None) -> Tool:

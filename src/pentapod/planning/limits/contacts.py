@@ -17,6 +17,7 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.solids import Solid
 from pentapod.machine.clearance.collision_world import (
+    CollisionWorld,
     MovingBodies,
     Obstacle,
     spindle_ends,
@@ -50,13 +51,24 @@ class Contacts:
 def body_comforts(scene: Scene) -> tuple[float, ...]:
     """Return the gaps (K,) in metres that count as margin 1, in the order of `CollisionWorld.names`."""
     comforts = scene.comforts
-    tool = (tool_comfort(scene.collision_world.tool, comforts),) if scene.collision_world.tool else ()
+    tool = (world_tool_comfort(scene.collision_world, comforts),) if scene.collision_world.tool else ()
     return (*[comforts.leg_obstacle] * scene.machine.robot.n_legs, comforts.spindle_obstacle, *tool)
 
 
-def tool_comfort(solids: tuple[Solid, ...], comforts: Comforts) -> float:
-    """Return the gap in metres from an obstacle that counts as margin 1 for these solids, shank and holder."""
-    return min(comforts.tool_obstacle, comforts.tool_share * min(solid.largest_radius for solid in solids))
+def world_tool_comfort(collision_world: CollisionWorld, comforts: Comforts) -> float:
+    """Return `tool_comfort` of the shank and holder of a collision world."""
+    allowance = max((obstacle.allowance for obstacle in collision_world.obstacles), default=0.0)
+    return tool_comfort(collision_world.tool, allowance, comforts)
+
+
+def tool_comfort(solids: Sequence[Solid], allowance: float, comforts: Comforts) -> float:
+    """Return the gap in metres from an obstacle that counts as margin 1 for shank and holder.
+
+    allowance: depth, metres, that they may be in the part.
+    """
+    allowed = comforts.tool_allowances * allowance if allowance > 0.0 else np.inf
+    thinnest = min(solid.largest_radius for solid in solids)
+    return min(comforts.tool_obstacle, comforts.tool_share * thinnest, allowed)
 
 
 def contacts(scene: Scene, tips: Floats, axes: Floats, placement: RigidTransform) -> Contacts:

@@ -52,8 +52,8 @@ class Comforts:
     as a share of the mean leg length. legs: gap between two legs, metres. tool: gap between a leg and the spindle,
     shank or holder on its own platform line, metres. leg_obstacle, spindle_obstacle, tool_obstacle: gaps of legs,
     spindle, and shank and holder to the part and other obstacles, metres; spindle and tool work near the part.
-    tool_share: the gap of shank and holder need be no more than this share of the thinner one's radius, as a stem works
-    right beside the surface.
+    tool_share, tool_allowances: the gap of shank and holder need not be more than this share of the thinner one's
+    radius, and than so many times the allowed depth, as a stem works right beside the surface.
     """
 
     axis_angle: float = float(np.radians(60.0))
@@ -64,6 +64,7 @@ class Comforts:
     spindle_obstacle: float = 0.01
     tool_obstacle: float = 0.005
     tool_share: float = 0.5
+    tool_allowances: float = 20.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from pentapod.machine.clearance.collision_world import CollisionWorld
 from pentapod.machine.clearance.tool_clearance import leg_tool_gap
 from pentapod.machine.machine import Machine
 from pentapod.mesh.query.swept_depth import TouchingBody, is_clear
-from pentapod.planning.limits.contacts import OPTIONS, tool_comfort
+from pentapod.planning.limits.contacts import OPTIONS, world_tool_comfort
 from pentapod.planning.limits.limit import Comforts
 from pentapod.planning.problem.samples import ToolpathSamples
 
@@ -47,7 +47,7 @@ def without_idle_tool(
     if not joints_are_nearer(machine, solids, options):
         return collision_world
     body = TouchingBody(tuple(leaning(solid, samples) for solid in solids), samples.tilt_centre)
-    gap = OPTIONS.cap * tool_comfort(solids, comforts)
+    gap = OPTIONS.cap * world_tool_comfort(collision_world, comforts)
     tips = samples.tilt_centres - samples.tilt_centre * samples.nominal
     clear = all(is_clear(o.surface.tree, body, tips, samples.nominal, threshold=o.allowance - gap) for o in obstacles)
     return replace(collision_world, tool=()) if clear else collision_world
