@@ -61,7 +61,7 @@ def test_unit_and_side_follow_from_size_and_shape(tmp_path, name):
     assert {key: getattr(job.part, key) for key in usual} == usual | expected
     mesh, machine = job_mesh(job), job_machine(job)
     assert mesh.diagnosis.problems == ()
-    assert "problem" not in str(region_report(job, mesh, rolls=True))
+    assert "problem" not in str(region_report(job, mesh))
     check_reach(job, machine, mesh)
     assert job.axis.mode == "auto"
     assert job.placement.mode == "table"
@@ -99,7 +99,7 @@ def test_of_a_part_larger_than_the_machine_a_box_in_its_middle_is_machined(tmp_p
     box = np.array(job.part.region_box_mm)
     assert np.ptp(box, axis=0)[:2].max() == pytest.approx(1e3 * DESK.work.diameter)
     assert box.mean(axis=0)[:2] == pytest.approx([0.0, 0.0], abs=0.1)
-    report = str(region_report(job, job_mesh(job), rolls=True))
+    report = str(region_report(job, job_mesh(job)))
     assert "is outside region_box_mm" in report
     assert any("larger than the work volume" in remark for remark in proposal.remarks)
 

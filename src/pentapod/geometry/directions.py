@@ -8,6 +8,9 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Floats, as_floats
 from pentapod.base.errors import ArrayError
 
+NEARLY_OPPOSITE = 3.0
+"""Angle between directions, radians, beyond which the great circle between them is arbitrary."""
+
 
 def normalised(vectors: ArrayLike, name: str = "direction") -> Floats:
     """Return vectors (..., 3) scaled to unit length. Raises ArrayError where one has no length."""
@@ -41,6 +44,21 @@ def partway(start: Floats, end: Floats, share: Floats) -> Floats:
     across = normalised(across - np.einsum("...i,...i->...", start, across)[..., None] * start)
     mixed = np.cos(angle) * start + np.sin(angle) * across
     return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
+
+
+def turned(start: Floats, end: Floats, share: Floats, by: Floats) -> Floats:
+    """Return the spherical interpolation (N, 3) at `share` (N,) from unit start (3,) to unit end (3,).
+
+    Nearly opposite directions are joined by way of `by` (3,), unit, or what of it is square to the start.
+    """
+    if float(angle_between(start, end)) < NEARLY_OPPOSITE:
+        return partway(np.broadcast_to(start, (len(share), 3)), np.broadcast_to(end, (len(share), 3)), share)
+    across = by - (by @ start) * start
+    length = float(np.linalg.norm(across))
+    middle = across / length if length > 1e-6 else tangent_frame(start)[0]
+    early = share < 0.5
+    ends = np.where(early[:, None], start, middle), np.where(early[:, None], middle, end)
+    return partway(*ends, np.where(early, 2.0 * share, 2.0 * share - 1.0))
 
 
 def arc_weights(angle: Floats, share: Floats) -> tuple[Floats, Floats]:

@@ -94,7 +94,7 @@ def test_a_beam_is_asked_for_half_the_distance_of_its_lines(make_job):
     assert found.left == pytest.approx(1e-3 * (1.25 + 0.06))
 
 
-def test_the_block_is_sound_and_its_region_is_what_faces_up(block_job):
+def test_the_block_is_sound_and_its_region_is_what_faces_up_and_walls(block_job):
     job = block_job()
     mesh = job_mesh(job)
     assert mesh.diagnosis.watertight
@@ -102,7 +102,8 @@ def test_the_block_is_sound_and_its_region_is_what_faces_up(block_job):
     assert not mesh.diagnosis.inverted
     region = coverage(job).region
     assert region is not None
-    assert region.areas.sum() == pytest.approx(80e-3 * 60e-3, rel=1e-9)
+    walls = mesh.facet_areas[np.abs(mesh.facet_normals[:, 2]) < 1e-9].sum()
+    assert region.areas.sum() == pytest.approx(80e-3 * 60e-3 + walls, rel=1e-9)
     cutting = job_cutting(job, job_collision_world(job, job_machine(job), mesh))
     assert cutting is not None
     assert cutting.coverage is not None

@@ -77,7 +77,7 @@ def test_an_open_surface_that_mostly_shows_its_back_is_told_of_flip(make_job):
     mostly = facets()
     mostly[30:] = mostly[30:, ::-1]
     job = Job.load(make_job(mesh=write_stl(mostly, "dome")))
-    assert "flip = true" in str(region_report(job, job_mesh(job), rolls=False))
+    assert "flip = true" in str(region_report(job, job_mesh(job)))
 
 
 @pytest.mark.parametrize(("unit", "width"), [("inch", "1,524"), ("m", "60,000")])

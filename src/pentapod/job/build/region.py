@@ -10,9 +10,11 @@ from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import fields_from
 from pentapod.base.units import from_si
 from pentapod.base.values import Value
+from pentapod.cutters.mounted import BallEnded
+from pentapod.cutters.registry import CUTTERS
 from pentapod.job.schema.job import Job
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.region import Region
+from pentapod.mesh.region import ON_PART, Region
 from pentapod.mesh.region_share import RegionShare, why_empty
 from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.strategies.registry import STRATEGIES
@@ -37,8 +39,17 @@ class RegionReport(Value):
 
 
 def job_region(job: Job) -> Region:
-    """Return the part of the surface that a job machines."""
-    return Region(**fields_from(Region, job.part))
+    """Return the part of the surface that a job machines; its angle is given."""
+    region = Region(**fields_from(Region, job.part))
+    return replace(region, angle=0.5 * np.pi if _rolls(job) else ON_PART) if region.angle is None else region
+
+
+def _rolls(job: Job) -> bool:
+    """Return whether the job's strategy draws on the drive surface of a ball."""
+    strategy = job.toolpath.strategy
+    return (
+        strategy in STRATEGIES and STRATEGIES[strategy].options.rolls and issubclass(CUTTERS[job.tool.type], BallEnded)
+    )
 
 
 def covers_region(job: Job) -> bool:
@@ -47,22 +58,19 @@ def covers_region(job: Job) -> bool:
     return strategy in STRATEGIES and issubclass(STRATEGIES[strategy].options, CoverOptions)
 
 
-def region_report(job: Job, mesh: Mesh, *, rolls: bool) -> RegionReport:
+def region_report(job: Job, mesh: Mesh) -> RegionReport:
     """Return how much of the part's surface a job's region holds, and the problems that this suggests.
 
-    rolls: whether a ball rolls over the part; it would roll over the back of a sheet, too. Raises ToolpathError where
-    the region holds nothing.
+    Raises ToolpathError where the region holds nothing: a ball would roll over the back of a sheet, too.
     """
     region, problems = job_region(job), list[str]()
-    angle = 0.5 * np.pi if rolls and region.angle is None else region.within
-    found = RegionShare.of(mesh, replace(region, angle=angle))
+    found = RegionShare.of(mesh, region)
     if found.inside <= 0.0:
-        what, why = "the region holds nothing to machine", why_empty(mesh, replace(region, angle=angle))
-        raise ToolpathError(what, key="region", remedy=why)
+        raise ToolpathError("the region holds nothing to machine", key="region", remedy=why_empty(mesh, region))
     if found.inside < LEAST_SHARE * found.facing:
         outside, steep = (found.facing - found.boxed) / found.facing, (found.boxed - found.inside) / found.facing
         why = [f"{_percent(outside)} is outside region_box_mm"] if job.part.region_box_mm is not None else []
-        degrees = from_si(angle, "deg")
+        degrees = from_si(region.within, "deg")
         why += [f"{_percent(steep)} is steeper than region_angle_deg = {degrees:g}"] if steep > 0.0 else []
         problems.append(f"less than half of what faces the direction is machined: {' and '.join(why)}")
     if found.facing < LEAST_SHARE and not mesh.diagnosis.watertight:

@@ -44,7 +44,7 @@ from pentapod.toolpath.lines.scallop import stepover_for
 from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.linking.partition import Piece, part_of
 from pentapod.toolpath.options import PathOptions
-from pentapod.toolpath.strategies.registry import STRATEGIES, rolls_over
+from pentapod.toolpath.strategies.registry import STRATEGIES
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 RATE_SLACK = 1.05
@@ -156,7 +156,7 @@ def job_toolpath(
     else:
         asked = job_options(job)
         if covers_region(job):
-            region.append(region_report(job, mesh, rolls=rolls_over(tool, asked)))
+            region.append(region_report(job, mesh))
         toolpath, report = toolpath_with_report(mesh, tool, asked)
         toolpath = stepped(oriented(toolpath, tool, _orientation(job, tool)), job.toolpath.si.axis_step)
     options = _gouge_options(job, _remedies(job), None if from_file else job_link_style(job, mesh, toolpath))

@@ -136,7 +136,7 @@ class _Search:
         along = arc_length(tips)
         rises = [float(np.linalg.norm(way[1] - way[0])) for way in (up, down)]
         share = (along - rises[0]) / max(along[-1] - sum(rises), 1e-12)
-        return Segment(SegmentKind.RAPID, tips, turning(first, last, np.clip(share, 0.0, 1.0)), np.inf)
+        return Segment(SegmentKind.RAPID, tips, turning(first, last, np.clip(share, 0.0, 1.0), style.view), np.inf)
 
 
 def _raised(corners: Floats, level: float, view: Floats) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
-from pentapod.geometry.directions import angle_between
+from pentapod.geometry.directions import NEARLY_OPPOSITE, angle_between, turned
 from pentapod.geometry.polyline import arc_length, spaced
 from pentapod.toolpath.options import Entry
 from pentapod.toolpath.toolpath import Segment, SegmentKind
@@ -94,7 +94,7 @@ def rapid(start: Pose | None, end: Pose | None, style: LinkStyle) -> Segment:
     length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
     tips = spaced(path, min(style.rapid_spacing, length * style.axis_step / max(turn, style.axis_step)))
     along = arc_length(tips)
-    return Segment(SegmentKind.RAPID, tips, turning(first, last, along / along[-1]), np.inf)
+    return Segment(SegmentKind.RAPID, tips, turning(first, last, along / along[-1], style.view), np.inf)
 
 
 def connection(before: Poses | None, after: Poses | None, style: LinkStyle) -> list[Segment]:
@@ -115,12 +115,17 @@ def rise(tip: Floats, leave: Floats, style: LinkStyle) -> Floats:
     return np.stack([tip, knee, knee + max(style.level - float(knee @ style.view), 0.0) * style.view])
 
 
-def turning(start: Floats, end: Floats, t: Floats) -> Floats:
-    """Return axes (N, 3) along the great circle from one axis to the other at shares t (N,), at rest at both ends."""
+def turning(start: Floats, end: Floats, t: Floats, view: Floats) -> Floats:
+    """Return axes (N, 3) along the great circle from one axis to the other at shares t (N,), at rest at both ends.
+
+    Opposite axes are joined by way of the view (3,).
+    """
     t = t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
     angle = float(angle_between(start, end))
     if angle < 1e-9:
         axes = (1.0 - t)[:, None] * start + t[:, None] * end
+    elif angle >= NEARLY_OPPOSITE:
+        axes = turned(start, end, t, view)
     else:
         axes = np.sin((1.0 - t) * angle)[:, None] * start + np.sin(t * angle)[:, None] * end
     axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats
-from pentapod.geometry.directions import partway, tangent_frame
+from pentapod.geometry.directions import tangent_frame, turned
 from pentapod.geometry.polyline import arc_length
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.offset.offset_surface import offset_surface
@@ -137,7 +137,7 @@ class DriveSurface:
             if way is not None:
                 length = arc_length(way)
                 share = length / length[-1] if length[-1] > 0.0 else np.linspace(0.0, 1.0, len(way))
-                normals = partway(first[1][row], last[1][row], share)
+                normals = turned(first[1][row], last[1][row], share, self.view)
                 contacts = way - self.radius * normals
                 for end, (contact, normal) in ((0, (first[0][row], first[1][row])), (-1, (last[0][row], last[1][row]))):
                     contacts[end], normals[end] = contact, normal
