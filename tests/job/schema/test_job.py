@@ -203,7 +203,8 @@ def test_every_key_is_described_and_has_its_unit():
         "matrix", "component", "interpolation", "solver", "format", "direction", "line", "directions", "remedy", "up",
         "then", "setups", "weight_strokes", "weight_singularities", "weight_joints", "weight_bodies",
         "entry", "fill", "upright", "curve", "form", "which", "laying", "centred", "text", "letter_spacing", "align",
-        "towards", "effect", "levels", "threshold", "frame", "use", "waive", "lowest_share", "left_share", "rotary_axes",
+        "towards", "effect", "levels", "threshold", "frame", "use", "waive", "lowest_share", "left_share",
+        "rotary_axes", "tool",
     }  # fmt: skip
     units = ("_mm", "_deg", "_mm_min", "_ms", "_s", "_mm_s2", "_mm_s3", "_deg_s", "_deg_s2")
     models = [table_model(name) for name in JobTables.model_fields if name != "toolpath"]

@@ -34,8 +34,8 @@ class CommonAxesOptions:
     of the iteration for the smallest cap. alike_deg: candidates whose axes differ by less are one. tries, ranked:
     random placements for each candidate, and how many of them are judged with the tilt field. waypoints: number that
     represents the path where the placements are given. starts: of the search of each candidate, the most promising one
-    first; so many are searched while their first guesses are within `near` of the best one; twice the starts where none
-    fits. Until a candidate fits, up to `most` are searched that are within `hopeful` of the best one.
+    first, then a fixed axis; so many are searched, except those whose first guess is no better than what was found.
+    Until a candidate fits, up to `most` are searched, each with up to twice the starts.
     """
 
     tilt: float = float(np.radians(15.0))
@@ -47,8 +47,6 @@ class CommonAxesOptions:
     ranked: int = 6
     waypoints: int = 48
     starts: tuple[int, ...] = (3, 2)
-    near: float = 0.1
-    hopeful: float = 0.3
     most: int = 4
 
 
@@ -85,17 +83,19 @@ def with_common_axis(
     guessing = SamplingOptions(tries=options.tries, ranked=options.ranked)
     scores = [best_guess(each, seed, guessing, options.waypoints) for each in problems]
     order = sorted(range(len(problems)), key=lambda k: -scores[k])
+    fixed = [k for k in order if (axis := problems[k].samples.common_axis) is not None and axis.cone == 0.0][:1]
+    order = [*order[:1], *(k for k in fixed if k != order[0]), *(k for k in order[1:] if k not in fixed)]
     best: Searched | None = None
-    for tried, k in enumerate(order):
-        behind = scores[order[0]] - scores[k]
-        if best is not None and best[1].best.smallest >= NEEDED_MARGIN:
-            if tried >= len(options.starts) or behind > options.near:
-                break
-        elif behind > options.hopeful or tried >= options.most:
+    count = 0
+    for k in order:
+        fits = best is not None and best[1].best.smallest >= NEEDED_MARGIN
+        if best is not None and fits and scores[k] <= best[1].best.smallest:
+            continue
+        if count >= (len(options.starts) if fits else options.most):
             break
-        starts = options.starts[min(tried, len(options.starts) - 1)]
+        starts = options.starts[min(count, len(options.starts) - 1)]
         found = search(problems[k], SearchOptions(refined=starts, tried=2 * starts))
-        best = found if best is None or found[1].best.smallest > best[1].best.smallest else best
+        best, count = found if best is None or found[1].best.smallest > best[1].best.smallest else best, count + 1
         if found[1].interrupted:
             break
     if best is None:  # not reached: the first candidate is always searched
