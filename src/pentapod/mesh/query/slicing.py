@@ -1,14 +1,16 @@
 """Level lines (isolines) of a quantity on a triangle mesh, for many values at once.
 
-The quantity (height along a direction, geodesic distance, a winding phase) is known at the vertices and linear on
-facets. Each vertex gets the number of levels at or below it, an integer; these tell without any tolerance which levels
-cross which edge. A facet crossed by a level gives one directed segment, from the side where its boundary falls through
-the level to the side where it rises, so that segments of neighbours join head to tail. They are chained by pointer
-doubling. The time is proportional to the number of crossings times the logarithm of the longest chain.
+The quantity (height along a direction, geodesic distance, a winding phase) is known at the vertices, and linear on
+facets unless it can be asked for inside them. Each vertex gets the number of levels at or below it, an integer; these
+tell without any tolerance which levels cross which edge. A facet crossed by a level gives one directed segment, from
+the side where its boundary falls through the level to the side where it rises, so that segments of neighbours join
+head to tail. They are chained by pointer doubling. The time is proportional to the number of crossings times the
+logarithm of the longest chain.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,6 +22,15 @@ from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.topology import components
 
+QuantityInside = Callable[[Ints, Floats], Floats]
+"""The quantity (N,) at places of facets (N,), from their barycentric weights (N, 3)."""
+
+ROUNDS = 40
+"""Steps in which crossings of a quantity that is not linear are found: each at least halves what is left."""
+
+ON_LEVEL = 1e-9
+"""Difference from a level, as a share of the change along an edge, that is good enough."""
+
 
 @dataclass(frozen=True, eq=False)
 class LevelSet:
@@ -27,13 +38,15 @@ class LevelSet:
 
     values (V,): at the vertices. levels (L,): ascending. turns (F, 3) or None: for a quantity that grows by one with
     each turn about a point, integers that each facet adds to its corners' values; both facets at an edge add the same
-    but for a constant. The levels are then all integers, and `levels` is not used.
+    but for a constant. The levels are then all integers, and `levels` is not used. inside: the quantity inside facets,
+    turns included, if it is not linear there: then lines cross each edge where it truly is at their level.
     """
 
     patch: Patch
     values: Floats
     levels: Floats
     turns: Ints | None = None
+    inside: QuantityInside | None = None
 
     @cached_property
     def corner_bins(self) -> Ints:
@@ -58,20 +71,108 @@ class LevelSet:
         return self.levels[level] if self.turns is None else level.astype(np.float64)
 
     @cached_property
+    def _edge_sides(self) -> tuple[Ints, Ints, Ints]:
+        """A side (E,) of each edge as 3 f + s, and the flat indices 3 f + k (E,), (E,) of its first and second end."""
+        edges = self.patch.topology.edges
+        side = np.empty(len(edges), dtype=np.intp)
+        side[self.patch.topology.edge_of_side.ravel()] = np.arange(3 * len(self.patch.faces))
+        here, after = side, side - side % 3 + (side + 1) % 3
+        swap = self.patch.faces.ravel()[here] != edges[:, 0]
+        return side, np.where(swap, after, here), np.where(swap, here, after)
+
+    @cached_property
+    def _second_turns(self) -> Ints:
+        """The turns (E,) at each edge's second vertex, in the count of its first: the same in each of its facets."""
+        if self.turns is None:
+            return np.zeros(len(self.patch.topology.edges), dtype=np.intp)
+        _, first, second = self._edge_sides
+        return self.turns.ravel()[second] - self.turns.ravel()[first]
+
+    @cached_property
     def edge_bins(self) -> tuple[Ints, Ints]:
         """Each edge's lowest level (E,), in the count of its first vertex; number (E + 1,) of its first crossing."""
         edges = self.patch.topology.edges
-        first, second = self._vertex_bins[edges[:, 0]], self._vertex_bins[edges[:, 1]]
-        if self.turns is not None:
-            # The difference of the turns at both ends is the same in each of the edge's facets.
-            side = np.empty(len(edges), dtype=np.intp)
-            side[self.patch.topology.edge_of_side.ravel()] = np.arange(3 * len(self.patch.faces))
-            here, after = side, side - side % 3 + (side + 1) % 3
-            swap = self.patch.faces.ravel()[here] != edges[:, 0]
-            here, after = np.where(swap, after, here), np.where(swap, here, after)
-            second = second + self.turns.ravel()[after] - self.turns.ravel()[here]
-        between = np.abs(second - first)
-        return np.minimum(first, second), run_starts(between)
+        first, second = self._vertex_bins[edges[:, 0]], self._vertex_bins[edges[:, 1]] + self._second_turns
+        return np.minimum(first, second), run_starts(np.abs(second - first))
+
+    @cached_property
+    def _shares(self) -> Floats:
+        """Where (N,) crossings are on their edges: the share of the way from the first vertex to the second."""
+        lowest, numbers = self.edge_bins
+        edge, number = members(np.diff(numbers))
+        level = self.level_values(number + lowest[edge] + 1)
+        ends = self.patch.topology.edges[edge]
+        start, end = self.values[ends[:, 0]], self.values[ends[:, 1]] + self._second_turns[edge]
+        rise = end - start
+        t = np.clip((level - start) / np.where(rise == 0.0, 1.0, rise), 0.0, 1.0)
+        return t if self.inside is None else self._solved(edge, level, t, (start - level, end - level))
+
+    def _solved(self, edge: Ints, level: Floats, t: Floats, ends: tuple[Floats, Floats]) -> Floats:
+        """Return where (N,) the quantity inside edges is at a level, from linear guesses, by the Illinois method.
+
+        ends: its difference from the level at both ends, of different signs.
+        """
+        _, first, second = (a[edge] for a in self._edge_sides)
+        count = np.zeros(len(edge)) if self.turns is None else self.turns.ravel()[first]
+        low, high = np.zeros(len(edge)), np.ones(len(edge))
+        at_low, at_high = ends[0].copy(), ends[1].copy()
+        enough, going = ON_LEVEL * np.abs(at_high - at_low), np.arange(len(edge))
+        inside = self.inside or (lambda _, weights: weights[:, 0])
+        for _ in range(ROUNDS):
+            weights = np.zeros((len(going), 3))
+            rows = np.arange(len(going))
+            weights[rows, first[going] % 3], weights[rows, second[going] % 3] = 1.0 - t[going], t[going]
+            at = inside(first[going] // 3, weights) - count[going] - level[going]
+            upper = (at > 0.0) == (at_high[going] > 0.0)
+            up, down = going[upper], going[~upper]
+            high[up], at_high[up], at_low[up] = t[up], at[upper], 0.5 * at_low[up]
+            low[down], at_low[down], at_high[down] = t[down], at[~upper], 0.5 * at_high[down]
+            going = going[(np.abs(at) > enough[going]) & (high[going] - low[going] > ON_LEVEL)]
+            if not len(going):
+                break
+            guess = high[going] - at_high[going] * (high[going] - low[going]) / (at_high[going] - at_low[going])
+            between = (guess > low[going]) & (guess < high[going])
+            t[going] = np.where(between, guess, 0.5 * (low[going] + high[going]))
+        return t
+
+    def _crossings(self) -> tuple[Ints, Ints, list[Ints]]:
+        """Return the facets (R,) that levels cross, the levels (R,), and the two sides (R,), (R,) where they do.
+
+        They cross from the side where the quantity falls, walking around the facet, to the one where it rises.
+        """
+        bins = self.corner_bins
+        low = bins.min(axis=1, initial=1 << 40)
+        count = np.maximum(bins.max(axis=1, initial=-1) - low, 0)
+        facet, number = members(count)
+        level = number + low[facet] + 1
+        above = bins[facet] >= level[:, None]
+        after = np.roll(above, -1, axis=1)
+        return facet, level, [np.argmax(above & ~after, axis=1), np.argmax(~above & after, axis=1)]
+
+    @cached_property
+    def _chains(self) -> tuple[Ints, Ints, list[Ints], Ints]:
+        """As `_crossings`, in the order in which segments follow each other, and the line (R,) of each."""
+        facet, level, sides = self._crossings()
+        nodes = [self._crossing(facet, level, side)[2] for side in sides]
+        joins = [self.patch.joins[self.patch.topology.edge_of_side[facet, side]] for side in sides]
+        begins_at = np.full(int(self.edge_bins[1][-1]), -1, dtype=np.intp)
+        begins_at[nodes[0][joins[0]]] = np.flatnonzero(joins[0])
+        order, chain = chained(np.where(joins[1], begins_at[nodes[1]], -1))
+        return facet[order], level[order], [side[order] for side in sides], chain
+
+    def segments(self) -> tuple[Ints, Floats, Floats, Ints]:
+        """Return the lines' segments: facets (R,), barycentric weights (R, 3) of both ends there, and the line (R,).
+
+        Those of a line follow each other.
+        """
+        facet, level, sides, chain = self._chains
+        rows, ends = np.arange(len(facet)), []
+        for side in sides:
+            a, b, _, t = self._crossing(facet, level, side)
+            weights = np.zeros((len(facet), 3))
+            weights[rows, a], weights[rows, b] = 1.0 - t, t
+            ends.append(weights)
+        return facet, ends[0], ends[1], chain
 
     def lines(self) -> Passes:
         """Return the lines, ordered by level.
@@ -80,47 +181,31 @@ class LevelSet:
         facets. Closed lines begin and end in the same point. Seen from outside, the quantity grows to the left of a
         line's direction.
         """
-        patch, topology = self.patch, self.patch.topology
-        bins = self.corner_bins
-        low = bins.min(axis=1, initial=1 << 40)
-        count = np.maximum(bins.max(axis=1, initial=-1) - low, 0)
-        facet, number = members(count)
-        level = number + low[facet] + 1
-        above = bins[facet] >= level[:, None]
-        after = np.roll(above, -1, axis=1)
-        sides = [np.argmax(above & ~after, axis=1), np.argmax(~above & after, axis=1)]  # falling, rising
-        ends = [self._crossing(facet, level, side) for side in sides]
-        nodes, edges = [e[2] for e in ends], [topology.edge_of_side[facet, side] for side in sides]
-        joins = [patch.joins[edge] for edge in edges]
-        begins_at = np.full(int(self.edge_bins[1][-1]), -1, dtype=np.intp)
-        begins_at[nodes[0][joins[0]]] = np.flatnonzero(joins[0])
-        order, chain = chained(np.where(joins[1], begins_at[nodes[1]], -1))
-        tails, heads = ([values[order] for values in end[:2]] for end in ends)
-        return _assembled(tails, heads, chain, level[order])
+        facet, level, sides, chain = self._chains
+        ends = [self._crossing_point(facet, level, side) for side in sides]
+        return _assembled([end[0] for end in ends], chain, level, [end[1] for end in ends])
 
-    def _crossing(self, facet: Ints, level: Ints, side: Ints) -> tuple[Floats, Floats, Ints]:
-        """Return where (R, 3) levels cross sides of facets, the normals (R, 3) there, and the crossing's number.
+    def _crossing(self, facet: Ints, level: Ints, side: Ints) -> tuple[Ints, Ints, Ints, Floats]:
+        """Return where levels (R,) cross sides (R,) of facets: both corners, the crossing's number, and the share.
 
-        Computed from the side's lower vertex to its higher, so that both its facets get the same bits.
+        From the side's lower vertex to its higher, so that both its facets get the same bits.
         """
         faces, edge = self.patch.faces, self.patch.topology.edge_of_side[facet, side]
         a, b = side, (side + 1) % 3
         swap = faces[facet, a] > faces[facet, b]
         a, b = np.where(swap, b, a), np.where(swap, a, b)
-        first, second = faces[facet, a], faces[facet, b]
-        base, more = np.intp(0), np.intp(0)
-        if self.turns is not None:
-            base = self.turns[facet, a]
-            more = self.turns[facet, b] - base
-        start, end = self.values[first], self.values[second] + more
+        base = np.intp(0) if self.turns is None else self.turns[facet, a]
         lowest, first_number = self.edge_bins
         number = first_number[edge] + (level - base - lowest[edge] - 1)
-        rise = end - start
-        t = (self.level_values(level - base) - start) / np.where(rise == 0.0, 1.0, rise)
-        t = np.clip(t, 0.0, 1.0)[:, None]
+        return a, b, number, self._shares[number]
+
+    def _crossing_point(self, facet: Ints, level: Ints, side: Ints) -> tuple[Floats, Floats]:
+        """Return where (R, 3) levels cross sides of facets, and the normals (R, 3) there."""
+        a, b, _, share = self._crossing(facet, level, side)
+        t, first, second = share[:, None], self.patch.faces[facet, a], self.patch.faces[facet, b]
         points = self.patch.vertices[first] + t * (self.patch.vertices[second] - self.patch.vertices[first])
         normals = self.patch.normals
-        return points, (1.0 - t) * normals[facet, a] + t * normals[facet, b], number
+        return points, (1.0 - t) * normals[facet, a] + t * normals[facet, b]
 
 
 def chained(after: Ints) -> tuple[Ints, Ints]:
@@ -152,14 +237,17 @@ def chained(after: Ints) -> tuple[Ints, Ints]:
     return order, np.cumsum(distance[order] == 0) - 1
 
 
-def _assembled(tails: list[Floats], heads: list[Floats], chain: Ints, level: Ints) -> Passes:
-    """Return passes from segments (K,) in order: each chain's first tail, then all its heads."""
+def _assembled(points: list[Floats], chain: Ints, level: Ints, normals: list[Floats]) -> Passes:
+    """Return passes from segments (K,) in order, with their tails' and heads' points and normals.
+
+    Each chain's first tail, then all its heads.
+    """
     count = len(chain)
     chains = int(chain[-1]) + 1 if count else 0
     at = np.arange(count) + chain + 1
     first = np.flatnonzero(np.diff(chain, prepend=-1))
     arrays: list[Floats] = []
-    for tail, head in zip(tails, heads, strict=True):
+    for tail, head in (points, normals):
         array = np.empty((count + chains, 3))
         array[at] = head
         array[at[first] - 1] = tail[first]

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats
+from pentapod.mesh.geodesic.distance import GeodesicField, Sources
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
-from pentapod.mesh.query.geodesic import border_vertices, distances, seeds_along
 from pentapod.mesh.query.slicing import LevelSet
 from pentapod.mesh.topology import components
 
@@ -25,26 +25,44 @@ class GapOptions:
     """How gaps are found.
 
     facets_per_step: facet edges in a stepover, for distances that are good to a few percent. negligible: share of the
-    area that gaps without lines of their own may have in total. slack: a gap counts from this many half steps on.
+    area that gaps without lines of their own may have in total. slack: a gap counts from this many half steps on;
+    scallops are 1.25 times as high there. spacing: of points that stand for lines which thin facets cut into short
+    pieces, in stepovers.
     """
 
     facets_per_step: float = 3.5
     negligible: float = 5e-4
-    slack: float = 1.04
+    slack: float = 1.118
+    spacing: float = 0.05
 
     def longest_edge(self, steps: Floats) -> float:
         """Return how long facet edges may be, metres, for stepovers (F,)."""
         return float(steps.min()) / self.facets_per_step
 
 
-FRONTS = GapOptions(facets_per_step=5.0, negligible=2e-4)
+FRONTS = GapOptions(facets_per_step=5.0, negligible=2e-4, slack=1.04)
 """For lines that are themselves at a geodesic distance: they turn sharp corners, which finer facets keep sharp."""
+
+
+def slowness_of(patch: Patch, steps: Floats) -> Floats | float:
+    """Return steps per metre at vertices (V,), from the stepover (F,) on facets; a number if it is the same on all."""
+    if steps.min() == steps.max():
+        return 1.0 / float(steps[0])
+    total, area = np.zeros((2, len(patch.vertices)))
+    np.add.at(total, patch.faces.ravel(), np.repeat(patch.areas / steps, 3))
+    np.add.at(area, patch.faces.ravel(), np.repeat(patch.areas, 3))
+    return np.where(area > 0.0, total / np.where(area > 0.0, area, 1.0), 1.0 / float(steps.max()))
+
+
+def lines_as_sources(level_set: LevelSet, steps: Floats, options: GapOptions = FRONTS) -> Sources:
+    """Return level lines as sources of distances, for stepovers (F,)."""
+    return Sources.along(level_set, options.spacing * float(steps.min()))
 
 
 def gap_lines(
     patch: Patch,
-    seeds: Floats,
-    slowness: Floats,
+    sources: Sources,
+    steps: Floats,
     options: GapOptions = FRONTS,
     *,
     where: Bools | None = None,
@@ -52,31 +70,54 @@ def gap_lines(
 ) -> Passes:
     """Return lines around everything that is more than half a step from the passes.
 
-    seeds (V,): distance in steps of vertices near the passes, infinite elsewhere. slowness (F,): steps per metre; the
-    facets must be small compared with a step. where (V,): the only vertices that may lie in a gap. area: of the whole
-    region, square metres, if the patch is a part of it. What no seed reaches gets a line midway between its borders,
-    and others a step from it.
+    sources: the passes on the patch. steps (F,): stepover on each facet, metres; the facets must be small compared with
+    it. where (V,): the only vertices that may lie in a gap. area: of the whole region, square metres, if the patch is a
+    part of it. What is not connected to a source gets a line midway between its borders, and others a step from it.
     """
-    distance = distances(patch, seeds, slowness)
-    parts: list[Passes] = []
-    if not np.isfinite(distance).all():
-        middle = _middle_lines(patch, distance, slowness)
+    slowness, parts = slowness_of(patch, steps), list[Passes]()
+    field = GeodesicField.of(patch, sources, slowness)
+    if not np.isfinite(field.values).all():
+        middle = _middle_lines(patch, field.values, slowness)
         parts.append(middle.lines())
-        distance = distances(patch, np.minimum(distance, seeds_along(middle, slowness)), slowness)
-    distance = np.where(np.isfinite(distance) & (True if where is None else where), distance, 0.0)
-    levels: Floats = np.arange(0.5, float(distance.max(initial=0.0)), 1.0)
+        field = GeodesicField.of(patch, Sources.joined([sources, lines_as_sources(middle, steps)]), slowness)
+    distance = np.where(np.isfinite(field.values) & (True if where is None else where), field.values, 0.0)
+    # Midway between parallel passes the distance is half a step exactly: that is no gap.
+    first = 0.25 * (1.0 + options.slack)
+    levels: Floats = np.arange(first, float(distance.max(initial=0.0)), 1.0)
     if len(levels):
-        lines = LevelSet(patch, distance, levels).lines()
+        lines = LevelSet(patch, distance, levels, inside=field.at if where is None else None).lines()
         negligible = options.negligible * (float(patch.areas.sum()) if area is None else area)
-        parts.append(lines.where(_needed(patch, distance > 0.5 * options.slack, lines, negligible)))
+        needed = lines.where(_needed(patch, distance > 0.5 * options.slack, lines, negligible))
+        parts.append(_one_side(needed, 0.5 * float(steps.min())))
     return Passes.joined(parts)
 
 
-def _middle_lines(patch: Patch, distance: Floats, slowness: Floats) -> LevelSet:
+def _one_side(lines: Passes, reach: float) -> Passes:
+    """Return lines with one side only where they turn back beside themselves, within `reach` metres: it covers both."""
+    found: list[tuple[Floats, Floats]] = []
+    for k, closed in enumerate(lines.closed):
+        points, normals = lines.points[lines.rows(k)], lines.normals[lines.rows(k)]
+        if closed:
+            # The tips of a loop are the points that are farthest from each other.
+            first = int(np.linalg.norm(points - points[0], axis=1).argmax())
+            points, normals = (np.concatenate([a[first:-1], a[: first + 1]]) for a in (points, normals))
+        tip = int(np.linalg.norm(points - points[0], axis=1).argmax())
+        sides = [(points[: tip + 1], normals[: tip + 1]), (points[tip:], normals[tip:])]
+        sides.sort(key=lambda side: float(np.linalg.norm(np.diff(side[0], axis=0), axis=1).sum()))
+        if 0 < tip < len(points) - 1 and KDTree(sides[0][0]).query(sides[1][0])[0].max() <= reach:
+            points, normals = sides[0]
+        found.append((points, normals))
+    return Passes.of(found, lines.levels)
+
+
+def _middle_lines(patch: Patch, distance: Floats, slowness: Floats | float) -> LevelSet:
     """Return the lines midway between the border and the innermost point of each body that `distance` (V,) misses."""
-    inner = distances(patch, np.where(border_vertices(patch) & ~np.isfinite(distance), 0.0, np.inf), slowness)
-    body = components(len(patch.vertices), *patch.topology.edges.T)[1]
-    missed = ~np.isfinite(distance) & np.isfinite(inner)
+    topology = patch.topology
+    missed = ~np.isfinite(distance)
+    border = (topology.facets_at_edge == 1) & missed[topology.edges].all(axis=1)
+    inner = GeodesicField.of(patch, Sources.sides(patch, border), slowness).values
+    body = components(len(patch.vertices), *topology.edges.T)[1]
+    missed &= np.isfinite(inner)
     furthest = np.zeros(int(body.max()) + 1)
     np.maximum.at(furthest, body[missed], inner[missed])
     share = np.where(missed, inner / np.where(furthest[body] > 0.0, furthest[body], 1.0), 0.0)

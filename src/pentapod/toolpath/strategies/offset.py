@@ -12,14 +12,15 @@ from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import Key
 from pentapod.geometry.polyline import spaced
+from pentapod.mesh.geodesic.distance import GeodesicField, Sources
+from pentapod.mesh.geodesic.places import PatchOn
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
-from pentapod.mesh.query.closest import closest
-from pentapod.mesh.query.geodesic import border_vertices, distances, seeds_along, seeds_at
+from pentapod.mesh.query.closest import closest, normals_at
 from pentapod.mesh.query.levels import gradients
-from pentapod.mesh.query.slicing import LevelSet
+from pentapod.mesh.query.slicing import LevelSet, QuantityInside
 from pentapod.toolpath.inputs.points import read_points
-from pentapod.toolpath.lines.gap_filling import FRONTS, gap_lines
+from pentapod.toolpath.lines.gap_filling import FRONTS, gap_lines, lines_as_sources, slowness_of
 from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.strategy import ContactPaths, Order, Strategy, region_patch
 from pentapod.toolpath.surface import Surface
@@ -50,41 +51,45 @@ class OffsetOptions(CoverOptions):
 
 @dataclass(frozen=True, eq=False)
 class DistanceField:
-    """Geodesic distance from a source over the region, in small facets.
+    """Geodesic distance from a source over the region, in steps.
 
-    steps (F,): stepover on each facet, metres. distance (V,): of each vertex from the source, in steps.
+    drawn: the region in small facets. steps (F,): stepover on each, metres. distance (V,): of each vertex. inside: of
+    places inside the facets. curve: the source on the facets, if it is not the region's border; on_curve: as a line.
     """
 
-    patch: Patch
+    drawn: PatchOn
     steps: Floats
     distance: Floats
+    inside: QuantityInside
+    curve: Sources | None
+    on_curve: Passes
 
 
 def offset_paths(surface: Surface, options: OffsetOptions) -> ContactPaths:
-    """Return lines half a step from the border, or on the curve, and then a step apart along the surface.
+    """Return lines half a step from the border, or the curve itself, and then a step apart along the surface.
 
     Where fronts meet and leave more than half a step, a further line fills the gap. Raises ToolpathError for an empty
     region, one without a border, or a scallop that does not suit the tool.
     """
     field = distance_field(surface, options, options.curve)
-    patch, slowness = field.patch, 1.0 / field.steps
-    first = 0.5 if options.curve is None else 0.0
-    reached = np.isfinite(field.distance)
-    levels: Floats = np.arange(first, max(float(field.distance[reached].max()), first) + 0.5, 1.0)
-    if options.curve is not None:
-        levels[0] = 1e-3  # steps: just beside the curve, which is not a level line itself
-    level_set = LevelSet(patch, np.where(reached, field.distance, float(levels[-1]) + 1.0), levels)
-    passes = Passes.joined([level_set.lines(), gap_lines(patch, seeds_along(level_set, slowness), slowness)])
+    patch, reached = field.drawn.patch, np.isfinite(field.distance)
+    first = 0.5 if options.curve is None else 1.0
+    furthest = float(field.distance[reached].max())
+    levels: Floats = np.arange(first, max(furthest, first) + 0.5, 1.0)
+    distance = np.where(reached, field.distance, float(levels[-1]) + 1.0)
+    level_set = LevelSet(patch, distance, levels, inside=field.inside)
+    lines = [lines_as_sources(level_set, field.steps), *([] if field.curve is None else [field.curve])]
+    passes = Passes.joined([field.on_curve, level_set.lines(), gap_lines(patch, Sources.joined(lines), field.steps)])
     missed = 1.0 - float(patch.areas[reached[patch.faces].all(axis=1)].sum() / patch.areas.sum())
     note = f"{100.0 * missed:.2g} % of the region is not connected to the source and left out"
     return ContactPaths(passes, float(field.steps.max()), Order.ZIGZAG, notes=(note,) if missed > 1e-9 else ())
 
 
-def refined_for_fronts(surface: Surface, patch: Patch, options: CoverOptions) -> tuple[Patch, float]:
+def refined_for_fronts(surface: Surface, patch: Patch, options: CoverOptions) -> tuple[PatchOn, float]:
     """Return a patch in facets that are small compared with the stepover, and the length of their edges, metres."""
     sides = patch.vertices[patch.faces[:, 1]] - patch.vertices[patch.faces[:, 0]]
     edge = FRONTS.longest_edge(surface.steps(patch, sides, options))
-    return patch.refined(edge), edge
+    return PatchOn.of(patch, lambda whole: whole.refined(edge)), edge
 
 
 def distance_field(
@@ -95,27 +100,42 @@ def distance_field(
     For a scallop, the steps follow from the curvature in the direction of growing distance. points_per_edge: of the
     curve in the length of a facet's edge. Raises ToolpathError for an empty region, or one without a border.
     """
-    patch, edge = refined_for_fronts(surface, region_patch(surface, options), options)
-    metre = np.ones(len(patch.faces))
-    facets, points = np.zeros(0, dtype=np.intp), np.zeros((0, 3))
-    if curve is None:
-        border = border_vertices(patch)
-        if not border.any():
-            raise ToolpathError(
-                "the region has no border to start from", key="curve", remedy="give a curve, or a smaller region"
-            )
-        seeds = np.where(border, 0.0, np.inf)
-    else:
-        facets, points, _ = closest(patch, spaced(curve, edge / points_per_edge))
-        seeds = seeds_at(patch, facets, points, metre)
-    metres = distances(patch, seeds, metre)
+    region = region_patch(surface, options)
+    drawn, edge = refined_for_fronts(surface, region, options)
+    patch, from_curve, line = drawn.patch, None, Passes.of([])
+    if curve is not None:
+        from_curve, line = _on_surface(patch, spaced(curve, edge / points_per_edge))
+    elif not (region.topology.facets_at_edge == 1).any():
+        raise ToolpathError(
+            "the region has no border to start from", key="curve", remedy="give a curve, or a smaller region"
+        )
     if options.stepover is not None:
-        return DistanceField(patch, np.full(len(patch.faces), options.stepover), metres / options.stepover)
+        # Over the region's own facets: distances are exact inside them, and there are fewer.
+        field = _distance(region, None if from_curve is None else from_curve.placed(drawn), 1.0 / options.stepover)
+        at_vertices, inside = drawn.at_vertices(field.at), drawn.carried(field.at)
+        steps = np.full(len(patch.faces), options.stepover)
+        return DistanceField(drawn, steps, at_vertices, inside, from_curve, line)
+    metres = _distance(patch, from_curve, 1.0).values
     growing = gradients(patch, np.where(np.isfinite(metres), metres, 0.0)[patch.faces])
     steps = surface.steps(patch, growing, options)
-    if curve is not None:
-        seeds = seeds_at(patch, facets, points, 1.0 / steps)
-    return DistanceField(patch, steps, distances(patch, seeds, 1.0 / steps))
+    field = _distance(patch, from_curve, slowness_of(patch, steps))
+    return DistanceField(drawn, steps, field.values, field.at, from_curve, line)
+
+
+def _distance(patch: Patch, curve: Sources | None, slowness: Floats | float) -> GeodesicField:
+    """Return the distance from a curve on a patch, or from the patch's border."""
+    border = Sources.sides(patch, patch.topology.facets_at_edge == 1)
+    return GeodesicField.of(patch, border if curve is None else curve, slowness)
+
+
+def _on_surface(patch: Patch, points: Floats) -> tuple[Sources, Passes]:
+    """Return a curve of closely spaced points (N, 3) on a patch, as the source of distances and as a pass."""
+    facets, on, weights = closest(patch, points)
+    inside = np.flatnonzero(facets[1:] == facets[:-1])
+    alone = np.setdiff1d(np.arange(len(facets)), np.concatenate([inside, inside + 1]))
+    begins, ends = np.concatenate([inside, alone]), np.concatenate([inside + 1, alone])
+    line = Passes.of([(on, normals_at(patch, facets, weights))])
+    return Sources(facets[begins], weights[begins], weights[ends]), line
 
 
 STRATEGY = Strategy("offset", OffsetOptions, offset_paths)

@@ -16,9 +16,8 @@ from pentapod.base.keys import Key
 from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
-from pentapod.mesh.query.geodesic import seeds_along
 from pentapod.mesh.query.slicing import LevelSet
-from pentapod.toolpath.lines.gap_filling import GapOptions, gap_lines
+from pentapod.toolpath.lines.gap_filling import GapOptions, gap_lines, lines_as_sources
 from pentapod.toolpath.lines.scallop import level_values
 from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.strategy import ContactPaths, Order, Strategy, region_patch
@@ -101,9 +100,9 @@ def _gaps(
     patch, near = whole.rim(1.25 * float(steps.max()), gaps.longest_edge(steps))
     if not len(patch.faces):
         return Passes.of([])
-    slowness = 1.0 / surface.steps(patch, across, options)
-    seeds = seeds_along(LevelSet(patch, patch.vertices @ across, levels), slowness)
-    return gap_lines(patch, seeds, slowness, gaps, where=near, area=float(whole.areas.sum()))
+    steps = surface.steps(patch, across, options)
+    sources = lines_as_sources(LevelSet(patch, patch.vertices @ across, levels), steps)
+    return gap_lines(patch, sources, steps, gaps, where=near, area=float(whole.areas.sum()))
 
 
 def _monotone(passes: Passes, view: Floats, *, upwards: bool, least: float) -> Passes:

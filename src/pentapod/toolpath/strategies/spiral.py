@@ -12,12 +12,13 @@ from pentapod.base.arrays import Bools, Floats, Ints, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import VECTOR, Key
 from pentapod.geometry.directions import tangent_frame
+from pentapod.mesh.geodesic.distance import Sources
+from pentapod.mesh.geodesic.places import PatchOn
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
-from pentapod.mesh.query.geodesic import seeds_along
 from pentapod.mesh.query.levels import gradients
-from pentapod.mesh.query.slicing import LevelSet
-from pentapod.toolpath.lines.gap_filling import gap_lines
+from pentapod.mesh.query.slicing import LevelSet, QuantityInside
+from pentapod.toolpath.lines.gap_filling import gap_lines, lines_as_sources
 from pentapod.toolpath.lines.scallop import level_values
 from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.strategies.offset import distance_field, refined_for_fronts
@@ -65,61 +66,87 @@ def spiral_paths(surface: Surface, options: SpiralOptions) -> ContactPaths:
 
 def _offset(surface: Surface, options: SpiralOptions) -> ContactPaths:
     field = distance_field(surface, options, None)
-    distance = np.where(np.isfinite(field.distance), field.distance, 0.0)
-    centre = field.patch.vertices[distance.argmax()] if options.centre is None else np.asarray(options.centre)
-    patch, angle, turns, kept = _polar_angle(field.patch, centre, options.up)
+    finite = np.where(np.isfinite(field.distance), field.distance, 0.0)
+    centre = field.drawn.patch.vertices[finite.argmax()] if options.centre is None else np.asarray(options.centre)
     # One closed turn at half a step from the border, and the spiral from there inwards.
-    ring = LevelSet(patch, distance, np.array([0.5]))
-    deep = (distance[patch.faces] >= 0.5).all(axis=1)
-    part = Patch(patch.vertices, patch.faces[deep], patch.normals[deep])
-    inside = LevelSet(part, distance - 0.5 - angle, np.zeros(0), turns[deep])
-    inner, inner_distance = patch.above(distance, 0.5)
-    inner, angle, turns, _ = _polar_angle(inner, centre, options.up)
-    spiral = LevelSet(inner, inner_distance - 0.5 - angle, np.zeros(0), turns)
-    slowness = 1.0 / field.steps[kept]
-    seeds = np.minimum(seeds_along(ring, slowness), seeds_along(inside, 1.0 / field.steps[kept][deep]))
-    passes = Passes.joined([ring.lines(), spiral.lines(), gap_lines(patch, seeds, slowness)])
+    ring = LevelSet(field.drawn.patch, finite, np.array([0.5]), inside=field.inside)
+    inner = PatchOn.of(field.drawn.patch, lambda patch: patch.above(finite, 0.5)[0])
+    if not len(inner.patch.faces):
+        gaps = gap_lines(field.drawn.patch, lines_as_sources(ring, field.steps), field.steps)
+        return ContactPaths(Passes.joined([ring.lines(), gaps]), float(field.steps.max()), Order.ZIGZAG)
+    spiral, kept = _wound(inner, field.inside, 0.5, centre, options.up)
+    sources = Sources.joined(
+        [lines_as_sources(ring, field.steps), lines_as_sources(spiral, field.steps).placed(inner.where(kept))]
+    )
+    passes = Passes.joined([ring.lines(), spiral.lines(), gap_lines(field.drawn.patch, sources, field.steps)])
     return ContactPaths(passes, float(field.steps.max()), Order.ZIGZAG)
 
 
 def _planar(surface: Surface, options: SpiralOptions) -> ContactPaths:
     whole = region_patch(surface, options)
-    patch, _ = refined_for_fronts(surface, whole, options)
+    drawn, _ = refined_for_fronts(surface, whole, options)
+    patch = drawn.patch
     centre = bounds_centre(whole) if options.centre is None else np.asarray(options.centre)
-    flat = patch.vertices - centre
-    flat = flat - (flat @ options.up)[:, None] * options.up
-    radius = np.linalg.norm(flat, axis=1)
-    corners = radius[patch.faces]
+
+    def radius(points: Floats) -> Floats:
+        flat = points - centre
+        return np.linalg.norm(flat - (flat @ options.up)[:, None] * options.up, axis=1)
+
+    corners = radius(patch.vertices)[patch.faces]
     outwards = gradients(patch, corners)
     steps = surface.steps(patch, outwards, options)
     levels = level_values(corners, np.linalg.norm(outwards, axis=1), steps)
     if len(levels) < 2:
         raise ToolpathError("the region is too small for a spiral of this stepover", key="stepover")
-    # Turn k passes radius levels[k] half way round.
-    turn = np.interp(radius, levels, np.arange(len(levels)) + 0.5)
-    inner, outer = radius < levels[0], radius > levels[-1]
-    turn[inner] = 0.5 + (radius[inner] - levels[0]) / (levels[1] - levels[0])
-    turn[outer] = len(levels) - 0.5 + (radius[outer] - levels[-1]) / (levels[-1] - levels[-2])
-    patch, angle, turns, kept = _polar_angle(patch, centre, options.up)
-    spiral = LevelSet(patch, turn - angle, np.zeros(0), turns)
-    slowness = 1.0 / steps[kept]
-    passes = Passes.joined([spiral.lines(), gap_lines(patch, seeds_along(spiral, slowness), slowness)])
+
+    def turn(facets: Ints, weights: Floats) -> Floats:
+        """Turn k passes radius levels[k] half way round."""
+        at = radius(_points(patch, facets, weights))
+        inwards = 0.5 + (at - levels[0]) / (levels[1] - levels[0])
+        outside = len(levels) - 0.5 + (at - levels[-1]) / (levels[-1] - levels[-2])
+        between = np.interp(at, levels, np.arange(len(levels)) + 0.5)
+        return np.where(at < levels[0], inwards, np.where(at > levels[-1], outside, between))
+
+    itself = PatchOn.of(patch, lambda same: same)
+    spiral, kept = _wound(itself, turn, 0.0, centre, options.up)
+    sources = lines_as_sources(spiral, steps).placed(itself.where(kept))
+    passes = Passes.joined([spiral.lines(), gap_lines(patch, sources, steps)])
     return ContactPaths(passes, float(steps.max()), Order.ZIGZAG)
 
 
-def _polar_angle(patch: Patch, centre: Floats, view: Floats) -> tuple[Patch, Floats, Ints, Bools]:
-    """Return the polar angle of vertices about a centre (3,), seen along the view, and how it continues on facets.
+def _wound(on: PatchOn, turn: QuantityInside, first: float, centre: Floats, view: Floats) -> tuple[LevelSet, Bools]:
+    """Return the spiral on a patch, and the facets (F,) used: all but those over the centre (3,), seen along the view.
 
-    The patch without the facets that hold the centre; the angle (V,) in turns, 0 to 1; the whole turns (F, 3) to
-    subtract at the corners of a facet so that the angle is continuous there; which facets (F,) of the patch are kept.
+    turn: of places on the patch on which it lies; turns pass where this is `first`, and one more each.
     """
     x, y = tangent_frame(view)
-    offset = patch.vertices - centre
-    angle = np.mod(np.arctan2(offset @ y, offset @ x) / (2.0 * np.pi), 1.0)
-    corners = angle[patch.faces]
+
+    def angle(points: Floats) -> Floats:
+        """Polar angle about the centre, in turns, 0 to 1."""
+        offset = points - centre
+        return np.mod(np.arctan2(offset @ y, offset @ x) / (2.0 * np.pi), 1.0)
+
+    whole = on.patch
+    at_vertices = angle(whole.vertices)
+    corners = at_vertices[whole.faces]
+    # Whole turns to subtract at the corners of a facet so that the angle is continuous there.
     turns = np.rint(corners - corners[:, :1]).astype(np.intp)
     kept = np.ptp(corners - turns, axis=1) < 0.5
-    return Patch(patch.vertices, patch.faces[kept], patch.normals[kept]), angle, turns[kept], kept
+    used, turns, continuous = on.where(kept), turns[kept], (corners - turns)[kept]
+    patch, turned = used.patch, used.carried(turn)
+
+    def phase(facets: Ints, weights: Floats) -> Floats:
+        exact = angle(_points(patch, facets, weights))
+        near = (weights * continuous[facets]).sum(axis=1)
+        return turned(facets, weights) - first - (exact + np.rint(near - exact))
+
+    values = on.at_vertices(turn) - first - at_vertices
+    return LevelSet(patch, values, np.zeros(0), turns, phase), kept
+
+
+def _points(patch: Patch, facets: Ints, weights: Floats) -> Floats:
+    """Return the places (N, 3) of facets (N,) at barycentric weights (N, 3)."""
+    return (weights[:, :, None] * patch.vertices[patch.faces[facets]]).sum(axis=1)
 
 
 STRATEGY = Strategy("spiral", SpiralOptions, spiral_paths)
