@@ -6,9 +6,11 @@ import pytest
 from pentapod.toolpath import BallCutter, Mesh, OffsetOptions, SpiralOptions
 from pentapod.toolpath.strategies.offset import offset_paths
 from pentapod.toolpath.strategies.spiral import spiral_paths
+from pentapod.toolpath.surfaces.part_surface import PartSurface
 
 BALL = BallCutter(3e-3)
 STEP = 4e-3
+UP = np.array([0.0, 0.0, 1.0])
 
 
 def plate(aspect, facets=1200, size=0.04):
@@ -23,8 +25,8 @@ def plate(aspect, facets=1200, size=0.04):
 
 
 def turns(points):
-    """The cosines of a line's turns, points closer than a nanometre left out."""
-    apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9
+    """The cosines of a line's turns, points closer than a micrometre left out."""
+    apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-6
     points = points[np.concatenate([[True], apart])]
     along = np.diff(points, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
@@ -35,7 +37,7 @@ def turns(points):
 def test_offsets_of_a_circle_are_circles_on_thin_facets(aspect):
     turn = np.linspace(0, 2 * np.pi, 200)
     curve = np.stack([0.02 + 3.5e-3 * np.cos(turn), 0.02 + 3.5e-3 * np.sin(turn), 0 * turn], 1)
-    passes = offset_paths(plate(aspect), BALL, OffsetOptions(stepover=STEP, curve=curve)).passes
+    passes = offset_paths(PartSurface(plate(aspect), BALL, UP), OffsetOptions(stepover=STEP, curve=curve)).passes
     radius = np.hypot(*(passes.points[:, :2] - 0.02).T)
     for k, level in enumerate(passes.levels):
         if level <= 6:  # further ones are fill lines
@@ -46,7 +48,7 @@ def test_offsets_of_a_circle_are_circles_on_thin_facets(aspect):
 
 @pytest.mark.parametrize("aspect", [1, 30])
 def test_offsets_of_the_border_are_squares_on_thin_facets(aspect):
-    passes = offset_paths(plate(aspect), BALL, OffsetOptions(stepover=STEP)).passes
+    passes = offset_paths(PartSurface(plate(aspect), BALL, UP), OffsetOptions(stepover=STEP)).passes
     for k, level in enumerate(passes.levels):
         if level < 5:
             points = passes.points[passes.rows(k), :2]
@@ -58,6 +60,6 @@ def test_offsets_of_the_border_are_squares_on_thin_facets(aspect):
 
 def test_a_spiral_on_thin_facets_has_no_reversal():
     for form in ("offset", "planar"):
-        passes = spiral_paths(plate(30), BALL, SpiralOptions(stepover=STEP, form=form)).passes
+        passes = spiral_paths(PartSurface(plate(30), BALL, UP), SpiralOptions(stepover=STEP, form=form)).passes
         longest = int(passes.lengths.argmax())
         assert (turns(passes.points[passes.rows(longest)]) > np.cos(np.radians(120))).all()

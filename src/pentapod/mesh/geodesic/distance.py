@@ -34,7 +34,7 @@ class GeodesicOptions:
     the facets at a vertex exceed a full turn, from which on shortest ways may turn there.
     """
 
-    slack: float = 1e-3
+    slack: float = 3e-4
     turn: float = 5e-3
     excess: float = 1e-6
 

@@ -64,7 +64,7 @@ def _cast(low: float, high: float, x: float, y: float, cx: float, cy: float, sid
     for k in range(2):
         at = high if k else low
         share = cx * y - cy * (at - x)
-        out[k] = min(side * at * y / share, side) if share > 0.0 else (side if at > 0.0 else 0.0)
+        out[k] = min(max(side * at * y / share, 0.0), side) if share > 0.0 else (side if at > 0.0 else 0.0)
 
 
 @kernel
@@ -135,7 +135,7 @@ def _widened(fronts: Fronts, row: int, beside: int, high: bool, mesh: Layout, g:
         other[0], other[1] = windows[beside, 2] if along else length - windows[beside, 2], windows[beside, 3]
     if other[1] <= 0.0:
         return place
-    return min(max(_shared(place, other, own, cx, cy, length), 0.0), length)
+    return _shared(place, other, own, cx, cy, length)
 
 
 @kernel

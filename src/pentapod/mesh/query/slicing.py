@@ -115,7 +115,7 @@ class LevelSet:
         _, first, second = (a[edge] for a in self._edge_sides)
         count = np.zeros(len(edge)) if self.turns is None else self.turns.ravel()[first]
         low, high = np.zeros(len(edge)), np.ones(len(edge))
-        at_low, at_high = ends[0].copy(), ends[1].copy()
+        at_low, at_high, rising = ends[0].copy(), ends[1].copy(), ends[1] >= 0.0
         enough, going = ON_LEVEL * np.abs(at_high - at_low), np.arange(len(edge))
         inside = self.inside or (lambda _, weights: weights[:, 0])
         for _ in range(ROUNDS):
@@ -123,7 +123,7 @@ class LevelSet:
             rows = np.arange(len(going))
             weights[rows, first[going] % 3], weights[rows, second[going] % 3] = 1.0 - t[going], t[going]
             at = inside(first[going] // 3, weights) - count[going] - level[going]
-            upper = (at > 0.0) == (at_high[going] > 0.0)
+            upper = (at >= 0.0) == rising[going]
             up, down = going[upper], going[~upper]
             high[up], at_high[up], at_low[up] = t[up], at[upper], 0.5 * at_low[up]
             low[down], at_low[down], at_high[down] = t[down], at[~upper], 0.5 * at_high[down]

@@ -104,8 +104,10 @@ def _one_side(lines: Passes, reach: float) -> Passes:
         tip = int(np.linalg.norm(points - points[0], axis=1).argmax())
         sides = [(points[: tip + 1], normals[: tip + 1]), (points[tip:], normals[tip:])]
         sides.sort(key=lambda side: float(np.linalg.norm(np.diff(side[0], axis=0), axis=1).sum()))
-        if 0 < tip < len(points) - 1 and KDTree(sides[0][0]).query(sides[1][0])[0].max() <= reach:
-            points, normals = sides[0]
+        for kept, left in ((0, 1), (1, 0)) if 0 < tip < len(points) - 1 else ():
+            if KDTree(sides[kept][0]).query(sides[left][0])[0].max() <= reach:
+                points, normals = sides[kept]
+                break
         found.append((points, normals))
     return Passes.of(found, lines.levels)
 
