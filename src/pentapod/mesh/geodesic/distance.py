@@ -178,11 +178,11 @@ def _layout(patch: Patch, lengths: Floats, options: GeodesicOptions) -> Layout:
 
 def _no_fronts(vertices: int, edges: int) -> Fronts:
     """Return an empty set of windows for a mesh with that many vertices and edges."""
-    from pentapod.mesh.geodesic.window_kernels import Fronts  # noqa: PLC0415  numba is heavy
+    from pentapod.mesh.geodesic.window_kernels import COLUMNS, Fronts  # noqa: PLC0415  numba is heavy
 
     rows = 4 * edges + 1024
     return Fronts(
-        np.empty((rows, 5)), np.empty((rows, 3), dtype=np.intp),
+        np.empty((rows, COLUMNS)), np.empty((rows, 3), dtype=np.intp),
         np.full(edges, -1, dtype=np.intp), np.zeros(edges, dtype=np.intp), np.array([1, -1], dtype=np.intp),
         np.full(edges, np.inf), np.full(vertices, np.inf), np.zeros(vertices, dtype=np.bool_),
         np.empty(4), np.empty(2), np.empty(2), np.empty((1024, 2)), np.empty(1024, dtype=np.intp), np.empty(3),

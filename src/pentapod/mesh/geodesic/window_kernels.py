@@ -23,6 +23,8 @@ TIE = 1e-7
 NARROW = 1e-9
 """Windows that are narrower than this many steps are left out."""
 NEXT, FACET, DONE = 0, 1, 2
+COLUMNS = 5
+"""Numbers of a window: b0, b1, x, y, start."""
 NEW = 0
 """The row of the window that is being inserted."""
 
@@ -58,7 +60,7 @@ def roomy(fronts: Fronts, rows: int) -> Fronts:
     if fronts.state[0] + rows <= len(fronts.windows) and 3 * rows <= len(fronts.owners):
         return fronts
     size = 2 * len(fronts.windows) + 4 * rows
-    windows, links = np.empty((size, 5)), np.empty((size, 3), dtype=np.intp)
+    windows, links = np.empty((size, COLUMNS)), np.empty((size, 3), dtype=np.intp)
     windows[: fronts.state[0]] = fronts.windows[: fronts.state[0]]
     links[: fronts.state[0]] = fronts.links[: fronts.state[0]]
     return Fronts(
@@ -222,7 +224,7 @@ def insert(fronts: Fronts, edge: int, facet: int) -> bool:
         row = owner
         if owner in (NEW, used):
             row = _node(links, state)
-            for j in range(2, 5):
+            for j in range(2, COLUMNS):
                 windows[row, j] = windows[owner, j]
             links[row, FACET] = facet if owner == NEW else links[owner, FACET]
             links[row, DONE] = 0 if owner == NEW else links[owner, DONE]
@@ -266,7 +268,7 @@ def _joined(windows: Floats, a: int, b: int, slack: float, turn: float) -> bool:
     middle = 0.5 * (windows[other, 0] + windows[other, 1])
     same = abs(reach(windows, wide, middle) - reach(windows, other, middle)) < TIE
     if same and abs(reach(windows, wide, end) - reach(windows, other, end)) < TIE:
-        for j in range(2, 5):
+        for j in range(2, COLUMNS):
             windows[a, j] = windows[wide, j]
         return True
     start, width = windows[wide, 4], high - low
