@@ -118,6 +118,8 @@ BY_HAND = [
     pentapod.WaterlineOptions(stepover=3e-3),
     pentapod.OffsetOptions(stepover=3e-3),
     pentapod.SpiralOptions(stepover=3e-3),
+    pentapod.PencilOptions(),
+    pentapod.RotaryAxes("C", "B"),
     pentapod.EdgeOptions(),
     pentapod.CurveOptions(lines=CURVES),
     pentapod.DrawingOptions(file=Path(__file__).parents[1] / "toolpaths" / "flower.svg"),

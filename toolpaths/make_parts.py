@@ -68,6 +68,11 @@ def relief(x: Floats, y: Floats) -> Floats:
     return 1.2 * np.cos(2.0 * np.pi * np.sqrt(r2 + 9.0) / 24.0) * np.exp(-r2 / 50.0**2) - r2 / 900.0
 
 
+def grooves(x: Floats, y: Floats) -> Floats:
+    """Two valleys that cross, with flanks of 25°: a ball touches both flanks along their bottoms."""
+    return np.tan(np.radians(25.0)) * np.minimum(np.abs(x), np.abs(y))
+
+
 def oversize(x: Floats, y: Floats) -> Floats:
     """Long waves over 600 mm: on purpose too large for the machine."""
     return 20.0 * np.cos(2.0 * np.pi * x / 400.0) * np.cos(2.0 * np.pi * y / 400.0)
@@ -99,6 +104,7 @@ PARTS: dict[str, tuple[Height, tuple[Floats, Floats, Ints]]] = {
     "wavy": (wavy, with_hole(*square_grid(150.0, 120.0, 150))),
     "relief": (relief, square_grid(100.0, 100.0, 140)),
     "rail": (rail, square_grid(800.0, 60.0, 320)),
+    "grooves": (grooves, square_grid(80.0, 80.0, 40)),
     "oversize": (oversize, square_grid(600.0, 600.0, 100)),
 }
 

@@ -50,8 +50,8 @@ def test_every_part_is_rastered_on_its_surface(parts, name, direction):
     mesh = load_mesh(parts / name, "mm", scale=0.1 / max(mesh.diagnosis.extents))
     options = RasterOptions(stepover=4e-3, direction=direction)
     toolpath, report = toolpath_with_report(mesh, BallCutter(3e-3), options)
-    cuts = np.concatenate([s.tips for s in toolpath.segments if s.kind is SegmentKind.CUT])
-    assert surfaces.surface_distance(mesh, cuts).max() < 1e-9
+    centres = np.concatenate([s.tips + 3e-3 * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT])
+    np.testing.assert_allclose(surfaces.surface_distance(mesh, centres), 3e-3, atol=1e-8)
     assert report.cut_length > 0
 
 

@@ -41,8 +41,9 @@ def block(scale=1.0):
 def block_job(make_job):
     """A job on that block, at its own size or scaled."""
 
-    def make(scale=1.0, stepover=4, diameter=6):
-        changes = (STEPOVER, f"stepover_mm = {stepover}"), ("diameter_mm = 10", f"diameter_mm = {diameter}")
+    def make(scale=1.0, stepover=4, diameter=6, cutter='type = "ball"'):
+        changes = [(STEPOVER, f"stepover_mm = {stepover}"), ("diameter_mm = 10", f"diameter_mm = {diameter}")]
+        changes += [('type = "ball"', cutter)]
         return Job.load(make_job(BY_DEFAULT, *changes, mesh=block(scale)))
 
     return make
@@ -112,7 +113,7 @@ def test_the_block_is_sound_and_its_region_is_what_faces_up_and_walls(block_job)
 @pytest.mark.slow
 def test_a_block_whose_motions_were_dropped_does_not_pass(block_job, tmp_path):
     """Its motions that gouge are dropped: the floor keeps a strip along the walls that the ball could have cleared."""
-    job = block_job(0.4, stepover=2, diameter=3)
+    job = block_job(0.4, stepover=2, diameter=3, cutter='type = "bull"\ncorner_mm = 1')
     _, reports = job_toolpath(job, job_mesh(job))
     assert "dropped" in str(reports)
     outcome = run(job, tmp_path / "out")

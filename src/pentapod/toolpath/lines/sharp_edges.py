@@ -30,7 +30,7 @@ class CreaseOptions:
     corner: float = float(np.radians(60.0))
     touch: float = 0.05
     gap: float = 1.04
-    shortest: float = 0.5
+    shortest: float = 1.0
 
 
 def crease_lines(patch: Patch, sharpest: float | None = None, options: CreaseOptions = CreaseOptions()) -> Passes:

@@ -27,14 +27,14 @@ class PencilOptions(PathOptions):
 def pencil_paths(surface: Surface, options: PencilOptions) -> ContactPaths:
     """Return the lines along which a ball touches the part on two sides.
 
-    Fillets with a radius above the ball's are no corners. Raises ToolpathError if there is no corner, or no ball.
+    Fillets with a radius above the ball's are no corners, and corners shorter than it are left out. Raises ToolpathError if there is no corner, or no ball.
     """
     if not surface.slides:
         raise ToolpathError(
             "only a ball follows concave corners", key="strategy", value="pencil", remedy="use a ball cutter"
         )
     lines = crease_lines(region_patch(surface, options), options.sharpest)
-    lines = lines.where(lines.lengths >= options.shortest)
+    lines = lines.where(lines.lengths >= max(options.shortest, surface.radius))
     if not len(lines):
         raise ToolpathError(
             "the region has no concave corner for this ball", key="sharpest", value=options.sharpest,

@@ -8,7 +8,7 @@ part. A ball is clear at a centre whatever its axis, so nothing of this depends 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -99,7 +99,7 @@ class DriveSurface:
                 for axis in range(3):
                     contacts = self.contacts(patch.vertices)
                     patch, _ = patch.above(side * (contacts[:, axis] - bound[axis]), 0.0)
-        patch = patch.where_normals(lambda n: region.faces(n, 0.5 * np.pi))
+        patch = patch.where_normals(partial(region.faces, default=0.5 * np.pi))
         return patch if self.part.topology.watertight else patch.above(-self._beyond_border(patch), 0.0)[0]
 
     def steps(self, patch: Patch, across: Floats, options: CoverOptions) -> Floats:
