@@ -27,13 +27,14 @@ class GapOptions:
     facets_per_step: facet edges in a stepover, for distances that are good to a few percent. negligible: share of the
     area that gaps without lines of their own may have in total. slack: a gap counts from this many half steps on;
     scallops are 1.25 times as high there. spacing: of points that stand for lines which thin facets cut into short
-    pieces, in stepovers.
+    pieces, in stepovers. smoothing: rounds in which the slowness is averaged with that of neighbouring vertices.
     """
 
     facets_per_step: float = 3.5
     negligible: float = 5e-4
     slack: float = 1.118
     spacing: float = 0.05
+    smoothing: int = 24
 
     def longest_edge(self, steps: Floats) -> float:
         """Return how long facet edges may be, metres, for stepovers (F,)."""
@@ -44,14 +45,23 @@ FRONTS = GapOptions(facets_per_step=5.0, negligible=2e-4, slack=1.04)
 """For lines that are themselves at a geodesic distance: they turn sharp corners, which finer facets keep sharp."""
 
 
-def slowness_of(patch: Patch, steps: Floats) -> Floats | float:
-    """Return steps per metre at vertices (V,), from the stepover (F,) on facets; a number if it is the same on all."""
+def slowness_of(patch: Patch, steps: Floats, options: GapOptions = FRONTS) -> Floats | float:
+    """Return steps per metre at vertices (V,), from the stepover (F,) on facets; a number if it is the same on all.
+
+    Curvatures of facets are noisy, and lines would waver with them: they are averaged over about half a stepover.
+    """
     if steps.min() == steps.max():
         return 1.0 / float(steps[0])
     total, area = np.zeros((2, len(patch.vertices)))
     np.add.at(total, patch.faces.ravel(), np.repeat(patch.areas / steps, 3))
     np.add.at(area, patch.faces.ravel(), np.repeat(patch.areas, 3))
-    return np.where(area > 0.0, total / np.where(area > 0.0, area, 1.0), 1.0 / float(steps.max()))
+    slowness = np.where(area > 0.0, total / np.where(area > 0.0, area, 1.0), 1.0 / float(steps.max()))
+    a, b = patch.topology.edges.T
+    beside = np.bincount(np.concatenate([a, b]), minlength=len(slowness))
+    for _ in range(options.smoothing):
+        around = np.bincount(a, slowness[b], len(slowness)) + np.bincount(b, slowness[a], len(slowness))
+        slowness = np.where(beside > 0, 0.5 * (slowness + around / np.maximum(beside, 1)), slowness)
+    return slowness
 
 
 def lines_as_sources(level_set: LevelSet, steps: Floats, options: GapOptions = FRONTS) -> Sources:
