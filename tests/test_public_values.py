@@ -45,6 +45,7 @@ from pentapod import (
 from pentapod.base import InputError, Value
 from pentapod.cli.commands.new import dome_stl
 from pentapod.timing import explain
+from pentapod.toolpath.formats import RotaryAxis
 from pentapod.verify import Place, verify
 from usual_job import job_text
 
@@ -119,7 +120,7 @@ BY_HAND = [
     pentapod.OffsetOptions(stepover=3e-3),
     pentapod.SpiralOptions(stepover=3e-3),
     pentapod.PencilOptions(),
-    pentapod.RotaryAxes("C", "B"),
+    pentapod.RotaryAxes((RotaryAxis("C"),)),
     pentapod.EdgeOptions(),
     pentapod.CurveOptions(lines=CURVES),
     pentapod.DrawingOptions(file=Path(__file__).parents[1] / "toolpaths" / "flower.svg"),
@@ -161,7 +162,7 @@ def test_repr_is_short_and_says_something(values):
 
 def test_repr_of_the_stages(reached):
     told = {kind: repr(reached.find(kind)) for kind in (Toolpath, PlacedPath, LegPath, Trajectory, Program)}
-    assert told[Toolpath].startswith("Toolpath(waypoints=231, cut_length=0.306")
+    assert told[Toolpath].startswith("Toolpath(waypoints=284, cut_length=0.306")
     assert "smallest_margin=0." in told[PlacedPath]
     assert "length=0.39" in told[LegPath]
     assert "duration=7." in told[Trajectory]
@@ -294,7 +295,7 @@ def test_notebooks_show_small_escaped_html_without_colours_of_its_own(reached):
     failed = Certificate("<b>claim</b> & co", False, 2.0, 1.0, "mm", Place(), "measured")
     verdict = Verdict((failed,) * 40, (NotJudged("gouge", 'no "mesh"'),))
     for value, words in (
-        (reached.find(Toolpath), "231 waypoints"),
+        (reached.find(Toolpath), "284 waypoints"),
         (reached.find(Program), "7874".replace("7", "7,", 1)),
         (reached.verdict, "passed"),
         (verdict, "<b>claim</b> & co"),

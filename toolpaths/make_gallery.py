@@ -23,8 +23,8 @@ from pentapod.toolpath import Mesh, PathReport, SegmentKind, Toolpath
 FOLDER = Path(__file__).parent
 DOCS = FOLDER.parent / "docs"
 ORDER = [
-    "dome", "saddle", "wavy", "hatch", "waterline", "offset", "spiral", "polish", "pencil", "deburr", "text", "flower", "outline",
-    "seam", "picture", "laser", "burn",
+    "dome", "saddle", "wavy", "hatch", "waterline", "offset", "spiral", "polish", "pencil", "deburr", "text", "flower",
+    "outline", "seam", "picture", "laser", "burn",
 ]  # fmt: skip
 LIGHT = np.array([-0.4, -0.5, 0.77])
 HEAD = """# Gallery

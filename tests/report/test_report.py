@@ -131,9 +131,10 @@ def test_signals_are_those_of_the_program(make_job, tmp_path):
     # Gaps to the part are margins too, and at the waypoints those of the plan.
     placed = outcome.find(PlacedPath)
     assert placed is not None
-    assert signals.margin_names == placed.margin_names
-    assert signals.margins[0] == pytest.approx(placed.margins[0], abs=1e-4)
-    assert signals.margins[-1] == pytest.approx(placed.margins[-1], abs=1e-4)
+    # A stem that no lean brings near a limit is left out of the plan, not of the report.
+    planned = [signals.margin_names.index(name) for name in placed.margin_names]
+    assert signals.margins[0, planned] == pytest.approx(placed.margins[0], abs=1e-4)
+    assert signals.margins[-1, planned] == pytest.approx(placed.margins[-1], abs=1e-4)
     gaps = [k for k, name in enumerate(signals.margin_names) if "the part" in name]
     assert len(gaps) >= 6
     spindle = by_claim["spindle clear of the part"].value

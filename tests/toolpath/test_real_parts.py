@@ -9,6 +9,7 @@ import toolpath_surfaces as surfaces
 from pentapod.base.errors import InputError
 from pentapod.toolpath import (
     BallCutter,
+    FlatEnd,
     HeightField,
     RasterOptions,
     Region,
@@ -79,7 +80,7 @@ JOBS = {
 
 
 @pytest.mark.parametrize("name", JOBS)
-@pytest.mark.parametrize("tool", [BallCutter(3e-3), StandOff(5e-3)], ids=["ball", "standoff"])
+@pytest.mark.parametrize("tool", [FlatEnd(3e-3), StandOff(5e-3)], ids=["flat", "standoff"])
 def test_parts_of_the_jobs_are_covered(parts, name, tool):
     unit, scale, region = JOBS[name]
     mesh = load_mesh(parts / name, unit, scale=scale)
@@ -88,7 +89,7 @@ def test_parts_of_the_jobs_are_covered(parts, name, tool):
     axes = np.concatenate([s.axes for s in cuts])
     contacts = np.concatenate([s.tips for s in cuts]) + min(tool.tilt_centre, 0.0) * axes
     assert surfaces.surface_distance(mesh, contacts).max() < 1e-9
-    assert np.degrees(np.arccos(axes @ region.direction)).max() <= np.degrees(region.angle) + 1e-6
+    assert np.degrees(np.arccos(axes @ region.direction)).max() <= np.degrees(region.within) + 1e-6
     # Nine hundred and ninety-nine of a thousand points of the region lie within half a stepover of a cut.
     points, normals = surfaces.random_points(mesh, 20_000, region)
     seen = ~HeightField(mesh, region.direction).hides(points, 1e-6)

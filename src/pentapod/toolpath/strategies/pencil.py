@@ -27,7 +27,8 @@ class PencilOptions(PathOptions):
 def pencil_paths(surface: Surface, options: PencilOptions) -> ContactPaths:
     """Return the lines along which a ball touches the part on two sides.
 
-    Fillets with a radius above the ball's are no corners, and corners shorter than it are left out. Raises ToolpathError if there is no corner, or no ball.
+    Fillets with a radius above the ball's are no corners, and corners shorter than it are left out. Raises
+    ToolpathError if there is no corner, or no ball.
     """
     if not surface.slides:
         raise ToolpathError(

@@ -27,7 +27,8 @@ class DriveOptions(Value):
     border: how exactly an open border is known, as a share of the radius; enters: how far beyond it the ball gets where
     it is no hole. longest: of a link on the surface, as a multiple of the straight way; uneven: of its longest step.
     sideways: distance around a point at which the surface above must hide it, above: by which height, both as
-    shares of the radius: walls, and valleys between steep flanks, do not hide themselves.
+    shares of the radius: walls, and valleys between steep flanks, do not hide themselves. evened: how often the
+    stepover for a scallop is averaged with that of neighbouring facets, whose curvature is noisy.
     """
 
     step: float = 0.25
@@ -40,6 +41,7 @@ class DriveOptions(Value):
     uneven: float = 3.0
     sideways: float = 0.01
     above: float = 0.2
+    evened: int = 2
 
 
 @dataclass(frozen=True, eq=False)

@@ -104,7 +104,14 @@ class DriveSurface:
 
     def steps(self, patch: Patch, across: Floats, options: CoverOptions) -> Floats:
         """Return the stepover (F,) on each facet, along the drive surface. Raises ToolpathError as `surface_steps`."""
-        return surface_steps(patch, self.radius, across, options, offset=True)
+        steps = surface_steps(patch, self.radius, across, options, offset=True)
+        if options.stepover is None:
+            corners = patch.faces.ravel()
+            facets = np.maximum(np.bincount(corners, minlength=len(patch.vertices)), 1)
+            for _ in range(self.options.evened):
+                mean = np.bincount(corners, weights=np.repeat(steps, 3), minlength=len(facets)) / facets
+                steps = mean[patch.faces].mean(axis=1)
+        return steps
 
     def waypoints(self, passes: Passes, options: PathOptions) -> Passes:
         """Return contacts and unit normals for lines on the drive surface, their centres put exactly on the offset.
