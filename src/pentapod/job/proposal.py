@@ -10,7 +10,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import MeshError
-from pentapod.base.units import from_si
+from pentapod.base.units import from_si, to_si
 from pentapod.base.values import Value
 from pentapod.geometry.directions import tangent_frame
 from pentapod.machine.machine import Machine
@@ -30,7 +30,8 @@ class ProposalOptions:
     work volume is taken. diameters: of cutters; the largest that is not wider than `cutter` of the part is taken.
     stepover: as a share of the diameter. steep_deg: slope from which surface counts as steep; waterlines where more
     than `steep` of it is. sideways: by how much more of the surface another side must show than the top. backs: share
-    of an open surface that may face the top where it is turned over.
+    of an open surface that may face the top where it is turned over. margin: of a box above and below, as a share of
+    the work volume's height.
     """
 
     usual_mm: tuple[float, float] = (5.0, 2000.0)
@@ -39,6 +40,7 @@ class ProposalOptions:
     stepover: float = 0.5
     feed_mm_min: float = 1500.0
     steep_deg: float = 60.0
+    margin: float = 0.001
     steep: float = 0.7
     sideways: float = 1.2
     backs: float = 0.05
@@ -128,7 +130,7 @@ def _unit(part: Path, work: WorkVolume) -> str:
     """Return the likely unit of a file's numbers."""
     # In metres the numbers are as they are in the file.
     largest = max(load_mesh(part, "m", repair=True).diagnosis.extents)
-    low, high = (1e-3 * end for end in OPTIONS.usual_mm)
+    low, high = to_si(OPTIONS.usual_mm, "mm")
     if low <= largest * UNITS["mm"] <= high:
         return "mm"
     return min(UNITS, key=lambda unit: abs(np.log(largest * UNITS[unit] / work.diameter)))
@@ -160,7 +162,7 @@ def _box(mesh: Mesh, direction: Floats, work: WorkVolume) -> Floats | None:
     # What lies above the middle; the highest of it is machined.
     near = points[(np.abs(points[:, :2] - middle) <= half).all(axis=1)]
     top = near[:, 2].max() if len(near) else high[2]
-    margin = 1e-3 * work.height
+    margin = OPTIONS.margin * work.height
     corners = np.array([[*(middle - half), top - height - margin], [*(middle + half), top + margin]]) @ frame
     return np.sort(corners, axis=0)
 
@@ -175,7 +177,7 @@ def _tool(patch: Patch, direction: Floats) -> dict[str, Any]:
 
 def _toolpath(patch: Patch, direction: Floats) -> dict[str, Any]:
     """Return the strategy for a region: waterlines where it is mostly steep, else a raster along its longer side."""
-    steep = patch.facet_normals @ direction < np.cos(np.radians(OPTIONS.steep_deg))
+    steep = patch.facet_normals @ direction < np.cos(to_si(OPTIONS.steep_deg, "deg"))
     if patch.areas[steep].sum() > OPTIONS.steep * patch.areas.sum():
         return {"strategy": "waterline"}
     width, height = np.ptp(patch.vertices[np.unique(patch.faces)] @ np.stack(tangent_frame(direction)).T, axis=0)
