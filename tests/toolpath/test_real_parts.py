@@ -45,14 +45,14 @@ def test_every_part_is_diagnosed(parts, name):
 
 
 @pytest.mark.parametrize("name", FILES)
-@pytest.mark.parametrize("direction", [0.0, 1.0])
-def test_every_part_is_rastered_on_its_surface(parts, name, direction):
+@pytest.mark.parametrize("tool", [BallCutter(6e-3), FlatEnd(3e-3)], ids=["ball", "flat"])
+def test_every_part_is_rastered_on_its_surface(parts, name, tool):
+    """The ball's centre is a radius from the part; the flat end's contacts are on it."""
     mesh = load_mesh(parts / name, "mm")
     mesh = load_mesh(parts / name, "mm", scale=0.1 / max(mesh.diagnosis.extents))
-    options = RasterOptions(stepover=4e-3, direction=direction)
-    toolpath, report = toolpath_with_report(mesh, BallCutter(3e-3), options)
-    centres = np.concatenate([s.tips + 3e-3 * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT])
-    np.testing.assert_allclose(surfaces.surface_distance(mesh, centres), 3e-3, atol=1e-8)
+    toolpath, report = toolpath_with_report(mesh, tool, RasterOptions(stepover=4e-3, direction=0.7))
+    cuts = [s.tips + tool.tilt_centre * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT]
+    np.testing.assert_allclose(surfaces.surface_distance(mesh, np.concatenate(cuts)), tool.tilt_centre, atol=1e-8)
     assert report.cut_length > 0
 
 
