@@ -61,7 +61,8 @@ def ridges(kind, mesh, toolpath, count):
                 for a, b, n in zip(line, line[1:], steps, strict=False)
             ]
     tree = KDTree(np.concatenate(centres))
-    points, _ = surfaces.random_points(mesh, count, Region(angle=np.radians(42.0)))
+    # Planes are densest at the region's edge, a stepover inside which the ridges are as high as asked.
+    points, _ = surfaces.random_points(mesh, count, Region(angle=np.radians(46.0)))
     if kind == "cylinder":
         points = points[np.abs(points[:, 0]) < 0.036]
     normals = exact_normals(kind, points)
@@ -87,16 +88,13 @@ QUICK = {("torus", RasterOptions), ("cylinder", RasterOptions), ("sphere", Offse
     ],
 )
 def test_scallops_are_as_high_as_asked_for(kind, options):
-    """The highest ridge at most a twentieth above; facets sag by less than a hundredth of that.
-
-    And not much below: the drive surface's curvature is that of facets of a quarter of the radius.
-    """
+    """The highest ridge within a tenth below and a twentieth above; facets sag by less than a hundredth of that."""
     mesh = Mesh.of(*SHAPES[kind]())
     told = options(scallop=SCALLOP, region=UPPER, spacing=1e-3, chordal=2e-6)
     toolpath, _ = toolpath_with_report(mesh, BallCutter(RADIUS), told)
     points = FEW if (kind, options) in QUICK else MANY
     high = np.quantile(ridges(kind, mesh, toolpath, points), 0.999)
-    assert 0.85 * SCALLOP <= high <= 1.05 * SCALLOP
+    assert 0.9 * SCALLOP <= high <= 1.05 * SCALLOP
 
 
 @pytest.mark.parametrize("curvature", [-200.0, -30.0, 0.0, 1e-9, 20.0, 500.0])
