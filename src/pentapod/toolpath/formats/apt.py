@@ -8,24 +8,24 @@ for which APT has no word.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from pentapod.base.errors import nearest
-from pentapod.toolpath.formats.moves import dwell_times, kind_remark, plain, poses, tilt_centre_remark
+from pentapod.toolpath.formats.apt_words import statements_of, words_of
+from pentapod.toolpath.formats.moves import dwell_times, kind_remark, plain, poses, tilt_centre_remark, words_before
 from pentapod.toolpath.formats.reading import StatementReader, number, read_lines, seconds
 from pentapod.toolpath.formats.registry import Defaults, Format, register
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 _MM = {"MM": 1.0, "INCHES": 25.4, "INCH": 25.4}
 _PER_MINUTE = {"MMPM": 1.0, "IPM": 25.4}
-_NAMED = ("PARTNO", "PPRINT", "REMARK", "TITLE", "INSERT")  # a text follows, with or without a slash
-_SILENT = frozenset(
-    (*_NAMED, "MACHIN", "LOADTL", "TOOLNO", "SPINDL", "COOLNT", "STOP", "OPSTOP", "CLDATE", "TLNAME", "END")
-)
-"""Words that do not move the tool."""
+_NAMED = ("PARTNO", "PPRINT", "REMARK", "TITLE")  # a text follows, with or without a slash
+_SILENT = frozenset((*_NAMED, "MACHIN", "TOOLNO", "CLDATE", "TLNAME", "END"))
+_SAYING, _INSERTED = frozenset({"LOADTL", "SPINDL", "COOLNT", "STOP", "OPSTOP"}), "INSERT"
+"""Words that do not move the tool; those about spindle, coolant and tool are kept."""
 
 _REFUSED = {
     "CUTCOM": "cutter compensation shifts the path: export without it",
@@ -36,6 +36,8 @@ _REFUSED = {
     "CYCLE": "drilling cycles are not read: export points",
     "GODLTA": "increments are not read: export absolute points",
 }
+_LONGEST_SHOWN, _MOST = 40, 6
+"""Characters of a statement, and statements, that notes show."""
 _WORDS = ("UNITS", "MULTAX", "FEDRAT", "RAPID", "GOTO", "FROM", "CUTTER", "DELAY", "FINI")
 
 
@@ -46,6 +48,7 @@ class _Reader(StatementReader):
     feed: float | None = None
     rapid: bool = False
     ended: int | None = None
+    unknown: dict[str, int] = field(default_factory=dict[str, int])
 
     def toolpath(self) -> Toolpath:
         line, pending, lines = 0, "", read_lines(self.file)
@@ -63,7 +66,10 @@ class _Reader(StatementReader):
             raise self.wrong("the file ends within a statement", line, pending.split("/")[0].strip())
         if self.ended is None:
             raise self.wrong("FINI is missing: the file was cut off", line, "FINI", expected="FINI as the last word")
-        return self.gathered()
+        told = [f"not kept: {text[:_LONGEST_SHOWN]} (line {at})" for text, at in self.unknown.items()]
+        if len(told) > _MOST:
+            told = [*told[:_MOST], f"not kept: {len(told) - _MOST} more statements"]
+        return self.gathered(tuple(told))
 
     def _statement(self, text: str, line: int) -> None:
         head, _, tail = text.partition("/")
@@ -72,11 +78,23 @@ class _Reader(StatementReader):
             raise self.wrong("a word after FINI", line, word)
         if word in _SILENT or word.startswith(_NAMED):
             return
+        values = [part.strip() for part in tail.split(",")] if tail.strip() else []
+        if word in _SAYING or word.startswith(_INSERTED):
+            self._say(text, word, values, line)
+            return
         if word in _REFUSED:
             raise self.wrong("a word that is not read", line, word, remedy=_REFUSED[word])
         if word not in _WORDS:
             raise self.wrong("an unknown word", line, word[:20], remedy=nearest(word, _WORDS))
-        getattr(self, f"_{word.lower()}")([part.strip() for part in tail.split(",")] if tail.strip() else [], line)
+        getattr(self, f"_{word.lower()}")(values, line)
+
+    def _say(self, text: str, word: str, values: list[str], line: int) -> None:
+        """Keep what a statement says of spindle, coolant and tool."""
+        said = words_of(word, values) if word in _SAYING else (text[len(_INSERTED) :].strip("/ "),)
+        if said is None:
+            self.unknown.setdefault(text, line)
+        for one in said or ():
+            self.moves.add_words(one)
 
     def _units(self, words: list[str], line: int) -> None:
         if len(words) != 1 or words[0].upper() not in _MM:
@@ -161,8 +179,9 @@ def _write(toolpath: Toolpath) -> bytes:
     tips, axes, kinds, feeds = poses(toolpath)
     dwells = dwell_times(toolpath)
     lines = ["PARTNO PENTAPOD", "UNITS/MM", f"$$ {tilt_centre_remark(toolpath.tilt_centre)}", "MULTAX/ON"]
-    kind, feed = SegmentKind.CUT, np.nan
+    kind, feed, said = SegmentKind.CUT, np.nan, words_before(toolpath)
     for k in range(len(tips)):
+        lines += statements_of(said.get(k, ()))
         move = kinds[k - 1] if k else SegmentKind.RAPID
         if move == SegmentKind.RAPID:
             lines.append("RAPID")
@@ -179,7 +198,7 @@ def _write(toolpath: Toolpath) -> bytes:
         lines.append(f"GOTO/{point}")
         if k in dwells:
             lines.append(f"DELAY/{plain(dwells[k], 9)}")
-    return ("\n".join([*lines, "FINI"]) + "\n").encode()
+    return ("\n".join([*lines, *statements_of(toolpath.end_words), "FINI"]) + "\n").encode()
 
 
 register(

@@ -150,6 +150,15 @@ def poses(toolpath: Toolpath) -> tuple[Floats, Floats, list[SegmentKind], Floats
     return toolpath.tips * 1e3, toolpath.axes, kinds, feeds
 
 
+def words_before(toolpath: Toolpath) -> dict[int, tuple[str, ...]]:
+    """Return what is said of spindle, coolant and tool before waypoints, by their index.
+
+    That of the first segment comes before the first waypoint.
+    """
+    starts = toolpath.starts[:-1].tolist()
+    return {at + 1 if at else 0: one.words for at, one in zip(starts, toolpath.segments, strict=True) if one.words}
+
+
 def dwell_times(toolpath: Toolpath) -> dict[int, float]:
     """Return the seconds of dwell at each waypoint where the tool stops, by the waypoint's index."""
     return {int(at): s for at, s in zip(toolpath.starts, toolpath.dwells, strict=True) if s is not None}

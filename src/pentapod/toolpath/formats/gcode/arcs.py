@@ -86,13 +86,11 @@ def arc_between(
     if abs(r0 - r1) > max(OPTIONS.arc_mismatch, OPTIONS.arc_mismatch_share * r0):
         raise ArcError(f"start and end are at different distances from the arc's centre: {r0:.4f} and {r1:.4f} mm")
     begin = math.atan2(s[1] - middle[1], s[0] - middle[0])
-    sweep = math.atan2(e[1] - middle[1], e[0] - middle[0]) - begin
-    sweep %= 2.0 * math.pi
-    if math.dist(s, e) <= _SAME:
-        sweep = 0.0 if clockwise else 2.0 * math.pi
-    if clockwise:
-        sweep -= 2.0 * math.pi
-    sweep += math.copysign(2.0 * math.pi * turns, sweep)
+    sense = -1.0 if clockwise else 1.0
+    turn = sense * (math.atan2(e[1] - middle[1], e[0] - middle[0]) - begin) % (2.0 * math.pi)
+    if turn == 0.0 or math.dist(s, e) <= _SAME:
+        turn = 2.0 * math.pi
+    sweep = sense * (turn + 2.0 * math.pi * turns)
     return Arc(axes, middle, begin, sweep, (r0, r1), (start[c], end[c]), {k: end[k] for k in axes})
 
 

@@ -29,9 +29,10 @@ class Coordinates:
 
     chain: the rotary axes of the machine; named: letters of those in the file; described: the user lists them. tcp:
     tool centre point programming is on. place: coordinates by letter, the linear ones only where they are known. frame:
-    a turned frame. fixed: the tool axis where it is not given by rotary words (G53.1, vectors). lost: rotary axes whose
-    angle is not known, as the controller found it (G53.1). shift: of G52 and G92. system: G54 and the like; offsets:
-    where the file gives them. first_system: the one in which the tool moved first, and its offset then.
+    a turned frame; swivelled: the controller knows how the machine stands in it (G68.2). fixed: the tool axis where it
+    is not given by rotary words (G53.1, vectors). lost: rotary axes whose angle is not known, as the controller found
+    it (G53.1). shift: of G52 and G92. system: G54 and the like; offsets: where the file gives them. first_system: the
+    one in which the tool moved first, and its offset then.
     """
 
     chain: RotaryAxes
@@ -40,6 +41,7 @@ class Coordinates:
     tcp: bool = False
     place: dict[str, float] = field(default_factory=lambda: dict.fromkeys(LETTERS, 0.0))
     frame: Frame | None = None
+    swivelled: bool = False
     fixed: Vector | None = None
     lost: frozenset[str] = frozenset()
     shift: Vector = _ORIGIN
@@ -55,7 +57,10 @@ class Coordinates:
     @property
     def tilted(self) -> bool:
         """Whether the tip depends on the machine: a rotary axis is turned, or the tool was turned by G53.1."""
-        return self.fixed is not None or any(self.place[letter] % 360.0 for letter in LETTERS)
+        return self._tilted_at(self.place)
+
+    def _tilted_at(self, place: Mapping[str, float]) -> bool:
+        return self.fixed is not None or any(place[letter] % 360.0 for letter in LETTERS)
 
     def forget(self, letters: Sequence[str] = LINEAR) -> None:
         """Take the place along some axes as unknown."""
@@ -71,7 +76,7 @@ class Coordinates:
         point: Vector | None = xyz(place)
         if self.frame is not None:
             point = self.frame.outside(point)
-        elif not self.tcp and self.tilted:
+        if not (self.tcp or self.swivelled) and self._tilted_at(place):
             point = None if self.fixed is not None else self.chain.tip(point, place)
         if point is None:
             return None
@@ -79,18 +84,19 @@ class Coordinates:
 
     def why_unknown(self) -> tuple[str, str]:
         """Return why there is no pose, and the remedy."""
-        if self.unknown:
-            return (
-                f"{self.unknown} is not known here",
-                "give all axes before the first cut and after each home position",
-            )
         if self._base() is None and self.first_system is not None:
             what = f"moves in {self.system} after moves in {self.first_system[0]}: the file does not say how far apart"
             return what, "export a file for each of them, or write their offsets into the file (G10 L2)"
+        if self.unknown:
+            return (
+                f"{self.unknown} {'are' if ',' in self.unknown else 'is'} not known here",
+                "give all axes before the first cut and after each home position",
+            )
         if self.lost and self.fixed is None:
             return f"the angle of {', '.join(sorted(self.lost))} is not known after G53.1", "give all rotary axes"
         if self.fixed is not None:
-            return "the tool was turned by G53.1, and its frame is off", "cut in the frame, or with G43.4"
+            what = "the tool is turned, and neither a turned frame nor tool centre point programming is on"
+            return what, "cut in the frame of G53.1, or with G43.4 or TRAORI"
         keys = "rotary_axes, with rotary_centre_mm (table) or pivot_mm (head),"
         if self.described:
             moved = [axis for axis in self.chain.axes if self.place[axis.letter] % 360.0]
@@ -118,16 +124,24 @@ class Coordinates:
         a, b, c = (s + new - old for s, new, old in zip(self.shift, offset, first, strict=True))
         return a, b, c
 
-    def set_frame(self, frame: Frame | None, *, oriented: bool = False) -> None:
+    def set_tcp(self, *, on: bool) -> bool:
+        """Switch tool centre point programming; return whether that changes what the coordinates mean."""
+        changed = on != self.tcp and self.tilted and not self.swivelled
+        self.tcp = on
+        if changed:
+            self.forget()
+        return changed
+
+    def set_frame(self, frame: Frame | None, *, swivelled: bool, oriented: bool = False) -> None:
         """Turn the frame, or turn it off; the tool stays where it is. oriented: the tool turns along."""
         before = self.pose(self.place)
-        self.frame = frame
+        self.frame, self.swivelled = frame, swivelled
         if oriented and frame is not None:
             self.fixed = frame.axis if math.dist(frame.axis, (0.0, 0.0, 1.0)) > 1e-12 else None
             self.lost = self.named if self.fixed is not None else frozenset()
             self.place.update(dict.fromkeys(LETTERS, 0.0))
         base = self._base()
-        upright = not oriented and (self.tcp or frame is not None or not self.tilted)
+        upright = not oriented and (self.tcp or swivelled or not self.tilted)
         if before is None or base is None or not upright:
             self.forget()
             return

@@ -29,7 +29,7 @@ class Drilling:
     """A drilling cycle at one hole. Heights along the drilling axis, mm.
 
     code: of the cycle. top: where the feed begins (R). bottom: of the hole. out: where it ends. peck: depth of a peck,
-    0 for none. dwell: seconds at the bottom.
+    0 for none. dwell: seconds at the bottom, None for no stop.
     """
 
     code: float
@@ -37,7 +37,7 @@ class Drilling:
     bottom: float
     out: float
     peck: float = 0.0
-    dwell: float = 0.0
+    dwell: float | None = None
 
     @property
     def pecks(self) -> float:
@@ -58,7 +58,7 @@ class Drilling:
                 yield Step(depth + down * back)
                 depth -= down * self.peck
         yield Step(self.bottom, rapid=False)
-        if self.code in _DWELLING:
+        if self.dwell is not None:
             yield Step(None, dwell=self.dwell)
         if self.code in _SLOW_OUT:
             yield Step(self.top, rapid=False)
@@ -113,7 +113,8 @@ class Drill:
             raise self.tracer.wrong("a cycle without its depth or its R", line, word, f"{word} X… Y… {normal}… R…")
         top, bottom = self.held["R"], self.held[normal]
         out = max(self.start, top) if modes.to_start else top
-        one = Drilling(code, top, bottom, out, abs(self.held.get("Q", 0.0)), self.held.get("P", 0.0))
+        dwell = self.held.get("P", 0.0) if code in _DWELLING else None
+        one = Drilling(code, top, bottom, out, abs(self.held.get("Q", 0.0)), dwell)
         count = int(next((words[k].value for k in ("K", "L") if k in words), 1.0))
         if count * one.pecks > OPTIONS.chords:
             raise self.tracer.wrong("a cycle of too many holes or pecks", line, word)
@@ -148,8 +149,10 @@ class Drill:
         code = _CALLED[name][0]
         if code == _PECKING and not given.get("VARI"):
             code = _CHIP_BREAKING
-        out, dwell = max(length.get("RTP", top), top), given.get("DTB", 0.0)
-        one = Drilling(code, top, bottom, out, peck, max(dwell, 0.0))
+        dwell = given.get("DTB")
+        if dwell is not None and dwell < 0.0:
+            raise self.tracer.wrong("a dwell in turns of the spindle", line, name, "export it in seconds")
+        one = Drilling(code, top, bottom, max(length.get("RTP", top), top), peck, dwell)
         if one.pecks > OPTIONS.chords:
             raise self.tracer.wrong("a cycle of too many holes or pecks", line, name)
         if modal:
@@ -169,4 +172,4 @@ class Drill:
             elif step.rapid:
                 self.tracer.rapid({normal: step.height}, line, word)
             else:
-                self.tracer.feed({normal: step.height}, line, word, own_feed=True)
+                self.tracer.feed({normal: step.height}, line, word)

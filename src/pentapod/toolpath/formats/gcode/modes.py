@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pentapod.toolpath.formats.gcode.language.vocabulary import Dialect
 
 _UNITS = {20.0: 25.4, 21.0: 1.0, 70.0: 25.4, 71.0: 1.0, 700.0: 25.4, 710.0: 1.0}
+_INCH_LENGTHS = 70.0
 _PATH = frozenset({60.0, 61.0, 61.1, 64.0, 64.1, 641.0, 642.0, 643.0, 644.0, 645.0})
-_WINDOWS = frozenset({601.0, 602.0, 603.0, 450.0, 451.0, 500.0})
+_WINDOWS = frozenset({601.0, 602.0, 603.0, 450.0, 451.0})
 CYCLES = frozenset({73.0, 81.0, 82.0, 83.0, 85.0, 86.0, 89.0})
 _PER_MINUTE, _INVERSE, _PER_TURN = 94.0, 93.0, 95.0
 
@@ -17,12 +18,13 @@ _PER_MINUTE, _INVERSE, _PER_TURN = 94.0, 93.0, 95.0
 class Modes:
     """What holds until it is changed. scale: millimetres in the unit; feed: as in the file; speed: of the spindle.
 
-    cycle: the drilling cycle that is on; to_start: it goes back to where it began (G98), not to R (G99). stopping:
-    exact stops at all points; from_line: the line that switched them on.
+    lengths_only: the scale is not that of the feed (G70 of Sinumerik). cycle: the drilling cycle that is on; to_start:
+    it goes back to where it began (G98), not to R (G99). stopping: exact stops at all points.
     """
 
     dialect: Dialect
     scale: float | None = None
+    lengths_only: bool = False
     absolute: bool = True
     absolute_centres: bool = False
     motion: float | None = None
@@ -55,7 +57,7 @@ class Modes:
         elif code in (17.0, 18.0, 19.0):
             self.plane = code
         elif code in _UNITS and (self.dialect.equals or code < 100.0):
-            self.scale = _UNITS[code]
+            self.scale, self.lengths_only = _UNITS[code], self.dialect.equals and code == _INCH_LENGTHS
         elif code in (_INVERSE, _PER_MINUTE, _PER_TURN):
             self.feed = self.feed if code == self.feed_mode else None
             self.feed_mode = code

@@ -39,7 +39,11 @@ def _arc(tracer: Tracer, target: Mapping[str, float], words: Mapping[str, Word],
     scale = modes.scale or 1.0
     radius = next((words[k].value * scale for k in ("CR", "R") if k in words), None)
     centre: dict[str, float] | None = None
-    in_plane = PLANES[modes.plane][:2]
+    in_plane, across = PLANES[modes.plane][:2], PLANES[modes.plane][2]
+    strange = [CENTRE[across], *("LQ" if modes.dialect.fanuc else "")]
+    if (letter := next((k for k in strange if k in words and words[k].value), None)) is not None:
+        remedy = "check the plane (G17, G18, G19); export a spiral or a helix of several turns as arcs of one turn"
+        raise _failed(tracer, target, f"{letter} in an arc of the plane G{modes.plane:g}", line, motion, remedy)
     if any(CENTRE[letter] in words for letter in in_plane):
         centre = {}
         for letter in in_plane:

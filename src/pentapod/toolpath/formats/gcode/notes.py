@@ -15,6 +15,7 @@ _SENTENCES = {
     "positioning": "positioning moves to places that only the machine knows are left out, the tool passes over the part"
     " instead",
     "tool change": "at a tool change the tool passes over the part",
+    "stop": "the stops M0 and M1 are kept as words, and nothing stops there",
     "skip": "blocks that may be skipped are read",
     "other tool": "moves of other tools are left out",
 }

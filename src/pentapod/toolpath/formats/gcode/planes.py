@@ -28,8 +28,10 @@ def feature_plane(tracer: Tracer, words: Mapping[str, Word], line: int) -> None:
     order = str(int(_value(words, "Q", 123.0 if form else 313.0)))
     if order not in (_FIXED if form else _EULER):
         raise tracer.wrong("an unknown order of rotations", line, f"Q{order}", "give Q313, or leave it out")
-    angles = [_value(words, letter) for letter in "IJK"]
-    frame = Frame(_point(tracer, words), rotation(angles, order, fixed=form == 1))
+    # With P1 I, J and K are about x, y and z, in whatever order.
+    letters = ["IJK"[int(axis) - 1] for axis in order] if form else "IJK"
+    angles = [_value(words, letter) for letter in letters]
+    frame = Frame(_point(tracer, words, line), rotation(angles, order, fixed=form == 1))
     tracer.set_frames(frame, None)
 
 
@@ -45,8 +47,8 @@ def rotate(tracer: Tracer, words: Mapping[str, Word], line: int) -> None:
     if "R" not in words:
         raise tracer.wrong("a rotation without its angle", line, "G68", "G68 X… Y… R…")
     a, b, normal = PLANES[tracer.modes.plane]
-    place, scale = tracer.at.place, tracer.modes.scale or 1.0
-    known = {k: words[k].value * scale if k in words else place.get(k) for k in (a, b)}
+    place = tracer.at.place
+    known = {k: tracer.length(words, k, line) if k in words else place.get(k) for k in (a, b)}
     if None in known.values():
         raise tracer.wrong("a rotation about an unknown point", line, "G68", "G68 X… Y… R…")
     centre: Vector = tuple(known.get(k) or 0.0 for k in LINEAR)  # type: ignore[assignment]
@@ -56,14 +58,14 @@ def rotate(tracer: Tracer, words: Mapping[str, Word], line: int) -> None:
     tracer.set_frames(tracer.swivel, Frame(origin, columns))
 
 
-def programmed_frame(tracer: Tracer, name: str, words: Mapping[str, Word]) -> None:
+def programmed_frame(tracer: Tracer, name: str, words: Mapping[str, Word], line: int) -> None:
     """TRANS and ROT of Sinumerik, and ATRANS and AROT, which are added to what was there."""
     if "RPL" in words:
         frame = Frame((0.0, 0.0, 0.0), rotation([words["RPL"].value], _ABOUT[PLANES[tracer.modes.plane][2]]))
     elif name.endswith("ROT"):
         frame = Frame((0.0, 0.0, 0.0), rotation([_value(words, k) for k in "ZYX"], "321"))
     else:
-        frame = Frame(_point(tracer, words))
+        frame = Frame(_point(tracer, words, line))
     before = tracer.programmed
     added = name.startswith("A") and before is not None
     nothing = frame == Frame((0.0, 0.0, 0.0))
@@ -101,9 +103,8 @@ def cycle800(tracer: Tracer, arguments: Sequence[str], line: int) -> None:
         tracer.set_frames(None, None)
 
 
-def _point(tracer: Tracer, words: Mapping[str, Word]) -> Vector:
-    scale = tracer.modes.scale or 1.0
-    return _value(words, "X") * scale, _value(words, "Y") * scale, _value(words, "Z") * scale
+def _point(tracer: Tracer, words: Mapping[str, Word], line: int) -> Vector:
+    return tracer.length(words, "X", line), tracer.length(words, "Y", line), tracer.length(words, "Z", line)
 
 
 def _value(words: Mapping[str, Word], letter: str, default: float = 0.0) -> float:

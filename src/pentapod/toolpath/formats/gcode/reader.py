@@ -17,8 +17,10 @@ from pentapod.toolpath.formats.gcode.language.sinumerik import SinumerikLines
 from pentapod.toolpath.formats.gcode.language.vocabulary import (
     IDLE_G,
     IDLE_NAMES,
+    NO_PLACES_G,
     REFUSED_G,
     REFUSED_NAMES,
+    SPEED_G,
     Dialect,
 )
 from pentapod.toolpath.formats.gcode.lifts import lift
@@ -35,19 +37,18 @@ _Words = Mapping[str, Word]
 _ONCE: dict[float, Callable[[Tracer, _Words, int], None]] = {
     10.0: places.set_data, 28.0: places.go_home, 30.0: places.go_home, 52.0: places.local_shift,
     53.0: places.machine_place, 153.0: places.machine_place, 92.0: places.set_coordinates,
-    92.1: places.no_coordinates, 92.2: places.no_coordinates, 92.3: places.no_coordinates,
+    92.1: places.no_coordinates, 92.2: places.no_coordinates,
     68.2: planes.feature_plane, 68.0: planes.rotate,
 }  # fmt: skip
 """Codes that take the axis words of their block."""
-_HOME_NAMES = frozenset({"SUPA", "G153"})
 _LARGEST = 1e12
 """Largest number of a word."""
+_CYCLES_OF_OTHERS, _CYCLE_WORDS = frozenset({70.0, 71.0}), frozenset("IJKLPQRU")
+"""Inch and millimetre of some controllers, with these words cycles of others."""
 _ORIENT, _ORIENT_AND_MOVE = frozenset({53.1, 53.3, 53.6}), 53.3
 _TCP, _VECTOR_TCP = frozenset({43.4, 43.5, 169.0, 234.0}), 43.5
 _DWELL, _STOP, _SMOOTHING = 4.0, 9.0, 187.0
 _TCP_OFF = frozenset({43.0, 43.1, 43.2, 49.0, 168.0})
-_MORE_SYSTEMS = frozenset({54.1, 154.0})
-_SPLINE_OR_SPEED = 5.0
 _IGNORED = frozenset("NOHDLPQRKIJS")
 _FRAMES = ("TRANS", "ATRANS", "ROT", "AROT")
 _TCP_ON, _TCP_ENDS = ("TRAORI",), ("TRAFOOF",)
@@ -156,7 +157,7 @@ class GCodeReader(StatementReader):
             planes.orient(self.tracer, line)
         elif once is not None:
             _ONCE[once](self.tracer, words, line)
-        if once is None or once == _ORIENT_AND_MOVE:
+        if (once is None and not NO_PLACES_G & set(codes)) or once == _ORIENT_AND_MOVE:
             self._move(codes, words, line)
 
     def _feed_and_speed(self, codes: list[float], words: dict[str, Word], line: int) -> None:
@@ -183,13 +184,13 @@ class GCodeReader(StatementReader):
                 self.problems.add(self.wrong(what, line, str(word), remedy=remedy))
         for word in names:
             name = word.address
-            if name in _HOME_NAMES:
+            if name == "SUPA":
                 places.machine_place(self.tracer, words, line)
                 taken = True
             elif name in _TCP_ON or name in _TCP_ENDS:
-                self.tracer.at.tcp = name in _TCP_ON
+                self.tracer.set_tcp(on=name in _TCP_ON)
             elif name in _FRAMES:
-                planes.programmed_frame(self.tracer, name, words)
+                planes.programmed_frame(self.tracer, name, words, line)
                 taken = True
             elif name == "CYCLE800":
                 planes.cycle800(self.tracer, word.arguments, line)
@@ -206,30 +207,31 @@ class GCodeReader(StatementReader):
 
     def _mode(self, code: float, words: dict[str, Word], line: int) -> None:
         """Take a modal code."""
-        tracer = self.tracer
+        tracer, dialect = self.tracer, self.dialect
         old = self.modes.scale
-        if self.modes.take(code):
+        if code in _CYCLES_OF_OTHERS and not dialect.equals and _CYCLE_WORDS & set(words):
+            self.problems.add(self.wrong("a cycle that is not read", line, f"G{code:g}", remedy="export it as moves"))
+        elif self.modes.take(code):
             if self.modes.cycle is None:
                 self.drill.end()
             if old not in (None, self.modes.scale) and self.moves.tips:
                 self.problems.add(self.wrong("the unit changes after the first move", line, f"G{code:g}"))
-        elif code in places.SYSTEMS or code in _MORE_SYSTEMS or (self.dialect.equals and 505.0 <= code <= 599.0):
-            system = places.SYSTEMS.get(code, f"G{code:g}")
-            if code in _MORE_SYSTEMS and "P" in words:
-                system += f" {words['P']}"
+        elif (system := places.system_of(code, words, dialect)) is not None:
             tracer.at.set_system(system)
         elif code in _TCP:
-            tracer.at.tcp, self.by_vector = True, code == _VECTOR_TCP
+            self.by_vector = code == _VECTOR_TCP
+            tracer.set_tcp(on=True)
         elif code in _TCP_OFF:
-            tracer.at.tcp, self.by_vector = tracer.at.tcp and not self.dialect.switched, False
+            self.by_vector = False
+            tracer.set_tcp(on=tracer.at.tcp and not dialect.switched)
         elif code == 69.0:
             tracer.set_frames(None, None)
-        elif code in REFUSED_G and not (code == _SPLINE_OR_SPEED and self.dialect.switched and "X" not in words):
+        elif code in REFUSED_G and not (dialect.switched and SPEED_G.get(code) in words):
             what, remedy = REFUSED_G[code]
             self.problems.add(self.wrong(what, line, f"G{code:g}", remedy=remedy))
         elif code == _SMOOTHING:
             words.pop("E", None)
-        elif code not in IDLE_G and code not in (_STOP, _SPLINE_OR_SPEED):
+        elif code not in IDLE_G and code not in REFUSED_G and code != _STOP:
             self.problems.add(self.wrong("a word that is not read", line, f"G{code:g}"))
 
     def _dwell(self, words: dict[str, Word], line: int) -> None:
@@ -241,7 +243,7 @@ class GCodeReader(StatementReader):
             raise self.wrong("a dwell without its time", line, "G4", expected=expected)
         value = times[0].value
         milliseconds = self.dialect.milliseconds and times[0].address == "P"
-        if milliseconds and value != int(value):
+        if milliseconds and "." in str(times[0]):
             raise self.wrong("seconds or milliseconds?", line, f"P{value:g}", remedy=f"write G4 X{value:g} for seconds")
         self.moves.add_dwell(1e-3 * value if milliseconds else value)
 

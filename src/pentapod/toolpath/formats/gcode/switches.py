@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pentapod.toolpath.formats.gcode.language.blocks import Word
 from pentapod.toolpath.formats.gcode.language.problems import Problems
 from pentapod.toolpath.formats.gcode.language.scan import Scan
-from pentapod.toolpath.formats.gcode.language.vocabulary import COOLANT_M, ENDS_M, IDLE_M, REFUSED_M, SPINDLE_M
+from pentapod.toolpath.formats.gcode.language.vocabulary import COOLANT_M, ENDS_M, IDLE_M, REFUSED_M, SPINDLE_M, STOP_M
 from pentapod.toolpath.formats.gcode.tracer import Tracer
 
 _CHANGE, _SET_TOOL = 6.0, 61.0
@@ -48,9 +48,12 @@ class Switches:
                 what, remedy = REFUSED_M[code]
                 self.problems.add(tracer.wrong(what, line, str(word), remedy))
             elif code in (_TCP_ON, _TCP_OFF) and not tracer.modes.dialect.switched:
-                self._switch_tcp(on=code == _TCP_ON)
+                tracer.set_tcp(on=code == _TCP_ON)
             elif code in (_CHANGE, _SET_TOOL):
                 self._change_tool(word, words, line)
+            elif code in STOP_M:
+                tracer.moves.add_words(str(word))
+                tracer.tell("stop", line)
             elif code not in IDLE_M:
                 tracer.moves.add_words(str(word))
                 if code not in SPINDLE_M and code not in COOLANT_M:
@@ -71,10 +74,3 @@ class Switches:
     def _take_tool(self) -> None:
         self.tracer.tool = self.pending
         self.seen.append(self.pending)
-
-    def _switch_tcp(self, *, on: bool) -> None:
-        at = self.tracer.at
-        if at.tcp != on and at.tilted:
-            at.forget()
-            self.tracer.here = None
-        at.tcp = on

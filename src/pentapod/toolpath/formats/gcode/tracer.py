@@ -11,10 +11,12 @@ from pentapod.base.errors import ToolpathError
 from pentapod.toolpath.formats.gcode.arcs import Arc, interpolated
 from pentapod.toolpath.formats.gcode.coordinates import LINEAR, Coordinates, Pose
 from pentapod.toolpath.formats.gcode.frames import Frame
+from pentapod.toolpath.formats.gcode.language.blocks import Word
 from pentapod.toolpath.formats.gcode.language.options import OPTIONS
 from pentapod.toolpath.formats.gcode.modes import Modes
 from pentapod.toolpath.formats.moves import Moves
 from pentapod.toolpath.formats.registry import Defaults
+from pentapod.toolpath.formats.rotary import LETTERS
 from pentapod.toolpath.toolpath import SegmentKind
 
 
@@ -60,9 +62,22 @@ class Tracer:
         before = self.at.place.copy(), self.at.fixed
         self.swivel, self.programmed = swivel, programmed
         frame = programmed if swivel is None else swivel if programmed is None else swivel.then(programmed)
-        self.at.set_frame(frame, oriented=oriented)
+        self.at.set_frame(frame, swivelled=swivel is not None, oriented=oriented)
         if oriented and before != (self.at.place, self.at.fixed):
             self.here = None
+
+    def set_tcp(self, *, on: bool) -> None:
+        """Switch tool centre point programming; where a rotary axis is turned, the place is unknown then."""
+        if self.at.set_tcp(on=on):
+            self.here = None
+
+    def length(self, words: Mapping[str, Word], letter: str, line: int) -> float:
+        """Return the length that a word gives, mm, 0 without the word. Raises ToolpathError without a unit."""
+        value = words[letter].value if letter in words else 0.0
+        if value and self.modes.scale is None:
+            remedy = f'{self.modes.dialect.units} before it, or unit = "mm" in [toolpath]'
+            raise self.wrong("the unit is missing", line, str(words[letter]), remedy)
+        return value * (self.modes.scale or 1.0)
 
     def home(self, letters: Iterable[str], line: int) -> None:
         """Send axes to a place of the machine: their coordinates are unknown, rotary axes are at 0."""
@@ -154,14 +169,16 @@ class Tracer:
                 raise self.wrong("a move through unknown places", line, word)
             return pose
 
+        if arc is not None and self.at.fixed is not None and math.dist(first.axis, last.axis) > OPTIONS.axis_tolerance:
+            what = "an arc on which the tool axis turns to a vector"
+            raise self.wrong(what, line, word, "export it as lines, or with rotary axes")
         count = 1 if arc is None else arc.chords(1e3 * self.defaults.chordal)
         if count > OPTIONS.chords:
             raise self.wrong(f"a move of more than {OPTIONS.chords:,} chords", line, word, "give a larger chordal_mm")
-        turning = (
-            not (self.jump or self.exact)
-            and self.at.fixed is None
-            and (start["A"] != end["A"] or start["B"] != end["B"] or start["C"] != end["C"])
-        )
+        turn = max(abs(end[letter] - start[letter]) for letter in LETTERS)
+        turning = turn > 0.0 and not (self.jump or self.exact) and self.at.fixed is None
+        if turning:  # Full turns end where they begin: parts of a turn are looked at.
+            count = max(count, math.ceil(min(turn / OPTIONS.part_turn, 1e12)))
         if not turning or (count == 1 and self._straight(first, place(0.5), last)):
             return [*(place((k + 1) / count) for k in range(count - 1)), last]
         return self._refined(place, count, line, word)
@@ -199,6 +216,9 @@ class Tracer:
             if self.defaults.feed is None:
                 raise self.wrong("the feed is missing", line, "F", "give F before it")
             return 6e4 * self.defaults.feed
+        if modes.lengths_only:
+            remedy = "G700 in its place, for feeds in inch"
+            raise self.wrong("with G70 the unit of the feed is that of the machine", line, "F", remedy)
         if modes.per_turn:
             if not modes.speed:
                 raise self.wrong("a feed per turn without the spindle's speed", line, "F", "give S before it, or G94")

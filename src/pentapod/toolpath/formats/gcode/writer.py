@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.toolpath.formats.moves import dwell_times, kind_remark, plain, poses, tilt_centre_remark
+from pentapod.toolpath.formats.moves import dwell_times, kind_remark, plain, poses, tilt_centre_remark, words_before
 from pentapod.toolpath.formats.rotary import Rotary
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
@@ -47,12 +47,11 @@ def _moves(toolpath: Toolpath, rows: list[list[str]], *, comment: str, dwell: st
     """Return the blocks of all waypoints. rows: the words of each; dwell: the letter of a dwell's time."""
     tips, _, kinds, feeds = poses(toolpath)
     dwells = dwell_times(toolpath)
-    said = {int(at): segment.words for at, segment in zip(toolpath.starts, toolpath.segments, strict=False)}
+    said = words_before(toolpath)
     lines: list[str] = []
     kind, feed, motion = SegmentKind.CUT, np.nan, ""
     for k, row in enumerate(rows):
-        if k != 1:  # those of the first segment come before the first waypoint
-            lines += _said(said.get(max(k - 1, 0), ()), comment)
+        lines += _said(said.get(k, ()), comment)
         move = kinds[k - 1] if k else SegmentKind.RAPID
         if move not in (SegmentKind.RAPID, kind):
             lines.append(comment.format(kind_remark(move)))

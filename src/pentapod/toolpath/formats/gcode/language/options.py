@@ -11,6 +11,7 @@ class GCodeOptions:
     """Lengths in millimetres.
 
     axis_tolerance: radians by which the tool axis between two waypoints may differ from what the rotary axes do.
+    part_turn: degrees; the way between two waypoints is looked at in parts over which no rotary axis turns further.
     clearance: height above the cuts at which a rapid that the file sends to the home position passes over the part.
     peck: distance from the last depth at which a drilling cycle with pecks goes back to the feed. arc_mismatch,
     arc_mismatch_share: difference, and share of the radius, by which start and end of an arc may be at different
@@ -20,6 +21,7 @@ class GCodeOptions:
     """
 
     axis_tolerance: float = math.radians(0.02)
+    part_turn: float = 90.0
     clearance: float = 10.0
     peck: float = 0.5
     arc_mismatch: float = 0.05

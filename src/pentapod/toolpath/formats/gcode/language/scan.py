@@ -14,9 +14,10 @@ from pentapod.toolpath.formats.rotary import LETTERS, RotaryAxes
 _PLAIN_COMMENT = re.compile(r"\([^()]*\)|;.*$")
 _SINUMERIK_COMMENT = re.compile(r"\"[^\"]*\"|;.*$")
 _TURNED = re.compile(
-    r"(?<![A-Z_])([ABC])(?![0-9]*\s*=)\s*[+-]?[0-9.]*[1-9]|(?<![A-Z_])([ABC])\s*=\s*(?:[A-Z]+\(\s*)?[+-]?[0-9.]*[1-9]"
+    r"(?<![A-Z_])([ABC])(?![0-9]*\s*=)\s*[+-]?(?:[0-9.]*[1-9]|#)|"
+    r"(?<![A-Z_])([ABC])\s*=\s*(?:[A-Z]+\(\s*)?[+-]?(?:[0-9.]*[1-9]|[A-Z_$][A-Z0-9_$]*+(?!\s*\())"
 )
-_PRESENT = re.compile(r"(?<![A-Z_])([ABC])(?:[+-]?[0-9.]|\s*=)")
+_PRESENT = re.compile(r"(?<![A-Z_])([ABC])\s*(?:[+-]?[0-9.#]|=)")
 _CHANGE, _SWITCH = re.compile(r"M0*6(?![0-9])"), re.compile(r"M42[89](?![0-9])")
 
 

@@ -20,7 +20,8 @@ REFUSED_G: dict[float, tuple[str, str]] = {
     **dict.fromkeys((41.0, 42.0, 41.1, 42.1, 41.2, 42.2, 41.3, 41.4, 42.4, 39.0), _COMPENSATION),
     **dict.fromkeys((33.0, 33.1, 33.2, 34.0, 35.0, 63.0, 74.0, 76.0, 84.0, 84.2, 84.3, 331.0, 332.0), _SPINDLE),
     **dict.fromkeys((31.0, 36.0, 37.0, 38.0, 38.2, 38.3, 38.4, 38.5), _PROBE),
-    **dict.fromkeys((5.0, 5.2, 5.3, 6.0, 6.1, 6.2, 6.3), _SPLINE),
+    7.0: ("X is a diameter, or an axis that does not exist", "export a milling program"),
+    **dict.fromkeys((5.0, 5.1, 5.2, 5.3, 6.0, 6.1, 6.2, 6.3), _SPLINE),
     **dict.fromkeys((50.1, 51.0, 51.1), _SCALED),
     **dict.fromkeys((12.1, 16.0, 110.0, 111.0, 112.0), _POLAR),
     **dict.fromkeys((65.0, 66.0, 66.1, 68.3, 68.4), _PROGRAM),
@@ -30,10 +31,16 @@ REFUSED_G: dict[float, tuple[str, str]] = {
 }
 
 IDLE_G = frozenset({
-    4.1, 5.1, 7.0, 8.0, 9.1, 10.6, 11.0, 13.1, 15.0, 22.0, 23.0, 25.0, 26.0, 40.0, 40.1, 40.2, 44.0, 45.1,
+    4.1, 8.0, 9.1, 10.6, 11.0, 13.1, 15.0, 22.0, 23.0, 25.0, 26.0, 40.0, 40.1, 40.2, 44.0, 45.1,
     50.0, 62.0, 63.1, 64.2, 67.0, 97.0, 103.0, 113.0, 168.0,
 })  # fmt: skip
 """Codes that change nothing here: smoothing, limits, compensations off."""
+
+SPEED_G = {5.0: "P", 5.1: "Q"}
+"""Splines of LinuxCNC; with this word, and on other controllers, the codes switch high speed on."""
+
+NO_PLACES_G = frozenset({*SPEED_G, 10.6, 22.0, 25.0, 26.0})
+"""Codes whose axis words are no places: axes to smooth, a way to retract, limits of the working area."""
 
 REFUSED_M: dict[float, tuple[str, str]] = {
     **dict.fromkeys((96.0, 97.0, 98.0, 99.0, 198.0, 199.0), _PROGRAM),
@@ -41,8 +48,9 @@ REFUSED_M: dict[float, tuple[str, str]] = {
 }
 SPINDLE_M, COOLANT_M = frozenset({3.0, 4.0, 5.0, 19.0}), frozenset({7.0, 8.0, 9.0})
 ENDS_M = frozenset({2.0, 17.0, 30.0})
-IDLE_M = frozenset({0.0, 1.0, 10.0, 11.0, 12.0, 13.0, 48.0, 49.0, 50.0, 51.0, 52.0, 53.0, 60.0})
-"""Codes that neither move nor switch anything here: stops of the program, clamps, overrides."""
+STOP_M = frozenset({0.0, 1.0})
+IDLE_M = frozenset({10.0, 11.0, 12.0, 13.0, 48.0, 49.0, 50.0, 51.0, 52.0, 53.0})
+"""Codes that neither move nor switch anything here: clamps, overrides."""
 
 REFUSED_NAMES: dict[str, tuple[str, str]] = {
     **dict.fromkeys(("CIP", "CT", "ASPLINE", "BSPLINE", "CSPLINE", "POLY"), _SPLINE),
@@ -89,6 +97,11 @@ class Dialect:
     pairs: dict[str, tuple[str, ...]]
     equals: bool = False
     units: str = "G20 or G21"
+
+    @property
+    def fanuc(self) -> bool:
+        """Whether it is that of Fanuc and its relatives."""
+        return self.switched and not self.equals
 
 
 _SINGLE = {letter: (f"table {letter}",) for letter in "ABC"}
