@@ -1,13 +1,13 @@
-"""Find a machine: how the shipped machine `desk` was designed.
+"""Find a machine: how the shipped machines `desk`, `steep` and `bench-general` were designed.
 
-A linear pentapod of the quadratic family has few numbers: five base joints (x, y), the factor delta that
-sets the platform joints at delta · x along the tool axis, the length from the lowest platform joint to the
-tip, and where the work lies. Most choices are useless: legs cross each other or the spindle, or small forces
-at the tip become large ones in the legs. This script samples the work volume, prices what each design
-lacks there, and lowers the price with CMA-ES (N. Hansen, "The CMA evolution strategy: a tutorial", 2016) from
-many starts, all candidates of a generation evaluated at once with NumPy.
+A linear pentapod has few numbers: five base joints (x, y), the platform joints along the tool axis (in the quadratic
+family at delta · x, in the general one anywhere), the length from the lowest platform joint to the tip, and where the
+work lies. Most choices are useless: legs cross each other or the spindle, or small forces at the tip become large ones
+in the legs. This script samples the work volume, prices what each design lacks there, and lowers the price with CMA-ES
+(N. Hansen, "The CMA evolution strategy: a tutorial", 2016) from many starts, all candidates of a generation evaluated
+at once with NumPy.
 
-    python examples/01_design_a_machine.py --minutes 20 --seed 1
+    python examples/01_design_a_machine.py --machine steep --minutes 20 --seed 1
 
 prints each improvement as numbers that go into a machine file; `pentapod machine check FILE` then judges that
 file by dense sampling. Shipped designs are rounded to whole millimetres.
@@ -28,9 +28,32 @@ from pentapod.machine import segment_distance
 LEG_RADIUS, SHAFT_RADIUS, JOINT_RADIUS, SHAFT_END = 0.008, 0.012, 0.080, 0.060
 PAIRS = np.array(list(itertools.combinations(range(5), 2)))
 
-# Unknowns: x1..x5, y1..y5 (m), delta, tip beyond the outermost platform joint (m), work centre (m).
-LOW = np.array([-0.60] * 10 + [0.10, 0.09, -0.35, -0.35, 0.35])
-HIGH = np.array([0.60] * 10 + [0.60, 0.25, 0.35, 0.35, 1.00])
+REST_LOW, REST_HIGH = [0.09, -0.35, -0.35, 0.35], [0.25, 0.35, 0.35, 1.00]
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What is looked for: bounds of the unknowns, the volume, needs, and where the search starts.
+
+    Unknowns: x1..x5, y1..y5 (m); delta, or the five platform joints along the line (m); tip beyond the outermost
+    platform joint (m); work centre (m).
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    start: np.ndarray
+    wanted: dict[str, tuple[int, float, float, float]]
+    tilt: float
+    """Degrees of the cone of tool axes."""
+    dome_tilt: float
+    """Degrees by which the tool leans at the corners of the dome."""
+
+    def unpacked(self, designs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return base joints (n, 5, 2), platform joints (n, 5), tool lengths (n,) and work centres (n, 3)."""
+        base = np.stack([designs[:, 0:5], designs[:, 5:10]], axis=-1)
+        along, beyond, centre = designs[:, 10:-4], designs[:, -4], designs[:, -3:]
+        offsets = along if along.shape[1] == 5 else along * base[..., 0]
+        return base, offsets, offsets.max(axis=1) + beyond, centre
 
 
 @dataclass(frozen=True)
@@ -40,6 +63,7 @@ class Volume:
     diameter: float
     height: float
     tilt: float
+    dome_tilt: float
 
     def poses(self, around: int, heights: int, azimuths: int) -> tuple[np.ndarray, np.ndarray]:
         """Return tips (m, 3) relative to the centre and platform directions (m, 3), on the boundary."""
@@ -51,7 +75,7 @@ class Volume:
         s, c = np.sin(self.tilt), np.cos(self.tilt)
         axes = np.stack([s * np.cos(lean), s * np.sin(lean), np.full(azimuths, c)], axis=-1)
         tips, axes = np.repeat(tips, azimuths, axis=0), np.tile(axes, (len(tips), 1))
-        dome = dome_poses(self.tilt)
+        dome = dome_poses(self.dome_tilt)
         return np.concatenate([tips, dome[0]]), np.concatenate([axes, dome[1]])
 
 
@@ -72,12 +96,9 @@ def dome_poses(lean: float) -> tuple[np.ndarray, np.ndarray]:
     return tips.reshape(-1, 3), axes.reshape(-1, 3)
 
 
-def figures(designs: np.ndarray, tips: np.ndarray, axes: np.ndarray) -> dict[str, np.ndarray]:
+def figures(search: Search, designs: np.ndarray, tips: np.ndarray, axes: np.ndarray) -> dict[str, np.ndarray]:
     """Return what decides about each design (n,), the worst over all poses: metres, radians or ratios."""
-    base = np.stack([designs[:, 0:5], designs[:, 5:10]], axis=-1)
-    delta, tip_beyond, centre = designs[:, 10], designs[:, 11], designs[:, 12:15]
-    offsets = delta[:, None] * base[..., 0]  # (n, 5)
-    tool = offsets.max(axis=1) + tip_beyond
+    base, offsets, tool, centre = search.unpacked(designs)
     p = centre[:, None, :] + tips - tool[:, None, None] * axes  # (n, m, 3)
     joints = p[:, :, None, :] + offsets[:, None, :, None] * axes[:, None, :]  # (n, m, 5, 3)
     feet = np.concatenate([base, np.zeros((len(base), 5, 1))], axis=-1)[:, None]
@@ -96,9 +117,7 @@ def figures(designs: np.ndarray, tips: np.ndarray, axes: np.ndarray) -> dict[str
     feet_gap = np.linalg.norm(base[:, PAIRS[:, 0]] - base[:, PAIRS[:, 1]], axis=-1)
     mean = e.mean(axis=1)
     mean /= np.linalg.norm(mean, axis=-1, keepdims=True)
-    u, w = axes[:, 0], axes[:, 2]
-    plane = delta[:, None] * w * p[..., 0] + (1.0 - delta[:, None] * u) * p[..., 2]
-    plane /= np.hypot(delta[:, None] * w, 1.0 - delta[:, None] * u)
+    singular = singular_distance(base, offsets, p, axes)
     return {
         "base radius": np.linalg.norm(base, axis=-1).max(axis=1),
         "leg ratio": lengths.max(axis=(1, 2)) / lengths.min(axis=(1, 2)),
@@ -114,9 +133,31 @@ def figures(designs: np.ndarray, tips: np.ndarray, axes: np.ndarray) -> dict[str
         "joint angle": np.arccos(np.clip(-to_axis, -1, 1)).max(axis=(1, 2)),
         "top": top[..., 2].min(axis=1),
         "base cone": np.arccos(np.clip(np.einsum("nmki,nki->nmk", e, mean), -1, 1)).max(axis=(1, 2)),
-        "S": plane.min(axis=1),
+        "S": np.maximum(singular.min(axis=1), -singular.max(axis=1)),
         "amplification": amplification(e, offsets, tool, axes),
     }
+
+
+def singular_distance(base: np.ndarray, offsets: np.ndarray, p: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Return a lower bound (n, m), signed, of how far each pose can shift before it meets the singular surface.
+
+    At one orientation the singularity polynomial is quadratic in the position; see `GeneralPentapod`. In the quadratic
+    family it is linear, and the bound is the distance.
+    """
+    (x, y), z = np.moveaxis(base - base[:, 2:3], -1, 0), offsets - offsets[:, 2:3]
+    rows = np.stack([z, -x, -y, -x * z, -y * z], axis=-1)[:, [0, 1, 3, 4]]
+    null = np.linalg.svd(rows)[2][:, -1] * [1.0, -1.0, -1.0, -1.0, -1.0]
+    n, nx, ny, nu, nv = null.T[..., None]
+    u, v, w = axes.T
+    px, py, pz = np.moveaxis(p + offsets[:, 2, None, None] * axes, -1, 0)
+    px, py = px - base[:, 2, 0, None], py - base[:, 2, 1, None]
+    ax, ay = pz * u - px * w, pz * v - py * w
+    value = w * (n * pz + nx * ax + ny * ay) - pz * (nu * ax + nv * ay)
+    along = nu * u + nv * v
+    by_z = w * (n + nx * u + ny * v) - (nu * ax + nv * ay) - pz * along
+    bent = np.sqrt(2.0 * (nu * nu + nv * nv) * w * w + 4.0 * along * along)
+    squared = np.square(w * (nu * pz - nx * w)) + np.square(w * (nv * pz - ny * w)) + by_z * by_z + 1e-60
+    return 2.0 * value / (np.sqrt(squared) + np.sqrt(squared + 2.0 * bent * np.abs(value)))
 
 
 def shortfall(clearance: np.ndarray) -> np.ndarray:
@@ -149,7 +190,7 @@ def amplification(e: np.ndarray, offsets: np.ndarray, tool: np.ndarray, axes: np
 
 
 # name: (sense, needed, wished, scale). Below the need a design costs ten times more than below the wish.
-WANTED: dict[str, tuple[int, float, float, float]] = {
+DESK: dict[str, tuple[int, float, float, float]] = {
     "base radius": (-1, 0.598, 0.595, 0.05),
     "leg ratio": (-1, 1.865, 1.84, 0.1),
     "shortest leg": (+1, 0.38, 0.38, 0.1),
@@ -166,14 +207,40 @@ WANTED: dict[str, tuple[int, float, float, float]] = {
     "S": (+1, 0.20, 0.25, 0.1),
     "amplification": (-1, 5.8, 5.0, 1.0),
 }
+# Tool axes to 45 degrees have a price: a larger base and longer legs, wider joints.
+STEEP = DESK | {
+    "base radius": (-1, 0.90, 0.598, 0.1),
+    "joint angle": (-1, np.radians(130), np.radians(110), 0.2),
+    "base cone": (-1, np.radians(55), np.radians(45), 0.2),
+    "amplification": (-1, 8.0, 5.8, 1.0),
+}
+
+# Where the search starts: the shipped design `desk` before rounding.
+_X, _Y = [0.5857, 0.2240, -0.3260, -0.5966, -0.0554], [-0.1203, 0.5538, 0.4981, -0.0389, -0.5952]
+_REST = [0.0900, 0.0853, -0.0175, 0.4667]
+_QUADRATIC = np.array([*_X, *_Y, 0.1847, *_REST])
+_GENERAL = np.array([*_X, *_Y, *(0.1847 * np.array(_X)), *_REST])
 
 
-def price(designs: np.ndarray, tips: np.ndarray, axes: np.ndarray) -> np.ndarray:
+def _bounds(base: float, along: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
+    """Return bounds of the unknowns: base joints within ± base, those of the platform as given."""
+    low, high = zip(*along, strict=True)
+    return np.array([-base] * 10 + [*low, *REST_LOW]), np.array([base] * 10 + [*high, *REST_HIGH])
+
+
+MACHINES = {
+    "desk": Search(*_bounds(0.60, [(0.10, 0.60)]), _QUADRATIC, DESK, 26.0, 26.0),
+    "steep": Search(*_bounds(0.90, [(0.10, 0.60)]), _QUADRATIC, STEEP, 45.0, 40.0),
+    "bench-general": Search(*_bounds(0.60, [(-0.25, 0.25)] * 5), _GENERAL, DESK, 30.0, 30.0),
+}
+
+
+def price(search: Search, designs: np.ndarray, tips: np.ndarray, axes: np.ndarray) -> np.ndarray:
     """Return the price (n,) of each design: 0 if every wish is met."""
-    inside = np.clip(designs, LOW, HIGH)
-    values = figures(inside, tips, axes)
+    inside = np.clip(designs, search.low, search.high)
+    values = figures(search, inside, tips, axes)
     total = 100.0 * np.abs(designs - inside).sum(axis=1)
-    for name, (sense, need, wish, scale) in WANTED.items():
+    for name, (sense, need, wish, scale) in search.wanted.items():
         value = values[name]
         total += 10.0 * np.maximum(sense * (need - value), 0.0) / scale
         total += np.maximum(sense * (wish - value), 0.0) / scale
@@ -181,7 +248,14 @@ def price(designs: np.ndarray, tips: np.ndarray, axes: np.ndarray) -> np.ndarray
 
 
 def minimise(
-    cost: Any, start: np.ndarray, sigma: float, *, rng: np.random.Generator, generations: int, give_up: float
+    cost: Any,
+    search: Search,
+    start: np.ndarray,
+    sigma: float,
+    *,
+    rng: np.random.Generator,
+    generations: int,
+    give_up: float,
 ) -> tuple[np.ndarray, float]:
     """Return the best point found and its cost: CMA-ES with the default constants of Hansen's tutorial."""
     n = len(start)
@@ -195,7 +269,7 @@ def minimise(
     cmu = min(1 - c1, 2 * (mu - 2 + 1 / mu) / ((n + 2) ** 2 + mu))
     damping = 1 + 2 * max(0.0, np.sqrt((mu - 1) / (n + 1)) - 1) + cs
     expected = np.sqrt(n) * (1 - 1 / (4 * n) + 1 / (21 * n * n))
-    mean, spread = start.copy(), np.diag(np.square(HIGH - LOW)) * 0.05
+    mean, spread = start.copy(), np.diag(np.square(search.high - search.low)) * 0.05
     path_c, path_s = np.zeros(n), np.zeros(n)
     best, best_cost = start, np.inf
     for g in range(generations):
@@ -219,54 +293,52 @@ def minimise(
             break
         if sigma * np.sqrt(np.diag(spread)).max() < 1e-4:
             break
-    return np.clip(best, LOW, HIGH), best_cost
+    return np.clip(best, search.low, search.high), best_cost
 
 
-def show(design: np.ndarray, cost: float, dense: tuple[np.ndarray, np.ndarray]) -> None:
+def show(search: Search, design: np.ndarray, cost: float, dense: tuple[np.ndarray, np.ndarray]) -> None:
     """Print a design and its figures on a dense sample."""
-    base = 1e3 * np.stack([design[0:5], design[5:10]], axis=-1)
-    tool = design[10] * design[0:5].max() + design[11]
-    print(f"price {cost:.4f}  delta = {design[10]:.4f}  base_mm = {np.round(base, 1).tolist()}")
-    print(f"  length_mm = {1e3 * tool:.1f}  centre_mm = {np.round(1e3 * design[12:15], 1).tolist()}")
-    values = figures(design[None], *dense)
+    base, offsets, tool, centre = (1e3 * values[0] for values in search.unpacked(design[None]))
+    along = f"delta = {design[10]:.4f}" if len(design) == 15 else f"platform_mm = {np.round(offsets, 1).tolist()}"
+    print(f"price {cost:.4f}  {along}  base_mm = {np.round(base, 1).tolist()}")
+    print(f"  length_mm = {tool:.1f}  centre_mm = {np.round(centre, 1).tolist()}")
+    values = figures(search, design[None], *dense)
     print("  " + ", ".join(f"{name} {value[0]:.4g}" for name, value in values.items()))
     print("  design = " + repr(np.round(design, 5).tolist()), flush=True)
-
-
-# Where the search starts: the shipped design before rounding. x1..x5, y1..y5, delta, tip beyond, work centre.
-_X, _Y = [0.5857, 0.2240, -0.3260, -0.5966, -0.0554], [-0.1203, 0.5538, 0.4981, -0.0389, -0.5952]
-KNOWN = np.array([*_X, *_Y, 0.1847, 0.0900, 0.0853, -0.0175, 0.4667])
 
 
 def main() -> None:
     """Search until the time is up."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--machine", choices=MACHINES, default="desk")
     parser.add_argument("--minutes", type=float, default=20.0)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--tilt", type=float, default=26.0, help="degrees of the cone of tool axes")
+    parser.add_argument("--tilt", type=float, help="degrees of the cone of tool axes; the machine's when left out")
     parser.add_argument("--diameter", type=float, default=150.0, help="mm of the cylinder of tips")
     parser.add_argument("--height", type=float, default=60.0, help="mm of the cylinder of tips")
     options = parser.parse_args()
-    rng = np.random.default_rng(options.seed)
-    volume = Volume(options.diameter * 1e-3, options.height * 1e-3, np.radians(options.tilt))
+    rng, search = np.random.default_rng(options.seed), MACHINES[options.machine]
+    tilt, lean = np.radians(search.tilt if options.tilt is None else options.tilt), np.radians(search.dome_tilt)
+    volume = Volume(options.diameter * 1e-3, options.height * 1e-3, tilt, lean)
     coarse, dense = volume.poses(8, 2, 8), volume.poses(16, 3, 24)
+    span, size = search.high - search.low, len(search.start)
 
     def cost(x: np.ndarray) -> np.ndarray:
-        return price(x, *coarse)
+        return price(search, x, *coarse)
 
-    stop, best, best_cost, run = time.monotonic() + 60.0 * options.minutes, KNOWN, np.inf, 0
+    stop, best, best_cost, run = time.monotonic() + 60.0 * options.minutes, search.start, np.inf, 0
     while time.monotonic() < stop:
         if run % 4 == 0:  # near the best so far, which is the known geometry at first
-            start, sigma = best + 0.05 * (run > 0) * rng.standard_normal(15) * (HIGH - LOW), 0.3
+            start, sigma = best + 0.05 * (run > 0) * rng.standard_normal(size) * span, 0.3
         else:
-            crowd = LOW + (HIGH - LOW) * rng.random((600, 15))
+            crowd = search.low + span * rng.random((600, size))
             start, sigma = crowd[np.argmin(cost(crowd))], 0.6
-        found, found_cost = minimise(cost, start, sigma, rng=rng, generations=500, give_up=4.0 * best_cost)
-        found_cost = float(price(found[None], *dense)[0])
+        found, found_cost = minimise(cost, search, start, sigma, rng=rng, generations=500, give_up=4.0 * best_cost)
+        found_cost = float(price(search, found[None], *dense)[0])
         print(f"run {run}: {found_cost:.3f}", flush=True)
         if found_cost < best_cost:
             best, best_cost = found, found_cost
-            show(best, best_cost, dense)
+            show(search, best, best_cost, dense)
         run += 1
 
 

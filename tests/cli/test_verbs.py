@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from pentapod.cli import verbs as entry
-from pentapod.cli.commands.kinematics import LEGS
+from pentapod.cli.commands.kinematics import leg_names
 from pentapod.cli.main import run
 from pentapod.cli.verbs import VERBS
 from pentapod.machine import Machine
@@ -323,7 +323,9 @@ def test_ik_and_fk_as_a_pipe():
 )  # fmt: skip
 def test_bad_rows_in_a_pipe_are_told_by_line(row, words, monkeypatch, capsys):
     """One number alone as well: it is no row of five equal legs."""
-    monkeypatch.setattr("sys.stdin", io.StringIO(f"{','.join(LEGS)}\n600,600,600,600,600\n\n{row}\n"))
+    monkeypatch.setattr(
+        "sys.stdin", io.StringIO(f"{','.join(leg_names(Machine.load('desk').robot))}\n600,600,600,600,600\n\n{row}\n")
+    )
     assert run(["fk"]) == 2
     said = capsys.readouterr()
     assert said.err.startswith("error: stdin:4: ")

@@ -64,9 +64,9 @@ def test_is_advertised_for_enough(desk):
 def test_keeps_its_limits_everywhere_in_its_work_volume(desk):
     report = check(desk, rings=3, around=20, levels=5)
     assert report.passed, [finding for finding in report.findings if not finding.passed]
-    assert report.component == Component(1, 1)
-    assert report.least_w >= 0.85
-    assert report.least_s >= 0.2
+    assert report.branch == Component(1, 1)
+    assert report.margins[0] >= np.arcsin(0.85)
+    assert report.margins[1] >= 0.2
     assert report.least_turn >= np.radians(45)
     assert report.clearance >= 0.0025
     assert report.amplification <= 5.5

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pentapod.base.errors import MachineError
+from pentapod.kinematics import GeneralPentapod
 from pentapod.machine import Machine, load_machine, read_machine, shipped_machines
 
 DESK = (resources.files("pentapod.machine") / "library" / "desk.toml").read_text(encoding="utf-8")
@@ -210,7 +211,24 @@ def test_offsets_that_are_not_proportional():
     assert "+0.5 mm" in str(claimed)
     assert claimed.key == "geometry.platform_mm"
     alone = refusal(replaced("delta", None).replace("[legs]", f"platform_mm = {platform}\n[legs]", 1))
-    assert "only the quadratic family" in str(alone)
+    assert "not of the quadratic family" in str(alone)
+    assert 'family = "general"' in str(alone)
+
+
+def test_general_family_takes_any_offsets():
+    platform = [100, 30, -50, -120, 110]
+    text = replaced("delta", None).replace("base_mm", f'family = "general"\nplatform_mm = {platform}\nbase_mm', 1)
+    robot = read_machine(text, "m").robot
+    np.testing.assert_allclose(robot.offsets, np.array(platform) * 1e-3, atol=1e-15)
+    assert isinstance(robot, GeneralPentapod)
+    assert read_machine(text, "m").digest != read_machine(DESK, "m").digest
+
+
+def test_general_family_without_platform_or_with_delta_is_an_error():
+    general = DESK.replace("base_mm", 'family = "general"\nbase_mm', 1)
+    assert "general family has no delta" in str(refusal(general))
+    missing = replaced("delta", None).replace("base_mm", 'family = "general"\nbase_mm', 1)
+    assert "platform_mm with five numbers" in str(refusal(missing))
 
 
 @pytest.mark.parametrize(

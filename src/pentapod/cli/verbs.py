@@ -18,6 +18,7 @@ VERBS = {
     "machine": "pentapod.cli.commands.machine:machine",
     "ik": "pentapod.cli.commands.kinematics:ik",
     "fk": "pentapod.cli.commands.kinematics:fk",
+    "modes": "pentapod.cli.commands.modes:modes",
     "new": "pentapod.cli.commands.new:new",
 }
 """In the order of `pentapod --help`: name → module:command."""

@@ -5,6 +5,7 @@ from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld, 
 from pentapod.machine.clearance.leg_clearance import clearances, pair_names, segment_distance
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.machine import ARCHITECTURAL_LIMIT, Machine, load_machine, read_machine
+from pentapod.machine.modes import AssemblyPose, AssemblyPoses, admissible_modes
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 from pentapod.machine.reader import shipped_machines
 from pentapod.machine.report.report import (
@@ -20,6 +21,8 @@ __all__ = [
     "AMPLIFICATION_LIMIT",
     "ARCHITECTURAL_LIMIT",
     "NOTHING",
+    "AssemblyPose",
+    "AssemblyPoses",
     "Bodies",
     "Calibration",
     "CollisionWorld",
@@ -34,6 +37,7 @@ __all__ = [
     "Obstacle",
     "ToolLimits",
     "WorkVolume",
+    "admissible_modes",
     "calibrate",
     "check",
     "clearances",

@@ -15,13 +15,13 @@ from pentapod.base.values import Value
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.fields import FIVE_NUMBERS, FIVE_PAIRS
 
-QUADRATIC = "quadratic"
+QUADRATIC, GENERAL = "quadratic", "general"
 
 
 class GeometryTable(TomlTable):
-    """Where the joints are. Of the quadratic family give delta, or platform_mm, or both if they agree."""
+    """Where the joints are. The quadratic family: delta, or platform_mm, or both if they agree; others: platform_mm."""
 
-    family: str = Field(default=QUADRATIC, description="name of the robot family; packages can add families")
+    family: str = Field(default=QUADRATIC, description="robot family: quadratic or general; packages can add others")
     base_mm: FIVE_PAIRS = Field(description="base joints [x, y] in the base plane z = 0, leg 1 to leg 5")
     delta: float | None = Field(default=None, description="platform joint i is at delta · x_i along the tool axis")
     platform_mm: FIVE_NUMBERS | None = Field(
@@ -46,7 +46,7 @@ FAMILIES = Registry(
     "pentapod.families",
     Family,
     MachineError,
-    homes={QUADRATIC: "pentapod.machine.quadratic"},
+    homes={QUADRATIC: "pentapod.machine.quadratic", GENERAL: "pentapod.machine.general"},
     constant="FAMILY",
 )
 """A new family of pentapod's own is a file with `FAMILY = Family(...)`, and its name here."""

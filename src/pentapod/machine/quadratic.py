@@ -23,10 +23,11 @@ def _robot(table: GeometryTable) -> LinearPentapod:
         if table.delta is not None or error.key != "offsets":
             raise
         raise MachineError(
-            f"only the quadratic family is supported, platform offsets z_3 + delta (x_i − x_3); {error.what}",
+            f"not of the quadratic family, platform offsets z_3 + delta (x_i − x_3); {error.what}",
             key="offsets",
             value=error.value,
             expected=error.expected,
+            remedy='family = "general" takes any platform_mm',
         ) from error
 
 

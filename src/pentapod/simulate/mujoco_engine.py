@@ -14,9 +14,8 @@ from pentapod.base.errors import ArrayError
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal, stage
 from pentapod.base.values import Result
-from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.kinematics.families.as_built import AsBuiltPentapod, as_nominal
 from pentapod.kinematics.families.as_built_forward import as_built_pose
-from pentapod.kinematics.families.quadratic import as_quadratic
 from pentapod.simulate.forces import leg_loads
 from pentapod.simulate.measures import Measure
 from pentapod.simulate.mjcf import mjcf
@@ -92,7 +91,7 @@ def plant(reference: Reference, *, base_errors: ArrayLike = 0.0, offset_errors: 
     number for all. A Refusal says that the real machine has no proven pose there.
     """
     program, machine = reference.program, reference.machine
-    robot = as_quadratic(machine.robot, "the rigid-body model")
+    robot = as_nominal(machine.robot, "the rigid-body model")
     real = AsBuiltPentapod.of(robot, base_errors=base_errors, offset_errors=offset_errors)
     start = as_built_pose(real, robot, program.legs[0], program.component)
     if not start.proven:

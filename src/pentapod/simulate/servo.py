@@ -14,8 +14,9 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal, stage
-from pentapod.kinematics.families.quadratic import as_quadratic
+from pentapod.kinematics.families.quadratic import LinearPentapod, as_quadratic
 from pentapod.kinematics.forward.quadratic import NEAR_W_SQUARED
+from pentapod.kinematics.robot import Robot
 from pentapod.simulate.correction import NO_CORRECTION, correction_for
 from pentapod.simulate.reference import Played, Reference
 
@@ -47,7 +48,9 @@ def simulate_servo(
     if seed < 0:
         raise InputError("must not be negative", key="seed", value=seed)
     program, machine = reference.program, reference.machine
-    drives, robot = machine.drives, as_quadratic(machine.robot, "the simulation of servo loops")
+    drives, robot = machine.drives, machine.robot
+    if correct:
+        as_quadratic(robot, "the correction by the pose")
     parts = max(1, round(program.period / drives.period))
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, robot.n_legs)
     delay = round(drives.dead_time * parts / program.period)
@@ -62,8 +65,6 @@ def simulate_servo(
     lengths, accelerations = _after_rest(reference.lengths, rest), _after_rest(reference.accelerations, rest)
     lengths[:rest, :, 0], lengths[:rest, :, 1:], accelerations[:rest] = program.legs[0], 0.0, 0.0
     legs, efforts = np.empty((2, len(lengths) + 1, robot.n_legs))
-    limits = np.array([NEAR_W_SQUARED, robot.linear_part.near_s_squared])
-    origin = np.append(robot.base_joints[2, :2], robot.offsets[2])
     with np.errstate(all="ignore"):  # unstable loops overflow; they are refused below
         drive(
             lengths,
@@ -78,9 +79,7 @@ def simulate_servo(
             correct,
             correction.feedback,
             (
-                robot.linear_part.linear_map,
-                robot.linear_part.constant,
-                np.concatenate([[robot.delta], origin, limits, [machine.tool_length]]),
+                *_forward(robot, machine.tool_length),
                 np.array([program.component], dtype=np.float64),
                 robot.base_joints,
                 robot.offsets,
@@ -102,6 +101,16 @@ def simulate_servo(
             remedy="lower the gains or the dead time in [drives]; near a singularity a small error is enough",
         )
     return Played(legs, position + machine.tool_length * direction, direction, efforts * drives.moving_mass)
+
+
+def _forward(robot: Robot, tool_length: float) -> tuple[Floats, Floats, Floats]:
+    """Return what the kernel's forward kinematics needs; zeros for a family without it, whose poses are not asked."""
+    if not isinstance(robot, LinearPentapod):
+        return np.zeros((4, robot.n_legs)), np.zeros(4), np.zeros(7)
+    limits = [NEAR_W_SQUARED, robot.linear_part.near_s_squared]
+    origin = [*robot.base_joints[2, :2], robot.offsets[2]]
+    numbers = np.array([robot.delta, *origin, *limits, tool_length])
+    return robot.linear_part.linear_map, robot.linear_part.constant, numbers
 
 
 def _after_rest(values: Floats, rest: int) -> Floats:

@@ -3,24 +3,36 @@
 from pentapod.theory.architecture import ArchitecturalDistance, architectural_distance
 from pentapod.theory.cell_poses import cell_of, poses_in_cell
 from pentapod.theory.cells import Cell, CellDecomposition, cell_decomposition
+from pentapod.theory.design_distance import DesignDistance, DesignSearch, design_distance
+from pentapod.theory.general_sphere import BoundedSphere, SphereSearch, bounded_singularity_free_sphere
 from pentapod.theory.guide_choice import GuideChoice, choose_rail_positions, conditioning_criterion, stiffness_criterion
 from pentapod.theory.reach import ReachField
+from pentapod.theory.rearrangements import EquivalentLeg, LegPencil, cross_ratio
 from pentapod.theory.sphere import SingularityFreeSphere, singularity_free_sphere
 from pentapod.theory.workspace import Workspace
 
 __all__ = [
     "ArchitecturalDistance",
+    "BoundedSphere",
     "Cell",
     "CellDecomposition",
+    "DesignDistance",
+    "DesignSearch",
+    "EquivalentLeg",
     "GuideChoice",
+    "LegPencil",
     "ReachField",
     "SingularityFreeSphere",
+    "SphereSearch",
     "Workspace",
     "architectural_distance",
+    "bounded_singularity_free_sphere",
     "cell_decomposition",
     "cell_of",
     "choose_rail_positions",
     "conditioning_criterion",
+    "cross_ratio",
+    "design_distance",
     "poses_in_cell",
     "singularity_free_sphere",
     "stiffness_criterion",

@@ -59,7 +59,7 @@ def test_desk_passes_and_is_explained(desk):
     report = check(desk)
     text = explain(report)
     assert report.passed
-    assert report.component == Component(1, 1)
+    assert report.branch == Component(1, 1)
     for words in ("machine desk", desk.digest, "keeps its own limits", report.clearance_pair, "stroke"):
         assert words in text
 

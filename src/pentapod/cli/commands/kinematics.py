@@ -13,9 +13,9 @@ from pentapod.cli.output import echo_json, json_option, quiet_option
 
 if TYPE_CHECKING:
     from pentapod.base.arrays import Floats
+    from pentapod.kinematics import Branch, Robot
 
 POSE = ("x_mm", "y_mm", "z_mm", "i", "j", "k")
-LEGS = ("leg1_mm", "leg2_mm", "leg3_mm", "leg4_mm", "leg5_mm")
 
 _NEGATIVES = {"ignore_unknown_options": True}  # or -120.5 would be taken for an option
 _machine_option = click.option(
@@ -55,34 +55,33 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -
     limits = machine.legs
     within = ((legs >= limits.min_length) & (legs <= limits.max_length)).all(axis=1)
     components = [_component(signs) for signs in machine.robot.branch(position, direction)]
-    columns: dict[str, Any] = {name: legs[:, k] * 1e3 for k, name in enumerate(LEGS)}
+    columns: dict[str, Any] = {name: legs[:, k] * 1e3 for k, name in enumerate(leg_names(machine.robot))}
     columns |= {"component": components, "within_strokes": within.tolist()}
     _print(columns, as_json=as_json, one=bool(pose), quiet=quiet)
     return 0
 
 
 @click.command(context_settings=_NEGATIVES)
-@click.argument("legs", nargs=-1, type=Real(), metavar="[L1 L2 L3 L4 L5]")
-@click.option("-c", "--component", help='Signs of w and S: "++", "+-", "-+", "--"; all four when left out.')
+@click.argument("legs", nargs=-1, type=Real(), metavar="[L1 L2 ...]")
+@click.option("-c", "--component", help='Its signs: "++", "+-", "-+" or "--"; all of the machine when left out.')
 @_machine_option
 @json_option
 @quiet_option
 def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_json: bool, quiet: bool) -> int:
-    """Forward kinematics: tips in mm, tool axes and distances to singularities of five leg lengths in mm.
+    """Forward kinematics: tips in mm, tool axes and distances to singularities of leg lengths in mm.
 
     Five legs have four poses, one in each component, or none. Without numbers, CSV is read from stdin: a
-    header "leg1_mm,...,leg5_mm", then one set of legs in each line. nan: no such pose. Exit code 1 where a
+    header "leg1_mm,leg2_mm,...", then one set of legs in each line. nan: no such pose. Exit code 1 where a
     set of legs has no pose.
     """
     import numpy as np
 
-    from pentapod.kinematics import COMPONENTS, Component, orientation_distance, position_distance
-    from pentapod.kinematics.families.quadratic import as_quadratic
     from pentapod.machine import Machine
 
     machine = Machine.load(machine_name)
-    rows = _rows(legs, LEGS) * 1e-3
-    chosen = list(COMPONENTS) if component is None else [Component.parse(component)]
+    robot = machine.robot
+    rows = _rows(legs, leg_names(robot)) * 1e-3
+    chosen = list(robot.branches) if component is None else [_named(robot, component)]
     position, direction = machine.robot.pose(rows[:, None, :], np.array(chosen))
     position, direction = position.reshape(-1, 3), direction.reshape(-1, 3)
     tips = (position + machine.tool_length * direction) * 1e3
@@ -90,11 +89,43 @@ def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_jso
     columns["component"] = [str(c) for c in chosen] * len(rows)
     columns |= {name: tips[:, k] for k, name in enumerate(POSE[:3])}
     columns |= {name: -direction[:, k] for k, name in enumerate(POSE[3:])}
-    robot = as_quadratic(machine.robot, "the distance to singularities")
-    columns["singularity_mm"] = position_distance(robot, position, direction) * 1e3
-    columns["singularity_deg"] = np.degrees(orientation_distance(robot, position, direction))
+    columns |= _distances(robot, position, direction)
     _print(columns, as_json=as_json, one=bool(legs) and component is not None, quiet=quiet)
     return 0 if np.isfinite(tips).all() else 1
+
+
+def leg_names(robot: Robot) -> tuple[str, ...]:
+    """Return the columns of a robot's legs."""
+    return tuple(f"leg{k}_mm" for k in range(1, robot.n_legs + 1))
+
+
+def _named(robot: Robot, name: str) -> Branch:
+    """Return the branch of a name. Raises InputError."""
+    from pentapod.base.errors import InputError
+
+    for branch in robot.branches:
+        if str(branch) == name:
+            return branch
+    known = ", ".join(f'"{branch}"' for branch in robot.branches)
+    raise InputError("unknown component", key="--component", value=name, expected=known)
+
+
+def _distances(robot: Robot, position: Floats, direction: Floats) -> dict[str, Any]:
+    """Return how far poses (N, 3) are from singularities, in mm and, where a closed form gives it, in degrees."""
+    import numpy as np
+
+    from pentapod.kinematics import LinearPentapod, orientation_distance, position_distance
+    from pentapod.kinematics.arithmetic import NUMPY
+
+    if isinstance(robot, LinearPentapod):
+        turn = orientation_distance(robot, position, direction)
+        return {
+            "singularity_mm": position_distance(robot, position, direction) * 1e3,
+            "singularity_deg": np.degrees(turn),
+        }
+    margins = robot.singularity_margins(list(position.T), list(direction.T), robot.branches[0], NUMPY)
+    far = [np.abs(m) for m, of in zip(margins, robot.singularities, strict=True) if of.unit == "mm"]
+    return {"singularity_mm": np.min(far, axis=0) * 1e3}
 
 
 def _component(signs: Sequence[int]) -> str:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pentapod.cli.commands.kinematics import LEGS
 from pentapod.cli.numbers import Real, Whole
 from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
 
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from pentapod.toolpath import Toolpath
 
 SERVO_OPTIONS, MUJOCO_OPTIONS = ("correct", "seed"), ("export", "cutting_force_n", "base_error", "offset_error")
-_LEG, _MM = Whole(1, len(LEGS)), Real()
+_LEG, _MM = Whole(1), Real()
 
 
 @click.command()
@@ -135,7 +134,8 @@ class _Task:
         from pentapod.base.refusal import Refusal
         from pentapod.simulate import cutting_forces, plant, simulate_mujoco
 
-        modelled = plant(self.reference, **_errors(given["base_error"], given["offset_error"]))
+        errors = _errors(given["base_error"], given["offset_error"], self.reference.machine.robot.n_legs)
+        modelled = plant(self.reference, **errors)
         if isinstance(modelled, Refusal):
             return modelled
         if export is not None:
@@ -163,15 +163,22 @@ class _Task:
         tracking = Tracking(physics.played, self.reference, self.toolpath, self.tolerance, physics.measures)
         low, high = physics.leg_forces.min(axis=0), physics.leg_forces.max(axis=0)
         spans = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in zip(low, high, strict=True))
-        lines = [*tracking.lines(), f"  leg forces 1 to 5, pushing: {spans} N"]
+        lines = [*tracking.lines(), f"  leg forces 1 to {len(low)}, pushing: {spans} N"]
         return tracking, lines, {**tracking.to_dict(), "leg_forces_n": {"least": low.tolist(), "most": high.tolist()}}
 
 
-def _errors(base: list[tuple[int, float, float, float]], offset: list[tuple[int, float]]) -> dict[str, Any]:
-    """Return the errors of the options, millimetres, as arrays in metres."""
+def _errors(
+    base: list[tuple[int, float, float, float]], offset: list[tuple[int, float]], n_legs: int
+) -> dict[str, Any]:
+    """Return the errors of the options, millimetres, as arrays in metres. Raises InputError: no such leg."""
     import numpy as np
 
-    base_errors, offset_errors = np.zeros((len(LEGS), 3)), np.zeros(len(LEGS))
+    from pentapod.base.errors import InputError
+
+    last = max((leg for leg, *_ in (*base, *offset)), default=1)
+    if last > n_legs:
+        raise InputError("no such leg", key="--base-error, --offset-error", value=last, expected=f"1 to {n_legs}")
+    base_errors, offset_errors = np.zeros((n_legs, 3)), np.zeros(n_legs)
     for leg, *error in base:
         base_errors[leg - 1] += np.array(error) * 1e-3
     for leg, along in offset:

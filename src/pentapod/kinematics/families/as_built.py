@@ -20,7 +20,7 @@ from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.proofs.by_leg_equations import ProvenByLegEquations
-from pentapod.kinematics.robot import Branch, SingularSurface
+from pentapod.kinematics.robot import Branch, Robot, SingularSurface
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,6 +209,16 @@ class AsBuiltPentapod(Value, ProvenByLegEquations):
             ratio = self.radii / np.linalg.norm(normal, axis=-1)
         ratio = np.where(self.radii == 0.0, 0.0, np.where(np.isinf(ratio), np.nan, ratio))
         return t, ratio, normal
+
+
+def as_nominal(robot: Robot, purpose: str) -> LinearPentapod | GeneralPentapod:
+    """Return the robot where errors can be added to it; raises MachineError, which names the purpose, else."""
+    if isinstance(robot, LinearPentapod | GeneralPentapod):
+        return robot
+    raise MachineError(
+        f"{purpose} needs a linear pentapod", key="robot", value=type(robot).__name__,
+        expected="a machine of the quadratic or the general family",
+    )  # fmt: skip
 
 
 def _given(value: ArrayLike, key: str, shape: tuple[int, ...]) -> Floats:

@@ -10,10 +10,11 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
 from pentapod.geometry.directions import angle_between
-from pentapod.kinematics.component import Component
-from pentapod.kinematics.families.quadratic import as_quadratic
-from pentapod.kinematics.families.singularities import orientation_distance, position_distance, singularity_values
+from pentapod.kinematics.arithmetic import NUMPY
+from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.kinematics.families.singularities import orientation_distance
 from pentapod.kinematics.forces import tip_force_amplification
+from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.leg_clearance import clearances, pair_names
 from pentapod.machine.machine import ARCHITECTURAL_LIMIT, Machine
 from pentapod.machine.parts import WorkVolume
@@ -52,9 +53,10 @@ class MachineReport(Value):
     """The worst values over all sampled poses.
 
     length_range (n_legs, 2) metres; base_angle (n_legs,) largest angle to the base joint's axis, radians;
-    platform_range (n_legs, 2) radians; least_w; least_s: distance to S = 0, metres; least_turn: to any singularity,
-    radians of turning about the tip; amplification: force of the legs by force at the tip; clearance, metres, and its
-    pair of bodies. component: the one in which all poses lie, or None.
+    platform_range (n_legs, 2) radians; margins: least distance from each of the robot's `singularities`, metres or
+    radians by its unit; least_turn: radians of turning about the tip to any singularity, None where no closed form
+    gives it; amplification: force of the legs by force at the tip; clearance, metres, and its pair of bodies. branch:
+    the one in which all poses lie, or None.
     """
 
     machine: Machine
@@ -62,13 +64,12 @@ class MachineReport(Value):
     length_range: Floats
     base_angle: Floats
     platform_range: Floats
-    least_w: float
-    least_s: float
-    least_turn: float
+    margins: tuple[float, ...]
+    least_turn: float | None
     amplification: float
     clearance: float
     clearance_pair: str
-    component: Component | None
+    branch: Branch | None
     findings: tuple[MachineFinding, ...]
 
     @property
@@ -85,18 +86,24 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = L
     """
     tips, axes = sample_work_volume(machine.work, rings=rings, around=around, levels=levels)
     position, direction = tips + machine.tool_length * axes, -axes
-    robot = as_quadratic(machine.robot, "the report of a work volume")
+    robot = machine.robot
     vectors = robot.leg_vectors(position, direction)
     lengths = np.linalg.norm(vectors, axis=-1)
     base = angle_between(vectors, machine.joints.base_axes)
     platform = angle_between(-vectors, axes[:, None, :])
-    w, s = singularity_values(robot, position, direction)
-    s_distance = position_distance(robot, position, direction)
-    turn = orientation_distance(robot, position, direction, about=machine.tool_length)
+    margins = robot.singularity_margins(list(position.T), list(direction.T), robot.branches[0], NUMPY)
+    units = [surface.unit for surface in robot.singularities]
+    margins = [
+        np.abs(m) if unit == "mm" else np.arcsin(np.minimum(np.abs(m), 1.0))
+        for m, unit in zip(margins, units, strict=True)
+    ]
+    turn = None
+    if isinstance(robot, LinearPentapod):
+        turn = orientation_distance(robot, position, direction, about=machine.tool_length)
     force = tip_force_amplification(robot, position, direction, machine.tool_length)
     gaps = clearances(machine, position, direction)
-    signs = {(int(a), int(b)) for a, b in zip(np.sign(w), np.sign(s), strict=True)}  # 0 on a singularity
-    one = next(iter(signs)) if len(signs) == 1 else (0, 0)
+    met = {tuple(signs) for signs in robot.branch(position, direction).tolist()}  # 0 on a singularity
+    one = next((branch for branch in robot.branches if met == {tuple(branch)}), None)
     pair = pair_names(machine)[int(np.argmin(gaps.min(axis=0)))]
 
     def where(pose: int) -> str:
@@ -107,31 +114,39 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = L
         pose = int(np.argmax(values) if kind == "at most" else np.argmin(values))
         return MachineFinding(name, values[pose], kind, limit, unit, where(pose))
 
-    nearest = int(np.argmin(np.minimum(np.abs(w), np.abs(s_distance))))
+    nearest = int(np.argmin(np.minimum.reduce(margins)))
+    limits = [
+        worst(f"distance to {surface.name}", _in_unit(values, surface.unit), "more than", 0.0, surface.unit)
+        for surface, values in zip(robot.singularities, margins, strict=True)
+    ]
+    if turn is not None:
+        limits.append(worst("turn about the tip to a singularity", np.degrees(turn), "more than", 0.0, "deg"))
     return MachineReport(
         machine=machine,
         poses=len(tips),
         length_range=np.stack([lengths.min(axis=0), lengths.max(axis=0)], axis=1),
         base_angle=base.max(axis=0),
         platform_range=np.stack([platform.min(axis=0), platform.max(axis=0)], axis=1),
-        least_w=float(np.abs(w).min()),
-        least_s=float(s_distance.min()),
-        least_turn=float(turn.min()),
+        margins=tuple(float(values.min()) for values in margins),
+        least_turn=None if turn is None else float(turn.min()),
         amplification=float(force.max()),
         clearance=float(gaps.min()),
         clearance_pair=pair,
-        component=Component(*one) if 0 not in one else None,
+        branch=one,
         findings=(
             *_of_legs(machine, lengths, base, platform, worst),
-            MachineFinding("components met", len(signs), "at most", 1, "", where(nearest)),
-            worst("|w|", np.abs(w), "more than", 0.0, ""),
-            worst("distance to S = 0", 1e3 * s_distance, "more than", 0.0, "mm"),
-            worst("turn about the tip to a singularity", np.degrees(turn), "more than", 0.0, "deg"),
+            MachineFinding("components met", len(met), "at most", 1, "", where(nearest)),
+            *limits,
             worst("tip force to leg forces", force, "at most", AMPLIFICATION_LIMIT, "N/N"),
             worst(f"clearance, {pair}", 1e3 * gaps.min(axis=1), "more than", 0.0, "mm"),
             MachineFinding("architectural measure", machine.architecture, "at least", ARCHITECTURAL_LIMIT, ""),
         ),
     )
+
+
+def _in_unit(margin: Floats, unit: str) -> Floats:
+    """Return distances in millimetres or degrees."""
+    return 1e3 * margin if unit == "mm" else np.degrees(margin)
 
 
 def _of_legs(
@@ -167,8 +182,8 @@ def explain(report: MachineReport) -> str:
         f"{1e3 * work.height:.0f} mm height",
         f"    around ({centre}) mm; tool axes within {np.degrees(work.tilt):.3g}° of -z",
         f"  tool {1e3 * m.tool_length:.1f} mm from the line's origin, "
-        f"{1e3 * (m.tool_length - m.robot.offsets.max()):.1f} mm beyond the lowest platform joint; "
-        f"delta {as_quadratic(m.robot, 'this report').delta:.6g}",
+        f"{1e3 * (m.tool_length - m.robot.offsets.max()):.1f} mm beyond the lowest platform joint",
+        f"  {_family(m)}",
         f"  rapids {6e4 * m.rapid_velocity:.0f} mm/min; a setpoint every {1e3 * m.controller.period:g} ms, "
         f"{m.controller.interpolation} between them",
         "",
@@ -185,13 +200,14 @@ def explain(report: MachineReport) -> str:
             f"{np.degrees(report.base_angle[k]):5.1f}° of {np.degrees(m.joints.base_cone[k]):.0f}°   "
             f"{least:5.1f}° to {most:5.1f}°"
         )
-    component = "several: a singularity runs through it" if report.component is None else str(report.component)
+    component = "several: a singularity runs through it" if report.branch is None else str(report.branch)
+    lines += ["", f"  component                             {component}"]
+    for surface, margin in zip(m.robot.singularities, report.margins, strict=True):
+        far = f"{1e3 * margin:.0f} mm" if surface.unit == "mm" else f"{np.degrees(margin):.1f}°"
+        lines.append(f"  {surface.name:<35}   {far} away")
+    if report.least_turn is not None:
+        lines.append(f"  turn about the tip to a singularity   {np.degrees(report.least_turn):.1f}°")
     lines += [
-        "",
-        f"  component                             {component}",
-        f"  least |w|                             {report.least_w:.3f}",
-        f"  distance to the plane S = 0           {1e3 * report.least_s:.0f} mm",
-        f"  turn about the tip to a singularity   {np.degrees(report.least_turn):.1f}°",
         f"  tip force to leg forces               {report.amplification:.2f} N/N",
         f"  smallest clearance                    {1e3 * report.clearance:.1f} mm ({report.clearance_pair})",
         f"  architectural measure                 {m.architecture:.4f}",
@@ -206,6 +222,20 @@ def explain(report: MachineReport) -> str:
         wanted = f"must be {finding.kind} {finding.limit:.4g}"
         lines.append(f"  {finding.name}: {finding.value:.4g} {finding.unit}, {wanted}{place}")
     return "\n".join(lines)
+
+
+def _family(machine: Machine) -> str:
+    """Return the line of the text that tells the robot's family, and the guides."""
+    robot = machine.robot
+    if isinstance(robot, LinearPentapod):
+        text = f"quadratic family, delta {robot.delta:.6g}"
+    else:
+        joints = ", ".join(f"{1e3 * z:.4g}" for z in robot.offsets)
+        text = f"{robot.numbers.get('family', 'a')} family, platform joints at {joints} mm along the line"
+    if machine.guides is None:
+        return text
+    travel = ", ".join(f"{1e3 * low:.4g} to {1e3 * high:.4g}" for low, high in machine.guides.travel)
+    return f"{text}; base joints on guides, positions {travel} mm"
 
 
 def sample_work_volume(volume: WorkVolume, *, rings: int, around: int, levels: int) -> tuple[Floats, Floats]:

@@ -1,0 +1,75 @@
+"""pentapod modes: which poses fit the legs' readings at power-on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pentapod.cli.numbers import Real
+from pentapod.cli.output import echo_json, json_option, quiet_option
+
+if TYPE_CHECKING:
+    from pentapod.machine import AssemblyPose
+
+
+@click.command()
+@click.option("--legs", required=True, metavar="L1,L2,...", help="What the legs' scales read, mm, leg 1 first.")
+@click.option("--error", "error_mm", type=Real(0.0), default=0.01, show_default=True, metavar="MM",
+              help="By how much each reading may be wrong.")  # fmt: skip
+@click.option("-m", "--machine", "machine_name", default="desk", show_default=True,
+              help="Shipped machine, or a machine file.")  # fmt: skip
+@json_option
+@quiet_option
+def modes(legs: str, error_mm: float, machine_name: str, as_json: bool, quiet: bool) -> int:
+    """Show which poses of the tool fit the lengths of the legs, and strokes, joints and bodies of the machine.
+
+    After power-on a controller knows the legs' lengths alone. The true pose is always among those that fit, within the
+    error of the readings; where this cannot be proven the command refuses. Exit code 1 there, and where more or fewer
+    than one fits.
+    """
+    from pentapod.base.errors import InputError
+    from pentapod.base.files import number_in
+    from pentapod.base.refusal import Refusal
+    from pentapod.machine import Machine, admissible_modes
+
+    machine = Machine.load(machine_name)
+    numbers = [number_in(word) for word in legs.replace(",", " ").split()]
+    lengths = [1e-3 * number for number in numbers if number is not None]
+    count = machine.robot.n_legs
+    if len(lengths) != len(numbers) or len(lengths) != count:
+        raise InputError("not the lengths of the legs", key="--legs", value=legs, expected=f"{count} numbers, mm")
+    found = admissible_modes(machine, lengths, leg_error=1e-3 * error_mm)
+    if isinstance(found, Refusal):
+        if as_json:
+            echo_json({"machine": machine.name, "proven": False, "cause": str(found)})
+        click.echo(f"refused: {found}", err=True)
+        return 1
+    fitting = len(found.admissible)
+    if as_json:
+        rows = [_row(pose) for pose in found.poses]
+        echo_json({"machine": machine.name, "proven": True, "fitting": fitting, "modes": rows})
+    elif not quiet:
+        click.echo(f"{machine.name}: {len(found.poses)} modes, {fitting} " + ("fits" if fitting == 1 else "fit"))
+        for pose in found.poses:
+            tip, axis = (
+                ", ".join(f"{x:{form}}" for x in v) for v, form in ((1e3 * pose.tip, ".3f"), (pose.axis, "+.4f"))
+            )
+            verdict = "fits" if pose.fits else _words(pose.excluded)
+            click.echo(f"  {pose.branch}  tip ({tip}) mm, tool axis ({axis}): {verdict}")
+    if fitting != 1 and not quiet:
+        told = "look at the machine to tell them apart" if fitting else "readings, machine file or their order is wrong"
+        click.echo(f"{fitting} modes fit: {told}", err=True)
+    return 0 if fitting == 1 else 1
+
+
+def _words(excluded: tuple[str, ...]) -> str:
+    more = len(excluded) - 1
+    return excluded[0] + (f", and {more} more limits" if more > 1 else f"; {excluded[1]}" if more else "")
+
+
+def _row(pose: AssemblyPose) -> dict[str, Any]:
+    return {
+        "component": str(pose.branch), "fits": pose.fits, "tip_mm": [1e3 * float(x) for x in pose.tip],
+        "axis": [float(x) for x in pose.axis], "tip_error_mm": 1e3 * pose.error, "excluded": list(pose.excluded),
+    }  # fmt: skip
