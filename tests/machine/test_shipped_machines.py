@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pentapod.machine import Machine, admissible_modes, check, explain, shipped_machines
-from pentapod.machine.modes import AssemblyPoses
+from pentapod.machine.report.modes import AssemblyPoses
 
 
 @pytest.fixture(scope="module", params=shipped_machines())

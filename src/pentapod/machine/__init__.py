@@ -5,9 +5,9 @@ from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld, 
 from pentapod.machine.clearance.leg_clearance import clearances, pair_names, segment_distance
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.machine import ARCHITECTURAL_LIMIT, Machine, load_machine, read_machine
-from pentapod.machine.modes import AssemblyPose, AssemblyPoses, admissible_modes
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 from pentapod.machine.reader import shipped_machines
+from pentapod.machine.report.modes import AssemblyPose, AssemblyPoses, admissible_modes
 from pentapod.machine.report.report import (
     AMPLIFICATION_LIMIT,
     MachineFinding,

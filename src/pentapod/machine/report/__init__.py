@@ -1,1 +1,1 @@
-"""The report on a machine: its work volume sampled, the worst poses, and its text."""
+"""What a machine can do: its work volume sampled, the worst poses and their text; its modes at power-on."""

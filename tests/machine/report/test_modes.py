@@ -9,7 +9,7 @@ from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal
 from pentapod.geometry.directions import angle_between
 from pentapod.machine import Machine, admissible_modes, clearances
-from pentapod.machine.modes import AssemblyPoses
+from pentapod.machine.report.modes import AssemblyPoses
 
 DESK = Machine.load("desk")
 
