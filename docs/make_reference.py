@@ -18,6 +18,7 @@ import click
 from pentapod.cli.verbs import VERBS, cli
 from pentapod.job.schema.strategies import job_strategies
 from pentapod.job.schema.tables import JobTables, table_model
+from pentapod.machine.calibration.calibration_file import CalibrationTables
 from pentapod.machine.tables import MachineTables
 
 HERE = Path(__file__).parent / "reference"
@@ -54,6 +55,11 @@ def pages() -> dict[str, str]:
             "TOML. Where legs have a number each, one number stands for all. "
             "`pentapod machine check FILE` judges a file.",
             MachineTables.model_json_schema(),
+        ),
+        "calibration.md": _file_page(
+            "The calibration file",
+            "TOML. `[calibration] file` of a machine file names it; [Machines as built](../as-built.md) explains it.",
+            CalibrationTables.model_json_schema(),
         ),
         "commands.md": _MADE + "# Commands\n\n" + "\n".join(_commands()),
         "api.md": _MADE + "# Python API\n\nEverything is in metres, radians and seconds.\n\n" + "\n".join(_packages()),

@@ -261,7 +261,11 @@ class _Task:
 
     def _program(self, placed: PlacedPath, trajectory: Trajectory, file: Path) -> Program:
         made_on = (processor_kind(), library_versions())
-        source = Provenance(self.machine.name, self.machine.digest, self.job.digest, __version__, self.piece, *made_on)
+        machine = self.machine
+        source = Provenance(
+            machine.name, machine.digest, self.job.digest, __version__, self.piece, *made_on,
+            calibration=machine.calibration_name,
+        )  # fmt: skip
         program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
         write_csv(program, file)
         return program

@@ -1,6 +1,9 @@
 """Machines: geometry with limits and bodies, machine files, clearances, calibration, and the report on a machine."""
 
 from pentapod.machine.calibration.calibration import Calibration, calibrate
+from pentapod.machine.calibration.calibration_file import read_calibration, write_calibration
+from pentapod.machine.calibration.record import CalibrationFit, CalibrationRecord, MeasuredGeometry, geometry_digest
+from pentapod.machine.calibration.recording import record_of
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld, Obstacle
 from pentapod.machine.clearance.leg_clearance import clearances, pair_names, segment_distance
 from pentapod.machine.drives import Drives, Masses
@@ -25,6 +28,8 @@ __all__ = [
     "AssemblyPoses",
     "Bodies",
     "Calibration",
+    "CalibrationFit",
+    "CalibrationRecord",
     "CollisionWorld",
     "ControllerSettings",
     "Drives",
@@ -34,6 +39,7 @@ __all__ = [
     "MachineFinding",
     "MachineReport",
     "Masses",
+    "MeasuredGeometry",
     "Obstacle",
     "ToolLimits",
     "WorkVolume",
@@ -42,10 +48,14 @@ __all__ = [
     "check",
     "clearances",
     "explain",
+    "geometry_digest",
     "load_machine",
     "pair_names",
+    "read_calibration",
     "read_machine",
+    "record_of",
     "sample_work_volume",
     "segment_distance",
     "shipped_machines",
+    "write_calibration",
 ]

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -21,6 +19,8 @@ from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.robot import Robot
 from pentapod.machine import reader
+from pentapod.machine.calibration.digest import digest_of
+from pentapod.machine.calibration.record import CalibrationRecord
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.fields import positive
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
@@ -36,7 +36,8 @@ class Machine(Value):
     tool_length: metres from p (the platform line's origin, where offset = 0) along i to the tool tip.
     rapid_velocity: largest tip speed on rapids, m/s. drives, masses: for simulation alone; a program does not depend on
     them. guides: of a reconfigurable machine, on which the base joints are set before a program runs; rail_positions
-    (n_legs,) metres: where they stand; `robot` is the geometry there.
+    (n_legs,) metres: where they stand; `robot` is the geometry there. calibration: from which `robot` is the machine as
+    built; None where it is the one that was designed.
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
     spindle's nose would be above the lowest platform joint.
@@ -57,6 +58,7 @@ class Machine(Value):
     masses: Masses = field(default_factory=Masses)
     tool_limits: ToolLimits = field(default_factory=ToolLimits)
     guides: ReconfigurablePentapod | None = None
+    calibration: CalibrationRecord | None = None
     rail_positions: Floats = field(default_factory=lambda: np.zeros(FiveLegs.n_legs))
     architecture: float = field(init=False)
 
@@ -117,9 +119,12 @@ class Machine(Value):
 
         Name, drives and masses do not count. With its guides elsewhere it is another machine.
         """
-        plain = {name: _plain(value) for name, value in _numbers(self)}
-        text = json.dumps(plain, sort_keys=True, separators=(",", ":"), allow_nan=False)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
+        return digest_of(dict(_numbers(self)))
+
+    @property
+    def calibration_name(self) -> str:
+        """What programs name as the machine's calibration; "" where there is none."""
+        return "" if self.calibration is None else self.calibration.name
 
     def with_tool(self, tool_length: float) -> Machine:
         """Return this machine with another tool: metres from p to the tip. Raises MachineError."""
@@ -145,10 +150,6 @@ def load_machine(name_or_path: str | Path) -> Machine:
 def read_machine(text: str, file: str | Path) -> Machine:
     """Return the machine that TOML text describes; `file` is named in errors. Raises MachineError."""
     return reader.read(text, file, Machine)
-
-
-def _plain(value: object) -> object:
-    return value if isinstance(value, str) else (np.asarray(value, dtype=np.float64) + 0.0).tolist()
 
 
 def _numbers(machine: Machine) -> Iterator[tuple[str, object]]:

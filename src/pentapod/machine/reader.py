@@ -21,6 +21,8 @@ from pentapod.base.toml import line_of, parsed, read_toml
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.kinematics.robot import Robot
+from pentapod.machine.calibration.calibration_file import read_calibration
+from pentapod.machine.calibration.record import CalibrationRecord
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.families import FAMILIES
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
@@ -66,15 +68,33 @@ def machine_bytes(name_or_path: str | Path) -> bytes:
         raise MachineError("the machine file cannot be read", file=name) from error
 
 
+def calibration_bytes(name_or_path: str | Path) -> bytes | None:
+    """Return the bytes of the calibration file that a machine's file names; None where it names none.
+
+    Raises MachineError where one of the two cannot be read.
+    """
+    content = parsed(machine_bytes(name_or_path).decode("utf-8-sig"), name_or_path, MachineError)
+    name = content.get("calibration", {}).get("file")
+    if name is None:
+        return None
+    path = Path(name_or_path).parent / name
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise MachineError("the calibration file cannot be read", file=path) from error
+
+
 def read(text: str, file: str | Path, make: Callable[..., Made]) -> Made:
     """Return the machine that TOML text describes, made by `make`; `file` is named in errors. Raises MachineError."""
     content = parsed(text, file, MachineError)
     try:
-        return make(**_fields(MachineTables.model_validate(content)))
+        return make(**_fields(MachineTables.model_validate(content), file))
     except ValidationError as error:
         where, details = problem_of(error, MachineTables, _table)
         raise MachineError(file=file, line=line_of(text, where), **details) from error
     except InputError as error:
+        if error.file is not None:  # of the calibration
+            raise
         key = FILE_KEYS.get(error.key or "", error.key)
         raise MachineError(
             error.what,
@@ -91,9 +111,11 @@ def _library() -> Traversable:
     return resources.files("pentapod.machine") / "library"
 
 
-def _fields(tables: Any) -> dict[str, Any]:
-    """Return the fields of a machine, SI, from a `MachineTables`."""
-    robot = FAMILIES[tables.geometry.family].robot(tables.geometry)
+def _fields(tables: Any, file: str | Path) -> dict[str, Any]:
+    """Return the fields of a machine, SI, from the `MachineTables` of a file."""
+    designed = FAMILIES[tables.geometry.family].robot(tables.geometry)
+    guides = _guides(designed, **fields_from(GuideKeys, tables.guides))
+    robot, calibration = _as_built(designed, guides, tables.calibration.file, file)
     platform = fields_from(PlatformJointKeys, tables.joints)
     return {
         "name": tables.name,
@@ -109,9 +131,31 @@ def _fields(tables: Any) -> dict[str, Any]:
         "drives": Drives(**fields_from(Drives, tables.drives)),
         "masses": Masses(**fields_from(Masses, tables.masses)),
         "tool_limits": ToolLimits(**fields_from(ToolLimits, tables.tool)),
-        "guides": _guides(robot, **fields_from(GuideKeys, tables.guides)),
+        "guides": guides,
+        "calibration": calibration,
         **fields_from(MachineToolKeys, tables.tool),
     }
+
+
+def _as_built(
+    designed: Robot, guides: ReconfigurablePentapod | None, name: str | None, machine_file: str | Path
+) -> tuple[Robot, CalibrationRecord | None]:
+    """Return the robot as the calibration file has it, and the calibration; as designed where none is named."""
+    if name is None:
+        return designed, None
+    if guides is not None:
+        raise MachineError(
+            "a machine with guides has no calibration file", key="calibration.file", value=name,
+            expected="a geometry that does not change", remedy="describe the machine with its guides where they stand",
+        )  # fmt: skip
+    path = Path(machine_file).parent / name
+    record = read_calibration(path)
+    try:
+        return record.as_built(designed), record
+    except MachineError as error:
+        raise MachineError(
+            error.what, file=path, key=error.key, value=error.value, expected=error.expected, remedy=error.remedy
+        ) from error
 
 
 def _guides(robot: Robot, direction: Any, least: Any, greatest: Any) -> ReconfigurablePentapod | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field, create_model
@@ -52,7 +53,17 @@ class MachineToolKeys:
     rapid_velocity: Annotated[float, Key("mm_min", "largest tip speed on rapids", "rapid", gt=0.0)]
 
 
+@dataclass(frozen=True)
+class CalibrationKeys:
+    """The machine as it was measured. Without it the machine counts as built exactly as designed."""
+
+    file: Annotated[
+        Path | None, Key("", "calibration file, relative to this file: programs are for the geometry in it", kind=Path)
+    ] = None
+
+
 PARTS: dict[str, tuple[type, ...]] = {
+    "calibration": (CalibrationKeys,),
     "guides": (GuideKeys,),
     "legs": (LegLimits,),
     "joints": (JointLimits, PlatformJointKeys),

@@ -40,9 +40,11 @@ GUIDES = "guides_mm"
 WAYPOINTS, BOX = "setup_waypoints", "setup_box_mm"
 SETUP_KEYS = (WAYPOINTS, BOX)
 """Keys of programs of several set-ups."""
+CALIBRATION = "calibration"
+"""Key of programs for a machine as it was measured."""
 MADE_ON = ("processor", "libraries")
 """Keys of planned programs: on another kind of processor or with other libraries bits may differ."""
-OPTIONAL_KEYS = (GUIDES, *SETUP_KEYS, *MADE_ON)
+OPTIONAL_KEYS = (CALIBRATION, GUIDES, *SETUP_KEYS, *MADE_ON)
 UNVERIFIED = "UNVERIFIED: no verdict has passed this program"
 """First line, after the comment mark, of files written for a controller without a passed verdict."""
 LARGEST_COUNT = 2**63 - 1
@@ -82,6 +84,8 @@ def header_text(program: Program) -> str:
         "placement_mm": _matrix(program.placement),
         "rows": str(len(program.legs)),
     }
+    if source.calibration:
+        values[CALIBRATION] = _string(source.calibration)
     if program.rail_positions is not None:
         values[GUIDES] = f"[{', '.join(_decimal(x, 3) for x in program.rail_positions)}]"
     if source.piece is not None:
@@ -157,7 +161,7 @@ class _Reader:
                 pentapod_version=self._text("pentapod_version"),
                 piece=self._piece(),
                 unverified=self.unverified,
-                **{key: self._text(key) for key in MADE_ON if key in self.values},
+                **{key: self._text(key) for key in (*MADE_ON, CALIBRATION) if key in self.values},
             ),
             rows=self._rows(),
             rail_positions=self._rail_positions(),

@@ -28,6 +28,7 @@ class Provenance(Value):
 
     piece: of the toolpath, where the program is one of several set-ups. processor, libraries: with which it was made;
     with the same ones it is the same to the bit. unverified: it was written for a controller without a passed verdict.
+    calibration: name of the machine's calibration, "" where there is none.
     """
 
     machine: str
@@ -38,6 +39,7 @@ class Provenance(Value):
     processor: str = ""
     libraries: str = ""
     unverified: bool = False
+    calibration: str = ""
 
 
 @dataclass(frozen=True, eq=False)

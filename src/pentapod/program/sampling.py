@@ -52,6 +52,9 @@ def sample(
         interpolation=machine.controller.interpolation,
         component=component,
         placement=placement,
-        provenance=provenance or Provenance(machine.name, machine.digest, "", __version__, None, *made_on),
+        provenance=provenance
+        or Provenance(
+            machine.name, machine.digest, "", __version__, None, *made_on, calibration=machine.calibration_name
+        ),
         rail_positions=None if machine.guides is None else tuple(machine.rail_positions.tolist()),
     )

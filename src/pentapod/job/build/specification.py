@@ -15,7 +15,7 @@ from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import Component
 from pentapod.machine.clearance.collision_world import CollisionWorld
 from pentapod.machine.machine import Machine
-from pentapod.machine.reader import machine_bytes
+from pentapod.machine.reader import calibration_bytes, machine_bytes
 from pentapod.mesh.io.load import load_mesh
 from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.options import PathOptions
@@ -115,10 +115,13 @@ def job_coverage(job: Job, mesh: Mesh, machine: Machine | None = None) -> Covera
 
 def _sources(job: Job, *, own_machine: bool) -> Sources:
     """Return the SHA-256 of a job's files. Raises MachineError where the machine's file is gone."""
-    machine = None if own_machine else machine_bytes(job.machine_file or str(job.machine.name))
+    name = job.machine_file or str(job.machine.name)
+    machine = None if own_machine else machine_bytes(name)
+    calibration = None if own_machine else calibration_bytes(name)
     return Sources(
         job=_job_file(job),
         machine=None if machine is None else sha256(machine).hexdigest(),
+        calibration=None if calibration is None else sha256(calibration).hexdigest(),
         mesh=sha256_of(job.mesh_path),
         fixture=None if job.fixture_mesh is None else sha256_of(job.fixture_mesh),
         **{f"toolpath_{key}": sha256_of(file) for key, file in job.files.items()},

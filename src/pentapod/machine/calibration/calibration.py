@@ -24,14 +24,12 @@ from pentapod.base.values import Value
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.machine.calibration.leg_noise import restricted_sigma
+from pentapod.machine.calibration.parameters import KINDS, LEGS, PARAMETERS
 
-_KINDS = ("x", "y", "z", "offset", "radius", "zero")
-LEGS, _EACH, _RADIUS, _ZERO = FiveLegs.n_legs, 6, 4, 5
-"""Legs; numbers of each leg: x, y, z, offset, radius, zero; the places of radius and zero among them."""
+_EACH, _RADIUS, _ZERO = len(KINDS), KINDS.index("radius"), KINDS.index("zero")
+"""Numbers of each leg; the places of radius and zero among them."""
 
 _GROUPS = {"base": (0, 1, 2), "offsets": (3,), "zeros": (_ZERO,), "radii": (_RADIUS,)}  # in order of identification
-PARAMETERS = tuple(f"leg {leg} {kind}" for leg in range(1, LEGS + 1) for kind in _KINDS)
-"""The 30 parameters in the order of `Calibration.covariance`."""
 
 
 @dataclass(frozen=True)
@@ -255,9 +253,9 @@ def _identifiable(
                 taken.append(kind)
             else:
                 terms = [
-                    f"{_KINDS[k]} {-c:+.3g}" for k, c in zip(taken, others, strict=True) if abs(c) > OPTIONS.negligible
+                    f"{KINDS[k]} {-c:+.3g}" for k, c in zip(taken, others, strict=True) if abs(c) > OPTIONS.negligible
                 ]
-                gauges.append(f"leg {leg + 1}: " + ", ".join([f"{_KINDS[kind]} +1", *terms]) + " change no reading")
+                gauges.append(f"leg {leg + 1}: " + ", ".join([f"{KINDS[kind]} +1", *terms]) + " change no reading")
         free += [_EACH * leg + kind for kind in taken]
     return free, tuple(gauges)
 

@@ -15,8 +15,14 @@ def machine(replay: Replay) -> Finding:
     """Judge that the program was made for this machine, by name and by digest."""
     made_for, judged = replay.program.provenance, replay.machine
     passed = made_for.machine == judged.name and made_for.machine_digest == judged.digest
-    made = f"header: made for {made_for.machine} ({made_for.machine_digest})"
-    return Finding.without_value(passed, f"{made}, judged on {judged.name} ({judged.digest})")
+    made = f"header: made for {_named(made_for.machine, made_for.machine_digest, made_for.calibration)}"
+    return Finding.without_value(
+        passed, f"{made}, judged on {_named(judged.name, judged.digest, judged.calibration_name)}"
+    )
+
+
+def _named(name: str, digest: str, calibration: str) -> str:
+    return f"{name} ({digest}{f', calibration {calibration}' if calibration else ''})"
 
 
 def job(replay: Replay) -> Finding | Idle:

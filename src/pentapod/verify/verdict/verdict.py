@@ -17,13 +17,15 @@ _SHOWN = 12
 class Sources(Value):
     """SHA-256 of each file that a verdict is about, as hex digits; None where there is none, or it is not known.
 
-    machine: of the machine's file, also of one that is shipped. fixture: of its mesh. toolpath_file and
-    toolpath_curve: what the job's [toolpath] names (a drawing, points, a picture, a toolpath; a guide curve).
+    machine: of the machine's file, also of one that is shipped. calibration: of the file that it names. fixture: of
+    its mesh. toolpath_file and toolpath_curve: what the job's [toolpath] names (a drawing, points, a picture, a
+    toolpath; a guide curve).
     """
 
     program: str | None = None
     job: str | None = None
     machine: str | None = None
+    calibration: str | None = None
     mesh: str | None = None
     fixture: str | None = None
     stock: str | None = None
