@@ -1,5 +1,6 @@
 """The documentation: a reference that the code agrees with, commands that run, a site that builds without a warning."""
 
+import datetime
 import json
 import os
 import re
@@ -19,11 +20,11 @@ from pentapod.cli.main import run
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job
 from pentapod.kinematics import Component
-from pentapod.machine import Machine
+from pentapod.machine import CalibrationRecord, Machine, MeasuredGeometry, geometry_digest, write_calibration
 from pentapod.program import Program, Provenance, write_csv
 
 ROOT = Path(__file__).parents[2]
-MACHINE_TABLES = ["guides"]
+MACHINE_TABLES = ["calibration", "guides"]
 GUIDES = [*sorted(ROOT.glob("docs/howto/*.md")), ROOT / "docs" / "tutorial.md"]
 
 
@@ -78,6 +79,10 @@ def test_every_table_of_a_job_is_one(page, tmp_path):
     (tmp_path / "part.nc").write_text("", encoding="utf-8")
     library = ROOT / "src" / "pentapod" / "machine" / "library"
     shutil.copy(library / "desk.toml", tmp_path / "my_machine.toml")
+    desk = Machine.load("desk").robot
+    joints = MeasuredGeometry(desk.base_joints + 1e-4, desk.offsets, np.zeros(5), np.zeros(5))
+    measured = CalibrationRecord("desk", geometry_digest(desk), datetime.date(2026, 1, 31), joints)
+    write_calibration(measured, tmp_path / "desk-0117.toml")
     usual = {
         "part": 'mesh = "dome.stl"\nunit = "mm"\n',
         "tool": 'type = "ball"\ndiameter_mm = 6\n',

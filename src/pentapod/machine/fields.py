@@ -91,10 +91,6 @@ def _pairs(value: object) -> list[list[float]]:
     return _rows(value, 2, "five pairs [x, y], one for each leg")
 
 
-def _points(value: object) -> list[list[float]]:
-    return _rows(value, 3, "five points [x, y, z], one for each leg")
-
-
 def _axes(value: object) -> list[list[float]]:
     words = "one unit vector [x, y, z], or five (one for each leg)"
     single = isinstance(value, list) and len(cast(list[Any], value)) == 3 and _numbers(cast(object, value))
@@ -104,6 +100,5 @@ def _axes(value: object) -> list[list[float]]:
 PER_LEG = Annotated[list[float], BeforeValidator(_one_or_five)]
 FIVE_NUMBERS = Annotated[list[float], BeforeValidator(_five)]
 FIVE_PAIRS = Annotated[list[list[float]], BeforeValidator(_pairs)]
-FIVE_POINTS = Annotated[list[list[float]], BeforeValidator(_points)]
 FIVE_AXES = Annotated[list[list[float]], BeforeValidator(_axes)]
 LIST_OF_3 = Annotated[list[float], Field(min_length=3, max_length=3)]

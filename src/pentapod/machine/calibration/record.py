@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from pentapod.base.arrays import Floats, set_frozen
 from pentapod.base.errors import MachineError
@@ -20,10 +21,14 @@ from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.calibration.digest import digest_of
 from pentapod.machine.calibration.parameters import LEGS, PARAMETERS
-from pentapod.machine.fields import FIVE_NUMBERS, FIVE_POINTS, PER_LEG, per_leg
 
 DIGITS = 13
 """Significant digits of the numbers in a calibration file, 1e-10 mm of a metre. A record holds what its file says."""
+
+FIVE_NUMBERS = Annotated[list[float], Field(min_length=LEGS, max_length=LEGS)]
+FIVE_POINTS = Annotated[
+    list[Annotated[list[float], Field(min_length=3, max_length=3)]], Field(min_length=LEGS, max_length=LEGS)
+]
 
 LARGEST_ERROR = 0.1
 """Largest error of a joint, as a share of the base's size: beyond it units or legs were mixed up."""
@@ -44,12 +49,18 @@ class MeasuredGeometry(Value):
     ]
     radii: Annotated[
         Floats,
-        Key("mm", "radii of the rings on which the legs end; 0 is a joint on the line", "ring_radius", kind=PER_LEG),
+        Key(
+            "mm", "radii of the rings on which the legs end; 0 is a joint on the line", "ring_radius", kind=FIVE_NUMBERS
+        ),
     ]
-    zeros: Annotated[Floats, Key("mm", "reading of a leg's scale minus the leg's length", "zero", kind=PER_LEG)]
+    zeros: Annotated[Floats, Key("mm", "reading of a leg's scale minus the leg's length", "zero", kind=FIVE_NUMBERS)]
 
     def __post_init__(self) -> None:
-        per_leg(self, "offsets", "radii", "zeros", base=3)
+        for name, shape in (("base", (LEGS, 3)), *((name, (LEGS,)) for name in ("offsets", "radii", "zeros"))):
+            array = np.array(getattr(self, name), dtype=np.float64)
+            if array.shape != shape:
+                raise MachineError("wrong shape", key=name, value=array.shape, expected=str(shape))
+            set_frozen(self, **{name: array})
         _as_in_files(self)
         if (self.radii < 0.0).any():
             leg = int(np.argmin(self.radii))
