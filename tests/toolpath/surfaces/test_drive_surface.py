@@ -1,5 +1,6 @@
 """Drive surface: lines of centres against closed forms, chords and links against densely sampled distances."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -80,6 +81,43 @@ def test_links_follow_the_surface_and_are_clear(pocket):
         if link is not None:
             np.testing.assert_array_equal(link[[0, -1]], [start, end])
             assert np.linalg.norm(np.diff(link, axis=0), axis=1).sum() <= 2.6 * np.linalg.norm(end - start) + 1e-3
+
+
+def contacts_at(surface, centres):
+    """Passes of two points that begin and end at centres (N, 3)."""
+    normals = surface.centres.normals(centres)
+    return [(np.stack([c - R * n] * 2), np.stack([n] * 2)) for c, n in zip(centres, normals, strict=True)]
+
+
+@pytest.fixture(scope="module")
+def post():
+    """A disc of 20 mm with a round post of 5 mm, 20 mm high; both are upright."""
+    both = [trimesh.creation.cylinder(20e-3, 5e-3, sections=64), trimesh.creation.cylinder(5e-3, 40e-3, sections=256)]
+    return DriveSurface.of(part(trimesh.util.concatenate(both)), R, UP)
+
+
+def test_a_link_leads_around_a_post_by_the_shortest_way(post):
+    """Tangents to the circle of the centres, and an arc; its chords are clear."""
+    options = RasterOptions(stepover=2e-3, chordal=CHORDAL)
+    level, away, inner = 2.5e-3 + R, 15e-3, 5e-3 + R
+    ends = contacts_at(post, np.array([[-away, 0.0, level], [away, 0.4e-3, level]]))
+    (link,) = post.links({1: (ends[0], ends[1])}, options, 2e-3).values()
+    np.testing.assert_array_equal(link[0][[0, -1]], [ends[0][0][-1], ends[1][0][0]])
+    centres = link[0] + R * link[1]
+    assert gaps(post.part, dense([centres])).min() >= R - CHORDAL
+    reach = np.hypot(away, 0.4e-3), away
+    turn = np.pi - np.arctan2(0.4e-3, away) - sum(np.arccos(inner / a) for a in reach)
+    shortest = sum(np.sqrt(a**2 - inner**2) for a in reach) + inner * turn
+    assert shortest - 1e-5 <= np.linalg.norm(np.diff(centres, axis=0), axis=1).sum() <= 1.03 * shortest
+
+
+def test_no_link_leaves_the_region_or_is_too_long(post):
+    ends = contacts_at(post, np.array([[-15e-3, 0.0, 2.5e-3 + R], [0.0, 0.0, 20e-3 + R]]))
+    pair = {1: (ends[0], ends[1])}
+    assert post.links(pair, RasterOptions(stepover=2e-3), 2e-3)
+    assert not post.links(pair, RasterOptions(stepover=2e-3, region=Region(angle=np.radians(80.0))), 2e-3)
+    lazy = replace(post, centres=replace(post.centres, options=replace(post.options, around=0.5)))
+    assert not lazy.links(pair, RasterOptions(stepover=2e-3), 2e-3)
 
 
 def test_region_box_bounds_the_contacts_not_the_centres(pocket):

@@ -26,6 +26,7 @@ class DriveOptions(Value):
     window: length over which normals are averaged along a line, as a share of the radius: at creases they jump.
     border: how exactly an open border is known, as a share of the radius; enters: how far beyond it the ball gets where
     it is no hole. longest: of a link on the surface, as a multiple of the straight way; uneven: of its longest step.
+    around: longest link around what is in the way, as a multiple of the straight way and twice the clearance.
     sideways: distance around a point at which the surface above must hide it, above: by which height, both as
     shares of the radius: walls, and valleys between steep flanks, do not hide themselves. evened: how often the
     stepover for a scallop is averaged with that of neighbouring facets, whose curvature is noisy.
@@ -39,6 +40,7 @@ class DriveOptions(Value):
     enters: float = 0.5
     longest: float = 2.5
     uneven: float = 3.0
+    around: float = 3.0
     sideways: float = 0.01
     above: float = 0.2
     evened: int = 2

@@ -29,6 +29,7 @@ from pentapod.toolpath.lines.scallop import surface_steps
 from pentapod.toolpath.options import CoverOptions, PathOptions
 from pentapod.toolpath.surface import Contacts
 from pentapod.toolpath.surfaces.ball_centres import BallCentres, DriveOptions, smoothed
+from pentapod.toolpath.surfaces.ways_around import drawn_taut, shortest_ways
 
 _KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, DriveOptions], tuple[FacetTree, Mesh]]] = WeakKeyDictionary()
 """Drive surfaces of parts that are in use: planning and the verdict need the same."""
@@ -126,7 +127,10 @@ class DriveSurface:
     def links(
         self, ends: dict[int, tuple[Contacts, Contacts]], options: PathOptions, stepover: float
     ) -> dict[int, Contacts]:
-        """Return the links on the surface between pairs of passes, by `BallCentres.ways`; axes turn evenly."""
+        """Return the links on the surface between pairs of passes; axes turn evenly.
+
+        They are straight (`BallCentres.ways`), or else lead around what is in the way, within the region.
+        """
         del stepover
         if not ends:
             return {}
@@ -138,7 +142,11 @@ class DriveSurface:
             for k, row in ((0, -1), (1, 0))
         )
         starts, stops = (contacts + self.radius * normals for contacts, normals in (first, last))
-        ways = self.centres.ways(starts, stops, options.spacing, options.chordal, min(options.closest, options.chordal))
+        told = options.spacing, options.chordal, min(options.closest, options.chordal)
+        ways = self.centres.ways(starts, stops, *told)
+        missed = [row for row, way in enumerate(ways) if way is None]
+        for row, way in zip(missed, self._around(starts[missed], stops[missed], options), strict=True):
+            ways[row] = way
         found: dict[int, Contacts] = {}
         for row, (key, way) in enumerate(zip(ends, ways, strict=True)):
             if way is not None:
@@ -150,6 +158,22 @@ class DriveSurface:
                     contacts[end], normals[end] = contact, normal
                 found[key] = contacts, normals
         return found
+
+    def _around(self, starts: Floats, ends: Floats, options: PathOptions) -> list[Floats | None]:
+        """Return ways (n, 3) between pairs of centres (L, 3) around what is between them, where there is one."""
+        if not len(starts):
+            return []
+        patch = self.patch(options.region)
+        seen = ~self.hides(patch.vertices, options.chordal)
+        over = np.linalg.norm(ends - starts, axis=1) + 2.0 * options.clearance
+        longest = self.options.around * over
+        lines = shortest_ways(patch, seen, starts, ends, longest)
+        rows = [row for row, line in enumerate(lines) if line is not None]
+        found = [line for line in lines if line is not None]
+        told = options.spacing, options.chordal, min(options.closest, options.chordal)
+        for row, way in zip(rows, drawn_taut(self.centres, found, *told), strict=True):
+            lines[row] = way
+        return lines
 
     def is_clear(self, centres: Floats, chordal: float) -> bool:
         """Return whether the ball is clear of the part but for `chordal` metres along a line of centres (n, 3)."""
