@@ -6,6 +6,12 @@ from pentapod.theory.cells import Cell, CellDecomposition, cell_decomposition
 from pentapod.theory.design_distance import DesignDistance, DesignSearch, design_distance
 from pentapod.theory.general_sphere import BoundedSphere, SphereSearch, bounded_singularity_free_sphere
 from pentapod.theory.guide_choice import GuideChoice, choose_rail_positions, conditioning_criterion, stiffness_criterion
+from pentapod.theory.platform_cells import (
+    PlatformCell,
+    PlatformCells,
+    platform_cell_decomposition,
+    platform_cell_of,
+)
 from pentapod.theory.reach import ReachField
 from pentapod.theory.rearrangements import EquivalentLeg, LegPencil, cross_ratio
 from pentapod.theory.sphere import SingularityFreeSphere, singularity_free_sphere
@@ -21,6 +27,8 @@ __all__ = [
     "EquivalentLeg",
     "GuideChoice",
     "LegPencil",
+    "PlatformCell",
+    "PlatformCells",
     "ReachField",
     "SingularityFreeSphere",
     "SphereSearch",
@@ -33,6 +41,8 @@ __all__ = [
     "conditioning_criterion",
     "cross_ratio",
     "design_distance",
+    "platform_cell_decomposition",
+    "platform_cell_of",
     "poses_in_cell",
     "singularity_free_sphere",
     "stiffness_criterion",

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -81,6 +82,11 @@ def cell_decomposition(delta: float) -> CellDecomposition:
     slope = float(as_floats(delta, "delta", ()))
     if slope == 0.0:
         raise ArrayError("delta is 0: every pose is singular", expected="delta ≠ 0")
+    return _decomposition(slope)
+
+
+@cache
+def _decomposition(slope: float) -> CellDecomposition:
     tilts = (1,) if abs(slope) <= 1.0 else (1, -1)
     touches = abs(slope) >= 1.0  # whether u = 1/δ is a direction
     described: list[tuple[Signs, bool]] = []
