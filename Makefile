@@ -15,7 +15,7 @@ ORACLES := pytest pytest-xdist hypothesis mpmath rtree pyyaml psutil python-flin
 LOWEST_TESTS := tests/numerics tests/geometry tests/kinematics tests/timing tests/program tests/mesh/query/test_swept_depth.py \
 	tests/toolpath/inputs/test_drawings.py tests/simulate/test_servo.py tests/job/test_pipeline.py
 
-.PHONY: demo test test-all test-lowest lock lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view reference pictures site clean
+.PHONY: demo test test-all test-lowest lock lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view bench-machines reference pictures site clean
 
 demo: $(READY)  ## plan a dome and judge the program
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
@@ -72,6 +72,9 @@ bench-verify: $(READY)  ## the verdict on a million rows: seconds, memory, again
 
 bench-view: demo  ## how often a second the viewer judges a part that is dragged, against pose by pose
 	$(BIN)/python benchmarks/view.py
+
+bench-machines: $(READY)  ## figures of the shipped machines, and how well power-on tells their modes apart
+	$(BIN)/python benchmarks/machines.py
 
 reference: $(READY)  ## the pages of docs/reference, from the code
 	$(BIN)/python docs/make_reference.py

@@ -207,9 +207,12 @@ DESK: dict[str, tuple[int, float, float, float]] = {
     "S": (+1, 0.20, 0.25, 0.1),
     "amplification": (-1, 5.8, 5.0, 1.0),
 }
-# Tool axes to 45 degrees have a price: a larger base and longer legs, wider joints.
+# Tool axes to 45 degrees have a price: a larger base, longer legs (the shortest is as much longer than the stroke as in
+# `desk`, 50 mm), wider joints, larger forces.
 STEEP = DESK | {
-    "base radius": (-1, 0.90, 0.598, 0.1),
+    "leg ratio": (-1, 1.90, 1.89, 0.02),
+    "base radius": (-1, 1.10, 1.00, 0.1),
+    "platform length": (-1, 0.60, 0.45, 0.1),
     "joint angle": (-1, np.radians(130), np.radians(110), 0.2),
     "base cone": (-1, np.radians(55), np.radians(45), 0.2),
     "amplification": (-1, 8.0, 5.8, 1.0),
@@ -218,6 +221,25 @@ STEEP = DESK | {
 # Where the search starts: the shipped design `desk` before rounding.
 _X, _Y = [0.5857, 0.2240, -0.3260, -0.5966, -0.0554], [-0.1203, 0.5538, 0.4981, -0.0389, -0.5952]
 _REST = [0.0900, 0.0853, -0.0175, 0.4667]
+_STEEP = np.array(
+    [
+        0.8323,
+        0.4180,
+        -0.5030,
+        -0.9852,
+        -0.0436,
+        0.5543,
+        -0.9080,
+        -0.8642,
+        0.1712,
+        0.9989,
+        0.1446,
+        0.0900,
+        -0.0321,
+        -0.0195,
+        0.4731,
+    ]
+)
 _QUADRATIC = np.array([*_X, *_Y, 0.1847, *_REST])
 _GENERAL = np.array([*_X, *_Y, *(0.1847 * np.array(_X)), *_REST])
 
@@ -230,7 +252,7 @@ def _bounds(base: float, along: list[tuple[float, float]]) -> tuple[np.ndarray, 
 
 MACHINES = {
     "desk": Search(*_bounds(0.60, [(0.10, 0.60)]), _QUADRATIC, DESK, 26.0, 26.0),
-    "steep": Search(*_bounds(0.90, [(0.10, 0.60)]), _QUADRATIC, STEEP, 45.0, 40.0),
+    "steep": Search(*_bounds(1.20, [(0.10, 0.60)]), _STEEP, STEEP, 45.0, 26.0),
     "bench-general": Search(*_bounds(0.60, [(-0.25, 0.25)] * 5), _GENERAL, DESK, 30.0, 30.0),
 }
 
@@ -320,7 +342,7 @@ def main() -> None:
     rng, search = np.random.default_rng(options.seed), MACHINES[options.machine]
     tilt, lean = np.radians(search.tilt if options.tilt is None else options.tilt), np.radians(search.dome_tilt)
     volume = Volume(options.diameter * 1e-3, options.height * 1e-3, tilt, lean)
-    coarse, dense = volume.poses(8, 2, 8), volume.poses(16, 3, 24)
+    coarse, dense = volume.poses(8, 2, 16), volume.poses(16, 3, 24)
     span, size = search.high - search.low, len(search.start)
 
     def cost(x: np.ndarray) -> np.ndarray:

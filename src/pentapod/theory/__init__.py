@@ -14,6 +14,7 @@ from pentapod.theory.platform_cells import (
 )
 from pentapod.theory.reach import ReachField
 from pentapod.theory.rearrangements import EquivalentLeg, LegPencil, cross_ratio
+from pentapod.theory.self_motions import SelfMotions, self_motions
 from pentapod.theory.sphere import SingularityFreeSphere, singularity_free_sphere
 from pentapod.theory.workspace import Workspace
 
@@ -30,6 +31,7 @@ __all__ = [
     "PlatformCell",
     "PlatformCells",
     "ReachField",
+    "SelfMotions",
     "SingularityFreeSphere",
     "SphereSearch",
     "Workspace",
@@ -44,6 +46,7 @@ __all__ = [
     "platform_cell_decomposition",
     "platform_cell_of",
     "poses_in_cell",
+    "self_motions",
     "singularity_free_sphere",
     "stiffness_criterion",
 ]

@@ -29,7 +29,7 @@ LEGS = FiveLegs.n_legs
 
 
 @dataclass(frozen=True)
-class DesignSearch:
+class DesignSearch(Value):
     """Options of the search.
 
     random: starts beside the simple ones; seed: of them. descents: how many of all starts, the nearest first, are

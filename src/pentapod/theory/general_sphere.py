@@ -23,7 +23,7 @@ from pentapod.kinematics.families.general import GeneralPentapod
 
 
 @dataclass(frozen=True)
-class SphereSearch:
+class SphereSearch(Value):
     """Options of the search.
 
     directions: starts on the sphere of directions, beside the pose's own; steps: of Newton's method; settled: |P| by
