@@ -108,6 +108,9 @@ def test_bodies_of_a_3mf_in_further_parts_of_the_archive(tmp_path):
     outer = '<object id="9"><components><component objectid="1" p:path="/3D/b.model"/></components></object>'
     text = model(outer, '<item objectid="9"/>', space)
     same(load_mesh(threemf(tmp_path / "a.3mf", text, b=model(body(), ""))), POINTS, 1e-3)
+    threemf(tmp_path / "b.3mf", text, b=model(body(), "", 'unit="inch"'))
+    with pytest.raises(MeshError, match='a part of the archive is in "inch", the model in "millimeter"'):
+        load_mesh(tmp_path / "b.3mf")
 
 
 def test_a_mirrored_body_stays_right_side_out(tmp_path):
@@ -193,6 +196,18 @@ def elsewhere(header):
     header["buffers"][0]["uri"] = "a.bin"
 
 
+def as_shares(header):
+    header["accessors"][0]["normalized"] = True
+
+
+def by_weights(header):
+    header["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": 0}]
+
+
+def many_times(header):
+    header["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 0}}}
+
+
 def beyond(header):
     header["accessors"][0]["count"] = 10**12
 
@@ -203,6 +218,10 @@ def beyond(header):
         ({"change": without_view}, "its vertices are compressed"),
         ({"change": elsewhere}, "its vertices are in another file"),
         ({"mode": 1}, "lines, points or fans"),
+        ({"change": as_shares}, "or stored as shares"),
+        ({"change": by_weights}, "its vertices are moved by weights"),
+        ({"change": many_times}, "placed by a list"),
+        ({"change": lambda header: header.update(extensionsRequired=["X"])}, "needs an extension that is not read: X"),
         ({"change": beyond}, "cannot be read as GLB: it is broken"),
     ],
 )

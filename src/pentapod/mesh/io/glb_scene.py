@@ -18,6 +18,8 @@ import trimesh
 REFUSED = 4
 TRIANGLES = (4, 5)
 """Modes of primitives that are triangles: one by one, and strips."""
+HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_mesh_quantization")
+"""Beginnings of the names of extensions that leave the vertices as they are."""
 
 
 def refuse(what: str) -> None:
@@ -31,6 +33,13 @@ def check(data: bytes) -> None:
     header: dict[str, Any] = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
     if any("uri" in buffer for buffer in header.get("buffers", [])):
         refuse("its vertices are in another file; export one file")
+    unknown = [name for name in header.get("extensionsRequired", []) if not name.startswith(HARMLESS)]
+    if unknown:
+        refuse(f"it needs an extension that is not read: {unknown[0]}")
+    if any(
+        "skin" in node or "EXT_mesh_gpu_instancing" in node.get("extensions", {}) for node in header.get("nodes", [])
+    ):
+        refuse("it holds bodies that are bent by a skeleton, or placed by a list; export plain bodies")
     accessors = header.get("accessors", [])
     for mesh in header.get("meshes", []):
         for primitive in mesh["primitives"]:
@@ -39,6 +48,8 @@ def check(data: bytes) -> None:
                 refuse("it holds lines, points or fans; export triangles alone")
             if any("bufferView" not in accessors[place] or "sparse" in accessors[place] for place in places):
                 refuse("its vertices are compressed, or stored as changes; export them plainly")
+            if "targets" in primitive or accessors[places[0]].get("normalized", False):
+                refuse("its vertices are moved by weights, or stored as shares; export them plainly")
 
 
 def main(source: str, target: str, most: int) -> None:

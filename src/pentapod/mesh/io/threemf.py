@@ -161,6 +161,7 @@ class _Archive:
         self.path, self.archive, self.models = path, archive, dict[str, _Model]()
         self._sizes = {entry.filename.lstrip("/").lower(): entry for entry in archive.infolist()}
         self._left, self._counts = MOST_UNPACKED, dict[tuple[str, str], int]()
+        self._unit = ""
 
     def model(self, name: str) -> _Model:
         """Return a model by its name in the archive."""
@@ -176,6 +177,10 @@ class _Archive:
             # With a number of bytes the decompression stops there, whatever the archive holds.
             with self.archive.open(entry) as source:
                 made.parse(source.read(entry.file_size))
+            self._unit = self._unit or made.unit
+            if made.unit != self._unit:
+                what = f'a part of the archive is in "{made.unit}", the model in "{self._unit}"'
+                raise MeshError(what, file=self.path, value=name, remedy="export it in one unit")
             self.models[name] = made
         return self.models[name]
 
@@ -183,7 +188,8 @@ class _Archive:
         """Return how many facets an object unfolds to. Raises MeshError for one that is missing or in itself."""
         key = (part, number)
         if key in above or len(above) > MOST_ENTRIES // 10:
-            raise MeshError("an object is a component of itself", file=self.path, value=number, remedy=EXPORT_AGAIN)
+            what = "an object is a component of itself" if key in above else "components are nested too deep"
+            raise MeshError(what, file=self.path, value=number, remedy=EXPORT_AGAIN)
         if key not in self._counts:
             found = self.model(part).objects.get(number)
             if found is None:
