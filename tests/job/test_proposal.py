@@ -82,6 +82,7 @@ def test_the_middle_of_the_region_stands_in_the_middle_of_the_work_volume(tmp_pa
 
 def test_steep_surfaces_get_waterlines_and_long_ones_passes_along_them(tmp_path):
     assert proposed(tmp_path, trimesh.creation.cone(20, 50))[0].toolpath.strategy == "waterline"
+    assert proposed(tmp_path, trimesh.creation.box((30, 30, 60)))[0].toolpath.strategy == "raster"  # its top is flat
     job, _ = proposed(tmp_path, trimesh.creation.box((30, 90, 5)))
     assert (job.toolpath.strategy, job.toolpath.direction_deg) == ("raster", 90.0)
     assert proposed(tmp_path, trimesh.creation.box((90, 30, 5)))[0].toolpath.direction_deg == 0.0

@@ -20,6 +20,7 @@ from pentapod.mesh.io.registry import states_unit
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.region import Region
+from pentapod.toolpath.strategies.waterline import WaterlineOptions
 
 
 @dataclass(frozen=True)
@@ -29,9 +30,9 @@ class ProposalOptions:
     usual_mm: largest extents for which the unit mm is believed; else the unit whose part is nearest to the size of the
     work volume is taken. diameters: of cutters; the largest that is not wider than `cutter` of the part is taken.
     stepover: as a share of the diameter. steep_deg: slope from which surface counts as steep; waterlines where more
-    than `steep` of it is. sideways: by how much more of the surface another side must show than the top. backs: share
-    of an open surface that may face the top where it is turned over. margin: of a box above and below, as a share of
-    the work volume's height.
+    than `steep` of it is, and less than `flat` of it is too flat for them. sideways: by how much more of the surface
+    another side must show than the top. backs: share of an open surface that may face the top where it is turned over.
+    margin: of a box above and below, as a share of the work volume's height.
     """
 
     usual_mm: tuple[float, float] = (5.0, 2000.0)
@@ -42,6 +43,7 @@ class ProposalOptions:
     steep_deg: float = 60.0
     margin: float = 0.001
     steep: float = 0.7
+    flat: float = 0.01
     sideways: float = 1.2
     backs: float = 0.05
 
@@ -176,9 +178,11 @@ def _tool(patch: Patch, direction: Floats) -> dict[str, Any]:
 
 
 def _toolpath(patch: Patch, direction: Floats) -> dict[str, Any]:
-    """Return the strategy for a region: waterlines where it is mostly steep, else a raster along its longer side."""
-    steep = patch.facet_normals @ direction < np.cos(to_si(OPTIONS.steep_deg, "deg"))
-    if patch.areas[steep].sum() > OPTIONS.steep * patch.areas.sum():
+    """Return the strategy for a region: waterlines where it is steep all over, else a raster along its longer side."""
+    upright, whole = patch.facet_normals @ direction, float(patch.areas.sum())
+    steep = float(patch.areas[upright < np.cos(to_si(OPTIONS.steep_deg, "deg"))].sum())
+    flat = float(patch.areas[upright > np.cos(WaterlineOptions.shallowest)].sum())
+    if steep > OPTIONS.steep * whole and flat < OPTIONS.flat * whole:
         return {"strategy": "waterline"}
     width, height = np.ptp(patch.vertices[np.unique(patch.faces)] @ np.stack(tangent_frame(direction)).T, axis=0)
     return {"strategy": "raster", "direction_deg": 0.0 if width >= height else 90.0}

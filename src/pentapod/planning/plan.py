@@ -131,14 +131,16 @@ def _searched(problem: PlacementProblem, limit: float, seed: int, solver: Solver
     world = problem.margins[0].scene.collision_world
     bare = problem.in_world(replace(world, tool=())).margins
 
+    def without_idle(problem: PlacementProblem) -> PlacementProblem:
+        idle = without_idle_tool(world, problem.machine, problem.samples) is not world
+        return replace(problem, margins=bare) if idle else problem
+
     def searched(problem: PlacementProblem, options: SearchOptions) -> Searched:
-        if without_idle_tool(world, problem.machine, problem.samples) is not world:
-            problem = replace(problem, margins=bare)
         if problem.machine.guides is not None:
             return reconfigured(problem, seed=seed, solver=solver, progress=progress)
         return problem, search(problem, seed=seed, solver=solver, progress=progress, options=options)
 
-    return with_common_axis(problem, limit, searched, seed=seed, progress=progress)
+    return with_common_axis(problem, limit, searched, without_idle=without_idle, seed=seed, progress=progress)
 
 
 def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: Floats, chosen_by: str) -> PlacedPath:

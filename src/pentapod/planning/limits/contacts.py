@@ -42,7 +42,10 @@ OPTIONS = ContactOptions()
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """Margins (N, C) of poses, and the numbers (N, C · NUMBERS) of their contacts; C: all bodies by obstacle."""
+    """Margins (N, C) of poses, and the numbers (N, C · NUMBERS) of their contacts; C: all bodies by obstacle.
+
+    Where only margins were asked for, the numbers of the tool body are those of no contact.
+    """
 
     margins: Floats
     numbers: Floats
@@ -71,8 +74,11 @@ def tool_comfort(solids: Sequence[Solid], allowance: float, comforts: Comforts) 
     return min(comforts.tool_obstacle, comforts.tool_share * thinnest, allowed)
 
 
-def contacts(scene: Scene, tips: Floats, axes: Floats, placement: RigidTransform) -> Contacts:
-    """Return the contacts of tool poses (N, 3), machine frame, with the workpiece placed."""
+def contacts(scene: Scene, tips: Floats, axes: Floats, placement: RigidTransform, *, numbers: bool = True) -> Contacts:
+    """Return the contacts of tool poses (N, 3), machine frame, with the workpiece placed.
+
+    numbers: False for the margins alone, which takes less time.
+    """
     machine, tool, obstacles = scene.machine, scene.collision_world.tool, scene.collision_world.obstacles
     position, direction = tips + machine.tool_length * axes, -axes
     comforts = body_comforts(scene)
@@ -87,7 +93,7 @@ def contacts(scene: Scene, tips: Floats, axes: Floats, placement: RigidTransform
         bodies = MovingBodies.at(machine, position[rows], direction[rows], frame)
         columns = _lines(machine, obstacle, bodies, comforts)
         if tool:
-            columns.append(_tool(obstacle, tool, bodies, OPTIONS.cap * comforts[-1]))
+            columns.append(_tool(obstacle, tool, bodies, OPTIONS.cap * comforts[-1], numbers=numbers))
         both[rows, k * moving : (k + 1) * moving] = np.stack(columns, axis=1)
     return Contacts(both[..., 0] / comfortable, both[..., 1:].reshape(len(tips), -1))
 
@@ -149,7 +155,7 @@ def _box_gap(obstacle: Obstacle, starts: Floats, ends: Floats) -> Floats:
     return np.maximum(np.minimum(starts, ends) - high, low - np.maximum(starts, ends)).max(axis=1)
 
 
-def _tool(obstacle: Obstacle, solids: tuple[Solid, ...], bodies: MovingBodies, cap: float) -> Floats:
+def _tool(obstacle: Obstacle, solids: tuple[Solid, ...], bodies: MovingBodies, cap: float, *, numbers: bool) -> Floats:
     """Return for the tool body the gaps, at most `cap`, and the numbers of its contacts (N, 1 + NUMBERS)."""
     from pentapod.mesh.query.sweep_kernels import meridian_distance  # noqa: PLC0415  loads numba
 
@@ -157,6 +163,8 @@ def _tool(obstacle: Obstacle, solids: tuple[Solid, ...], bodies: MovingBodies, c
     gaps = np.minimum(gaps + obstacle.allowance, cap)
     column = np.zeros((len(gaps), 1 + NUMBERS))
     column[:, 0], column[:, -1] = gaps, -cap
+    if not numbers:
+        return column
     shapes = [np.array(solid.numbers) for solid in solids]
     for row in np.flatnonzero(np.isfinite(points[:, 0]) & (gaps < cap)):
         tip, axis, point = bodies.tips[row], bodies.axes[row], points[row]

@@ -92,7 +92,7 @@ class Margins:
             return own
         if placement is None:
             raise ArrayError("gaps to the part depend on the placement", key="placement", expected="a RigidTransform")
-        outer = contacts(self.scene, tips.reshape(-1, 3), axes.reshape(-1, 3), placement).margins
+        outer = contacts(self.scene, tips.reshape(-1, 3), axes.reshape(-1, 3), placement, numbers=False).margins
         return np.concatenate([own, outer.reshape(*own.shape[:-1], -1)], axis=-1)
 
     def own(self, tips: Floats, axes: Floats, block: int = 16_384) -> Floats:

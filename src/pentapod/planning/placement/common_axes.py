@@ -2,21 +2,24 @@
 
 Candidates are the middle of the path's own axes (the centre of their smallest cap), the workpiece's axis next to it,
 and the direction that is up on a table, each with several cones; and the path's own axes as they are. All are compared
-by first guesses of the placement; the most promising ones are searched as any other problem is.
+at a few hundred waypoints: by first guesses of the placement, and by the room that shank and holder have over the part.
+The most promising ones are searched at these waypoints, and the best is improved at all of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Floats, Ints
 from pentapod.base.progress import Progress, silent
 from pentapod.geometry.directions import angle_between, normalised
 from pentapod.planning.placement.sampling import SamplingOptions, best_guess
 from pentapod.planning.placement.search import Search, SearchOptions
+from pentapod.planning.placement.sequential import SequentialSolver
+from pentapod.planning.placement.tool_access import tool_access
 from pentapod.planning.problem.common_axis import CommonAxis
 from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.planning.problem.problem import PlacementProblem
@@ -31,11 +34,12 @@ class CommonAxesOptions:
 
     tilt: half angle of the cone of the tilt field around the nominal axes, radians. cones_deg: half angles of the cones
     that nominal axes may fill around the common direction. apart_deg: smallest angle between two directions. cap_steps:
-    of the iteration for the smallest cap. alike_deg: candidates whose axes differ by less are one. tries, ranked:
-    random placements for each candidate, and how many of them are judged with the tilt field. waypoints: number that
-    represents the path where the placements are given. starts: of the search of each candidate, the most promising one
-    first, then a fixed axis; so many are searched, except those whose first guess is no better than what was found.
-    Until a candidate fits, up to `most` are searched, each with up to twice the starts.
+    of the iteration for the smallest cap. alike_deg: candidates whose axes differ by less are one. compared: waypoints
+    at which candidates are compared and searched. tries, ranked: random placements for each candidate, and how many of
+    them are judged with the tilt field. waypoints: number that represents the path where the placements are given.
+    starts: of the search of each candidate, the most promising one first, then a fixed axis; so many are searched,
+    except those whose first guess is no better than what was found. Until a candidate fits, up to `most` are searched,
+    each with up to twice the starts.
     """
 
     tilt: float = float(np.radians(15.0))
@@ -43,6 +47,7 @@ class CommonAxesOptions:
     apart_deg: float = 8.0
     cap_steps: int = 400
     alike_deg: float = 1.0
+    compared: int = 600
     tries: int = 900
     ranked: int = 6
     waypoints: int = 48
@@ -58,6 +63,7 @@ def with_common_axis(
     limit: float,
     search: Callable[[PlacementProblem, SearchOptions], Searched],
     *,
+    without_idle: Callable[[PlacementProblem], PlacementProblem] = lambda problem: problem,
     seed: int = 0,
     progress: Progress = silent,
     options: CommonAxesOptions = OPTIONS,
@@ -65,42 +71,75 @@ def with_common_axis(
     """Return the problem whose nominal axes give the largest smallest margin, and its search.
 
     problem: with the path's own axes and the cone of the tilt field; limit: largest angle of the tool from them,
-    radians. search: returns a problem, maybe on another machine, and its search. Where the limit leaves no room beyond
-    the tilt field, only the path's own axes are searched.
+    radians. search: returns a problem, maybe on another machine, and its search. without_idle: leaves bodies of the
+    tool out of a problem that cannot be limits of it. Where the limit leaves no room beyond the tilt field, only the
+    path's own axes are searched.
     """
     if limit <= options.tilt:
-        return search(problem, SearchOptions())
+        return search(without_idle(problem), SearchOptions())
     progress("tool axis", 0.0, "comparing common directions")
-    problems = [problem]
-    for direction in directions(problem.samples.nominal, problem.constraints, options):
-        for cone in np.radians(options.cones_deg).tolist():
-            samples = problem.samples.towards(CommonAxis(direction, cone, limit))
-            apart = (angle_between(samples.nominal, other.samples.nominal).max() for other in problems)
-            if min(apart) > np.radians(options.alike_deg):
-                problems.append(problem.along(samples))
+    problems = candidates(problem, limit, options)
     if len(problems) == 1:
-        return search(problem, SearchOptions())
-    guessing = SamplingOptions(tries=options.tries, ranked=options.ranked)
-    scores = [best_guess(each, seed, guessing, options.waypoints) for each in problems]
+        return search(without_idle(problem), SearchOptions())
+    rows = np.sort(problem.samples.representatives(options.compared))
+    scores = [promise(each.at(rows), seed, options) for each in problems]
     order = sorted(range(len(problems)), key=lambda k: -scores[k])
     fixed = [k for k in order if (axis := problems[k].samples.common_axis) is not None and axis.cone == 0.0][:1]
     order = [*order[:1], *(k for k in fixed if k != order[0]), *(k for k in order[1:] if k not in fixed)]
-    best: Searched | None = None
-    count = 0
+    found: list[tuple[PlacementProblem, Searched]] = []
+    best = -np.inf
     for k in order:
-        fits = best is not None and best[1].best.smallest >= NEEDED_MARGIN
-        if best is not None and fits and scores[k] <= best[1].best.smallest:
+        fits = best >= NEEDED_MARGIN
+        if fits and scores[k] <= best:
             continue
-        if count >= (len(options.starts) if fits else options.most):
+        if len(found) >= (len(options.starts) if fits else options.most):
             break
-        starts = options.starts[min(count, len(options.starts) - 1)]
-        found = search(problems[k], SearchOptions(refined=starts, tried=2 * starts))
-        best, count = found if best is None or found[1].best.smallest > best[1].best.smallest else best, count + 1
-        if found[1].interrupted:
+        starts = options.starts[min(len(found), len(options.starts) - 1)]
+        whole = without_idle(problems[k])
+        found.append((whole, search(whole.at(rows), SearchOptions(refined=starts, tried=2 * starts))))
+        best = max(best, found[-1][1][1].best.smallest)
+        if found[-1][1][1].interrupted:
             break
-    if best is None:  # not reached: the first candidate is always searched
-        raise RuntimeError("no candidate was searched")
-    return best
+    found.sort(key=lambda pair: -pair[1][1].best.smallest)
+    done: list[Searched] = []
+    for whole, few in found:
+        best = max((each[1].best.smallest for each in done), default=-np.inf)
+        if done and (best >= NEEDED_MARGIN or few[1].best.smallest < NEEDED_MARGIN):
+            break
+        done.append(everywhere(whole, few, rows))
+    return max(done, key=lambda pair: pair[1].best.smallest)
+
+
+def candidates(problem: PlacementProblem, limit: float, options: CommonAxesOptions = OPTIONS) -> list[PlacementProblem]:
+    """Return the problem and those with common directions and cones, no two alike."""
+    found = [problem]
+    for direction in directions(problem.samples.nominal, problem.constraints, options):
+        for cone in np.radians(options.cones_deg).tolist():
+            samples = problem.samples.towards(CommonAxis(direction, cone, limit))
+            apart = (angle_between(samples.nominal, other.samples.nominal).max() for other in found)
+            if min(apart) > np.radians(options.alike_deg):
+                found.append(problem.along(samples))
+    return found
+
+
+def promise(problem: PlacementProblem, seed: int = 0, options: CommonAxesOptions = OPTIONS) -> float:
+    """Return about the largest margin to expect of a problem: of its best first guess, and of the tool over the part.
+
+    First guesses are made without shank and holder, whose room does not depend on the placement.
+    """
+    world = problem.margins[0].scene.collision_world
+    guessing = SamplingOptions(tries=options.tries, ranked=options.ranked)
+    guess = best_guess(problem.in_world(replace(world, tool=())), seed, guessing, options.waypoints)
+    return min(guess, float(tool_access(problem.samples, world).min()))
+
+
+def everywhere(whole: PlacementProblem, found: Searched, rows: Ints) -> Searched:
+    """Return the search of a problem at the waypoints `rows`, improved at all waypoints of the whole problem."""
+    few, search = found
+    whole = whole if few.machine is whole.machine else whole.on(few.machine)
+    start = whole.candidate(search.best.margins, search.best.transform, search.best.coefficients)
+    best = SequentialSolver(whole, whole.constraints.moves, rows=rows).raise_margin(start)
+    return whole, replace(search, best=best)
 
 
 def directions(own: Floats, constraints: PlacementConstraints, options: CommonAxesOptions = OPTIONS) -> list[Floats]:

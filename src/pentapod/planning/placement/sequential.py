@@ -49,12 +49,16 @@ class SequentialOptions:
 
 @dataclass(eq=False)
 class SequentialSolver:
-    """Improves candidates of one problem. free, guides: whether placement and rail positions are free."""
+    """Improves candidates of one problem. free, guides: whether placement and rail positions are free.
+
+    rows: waypoints used in every step; evenly spaced ones by default.
+    """
 
     problem: PlacementProblem
     free: bool
     guides: bool = False
     options: SequentialOptions = SequentialOptions()
+    rows: Ints | None = None
 
     def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
         """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one."""
@@ -75,17 +79,19 @@ class SequentialSolver:
         return smoothed(self.problem, start, keep)
 
     def _waypoints(self) -> Ints:
+        if self.rows is not None:
+            return self.rows
         count = len(self.problem.samples.tilt_centres)
         return np.unique(np.linspace(0, count - 1, min(count, self.options.waypoints)).astype(np.intp))
 
     def _optimised(self, start: Candidate, rows: Ints, enough: float) -> Candidate:
         """Return the result of the trust-region method, with its smallest margin over `rows`."""
         problem, options, radius, extra = self.problem, self.options, self.options.radius, _NO_ROWS
-        smallest = float(problem.values(start.margins, start.transform, start.coefficients, rows).min())
-        best = Candidate(start.margins, start.transform, start.coefficients, smallest)
+        here = problem.values(start.margins, start.transform, start.coefficients, rows)
+        best = Candidate(start.margins, start.transform, start.coefficients, float(here.min()))
         slopes = step_slopes(problem, start.margins, guides=self.guides)
         curvature = Curvature(problem, start.margins, self.guides)
-        model = self.model(best, rows, best.smallest, slopes=slopes)
+        model = self.model(best, rows, best.smallest, slopes=slopes, values=here)
         for _ in range(options.steps):
             if best.smallest >= enough:
                 break
@@ -100,13 +106,13 @@ class SequentialSolver:
             kept = 1.0 if gain > options.good * predicted else options.shrink
             radius *= 2.0 if gain > options.very_good * predicted else kept
             if moved is not None and gain > options.accepted * predicted:
-                best = Candidate(*moved, coefficients, float(values.min()))
+                best, here = Candidate(*moved, coefficients, float(values.min())), values
             elif radius < options.least:
                 break
             elif moved is not None:  # the worst margins may not have been in the model
                 steepness = problem.steepness(best.coefficients + change, rows)
                 extra = np.union1d(extra, np.union1d(valleys(values), valleys(-steepness[:, None])))
-            model = self.model(best, rows, best.smallest, extra, slopes)
+            model = self.model(best, rows, best.smallest, extra, slopes, here)
         return best
 
     def _moved(self, at: Candidate, step: Floats) -> tuple[Margins, RigidTransform] | None:
@@ -120,17 +126,24 @@ class SequentialSolver:
         return margins, transform
 
     def model(
-        self, at: Candidate, rows: Ints, level: float, extra: Ints = _NO_ROWS, slopes: StepSlopes | None = None
+        self,
+        at: Candidate,
+        rows: Ints,
+        level: float,
+        extra: Ints = _NO_ROWS,
+        slopes: StepSlopes | None = None,
+        values: Floats | None = None,
     ) -> LinearModel:
         """Return the linear model around a candidate of what comes near a margin of `level` among `rows`.
 
         extra: indices into rows that enter in any case. slopes: of the margins; those of the candidate by default.
+        values (n, M): the candidate's margins at `rows`, where they are known.
         """
         slopes = step_slopes(self.problem, at.margins) if slopes is None else slopes
         room = self._room(at.transform)
         if self.guides:
             room = with_travel(at.margins.scene.machine, room)
-        return LinearModel.of(self.problem, at, rows, level, extra, slopes, room, self._moves)
+        return LinearModel.of(self.problem, at, rows, level, extra, slopes, room, self._moves, values)
 
     @property
     def _moves(self) -> Floats:

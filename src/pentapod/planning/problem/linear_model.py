@@ -66,14 +66,17 @@ class LinearModel:
         slopes: StepSlopes,
         room: tuple[Floats, Floats],
         moves: Floats,
+        values: Floats | None = None,
     ) -> LinearModel:
         """Return the model of the margins near `level` at waypoints `rows`, and of rows[extra] in any case.
 
         room (L,): constraints of placement and rail positions, with their derivatives (L, p). slopes: derivatives of
-        the margins, (n, M, p + 2) by step, rail positions and lean.
+        the margins, (n, M, p + 2) by step, rail positions and lean. values (n, M): the candidate's margins at
+        `rows`, where they are known.
         """
         length, count = moves.shape
-        values = problem.values(at.margins, at.transform, at.coefficients, rows)
+        if values is None:
+            values = problem.values(at.margins, at.transform, at.coefficients, rows)
         chosen = np.union1d(valleys(values), extra)
         chosen = chosen[values[chosen].min(axis=1) < level + OPTIONS.near]
         point, kinds = np.nonzero(values[chosen] < level + OPTIONS.near)

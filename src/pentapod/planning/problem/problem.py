@@ -77,6 +77,10 @@ class PlacementProblem:
         domain, basis = _field(samples)
         return replace(self, samples=samples, domain=domain, basis=basis)
 
+    def at(self, rows: Ints) -> PlacementProblem:
+        """Return the problem of the waypoints `rows` alone, with the same tilt field."""
+        return replace(self, samples=self.samples.at(rows), basis=self.basis[rows])
+
     def on(self, machine: Machine) -> PlacementProblem:
         """Return the same problem on another machine."""
         return replace(self, machine=machine, margins=tuple(margins.on(machine) for margins in self.margins))
