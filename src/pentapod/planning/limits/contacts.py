@@ -74,10 +74,19 @@ def tool_comfort(solids: Sequence[Solid], allowance: float, comforts: Comforts) 
     return min(comforts.tool_obstacle, comforts.tool_share * thinnest, allowed)
 
 
-def contacts(scene: Scene, tips: Floats, axes: Floats, placement: RigidTransform, *, numbers: bool = True) -> Contacts:
+def contacts(
+    scene: Scene,
+    tips: Floats,
+    axes: Floats,
+    placement: RigidTransform,
+    *,
+    numbers: bool = True,
+    gaps: Floats | None = None,
+) -> Contacts:
     """Return the contacts of tool poses (N, 3), machine frame, with the workpiece placed.
 
-    numbers: False for the margins alone, which takes less time.
+    numbers: False for the margins alone, which takes less time. gaps (N, obstacles): of the tool body, as `tool_gap`,
+    where they are known; used for margins alone. NaN for obstacles of the machine.
     """
     machine, tool, obstacles = scene.machine, scene.collision_world.tool, scene.collision_world.obstacles
     position, direction = tips + machine.tool_length * axes, -axes
@@ -93,7 +102,10 @@ def contacts(scene: Scene, tips: Floats, axes: Floats, placement: RigidTransform
         bodies = MovingBodies.at(machine, position[rows], direction[rows], frame)
         columns = _lines(machine, obstacle, bodies, comforts)
         if tool:
-            columns.append(_tool(obstacle, tool, bodies, OPTIONS.cap * comforts[-1], numbers=numbers))
+            cap, known = OPTIONS.cap * comforts[-1], None
+            if gaps is not None and not numbers and obstacle.clamped:
+                known = _with_gaps(gaps[rows, k], cap)
+            columns.append(_tool(obstacle, tool, bodies, cap, numbers=numbers) if known is None else known)
         both[rows, k * moving : (k + 1) * moving] = np.stack(columns, axis=1)
     return Contacts(both[..., 0] / comfortable, both[..., 1:].reshape(len(tips), -1))
 
@@ -155,14 +167,25 @@ def _box_gap(obstacle: Obstacle, starts: Floats, ends: Floats) -> Floats:
     return np.maximum(np.minimum(starts, ends) - high, low - np.maximum(starts, ends)).max(axis=1)
 
 
+def tool_gap(obstacle: Obstacle, solids: tuple[Solid, ...], tips: Floats, axes: Floats, cap: float) -> Floats:
+    """Return the gaps (N,), at most `cap`, of tool bodies from an obstacle; tips, axes (N, 3): in its frame."""
+    return np.minimum(obstacle.surface.bodies(solids, tips, axes, cap)[0] + obstacle.allowance, cap)
+
+
+def _with_gaps(gaps: Floats, cap: float) -> Floats:
+    """Return gaps (N,) with the numbers of no contact, (N, 1 + NUMBERS)."""
+    column = np.zeros((len(gaps), 1 + NUMBERS))
+    column[:, 0], column[:, -1] = gaps, -cap
+    return column
+
+
 def _tool(obstacle: Obstacle, solids: tuple[Solid, ...], bodies: MovingBodies, cap: float, *, numbers: bool) -> Floats:
     """Return for the tool body the gaps, at most `cap`, and the numbers of its contacts (N, 1 + NUMBERS)."""
     from pentapod.mesh.query.sweep_kernels import meridian_distance  # noqa: PLC0415  loads numba
 
     gaps, points = obstacle.surface.bodies(solids, bodies.tips, bodies.axes, cap)
     gaps = np.minimum(gaps + obstacle.allowance, cap)
-    column = np.zeros((len(gaps), 1 + NUMBERS))
-    column[:, 0], column[:, -1] = gaps, -cap
+    column = _with_gaps(gaps, cap)
     if not numbers:
         return column
     shapes = [np.array(solid.numbers) for solid in solids]

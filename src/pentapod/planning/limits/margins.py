@@ -82,17 +82,21 @@ class Margins:
         """Return the same margins in another collision world."""
         return Margins.of(self.scene.machine, self.scene.branch, collision_world, self.kinds)
 
-    def __call__(self, tips: Floats, axes: Floats, placement: RigidTransform | None = None) -> Floats:
+    def __call__(
+        self, tips: Floats, axes: Floats, placement: RigidTransform | None = None, gaps: Floats | None = None
+    ) -> Floats:
         """Return margins (..., M) of tool tips and axes (tip → spindle), both (..., 3), machine frame.
 
-        placement: of the workpiece; needed where there are obstacles.
+        placement: of the workpiece; needed where there are obstacles. gaps (..., obstacles): as for `contacts`.
         """
         own = self.own(tips, axes)
         if not self.scene.collision_world.obstacles:
             return own
         if placement is None:
             raise ArrayError("gaps to the part depend on the placement", key="placement", expected="a RigidTransform")
-        outer = contacts(self.scene, tips.reshape(-1, 3), axes.reshape(-1, 3), placement, numbers=False).margins
+        known = None if gaps is None else gaps.reshape(-1, gaps.shape[-1])
+        poses = tips.reshape(-1, 3), axes.reshape(-1, 3)
+        outer = contacts(self.scene, *poses, placement, numbers=False, gaps=known).margins
         return np.concatenate([own, outer.reshape(*own.shape[:-1], -1)], axis=-1)
 
     def own(self, tips: Floats, axes: Floats, block: int = 16_384) -> Floats:

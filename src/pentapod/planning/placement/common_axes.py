@@ -19,10 +19,10 @@ from pentapod.geometry.directions import angle_between, normalised
 from pentapod.planning.placement.sampling import SamplingOptions, best_guess
 from pentapod.planning.placement.search import Search, SearchOptions
 from pentapod.planning.placement.sequential import SequentialSolver
-from pentapod.planning.placement.tool_access import tool_access
 from pentapod.planning.problem.common_axis import CommonAxis
 from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.planning.problem.problem import PlacementProblem
+from pentapod.planning.problem.tool_access import tool_access
 from pentapod.planning.problem.weights import NEEDED_MARGIN
 
 Searched = tuple[PlacementProblem, Search]

@@ -13,7 +13,8 @@ from pentapod.machine.machine import Machine
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
-from pentapod.planning.problem.tilt_field import lean
+from pentapod.planning.problem.tilt_field import lean, tilts
+from pentapod.planning.problem.tool_access import tool_gaps
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,8 @@ def first_guesses(problem: PlacementProblem, seed: int = 0, options: SamplingOpt
     centre, mean_axis = samples.tilt_centres.mean(axis=0), samples.nominal.mean(axis=0)
     mean_axis = mean_axis / max(float(np.linalg.norm(mean_axis)), 1e-9)
     guesses: list[Guess] = []
+    few = samples.at(rows)
+    gaps = tool_gaps(few, problem.margins[0].scene)
     for margins in problem.margins:
         simple = samples.tilt == 0.0 and not margins.scene.collision_world.obstacles
         rotations = _rotations(mean_axis, -float(margins.scene.branch.w), tries, options.largest_slope, rng)
@@ -83,7 +86,7 @@ def first_guesses(problem: PlacementProblem, seed: int = 0, options: SamplingOpt
         found: list[Guess] = []
         for k in best:
             place = constraints.nearest_to(RigidTransform(_orthonormal(rotations[k]), translations[k]))
-            tilted = score[k] if simple else best_tilted_margins(samples.at(rows), margins, place)[0].min()
+            tilted = score[k] if simple else best_tilted_margins(few, margins, place, gaps)[0].min()
             found.append(Guess(margins, place, float(tilted)))
         guesses += _different(sorted(found, key=lambda g: -g.margin), centre, options)
     return sorted(guesses, key=lambda g: -g.margin)
@@ -97,16 +100,29 @@ def best_guess(problem: PlacementProblem, seed: int, options: SamplingOptions, w
     if problem.constraints.moves:
         return max(guess.margin for guess in first_guesses(problem, seed, options))
     few = problem.samples.at(problem.samples.representatives(waypoints))
-    poses = problem.constraints.poses
-    return max(float(best_tilted_margins(few, m, pose)[0].min()) for m in problem.margins for pose in poses)
+    poses, gaps = problem.constraints.poses, tool_gaps(few, problem.margins[0].scene)
+    return max(float(best_tilted_margins(few, m, pose, gaps)[0].min()) for m in problem.margins for pose in poses)
 
 
-def first_candidate(problem: PlacementProblem, margins: Margins, transform: RigidTransform) -> Candidate:
-    """Return the candidate with a smooth field fitted to the best tilts of single waypoints (least squares)."""
+def fitted_gaps(problem: PlacementProblem) -> Floats | None:
+    """Return the gaps of the tool at the waypoints to which first tilt fields are fitted, as `tool_gaps`."""
+    samples = problem.samples
+    if samples.tilt == 0.0:
+        return None
+    return tool_gaps(samples.at(samples.representatives(OPTIONS.fitted)), problem.margins[0].scene)
+
+
+def first_candidate(
+    problem: PlacementProblem, margins: Margins, transform: RigidTransform, gaps: Floats | None = None
+) -> Candidate:
+    """Return the candidate with a smooth field fitted to the best tilts of single waypoints (least squares).
+
+    gaps: `fitted_gaps` of the problem, where they are known.
+    """
     coefficients, samples, domain = problem.upright, problem.samples, problem.domain
     if samples.tilt > 0.0:
         rows = samples.representatives(OPTIONS.fitted)
-        _, leans = best_tilted_margins(samples.at(rows), margins, transform)
+        _, leans = best_tilted_margins(samples.at(rows), margins, transform, gaps)
         # Small weights of roughness and size regularise the fit.
         smooth = np.vstack([0.3 * domain.roughness(), 1e-3 * np.eye(domain.size)])
         wanted = np.vstack([leans @ domain.lean_plane.T, np.zeros((len(smooth), 2))])
@@ -115,27 +131,25 @@ def first_candidate(problem: PlacementProblem, margins: Margins, transform: Rigi
     return problem.candidate(margins, transform, coefficients)
 
 
-def tilts(angle: float) -> Floats:
-    """Return lean vectors (K, 2) in a tangent frame that fill a cone of half angle `angle`: centre and two rings."""
-    rings = [np.zeros((1, 2))]
-    for share, count in ((0.5, 6), (0.95, 12)):
-        turn = 2.0 * np.pi * np.arange(count) / count
-        rings.append(share * np.tan(angle) * np.stack([np.cos(turn), np.sin(turn)], axis=1))
-    return np.concatenate(rings)
-
-
 def best_tilted_margins(
-    samples: ToolpathSamples, margins: Margins, placement: RigidTransform, block: int = 4096
+    samples: ToolpathSamples,
+    margins: Margins,
+    placement: RigidTransform,
+    gaps: Floats | None = None,
+    block: int = 4096,
 ) -> tuple[Floats, Floats]:
-    """Return margins (N, M) and leans (N, 3) at each waypoint's best tilt of a grid over the cone."""
-    grid = tilts(samples.tilt) if samples.tilt > 0.0 else np.zeros((1, 2))
+    """Return margins (N, M) and leans (N, 3) at each waypoint's best tilt of a grid over the cone.
+
+    gaps: `tool_gaps` of these samples, where they are known.
+    """
+    grid = tilts(samples.tilt)
     out, leans = np.empty((len(samples.tilt_centres), len(margins.limits))), np.empty((len(samples.tilt_centres), 3))
     for start in range(0, len(out), block):
         rows = np.arange(start, min(start + block, len(out)))
         t1, t2 = tangent_frame(samples.nominal[rows])
         b = samples.room(rows)[:, None] * (grid[:, None, :1] * t1 + grid[:, None, 1:] * t2)
         tips, axes = samples.machine_poses(placement, lean(samples.nominal[rows], b), rows)
-        all_margins = margins(tips, axes, placement)
+        all_margins = margins(tips, axes, placement, None if gaps is None else gaps[:, rows])
         choice = all_margins.min(axis=-1).argmax(axis=0)
         out[rows] = all_margins[choice, np.arange(len(rows))]
         leans[rows] = b[choice, np.arange(len(rows))]

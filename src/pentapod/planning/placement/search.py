@@ -14,7 +14,7 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.ipopt import IpoptSolver
-from pentapod.planning.placement.sampling import first_candidate, first_guesses
+from pentapod.planning.placement.sampling import first_candidate, first_guesses, fitted_gaps
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
@@ -109,11 +109,11 @@ def search(
             if alone.interrupted:
                 raise KeyboardInterrupt
         count = min(len(starts), options.tried) if constraints.moves else len(starts)
-        improver = SOLVERS[solver](problem, constraints.moves)
+        improver, gaps = SOLVERS[solver](problem, constraints.moves), fitted_gaps(problem)
         for margins, transform in starts[:count]:
             if constraints.moves and tried >= options.refined and best is not None and _is_decided(best, options):
                 break
-            found = improver.raise_margin(first_candidate(problem, margins, transform))
+            found = improver.raise_margin(first_candidate(problem, margins, transform, gaps))
             best = found if best is None or found.smallest > best.smallest else best
             tried += 1
             note = f"component {best.margins.scene.branch}, best margin so far {best.smallest:.3f}"

@@ -68,6 +68,17 @@ class FieldDomain:
         return np.concatenate(along_both, dtype=np.float64)
 
 
+def tilts(angle: float) -> Floats:
+    """Return lean vectors (K, 2) in a tangent frame that fill a cone of half angle `angle`: centre and two rings."""
+    if angle == 0.0:
+        return np.zeros((1, 2))
+    rings = [np.zeros((1, 2))]
+    for share, count in ((0.5, 6), (0.95, 12)):
+        turn = 2.0 * np.pi * np.arange(count) / count
+        rings.append(share * np.tan(angle) * np.stack([np.cos(turn), np.sin(turn)], axis=1))
+    return np.concatenate(rings)
+
+
 def lean(nominal: Floats, b: Floats) -> Floats:
     """Return unit nominal axes (..., 3) tilted by b (..., 3): normalised n + b − (b·n) n."""
     across: Floats = b - (b * nominal).sum(axis=-1, keepdims=True) * nominal

@@ -12,8 +12,8 @@ from pentapod.machine.clearance.collision_world import TOOL_BODY, CollisionWorld
 from pentapod.planning.limits.contacts import OPTIONS
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.sampling import best_tilted_margins
-from pentapod.planning.placement.tool_access import tool_access
 from pentapod.planning.problem.samples import ToolpathSamples
+from pentapod.planning.problem.tool_access import tool_access
 
 RADIUS, WIDE, DEEP, ALLOWED = 2e-3, 10e-3, 12e-3, 50e-6
 UP = np.array([0.0, 0.0, 1.0])
