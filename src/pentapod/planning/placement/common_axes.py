@@ -83,14 +83,14 @@ def with_common_axis(
         return search(without_idle(problem), SearchOptions())
     rows = np.sort(problem.samples.representatives(options.compared))
     scores = [promise(each.at(rows), seed, options) for each in problems]
-    order = sorted(range(len(problems)), key=lambda k: -scores[k])
+    order = sorted(range(len(problems)), key=lambda k: scores[k], reverse=True)
     fixed = [k for k in order if (axis := problems[k].samples.common_axis) is not None and axis.cone == 0.0][:1]
     order = [*order[:1], *(k for k in fixed if k != order[0]), *(k for k in order[1:] if k not in fixed)]
     found: list[tuple[PlacementProblem, Searched]] = []
     best = -np.inf
     for k in order:
         fits = best >= NEEDED_MARGIN
-        if fits and scores[k] <= best:
+        if fits and scores[k][0] <= best:
             continue
         if len(found) >= (len(options.starts) if fits else options.most):
             break
@@ -122,15 +122,15 @@ def candidates(problem: PlacementProblem, limit: float, options: CommonAxesOptio
     return found
 
 
-def promise(problem: PlacementProblem, seed: int = 0, options: CommonAxesOptions = OPTIONS) -> float:
-    """Return about the largest margin to expect of a problem: of its best first guess, and of the tool over the part.
+def promise(problem: PlacementProblem, seed: int = 0, options: CommonAxesOptions = OPTIONS) -> tuple[float, float]:
+    """Return about the largest margin to expect of a problem, and that without shank and holder.
 
-    First guesses are made without shank and holder, whose room does not depend on the placement.
+    Their room over the part does not depend on the placement, first guesses of which are made without them.
     """
     world = problem.margins[0].scene.collision_world
     guessing = SamplingOptions(tries=options.tries, ranked=options.ranked)
     guess = best_guess(problem.in_world(replace(world, tool=())), seed, guessing, options.waypoints)
-    return min(guess, float(tool_access(problem.samples, world).min()))
+    return min(guess, float(tool_access(problem.samples, world).min())), guess
 
 
 def everywhere(whole: PlacementProblem, found: Searched, rows: Ints) -> Searched:
