@@ -17,7 +17,7 @@ from pentapod.planning.diagnosis import refusal
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.placement.base_reconfiguration import reconfigured
 from pentapod.planning.placement.common_axes import OPTIONS as COMMON_AXES
-from pentapod.planning.placement.common_axes import Searched, with_common_axis
+from pentapod.planning.placement.common_axes import CommonAxesOptions, Searched, with_common_axis
 from pentapod.planning.placement.placed_path import PlacedPath, Placement, UnplacedPath
 from pentapod.planning.placement.sampling import best_tilted_margins
 from pentapod.planning.placement.search import SOLVERS, SearchOptions, Solver, SolverName, search
@@ -41,7 +41,7 @@ class PlacementOptions(TypedDict):
     """The options of `plan` that `fits` takes, too."""
 
     tilt: float
-    common_axis: bool
+    common_axis: bool | CommonAxesOptions
     constraints: PlacementConstraints
     component: Branch | None
     collision_world: CollisionWorld
@@ -56,7 +56,7 @@ def plan(
     machine: Machine,
     *,
     tilt: float = 0.0,
-    common_axis: bool = False,
+    common_axis: bool | CommonAxesOptions = False,
     constraints: PlacementConstraints = FREE,
     component: Branch | None = None,
     collision_world: CollisionWorld = NOTHING,
@@ -70,31 +70,31 @@ def plan(
     """Return placement, component and tool axes that maximise the smallest margin of the machine's limits on the path.
 
     tilt: half angle in radians of the cone around the nominal axis within which the tool may lean. common_axis: whether
-    nominal axes between the toolpath's and one common direction are found as well; `tilt` is then the largest angle
-    from the toolpath's axis. constraints: the allowed placements. component: all are searched where none is given.
-    collision_world: obstacles of legs, spindle and tool. weights: of the groups of margins. The rail positions of a
-    reconfigurable machine are optimised, too. secondary_objective: up to a tenth of the margin is given up for it.
-    limits: kinds of limits besides pentapod's own. Deterministic for a seed.
+    nominal axes between the toolpath's and one common direction are found as well, and which ones are compared; `tilt`
+    is then the largest angle from the toolpath's axis. constraints: the allowed placements. component: all are searched
+    where none is given. collision_world: obstacles of legs, spindle and tool. weights: of the groups of margins. The
+    rail positions of a reconfigurable machine are optimised, too. secondary_objective: up to a tenth of the margin is
+    given up for it. limits: kinds of limits besides pentapod's own. Deterministic for a seed.
 
     Returns a Refusal that names limits, waypoints and shortfalls where the part does not fit. An interruption (Ctrl-C)
     ends the search with the best placement so far, if that fits; else KeyboardInterrupt is raised.
     """
     problem = PlacementProblem.of(
-        _samples(toolpath, tilt, common_axis=common_axis), machine, constraints, weights,
+        _samples(toolpath, tilt, common_axis), machine, constraints, weights,
         component=component, collision_world=collision_world, limits=limits,
     )  # fmt: skip
-    problem, found = _searched(problem, tilt if common_axis else 0.0, seed, solver, progress)
+    problem, found = _searched(problem, tilt, common_axis, seed, solver, progress)
     best = found.best
     if best.smallest < NEEDED_MARGIN:
         progress("placement", 1.0, "it does not fit; trying changes that would help")
         return _refusal(toolpath, problem, best, SOLVERS[solver])
     keep = max(KEPT_SHARE * best.smallest, NEEDED_MARGIN)
-    if secondary_objective is not None and (constraints.moves or tilt > 0.0):
+    if secondary_objective is not None and (constraints.moves or problem.samples.tilt > 0.0):
         progress("placement", 1.0, f"margin {best.smallest:.3f}; now the objective {secondary_objective}")
         objective = objective_of(secondary_objective, problem, toolpath)
         best = improved(SequentialSolver(problem, constraints.moves), best, objective, keep)
     leans = problem.leans(best.coefficients)
-    if tilt > 0.0:
+    if problem.samples.tilt > 0.0:
         progress("tool axis", 0.0, f"smallest margin {best.smallest:.3f}")
         smooth = SOLVERS[solver](problem, False).smooth(best, min(keep, best.smallest))
         leans = leans if smooth is None else AxisSpline.of(problem.samples, problem.cone).leans(smooth)
@@ -109,25 +109,33 @@ def fits(toolpath: Toolpath, machine: Machine, **options: Unpack[PlacementOption
     """
     tilt, common_axis = options["tilt"], options["common_axis"]
     problem = PlacementProblem.of(
-        _samples(toolpath, tilt, common_axis=common_axis), machine, options["constraints"], options["weights"],
+        _samples(toolpath, tilt, common_axis), machine, options["constraints"], options["weights"],
         component=options["component"], collision_world=options["collision_world"], limits=options["limits"],
     )  # fmt: skip
-    _, found = _searched(problem, tilt if common_axis else 0.0, 0, options["solver"], silent)
+    _, found = _searched(problem, tilt, common_axis, 0, options["solver"], silent)
     if found.interrupted:
         raise KeyboardInterrupt
     return found.best.smallest >= NEEDED_MARGIN
 
 
-def _samples(toolpath: Toolpath, tilt: float, *, common_axis: bool) -> ToolpathSamples:
+def _samples(toolpath: Toolpath, tilt: float, common_axis: bool | CommonAxesOptions) -> ToolpathSamples:
     """Return the samples of a toolpath with the cone of its tilt field."""
-    return ToolpathSamples.of(toolpath, min(tilt, COMMON_AXES.tilt) if common_axis else tilt)
+    return ToolpathSamples.of(toolpath, min(tilt, _compared(common_axis).tilt) if common_axis else tilt)
 
 
-def _searched(problem: PlacementProblem, limit: float, seed: int, solver: SolverName, progress: Progress) -> Searched:
-    """Return the search and its problem: that of a reconfigurable machine at the rail positions found.
+def _compared(common_axis: bool | CommonAxesOptions) -> CommonAxesOptions:
+    return common_axis if isinstance(common_axis, CommonAxesOptions) else COMMON_AXES
 
-    limit: largest angle from the toolpath's axes where a common direction is chosen, radians; 0 where none is.
-    """
+
+def _searched(
+    problem: PlacementProblem,
+    tilt: float,
+    common_axis: bool | CommonAxesOptions,
+    seed: int,
+    solver: SolverName,
+    progress: Progress,
+) -> Searched:
+    """Return the search and its problem: that of a reconfigurable machine at the rail positions found."""
     world = problem.margins[0].scene.collision_world
     bare = problem.in_world(replace(world, tool=())).margins
 
@@ -140,7 +148,10 @@ def _searched(problem: PlacementProblem, limit: float, seed: int, solver: Solver
             return reconfigured(problem, seed=seed, solver=solver, progress=progress)
         return problem, search(problem, seed=seed, solver=solver, progress=progress, options=options)
 
-    return with_common_axis(problem, limit, searched, without_idle=without_idle, seed=seed, progress=progress)
+    limit, options = tilt if common_axis else 0.0, _compared(common_axis)
+    return with_common_axis(
+        problem, limit, searched, without_idle=without_idle, seed=seed, progress=progress, options=options
+    )
 
 
 def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: Floats, chosen_by: str) -> PlacedPath:

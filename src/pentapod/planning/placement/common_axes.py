@@ -39,7 +39,7 @@ class CommonAxesOptions:
     them are judged with the tilt field. waypoints: number that represents the path where the placements are given.
     starts: of the search of each candidate, the most promising one first, then a fixed axis; so many are searched,
     except those whose first guess is no better than what was found. Until a candidate fits, up to `most` are searched,
-    each with up to twice the starts.
+    each with up to twice the starts. own: whether the path's own axes are a candidate.
     """
 
     tilt: float = float(np.radians(15.0))
@@ -53,9 +53,13 @@ class CommonAxesOptions:
     waypoints: int = 48
     starts: tuple[int, ...] = (3, 2)
     most: int = 4
+    own: bool = True
 
 
 OPTIONS = CommonAxesOptions()
+
+FIXED = CommonAxesOptions(tilt=0.0, cones_deg=(0.0,), own=False)
+"""The tool keeps one direction everywhere."""
 
 
 def with_common_axis(
@@ -80,7 +84,7 @@ def with_common_axis(
     progress("tool axis", 0.0, "comparing common directions")
     problems = candidates(problem, limit, options)
     if len(problems) == 1:
-        return search(without_idle(problem), SearchOptions())
+        return search(without_idle(problems[0]), SearchOptions())
     rows = np.sort(problem.samples.representatives(options.compared))
     scores = [promise(each.at(rows), seed, options) for each in problems]
     order = sorted(range(len(problems)), key=lambda k: scores[k], reverse=True)
@@ -112,12 +116,12 @@ def with_common_axis(
 
 def candidates(problem: PlacementProblem, limit: float, options: CommonAxesOptions = OPTIONS) -> list[PlacementProblem]:
     """Return the problem and those with common directions and cones, no two alike."""
-    found = [problem]
+    found = [problem] if options.own else []
     for direction in directions(problem.samples.nominal, problem.constraints, options):
         for cone in np.radians(options.cones_deg).tolist():
             samples = problem.samples.towards(CommonAxis(direction, cone, limit))
             apart = (angle_between(samples.nominal, other.samples.nominal).max() for other in found)
-            if min(apart) > np.radians(options.alike_deg):
+            if min(apart, default=np.inf) > np.radians(options.alike_deg):
                 found.append(problem.along(samples))
     return found
 
@@ -138,6 +142,8 @@ def everywhere(whole: PlacementProblem, found: Searched, rows: Ints) -> Searched
     few, search = found
     whole = whole if few.machine is whole.machine else whole.on(few.machine)
     start = whole.candidate(search.best.margins, search.best.transform, search.best.coefficients)
+    if search.best.smallest < NEEDED_MARGIN:  # at more waypoints it is no larger
+        return whole, replace(search, best=start)
     best = SequentialSolver(whole, whole.constraints.moves, rows=rows).raise_margin(start)
     return whole, replace(search, best=best)
 

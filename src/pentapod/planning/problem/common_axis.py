@@ -66,6 +66,8 @@ class CommonAxis(Value):
 
     def shares(self, centres: Floats, own: Floats, nominal: Floats, tilt: float) -> Floats:
         """Return the share (N,) of a cone of half angle `tilt` around nominal axes that keeps the limit, above 0."""
+        if tilt == 0.0:
+            return np.ones(len(own))
         room = np.clip(self.limit - angle_between(own, nominal), self.options.spare, tilt)
         share = np.minimum(np.tan(room) / np.tan(tilt), 1.0)
         place = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(centres, axis=0), axis=1))])
