@@ -25,6 +25,7 @@ from pentapod.job.schema.job import Job
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
 from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
+from pentapod.planning.placement.common_axes import FIXED
 from pentapod.planning.plan import PlacementOptions, fits
 from pentapod.planning.problem.constraints import FREE
 from pentapod.planning.setups import setups
@@ -36,6 +37,9 @@ from pentapod.verify import Claim, Specification, Verdict, judged
 
 UPRIGHT = "the tool does not lean, as it would touch the part"
 """What is said of a placement with the toolpath's axes."""
+
+STRAIGHT = "the tool keeps one direction, as it would touch the part"
+"""What is said of a placement with one axis everywhere."""
 
 Writer = Callable[[Outcome, Path], object]
 T = TypeVar("T")
@@ -215,15 +219,16 @@ class _Task:
         return fits(part, self.machine, **self._options())
 
     def _placed(self) -> PlacedPath | Refusal:
-        """Return the placed path. Where leaning makes the tool meet the part, the tool keeps the toolpath's axes."""
+        """Return the placed path. Where leaning makes the tool meet the part, it keeps the toolpath's axes, or one."""
         options = self._options()
         placed = self._planned(options)
         met = self._meetings(placed)
-        if met and options["tilt"] > 0.0 and not options["common_axis"]:
-            placed = self._planned({**options, "tilt": 0.0})
+        if met and options["tilt"] > 0.0:
+            common = bool(options["common_axis"])
+            placed = self._planned({**options, "common_axis": FIXED} if common else {**options, "tilt": 0.0})
             met = self._meetings(placed)
             if isinstance(placed, PlacedPath):
-                chosen = f"{placed.placement.chosen_by}; {UPRIGHT}"
+                chosen = f"{placed.placement.chosen_by}; {STRAIGHT if common else UPRIGHT}"
                 placed = dataclasses.replace(placed, placement=dataclasses.replace(placed.placement, chosen_by=chosen))
         return refusal_of(met) if met else placed
 
@@ -288,6 +293,6 @@ def _remarks(placed: PlacedPath | Refusal) -> str:
     chosen = placed.placement
     lines = [f"guides 1 to 5 at {chosen.guides}"] if chosen.guides else []
     lines += [f"tool axis: {placed.common_axis}; {placed.lean}"] if placed.common_axis is not None else []
-    if "interrupted" in chosen.chosen_by or UPRIGHT in chosen.chosen_by:
+    if any(word in chosen.chosen_by for word in ("interrupted", UPRIGHT, STRAIGHT)):
         lines.append(f"placement: {chosen.chosen_by}; smallest margin {placed.smallest_margin:.3f}")
     return "\n".join(lines)

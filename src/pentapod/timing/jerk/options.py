@@ -50,6 +50,7 @@ class SolverOptions(Value):
     accepted_gap: float = 1e-3  # gap that is accepted where it does not get there
     accepted_residual: float = 1e-6  # largest residual of a row that is accepted
     x_floor: float = 1e-9  # smallest x to linearise about, as a share of its upper bound
+    dip: float = 0.1  # smallest x halfway between gridpoints, as a share of the smaller one at their ends
 
 
 @dataclass(frozen=True)

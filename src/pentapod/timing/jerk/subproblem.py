@@ -166,10 +166,16 @@ class Subproblem:
         return y
 
     def nodes(self, y: Floats) -> SpeedNodes:
-        """Return the law at rests, at gridpoints and halfway between, so that cubics follow the spline closely."""
+        """Return the law at rests, at gridpoints and halfway between, so that cubics follow the spline closely.
+
+        Rows hold at gridpoints alone; where the spline dips between two of them, it is kept above 0.
+        """
         v, s = np.empty((2 * len(self.s) - 1, 3)), np.empty(2 * len(self.s) - 1)
         s[::2], s[1::2] = self.s, (self.s[1:] + self.s[:-1]) / 2.0
         v[::2], v[1::2] = self.values(y), self.at(y, s[1::2])
+        least = self.options.solver.dip * np.minimum(v[:-2:2, 0], v[2::2, 0])
+        dips = 1 + 2 * np.flatnonzero(v[1::2, 0] < least)
+        v[dips, 0], v[dips, 1] = least[dips // 2], 0.0
         x, slope = v[:, 0], v[:, 1]
         if self.begin.join > 0.0:
             s, x, slope = np.append(0.0, s), np.append(0.0, x), np.append(0.0, slope)
