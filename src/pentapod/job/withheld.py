@@ -1,0 +1,33 @@
+"""Withheld programs: what a run says of a program that would fail its own verdict."""
+
+from __future__ import annotations
+
+from pentapod.base.refusal import Refusal
+from pentapod.verify import Verdict
+from pentapod.verify.verdict.verdict import Certificate
+
+STAGE = "verdict"
+"""The stage of the refusal."""
+
+
+def withheld(verdict: Verdict) -> Refusal | None:
+    """Return the refusal of a program some claims about which fail; None where all claims that were judged hold."""
+    failed = [certificate for certificate in verdict.certificates if not certificate.passed]
+    if not failed:
+        return None
+    more = f"; and {len(failed) - 3} more claims" if len(failed) > 3 else ""
+    return Refusal(
+        STAGE,
+        f"the program fails its own verdict: {'; '.join(_said(each) for each in failed[:3])}{more}",
+        remedy="report.html shows where. Try another strategy, a smaller tool or region, or another axis.mode",
+    )
+
+
+def _said(certificate: Certificate) -> str:
+    """Return a claim that fails, with its value, its bound and the time in the program."""
+    text = certificate.claim
+    if certificate.value is not None:
+        text += f" {certificate.value:.4g} {certificate.unit}".rstrip()
+    if certificate.bound is not None:
+        text += f" (bound {certificate.bound:.4g})"
+    return text + ("" if certificate.where.time_s is None else f" at {certificate.where.time_s:.3f} s")
