@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pentapod.base.arrays import Floats, as_floats, set_frozen
+from pentapod.base.arrays import Floats, as_batch, as_floats, set_frozen
 from pentapod.base.errors import ArrayError, MachineError
 from pentapod.base.values import Value
 from pentapod.kinematics.arithmetic import Arithmetic, Joints, Vector, dot
-from pentapod.kinematics.batches import as_poses
+from pentapod.kinematics.batches import as_poses, broadcast
 from pentapod.kinematics.families.as_built_forward import as_built_pose
+from pentapod.kinematics.families.as_built_quick import quick_poses
 from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.five_legs import FiveLegs
@@ -112,10 +113,18 @@ class AsBuiltPentapod(Value, ProvenByLegEquations):
         return self._nominal.branch(position, direction)
 
     def pose(self, legs: ArrayLike, branch: ArrayLike) -> tuple[Floats, Floats]:
-        """Return the proven poses (..., 3) of leg readings (..., 5) in a branch: `as_built_pose`. NaN without proof."""
-        found = as_built_pose(self, self._nominal, legs, branch)
-        known = found.proven[..., None]
-        return np.where(known, found.position, np.nan), np.where(known, found.direction, np.nan)
+        """Return the proven poses (..., 3) of leg readings (..., 5) in a branch. NaN without proof.
+
+        By `quick_poses`, and by `as_built_pose` where that proves nothing.
+        """
+        position, direction, proven = quick_poses(self, self._nominal, legs, branch)
+        if not proven.all():
+            readings, signs = broadcast(as_batch(legs, "legs"), as_batch(branch, "branch"), ("legs", "branch"))
+            found = as_built_pose(self, self._nominal, readings[~proven], signs[~proven])
+            known = found.proven[..., None]
+            position[~proven] = np.where(known, found.position, np.nan)
+            direction[~proven] = np.where(known, found.direction, np.nan)
+        return position, direction
 
     @property
     def _nominal(self) -> LinearPentapod | GeneralPentapod:

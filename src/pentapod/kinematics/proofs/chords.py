@@ -20,7 +20,7 @@ from pentapod.base.errors import ArrayError
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.component import as_component
 from pentapod.kinematics.proof_results import Chords
-from pentapod.kinematics.tubes.leg_equations import PosedLegs, QuadraticLegs
+from pentapod.kinematics.tubes.leg_equations import BuiltLegs, PosedLegs, QuadraticLegs
 from pentapod.numerics.bernstein import elevate, multiply, split
 
 Pose = tuple[Floats, Floats]
@@ -68,8 +68,8 @@ class _Prover:
 
     def __init__(self, robot: PosedLegs, signs: Floats, offsets: Floats, base_axes: Floats, degree: int) -> None:
         self.robot, self.signs, self.offsets, self.base_axes = robot, signs, offsets, np.ascontiguousarray(base_axes)
-        self.rings = np.column_stack([np.zeros((5, 8)), robot.radii]) if robot.radii.any() else None
-        self.bases = _bases(degree)
+        self.rings = kernel_rings(robot)
+        self.bases = kernel_bases(degree)
 
     def prove(self, legs: Floats, start: Floats, end: Floats, depth: int) -> Chords:
         """As `prove_chords`; start, end (H, 6)."""
@@ -79,22 +79,12 @@ class _Prover:
         proven, angles = np.empty(count, dtype=np.bool_), np.empty(count)
         deviations, speeds = np.empty((count, points)), np.empty((count, points))
         found = (proven, deviations, angles, speeds, np.empty((count, 5)), np.empty((count, 5, 2)))
-        geometry, asked = self._geometry(legs), (self.signs, self.offsets, self.base_axes, self.bases)
+        geometry, asked = kernel_geometry(self.robot, legs), (self.signs, self.offsets, self.base_axes, self.bases)
         chords(np.ascontiguousarray(legs), start, end, geometry, self.rings, *asked, found)
         answer = Chords(*found)
         if depth > 0:
             self._halve(answer, legs, start, end, depth)
         return answer
-
-    def _geometry(self, legs: Floats) -> Floats:
-        """Return the robot's numbers (6, 4) as the kernels take them."""
-        robot, last = self.robot, [0.0, 0.0, 0.0]
-        if isinstance(robot, QuadraticLegs):
-            last = [robot.delta, robot.lever, 1.0]
-        reach = float(np.abs(legs).max(initial=0.0)) + 2.0 * float(np.abs(robot.base_joints).sum(axis=1).max())
-        size = 2.0 * (reach + 2.0 * float(np.abs(robot.offsets).max()) + 4.0 * float(robot.radii.max()))
-        rows = np.column_stack([robot.base_joints, robot.offsets])
-        return np.vstack([rows, [*last[:2], size, last[2]]])
 
     def _halve(self, found: Chords, legs: Floats, start: Floats, end: Floats, depth: int) -> None:
         """Fill in what two halves prove where the whole chord was not proven, or its speed was not."""
@@ -127,8 +117,23 @@ class _Prover:
         found.platform_cosines[which, :, 1] = largest(parts.platform_cosines[..., 1])
 
 
+def kernel_geometry(robot: BuiltLegs, legs: Floats) -> Floats:
+    """Return a robot's numbers (6, 4) as `krawczyk_kernels` take them, for legs of these lengths or NaN."""
+    last = [robot.delta, robot.lever, 1.0] if isinstance(robot, QuadraticLegs) else [0.0, 0.0, 0.0]
+    longest = float(np.nanmax(np.abs(legs), initial=0.0))
+    reach = longest + 2.0 * float(np.abs(robot.base_joints).sum(axis=1).max())
+    size = 2.0 * (reach + 2.0 * float(np.abs(robot.offsets).max()) + 4.0 * float(robot.radii.max()))
+    rows = np.column_stack([robot.base_joints, robot.offsets])
+    return np.vstack([rows, [*last[:2], size, last[2]]])
+
+
+def kernel_rings(robot: BuiltLegs) -> Floats | None:
+    """Return a robot's rings (5, 9) as `krawczyk_kernels` take them; None where it has none."""
+    return np.column_stack([np.zeros((5, 8)), robot.radii]) if robot.radii.any() else None
+
+
 @cache
-def _bases(degree: int) -> tuple[Floats, Floats, Floats, Floats]:
+def kernel_bases(degree: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Return what `chords` of the kernels takes as bases."""
     one, top = np.eye(degree + 1), max(degree, 2)
     return (

@@ -55,14 +55,14 @@ def chords(
     for h in range(len(legs)):
         proven[h], angles[h], deviations[h], speeds[h] = False, np.inf, np.inf, np.inf
         base_cosines[h], platform_cosines[h, :, 0], platform_cosines[h, :, 1] = -1.0, -1.0, 1.0
-        if not _sane(legs[h], start[h], end[h]):
+        if not sane(legs[h], start[h], end[h]):
             continue
         fill_line(start[h], end[h], geometry, first, second, change, step, jacobian, rings)
         if not invert(jacobian, work, inverse):
             continue
         fill_defect(inverse, jacobian, defect)
-        _residuals(legs[h], start[h], end[h], first, second, rings, squares_up, products, residual)
-        _corrections(inverse, residual, geometry[5, 2], rings, e, slack, y)
+        line_residuals(legs[h], start[h], end[h], first, second, rings, squares_up, products, residual)
+        line_corrections(inverse, residual, geometry[5, 2], rings, e, slack, y)
         if not enclosed(y, inverse, defect, geometry, rings, change, step, spread, spread_i, z, bound):
             continue
         if not sided(start[h], end[h], bound, signs, geometry):
@@ -105,7 +105,7 @@ def chords(
 
 
 @kernel
-def _sane(legs: Floats, start: Floats, end: Floats) -> bool:
+def sane(legs: Floats, start: Floats, end: Floats) -> bool:
     """Return whether there are poses, and lengths that are positive."""
     total = 0.0
     for r in range(6):
@@ -118,7 +118,7 @@ def _sane(legs: Floats, start: Floats, end: Floats) -> bool:
 
 
 @kernel
-def _residuals(
+def line_residuals(
     legs: Floats,
     start: Floats,
     end: Floats,
@@ -157,7 +157,7 @@ def _square(first: Floats, second: Floats, squares_up: Floats, out: Floats) -> N
 
 
 @kernel
-def _corrections(
+def line_corrections(
     inverse: Floats, residual: Floats, size: float, rings: Floats | None, e: Floats, slack: Floats, y: Floats
 ) -> None:
     """Fill e = C G (6, 2k + 1), the error of it by rounding and curved ρ (6,), and bounds (6,) of both at all times."""

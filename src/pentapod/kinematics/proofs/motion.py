@@ -20,6 +20,7 @@ from pentapod.base.errors import ArrayError
 from pentapod.base.values import Value
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.proof_results import BranchProof, ProofResult, ProvenMeasure
+from pentapod.kinematics.proofs.chords import kernel_bases, kernel_geometry, kernel_rings
 from pentapod.kinematics.tubes.continuation import ContinuationOptions, continue_poses
 from pentapod.kinematics.tubes.leg_equations import BuiltLegs, Legs, length_scale, mids, newton
 from pentapod.kinematics.tubes.tube import LegFamily, proven_jacobian_signs
@@ -139,14 +140,50 @@ def motion_in_branch(
     Intervals on which a leg's length is not positive are undecided, and so are all where a pose is missing.
     """
     n = len(leg_coefficients)
-    if not (leg_coefficients - machine.zeros[:, None] > 0.0).all():
+    lengths = leg_coefficients - machine.zeros[:, None]
+    if not (lengths > 0.0).all():
         nothing = np.zeros(n, dtype=np.bool_)
         return BranchProof(nothing, nothing, np.tile([0.0, 1.0], (n, 1)), np.zeros((n, 1)))
-    proof = certify_motion(machine, leg_coefficients, position, direction, leg_error=leg_error)
-    doubt = np.where(proof.proven[:, None], np.nan, np.stack([proof.reached, proof.stop], axis=1))
+    proven, least = _short_motions(machine, lengths, position, direction, leg_error)
+    refuted, doubt = np.zeros(n, dtype=np.bool_), np.full((n, 2), np.nan)
+    for run in _runs(~proven):
+        nodes = slice(run.start, run.stop + 1)
+        proof = certify_motion(machine, leg_coefficients[run], position[nodes], direction[nodes], leg_error=leg_error)
+        proven[run], refuted[run] = proof.proven, proof.refuted
+        doubt[run] = np.where(proof.proven[:, None], np.nan, np.stack([proof.reached, proof.stop], axis=1))
+        with np.errstate(divide="ignore"):
+            least[run] = np.where(proof.proven, 1.0 / proof.position_sensitivity, 0.0)
+    return BranchProof(proven, refuted, doubt, least[:, None])
+
+
+def _short_motions(
+    machine: BuiltLegs, lengths: Floats, position: Floats, direction: Floats, leg_error: float
+) -> tuple[Bools, Floats]:
+    """Return which intervals the kernel proves (N,), and the reciprocal of the sensitivity there, 0 elsewhere."""
+    from pentapod.kinematics.proofs.motion_kernels import motions  # noqa: PLC0415 - loads numba
+
+    if lengths.shape[-1] < 2:
+        return np.zeros(len(lengths), dtype=np.bool_), np.zeros(len(lengths))
+    proven, sensitivity = np.zeros(len(lengths), dtype=np.bool_), np.empty(len(lengths))
+    motions(
+        np.ascontiguousarray(lengths),
+        np.concatenate([position, direction], axis=1),
+        kernel_geometry(machine, lengths),
+        kernel_rings(machine),
+        leg_error,
+        length_scale(machine),
+        kernel_bases(lengths.shape[-1] - 1),
+        proven,
+        sensitivity,
+    )
     with np.errstate(divide="ignore"):
-        least = np.where(proof.proven, 1.0 / proof.position_sensitivity, 0.0)
-    return BranchProof(proof.proven, proof.refuted, doubt, least[:, None])
+        return proven, np.where(proven, 1.0 / sensitivity, 0.0)
+
+
+def _runs(doubt: Bools) -> list[slice]:
+    """Return where consecutive intervals (N,) are in doubt."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], doubt, [False]]).astype(np.int8)))
+    return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 class _Motion:
