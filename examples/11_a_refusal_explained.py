@@ -1,4 +1,4 @@
-"""A refusal with its explanation: a plate that no placement reaches, what is in the way where, and what would help.
+"""A refusal with its explanation: a plate that no placement reaches, and what is in the way where.
 
     python examples/11_a_refusal_explained.py --out docs/refusal.png
 

@@ -79,7 +79,7 @@ def test_json_and_quiet(make_job, tmp_path, capsys):
 
 def test_a_refusal_is_exit_code_1_with_the_reason(make_job, tmp_path, capsys):
     job, out = make_job(TOO_FAR), tmp_path / "out"
-    assert run(["plan", str(job), "-o", str(out)]) == 1
+    assert run(["plan", str(job), "-o", str(out), "--advice", "0"]) == 1
     said = capsys.readouterr()
     assert said.err.startswith("refused: placement: ")
     assert said.err.count("\n") == 1
@@ -366,7 +366,7 @@ def test_explain_prints_the_table_of_limits(make_job, tmp_path, capsys):
     limits = json.loads(capsys.readouterr().out)["limits"]
     assert [limit["margin"] for limit in limits] == pytest.approx(margins, abs=1e-4)
     assert sum(limit["share"] for limit in limits) == pytest.approx(1.0)
-    assert run(["plan", str(make_job(TOO_FAR)), *out]) == 1
+    assert run(["plan", str(make_job(TOO_FAR)), *out, "--advice", "0"]) == 1
     refused = capsys.readouterr().out
     assert "limit exceeded" in refused
     assert re.search(r"too long +\d+ mm +\d+", refused)

@@ -88,7 +88,7 @@ def test_guides_from_the_plan_to_the_verdict(job, tmp_path):
 def test_where_guides_were_to_stand_is_kept_of_a_job_without_a_program(job, tmp_path, monkeypatch):
     """A time law that is refused leaves a placement, which is looked at with the guides where it wants them."""
     monkeypatch.setattr(pipeline, "retime", lambda *_, **__: Refusal("timing", "no law"))
-    outcome = run(job, tmp_path)
+    outcome = run(job, tmp_path, advice=None)
     assert outcome.refusal.cause == "no law"
     assert not (tmp_path / "program.csv").exists()
     rail_positions = outcome.find(PlacedPath).placement.rail_positions

@@ -45,7 +45,7 @@ def planned(tmp_path, parts):
             f'[part]\nmesh = "${{PENTAPOD_PARTS}}/{mesh}"\n{part}\n[tool]\ntype = "ball"\ndiameter_mm = 6\n'
             f"[toolpath]\nstepover_mm = {stepover}\n[feed]\ncut_mm_min = 3000\n"
         )
-        return run(Job.load(job), tmp_path / "out")
+        return run(Job.load(job), tmp_path / "out", advice=None)
 
     return plan
 

@@ -66,7 +66,7 @@ def test_toolpaths_of_shipped_jobs(name):
 
 
 def check_shipped(job, folder):
-    outcome = run(job, folder)
+    outcome = run(job, folder, advice=None)
     name = job.path.stem
     assert outcome.passed is (name != "oversize"), outcome.refusal or [
         c for c in outcome.verdict.certificates if not c.passed
@@ -153,7 +153,7 @@ def test_free_placement_gives_the_same_bytes_twice(make_job, tmp_path):
 def test_a_refused_job_leaves_no_program_not_even_an_old_one(usual, make_job, tmp_path):
     out = shutil.copytree(usual[1], tmp_path / "out")
     (out / "notes.txt").write_text("mine")
-    outcome = run(Job.load(make_job(TOO_FAR)), out)
+    outcome = run(Job.load(make_job(TOO_FAR)), out, advice=None)
     assert isinstance(outcome.refusal, Refusal)
     assert not outcome.passed
     assert names(out) == {"plan.npz", "verdict.json", "manifest.json", "notes.txt"}

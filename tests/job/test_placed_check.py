@@ -61,7 +61,7 @@ def test_axes_that_lean_into_the_part_are_planned_again_without_leaning_or_refus
     assert asked == [np.radians(15.0), 0.0]
 
     stubborn = True
-    outcome = run(job, tmp_path / "refused")
+    outcome = run(job, tmp_path / "refused", advice=None)
     assert outcome.refusal is not None
     assert "the tool touches the part at waypoints" in str(outcome.refusal)
     assert not (tmp_path / "refused" / "program.csv").exists()

@@ -96,7 +96,7 @@ def test_a_drawing_is_named_by_its_bytes(make_job, tmp_path):
         ("stepover_mm = 15\nspacing_mm = 4", 'strategy = "drawing"\nfile = "a.svg"'),
         ("position_mm = [", "position_mm = [1000.0, 0, 700] # ["),
     )
-    assert run(Job.load(job), tmp_path / "out").refusal is not None
+    assert run(Job.load(job), tmp_path / "out", advice=None).refusal is not None
     found = json.loads((tmp_path / "out" / "verdict.json").read_text(encoding="utf-8"))["sha256"]
     assert found["toolpath_file"] == sha256(drawing).hexdigest()
     assert found["toolpath_curve"] is None

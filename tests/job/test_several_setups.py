@@ -180,7 +180,7 @@ def test_too_few_set_ups_are_a_refusal_that_names_what_is_left(job, tmp_path):
     old = tmp_path / "setup-1"
     old.mkdir()
     (old / "program.csv").write_text("")
-    outcome = run(Job.load(large), tmp_path)
+    outcome = run(Job.load(large), tmp_path, advice=None)
     assert outcome.refusal.stage == "placement"
     assert outcome.refusal.diagnosis[0].constraint == "beyond 2 set-ups"
     assert outcome.refusal.diagnosis[0].waypoints

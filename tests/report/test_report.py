@@ -142,7 +142,7 @@ def test_signals_are_those_of_the_program(make_job, tmp_path):
 
 
 def test_report_of_a_refused_job(make_job, tmp_path):
-    outcome = run(Job.load(make_job(TOO_FAR)), tmp_path / "out")
+    outcome = run(Job.load(make_job(TOO_FAR)), tmp_path / "out", advice=None)
     text, page = page_of(outcome, tmp_path)
     refusal = outcome.refusal
     assert refusal is not None
@@ -154,7 +154,7 @@ def test_report_of_a_refused_job(make_job, tmp_path):
 
 
 def test_a_refusal_is_drawn_in_the_machine_where_it_came_nearest(make_job, tmp_path):
-    outcome = run(Job.load(make_job(TOO_FAR)), tmp_path / "out")
+    outcome = run(Job.load(make_job(TOO_FAR)), tmp_path / "out", advice=None)
     text, _ = page_of(outcome, tmp_path)
     traces = {trace["name"]: trace for trace in data(text, "figures")["scene"]["data"]}
     attempt, machine = outcome.refusal.attempt, outcome.machine

@@ -61,7 +61,7 @@ def test_what_is_missing_is_named(planned, tmp_path):
 
 def test_a_refused_job_is_shown_in_the_middle_of_the_work(make_job, tmp_path):
     """So that it can be dragged to where it fits."""
-    outcome = run(Job.load(make_job(TOO_FAR)), tmp_path / "out")
+    outcome = run(Job.load(make_job(TOO_FAR)), tmp_path / "out", advice=None)
     assert outcome.refusal is not None
     opened = open_run(tmp_path / "out")
     assert opened.program is None

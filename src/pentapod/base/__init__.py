@@ -1,5 +1,6 @@
 """Base: errors, refusals, values, registries, keys, files and versions. No mathematics."""
 
+from pentapod.base.advice import Advice, Change
 from pentapod.base.errors import (
     ArrayError,
     InputError,
@@ -16,7 +17,9 @@ from pentapod.base.registry import Registry
 from pentapod.base.values import Result, Value
 
 __all__ = [
+    "Advice",
     "ArrayError",
+    "Change",
     "InputError",
     "JobError",
     "MachineError",

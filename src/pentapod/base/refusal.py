@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import wraps
 from typing import Any, Concatenate, Never, ParamSpec, Protocol, TypeVar, cast, overload
 
+from pentapod.base.advice import Advice
 from pentapod.base.errors import PentapodError
 from pentapod.base.values import Value
 
@@ -39,13 +40,15 @@ class Shortfall(Value):
 class Refusal(Value):
     """Result of a stage that cannot do its task. stage: "placement", "timing", ...; cause: one sentence.
 
-    Later stages return it unchanged, so a chain of stages needs one `unwrap` at its end.
+    advice: changes of the job that were planned, and passed, the best first (`job.pipeline.run`). Later stages return
+    a refusal unchanged, so a chain of stages needs one `unwrap` at its end.
     """
 
     stage: str
     cause: str
     diagnosis: tuple[Shortfall, ...] = ()
     remedy: str = ""
+    advice: tuple[Advice, ...] = ()
 
     def __str__(self) -> str:
         text = f"{self.stage}: {self.cause}"

@@ -6,7 +6,7 @@ import json
 import logging
 import math
 import sys
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -15,6 +15,7 @@ import click
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from pentapod.base.advice import Advice
     from pentapod.base.progress import Progress
     from pentapod.verify.verdict.verdict import Certificate, NotJudged, Verdict
 
@@ -103,6 +104,11 @@ def note_changes(folder: Path) -> None:
         check_run(folder)
     except InputError as error:
         click.echo(f"note: {error}", err=True)
+
+
+def advice_text(advice: Sequence[Advice]) -> str:
+    """Return advice as TOML for the job file, each with what it does and what it keeps."""
+    return "\n\n".join(f"# {each}\n{each.toml}" for each in advice)
 
 
 def verdict_text(verdict: Verdict) -> str:

@@ -9,14 +9,25 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pentapod.job.advice.options import AdviceOptions as AdviceOptions
+    from pentapod.job.advice.search import Advised as Advised
+    from pentapod.job.advise import advise as advise
     from pentapod.job.outcome import Outcome as Outcome
     from pentapod.job.pipeline import run as run
     from pentapod.job.schema.job import Job as Job
     from pentapod.job.verdict import judge as judge
 
-_HOMES = {"Job": "schema.job", "Outcome": "outcome", "judge": "verdict", "run": "pipeline"}
+_HOMES = {
+    "Advised": "advice.search",
+    "AdviceOptions": "advice.options",
+    "Job": "schema.job",
+    "Outcome": "outcome",
+    "advise": "advise",
+    "judge": "verdict",
+    "run": "pipeline",
+}
 
-__all__ = ["Job", "Outcome", "judge", "run"]
+__all__ = ["AdviceOptions", "Advised", "Job", "Outcome", "advise", "judge", "run"]
 
 
 def __getattr__(name: str) -> Any:

@@ -28,10 +28,14 @@ class Stage(Value):
     value: Any
     remark: str = ""
 
+    def with_value(self, value: Any) -> Self:
+        """Return the stage with another result."""
+        return replace(self, value=value)
+
 
 @dataclass(frozen=True)
 class Outcome(Result):
-    """Results of a run. stages: in the order of the flow; a refusal is the last one.
+    """Results of a run. stages: in the order of the flow; only the search for advice comes after a refusal.
 
     machine: with the job's tool length and controller settings.
     """
@@ -196,6 +200,7 @@ def refusal_dict(refusal: Refusal) -> dict[str, Any]:
         "stage": refusal.stage,
         "cause": refusal.cause,
         "remedy": refusal.remedy,
+        "advice": [each.to_dict() for each in refusal.advice],
         "diagnosis": [
             {
                 "constraint": shortfall.constraint,

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-import time
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal
 from pentapod.base.version import __version__, library_versions, processor_kind
+from pentapod.job.advice.options import OPTIONS, AdviceOptions
+from pentapod.job.advice.search import advised
 from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, write_arrays, write_json
 from pentapod.job.build.limits import placement_limits, timing_limits
 from pentapod.job.build.placement import job_weights
@@ -22,6 +24,7 @@ from pentapod.job.placed_check import Ranges, meetings, refusal_of
 from pentapod.job.plan_arrays import arrays_of
 from pentapod.job.run_folder import staged, unstaged
 from pentapod.job.schema.job import Job
+from pentapod.job.stage_runner import StageRunner
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
 from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
@@ -42,25 +45,6 @@ STRAIGHT = "the tool keeps one direction, as it would touch the part"
 """What is said of a placement with one axis everywhere."""
 
 Writer = Callable[[Outcome, Path], object]
-T = TypeVar("T")
-
-
-class StageRunner:
-    """Runs stages and records their names, wall times and results."""
-
-    def __init__(self, progress: Progress) -> None:
-        self.progress = progress
-        self.stages: list[Stage] = []
-
-    def run(self, name: str, stage: Callable[[], T], remark: Callable[[T], str] = lambda _: "") -> T:
-        """Return the result of a stage and record it. remark: returns a text about the result."""
-        self.progress(name, 0.0)
-        start = time.perf_counter()
-        value = stage()
-        seconds = time.perf_counter() - start
-        self.stages.append(Stage(name, seconds, value, remark(value)))
-        self.progress(name, 1.0)
-        return value
 
 
 def run(
@@ -73,13 +57,15 @@ def run(
     writers: Mapping[str, Writer] | None = None,
     limits: Sequence[Limit] = (),
     claims: Sequence[Claim] = (),
+    advice: AdviceOptions | None = OPTIONS,
 ) -> Outcome:
     """Plan a job, write program.csv, plan.npz and verdict.json into `out`, and return the outcome.
 
     machine: to be used instead of the one that the job names, with the job's tool length and controller settings.
     piece: plan only this piece of the job's toolpath, in one set-up. writers: further files, by name, each written from
     the outcome (the report, for example). limits: further limits on the time law. claims: further claims of the
-    verdict.
+    verdict. advice: how changes are searched for with which a job that cannot be done is planned, and passes; the
+    refusal holds them. None for no search.
     The program is judged from the file, as it was written. A job that cannot be done gives an outcome with a refusal,
     a verdict.json that says so, and no program. The folder changes when the run ends: an error or an interruption
     leaves it as it was. Raises InputError for a bad job, mesh, machine or folder, and where another run is writing into
@@ -101,7 +87,22 @@ def run(
         refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
         if refusal is not None and refusal.stage == "placement" and splits:
             outcome = _split(task, mesh, refusal, staging, writers or {})
+        if (refusal := outcome.refusal) is not None and piece is None and advice is not None:
+            again = partial(passes, machine=machine, limits=limits, claims=claims)
+            search = (job, used, mesh, task.toolpath, again, advice, progress)
+            found = runner.run("advice", lambda: advised(*search))
+            better = dataclasses.replace(refusal, advice=found.advice, remedy=found.sentence)
+            runner.stages = [s if s.value is not refusal else s.with_value(better) for s in runner.stages]
+            outcome = _written(task, refusal_verdict(better, specification.sources), staging, writers or {})
     return outcome
+
+
+def passes(
+    job: Job, *, machine: Machine | None = None, limits: Sequence[Limit] = (), claims: Sequence[Claim] = ()
+) -> bool:
+    """Return whether a job is planned, with a verdict that passes; nothing is kept. Raises InputError as `run`."""
+    with tempfile.TemporaryDirectory() as folder:
+        return run(job, folder, machine=machine, limits=limits, claims=claims, advice=None).passed
 
 
 def _toolpath(job: Job, machine: Machine, mesh: Mesh, piece: Piece | None, runner: StageRunner) -> Toolpath:

@@ -37,5 +37,4 @@ def refusal_of(places: Ranges) -> Refusal:
         "placement",
         "with the tool axes that the machine needs, cutter, shank or holder would cut into the part",
         (Shortfall("the tool touches the part", places, 0.0, "mm"),),
-        remedy="Try a smaller axis.tilt_deg, a thinner or longer tool, or a smaller region",
     )

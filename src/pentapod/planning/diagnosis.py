@@ -51,19 +51,14 @@ def diagnose(values: Floats, margins: Margins, needed: float) -> tuple[Shortfall
     return tuple(shortfall for _, shortfall in sorted(found, key=lambda pair: pair[0]))
 
 
-def refusal(
-    values: Floats, attempt: PlacedPath, margins: Margins, needed: float, suggestions: tuple[str, ...], *, fixed: bool
-) -> UnplacedPath:
-    """Return the refusal of a placement whose best margins are values (N, M); suggestions: phrases for "Try to …"."""
+def refusal(values: Floats, attempt: PlacedPath, margins: Margins, needed: float, *, fixed: bool) -> UnplacedPath:
+    """Return the refusal of a placement whose best margins are values (N, M)."""
     short = int((values.min(axis=1) < needed).sum())
     where = "at the given placement" if fixed else "at the best placement found"
-    smaller = "scale the part down: no wider cone and no large region of it was found to fit"
-    otherwise = "turn or move the part" if fixed else smaller
     return UnplacedPath(
         "placement",
         f"the part does not fit the machine {where}: {short} of {len(values)} waypoints are out of limits",
         diagnose(values, margins, needed),
-        remedy="Try to " + (", or to ".join(suggestions) or otherwise),
         attempt=attempt,
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypedDict, Unpack
 
@@ -20,7 +20,7 @@ from pentapod.planning.placement.common_axes import OPTIONS as COMMON_AXES
 from pentapod.planning.placement.common_axes import CommonAxesOptions, Searched, with_common_axis
 from pentapod.planning.placement.placed_path import PlacedPath, Placement, UnplacedPath
 from pentapod.planning.placement.sampling import best_tilted_margins
-from pentapod.planning.placement.search import SOLVERS, SearchOptions, Solver, SolverName, search
+from pentapod.planning.placement.search import SOLVERS, SearchOptions, SolverName, search
 from pentapod.planning.placement.secondary_objective import SecondaryObjective, improved, objective_of
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.constraints import FREE, PlacementConstraints
@@ -29,7 +29,6 @@ from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.problem.weights import EVEN, NEEDED_MARGIN, Weights
-from pentapod.planning.suggestions import suggestions
 from pentapod.planning.tool_axis.spline import AxisSpline
 from pentapod.toolpath.toolpath import Toolpath
 
@@ -86,8 +85,7 @@ def plan(
     problem, found = _searched(problem, tilt, common_axis, seed, solver, progress)
     best = found.best
     if best.smallest < NEEDED_MARGIN:
-        progress("placement", 1.0, "it does not fit; trying changes that would help")
-        return _refusal(toolpath, problem, best, SOLVERS[solver])
+        return _refusal(toolpath, problem, best)
     keep = max(KEPT_SHARE * best.smallest, NEEDED_MARGIN)
     if secondary_objective is not None and (constraints.moves or problem.samples.tilt > 0.0):
         progress("placement", 1.0, f"margin {best.smallest:.3f}; now the objective {secondary_objective}")
@@ -103,7 +101,7 @@ def plan(
 
 @on_one_thread
 def fits(toolpath: Toolpath, machine: Machine, **options: Unpack[PlacementOptions]) -> bool:
-    """Return whether `plan` finds a placement, without smoothing the axes and without suggestions.
+    """Return whether `plan` finds a placement, without smoothing the axes.
 
     Raises KeyboardInterrupt where the search is interrupted.
     """
@@ -164,18 +162,11 @@ def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: F
     return PlacedPath(toolpath, placement, branch, tips, axes, values, at.margins.limits, common_axis)
 
 
-def _refusal(
-    toolpath: Toolpath, problem: PlacementProblem, best: Candidate, improves: Callable[[PlacementProblem, bool], Solver]
-) -> UnplacedPath:
+def _refusal(toolpath: Toolpath, problem: PlacementProblem, best: Candidate) -> UnplacedPath:
     values, leans = best_tilted_margins(problem.samples, best.margins, best.transform)
     if (values.min(axis=1) >= NEEDED_MARGIN).all():  # each waypoint fits by itself, but not with one smooth field
         leans = problem.leans(best.coefficients)
         poses = problem.samples.machine_poses(best.transform, problem.axes(best.coefficients))
         values = best.margins(*poses, best.transform)
-
-    def improve(other: PlacementProblem, start: Candidate) -> Candidate:
-        return improves(other, True).raise_margin(start, NEEDED_MARGIN)
-
-    found, fixed = suggestions(problem, best, improve, NEEDED_MARGIN), not problem.constraints.moves
     attempt = _path(toolpath, problem, best, leans, "best attempt")
-    return refusal(values, attempt, best.margins, NEEDED_MARGIN, found, fixed=fixed)
+    return refusal(values, attempt, best.margins, NEEDED_MARGIN, fixed=not problem.constraints.moves)

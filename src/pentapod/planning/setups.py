@@ -166,4 +166,4 @@ def _refusal(search: _Search, most: int, whole: Refusal) -> Refusal:
     reached = f"the best partition found makes {share:.0f} % of the cuts"
     cause = f"{most} set-ups are not enough: {reached}; in one set-up {whole.cause}"
     over = Shortfall(f"beyond {most} set-ups", left, 0.0, "")
-    return replace(whole, cause=cause, diagnosis=(over, *whole.diagnosis), remedy=f"Try more set-ups. {whole.remedy}")
+    return replace(whole, cause=cause, diagnosis=(over, *whole.diagnosis))

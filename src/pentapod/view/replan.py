@@ -38,5 +38,5 @@ def replanned(run: OpenedRun, placement: RigidTransform, progress: Progress = si
     """
     job = job_at(run.job, placement)
     folder = run.folder if run.folder.name == FOLDER else run.folder / FOLDER
-    outcome = run_job(job, folder, progress, piece=run.piece, writers={REPORT: write_report})
+    outcome = run_job(job, folder, progress, piece=run.piece, writers={REPORT: write_report}, advice=None)
     return Replanned(outcome, run_of(outcome, folder), folder, placement_toml(job.placement))

@@ -52,7 +52,7 @@ def test_a_job_with_holder_and_vise_is_done_and_judged(make_job, meshes):
 
 
 def test_a_fixture_in_the_way_is_refused_by_name(make_job, meshes):
-    outcome = run(Job.load(make_job(*with_fixture("plate"))), meshes / "out")
+    outcome = run(Job.load(make_job(*with_fixture("plate"))), meshes / "out", advice=None)
     assert outcome.refusal is not None
     blamed = [b for b in outcome.refusal.diagnosis if b.constraint == "spindle touches the fixture"]
     assert blamed

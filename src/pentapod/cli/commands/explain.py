@@ -34,7 +34,7 @@ def shortfalls_text(refusal: Refusal) -> str:
     for shortfall in refusal.diagnosis:
         amount = f"{shortfall.shortfall:.3g} {shortfall.unit}" if shortfall.shortfall else "–"
         lines.append(f"{shortfall.constraint:<46} {amount:>14}  {_ranges(shortfall.waypoints)}".rstrip())
-    return "\n".join([*lines, refusal.remedy])
+    return "\n".join([*lines, *([refusal.remedy] if refusal.remedy else [])])
 
 
 def _ranges(waypoints: Sequence[tuple[int, int]]) -> str:

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option, verdict_text
+from pentapod.cli.output import advice_text, echo_json, json_option, progress_bar, quiet_option, verdict_text
 
 if TYPE_CHECKING:
+    from pentapod.job.advice.options import AdviceOptions
     from pentapod.job.outcome import Outcome
+    from pentapod.job.schema.job import Job
 
 
 @click.command()
@@ -19,17 +21,23 @@ if TYPE_CHECKING:
 @click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True,
               help="Folder for the files.")  # fmt: skip
 @click.option("--explain", is_flag=True, help="Print the nearest limits: where, and by how much.")
+@click.option("--advice", type=click.IntRange(0), default=1, show_default=True, metavar="N",
+              help="Changes to find with which a job that cannot be done is planned; 0: do not search.")  # fmt: skip
 @json_option
 @quiet_option
-def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int:
+def plan(job: Path, out: Path, explain: bool, advice: int, as_json: bool, quiet: bool) -> int:
     """Plan JOB.toml: write program.csv, verdict.json, report.html and plan.npz.
 
     The folder changes only when the run ends, so that its files are always of one run. A job that cannot be done
-    leaves no program.csv. A job in several set-ups has a folder of files for each: setup-1, setup-2, and so on.
+    leaves no program.csv. Then changes of the job are searched for and planned, and those whose verdict passed are
+    printed. A job in several set-ups has a folder of files for each: setup-1, setup-2, and so on.
 
-    Ctrl-C during the search for a placement continues with the best one so far, if that fits. At any other time it
-    ends the command and changes nothing.
+    Ctrl-C during the search for a placement continues with the best one so far, if that fits. During the
+    search for changes it ends that. At any other time it ends the command and changes nothing.
     """
+    from pentapod.base.errors import InputError
+    from pentapod.job.advice.options import AdviceOptions
+    from pentapod.job.advise import can_help
     from pentapod.job.artefacts import PROGRAM, REPORT
     from pentapod.job.outcome import SetUps
     from pentapod.job.pipeline import run
@@ -39,9 +47,15 @@ def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int
     from pentapod.report import write_report
     from pentapod.timing import Explanation
 
-    loaded = Job.load(job)
-    with progress_bar(quiet=quiet or as_json) as progress:
-        outcome = run(loaded, out, progress, writers={REPORT: write_report})
+    loaded, options = Job.load(job), AdviceOptions(wanted=advice) if advice else None
+    try:
+        with progress_bar(quiet=quiet or as_json) as progress:
+            outcome = run(loaded, out, progress, writers={REPORT: write_report}, advice=options)
+    except InputError as error:
+        if options is None or not can_help(error):
+            raise
+        click.echo(f"error: {error}", err=True)  # at once: the search takes as long as a plan or two
+        return _advised(loaded, options, as_json=as_json, quiet=quiet)
     refusal = outcome.refusal
     if as_json:
         seconds = {stage.name: round(stage.seconds, 3) for stage in outcome.stages}
@@ -62,9 +76,24 @@ def plan(job: Path, out: Path, explain: bool, as_json: bool, quiet: bool) -> int
         click.echo(f"report: {out / REPORT}")
     if refusal is not None:
         click.echo(f"refused: {refusal}", err=True)
+        click.echo(advice_text(refusal.advice), err=True, nl=bool(refusal.advice))
     elif not outcome.passed and quiet:
         click.echo("the verdict failed", err=True)
     return 0 if outcome.passed else 1
+
+
+def _advised(job: Job, options: AdviceOptions, *, as_json: bool, quiet: bool) -> int:
+    """Search for advice for a job that is an error, print it, and return the exit code of the error."""
+    from pentapod.cli.main import EXIT_INPUT
+    from pentapod.job.advise import advise
+
+    with progress_bar(quiet=quiet or as_json) as progress:
+        found = advise(job, options=options, progress=progress)
+    if as_json:
+        echo_json({"advice": [each.to_dict() for each in found.advice], "tried": found.tried})
+    click.echo(f"{found.sentence}.", err=True)
+    click.echo(advice_text(found.advice), err=True, nl=bool(found.advice))
+    return EXIT_INPUT
 
 
 def _explained(outcome: Outcome) -> str:

@@ -37,12 +37,12 @@ def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
         return
     extents = np.ptp(mesh.bounds, axis=0)
     size, width = (f"{from_si(value, 'mm'):,.0f} mm" for value in (extents.max(), machine.work.diameter))
-    key, remedy = "scale", "machine a smaller region, or set scale: 0.001 if the numbers are millimetres, not metres"
+    key, remedy = "scale", "scale = 0.001 if the numbers are millimetres, not metres"
     if not states_unit(job.mesh_path):
         known = UNITS[job.part.unit]
         unit = min(UNITS, key=lambda name: abs(np.log(extents.max() * UNITS[name] / known / machine.work.diameter)))
         key = "scale" if unit == job.part.unit else "unit"
-        remedy = "machine a smaller region, or set scale" if unit == job.part.unit else f'unit = "{unit}"?'
+        remedy = None if unit == job.part.unit else f'unit = "{unit}"?'
     raise job.error(
         "part", key, f"the part is {size} wide, the work volume {width}",
         expected=f"places to machine that are at most {from_si(apart, 'mm'):,.0f} mm from each other", remedy=remedy,

@@ -1,0 +1,102 @@
+"""Other tool axes for a job: what to write into [axis], and what the axes are then at the points of a sketch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.base.units import to_si
+from pentapod.cutters.tool import Tool
+from pentapod.geometry.directions import angle_between, normalised
+from pentapod.job.advice.options import AdviceOptions
+from pentapod.job.advice.sketch import Sketch
+from pentapod.job.schema.axis import AxisKeys
+from pentapod.job.schema.job import Job
+from pentapod.job.schema.strategies import FILE
+from pentapod.planning.estimate import leaning
+from pentapod.planning.placement.common_axes import directions
+from pentapod.planning.problem.constraints import PlacementConstraints
+from pentapod.planning.problem.samples import ToolpathSamples
+
+Changes = dict[str, dict[str, Any]]
+Kinds = Callable[[Sketch], list[ToolpathSamples]]
+
+_OF_MODES = ("direction", "point_mm", "line", "places_mm", "directions")
+_FROM_AXES = ("lead_deg", "side_deg")
+
+
+@dataclass(frozen=True, eq=False)
+class AxisChoice:
+    """Tool axes to try. words: what they are, empty for the job's own; kinds: samples of a sketch, to choose from."""
+
+    words: str
+    changes: Changes
+    kinds: Kinds
+
+
+def taken_out(job: Job, table: str, keys: tuple[str, ...]) -> dict[str, Any]:
+    """Return the changes that take keys out of a table, of those that the job gives."""
+    given = getattr(job.tables, table).model_fields_set
+    return {key: None for key in keys if key in given}
+
+
+def axis_choices(
+    job: Job, tool: Tool, sketch: Sketch, constraints: PlacementConstraints, options: AdviceOptions
+) -> list[AxisChoice]:
+    """Return the job's own axes, and others that its tool and strategy allow, the cheapest to plan first."""
+    axis, lean = job.axis, float(getattr(tool, "largest_lean", 0.0))
+    own = job.axis.si.tilt
+    if axis.mode == "auto":
+        found = [AxisChoice("", {}, lambda s: leaning(s.samples(s.normals, 0.0), own, constraints))]
+    else:
+        found = [AxisChoice("", {}, lambda s: [s.samples(s.axes, own)])]
+    if job.toolpath.strategy != FILE:
+        usual = AxisKeys().tilt if tool.can_tilt else 0.0
+        # A cone that is given may be too narrow, or too wide for a tool that cannot tilt.
+        cone = {} if own == usual else taken_out(job, "axis", ("tilt_deg",))
+        for direction in _directions(job, sketch, constraints):
+            same = axis.mode == "fixed" and np.allclose(normalised(axis.direction), direction, atol=1e-3)
+            # A beam that leans far from the normal burns another spot.
+            suits = not 0.0 < lean < float(angle_between(sketch.normals, direction).max())
+            if suits and not (same and not cone):
+                found.append(_fixed(job, direction, usual, cone))
+        if lean > usual and axis.mode != "auto":
+            keys = taken_out(job, "axis", (*_OF_MODES, *_FROM_AXES, "tilt_deg"))
+            found.append(
+                AxisChoice(
+                    "the planner chooses the tool axis", {"axis": {"mode": "auto", **keys}},
+                    lambda s: leaning(s.samples(s.normals, 0.0), lean, constraints),
+                )
+            )  # fmt: skip
+    if tool.can_tilt and axis.mode != "auto":
+        wider = [deg for deg in options.cones_deg if deg > axis.tilt_deg]
+        found += [_wider(deg) for deg in wider]
+    return found
+
+
+def _fixed(job: Job, direction: Floats, cone: float, others: dict[str, Any]) -> AxisChoice:
+    """Return the choice of one direction for the whole path."""
+    rounded = [round(float(v), 4) + 0.0 for v in direction]
+    keys = {**taken_out(job, "axis", (*_OF_MODES, *_FROM_AXES)), **others, "direction": rounded}
+    upward = normalised(np.array(rounded))
+    return AxisChoice(
+        "one direction of the tool for the whole path", {"axis": {"mode": "fixed", **keys}},
+        lambda s: [s.samples(upward, cone)],
+    )  # fmt: skip
+
+
+def _directions(job: Job, sketch: Sketch, constraints: PlacementConstraints) -> list[Floats]:
+    """Return directions for a fixed axis: that of the region, and those about which the normals lie."""
+    view = normalised(job.part.si.region_direction)
+    others = directions(sketch.normals, constraints)
+    return [view, *(d for d in others if float(d @ view) < np.cos(to_si(5.0, "deg")) and float(d @ view) > 0.0)]
+
+
+def _wider(degrees: float) -> AxisChoice:
+    """Return the choice of a wider cone around the job's own axes."""
+    words = f"the tool may lean by up to {degrees:g} deg"
+    return AxisChoice(words, {"axis": {"tilt_deg": degrees}}, lambda s: [s.samples(s.axes, to_si(degrees, "deg"))])

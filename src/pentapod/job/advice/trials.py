@@ -1,0 +1,266 @@
+"""Trials: changes of a job that fit by an estimate, those first that keep most of the task."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from pentapod.base.errors import InputError
+from pentapod.base.progress import Progress
+from pentapod.base.units import from_si, to_si
+from pentapod.job.advice.axes import AxisChoice, Changes, axis_choices
+from pentapod.job.advice.options import AdviceOptions
+from pentapod.job.advice.parts import Regions, Smaller
+from pentapod.job.advice.places import Place, places
+from pentapod.job.advice.sketch import Sketch
+from pentapod.job.build.limits import placement_limits
+from pentapod.job.build.placement import job_weights
+from pentapod.job.build.specification import job_collision_world
+from pentapod.job.build.toolpath import job_tool
+from pentapod.job.schema.job import Job
+from pentapod.machine.machine import Machine
+from pentapod.mesh.mesh import Mesh
+from pentapod.planning.estimate import Estimate, Estimator
+from pentapod.planning.problem.constraints import FREE
+from pentapod.planning.problem.problem import PlacementProblem
+
+FEWEST = 4
+"""Points below which a sketch shows nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Changes to plan. kept, whole: as in `Advice`; worth: those of more worth are planned first."""
+
+    words: str
+    changes: Changes
+    kept: float
+    worth: float
+    whole: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """Tool axes and a placement, and what was estimated for the whole task with them."""
+
+    axis: AxisChoice
+    place: Place
+    found: Estimate
+
+    @property
+    def changes(self) -> Changes:
+        """The changes of the job."""
+        return merged(self.axis.changes, self.place.changes(self.found.candidate.transform))
+
+    @property
+    def words(self) -> str:
+        """What is changed, in words; empty for the job's own setting."""
+        return joined(self.axis.words, self.place.words)
+
+
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """The trials of one job. tried: words for what was looked at, in order."""
+
+    job: Job
+    machine: Machine
+    mesh: Mesh
+    sketch: Sketch
+    options: AdviceOptions
+    progress: Progress
+    tried: dict[str, None]
+
+    @cached_property
+    def estimator(self) -> Estimator:
+        """Estimates on the machine. Raises JobError where the tool does not go with it."""
+        world = job_collision_world(self.job, self.machine, self.mesh)
+        return Estimator.of(
+            PlacementProblem.of(
+                self.sketch.samples(self.sketch.axes, 0.0), self.machine, FREE, job_weights(self.job),
+                collision_world=world, limits=placement_limits(self.job),
+            )
+        )  # fmt: skip
+
+    @cached_property
+    def places(self) -> list[Place]:
+        """The job's own placements, and wider ones."""
+        return places(self.job, self.machine, self.mesh)
+
+    @cached_property
+    def axes(self) -> list[AxisChoice]:
+        """The job's own tool axes, and others."""
+        tool = job_tool(self.job, self.machine)
+        return axis_choices(self.job, tool, self.sketch, self.places[0].constraints, self.options)
+
+    @cached_property
+    def looked_at(self) -> list[Setting]:
+        """The settings that were estimated so far."""
+        return []
+
+    def all(self, own: bool) -> Iterator[Trial]:
+        """Yield the trials, the best first as far as that is known. own: whether the job as it is counts as one."""
+        yield from self._keeping_all(own)
+        for base in self._bases():
+            yield from self._smaller(base)
+        yield from self._scales(self._bases()[0])
+
+    def _keeping_all(self, own: bool) -> Iterator[Trial]:
+        """Yield changes of tool axes and placement; the cheapest to plan first, once they fit comfortably."""
+        o = self.options
+        for place in self.places:
+            scant: list[Setting] = []
+            for axis in self.axes:
+                setting = self._setting(axis, place)
+                if not (own or setting.words) or setting.found.margin < o.enough:
+                    continue
+                if setting.found.margin < o.comfortable:
+                    scant.append(setting)
+                else:
+                    yield Trial(setting.words, setting.changes, 1.0, 1.0)
+            for setting in sorted(scant, key=lambda s: -s.found.margin):
+                yield Trial(setting.words, setting.changes, 1.0, 1.0)
+
+    def _setting(self, axis: AxisChoice, place: Place) -> Setting:
+        self._tell(joined(axis.words, place.words))
+        setting = Setting(axis, place, self._estimated(axis, place, self.sketch))
+        self.looked_at.append(setting)
+        return setting
+
+    def _bases(self) -> list[Setting]:
+        """Return the settings from which other changes start: the best one, and the job's own."""
+        best, own = max(self.looked_at, key=lambda setting: setting.found.margin), self.looked_at[0]
+        return [own] if best is own else [best, own]
+
+    def _smaller(self, base: Setting) -> Iterator[Trial]:
+        """Yield changes that keep less, or need more set-ups or another tool."""
+        yield from self._setups(base)
+        regions = sorted(self._regions(base), key=lambda trial: -trial.worth)
+        yield from (trial for trial in regions if trial.worth >= self.options.worth_length)
+        yield from self._lengths(base)
+        yield from (trial for trial in regions if trial.worth < self.options.worth_length)
+
+    def _regions(self, base: Setting) -> list[Trial]:
+        """Return the largest smaller regions that fit: flatter ones, and boxes."""
+        regions = Regions.of(self.job, self.mesh, self.sketch)
+        if regions is None:
+            return []
+        found: list[Smaller] = []
+        self._tell("a smaller region_angle_deg")
+        near: Estimate | None = None
+        for degrees in self.options.angles_deg:
+            smaller = regions.flatter(degrees)
+            if smaller.keeps.all() or smaller.keeps.sum() < FEWEST:
+                continue
+            near = self._estimated(base.axis, base.place, self.sketch.at(smaller.keeps), near)
+            if near.margin >= self.options.enough:
+                found.append(smaller)
+                break
+        self._tell("a smaller region_box_mm")
+        for deep in (False, True):
+            found += self._boxes(base, regions, deep=deep)
+        return [self._of_region(base, smaller) for smaller in found if smaller.share > 0.0]
+
+    def _of_region(self, base: Setting, smaller: Smaller) -> Trial:
+        changes, words = merged(base.changes, smaller.changes), joined(smaller.words, base.words)
+        return Trial(words, changes, smaller.share, smaller.share)
+
+    def _boxes(self, base: Setting, regions: Regions, *, deep: bool) -> list[Smaller]:
+        """Return about the largest box that fits, by bisection, and a smaller one, in case its plan fails."""
+        fits, too_large, near, share = 0.0, 1.0, None, 0.7
+        for _ in range(self.options.halvings):
+            try:
+                smaller = regions.boxed(share, deep=deep)
+            except InputError:  # the box is flat
+                break
+            enough = smaller.keeps.sum() >= FEWEST
+            if enough:
+                near = self._estimated(base.axis, base.place, self.sketch.at(smaller.keeps), near)
+            if enough and near is not None and near.margin >= self.options.enough:
+                fits = share
+            else:
+                too_large = share
+            share = 0.5 * (fits + too_large) if fits > 0.0 else 0.6 * share
+            if share < self.options.least:
+                break
+        shares = (self.options.spare * fits, self.options.smaller * fits)
+        return [regions.boxed(share, deep=deep) for share in shares] if fits > 0.0 else []
+
+    def _setups(self, base: Setting) -> Iterator[Trial]:
+        """Yield the smallest number of set-ups whose slabs fit."""
+        if not base.place.constraints.moves:
+            return
+        self._tell("more placement.setups")
+        for count in self.options.setups:
+            for along in np.argsort(-np.ptp(self.sketch.contacts, axis=0))[:2].tolist():
+                at = self.sketch.contacts[:, along]
+                borders = np.linspace(at.min(), at.max(), count + 1)
+                slabs = [(at >= a - 1e-9) & (at <= b + 1e-9) for a, b in pairwise(borders.tolist())]
+                parts = (self.sketch.at(slab) for slab in slabs if slab.sum() >= FEWEST)
+                margins = (self._estimated(base.axis, base.place, part).margin for part in parts)
+                if count > self.job.placement.setups and all(margin >= self.options.enough for margin in margins):
+                    changes = merged(base.changes, {"placement": {"setups": count}})
+                    yield Trial(joined(f"up to {count} set-ups", base.words), changes, 1.0, 1.0)
+                    return
+
+    def _lengths(self, base: Setting) -> Iterator[Trial]:
+        """Yield the first other tool length that fits."""
+        self._tell("another tool.length_mm")
+        for share in self.options.lengths:
+            length = round(float(from_si(share * self.machine.tool_length, "mm")))
+            try:
+                other = replace(self, machine=self.machine.with_tool(to_si(length, "mm")))
+                margin = other._estimated(base.axis, base.place, self.sketch).margin
+            except InputError:  # the spindle or the holder would not fit
+                continue
+            if margin >= self.options.enough:
+                changes = merged(base.changes, {"tool": {"length_mm": float(length)}})
+                yield Trial(joined(f"a tool of {length} mm", base.words), changes, 1.0, self.options.worth_length)
+                return
+
+    def _scales(self, base: Setting) -> Iterator[Trial]:
+        """Yield the largest scale that fits, by bisection; it makes another part."""
+        self._tell("a smaller part.scale")
+        fits, too_large, share, near = 0.0, 1.0, 0.5, None
+        for _ in range(self.options.halvings):
+            near = self._estimated(base.axis, base.place, self.sketch.scaled(share), near, obstacles=False)
+            if near.margin >= self.options.enough:
+                fits = share
+            else:
+                too_large = share
+            share = 0.5 * (fits + too_large)
+            if share < self.options.least:
+                break
+        if fits > 0.0:
+            size = self.options.spare * fits
+            changes = merged(base.changes, {"part": {"scale": float(f"{size * self.job.part.scale:.3g}")}})
+            yield Trial(joined(f"the part at {size:.2g} of its size", base.words), changes, 1.0, 0.0, whole=False)
+
+    def _estimated(
+        self, axis: AxisChoice, place: Place, sketch: Sketch, near: Estimate | None = None, *, obstacles: bool = True
+    ) -> Estimate:
+        """Return the estimate for axes, a placement and a sketch; without obstacles where it is of another part."""
+        estimator = self.estimator if obstacles else replace(self.estimator, world=None)
+        return estimator.best(axis.kinds(sketch), place.constraints, place.component, self.options.comfortable, near)
+
+    def _tell(self, words: str) -> None:
+        if words:
+            self.tried[words] = None
+            self.progress("advice", 0.0, words)
+
+
+def joined(*words: str) -> str:
+    """Return words that are not empty, with commas."""
+    return ", ".join(each for each in words if each)
+
+
+def merged(*changes: Changes) -> Changes:
+    """Return several changes as one; later ones win."""
+    found: Changes = {}
+    for each in changes:
+        for table, keys in each.items():
+            found[table] = {**found.get(table, {}), **keys}
+    return found

@@ -1,0 +1,33 @@
+"""Advice for jobs that are an error: the region holds nothing to machine, or the part is too large for the machine."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from pentapod.base.errors import InputError
+from pentapod.base.progress import Progress, silent
+from pentapod.job.advice.options import OPTIONS, AdviceOptions
+from pentapod.job.advice.search import Advised, advised
+from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.job.pipeline import passes
+from pentapod.job.schema.job import Job
+from pentapod.machine.machine import Machine
+
+_KEYS = frozenset(("region", "gouge.remedy", "part.unit", "part.scale"))
+
+
+def can_help(error: InputError) -> bool:
+    """Return whether an error of `run` is about a task that other values of the job may make possible."""
+    return error.key in _KEYS
+
+
+def advise(
+    job: Job, *, machine: Machine | None = None, options: AdviceOptions = OPTIONS, progress: Progress = silent
+) -> Advised:
+    """Return changes with which a job that cannot be done is planned, and its verdict passes.
+
+    For jobs for which `run` raises an error of those that `can_help` names; refusals hold their advice. Raises
+    InputError for a bad job, mesh or machine.
+    """
+    used, mesh = job_machine(job, machine), job_mesh(job, progress)
+    return advised(job, used, mesh, None, partial(passes, machine=machine), options, progress)
