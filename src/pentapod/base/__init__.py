@@ -1,6 +1,5 @@
 """Base: errors, refusals, values, registries, keys, files and versions. No mathematics."""
 
-from pentapod.base.advice import Advice, Change
 from pentapod.base.errors import (
     ArrayError,
     InputError,
@@ -12,7 +11,7 @@ from pentapod.base.errors import (
     ToolpathError,
 )
 from pentapod.base.progress import Progress
-from pentapod.base.refusal import Refusal, RefusalError, Shortfall, stage
+from pentapod.base.refusal import Advice, Change, Refusal, RefusalError, Shortfall, stage
 from pentapod.base.registry import Registry
 from pentapod.base.values import Result, Value
 

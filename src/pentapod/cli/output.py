@@ -15,8 +15,8 @@ import click
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from pentapod.base.advice import Advice
     from pentapod.base.progress import Progress
+    from pentapod.base.refusal import Advice
     from pentapod.verify.verdict.verdict import Certificate, NotJudged, Verdict
 
 Command = TypeVar("Command", bound=Callable[..., Any])

@@ -8,8 +8,8 @@ import tomllib
 
 import pytest
 
-from pentapod.base.advice import Advice, Change
 from pentapod.base.errors import JobError
+from pentapod.base.refusal import Advice, Change
 from pentapod.cli.main import run as run_cli
 from pentapod.job import AdviceOptions, Job, advise, run
 from pentapod.job.advice.search import Advised, advised

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
 
-from pentapod.base.advice import Advice, Change
 from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress
+from pentapod.base.refusal import Advice, Change
 from pentapod.base.values import Value
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.sketch import Sketch
