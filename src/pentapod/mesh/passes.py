@@ -86,6 +86,35 @@ class Passes:
         levels = self.levels[self.pass_of_point[begins]]
         return Passes(self.points[index], self.normals[index], starts, levels)
 
+    def without_spikes(self, near: float) -> Passes:
+        """Return the passes without what leads to a point and straight back: where that is all, none is left.
+
+        near: metres up to which two points are the same; of equal neighbours one is kept.
+        """
+        rows, owner = np.arange(len(self.points)), self.pass_of_point
+        for apart in (1, 2):  # equal neighbours; then points that come back to the one before the last
+            while len(rows) > apart:
+                place, line = self.points[rows], owner[rows]
+                same = (line[apart:] == line[:-apart]) & (
+                    np.linalg.norm(place[apart:] - place[:-apart], axis=1) <= near
+                )
+                same[1:] &= ~same[:-1]
+                if not same.any():
+                    break
+                # The first and the last point of a pass stay.
+                before = np.flatnonzero(same)
+                after = before + apart
+                ends = np.append(line[1:] != line[:-1], True)
+                keep = np.ones(len(rows), dtype=np.bool_)
+                keep[np.where(ends[after], before, after)] = False
+                if apart > 1:
+                    keep[before + 1] = False
+                rows = rows[keep]
+        counts = np.bincount(owner[rows], minlength=len(self))
+        kept = counts > 1
+        rows = rows[kept[owner[rows]]]
+        return Passes(self.points[rows], self.normals[rows], run_starts(counts[kept]), self.levels[kept])
+
     def rows(self, k: int) -> slice:
         """Return where the points of pass k are."""
         return slice(int(self.starts[k]), int(self.starts[k + 1]))

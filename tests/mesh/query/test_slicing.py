@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import toolpath_surfaces as surfaces
+from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.slicing import LevelSet, chained
 from pentapod.mesh.topology import Topology
@@ -169,6 +170,25 @@ def test_without_duplicates_keeps_the_ends():
     assert len(thinned) == len(passes)
     np.testing.assert_array_equal(thinned.points[thinned.starts[:-1]], passes.points[passes.starts[:-1]])
     np.testing.assert_array_equal(thinned.points[thinned.starts[1:] - 1], passes.points[passes.starts[1:] - 1])
+
+
+@pytest.mark.parametrize(
+    ("names", "left"),
+    [
+        ("abcbd", "abd"), ("abcbabe", "abe"), ("abcdcbe", "abe"), ("abbcb", "ab"), ("aba", ""), ("abca", "abca"),
+        ("abcc", "abc"), ("abcbca", "abca"), ("ababa", ""),
+    ],
+)  # fmt: skip
+def test_spikes_of_lines_are_left_out(names, left):
+    """A line that leads to a point and straight back; other lines beside it, and closed ones, stay as they are."""
+    places = {name: np.array([k, k * k, 0.0]) for k, name in enumerate("abcde")}
+    lines = [np.array([places[name] for name in text]) for text in ("ade", names, "abca")]
+    found = Passes.of([(line, line + 1.0) for line in lines]).without_spikes(1e-7)
+    expected = ["ade", *([left] if left else []), "abca"]
+    assert found.levels.tolist() == [0, *([1] if left else []), 2]
+    for k, text in enumerate(expected):
+        np.testing.assert_array_equal(found.points[found.rows(k)], [places[name] for name in text])
+    np.testing.assert_array_equal(found.normals, found.points + 1.0)
 
 
 def test_crossings_count_the_points_of_slices():

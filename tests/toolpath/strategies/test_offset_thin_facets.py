@@ -13,7 +13,7 @@ STEP = 4e-3
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def plate(aspect, facets=1200, size=0.04):
+def plate(aspect, facets, size=0.04):
     """A square plate in thin triangles."""
     rows = int(np.sqrt(0.5 * facets * aspect))
     columns = max(2, round(0.5 * facets / rows))
@@ -33,11 +33,13 @@ def turns(points):
     return (along[1:] * along[:-1]).sum(axis=1)
 
 
-@pytest.mark.parametrize("aspect", [1, 10, 30])
-def test_offsets_of_a_circle_are_circles_on_thin_facets(aspect):
+@pytest.mark.parametrize(("aspect", "facets"), [(1, 600), (10, 400), (30, 900)])
+def test_offsets_of_a_circle_are_circles_on_thin_facets(aspect, facets):
     turn = np.linspace(0, 2 * np.pi, 200)
     curve = np.stack([0.02 + 3.5e-3 * np.cos(turn), 0.02 + 3.5e-3 * np.sin(turn), 0 * turn], 1)
-    passes = offset_paths(PartSurface(plate(aspect), BALL, UP), OffsetOptions(stepover=STEP, curve=curve)).passes
+    passes = offset_paths(
+        PartSurface(plate(aspect, facets), BALL, UP), OffsetOptions(stepover=STEP, curve=curve)
+    ).passes
     radius = np.hypot(*(passes.points[:, :2] - 0.02).T)
     for k, level in enumerate(passes.levels):
         if level <= 6:  # further ones are fill lines
@@ -46,9 +48,9 @@ def test_offsets_of_a_circle_are_circles_on_thin_facets(aspect):
     assert set(range(6)) <= set(passes.levels.tolist())
 
 
-@pytest.mark.parametrize("aspect", [1, 30])
-def test_offsets_of_the_border_are_squares_on_thin_facets(aspect):
-    passes = offset_paths(PartSurface(plate(aspect), BALL, UP), OffsetOptions(stepover=STEP)).passes
+@pytest.mark.parametrize(("aspect", "facets"), [(3, 500), (10, 400), (30, 900)])
+def test_offsets_of_the_border_are_squares_on_thin_facets(aspect, facets):
+    passes = offset_paths(PartSurface(plate(aspect, facets), BALL, UP), OffsetOptions(stepover=STEP)).passes
     for k, level in enumerate(passes.levels):
         if level < 5:
             points = passes.points[passes.rows(k), :2]
@@ -60,6 +62,6 @@ def test_offsets_of_the_border_are_squares_on_thin_facets(aspect):
 
 def test_a_spiral_on_thin_facets_has_no_reversal():
     for form in ("offset", "planar"):
-        passes = spiral_paths(PartSurface(plate(30), BALL, UP), SpiralOptions(stepover=STEP, form=form)).passes
+        passes = spiral_paths(PartSurface(plate(10, 400), BALL, UP), SpiralOptions(stepover=STEP, form=form)).passes
         longest = int(passes.lengths.argmax())
         assert (turns(passes.points[passes.rows(longest)]) > np.cos(np.radians(120))).all()

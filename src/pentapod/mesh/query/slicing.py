@@ -28,6 +28,9 @@ QuantityInside = Callable[[Ints, Floats], Floats]
 ROUNDS = 40
 """Steps in which crossings of a quantity that is not linear are found: each at least halves what is left."""
 
+SAME_PLACE = 1e-7
+"""Metres up to which points of a line are the same."""
+
 ON_LEVEL = 1e-9
 """Difference from a level, as a share of the change along an edge, that is good enough."""
 
@@ -183,7 +186,9 @@ class LevelSet:
         """
         facet, level, sides, chain = self._chains
         ends = [self._crossing_point(facet, level, side) for side in sides]
-        return _assembled([end[0] for end in ends], chain, level, [end[1] for end in ends])
+        found = _assembled([end[0] for end in ends], chain, level, [end[1] for end in ends])
+        # A line through a corner of facets may go along one of their edges and back.
+        return found if self.inside is None else found.without_spikes(SAME_PLACE)
 
     def _crossing(self, facet: Ints, level: Ints, side: Ints) -> tuple[Ints, Ints, Ints, Floats]:
         """Return where levels (R,) cross sides (R,) of facets: both corners, the crossing's number, and the share.

@@ -28,6 +28,7 @@ class GapOptions:
     area that gaps without lines of their own may have in total. slack: a gap counts from this many half steps on;
     scallops are 1.25 times as high there. spacing: of points that stand for lines which thin facets cut into short
     pieces, in stepovers. smoothing: rounds in which the slowness is averaged with that of neighbouring vertices.
+    reversal: turn, radians, from which a line goes back.
     """
 
     facets_per_step: float = 3.5
@@ -35,6 +36,7 @@ class GapOptions:
     slack: float = 1.118
     spacing: float = 0.05
     smoothing: int = 24
+    reversal: float = float(np.radians(120.0))
 
     def longest_edge(self, steps: Floats) -> float:
         """Return how long facet edges may be, metres, for stepovers (F,)."""
@@ -98,12 +100,15 @@ def gap_lines(
         lines = LevelSet(patch, distance, levels, inside=field.at if where is None else None).lines()
         negligible = options.negligible * (float(patch.areas.sum()) if area is None else area)
         needed = lines.where(_needed(patch, distance > 0.5 * options.slack, lines, negligible))
-        parts.append(_one_side(needed, 0.5 * float(steps.min())))
+        parts.append(_one_side(needed, 0.5 * float(steps.min()), options.reversal))
     return Passes.joined(parts)
 
 
-def _one_side(lines: Passes, reach: float) -> Passes:
-    """Return lines with one side only where they turn back beside themselves, within `reach` metres: it covers both."""
+def _one_side(lines: Passes, reach: float, reversal: float) -> Passes:
+    """Return lines with one side only where they turn back beside themselves, within `reach` metres: it covers both.
+
+    reversal: turn, radians, at which a line goes back.
+    """
     found: list[tuple[Floats, Floats]] = []
     for k, closed in enumerate(lines.closed):
         points, normals = lines.points[lines.rows(k)], lines.normals[lines.rows(k)]
@@ -111,15 +116,38 @@ def _one_side(lines: Passes, reach: float) -> Passes:
             # The tips of a loop are the points that are farthest from each other.
             first = int(np.linalg.norm(points - points[0], axis=1).argmax())
             points, normals = (np.concatenate([a[first:-1], a[: first + 1]]) for a in (points, normals))
-        tip = int(np.linalg.norm(points - points[0], axis=1).argmax())
-        sides = [(points[: tip + 1], normals[: tip + 1]), (points[tip:], normals[tip:])]
-        sides.sort(key=lambda side: float(np.linalg.norm(np.diff(side[0], axis=0), axis=1).sum()))
-        for kept, left in ((0, 1), (1, 0)) if 0 < tip < len(points) - 1 else ():
-            if KDTree(sides[kept][0]).query(sides[left][0])[0].max() <= reach:
-                points, normals = sides[kept]
-                break
+        farthest = int(np.linalg.norm(points - points[0], axis=1).argmax())
+        if (side := _covering(points, farthest, reach)) is not None:
+            points, normals = points[side], normals[side]
+        while (tip := _reversal(points, reversal)) is not None and (side := _covering(points, tip, reach)) is not None:
+            points, normals = points[side], normals[side]
         found.append((points, normals))
     return Passes.of(found, lines.levels)
+
+
+def _covering(points: Floats, tip: int, reach: float) -> slice | None:
+    """Return the side of a line, from a tip on, all of whose other side is within `reach` metres; the shorter if both.
+
+    None where neither is so.
+    """
+    if not 0 < tip < len(points) - 1:
+        return None
+    sides = [slice(0, tip + 1), slice(tip, len(points))]
+    sides.sort(key=lambda side: float(np.linalg.norm(np.diff(points[side], axis=0), axis=1).sum()))
+    for kept, left in (sides, sides[::-1]):
+        if KDTree(points[kept]).query(points[left])[0].max() <= reach:
+            return kept
+    return None
+
+
+def _reversal(points: Floats, angle: float) -> int | None:
+    """Return the point of a line at which it turns most, None where that is by less than an angle, radians."""
+    along = np.diff(points, axis=0)
+    length = np.linalg.norm(along, axis=1)
+    scale = length[1:] * length[:-1]
+    cosine = (along[1:] * along[:-1]).sum(axis=1) / np.where(scale > 0.0, scale, 1.0)
+    sharpest = int(cosine.argmin()) if len(cosine) else 0
+    return sharpest + 1 if len(cosine) and cosine[sharpest] < np.cos(angle) else None
 
 
 def _middle_lines(patch: Patch, distance: Floats, slowness: Floats | float) -> LevelSet:
