@@ -16,6 +16,7 @@ VERBS = {
     "post": "pentapod.cli.commands.post:post",
     "toolpath": "pentapod.cli.commands.toolpath:toolpath",
     "machine": "pentapod.cli.commands.machine:machine",
+    "calibrate": "pentapod.cli.commands.calibrate:calibrate",
     "ik": "pentapod.cli.commands.kinematics:ik",
     "fk": "pentapod.cli.commands.kinematics:fk",
     "modes": "pentapod.cli.commands.modes:modes",

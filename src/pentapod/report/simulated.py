@@ -23,9 +23,12 @@ def write_simulation(
     """Write the page and return its path. runs: by name, of the same program. Raises InputError."""
     return write_page(
         path,
-        "simulated.html.j2",
+        "figures.html.j2",
         title=title,
-        engine=engine,
+        about="simulation",
+        kind=f"pentapod simulation, engine {engine}",
+        summary="Measures",
+        heading="Against time",
         lines=[line.strip() for line in lines],
         figure=as_script(simulation_figure(runs)),
     )

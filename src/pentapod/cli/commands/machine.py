@@ -1,9 +1,12 @@
-"""pentapod machine: list, explain and check machines."""
+"""pentapod machine: list, explain and check machines, and compare two calibrations of one."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
+from pentapod.cli.numbers import Real
 from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
 
 
@@ -54,3 +57,44 @@ def check(name_or_file: str, as_json: bool, quiet: bool) -> int:
     elif not quiet:
         click.echo(explain(report))
     return 0 if passed else 1
+
+
+@machine.command("drift")
+@click.argument("first", type=click.Path(path_type=Path))
+@click.argument("second", type=click.Path(path_type=Path))
+@click.option("-m", "--machine", "machine_name", help="The machine's file  [default: the shipped one of that name]")
+@click.option("--within", "within_mm", type=Real(0.0, min_open=True), metavar="MM",
+              help="Fail if the tip has moved further anywhere.")  # fmt: skip
+@json_option
+@quiet_option
+def compare(
+    first: Path, second: Path, machine_name: str | None, within_mm: float | None, as_json: bool, quiet: bool
+) -> int:
+    """Say what has moved from one calibration file to another: in mm, in standard deviations, and at the tip."""
+    from pentapod.base.errors import MachineError
+    from pentapod.base.units import from_si
+    from pentapod.machine import Machine, shipped_machines
+    from pentapod.machine.calibration.calibration_file import read_calibration
+    from pentapod.machine.calibration.parameters import PARAMETERS
+    from pentapod.machine.report.drift import drift, drift_text
+
+    before, after = read_calibration(first), read_calibration(second)
+    if machine_name is None and before.machine not in shipped_machines():
+        raise MachineError(
+            "no machine ships under this name", file=first, key="machine", value=before.machine,
+            remedy="name the machine's file with --machine",
+        )  # fmt: skip
+    found = drift(before, after, Machine.load(machine_name or before.machine))
+    largest = float(from_si(found.largest, "mm"))
+    if as_json:
+        changes, sigmas = from_si(found.changes, "mm").tolist(), from_si(found.sigmas, "mm").tolist()
+        echo_json({
+            "changes_mm": dict(zip(PARAMETERS, changes, strict=True)),
+            "sigmas_mm": dict(zip(PARAMETERS, sigmas, strict=True)),
+            "moved_mm": {one.name: float(from_si(one.change, "mm")) for one in found.moved},
+            "chance": found.chance, "tip_largest_mm": largest,
+            "tip_sigma_mm": float(from_si(found.tip_sigma, "mm")),
+        })  # fmt: skip
+    elif not quiet:
+        click.echo(drift_text(found))
+    return 1 if within_mm is not None and largest > within_mm else 0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import datetime
 
 from pentapod.kinematics.robot import Robot
-from pentapod.machine.calibration.calibration import Calibration
 from pentapod.machine.calibration.record import CalibrationFit, CalibrationRecord, MeasuredGeometry, geometry_digest
+from pentapod.machine.identification.calibration import Calibration
 
 
 def record_of(found: Calibration, machine: str, nominal: Robot, date: datetime.date) -> CalibrationRecord:

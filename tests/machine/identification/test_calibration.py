@@ -8,7 +8,7 @@ from scipy.optimize import least_squares, minimize_scalar
 from pentapod.base.errors import ArrayError
 from pentapod.kinematics import AsBuiltPentapod, LinearPentapod
 from pentapod.machine import calibrate
-from pentapod.machine.calibration.calibration import PARAMETERS
+from pentapod.machine.calibration.parameters import PARAMETERS
 
 BASE = 0.2 * np.array([(-2.0, 1.0), (-1.0, -2.0), (0.0, 0.0), (1.0, -2.0), (2.0, 2.0)])
 

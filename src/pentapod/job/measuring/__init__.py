@@ -1,0 +1,1 @@
+"""Measuring: programs that take a machine to the poses in which an instrument measures it."""

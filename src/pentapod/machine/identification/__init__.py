@@ -1,0 +1,1 @@
+"""Identification: the geometry of a machine from what instruments measured of it."""

@@ -1,0 +1,185 @@
+"""drift: what has moved on a machine between two calibrations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtrc
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.base.errors import MachineError
+from pentapod.base.units import from_si
+from pentapod.base.values import Value
+from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.machine.calibration.parameters import PARAMETERS
+from pentapod.machine.calibration.record import CalibrationRecord
+from pentapod.machine.identification.alignment import rigid_motion
+from pentapod.machine.identification.sensitivity import numbers_of, poses_near, tip_by_parameters
+from pentapod.machine.machine import Machine
+from pentapod.machine.work_volume import sample_work_volume
+
+
+@dataclass(frozen=True)
+class DriftOptions:
+    """chance: below which changes are no chance. explained_by: numbers at most that explain them.
+
+    rings, around, levels: of the poses in which tips are compared (`sample_work_volume`).
+    """
+
+    chance: float = 1e-3
+    explained_by: int = 8
+    rings: int = 2
+    around: int = 8
+    levels: int = 3
+
+
+@dataclass(frozen=True)
+class Moved(Value):
+    """A number that has moved: its name, by how much, and the standard deviation of that; metres."""
+
+    name: str
+    change: float
+    sigma: float
+
+    def __str__(self) -> str:
+        change, sigma = (float(from_si(value, "mm")) for value in (self.change, self.sigma))
+        return f"{self.name:<14} {change:+9.4f} mm  {abs(change) / sigma:8.1f} sigma"
+
+
+@dataclass(frozen=True, eq=False)
+class Drift(Value):
+    """The changes from one calibration to another.
+
+    changes, sigmas (30,): of the `PARAMETERS`, metres; sigmas are NaN where one of the calibrations does not know a
+    number. chance: probability of changes as large as all of these together if nothing has moved; NaN without
+    covariances. moved: the fewest numbers whose changes explain it, as errors of numbers hang together: a change of one
+    of them shows in many. left: probability of what they leave. tips (T, 3): of the work volume, metres; tip_changes
+    (T, 3): how far the tip is from there now if the legs are set by the first calibration; tip_sigma: root mean square
+    that errors of both calibrations explain. apart_from_frame (T, 3): tip_changes without the rigid motion common to
+    all, which may be the instrument's frame.
+    """
+
+    first: CalibrationRecord
+    second: CalibrationRecord
+    changes: Floats
+    sigmas: Floats
+    chance: float
+    moved: tuple[Moved, ...]
+    left: float
+    tips: Floats
+    tip_changes: Floats
+    tip_sigma: float
+    apart_from_frame: Floats
+
+    @property
+    def largest(self) -> float:
+        """The largest change of a tip, metres."""
+        return float(np.linalg.norm(self.tip_changes, axis=1).max())
+
+
+def drift(
+    first: CalibrationRecord, second: CalibrationRecord, machine: Machine, options: DriftOptions | None = None
+) -> Drift:
+    """Return what has moved from the first calibration to the second. machine: of both, for its work volume.
+
+    Raises MachineError where the calibrations are of two machines, or of another one than `machine`.
+    """
+    options = options or DriftOptions()
+    if (first.machine, first.nominal) != (second.machine, second.nominal):
+        raise MachineError(
+            "the calibrations are of two machines", value=f"{first.machine} {first.nominal}",
+            expected=f"{second.machine} {second.nominal}", remedy="compare two calibrations of one machine",
+        )  # fmt: skip
+    design = machine.robot.nominal if isinstance(machine.robot, AsBuiltPentapod) else machine.robot
+    if design is None:
+        raise MachineError("a machine as built has poses only beside its nominal geometry", key="nominal")
+    one, other = first.as_built(design), second.as_built(design)
+    changes = numbers_of(other) - numbers_of(one)
+    covariance, known = np.zeros((len(PARAMETERS), len(PARAMETERS))), np.zeros(len(PARAMETERS), dtype=bool)
+    if first.fit is not None and second.fit is not None:
+        covariance = first.fit.covariance + second.fit.covariance
+        both = set(first.fit.identified) & set(second.fit.identified)
+        known = np.array([name in both for name in PARAMETERS])
+    chance, moved, left = _explained(changes, covariance, np.flatnonzero(known), options)
+    tips, axes = sample_work_volume(machine.work, rings=options.rings, around=options.around, levels=options.levels)
+    p, i, length = tips + machine.tool_length * axes, -axes, machine.tool_length
+    now = poses_near(other, one.leg_lengths(p, i), p, i)
+    reached = now[0] + length * now[1]
+    moves = tip_by_parameters(one, p, i, length).reshape(-1, len(PARAMETERS))
+    tip_sigma = float(np.sqrt(np.einsum("aj,jk,ak->", moves, covariance, moves) / len(tips)))
+    return Drift(
+        first=first,
+        second=second,
+        changes=changes,
+        sigmas=np.where(known, np.sqrt(np.diagonal(covariance)), np.nan),
+        chance=chance,
+        moved=moved,
+        left=left,
+        tips=tips,
+        tip_changes=reached - tips,
+        tip_sigma=tip_sigma if known.any() else float("nan"),
+        apart_from_frame=rigid_motion(reached, tips).apply(reached) - tips,
+    )
+
+
+def _explained(
+    changes: Floats, covariance: Floats, known: Ints, options: DriftOptions
+) -> tuple[float, tuple[Moved, ...], float]:
+    """Return the chance of the changes, the fewest numbers that explain them, one after the other, and what is left."""
+    if not known.size:
+        return float("nan"), (), float("nan")
+    change, information = changes[known], np.linalg.inv(covariance[np.ix_(known, known)])
+    pull, count = information @ change, len(known)
+    total = float(change @ pull)
+    chance = left = float(chdtrc(count, total))
+    chosen: list[int] = []
+    found: tuple[Moved, ...] = ()
+    while left < options.chance and len(chosen) < min(options.explained_by, count - 1):
+        trials = [[*chosen, k] for k in range(count) if k not in chosen]
+        gains = [float(pull[some] @ np.linalg.solve(information[np.ix_(some, some)], pull[some])) for some in trials]
+        chosen = trials[int(np.argmax(gains))]
+        spread = np.linalg.inv(information[np.ix_(chosen, chosen)])
+        steps, sigmas = spread @ pull[chosen], np.sqrt(np.diagonal(spread))
+        found = tuple(
+            Moved(PARAMETERS[known[k]], float(step), float(sigma))
+            for k, step, sigma in zip(chosen, steps, sigmas, strict=True)
+        )
+        left = float(chdtrc(count - len(chosen), max(total - max(gains), 0.0)))
+    return chance, found, left
+
+
+def drift_text(found: Drift) -> str:
+    """Return the text of `pentapod machine drift`."""
+
+    def mm(value: float) -> float:
+        return float(from_si(value, "mm"))
+
+    def root_mean_square(vectors: Floats) -> float:
+        return mm(float(np.sqrt(np.square(vectors).sum(axis=1).mean())))
+
+    lines = [f"machine {found.first.machine}: {found.first.date} to {found.second.date}"]
+    order = np.argsort(-np.abs(found.changes), kind="stable")
+    if np.isnan(found.chance):
+        lines.append("  what moved is not said: the files hold no covariances of the same numbers")
+    elif not found.moved:
+        lines.append(f"  nothing has moved that errors of measuring do not explain (chance {found.chance:.2g})")
+    else:
+        lines += ["  something has moved; the fewest numbers that explain it:", *(f"    {one}" for one in found.moved)]
+        if found.left < DriftOptions().chance:
+            lines.append("    they do not explain all: many numbers have changed, as after assembly")
+    unknown = [k for k in order if np.isnan(found.sigmas[k]) and found.changes[k] != 0.0]
+    if unknown:
+        names = ", ".join(f"{PARAMETERS[k]} {mm(found.changes[k]):+.4f} mm" for k in unknown[:6])
+        lines.append(f"  changed, but not known in both: {names}{', ...' if len(unknown) > 6 else ''}")
+    worst = int(np.argmax(np.linalg.norm(found.tip_changes, axis=1)))
+    where = ", ".join(f"{mm(x):.0f}" for x in found.tips[worst])
+    explained = "" if np.isnan(found.tip_sigma) else f"; errors of measuring explain {mm(found.tip_sigma):.4f} mm"
+    lines += [
+        f"  tip, with the legs of the first: {root_mean_square(found.tip_changes):.4f} mm off "
+        f"(root mean square over the work volume{explained})",
+        f"    worst {mm(found.largest):.4f} mm at ({where}) mm",
+        f"    {root_mean_square(found.apart_from_frame):.4f} mm of it bend the work volume; "
+        "the rest moves it as a whole, as another frame of the instrument would",
+    ]
+    return "\n".join(lines)

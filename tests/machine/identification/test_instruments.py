@@ -1,0 +1,103 @@
+"""identify: what each instrument tells of a machine with known errors; scales by finite differences, Monte Carlo."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pentapod.kinematics import AsBuiltPentapod
+from pentapod.machine import identify
+from pentapod.machine.identification.identification import believed
+from pentapod.machine.identification.observations import in_machine_frame, observations_of
+from pentapod.machine.identification.sensitivity import numbers_of
+from true_machine import MACHINE, frame_free, measured, poses, reached, true_numbers
+
+EVERY = [("pose", 12, 1), ("tracker", 20, 1), ("plate", 24, 2), ("ballbar", 80, 1), ("ballbar", 90, 2)]
+
+
+@pytest.mark.parametrize(("instrument", "n", "setups"), EVERY)
+def test_every_instrument_finds_the_machine_without_noise(instrument, n, setups):
+    found = identify(measured(instrument, n, 1, noise=0.0, setups=setups), MACHINE)
+    assert found.calibration.converged
+    assert found.outliers == ()
+    near = poses(5, seed=7)
+    tips = reached(true_numbers(1), found.calibration.machine.leg_lengths(*_pose(*near)), near)
+    off = frame_free(tips, near[0]) if instrument == "ballbar" else tips - near[0]
+    assert np.abs(off).max() < 2e-8
+    if instrument != "ballbar":
+        assert len(found.calibration.identified) == 30
+        assert np.abs(numbers_of(found.calibration.machine) - true_numbers(1)).max() < 1e-7
+    assert np.nanmax(found.held_out) < 1e-7
+
+
+@pytest.mark.parametrize(("instrument", "n"), [("pose", 20), ("tracker", 30)])
+def test_a_frame_of_the_instruments_own_is_found(instrument, n):
+    found = identify(measured(instrument, n, 2, noise=0.0, own_frame=True), MACHINE)
+    near = poses(5, seed=8)
+    tips = reached(true_numbers(2), found.calibration.machine.leg_lengths(*_pose(*near)), near)
+    assert np.abs(frame_free(tips, near[0])).max() < 2e-8
+    assert np.abs(tips - near[0]).max() < 5e-3, "the frame is laid on the machine as designed"
+
+
+def test_a_few_docks_tell_the_zeros_alone():
+    found = identify(measured("dock", 6, 3, given=False), MACHINE)
+    assert found.calibration.identified == tuple(f"leg {k} zero" for k in range(1, 6))
+    near = poses(20, seed=9)
+    off = [
+        np.linalg.norm(reached(true_numbers(3), legs, near) - near[0], axis=1).mean()
+        for legs in (MACHINE.robot.leg_lengths(*_pose(*near)), found.calibration.machine.leg_lengths(*_pose(*near)))
+    ]
+    assert off[1] < 0.5 * off[0]
+    assert found.tip_sigma > 0.3 * off[1], "the tolerances of building count, as the joints are not found"
+
+
+@pytest.mark.parametrize(("instrument", "setups"), [("pose", 1), ("tracker", 2), ("ballbar", 2)])
+def test_columns_are_the_finite_differences_of_residuals(instrument, setups):
+    design = believed(MACHINE)
+    seen = observations_of(in_machine_frame(measured(instrument, 20, 4, setups=setups), design), design)
+    theta = seen.start + 1e-4 * np.random.default_rng(0).normal(size=len(seen.start))
+    theta[4:30:6] = np.abs(theta[4:30:6]) + 1e-3
+    columns, h = seen.columns(theta), 1e-7
+    for k in range(len(theta)):
+        step = h * np.eye(len(theta))[k]
+        numeric = (seen.residuals(theta - step) - seen.residuals(theta + step)) / (2.0 * h)
+        assert np.abs(columns[..., k] - numeric).max() < 2e-5 * max(1.0, np.abs(numeric).max())
+
+
+def test_the_predicted_errors_of_the_tip_are_those_that_come():
+    near, ratios = poses(5, seed=10), []
+    for seed in range(4):
+        found = identify(measured("tracker", 30, seed), MACHINE)
+        tips = reached(true_numbers(seed), found.calibration.machine.leg_lengths(*_pose(*near)), near)
+        ratios.append(np.square(tips - near[0]).sum(axis=1).mean() / found.tip_sigma**2)
+    assert 0.3 < np.mean(ratios) < 2.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("instrument", "n"), [("pose", 20), ("tracker", 30), ("plate", 40), ("ballbar", 80)])
+def test_two_sigma_of_the_tip_hold_what_they_should(instrument, n):
+    """Of partial measurements, too. Rings are far from 0, where a bound would cut the distribution."""
+    outside, deviations = [], []
+    near = poses(3, seed=11)
+    ringed = replace(MACHINE, robot=AsBuiltPentapod.of(MACHINE.robot, radii=15e-3))
+    for trial in range(200):
+        rng = np.random.default_rng(trial + 5000)
+        found = identify(measured(instrument, n, 5, rings=20e-3, rng=rng), ringed, keep_outliers=True)
+        numbers, made = true_numbers(5, 20e-3), found.calibration
+        assert made.converged
+        if instrument == "ballbar":  # the frame is free: distances between tips are not
+            tips = reached(numbers, made.machine.leg_lengths(*_pose(*near)), near)
+            sides = np.linalg.norm(tips - np.roll(tips, 1, axis=0), axis=1)
+            truth = np.linalg.norm(near[0] - np.roll(near[0], 1, axis=0), axis=1)
+            deviations.append(sides - truth)
+            continue
+        away = np.abs(numbers_of(made.machine) - numbers) / np.sqrt(np.diag(made.covariance))
+        outside.append((away > 2.0).mean())
+    if instrument == "ballbar":
+        assert np.abs(np.mean(deviations, axis=0)).max() < 4.0 * np.std(deviations, axis=0).max() / np.sqrt(200.0)
+    else:
+        assert 0.04 <= np.mean(outside) <= 0.055
+
+
+def _pose(tips, axes):
+    return tips + MACHINE.tool_length * axes, -axes
