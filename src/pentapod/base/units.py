@@ -11,7 +11,7 @@ MM_MIN = 1e-3 / 60.0
 
 _TO_SI: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("mm", "mm_s", "mm_s2", "mm_s3", "ms"), lambda x: x / 1000.0),
-    "mm2": lambda x: x / 1e6,
+    **dict.fromkeys(("mm2", "um"), lambda x: x / 1e6),
     "mm_min": lambda x: x * MM_MIN,
     **dict.fromkeys(("deg", "deg_s", "deg_s2"), np.radians),
     "deg_mm": lambda x: np.radians(x) / 1e-3,
@@ -20,7 +20,7 @@ _TO_SI: dict[str, Callable[[Any], Any]] = {
 }
 _FROM_SI: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("mm", "mm_s", "mm_s2", "mm_s3", "ms"), lambda x: x * 1000.0),
-    "mm2": lambda x: x * 1e6,
+    **dict.fromkeys(("mm2", "um"), lambda x: x * 1e6),
     "mm_min": lambda x: x / MM_MIN,
     **dict.fromkeys(("deg", "deg_s", "deg_s2"), np.degrees),
     "deg_mm": lambda x: np.degrees(x) * 1e-3,
