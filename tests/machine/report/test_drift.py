@@ -58,6 +58,20 @@ def test_one_number_that_changed_is_the_explanation(first):
     assert abs(one.change + 0.15e-3) < 4.0 * one.sigma < 0.05e-3
 
 
+def test_frames_of_two_stations_are_no_drift():
+    """Each fit lays its own frame on the base joints: only what changed on the machine is left."""
+    tips, axes = poses(30, 9)
+    numbers, change = true_numbers(1), np.zeros(30)
+    change[23] = 0.15e-3
+    first = measured("pose", 30, 1, own_frame=True, where=(tips, axes))
+    second = measured("pose", 30, 1, where=(tips, axes), rng=np.random.default_rng(8))
+    slipped = second.legs + readings(numbers + change, tips, axes) - readings(numbers, tips, axes)
+    found = drift(record(first), record(replace(second, legs=slipped, frame="instrument")), MACHINE)
+    (one,) = found.moved
+    assert one.name == "leg 4 zero"
+    assert abs(one.change - 0.15e-3) < 4.0 * one.sigma
+
+
 def test_what_noise_explains_is_said_so(first):
     found = drift(first, bumped(np.zeros(30)), MACHINE)
     assert found.chance > 1e-3

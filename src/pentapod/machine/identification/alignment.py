@@ -1,4 +1,4 @@
-"""Rigid motions between points, and the centre of a ball from distances, by least squares."""
+"""Frames: rigid motions between points, the centre of a ball from distances, the frame of the base joints."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ArrayError
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.machine.calibration.parameters import PARAMETERS
 
 FEWEST = 3
 """Points that fix a rigid motion."""
@@ -56,3 +58,29 @@ def ball_centre(targets: Floats, distances: Floats) -> Floats:
         fit = least_squares(lambda c: np.linalg.norm(targets - c, axis=1) - distances, first)
         found.append((float(fit.cost), -float(fit.x[2]), np.asarray(fit.x, dtype=np.float64)))
     return min(found, key=lambda one: (round(one[0], 15), one[1]))[2]
+
+
+def in_base_frame(built: AsBuiltPentapod, covariance: Floats, nominal: Floats) -> tuple[AsBuiltPentapod, Floats]:
+    """Return a machine, and the covariance (30, 30) of its numbers, in the frame in which its base joints fit best.
+
+    nominal (5, 3): the joints on which they are laid by a rigid motion, as no instrument saw the machine's frame. The
+    covariance has no part in the six directions of rigid motions: the frame is defined, not measured.
+    """
+    motion = rigid_motion(built.base, nominal)
+    base = motion.apply(built.base)
+    # The best fit is where no rigid motion of the nominal joints has a part in what is left: the same for every fit.
+    moves, defined = rigid_motions(base), rigid_motions(nominal)
+    free = moves @ np.linalg.solve(defined.T @ moves, defined.T)
+    of_base = (np.eye(len(free)) - free) @ np.kron(np.eye(len(base)), motion.rotation)
+    places = np.array([k for k, name in enumerate(PARAMETERS) if name[-1] in "xyz"])
+    change = np.eye(len(PARAMETERS))
+    change[np.ix_(places, places)] = of_base
+    moved = AsBuiltPentapod(base, built.offsets, built.radii, built.zeros, built.nominal)
+    return moved, change @ covariance @ change.T
+
+
+def rigid_motions(points: Floats) -> Floats:
+    """Return how the coordinates of points change (3 N, 6) with shifts and turns about their middle."""
+    arms = points - points.mean(axis=0)
+    turns = np.cross(np.eye(3)[None], arms[:, None]).swapaxes(1, 2).reshape(-1, 3)
+    return np.hstack([np.tile(np.eye(3), (len(points), 1)), turns])

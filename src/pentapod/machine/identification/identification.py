@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +17,7 @@ from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.machine.calibration.parameters import PARAMETERS
 from pentapod.machine.calibration.record import geometry_digest
+from pentapod.machine.identification.alignment import in_base_frame, rigid_motions
 from pentapod.machine.identification.calibration import Calibration, calibration_of, checked_groups
 from pentapod.machine.identification.least_squares import GROUPS, Solution, solved
 from pentapod.machine.identification.measurements import Frame, Instrument, Measurements
@@ -122,6 +124,7 @@ def _identified(
     held_out = _held_out(used, design, wanted, found.leg_sigma, options)
     covariance = with_tolerances(seen, solution, options.tolerances)
     tip_sigma = predicted_tip_sigma(found.machine, covariance, machine, free_frame=free_frame)
+    found = _in_base_frame(found, design) if free_frame else found
     return Identified(found, used, outliers, held_out, tip_sigma)
 
 
@@ -143,6 +146,27 @@ def design_digest(machine: Machine) -> str:
     """Return the digest of the geometry as designed, which measurements and calibrations name."""
     design = believed(machine).nominal
     return "" if design is None else geometry_digest(design)
+
+
+def _in_base_frame(found: Calibration, design: AsBuiltPentapod) -> Calibration:
+    """Return a calibration with a free frame as the base joints define it best.
+
+    A ball bar leaves six of their coordinates open, which the frame alone decides: then these are no ambiguity. Where
+    more is open it stays as it is.
+    """
+    base = [name for name in PARAMETERS if name[-1] in "xyz"]
+    held = [name for name in found.held if name in base]
+    if design.nominal is None or len(held) not in (0, FREE_MOTIONS) or len(held) == len(base):
+        return found
+    machine, covariance = in_base_frame(found.machine, found.covariance, design.nominal.base_joints)
+    return dataclasses.replace(
+        found,
+        machine=machine,
+        covariance=covariance,
+        identified=tuple(name for name in PARAMETERS if name in found.identified or name in held),
+        held=tuple(name for name in found.held if name not in held),
+        gauges=tuple(g for g in found.gauges if not any(g.startswith(f"{n[:5]}: {n[6:]} +1") for n in held)),
+    )
 
 
 def with_tolerances(seen: Observations, found: Solution, tolerances: Tolerances) -> Floats:
@@ -171,9 +195,7 @@ def predicted_tip_sigma(
     moves = tip_by_parameters(built, tips + machine.tool_length * axes, -axes, machine.tool_length)
     moves = moves.reshape(-1, moves.shape[-1])
     if free_frame:
-        local = tips - tips.mean(axis=0)
-        turns = np.cross(np.eye(3)[None], local[:, None]).swapaxes(1, 2).reshape(-1, 3)
-        rigid = np.linalg.qr(np.hstack([np.tile(np.eye(3), (len(tips), 1)), turns]))[0]
+        rigid = np.linalg.qr(rigid_motions(tips))[0]
         moves = moves - rigid @ (rigid.T @ moves)
     return float(np.sqrt(np.einsum("aj,jk,ak->", moves, covariance, moves) / len(tips)))
 

@@ -24,7 +24,8 @@ _EACH, _RADIUS = len(KINDS), KINDS.index("radius")
 class FitOptions:
     """When the iterations end.
 
-    rounds: Gauss-Newton steps at most. settled: relative change of the unknowns below which they end. noise_rounds:
+    rounds: Gauss-Newton steps at most. settled: relative change of the unknowns below which they end, or
+    still: change of all that is computed, in standard deviations of what is measured. noise_rounds:
     fits at most while leg_sigma is estimated; same_noise: its relative change below which they end. first_sigma: the
     first leg_sigma, metres. rising: relative rise of the cost that counts as rounding; least_step: share of a step
     below which it is taken although the cost rises.
@@ -32,6 +33,7 @@ class FitOptions:
 
     rounds: int = 50
     settled: float = 1e-13
+    still: float = 1e-7
     noise_rounds: int = 12
     same_noise: float = 1e-3
     first_sigma: float = 1e-6
@@ -107,7 +109,9 @@ def _solved(
         step, bound = _bounded_step(a, b, theta, free)
         change = np.zeros(len(names))
         change[[k for k in free if k not in bound]] = step
-        converged = bool(np.abs(change).max(initial=0.0) < options.settled * max(1.0, float(np.abs(theta).max())))
+        far = float(np.linalg.norm(a @ change))
+        small = np.abs(change).max(initial=0.0) < options.settled * max(1.0, float(np.abs(theta).max()))
+        converged = bool(small or far < options.still)
         theta, residuals = _moved(seen, theta, change, float(b @ b), weights, options)
         if converged:
             break

@@ -15,7 +15,8 @@ from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.machine.calibration.parameters import PARAMETERS
 from pentapod.machine.calibration.record import CalibrationRecord
 from pentapod.machine.identification.alignment import rigid_motion
-from pentapod.machine.identification.sensitivity import numbers_of, poses_near, tip_by_parameters
+from pentapod.machine.identification.identification import predicted_tip_sigma
+from pentapod.machine.identification.sensitivity import numbers_of, poses_near
 from pentapod.machine.machine import Machine
 from pentapod.machine.work_volume import sample_work_volume
 
@@ -24,11 +25,13 @@ from pentapod.machine.work_volume import sample_work_volume
 class DriftOptions:
     """chance: below which changes are no chance. explained_by: numbers at most that explain them.
 
-    rings, around, levels: of the poses in which tips are compared (`sample_work_volume`).
+    regular: share of a covariance's largest variance below which one is rounding. rings, around, levels: of the poses
+    in which tips are compared (`sample_work_volume`).
     """
 
     chance: float = 1e-3
     explained_by: int = 8
+    regular: float = 1e-11
     rings: int = 2
     around: int = 8
     levels: int = 3
@@ -57,7 +60,7 @@ class Drift(Value):
     of them shows in many. left: probability of what they leave. tips (T, 3): of the work volume, metres; tip_changes
     (T, 3): how far the tip is from there now if the legs are set by the first calibration; tip_sigma: root mean square
     that errors of both calibrations explain. apart_from_frame (T, 3): tip_changes without the rigid motion common to
-    all, which may be the instrument's frame.
+    all, which may be the instrument's frame; bent_sigma: what errors explain of it.
     """
 
     first: CalibrationRecord
@@ -71,6 +74,7 @@ class Drift(Value):
     tip_changes: Floats
     tip_sigma: float
     apart_from_frame: Floats
+    bent_sigma: float
 
     @property
     def largest(self) -> float:
@@ -106,8 +110,8 @@ def drift(
     p, i, length = tips + machine.tool_length * axes, -axes, machine.tool_length
     now = poses_near(other, one.leg_lengths(p, i), p, i)
     reached = now[0] + length * now[1]
-    moves = tip_by_parameters(one, p, i, length).reshape(-1, len(PARAMETERS))
-    tip_sigma = float(np.sqrt(np.einsum("aj,jk,ak->", moves, covariance, moves) / len(tips)))
+    sigmas = [predicted_tip_sigma(one, covariance, machine, free_frame=free) for free in (False, True)]
+    tip_sigma, bent_sigma = sigmas if known.any() else (float("nan"), float("nan"))
     return Drift(
         first=first,
         second=second,
@@ -118,7 +122,8 @@ def drift(
         left=left,
         tips=tips,
         tip_changes=reached - tips,
-        tip_sigma=tip_sigma if known.any() else float("nan"),
+        tip_sigma=tip_sigma,
+        bent_sigma=bent_sigma,
         apart_from_frame=rigid_motion(reached, tips).apply(reached) - tips,
     )
 
@@ -129,14 +134,14 @@ def _explained(
     """Return the chance of the changes, the fewest numbers that explain them, one after the other, and what is left."""
     if not known.size:
         return float("nan"), (), float("nan")
-    change, information = changes[known], np.linalg.inv(covariance[np.ix_(known, known)])
-    pull, count = information @ change, len(known)
+    information, count = _information(covariance[np.ix_(known, known)], options)
+    pull, change = information @ changes[known], changes[known]
     total = float(change @ pull)
     chance = left = float(chdtrc(count, total))
     chosen: list[int] = []
     found: tuple[Moved, ...] = ()
     while left < options.chance and len(chosen) < min(options.explained_by, count - 1):
-        trials = [[*chosen, k] for k in range(count) if k not in chosen]
+        trials = [[*chosen, k] for k in range(len(known)) if k not in chosen]
         gains = [float(pull[some] @ np.linalg.solve(information[np.ix_(some, some)], pull[some])) for some in trials]
         chosen = trials[int(np.argmax(gains))]
         spread = np.linalg.inv(information[np.ix_(chosen, chosen)])
@@ -147,6 +152,15 @@ def _explained(
         )
         left = float(chdtrc(count - len(chosen), max(total - max(gains), 0.0)))
     return chance, found, left
+
+
+def _information(covariance: Floats, options: DriftOptions) -> tuple[Floats, int]:
+    """Return the pseudo-inverse of a covariance, and its rank: a frame that is defined by the machine has no errors."""
+    scale = 1.0 / np.sqrt(np.diagonal(covariance))
+    values, vectors = np.linalg.eigh(scale[:, None] * covariance * scale)
+    some = values > options.regular * values[-1]
+    half = (vectors[:, some] / np.sqrt(values[some])) * scale[:, None]
+    return half @ half.T, int(some.sum())
 
 
 def drift_text(found: Drift) -> str:
@@ -174,12 +188,15 @@ def drift_text(found: Drift) -> str:
         lines.append(f"  changed, but not known in both: {names}{', ...' if len(unknown) > 6 else ''}")
     worst = int(np.argmax(np.linalg.norm(found.tip_changes, axis=1)))
     where = ", ".join(f"{mm(x):.0f}" for x in found.tips[worst])
-    explained = "" if np.isnan(found.tip_sigma) else f"; errors of measuring explain {mm(found.tip_sigma):.4f} mm"
+    explained, bent = (
+        "" if np.isnan(sigma) else f"; errors of measuring explain {mm(sigma):.4f} mm"
+        for sigma in (found.tip_sigma, found.bent_sigma)
+    )
     lines += [
         f"  tip, with the legs of the first: {root_mean_square(found.tip_changes):.4f} mm off "
-        f"(root mean square over the work volume{explained})",
+        f"(root mean square){explained}",
         f"    worst {mm(found.largest):.4f} mm at ({where}) mm",
-        f"    {root_mean_square(found.apart_from_frame):.4f} mm of it bend the work volume; "
-        "the rest moves it as a whole, as another frame of the instrument would",
+        "    without what moves the work volume as a whole, as another frame would: "
+        f"{root_mean_square(found.apart_from_frame):.4f} mm{bent}",
     ]
     return "\n".join(lines)
