@@ -140,7 +140,7 @@ def fit(
     """
     from pentapod.base.units import from_si
     from pentapod.machine.calibration.calibration_file import write_calibration
-    from pentapod.machine.identification.identification import believed, identify
+    from pentapod.machine.identification.identification import designed, identify
     from pentapod.machine.identification.measurements_file import read_measurements
     from pentapod.machine.identification.recording import record_of
     from pentapod.machine.report.identified import identified_lines
@@ -154,8 +154,7 @@ def fit(
     day = (date or datetime.datetime.now()).date()
     out = measurements.with_name("calibration.toml") if out is None else out
     report = out.with_suffix(".html") if report is None else report
-    design = believed(machine).nominal
-    record = record_of(found.calibration, machine.name, design, day)
+    record = record_of(found.calibration, machine.name, designed(machine), day)
     write_calibration(record, out)
     lines = identified_lines(found, machine)
     write_calibration_report(report, found, machine, lines)

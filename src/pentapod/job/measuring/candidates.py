@@ -10,7 +10,8 @@ from pentapod.base.arrays import Bools, Floats
 from pentapod.base.errors import InputError
 from pentapod.base.values import Value
 from pentapod.kinematics.robot import Branch
-from pentapod.machine.identification.identification import believed, design_digest
+from pentapod.machine.calibration.record import geometry_digest
+from pentapod.machine.identification.identification import believed, designed
 from pentapod.machine.identification.measurements import Frame, Instrument, Measurements
 from pentapod.machine.identification.observations import observations_of
 from pentapod.machine.identification.sensitivity import tip_by_parameters
@@ -90,7 +91,7 @@ def candidates(
     where, along = sample_work_volume(machine.work, rings=options.rings, around=options.around, levels=options.levels)
     length = machine.tool_length
     moves = tip_by_parameters(design, where + length * along, -along, length)
-    return Candidates(tips, axes, whitened[..., : moves.shape[-1]], moves)
+    return Candidates(tips, axes, np.asarray(whitened[..., : moves.shape[-1]], dtype=np.float64), moves)
 
 
 def measurements_in(
@@ -114,7 +115,7 @@ def measurements_in(
         component=branch,
         frame=Frame.MACHINE if kind is Instrument.DOCK else Frame.INSTRUMENT,
         machine=machine.name,
-        digest=design_digest(machine),
+        digest=geometry_digest(designed(machine)),
         leg_sigma=None,
         position_sigma=instruments.position_sigma,
         direction_sigma=instruments.direction_sigma if kind.sees_axes else 0.0,

@@ -18,6 +18,7 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.artefacts import PROGRAM, VERDICT, check_folder, write_json
 from pentapod.job.measuring.candidates import Instruments, candidates, clear_way, measurements_in
 from pentapod.job.measuring.order import short_order
+from pentapod.kinematics.component import Component
 from pentapod.kinematics.robot import Branch
 from pentapod.machine.identification.measurements import Measurements
 from pentapod.machine.identification.measurements_file import write_measurements
@@ -154,14 +155,24 @@ def _driven(
     placed = plan(toolpath, machine, constraints=here, component=branch, progress=progress)
     if isinstance(placed, Refusal):
         return placed
-    tolerances = {"path_tolerance": options.path_tolerance, "axis_tolerance": options.axis_tolerance}
-    trajectory = retime(leg_path(placed, machine, **tolerances), machine, progress=progress)
+    path, axis = options.path_tolerance, options.axis_tolerance
+    trajectory = retime(leg_path(placed, machine, path_tolerance=path, axis_tolerance=axis), machine, progress=progress)
     if isinstance(trajectory, Refusal):
         return trajectory
     program = sample(trajectory, machine, placed)
     file = write_csv(program, folder / PROGRAM)
-    asked = {**tolerances, "constraints": here, "component": branch, "waived": NO_PART}
-    verdict = verify(file, machine, toolpath, tilt=0.0, progress=progress, **asked)
+    verdict = verify(
+        file,
+        machine,
+        toolpath,
+        tilt=0.0,
+        path_tolerance=path,
+        axis_tolerance=axis,
+        constraints=here,
+        component=branch if isinstance(branch, Component) else None,
+        waived=NO_PART,
+        progress=progress,
+    )
     return program.duration, verdict
 
 

@@ -32,7 +32,7 @@ def rigid_motion(points: Floats, onto: Floats) -> RigidTransform:
     if spreads[1] < THIN * spreads[0]:
         what = "the positions are on a line: they do not fix the instrument's frame"
         raise ArrayError(what, remedy="measure poses to all sides")
-    turn, _ = Rotation.align_vectors(onto - target, points - middle)
+    turn = Rotation.align_vectors(onto - target, points - middle)[0]
     return RigidTransform(turn.as_matrix(), target - turn.apply(middle))
 
 
@@ -71,7 +71,7 @@ def in_base_frame(built: AsBuiltPentapod, covariance: Floats, nominal: Floats) -
     # The best fit is where no rigid motion of the nominal joints has a part in what is left: the same for every fit.
     moves, defined = rigid_motions(base), rigid_motions(nominal)
     free = moves @ np.linalg.solve(defined.T @ moves, defined.T)
-    of_base = (np.eye(len(free)) - free) @ np.kron(np.eye(len(base)), motion.rotation)
+    of_base: Floats = (np.eye(len(free)) - free) @ np.kron(np.eye(len(base)), motion.rotation)
     places = np.array([k for k, name in enumerate(PARAMETERS) if name[-1] in "xyz"])
     change = np.eye(len(PARAMETERS))
     change[np.ix_(places, places)] = of_base
@@ -82,5 +82,5 @@ def in_base_frame(built: AsBuiltPentapod, covariance: Floats, nominal: Floats) -
 def rigid_motions(points: Floats) -> Floats:
     """Return how the coordinates of points change (3 N, 6) with shifts and turns about their middle."""
     arms = points - points.mean(axis=0)
-    turns = np.cross(np.eye(3)[None], arms[:, None]).swapaxes(1, 2).reshape(-1, 3)
+    turns = np.asarray(np.cross(np.eye(3)[None], arms[:, None]), dtype=np.float64).swapaxes(1, 2).reshape(-1, 3)
     return np.hstack([np.tile(np.eye(3), (len(points), 1)), turns])

@@ -48,7 +48,8 @@ def identifiable(
             taken.append(k)
             basis = np.column_stack([basis, left / rest])
             continue
-        others = np.linalg.lstsq(columns[:, taken], column, rcond=None)[0] if taken else np.zeros(0)
+        found = np.linalg.lstsq(columns[:, taken], column, rcond=None)[0] if taken else ()
+        others = np.asarray(found, dtype=np.float64)
         gauges.append(_gauge(names, k, taken, others, options))
     return taken, tuple(gauges)
 
@@ -56,7 +57,9 @@ def identifiable(
 def _gauge(names: Sequence[str], held: int, taken: list[int], others: Floats, options: IdentifyOptions) -> str:
     """Return which changes together change no measurement, such as "leg 2: offset +1, x +0.48 change no reading"."""
     largest = sorted(np.argsort(-np.abs(others), kind="stable")[: options.named].tolist())
-    terms = [(names[taken[k]], -float(others[k])) for k in largest if abs(others[k]) > options.negligible]
+    terms: list[tuple[str, float]] = [
+        (str(names[taken[k]]), -float(others[k])) for k in largest if abs(others[k]) > options.negligible
+    ]
     owner, kind = names[held].rsplit(" ", 1)
     short = [(name.removeprefix(f"{owner} ") if name.startswith(f"{owner} ") else name, by) for name, by in terms]
     parts = [f"{kind} +1", *(f"{name} {by:+.3g}" for name, by in short)]

@@ -83,7 +83,7 @@ def identify(
     axes, or fewer than the unknowns; also for unknown groups.
     """
     design = believed(machine)
-    digest = design_digest(machine)
+    digest = geometry_digest(designed(machine))
     if measured.digest != digest:
         raise MachineError(
             f'the measurements are of another geometry: "{measured.machine}" as it was designed then', key="nominal",
@@ -92,8 +92,9 @@ def identify(
     try:
         return _identified(measured, machine, design, groups, file, options, keep_outliers=keep_outliers)
     except ArrayError as error:
-        details = {"key": error.key, "value": error.value, "expected": error.expected, "remedy": error.remedy}
-        raise MachineError(error.what, file=file, **details) from error
+        raise MachineError(
+            error.what, file=file, key=error.key, value=error.value, expected=error.expected, remedy=error.remedy
+        ) from error
 
 
 def _identified(
@@ -133,19 +134,17 @@ def believed(machine: Machine) -> AsBuiltPentapod:
 
     Raises MachineError: it is no linear pentapod.
     """
-    robot = machine.robot
-    if isinstance(robot, AsBuiltPentapod) and robot.nominal is not None:
-        return robot
+    design = designed(machine)
+    return machine.robot if isinstance(machine.robot, AsBuiltPentapod) else AsBuiltPentapod.of(design)
+
+
+def designed(machine: Machine) -> LinearPentapod | GeneralPentapod:
+    """Return a machine's geometry as designed. Raises MachineError: it is no linear pentapod."""
+    robot = machine.robot.nominal if isinstance(machine.robot, AsBuiltPentapod) else machine.robot
     if not isinstance(robot, LinearPentapod | GeneralPentapod):
-        family = type(robot).__name__
+        family = type(machine.robot).__name__
         raise MachineError("calibration is for linear pentapods", key="geometry.family", value=family)
-    return AsBuiltPentapod.of(robot)
-
-
-def design_digest(machine: Machine) -> str:
-    """Return the digest of the geometry as designed, which measurements and calibrations name."""
-    design = believed(machine).nominal
-    return "" if design is None else geometry_digest(design)
+    return robot
 
 
 def _in_base_frame(found: Calibration, design: AsBuiltPentapod) -> Calibration:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -53,6 +53,10 @@ WIDTHS = {Instrument.POSE: 6, Instrument.DOCK: 6, Instrument.TRACKER: 3, Instrum
 """How many numbers an instrument gives of a pose."""
 
 
+def _not_given() -> Ints:
+    return np.zeros(0, dtype=np.intp)
+
+
 @dataclass(frozen=True, eq=False)
 class Measurements(Value):
     """Poses of one machine as an instrument saw them, and the readings of the legs there; SI units.
@@ -74,13 +78,13 @@ class Measurements(Value):
     target: float
     component: Branch
     frame: Frame = Frame.MACHINE
-    setups: Ints | None = None
+    setups: Ints = field(default_factory=_not_given)
     machine: str = ""
     digest: str = ""
     leg_sigma: float | None = None
     position_sigma: float = 0.0
     direction_sigma: float = 0.0
-    lines: Ints | None = None
+    lines: Ints = field(default_factory=_not_given)
 
     def __post_init__(self) -> None:
         instrument = Instrument(self.instrument)
@@ -106,7 +110,7 @@ class Measurements(Value):
         set_frozen(self, instrument=instrument, frame=Frame(self.frame), legs=legs, seen=seen)
         for name, default in (("setups", np.zeros(count)), ("lines", np.arange(1, count + 1))):
             value = getattr(self, name)
-            array = np.array(default if value is None else value, dtype=np.intp)
+            array = np.array(value if len(value) else default, dtype=np.intp)
             if array.shape != (count,):
                 raise ArrayError(f"{name} has shape {array.shape}", expected=f"shape ({count},)")
             array.flags.writeable = False

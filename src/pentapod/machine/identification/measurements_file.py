@@ -118,7 +118,9 @@ def read_measurements(path: str | Path) -> Measurements:
     table = np.array(rows)
     legs_from = columns.index(LEG_COLUMNS[0])
     legs, seen = np.split(table[:, legs_from:], [LEGS], axis=1)
-    setups = None if instrument.sees_axes else _setups(table[:, columns.index(_SETUP)], numbers, file)
+    setups = (
+        np.zeros(0, dtype=np.intp) if instrument.sees_axes else _setups(table[:, columns.index(_SETUP)], numbers, file)
+    )
     options = {name: to_si(header[key], unit) for key in header for name, unit in [split_key(key)] if unit}
     try:
         return Measurements(

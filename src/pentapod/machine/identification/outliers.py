@@ -92,7 +92,7 @@ def _deleted(seen: Observations, solution: Solution, options: OutlierOptions) ->
 
 def _named(measured: Measurements, seen: Observations, deleted: Floats, pose: int, options: OutlierOptions) -> Outlier:
     """Return the outlier: with its leg where one leg alone explains it."""
-    line = int(measured.lines[pose])  # pyright: ignore[reportOptionalSubscript]
+    line = int(measured.lines[pose])
     if isinstance(seen, PoseObservations):
         leg = int(np.argmax(np.abs(deleted)))
         if deleted[leg] ** 2 >= options.one_leg * float(deleted @ deleted):

@@ -70,7 +70,7 @@ def choose_poses(columns: Floats, tips: Floats, count: int, options: ChoiceOptio
     each = columns.swapaxes(1, 2) @ columns
     chosen: list[int] = []
     for _ in range(count):
-        gains = _gains(columns, np.linalg.inv(information), weight)
+        gains = _gains(columns, information, weight)
         gains[chosen] = -np.inf
         chosen.append(int(np.argmax(gains)))
         information = information + each[chosen[-1]]
@@ -79,7 +79,7 @@ def choose_poses(columns: Floats, tips: Floats, count: int, options: ChoiceOptio
         before = cost
         for place, pose in enumerate(chosen):
             without = information - each[pose]
-            gains = _gains(columns, np.linalg.inv(without), weight)
+            gains = _gains(columns, without, weight)
             gains[[other for other in chosen if other != pose]] = -np.inf
             best = int(np.argmax(gains))
             if best != pose and (better := _cost(without + each[best], weight)) < cost:
@@ -99,9 +99,9 @@ def _cost(information: Floats, weight: Floats) -> float:
     return float(np.trace(np.linalg.solve(information, weight)))
 
 
-def _gains(columns: Floats, covariance: Floats, weight: Floats) -> Floats:
+def _gains(columns: Floats, information: Floats, weight: Floats) -> Floats:
     """Return by how much each candidate (N,) would lower the mean square error."""
-    moved = columns @ covariance
+    moved = columns @ np.asarray(np.linalg.inv(information), dtype=np.float64)
     inner = np.eye(columns.shape[1]) + moved @ columns.swapaxes(1, 2)
     taken = moved @ weight @ moved.swapaxes(1, 2)
     return np.trace(np.linalg.solve(inner, taken), axis1=1, axis2=2)

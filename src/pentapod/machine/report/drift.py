@@ -166,8 +166,8 @@ def _information(covariance: Floats, options: DriftOptions) -> tuple[Floats, int
 def drift_text(found: Drift) -> str:
     """Return the text of `pentapod machine drift`."""
 
-    def mm(value: float) -> float:
-        return float(from_si(value, "mm"))
+    def mm(metres: float) -> float:
+        return float(from_si(metres, "mm"))
 
     def root_mean_square(vectors: Floats) -> float:
         return mm(float(np.sqrt(np.square(vectors).sum(axis=1).mean())))
@@ -184,10 +184,10 @@ def drift_text(found: Drift) -> str:
             lines.append("    they do not explain all: many numbers have changed, as after assembly")
     unknown = [k for k in order if np.isnan(found.sigmas[k]) and found.changes[k] != 0.0]
     if unknown:
-        names = ", ".join(f"{PARAMETERS[k]} {mm(found.changes[k]):+.4f} mm" for k in unknown[:6])
+        names = ", ".join(f"{PARAMETERS[k]} {mm(float(found.changes[k])):+.4f} mm" for k in unknown[:6])
         lines.append(f"  changed, but not known in both: {names}{', ...' if len(unknown) > 6 else ''}")
     worst = int(np.argmax(np.linalg.norm(found.tip_changes, axis=1)))
-    where = ", ".join(f"{mm(x):.0f}" for x in found.tips[worst])
+    where = ", ".join(f"{x:.0f}" for x in from_si(found.tips[worst], "mm"))
     explained, bent = (
         "" if np.isnan(sigma) else f"; errors of measuring explain {mm(sigma):.4f} mm"
         for sigma in (found.tip_sigma, found.bent_sigma)
