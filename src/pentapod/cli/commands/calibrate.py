@@ -144,7 +144,7 @@ def fit(
     from pentapod.machine.identification.measurements_file import read_measurements
     from pentapod.machine.identification.recording import record_of
     from pentapod.machine.report.identified import identified_lines
-    from pentapod.report.calibration import write_calibration_report
+    from pentapod.report.calibration.page import write_calibration_report
 
     measured = read_measurements(measurements)
     machine = _machine_of(measured, machine_name, measurements)

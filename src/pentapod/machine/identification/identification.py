@@ -144,6 +144,8 @@ def designed(machine: Machine) -> LinearPentapod | GeneralPentapod:
     if not isinstance(robot, LinearPentapod | GeneralPentapod):
         family = type(machine.robot).__name__
         raise MachineError("calibration is for linear pentapods", key="geometry.family", value=family)
+    if machine.guides is not None:
+        raise MachineError("a machine with guides cannot be calibrated", key="guides", expected="fixed base joints")
     return robot
 
 
