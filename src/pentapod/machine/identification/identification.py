@@ -159,6 +159,7 @@ def _in_base_frame(found: Calibration, design: AsBuiltPentapod) -> Calibration:
     held = [name for name in found.held if name in base]
     if design.nominal is None or len(held) not in (0, FREE_MOTIONS) or len(held) == len(base):
         return found
+    frame = [f"{': '.join(name.rsplit(' ', 1))} +1" for name in held]
     machine, covariance = in_base_frame(found.machine, found.covariance, design.nominal.base_joints)
     return dataclasses.replace(
         found,
@@ -166,7 +167,7 @@ def _in_base_frame(found: Calibration, design: AsBuiltPentapod) -> Calibration:
         covariance=covariance,
         identified=tuple(name for name in PARAMETERS if name in found.identified or name in held),
         held=tuple(name for name in found.held if name not in held),
-        gauges=tuple(g for g in found.gauges if not any(g.startswith(f"{n[:5]}: {n[6:]} +1") for n in held)),
+        gauges=tuple(gauge for gauge in found.gauges if not gauge.startswith(tuple(frame))),
     )
 
 

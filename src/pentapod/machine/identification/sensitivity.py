@@ -15,7 +15,8 @@ def machine_of(theta: Floats, nominal: AsBuiltPentapod | None = None) -> AsBuilt
     """Return the machine of the thirty numbers, in the order of `PARAMETERS`. nominal: whose branches it has."""
     rows = theta[: len(PARAMETERS)].reshape(LEGS, len(KINDS))
     known = None if nominal is None else nominal.nominal
-    return AsBuiltPentapod(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5], known)
+    offsets, radii, zeros = rows[:, 3:].T
+    return AsBuiltPentapod(rows[:, :3], offsets, radii, zeros, known)
 
 
 def numbers_of(machine: AsBuiltPentapod) -> Floats:

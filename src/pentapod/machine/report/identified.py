@@ -50,7 +50,8 @@ def _away(found: Identified, machine: Machine) -> str:
     """Return by how much numbers differ from those of the machine's file, by kind."""
     off = np.abs(numbers_of(found.calibration.machine) - numbers_of(believed(machine))).reshape(-1, len(KINDS))
     joints: Floats = np.linalg.norm(off[:, :3], axis=1)
-    parts = {"base joints": joints, "offsets": off[:, 3], "rings": off[:, 4], "zeros": off[:, 5]}
+    offsets, rings, zeros = off[:, 3:].T
+    parts = {"base joints": joints, "offsets": offsets, "rings": rings, "zeros": zeros}
     return ", ".join(f"{name} up to {float(from_si(values.max(), 'mm')):.3f} mm" for name, values in parts.items())
 
 
