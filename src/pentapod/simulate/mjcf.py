@@ -1,7 +1,8 @@
 """The machine as MJCF, MuJoCo's model format: bodies, joints, closed loops and drives.
 
 Each leg is a cylinder on two hinges at its base joint, and a rod that slides out of it, as long as the slide's
-position says; `connect` constraints close the five loops at the platform's joints. A little damping acts on the one
+position says; `connect` constraints close the five loops at the platform's joints. A leg that ends on a ring hangs on
+it by a hinge along the ring's tangent, which keeps it in a plane with the line. A little damping acts on the one
 freedom that legs do not constrain, the spin of the tool about its own line. The constraints are as stiff as the step
 allows, solved by Newton's method to convergence: MuJoCo's defaults, meant for soft contacts, leave millimetres.
 """
@@ -31,7 +32,11 @@ class MujocoModelOptions:
     constraint_steps: float = 2.0
     """Time constant of the constraints, in steps: the smallest that is stable."""
     spin_damping: float = 0.01
-    """Damping of the tool's spin about its own line, N·m·s."""
+    """Damping of the tool's spin about its own line, and of rings about it, N·m·s."""
+    ring_mass: float = 0.02
+    """Mass of a ring on which a leg ends, kg."""
+    hinge: float = 0.03
+    """Half the length of the hinge by which a leg hangs on a ring, m."""
 
 
 DEFAULTS = MujocoModelOptions()
@@ -48,12 +53,13 @@ def mjcf(
 ) -> str:
     """Return the model as XML, standing at a pose: position p and direction i (3,), machine frame.
 
-    real: the geometry as built; a slide's position, and a drive's control, is the leg's length in metres. step:
-    seconds. Lengths in metres, masses in kilograms.
+    real: the geometry as built; a slide's position, and a drive's control, is the reading of the leg's scale in metres.
+    step: seconds. Lengths in metres, masses in kilograms.
     """
-    joints = position + real.offsets[:, None] * direction
-    vectors = joints - real.base_joints
+    vectors = real.leg_vectors(position, direction)
     lengths = np.linalg.norm(vectors, axis=1)
+    readings = lengths + real.zeros
+    tangents = _tangents(real, position, direction)
     root = Xml.Element("mujoco", model=machine.name)
     _add(root, "compiler", angle="radian", autolimits="true")
     option = _add(root, "option", timestep=[step], gravity=machine.masses.gravity, integrator="implicitfast")
@@ -65,8 +71,15 @@ def mjcf(
     _add(defaults, "joint", solreflimit=stiff, solimplimit=SOLIMP)
     world = _add(root, "worldbody")
     for leg in range(real.n_legs):
-        _leg(world, machine, leg, real.base_joints[leg], vectors[leg] / lengths[leg], lengths[leg])
-    _platform(world, machine, real, position, direction)
+        pose = (real.base_joints[leg], vectors[leg] / lengths[leg], lengths[leg])
+        rod = _leg(world, machine, leg, *pose, reading=readings[leg])
+        if (
+            real.radii[leg] > 0.0
+        ):  # the rod hangs on the ring by a hinge along the ring's tangent: it may turn in itself
+            _add(rod, "joint", name=f"turn{leg + 1}", type="hinge", axis="0 0 1")
+            tangent = _turned_back(_rotation_from_z(pose[1]), model.hinge * tangents[leg])
+            _add(rod, "site", name=f"rod{leg + 1}side", pos=tangent)
+    _platform(world, machine, real, position, direction, model)
     loops = _add(root, "equality")
     actuators = _add(root, "actuator")
     drives = machine.drives
@@ -75,14 +88,19 @@ def mjcf(
         damping = drives.moving_mass[leg] * drives.velocity_gain[leg]
         stiffness = damping * drives.position_gain[leg]
         _add(actuators, "position", name=f"drive{leg + 1}", joint=f"leg{leg + 1}", kp=[stiffness], kv=[damping])
+    for leg in np.flatnonzero(real.radii).tolist():  # after all loops, whose forces are read by their places
+        name = f"{leg + 1}side"
+        _add(loops, "connect", name=f"hinge{leg + 1}", site1=f"rod{name}", site2=f"platform{name}")
     _add(actuators, "velocity", name="spin", site="origin", gear="0 0 0 0 0 1", kv=[model.spin_damping])
-    _add(_add(root, "keyframe"), "key", name="start", ctrl=[*lengths, 0.0])
+    _add(_add(root, "keyframe"), "key", name="start", ctrl=[*readings, 0.0])
     Xml.indent(root)
     return Xml.tostring(root, encoding="unicode") + "\n"
 
 
-def _leg(world: Xml.Element, machine: Machine, leg: int, base: Floats, along: Floats, length: float) -> None:
-    """Add a leg: a cylinder that turns about its base joint, and the rod that slides in it."""
+def _leg(
+    world: Xml.Element, machine: Machine, leg: int, base: Floats, along: Floats, length: float, *, reading: float
+) -> Xml.Element:
+    """Add a leg: a cylinder that turns about its base joint, and the rod that slides in it; return the rod."""
     name, limits = str(leg + 1), machine.legs
     stroke = [float(limits.min_length[leg]), float(limits.max_length[leg])]
     body = _add(world, "body", name=f"leg{name}", pos=base, quat=_rotation_from_z(along))
@@ -90,14 +108,22 @@ def _leg(world: Xml.Element, machine: Machine, leg: int, base: Floats, along: Fl
         _add(body, "joint", name=f"base{name}{letter}", type="hinge", axis=axis)
     _capsule(body, leg_cylinder(machine, leg), _STEEL)
     rod = _add(body, "body", name=f"rod{name}", pos=[0.0, 0.0, length])
-    slide = _add(rod, "joint", name=f"leg{name}", type="slide", axis="0 0 1", ref=[length], range=stroke)
+    slide = _add(rod, "joint", name=f"leg{name}", type="slide", axis="0 0 1", ref=[reading], range=stroke)
     slide.set("armature", _text([machine.drives.moving_mass[leg]]))
     _capsule(rod, leg_rod(machine, leg), _ROD)
     _add(rod, "site", name=f"rod{name}", size=[1.2 * machine.bodies.leg_radius])
+    return rod
 
 
-def _platform(world: Xml.Element, machine: Machine, real: AsBuiltPentapod, position: Floats, direction: Floats) -> None:
-    """Add the platform: a free body whose z axis is the platform line, its origin p."""
+def _platform(
+    world: Xml.Element,
+    machine: Machine,
+    real: AsBuiltPentapod,
+    position: Floats,
+    direction: Floats,
+    model: MujocoModelOptions,
+) -> None:
+    """Add the platform: a free body whose z axis is the platform line, its origin p; rings turn about that line."""
     shaft, tool = spindle(machine, float(real.offsets.min())), machine.tool_length
     body = _add(world, "body", name="platform", pos=position, quat=_rotation_from_z(direction))
     _add(body, "freejoint", name="platform")
@@ -105,8 +131,20 @@ def _platform(world: Xml.Element, machine: Machine, real: AsBuiltPentapod, posit
     _capsule(body, Capsule(shaft.high, tool, 0.2 * shaft.radius, 0.0), _STEEL)
     _add(body, "site", name="origin")
     _add(body, "site", name="tip", pos=[0.0, 0.0, tool])
+    off = real.platform_joints(position, direction) - position - real.offsets[:, None] * direction
+    tangents = _tangents(real, position, direction)
     for leg in range(real.n_legs):
-        _add(body, "site", name=f"platform{leg + 1}", pos=[0.0, 0.0, real.offsets[leg]])
+        height, name = [0.0, 0.0, float(real.offsets[leg])], f"platform{leg + 1}"
+        if real.radii[leg] == 0.0:
+            _add(body, "site", name=name, pos=height)
+            continue
+        ring = _add(body, "body", name=f"ring{leg + 1}", pos=height)
+        _add(ring, "joint", name=f"ring{leg + 1}", type="hinge", axis="0 0 1", damping=[model.spin_damping])
+        inertia = model.ring_mass * float(real.radii[leg]) ** 2
+        still = [inertia, inertia, inertia]
+        _add(ring, "inertial", pos=[0.0, 0.0, 0.0], mass=[model.ring_mass], diaginertia=still)
+        for at, place in ((name, off[leg]), (f"{name}side", off[leg] + model.hinge * tangents[leg])):
+            _add(ring, "site", name=at, pos=_turned_back(_rotation_from_z(direction), place))
 
 
 def _capsule(body: Xml.Element, capsule: Capsule, colour: str) -> None:
@@ -123,6 +161,19 @@ def _rotation_from_z(direction: Floats) -> Floats:
     u, v, w = direction
     quaternion = np.array([1.0 + w, -v, u, 0.0] if w > -0.9 else [-v, 1.0 - w, 0.0, u])
     return quaternion / np.linalg.norm(quaternion)
+
+
+def _tangents(real: AsBuiltPentapod, position: Floats, direction: Floats) -> Floats:
+    """Return the unit tangents (5, 3) of rings where the legs end; anything for legs without a ring."""
+    across = np.cross(direction, real.base_joints - position)
+    return np.asarray(across / np.linalg.norm(across, axis=1, keepdims=True), dtype=np.float64)
+
+
+def _turned_back(quaternion: Floats, vector: Floats) -> Floats:
+    """Return a vector (3,) in the frame that a quaternion (4,), scalar first, turns to the world."""
+    scalar, axis = quaternion[0], -quaternion[1:]
+    turned = vector + 2.0 * np.cross(axis, np.cross(axis, vector) + scalar * vector)
+    return np.asarray(turned, dtype=np.float64)
 
 
 def _add(parent: Xml.Element, tag: str, **attributes: str | Iterable[float]) -> Xml.Element:

@@ -14,8 +14,7 @@ from pentapod.base.errors import ArrayError
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal, stage
 from pentapod.base.values import Result
-from pentapod.kinematics.families.as_built import AsBuiltPentapod, as_nominal
-from pentapod.kinematics.families.as_built_forward import as_built_pose
+from pentapod.kinematics.families.as_built import AsBuiltPentapod, as_pentapod
 from pentapod.simulate.forces import leg_loads
 from pentapod.simulate.measures import Measure
 from pentapod.simulate.mjcf import mjcf
@@ -84,21 +83,28 @@ def load_mujoco() -> Any:
     return load_extra("mujoco", "sim", "this engine needs MuJoCo", key="mujoco")
 
 
-def plant(reference: Reference, *, base_errors: ArrayLike = 0.0, offset_errors: ArrayLike = 0.0) -> Plant | Refusal:
+def plant(
+    reference: Reference,
+    *,
+    base_errors: ArrayLike = 0.0,
+    offset_errors: ArrayLike = 0.0,
+    true: AsBuiltPentapod | None = None,
+) -> Plant | Refusal:
     """Return the machine as MJCF, with the leg lengths of the program's first row; MuJoCo itself is not needed.
 
-    base_errors (n, 3) and offset_errors (n,): deviations of the real joints from the machine file, metres, or one
-    number for all. A Refusal says that the real machine has no proven pose there.
+    base_errors (n, 3) and offset_errors (n,): deviations of the real joints from the machine, as designed or as its
+    calibration has it, metres, or one number for all. true: the machine that plays, where it is known: it takes the
+    place of the reference's, and the errors are added to it. A Refusal says that the real machine has no proven pose
+    there.
     """
     program, machine = reference.program, reference.machine
-    robot = as_nominal(machine.robot, "the rigid-body model")
+    robot = as_pentapod(machine.robot if true is None else true, "the rigid-body model")
     real = AsBuiltPentapod.of(robot, base_errors=base_errors, offset_errors=offset_errors)
-    start = as_built_pose(real, robot, program.legs[0], program.component)
-    if not start.proven:
+    position, direction = real.pose(program.legs[0], program.component)
+    if not np.isfinite(position).all():
         return Refusal("simulation", "the machine with these errors has no proven pose at the program's start")
     step = program.period / DEFAULTS.steps(program.period)
-    xml = mjcf(machine, real, start.position, start.direction, step=step)
-    return Plant(xml, start.position, start.direction)
+    return Plant(mjcf(machine, real, position, direction, step=step), position, direction)
 
 
 @stage

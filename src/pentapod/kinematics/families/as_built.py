@@ -50,18 +50,19 @@ class AsBuiltPentapod(Value, ProvenByLegEquations):
     @classmethod
     def of(
         cls,
-        nominal: FiveLegs,
+        nominal: FiveLegs | AsBuiltPentapod,
         *,
         base_errors: ArrayLike = 0.0,
         offset_errors: ArrayLike = 0.0,
         radii: ArrayLike = 0.0,
         zeros: ArrayLike = 0.0,
     ) -> AsBuiltPentapod:
-        """Return a nominal machine with errors (metres) added: base_errors (5, 3), the others (5,), or one for all."""
+        """Return a machine with errors (metres) added: base_errors (5, 3), the others (5,), or one for all."""
         base = nominal.base_joints + _given(base_errors, "base_errors", (5, 3))
         offsets = nominal.offsets + _given(offset_errors, "offset_errors", (5,))
-        known = nominal if isinstance(nominal, LinearPentapod | GeneralPentapod) else None
-        return cls(base, offsets, _given(radii, "radii", (5,)), _given(zeros, "zeros", (5,)), known)
+        rings, scales = nominal.radii + _given(radii, "radii", (5,)), nominal.zeros + _given(zeros, "zeros", (5,))
+        known = nominal.nominal if isinstance(nominal, AsBuiltPentapod) else nominal
+        return cls(base, offsets, rings, scales, known if isinstance(known, LinearPentapod | GeneralPentapod) else None)
 
     def __post_init__(self) -> None:
         for name, shape in (("base", (5, 3)), ("offsets", (5,)), ("radii", (5,)), ("zeros", (5,))):
@@ -220,9 +221,11 @@ class AsBuiltPentapod(Value, ProvenByLegEquations):
         return t, ratio, normal
 
 
-def as_nominal(robot: Robot, purpose: str) -> LinearPentapod | GeneralPentapod:
-    """Return the robot where errors can be added to it; raises MachineError, which names the purpose, else."""
+def as_pentapod(robot: Robot, purpose: str) -> AsBuiltPentapod:
+    """Return a linear pentapod as one to which errors can be added; raises MachineError, which names the purpose."""
     if isinstance(robot, LinearPentapod | GeneralPentapod):
+        return AsBuiltPentapod.of(robot)
+    if isinstance(robot, AsBuiltPentapod) and robot.nominal is not None:
         return robot
     raise MachineError(
         f"{purpose} needs a linear pentapod", key="robot", value=type(robot).__name__,

@@ -141,12 +141,12 @@ def _near(scene: Scene, obstacle: Obstacle, tips: Floats, axes: Floats, frame: R
     """Return the indices of those poses (N, 3) in which a body's bounding box is near the obstacle's."""
     machine, tool, comforts = scene.machine, scene.collision_world.tool, scene.comforts
     robot, bodies = machine.robot, machine.bodies
-    base, heights = robot.base_joints, robot.offsets
+    base, joints = robot.base_joints, robot.platform_joints(tips + machine.tool_length * axes, -axes)
     if frame is not None:
         back = frame.inverse()
-        tips, axes, base = back.apply(tips), back.rotate(axes), back.apply(base)
+        tips, axes, base, joints = back.apply(tips), back.rotate(axes), back.apply(base), back.apply(joints)
     top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
-    lines = [(base[k], tips + (machine.tool_length - heights[k]) * axes) for k in range(robot.n_legs)]
+    lines = [(base[k], joints[:, k]) for k in range(robot.n_legs)]
     reaches = [OPTIONS.cap * comforts.leg_obstacle + bodies.leg_radius] * robot.n_legs
     lines.append((tips + nose * axes, tips + top * axes))
     reaches.append(OPTIONS.cap * comforts.spindle_obstacle + bodies.shaft_radius)

@@ -1,8 +1,10 @@
 """LinuxCNC's pentakins: the toolpath as XYZAB, planned by the controller itself, with its ini and HAL.
 
 In pentakins XYZ is a point on the tool's line, and the joints of the legs are along the line from it towards the
-spindle. So the tip is that point, and joint i is at tool_length − z_i. The controller's frame has z along the upright
-tool and its zero in the middle of the work volume: home is then machine zero, where its Newton iteration converges.
+spindle. So the tip is that point, and joint i is at tool_length − z_i. Its joints are lengths of legs; what the
+scales of a calibrated machine read beyond them is added behind it (`hal_text`). The controller's frame has z along the
+upright tool and its zero in the middle of the work volume: home is then machine zero, where its Newton iteration
+converges.
 """
 
 from __future__ import annotations
@@ -65,7 +67,8 @@ def pentakins_files(given: PostInput) -> dict[str, bytes]:
     limits = machine.legs
     upright = frame.inverse().rotate([0.0, 0.0, 1.0])
     tip = frame.inverse().apply([0.0, 0.0, 0.0])
-    home = 1e3 * machine.robot.leg_lengths(tip + machine.tool_length * upright, -upright)
+    zeros = 1e3 * built_legs(machine).zeros
+    home = 1e3 * machine.robot.leg_lengths(tip + machine.tool_length * upright, -upright) - zeros
     velocity, acceleration = 1e3 * limits.max_velocity, 1e3 * limits.max_acceleration
     rate, gain = 1e3 * machine.rapid_velocity, OPTIONS.share * float(acceleration.min())
     turn = np.degrees(1e-3 / machine.tool_length)
@@ -81,7 +84,7 @@ def pentakins_files(given: PostInput) -> dict[str, bytes]:
         "pentakins",
         FILE,
         axes,
-        joint_words(home, 1e3 * limits.min_length, 1e3 * limits.max_length, velocity, acceleration),
+        joint_words(home, 1e3 * limits.min_length - zeros, 1e3 * limits.max_length - zeros, velocity, acceleration),
         {
             "DEFAULT_LINEAR_VELOCITY": number(0.1 * rate),
             "MAX_LINEAR_VELOCITY": number(rate),
@@ -91,8 +94,8 @@ def pentakins_files(given: PostInput) -> dict[str, bytes]:
         },
         servo_period_ns(given.program.period),
     )
-    hal = hal_text(parameters(machine, frame))
-    return files_of(ini, hal, FILE, _code(_within(path, machine.rapid_velocity)))
+    hal = hal_text(parameters(machine, frame), zeros)
+    return files_of(ini, hal, FILE, scales=bool(zeros.any()), code=_code(_within(path, machine.rapid_velocity)))
 
 
 def controller_frame(machine: Machine, component: Branch) -> RigidTransform:
@@ -102,14 +105,20 @@ def controller_frame(machine: Machine, component: Branch) -> RigidTransform:
     return RigidTransform(turned, -turned @ machine.work.centre)
 
 
-def parameters(machine: Machine, frame: RigidTransform) -> dict[str, float]:
-    """Return pentakins' parameters, mm; legs are numbered from 0. Raises MachineError."""
+def built_legs(machine: Machine) -> FiveLegs | AsBuiltPentapod:
+    """Return the robot where pentakins can be told of it. Raises MachineError."""
     robot = machine.robot
-    if not isinstance(robot, FiveLegs | AsBuiltPentapod) or robot.zeros.any():
+    if not isinstance(robot, FiveLegs | AsBuiltPentapod):
         raise MachineError(
             "pentakins has no such kinematics", key="robot", value=type(robot).__name__,
-            expected="a linear pentapod whose scales read the lengths of the legs", remedy="play the setpoints instead",
+            expected="a linear pentapod", remedy="play the setpoints instead",
         )  # fmt: skip
+    return robot
+
+
+def parameters(machine: Machine, frame: RigidTransform) -> dict[str, float]:
+    """Return pentakins' parameters, mm; legs are numbered from 0. Raises MachineError."""
+    robot = built_legs(machine)
     base = 1e3 * frame.apply(robot.base_joints)
     joints = 1e3 * (machine.tool_length - robot.offsets)
     found: dict[str, float] = {}
