@@ -137,6 +137,12 @@ def test_retract_after_tool_centre_point_programming_is_off(read):
     np.testing.assert_allclose(tips(path)[[0, 1, -2, -1]], [[10, 10, 50], [10, 10, 5], [10, 20, 50], [10, 20, 5]])
 
 
+@pytest.mark.parametrize("word", ["Z0", "W0"])
+def test_rotary_axes_stay_turned_where_z_alone_goes_home(read, word):
+    text = f"G43.4 H1\nG0 X0 Y0 Z10 B30\nG1 X10\nG91 G28 {word}\nG90\nG0 X0 Y0 Z20\nG1 X10\n"
+    np.testing.assert_allclose(read(f"{HEAD}{text}{END}").axes, [[0.5, 0.0, np.sqrt(0.75)]] * 6, atol=1e-12)
+
+
 @pytest.mark.parametrize("code", ["G2", "G3"])
 def test_arc_that_ends_beside_its_start_on_the_same_ray_is_a_full_turn(read, code):
     path = read(f"{HEAD}G0 X10 Y0 Z0\n{code} X10.001 Y0 I-10 J0\n{END}")

@@ -15,7 +15,7 @@ SYSTEMS = {54.0: "G54", 55.0: "G55", 56.0: "G56", 57.0: "G57", 58.0: "G58", 59.0
 _BY_NUMBER = dict(enumerate(SYSTEMS.values(), start=1))
 _FIRST, _NUMBERED = 54.0, frozenset({54.1, 154.0})
 _OFF, _FROM, _TO = 500.0, 505.0, 599.0
-_AXES = (*LINEAR, *LETTERS)
+_AXES, _STEPS = (*LINEAR, *LETTERS), {"X": "U", "Y": "V", "Z": "W"}
 
 
 def system_of(code: float, words: Mapping[str, Word], dialect: Dialect) -> str | None:
@@ -27,8 +27,12 @@ def system_of(code: float, words: Mapping[str, Word], dialect: Dialect) -> str |
 
 
 def go_home(tracer: Tracer, words: Mapping[str, Word], line: int) -> None:
-    """G28, G30: the axes that are named, or all, go to the home position; the point on the way is left out."""
-    tracer.home([letter for letter in _AXES if letter in words] or _AXES, line)
+    """G28, G30: the axes that are named, or all, go to the home position; the point on the way is left out.
+
+    U, V and W are steps along X, Y and Z.
+    """
+    named = [letter for letter in _AXES if letter in words or _STEPS.get(letter) in words]
+    tracer.home(named or _AXES, line)
 
 
 def machine_place(tracer: Tracer, words: Mapping[str, Word], line: int) -> None:
