@@ -19,7 +19,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("timing",),
     ("program",),
     ("verify",),
-    ("simulate",),
+    ("simulate", "registration"),
     ("job",),
     ("report",),
     ("view",),

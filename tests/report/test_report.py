@@ -312,7 +312,14 @@ def test_the_setup_sheet_names_the_limit_at_every_place(make_job, tmp_path):
         assert float(margin) == pytest.approx(stretch.min(), abs=1e-3)
         assert placed.margin_names[int(stretch.min(axis=0).argmin())] == name.replace("&gt;", ">")
     views = re.findall(r'aria-label="((?:the part )?from [^"]*)">(.*?)</svg>', text, re.S)
-    assert len(views) == 3
+    assert len(views) == 4
+    low, high = outcome.find(Mesh).bounds * 1e3
+    for name, drawing, axis in (("above", views[2][1], 1), ("side", views[3][1], 2)):
+        told = [float(t) for t in re.findall(r'class="dimension"[^>]*>([\d.]+)</text>', drawing)]
+        upright = abs(placed.placement.transform.rotation[2, 2]) > 1 - 1e-9  # then extents along z are the mesh's
+        assert len(told) == 2, name
+        assert axis != 2 or not upright or told[1] == pytest.approx((high - low)[2], abs=0.01)
+    check_touch_off(text, outcome)
     # The base hangs above: seen from above, with x to the right, y comes towards one. No mirror image.
     assert "y down" in views[0][0]
     circles = np.array(re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', views[0][1]), dtype=float)
@@ -320,6 +327,26 @@ def test_the_setup_sheet_names_the_limit_at_every_place(make_job, tmp_path):
     assert circles - circles[0] == pytest.approx(base - base[0], abs=0.2)
     assert re.findall(r">(\d)</text>", views[0][1]) == list("12345")
     assert "nearest limits" in page.text
+
+
+def check_touch_off(text, outcome):
+    """Three places, where the legs hold the tool such that its ball touches the mesh, by distances of joints alone."""
+    rows = re.findall(r"<tr>(.*?)</tr>", text.split('class="touch-off"')[1].split("</table>")[0], re.S)[1:]
+    assert len(rows) == 3
+    machine, placed, mesh = outcome.machine, outcome.find(PlacedPath), outcome.find(Mesh)
+    points = []
+    for row in rows:
+        cells = re.findall(r"<td>(.*?)</td>", row.replace("−", "-"))
+        on_part, there, tip, axis, legs = (np.array([float(v) for v in cell.split(",")]) for cell in cells[1:])
+        joints = 1e-3 * tip + (machine.tool_length - machine.robot.offsets)[:, None] * axis
+        assert 1e3 * np.linalg.norm(joints - machine.robot.base, axis=1) == pytest.approx(legs, abs=0.05)
+        assert 1e3 * placed.placement.transform.apply(1e-3 * on_part) == pytest.approx(there, abs=0.02)
+        radius = placed.toolpath.tilt_centre
+        assert np.linalg.norm(1e-3 * (there - tip) - radius * axis) == pytest.approx(radius, abs=60e-6)
+        assert np.linalg.norm(mesh.vertices - 1e-3 * on_part, axis=1).min() < 5e-3
+        points.append(on_part)
+    area = np.linalg.norm(np.cross(points[1] - points[0], points[2] - points[0]))
+    assert area > 0.1 * np.ptp(mesh.bounds[:, 0]) * np.ptp(mesh.bounds[:, 1]) * 1e6
 
 
 def test_viewer_draws_few_waypoints_of_a_long_job():

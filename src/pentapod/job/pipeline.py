@@ -22,6 +22,8 @@ from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
 from pentapod.job.placed_check import Ranges, meetings, refusal_of
 from pentapod.job.plan_arrays import arrays_of
+from pentapod.job.plan_before import PlanBefore
+from pentapod.job.remarks import STRAIGHT, UPRIGHT, explanation, placement_remarks
 from pentapod.job.run_folder import staged, unstaged
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import StageRunner
@@ -33,16 +35,11 @@ from pentapod.planning.plan import PlacementOptions, fits
 from pentapod.planning.problem.constraints import FREE
 from pentapod.planning.setups import setups
 from pentapod.program import Program, Provenance, sample, write_csv
-from pentapod.timing import Explanation, Limit, Trajectory, certify, explain, retime, slow_cuts
+from pentapod.timing import Limit, Trajectory, retime
+from pentapod.timing.reuse import retime_as_before
 from pentapod.toolpath import Mesh, Toolpath
 from pentapod.toolpath.linking.partition import Piece, missed_cuts
 from pentapod.verify import Claim, Specification, Verdict, judged
-
-UPRIGHT = "the tool does not lean, as it would touch the part"
-"""What is said of a placement with the toolpath's axes."""
-
-STRAIGHT = "the tool keeps one direction, as it would touch the part"
-"""What is said of a placement with one axis everywhere."""
 
 Writer = Callable[[Outcome, Path], object]
 
@@ -54,6 +51,7 @@ def run(
     *,
     machine: Machine | None = None,
     piece: Piece | None = None,
+    before: PlanBefore | None = None,
     writers: Mapping[str, Writer] | None = None,
     limits: Sequence[Limit] = (),
     claims: Sequence[Claim] = (),
@@ -62,10 +60,10 @@ def run(
     """Plan a job, write program.csv, plan.npz and verdict.json into `out`, and return the outcome.
 
     machine: to be used instead of the one that the job names, with the job's tool length and controller settings.
-    piece: plan only this piece of the job's toolpath, in one set-up. writers: further files, by name, each written from
-    the outcome (the report, for example). limits: further limits on the time law. claims: further claims of the
-    verdict. advice: how changes are searched for with which a job that cannot be done is planned, and passes; the
-    refusal holds them. None for no search.
+    piece: plan only this piece of the job's toolpath, in one set-up. before: the run of the same job with its part
+    elsewhere, of which as much is kept as fits. writers: further files, by name, each written from the outcome.
+    limits: further limits on the time law. claims: further claims of the verdict. advice: how changes are searched for
+    with which a job that cannot be done is planned, and passes; the refusal holds them. None for no search.
     The program is judged from the file, as it was written. A job that cannot be done gives an outcome with a refusal,
     a verdict.json that says so, and no program. The folder changes when the run ends: an error or an interruption
     leaves it as it was. Raises InputError for a bad job, mesh, machine or folder, and where another run is writing into
@@ -78,11 +76,11 @@ def run(
         used, own_machine = job_machine(job, machine), machine is not None
         mesh = runner.run("mesh", lambda: job_mesh(job, progress), remark=lambda mesh: str(mesh.diagnosis))
         specification = job_specification(
-            job, used, mesh, lambda: _toolpath(job, used, mesh, piece, runner), own_machine=own_machine
+            job, used, mesh, lambda: _toolpath(job, used, mesh, piece, runner, before), own_machine=own_machine
         )
         if piece is not None:  # the caller plans the other pieces elsewhere
             specification = dataclasses.replace(specification, setups=max(specification.setups, 2))
-        task = _Task(job, specification, runner, piece, (*timing_limits(job, used), *limits), tuple(claims))
+        task = _Task(job, specification, runner, piece, (*timing_limits(job, used), *limits), tuple(claims), before)
         outcome = _planned(task, staging, writers or {})
         refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
         if refusal is not None and refusal.stage == "placement" and splits:
@@ -105,10 +103,14 @@ def passes(
         return run(job, folder, machine=machine, limits=limits, claims=claims, advice=None).passed
 
 
-def _toolpath(job: Job, machine: Machine, mesh: Mesh, piece: Piece | None, runner: StageRunner) -> Toolpath:
+def _toolpath(
+    job: Job, machine: Machine, mesh: Mesh, piece: Piece | None, runner: StageRunner, before: PlanBefore | None
+) -> Toolpath:
     """Return the job's toolpath, or a piece of it, as a stage of the run."""
 
     def made() -> tuple[Toolpath, object]:
+        if before is not None:
+            return before.toolpath, "toolpath of the run before"
         if piece is None:
             return job_toolpath(job, mesh, runner.progress, machine=machine)
         return job_piece(job, mesh, piece, runner.progress, machine=machine), piece
@@ -179,6 +181,7 @@ class _Task:
     piece: Piece | None = None
     limits: tuple[Limit, ...] = ()
     claims: tuple[Claim, ...] = ()
+    before: PlanBefore | None = None
 
     @property
     def machine(self) -> Machine:
@@ -190,7 +193,7 @@ class _Task:
 
     def program(self, file: Path) -> Program | Refusal:
         """Plan, write the program to `file` and return it; or return the first refusal."""
-        placed = self.runner.run("placement", self._placed, remark=_remarks)
+        placed = self.runner.run("placement", self._placed, remark=placement_remarks)
         if isinstance(placed, Refusal):
             return placed
         return self.on(placed.placement).written(placed, file)
@@ -207,12 +210,13 @@ class _Task:
         path = self.runner.run("leg path", lambda: self._path(placed))
         if isinstance(path, Refusal):
             return path
-        machine, progress = self.machine, self.runner.progress
-        trajectory = self.runner.run("timing", lambda: retime(path, machine, limits=self.limits, progress=progress))
+        trajectory = self.runner.run("timing", lambda: self._timed(path))
         if isinstance(trajectory, Refusal):
             return trajectory
         program = self.runner.run("program", lambda: self._program(placed, trajectory, file))
-        self.runner.run("explain", lambda: self._explanation(path, trajectory, program), remark=str)
+        self.runner.run(
+            "explain", lambda: explanation(path, trajectory, program, self.machine, self.toolpath), remark=str
+        )
         return program
 
     def fits(self, part: Toolpath) -> bool:
@@ -222,6 +226,8 @@ class _Task:
     def _placed(self) -> PlacedPath | Refusal:
         """Return the placed path. Where leaning makes the tool meet the part, it keeps the toolpath's axes, or one."""
         options = self._options()
+        if self.before is not None and (kept := self.before.kept(self.toolpath, self.machine, options)) is not None:
+            return kept
         placed = self._planned(options)
         met = self._meetings(placed)
         if met and options["tilt"] > 0.0:
@@ -232,6 +238,12 @@ class _Task:
                 chosen = f"{placed.placement.chosen_by}; {STRAIGHT if common else UPRIGHT}"
                 placed = dataclasses.replace(placed, placement=dataclasses.replace(placed.placement, chosen_by=chosen))
         return refusal_of(met) if met else placed
+
+    def _timed(self, path: LegPath) -> Trajectory | Refusal:
+        machine, progress = self.machine, self.runner.progress
+        if self.before is not None:
+            return retime_as_before(path, machine, self.before.laws, limits=self.limits, progress=progress)
+        return retime(path, machine, limits=self.limits, progress=progress)
 
     def _planned(self, options: PlacementOptions) -> PlacedPath | Refusal:
         objective, progress = self.job.placement.then, self.runner.progress
@@ -275,25 +287,3 @@ class _Task:
         program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
         write_csv(program, file)
         return program
-
-    def _explanation(self, path: LegPath, trajectory: Trajectory, program: Program) -> Explanation:
-        position, direction = self.machine.robot.pose(program.legs, program.component)
-        tips = position + self.machine.tool_length * direction
-        # A beam or a spray needs constant speed on the surface; a cutter only has an upper bound.
-        beam, period = self.toolpath.tilt_centre < 0.0, self.machine.controller.period
-        slow = slow_cuts(trajectory, period, path.surface_rate) if beam else ()
-        spot = self.toolpath.tilt_centre if beam else 0.0
-        uses = certify(trajectory, self.machine, legs=program.legs, tips=tips, axes=-direction, spot=spot)
-        return explain(trajectory, self.machine, uses, slow)
-
-
-def _remarks(placed: PlacedPath | Refusal) -> str:
-    """Return the positions of guides, a common direction of the tool, and what the choice of placement has to tell."""
-    if isinstance(placed, Refusal):
-        return ""
-    chosen = placed.placement
-    lines = [f"guides 1 to 5 at {chosen.guides}"] if chosen.guides else []
-    lines += [f"tool axis: {placed.common_axis}; {placed.lean}"] if placed.common_axis is not None else []
-    if any(word in chosen.chosen_by for word in ("interrupted", UPRIGHT, STRAIGHT)):
-        lines.append(f"placement: {chosen.chosen_by}; smallest margin {placed.smallest_margin:.3f}")
-    return "\n".join(lines)

@@ -17,6 +17,7 @@ from pentapod.job.outcome import Outcome
 from pentapod.planning.leg_path.leg_path import LegPath
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.program.program import Program
+from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.time_law.trajectory import Trajectory
 from pentapod.toolpath.formats.npz import toolpath_arrays
 from pentapod.toolpath.linking.partition import Piece
@@ -26,6 +27,19 @@ Arrays = dict[str, NDArray[Any]]
 
 JOB_FILE = "job.file"
 """The job file of the run, relative to the run's folder where possible."""
+
+PLACEMENT = "placed.placement_mm"
+"""Homogeneous matrix (4, 4), workpiece → machine."""
+
+LAW_NAMES = (
+    "trajectory.law_knots",
+    "trajectory.law_time_s",
+    "trajectory.law_station_mm",
+    "trajectory.law_speed_mm_s",
+    "trajectory.law_acceleration_m_s2",
+    "trajectory.law_jerk_m_s3",
+)
+"""Knots of each motion law, and the values of all laws, one after the other; accelerations and jerks between knots."""
 
 GUIDES = "placed.guides_mm"
 """Positions of the base joints along their guides, for a reconfigurable machine."""
@@ -101,7 +115,7 @@ def _placed(placed: PlacedPath) -> Arrays:
         "placed.margin_names": np.array(placed.margin_names),
         **({} if rail_positions is None else {GUIDES: np.array(rail_positions)}),
     }
-    return {"placed.placement_mm": matrix_mm(placed.placement.transform), **_in_units(arrays)}
+    return {PLACEMENT: matrix_mm(placed.placement.transform), **_in_units(arrays)}
 
 
 def _leg_path(path: LegPath) -> Arrays:
@@ -128,5 +142,10 @@ def _trajectory(trajectory: Trajectory) -> Arrays:
         "trajectory.active": profile.active,
         "trajectory.shares": profile.shares,
         "trajectory.constraint_names": np.array(profile.constraint_names),
+        LAW_NAMES[0]: np.array([len(law.times) for law in trajectory.laws]),
+        **{
+            name: np.concatenate([getattr(law, part) for law in trajectory.laws])
+            for name, part in zip(LAW_NAMES[1:], MotionLaw.__dataclass_fields__, strict=True)
+        },
     }
     return _in_units(arrays)

@@ -14,9 +14,13 @@ from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.report.decimate import thinned_mesh
 from pentapod.report.figure import DETAIL, HELD_COLOUR, LIMIT_COLOUR, QUIET_COLOUR, leg_colour
 from pentapod.report.held import Held
+from pentapod.report.sheet.dimensions import dimension_lines
 
 LETTER = 15.0
 """Height of letters in a drawing 500 wide."""
+
+_DIMENSIONED = 0.2
+"""Share of a drawing's size that its rim takes where it has dimension lines."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +59,7 @@ def placement_views(
         _view(subject, f"from above: x to the right, y {y}", (0, 1))
         + _view(subject, f"from the side: x to the right, {side}", (0, 2))
         + _view(subject, f"the part from above: x to the right, y {y}", (0, 1), close=True)
+        + _view(subject, f"the part from the side: x to the right, {side}", (0, 2), close=True)
     )
 
 
@@ -86,11 +91,12 @@ class _Paper:
 
     low: Floats
     high: Floats
+    rim: float = 0.07
 
     @property
     def room(self) -> float:
         """Width of the rim, mm."""
-        return 0.07 * float((self.high - self.low).max())
+        return self.rim * float((self.high - self.low).max())
 
     @property
     def size(self) -> Floats:
@@ -147,10 +153,10 @@ def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool =
     seen = [flat(subject.tips), flat(subject.facets).reshape(-1, 2)]
     seen += [] if close else [flat(subject.base), flat(subject.joints), flat(subject.around).reshape(-1, 2)]
     shown = np.concatenate(seen)
-    paper = _Paper(shown.min(axis=0), shown.max(axis=0))
+    paper = _Paper(shown.min(axis=0), shown.max(axis=0), _DIMENSIONED if close else _Paper.rim)
     parts = [paper.filled(flat(subject.around), HELD_COLOUR, subject.holder)] if len(subject.around) else []
     parts.append(paper.filled(flat(subject.facets), QUIET_COLOUR, "part"))
-    if axes[1] == 2:
+    if axes[1] == 2 and not close:
         parts += _levels(paper, None if subject.table is None else 1e3 * up * subject.table)
     parts.append(paper.line(flat(subject.tips), LIMIT_COLOUR, 0.6))
     if not close:
@@ -159,6 +165,13 @@ def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool =
         parts += [paper.numbered(joint, k + 1, leg_colour(k)) for k, joint in enumerate(base)]
         parts.append(paper.line(flat(np.stack([subject.far, subject.tip])), "currentColor", 3.0))
     parts.append(paper.cross(flat(subject.origin), "origin of the mesh"))
+    if close and len(subject.facets):
+        corners = flat(subject.facets).reshape(-1, 2)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        ends = np.array([[low[0], high[1]], [high[0], low[1]]])  # upper left and lower right
+        machine = ends * (1.0, up)
+        names = ("xyz"[axes[0]], "xyz"[axes[1]])
+        parts.append(dimension_lines(paper.at(ends), machine[0], machine[1], paper.unit, names))
     (width, height), extent = paper.size, paper.high - paper.low
     origin = ", ".join(f"{'xyz'[k]} = {round(1e3 * float(subject.origin[k]), 2) + 0.0:.2f}" for k in axes)
     as_at = "" if close else " Legs as at the smallest margin."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
+from pentapod.base.units import from_si
 from pentapod.job.outcome import Outcome
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.diagnosis import ActiveLimit, active_limits
@@ -12,6 +13,7 @@ from pentapod.report.figure import DETAIL
 from pentapod.report.held import held_mesh
 from pentapod.report.margin_band import margin_band
 from pentapod.report.placement_views import placement_views
+from pentapod.report.sheet.touch_off import touch_off_points, touch_off_table
 from pentapod.report.words import number
 
 
@@ -23,12 +25,12 @@ def setup_sheet(outcome: Outcome) -> str:
     table = outcome.job.placement
     height = table.table_z_mm if table.mode == "table" else None
     surface = None if height is None else 1e-3 * height
-    on_table = "" if height is None else f"<p>The part stands on the table, at z = {number(height, 'mm')}.</p>"
-    held = held_mesh(outcome, placed)
-    views = placement_views(outcome.find(Mesh), placed, outcome.machine, surface, held)
+    held, mesh = held_mesh(outcome, placed), outcome.find(Mesh)
+    views = placement_views(mesh, placed, outcome.machine, surface, held)
+    points = "" if mesh is None else touch_off_table(touch_off_points(mesh, placed, outcome.machine))
     rows = "".join(_row(limit) for limit in active_limits(placed)[: DETAIL.limits])
     return (
-        f'{on_table}<div class="views">{views}</div>'
+        f'<p>{_standing(mesh, placed, outcome, height)}</p><div class="views">{views}</div>{points}'
         f"<h3>Margins along the path</h3>{margin_band(placed.tips, placed.margins, placed.margin_names)}"
         '<p class="hint">Height: the smallest margin (0: a limit, about 1: comfortable). Colour: the nearest limit; '
         "point at it for its name.</p>"
@@ -36,6 +38,17 @@ def setup_sheet(outcome: Outcome) -> str:
         '<th class="n">room</th><th class="n">at waypoint</th><th class="n">nearest on</th></tr></thead>'
         f"<tbody>{rows}</tbody></table></div>"
     )
+
+
+def _standing(mesh: Mesh | None, placed: PlacedPath, outcome: Outcome, height: float | None) -> str:
+    """Return where the table is, or where it would have to be."""
+    if height is not None:
+        return f"The part stands on the table, at z = {number(height, 'mm')}."
+    if mesh is None:
+        return ""
+    z = placed.placement.transform.apply(mesh.vertices)[:, 2]
+    far = from_si(float(z.max() if outcome.machine.work.centre[2] > 0.0 else z.min()), "mm")
+    return f"The lowest point of the part is at z = {number(far, 'mm')}: a table must not be higher."
 
 
 def _row(limit: ActiveLimit) -> str:

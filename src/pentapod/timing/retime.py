@@ -80,7 +80,7 @@ def retime(
     if wrong is not None:
         return wrong
     indices = [k for k, piece in enumerate(path.pieces) if piece.length > STILL_M]
-    dwells = _dwells(path, indices, period)
+    dwells = dwells_of(path, indices, period)
     _check_standing(start_speed, end_speed, dwells)
     total = sum(path.pieces[k].length for k in indices)
     profiles: list[PieceProfile] = []
@@ -126,7 +126,7 @@ def _check_standing(start: float, end: float, dwells: Floats) -> None:
             raise InputError(what, key=name, value=speed, expected="0 m/s", remedy="or take the dwell out of the path")
 
 
-def _dwells(path: LegPathLike, indices: list[int], period: float) -> Floats:
+def dwells_of(path: LegPathLike, indices: list[int], period: float) -> Floats:
     """Return the seconds (L + 1,) of dwell before each moving piece and after the last, in whole periods."""
     owner = np.searchsorted(indices, np.arange(len(path.pieces) + 1), side="left")
     periods = np.bincount(owner, np.ceil(np.asarray(path.dwells) / period - 1e-9), len(indices) + 1)

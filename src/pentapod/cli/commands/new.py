@@ -24,6 +24,7 @@ _VALUES: dict[str, dict[str, Any]] = {
     "toolpath": {"direction_deg": 0.0, "pattern": "zigzag", "stepover_mm": 6.0},
     "axis": {"tilt_deg": 15.0},
     "feed": {"cut_mm_min": 1500.0},
+    "placement": {"mode": "table", "table_z_mm": 471.0},
 }
 COMMENT_COLUMN = 46
 

@@ -23,9 +23,11 @@ if TYPE_CHECKING:
 @click.option("--explain", is_flag=True, help="Print the nearest limits: where, and by how much.")
 @click.option("--advice", type=click.IntRange(0), default=1, show_default=True, metavar="N",
               help="Changes to find with which a job that cannot be done is planned; 0: do not search.")  # fmt: skip
+@click.option("--placement", type=click.Path(path_type=Path), metavar="FILE",
+              help="Fix the part where `pentapod register` found it; writes placed-job.toml, too.")  # fmt: skip
 @json_option
 @quiet_option
-def plan(job: Path, out: Path, explain: bool, advice: int, as_json: bool, quiet: bool) -> int:
+def plan(job: Path, out: Path, explain: bool, advice: int, placement: Path | None, as_json: bool, quiet: bool) -> int:
     """Plan JOB.toml: write program.csv, verdict.json, report.html and plan.npz.
 
     The folder changes only when the run ends, so that its files are always of one run. A job that cannot be done
@@ -38,16 +40,15 @@ def plan(job: Path, out: Path, explain: bool, advice: int, as_json: bool, quiet:
     from pentapod.base.errors import InputError
     from pentapod.job.advice.options import AdviceOptions
     from pentapod.job.advise import can_help
-    from pentapod.job.artefacts import PROGRAM, REPORT
-    from pentapod.job.outcome import SetUps
+    from pentapod.job.artefacts import REPORT
+    from pentapod.job.clamped.placed_job import placed_job, read_placement
     from pentapod.job.pipeline import run
     from pentapod.job.schema.job import Job
-    from pentapod.planning import PlacedPath
-    from pentapod.planning.diagnosis import active_limits
     from pentapod.report import write_report
-    from pentapod.timing import Explanation
 
     loaded, options = Job.load(job), AdviceOptions(wanted=advice) if advice else None
+    if placement is not None:
+        loaded = placed_job(loaded, read_placement(placement), out)
     try:
         with progress_bar(quiet=quiet or as_json) as progress:
             outcome = run(loaded, out, progress, writers={REPORT: write_report}, advice=options)
@@ -56,6 +57,17 @@ def plan(job: Path, out: Path, explain: bool, advice: int, as_json: bool, quiet:
             raise
         click.echo(f"error: {error}", err=True)  # at once: the search takes as long as a plan or two
         return _advised(loaded, options, as_json=as_json, quiet=quiet)
+    return shown(outcome, out, explain=explain, as_json=as_json, quiet=quiet)
+
+
+def shown(outcome: Outcome, out: Path, *, explain: bool, as_json: bool, quiet: bool) -> int:
+    """Print the outcome of a run in a folder and return the exit code."""
+    from pentapod.job.artefacts import PROGRAM, REPORT
+    from pentapod.job.outcome import SetUps
+    from pentapod.planning import PlacedPath
+    from pentapod.planning.diagnosis import active_limits
+    from pentapod.timing import Explanation
+
     refusal = outcome.refusal
     if as_json:
         seconds = {stage.name: round(stage.seconds, 3) for stage in outcome.stages}

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.base.errors import ArrayError
+from pentapod.base.errors import ArrayError, InputError
 from pentapod.base.keys import VECTOR
 from pentapod.base.tables import TomlTable
 from pentapod.base.units import from_si, to_si
@@ -30,16 +31,16 @@ def job_constraints(job: Job, machine: Machine, mesh: Mesh) -> PlacementConstrai
     """Return the placements that the job allows. Raises JobError where its matrix is not rigid."""
     table = job.placement
     if table.mode == "fixed":
-        return PlacementConstraints.fixture([_fixed(job)])
+        return PlacementConstraints.fixture([fixed_placement(table, partial(job.error, "placement"))])
     if table.mode == "fixture":
-        return PlacementConstraints.fixture([_pose(pose[:3], pose[3:]) for pose in table.poses_mm_deg or ()])
+        return PlacementConstraints.fixture([pose_of(pose[:3], pose[3:]) for pose in table.poses_mm_deg or ()])
     if table.mode == "table":
         return _on_table(job, machine, mesh)
     if table.box_mm is None and table.largest_turn_deg is None:
         return FREE
     corners = np.array([[-np.inf] * 3, [np.inf] * 3]) if table.box_mm is None else table.si.box
     turn = np.pi if table.largest_turn_deg is None else table.si.largest_turn
-    reference = _pose((0.0, 0.0, 0.0), table.rotation_deg or (0.0, 0.0, 0.0))
+    reference = pose_of((0.0, 0.0, 0.0), table.rotation_deg or (0.0, 0.0, 0.0))
     low, high = corners.min(axis=0), corners.max(axis=0)
     return PlacementConstraints.free(low=low, high=high, reference=reference, largest_turn=turn)
 
@@ -94,19 +95,19 @@ def _on_table(job: Job, machine: Machine, mesh: Mesh) -> PlacementConstraints:
     return PlacementConstraints.table(height, x=x, y=y, up=up, normal=(0.0, 0.0, side))
 
 
-def _fixed(job: Job) -> RigidTransform:
-    table = job.placement
+def fixed_placement(table: TomlTable, wrong: Callable[..., InputError]) -> RigidTransform:
+    """Return the placement of a table with mode "fixed". wrong: returns the error about a key that is not rigid."""
     if table.matrix is None:
-        return _pose(table.position_mm or (0.0, 0.0, 0.0), table.rotation_deg or (0.0, 0.0, 0.0))
+        return pose_of(table.position_mm or (0.0, 0.0, 0.0), table.rotation_deg or (0.0, 0.0, 0.0))
     matrix = np.array(table.matrix)
     matrix[:3, 3] = to_si(matrix[:3, 3], "mm")
     try:
         return RigidTransform.from_matrix(matrix)
     except ArrayError as error:
-        raise job.error("placement", "matrix", error.what, expected=error.expected) from error
+        raise wrong("matrix", error.what, expected=error.expected) from error
 
 
-def _pose(position_mm: Sequence[float], rotation_deg: Sequence[float]) -> RigidTransform:
+def pose_of(position_mm: Sequence[float], rotation_deg: Sequence[float]) -> RigidTransform:
     """Return the placement at a position (mm), rotated about the fixed x, then y, then z axis (degrees)."""
     turns = to_si(rotation_deg, "deg")
     (cx, cy, cz), (sx, sy, sz) = np.cos(turns), np.sin(turns)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -53,6 +54,19 @@ class Gap:
 
 
 @dataclass(frozen=True, eq=False)
+class Feet:
+    """Nearest mesh points of M points.
+
+    points (M, 3): the nearest points. facets (M,): the mesh's facets they lie on. sides (M,): 1 in front of the
+    surface, -1 behind it, by the winding of the facets; an open sheet has two sides, too.
+    """
+
+    points: Floats
+    facets: Ints
+    sides: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class MeshDistance:
     """Distances to one mesh, in its own frame, metres. Build one with `MeshDistance.of`.
 
@@ -86,6 +100,20 @@ class MeshDistance:
         inside = self._inside(at, offset, facet)
         distance = np.where(inside, -distance, distance)
         return Gap(distance, np.zeros(len(at)), np.where(inside[:, None], -1.0, 1.0) * unit_or_zero(offset))
+
+    def feet(self, points: ArrayLike) -> Feet:
+        """Return the nearest points on the mesh of points (M, 3), and on which side of it they are."""
+        at = as_floats(points, "points", (None, 3))
+        _, _, offset, facet = self._nearest(at, np.zeros_like(at), np.inf)
+        on = _feature(self.tree.corners[facet], at - offset)
+        normals = self._outward[facet, on]
+        sides = np.where(np.einsum("ij,ij->i", normals, offset) < 0.0, -1.0, 1.0)
+        return Feet(at - offset, self.tree.facets[facet], sides)
+
+    @cached_property
+    def _outward(self) -> Floats:
+        """Features as in `features`, of an open sheet too."""
+        return _features(self.mesh)[self.tree.facets] if self.features is None else self.features
 
     def segments(self, starts: ArrayLike, ends: ArrayLike, within: float = np.inf) -> Gap:
         """Return the distances, capped at `within`, of segments from starts to ends (M, 3).

@@ -1,0 +1,92 @@
+"""Touch-off points: places on the part at which an operator checks, with the machine, that it stands right."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.base.units import from_si
+from pentapod.machine.machine import Machine
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.query.distance import MeshDistance
+from pentapod.planning.placement.placed_path import PlacedPath
+from pentapod.toolpath.toolpath import SegmentKind
+
+COUNT = 3
+"""Points that hold a plane."""
+
+
+@dataclass(frozen=True, eq=False)
+class TouchOff:
+    """A point of the part and the tool on it, metres. waypoint: of the toolpath.
+
+    on_part, in_machine (3,): the point, mesh frame and machine frame; tip, axis (3,): of the tool, machine frame;
+    legs (n_legs,).
+    """
+
+    waypoint: int
+    on_part: Floats
+    in_machine: Floats
+    tip: Floats
+    axis: Floats
+    legs: Floats
+
+
+def touch_off_points(mesh: Mesh, placed: PlacedPath, machine: Machine) -> list[TouchOff]:
+    """Return points of the cuts that are far from each other, with the tool as the program has it there."""
+    rows = _spread(placed, COUNT)
+    if not len(rows):
+        return []
+    back = placed.placement.transform.inverse()
+    feet = MeshDistance.of(mesh).feet(back.apply(placed.tilt_centres[rows])).points
+    tips, axes = placed.tips[rows], placed.axes[rows]
+    legs = machine.robot.leg_lengths(tips + machine.tool_length * axes, -axes)
+    there = placed.placement.transform.apply(feet)
+    return [
+        TouchOff(int(row), *values) for row, *values in zip(rows.tolist(), feet, there, tips, axes, legs, strict=True)
+    ]
+
+
+def touch_off_table(points: list[TouchOff]) -> str:
+    """Return the points as an HTML table with a sentence; empty where there are none."""
+    if not points:
+        return ""
+    rows = "".join(_row(number, point) for number, point in enumerate(points, start=1))
+    return (
+        '<h3>Touch-off</h3><p class="hint">With the tool of the job at these legs, it just touches the part at these '
+        "points. mm; drive up along the tool axis.</p>"
+        '<div class="scroll"><table class="touch-off"><thead><tr><th>point</th><th>on the mesh</th>'
+        "<th>in the machine</th><th>tip of the tool</th><th>tool axis</th><th>legs</th></tr></thead>"
+        f"<tbody>{rows}</tbody></table></div>"
+    )
+
+
+def _row(number: int, point: TouchOff) -> str:
+    cells = [
+        str(number), *(_numbers(from_si(value, "mm"), 2) for value in (point.on_part, point.in_machine, point.tip)),
+        _numbers(point.axis, 4), _numbers(from_si(point.legs, "mm"), 3),
+    ]  # fmt: skip
+    return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+
+
+def _numbers(values: Floats, digits: int) -> str:
+    return ", ".join(f"{round(value, digits) + 0.0:.{digits}f}".replace("-", "−") for value in values.tolist())
+
+
+def _spread(placed: PlacedPath, count: int) -> Ints:
+    """Return waypoints (k,) on cuts that are far from each other: the first far from the middle."""
+    toolpath = placed.toolpath
+    kinds = np.array([toolpath.segments[k].kind is SegmentKind.CUT for k in toolpath.segment_of_interval])
+    rows = np.flatnonzero(kinds)
+    points = placed.tilt_centres[rows]
+    if len(rows) < count:
+        return rows[:0]
+    chosen: list[int] = []
+    nearest = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    while len(chosen) < count:
+        chosen.append(int(nearest.argmax()))
+        off = np.linalg.norm(points - points[chosen[-1]], axis=1)
+        nearest = off if len(chosen) == 1 else np.minimum(nearest, off)
+    return rows[chosen]
