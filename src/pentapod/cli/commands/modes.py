@@ -15,30 +15,29 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--legs", required=True, metavar="L1,L2,...", help="What the legs' scales read, mm, leg 1 first.")
+@click.option(
+    "--rails", metavar="P1,P2,...", help="Where the rails of a reconfigurable machine stand, mm; 0 if left out."
+)
 @click.option("--error", "error_mm", type=Real(0.0), default=0.01, show_default=True, metavar="MM",
               help="By how much each reading may be wrong.")  # fmt: skip
 @click.option("-m", "--machine", "machine_name", default="desk", show_default=True,
               help="Shipped machine, or a machine file.")  # fmt: skip
 @json_option
 @quiet_option
-def modes(legs: str, error_mm: float, machine_name: str, as_json: bool, quiet: bool) -> int:
+def modes(legs: str, rails: str | None, error_mm: float, machine_name: str, as_json: bool, quiet: bool) -> int:
     """Show which poses of the tool fit the lengths of the legs, and strokes, joints and bodies of the machine.
 
     After power-on a controller knows the legs' lengths alone. The true pose is always among those that fit, within the
     error of the readings; where this cannot be proven the command refuses. Exit code 1 there, and where more or fewer
     than one fits.
     """
-    from pentapod.base.errors import InputError
-    from pentapod.base.files import number_in
     from pentapod.base.refusal import Refusal
     from pentapod.machine import Machine, admissible_modes
 
     machine = Machine.load(machine_name)
-    numbers = [number_in(word) for word in legs.replace(",", " ").split()]
-    lengths = [1e-3 * number for number in numbers if number is not None]
-    count = machine.robot.n_legs
-    if len(lengths) != len(numbers) or len(lengths) != count:
-        raise InputError("not the lengths of the legs", key="--legs", value=legs, expected=f"{count} numbers, mm")
+    if rails is not None:
+        machine = machine.at(_metres(rails, "--rails", machine.robot.n_legs))
+    lengths = _metres(legs, "--legs", machine.robot.n_legs)
     found = admissible_modes(machine, lengths, leg_error=1e-3 * error_mm)
     if isinstance(found, Refusal):
         if as_json:
@@ -61,6 +60,18 @@ def modes(legs: str, error_mm: float, machine_name: str, as_json: bool, quiet: b
         told = "look at the machine to tell them apart" if fitting else "readings, machine file or their order is wrong"
         click.echo(f"{fitting} modes fit: {told}", err=True)
     return 0 if fitting == 1 else 1
+
+
+def _metres(text: str, option: str, count: int) -> list[float]:
+    """Return `count` numbers of an option, given in millimetres. Raises InputError."""
+    from pentapod.base.errors import InputError
+    from pentapod.base.files import number_in
+
+    numbers = [number_in(word) for word in text.replace(",", " ").split()]
+    known = [1e-3 * number for number in numbers if number is not None]
+    if not len(known) == len(numbers) == count:
+        raise InputError("wrong numbers", key=option, value=text, expected=f"{count} numbers, mm, with commas between")
+    return known
 
 
 def _words(excluded: tuple[str, ...]) -> str:

@@ -59,7 +59,8 @@ def admissible_modes(machine: Machine, legs: ArrayLike, *, leg_error: float = 1e
 
     leg_error: metres by which each reading may be wrong. A pose is excluded only where it breaks a limit for all
     lengths within that error, so the true one is among the admissible ones; a Refusal says where this cannot be proven:
-    lengths without a pose, or close to a singularity, where two modes meet. Raises InputError.
+    lengths without a pose, or close to a singularity, where two modes meet. Of a machine as built the poses are those
+    that continue the nominal ones; that base joints off the plane add none is not proven. Raises InputError.
     """
     robot, count = machine.robot, machine.robot.n_legs
     readings = as_floats(legs, "legs")
