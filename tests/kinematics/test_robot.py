@@ -9,16 +9,19 @@ from built_machines import with_errors
 
 from pentapod import Machine
 from pentapod.base.errors import MachineError
-from pentapod.kinematics import AsBuiltPentapod, GeneralPentapod, Robot
+from pentapod.kinematics import AsBuiltPentapod, GeneralPentapod, Robot, RolledPlatform, SixLegPlatform
 from pentapod.kinematics.arithmetic import NUMPY, Arithmetic
 
 DESK = Machine.load("desk")
 GENERAL = GeneralPentapod(DESK.robot.base_joints[:, :2], DESK.robot.offsets + 1e-3 * np.array([4, -3, 2, 5, -4]))
+SIX_LEGS = SixLegPlatform(DESK.robot, np.array([-0.3, -0.5, 0.02]), np.array([0.08, -0.05, -0.02]))
 ROBOTS: dict[str, Robot] = {
     "quadratic": DESK.robot,
     "general": GENERAL,
     "as built": AsBuiltPentapod.of(DESK.robot, base_errors=2e-4, radii=[0.006, 0.0, 0.004, 0.0, 0.0], zeros=5e-4),
     "as built, general": with_errors(GENERAL, 2e-4, 3),
+    "six legs": RolledPlatform(SIX_LEGS),
+    "six legs, general": RolledPlatform(SixLegPlatform(GENERAL, [0.1, 0.5, 0.0], [0.0, 0.09, 0.1]), -1),
 }
 
 
@@ -99,6 +102,8 @@ def test_one_formula_gives_the_leg_vectors_for_numbers_and_symbols(robot: Robot)
 def joints(robot: Robot, p: np.ndarray, i: np.ndarray) -> np.ndarray:
     """The platform joints from p: on the line, or beside it by the ring's radius, towards the base joint."""
     found = robot.offsets[:, None] * i[:, None, :]
+    if isinstance(robot, RolledPlatform):
+        found[:, 5] = robot.rotation(p, i) @ robot.platform.sixth_joint
     if isinstance(robot, AsBuiltPentapod):
         across = robot.base - p[:, None] - np.einsum("nkc,nc->nk", robot.base - p[:, None], i)[..., None] * i[:, None]
         found = found + robot.radii[:, None] * across / np.linalg.norm(across, axis=-1, keepdims=True)

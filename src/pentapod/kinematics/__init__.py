@@ -14,6 +14,7 @@ from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.path_tracking import FollowedPath, follow
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
+from pentapod.kinematics.families.rolled_platform import RolledPlatform
 from pentapod.kinematics.families.singularities import (
     architectural_measure,
     orientation_distance,
@@ -63,6 +64,7 @@ __all__ = [
     "ProvenPoses",
     "ReconfigurablePentapod",
     "Robot",
+    "RolledPlatform",
     "SingularSurface",
     "SixLegPlatform",
     "TipTube",

@@ -16,6 +16,7 @@ from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
+from pentapod.kinematics.families.rolled_platform import RolledPlatform
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.robot import Robot
 from pentapod.machine import reader
@@ -64,8 +65,8 @@ class Machine(Value):
 
     def __post_init__(self) -> None:
         positive(self, "tool_length", "rapid_velocity")
-        set_frozen(self, rail_positions=frozen(self.rail_positions, "rail_positions", (self.robot.n_legs,)))
         self._check_legs()
+        set_frozen(self, rail_positions=frozen(self.rail_positions, "rail_positions", (self.robot.n_legs,)))
         measure = self.robot.conditioning
         set_frozen(self, architecture=measure)
         if measure < ARCHITECTURAL_LIMIT:
@@ -87,6 +88,13 @@ class Machine(Value):
 
     def _check_legs(self) -> None:
         """Raise MachineError where a limit is not given for each leg, or the guides are another robot's."""
+        if isinstance(self.robot, RolledPlatform):
+            raise MachineError(
+                "no machine has six legs yet: clearances of legs are known for legs that end on the tool's line",
+                key="robot",
+                value=type(self.robot).__name__,
+                expected="a linear pentapod",
+            )
         count = self.robot.n_legs
         rows = {
             "min_length": self.legs.min_length,

@@ -106,7 +106,7 @@ class SixLegPlatform(Value):
         p, i = self.pentapod.pose(lengths[..., :5], signs[..., :2])
         seen = p + self.sixth_joint[2] * i - self.sixth_base
         arm = _arm(seen, i, float(np.hypot(*self.sixth_joint[:2])), lengths[..., 5], signs[..., 2])
-        rotation = _rotation(i, arm, float(np.arctan2(self.sixth_joint[1], self.sixth_joint[0])))
+        rotation = rotation_to(i, arm, float(np.arctan2(self.sixth_joint[1], self.sixth_joint[0])))
         return np.where(np.isnan(rotation[..., 0]), np.nan, p), rotation
 
     def assembly_modes(self, legs: ArrayLike) -> tuple[Floats, Floats]:
@@ -162,7 +162,7 @@ def _arm(seen: Floats, axis: Floats, radius: float, length: Floats, side: Floats
     return radius * (np.cos(angle)[..., None] * towards + np.sin(angle)[..., None] * np.cross(axis, towards))
 
 
-def _rotation(axis: Floats, arm: Floats, azimuth: float) -> Floats:
+def rotation_to(axis: Floats, arm: Floats, azimuth: float) -> Floats:
     """Return rotations (..., 3, 3) from (0, 0, 1) to axis and (cos azimuth, sin azimuth, 0) to the arm's direction."""
     radial: Floats = arm / np.linalg.norm(arm, axis=-1, keepdims=True)
     tangential = np.cross(axis, radial)
