@@ -218,30 +218,19 @@ STEEP = DESK | {
     "amplification": (-1, 8.0, 5.8, 1.0),
 }
 
-# Where the search starts: the shipped design `desk` before rounding.
-_X, _Y = [0.5857, 0.2240, -0.3260, -0.5966, -0.0554], [-0.1203, 0.5538, 0.4981, -0.0389, -0.5952]
-_REST = [0.0900, 0.0853, -0.0175, 0.4667]
+# Where the searches start: the shipped designs before rounding.
+_DESK = np.array(
+    [0.5857, 0.2240, -0.3260, -0.5966, -0.0554, -0.1203, 0.5538, 0.4981, -0.0389, -0.5952,
+     0.1847, 0.0900, 0.0853, -0.0175, 0.4667]
+)  # fmt: skip
 _STEEP = np.array(
-    [
-        0.8323,
-        0.4180,
-        -0.5030,
-        -0.9852,
-        -0.0436,
-        0.5543,
-        -0.9080,
-        -0.8642,
-        0.1712,
-        0.9989,
-        0.1446,
-        0.0900,
-        -0.0321,
-        -0.0195,
-        0.4731,
-    ]
-)
-_QUADRATIC = np.array([*_X, *_Y, 0.1847, *_REST])
-_GENERAL = np.array([*_X, *_Y, *(0.1847 * np.array(_X)), *_REST])
+    [0.7760, 0.3196, -0.5737, -0.9889, -0.1366, 0.6302, -0.9473, -0.8187, 0.0838, 0.9903,
+     0.1429, 0.0900, -0.0113, -0.0127, 0.4637]
+)  # fmt: skip
+_GENERAL = np.array(
+    [0.0372, 0.3458, -0.5921, -0.2883, -0.4927, 0.5874, 0.4842, -0.0584, -0.5205, 0.0541,
+     -0.1855, -0.0241, 0.1001, 0.0501, -0.1355, 0.0900, 0.3389, -0.2426, 0.5635]
+)  # fmt: skip
 
 
 def _bounds(base: float, along: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
@@ -251,7 +240,7 @@ def _bounds(base: float, along: list[tuple[float, float]]) -> tuple[np.ndarray, 
 
 
 MACHINES = {
-    "desk": Search(*_bounds(0.60, [(0.10, 0.60)]), _QUADRATIC, DESK, 26.0, 26.0),
+    "desk": Search(*_bounds(0.60, [(0.10, 0.60)]), _DESK, DESK, 26.0, 26.0),
     "steep": Search(*_bounds(1.20, [(0.10, 0.60)]), _STEEP, STEEP, 45.0, 26.0),
     "bench-general": Search(*_bounds(0.60, [(-0.25, 0.25)] * 5), _GENERAL, DESK, 30.0, 30.0),
 }
