@@ -96,3 +96,11 @@ def test_a_machine_that_fails_is_told_why(desk, change, name):
     text = explain(report)
     assert "does not keep its own limits" in text
     assert all(finding.name in text for finding in failed)
+
+
+def test_rails_that_pass_an_architectural_singularity_are_told():
+    guide = Machine.load("guide")
+    assert "least F on the rails" in explain(check(guide, rings=1, around=4, levels=2))
+    far = dataclasses.replace(guide.guides, travel=np.tile([-0.9, 0.9], (5, 1)))
+    report = check(dataclasses.replace(guide, guides=far), rings=1, around=4, levels=2)
+    assert [found.name for found in report.findings if not found.passed] == ["least F on the rails, by that at home"]

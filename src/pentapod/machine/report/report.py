@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -140,6 +141,7 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = L
             worst("tip force to leg forces", force, "at most", AMPLIFICATION_LIMIT, "N/N"),
             worst(f"clearance, {pair}", 1e3 * gaps.min(axis=1), "more than", 0.0, "mm"),
             MachineFinding("architectural measure", machine.architecture, "at least", ARCHITECTURAL_LIMIT, ""),
+            *_of_rails(machine),
         ),
     )
 
@@ -211,6 +213,7 @@ def explain(report: MachineReport) -> str:
         f"  tip force to leg forces               {report.amplification:.2f} N/N",
         f"  smallest clearance                    {1e3 * report.clearance:.1f} mm ({report.clearance_pair})",
         f"  architectural measure                 {m.architecture:.4f}",
+        *(f"  {found.name:<35}   {found.value:.2f}" for found in _of_rails(m)),
         "",
     ]
     failed = [finding for finding in report.findings if not finding.passed]
@@ -222,6 +225,19 @@ def explain(report: MachineReport) -> str:
         wanted = f"must be {finding.kind} {finding.limit:.4g}"
         lines.append(f"  {finding.name}: {finding.value:.4g} {finding.unit}, {wanted}{place}")
     return "\n".join(lines)
+
+
+def _of_rails(machine: Machine) -> list[MachineFinding]:
+    """Return whether F of the paper keeps its sign at all ends of the rails, as a share of its value in between.
+
+    On rails along y F is affine in each position: then it keeps its sign everywhere between the ends, too.
+    """
+    guides = machine.guides
+    if guides is None:
+        return []
+    ends = guides.determinant(np.array(list(product(*guides.travel))))
+    home = float(guides.determinant(np.zeros(len(guides.travel))))
+    return [MachineFinding("least F on the rails, by that at home", float((ends / home).min()), "more than", 0.0, "")]
 
 
 def _family(machine: Machine) -> str:
