@@ -228,6 +228,7 @@ def _provenance(outcome: Outcome) -> list[tuple[str, str]]:
         ("job", f"{job.path.name}, {job.digest}"),
         ("mesh", job.mesh_path.name),
         ("machine", f"{machine.name}, {machine.digest}"),
+        *((("calibration", machine.calibration_name),) if machine.calibration_name else ()),
         ("controller", f"a row every {1e3 * machine.controller.period:g} ms, {machine.controller.interpolation}"),
         ("pentapod", __version__),
         ("libraries", library_versions()),

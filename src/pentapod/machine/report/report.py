@@ -180,6 +180,7 @@ def explain(report: MachineReport) -> str:
     centre = ", ".join(f"{1e3 * c:.0f}" for c in work.centre)
     lines = [
         f"machine {m.name} ({m.digest})",
+        *([f"  as measured: calibration {m.calibration_name}"] if m.calibration_name else []),
         f"  work volume: tips in a cylinder of {1e3 * work.diameter:.0f} mm diameter and "
         f"{1e3 * work.height:.0f} mm height",
         f"    around ({centre}) mm; tool axes within {np.degrees(work.tilt):.3g}° of -z",
