@@ -96,7 +96,7 @@ def test_the_best_that_passes_comes_first_and_what_fails_is_no_advice(tmp_path):
 
 def test_nothing_that_works_is_told(tmp_path):
     tried = ("the planner chooses the placement", "a smaller part.scale")
-    assert Advised((), tried).sentence == f"Tried: {'; '.join(tried)}: none works"
+    assert Advised((), tried).sentence == f"Tried, by estimate or plan: {'; '.join(tried)}: none works"
 
 
 def test_advice_in_toml():

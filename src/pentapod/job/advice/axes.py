@@ -52,6 +52,10 @@ def axis_choices(
     own = job.axis.si.tilt
     if axis.mode == "auto":
         found = [AxisChoice("", {}, lambda s: leaning(s.samples(s.normals, 0.0), own, constraints))]
+        if own < lean:
+            further: Changes = {"axis": {"tilt_deg": None}}
+            words = "the tool may lean as far as its type allows"
+            found.append(AxisChoice(words, further, lambda s: leaning(s.samples(s.normals, 0.0), lean, constraints)))
     else:
         found = [AxisChoice("", {}, lambda s: [s.samples(s.axes, own)])]
     if job.toolpath.strategy != FILE:

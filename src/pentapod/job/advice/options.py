@@ -14,11 +14,12 @@ class AdviceOptions(Value):
     wanted: number of changes to find. plans: whole plans that are tried for them, at most. points: that stand for the
     path in estimates. enough: estimated margin from which a change is planned. comfortable: estimated margin beyond
     which more counts for nothing. cones_deg: wider tilt cones. angles_deg: smaller angles of the region. setups:
-    numbers of set-ups. lengths: of the tool, as shares of the machine's. halvings: steps of the bisection for the
-    largest box and scale. least: smallest extent of a box, and smallest scale, as shares. spare: share of the extent,
-    or of the scale, that is found and taken; the estimate looks at few points. smaller: factor on the extent of a
-    second, smaller box. largest_mm: extent of a part beyond which its unit is doubted. worth_length: what
-    another tool counts beside a region that keeps a share of the area.
+    numbers of set-ups. lengths: of the tool, as shares of the machine's. first, halvings: first share of the extents,
+    and steps of the bisection, for the largest box. most: share of the area from which a region counts as all. flat:
+    height, as a share of the largest extent, below which a box keeps it. least: smallest extent of a box, and smallest
+    scale, as shares. spare: share of the extent, or of the scale, that is found and taken; the estimate looks at few
+    points. smaller: factor on the extent of a second, smaller box. largest_mm: extent of a part beyond which its unit
+    is doubted. worth_length: what another tool counts beside a region that keeps a share of the area.
     """
 
     wanted: int = 1
@@ -30,7 +31,10 @@ class AdviceOptions(Value):
     angles_deg: tuple[float, ...] = (80.0, 70.0, 60.0, 50.0, 40.0, 30.0, 20.0, 10.0)
     setups: tuple[int, ...] = (2, 3, 4)
     lengths: tuple[float, ...] = (0.7, 1.3, 0.5, 1.6)
+    first: float = 0.6
     halvings: int = 5
+    most: float = 0.999
+    flat: float = 0.1
     least: float = 0.1
     spare: float = 0.97
     smaller: float = 0.75

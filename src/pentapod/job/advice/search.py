@@ -38,7 +38,7 @@ class Advised(Value):
             return "What does, planned: " + "; or ".join(str(each) for each in self.advice)
         if not self.tried:
             return "Nothing was found to try"
-        return f"Tried: {'; '.join(self.tried)}: none works"
+        return f"Tried, by estimate or plan: {'; '.join(self.tried)}: none works"
 
 
 def advised(
@@ -95,7 +95,7 @@ def _trials(
             sketch = Sketch.of_region(start.job, start.mesh, tool, options.points)
         else:
             sketch = Sketch.of_toolpath(job, mesh, tool, toolpath, options.points)
-        if len(sketch.contacts) < FEWEST:
+        if sketch is None or len(sketch.contacts) < FEWEST:
             continue
         trials = Trials(start.job, machine, start.mesh, sketch, options, progress, tried)
         for trial in trials.all(own=bool(start.changes)):

@@ -7,10 +7,11 @@ from typing import Self
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.arrays import Floats
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
 from pentapod.job.build.region import job_region
+from pentapod.job.build.toolpath import job_axis_mode
 from pentapod.job.schema.job import Job
 from pentapod.job.schema.strategies import FILE
 from pentapod.mesh.mesh import Mesh
@@ -25,15 +26,13 @@ from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 class Sketch:
     """Points (N, 3) of a path, workpiece frame, metres.
 
-    contacts: on the surface, or above it. normals, axes: unit, of the surface and of the tool as the job says. cutting
-    (N,): whether the tool touches the part there.
+    contacts: on the surface, or above it. normals, axes: unit, of the surface and of the tool as the job says.
     """
 
     tool: Tool
     contacts: Floats
     normals: Floats
     axes: Floats
-    cutting: Bools
 
     @classmethod
     def of_toolpath(cls, job: Job, mesh: Mesh, tool: Tool, toolpath: Toolpath, count: int) -> Self:
@@ -47,25 +46,30 @@ class Sketch:
             from_part = MeshDistance.of(mesh).points(centres).normal
             known = cutting & (np.abs(from_part).sum(axis=1) > 0.0)
             normals = np.where(known[:, None], from_part, normalised(job.part.si.region_direction))
-        return cls(tool, centres - max(tool.tilt_centre, 0.0) * normals, normals, axes, cutting)
+        return cls(tool, centres - max(tool.tilt_centre, 0.0) * normals, normals, axes)
 
     @classmethod
-    def of_region(cls, job: Job, mesh: Mesh, tool: Tool, count: int) -> Self:
-        """Return a sketch of about `count` points of a job's region, and of the places above them."""
+    def of_region(cls, job: Job, mesh: Mesh, tool: Tool, count: int) -> Self | None:
+        """Return a sketch of about `count` points of a job's region, and of the places above; None if it is empty."""
         patch, view = Patch.of(mesh, job_region(job)), normalised(job.part.si.region_direction)
+        if not len(patch.faces):
+            return None
+        extent = float(np.ptp(patch.vertices[np.unique(patch.faces)], axis=0).max())
+        patch = patch.refined(extent / max(count, 1) ** 0.5)
         contacts, normals = patch.vertices[patch.faces].reshape(-1, 3), normalised(patch.normals.reshape(-1, 3))
         rows = ToolpathSamples(contacts, normals, 0.0, 0.0).representatives((count + 1) // 2)
         contacts, normals = contacts[rows], normals[rows]
         style = job.toolpath.si if hasattr(job.toolpath, "clearance_mm") else PathOptions()
         level = float((mesh.vertices @ view).max()) + max(style.clearance, 2.0 * style.approach)
         above = contacts + np.maximum(level - contacts @ view, 0.0)[:, None] * view
-        axes = normals if job.axis.mode != "fixed" else np.tile(normalised(job.axis.si.direction), (len(rows), 1))
-        cutting = np.arange(2 * len(rows)) < len(rows)
-        return cls(tool, np.concatenate([contacts, above]), np.tile(normals, (2, 1)), np.tile(axes, (2, 1)), cutting)
+        axes = job_axis_mode(job).axes(contacts, normals)
+        twice = {"normals": np.tile(normals, (2, 1)), "axes": np.tile(axes, (2, 1))}
+        return cls(tool, np.concatenate([contacts, above]), **twice)
 
-    def at(self, rows: Bools | Ints) -> Self:
-        """Return the sketch of some of the points."""
-        kept = {name: getattr(self, name)[rows] for name in ("contacts", "normals", "axes", "cutting")}
+    def within(self, low: float, high: float, along: int) -> Self:
+        """Return the sketch of the points with a coordinate in a range, metres."""
+        rows = (self.contacts[:, along] >= low) & (self.contacts[:, along] <= high)
+        kept = {name: getattr(self, name)[rows] for name in ("contacts", "normals", "axes")}
         return replace(self, **kept)
 
     def scaled(self, factor: float) -> Self:

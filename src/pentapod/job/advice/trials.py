@@ -145,24 +145,23 @@ class Trials:
 
     def _regions(self, base: Setting) -> list[Trial]:
         """Return the largest smaller regions that fit: flatter ones, and boxes."""
-        regions = Regions.of(self.job, self.mesh, self.sketch)
+        regions = Regions.of(self.job, self.mesh, self.sketch.tool, self.options)
         if regions is None:
             return []
         found: list[Smaller] = []
         self._tell("a smaller region_angle_deg")
         near: Estimate | None = None
         for degrees in self.options.angles_deg:
-            smaller = regions.flatter(degrees)
-            if smaller.keeps.all() or smaller.keeps.sum() < FEWEST:
+            if (smaller := regions.flatter(degrees)) is None:
                 continue
-            near = self._estimated(base.axis, base.place, self.sketch.at(smaller.keeps), near)
+            near = self._estimated(base.axis, base.place, smaller.sketch, near)
             if near.margin >= self.options.enough:
                 found.append(smaller)
                 break
         self._tell("a smaller region_box_mm")
         for deep in (False, True):
             found += self._boxes(base, regions, deep=deep)
-        return [self._of_region(base, smaller) for smaller in found if smaller.share > 0.0]
+        return [self._of_region(base, smaller) for smaller in found]
 
     def _of_region(self, base: Setting, smaller: Smaller) -> Trial:
         changes, words = merged(base.changes, smaller.changes), joined(smaller.words, base.words)
@@ -170,24 +169,22 @@ class Trials:
 
     def _boxes(self, base: Setting, regions: Regions, *, deep: bool) -> list[Smaller]:
         """Return about the largest box that fits, by bisection, and a smaller one, in case its plan fails."""
-        fits, too_large, near, share = 0.0, 1.0, None, 0.7
+        fits, too_large, near, share = 0.0, 1.0, None, self.options.first
         for _ in range(self.options.halvings):
-            try:
-                smaller = regions.boxed(share, deep=deep)
-            except InputError:  # the box is flat
-                break
-            enough = smaller.keeps.sum() >= FEWEST
-            if enough:
-                near = self._estimated(base.axis, base.place, self.sketch.at(smaller.keeps), near)
-            if enough and near is not None and near.margin >= self.options.enough:
+            smaller = regions.boxed(share, deep=deep)
+            if smaller is not None:
+                near = self._estimated(base.axis, base.place, smaller.sketch, near)
+            if smaller is not None and near is not None and near.margin >= self.options.enough:
                 fits = share
             else:
                 too_large = share
-            share = 0.5 * (fits + too_large) if fits > 0.0 else 0.6 * share
+            share = 0.5 * (fits + too_large)
             if share < self.options.least:
                 break
-        shares = (self.options.spare * fits, self.options.smaller * fits)
-        return [regions.boxed(share, deep=deep) for share in shares] if fits > 0.0 else []
+        if fits == 0.0:
+            return []
+        boxes = (regions.boxed(factor * fits, deep=deep) for factor in (self.options.spare, self.options.smaller))
+        return [box for box in boxes if box is not None]
 
     def _setups(self, base: Setting) -> Iterator[Trial]:
         """Yield the smallest number of set-ups whose slabs fit."""
@@ -197,9 +194,9 @@ class Trials:
         for count in self.options.setups:
             for along in np.argsort(-np.ptp(self.sketch.contacts, axis=0))[:2].tolist():
                 at = self.sketch.contacts[:, along]
-                borders = np.linspace(at.min(), at.max(), count + 1)
-                slabs = [(at >= a - 1e-9) & (at <= b + 1e-9) for a, b in pairwise(borders.tolist())]
-                parts = (self.sketch.at(slab) for slab in slabs if slab.sum() >= FEWEST)
+                borders = pairwise(np.linspace(at.min(), at.max(), count + 1).tolist())
+                parts = [self.sketch.within(low, high, along) for low, high in borders]
+                parts = [part for part in parts if len(part.contacts) >= FEWEST]
                 margins = (self._estimated(base.axis, base.place, part).margin for part in parts)
                 if count > self.job.placement.setups and all(margin >= self.options.enough for margin in margins):
                     changes = merged(base.changes, {"placement": {"setups": count}})

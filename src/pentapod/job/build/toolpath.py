@@ -268,7 +268,7 @@ def _turns(toolpath: Toolpath, most: float | None) -> list[str]:
 
 def _orientation(job: Job, tool: Tool) -> Orientation:
     """Return the nominal axes that a job asks for; smoothed over three stepovers, where it does not say."""
-    orientation, path = Orientation(mode=_mode(job), **fields_from(Orientation, job.axis)), job.toolpath.si
+    orientation, path = Orientation(mode=job_axis_mode(job), **fields_from(Orientation, job.axis)), job.toolpath.si
     if orientation.reach is not None:
         return orientation
     stepover, scallop, radius = (getattr(path, "stepover", None), getattr(path, "scallop", None), tool.scallop_radius)
@@ -277,7 +277,8 @@ def _orientation(job: Job, tool: Tool) -> Orientation:
     return dataclasses.replace(orientation, reach=max(REACH_M, 3.0 * (stepover or 0.0)))
 
 
-def _mode(job: Job) -> AxisMode:
+def job_axis_mode(job: Job) -> AxisMode:
+    """Return the direction from which a job's tool axes are measured."""
     axis = job.axis.si
     if axis.mode == "fixed":
         return Fixed(axis.direction)
