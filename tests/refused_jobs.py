@@ -147,7 +147,7 @@ REFUSED: dict[str, Refused] = {
     "dome of 55 deg, bull nose": Refused(cap(40.0, 55.0), {"tool": {"type": "bull", "corner_mm": 1.0}, "axis": STRICT}),
     # parts too large
     "plate of 600 x 600": Refused(plate(600.0, 600.0), LARGE),
-    "plate of 500 x 100": Refused(plate(500.0, 100.0), LARGE),
+    "plate of 900 x 100": Refused(plate(900.0, 100.0), LARGE),
     "plate of 700 x 60, bent": Refused(plate(700.0, 60.0, 40.0), LARGE),
     "plate of 450 x 450, bent": Refused(plate(450.0, 450.0, 60.0), LARGE),
     "plate of 1500 x 1500": Refused(plate(1500.0, 1500.0), SCANT),
@@ -157,8 +157,12 @@ REFUSED: dict[str, Refused] = {
     "dome in inches": Refused(cap(60.0, 40.0), {"part": {"unit": "inch"}}),
     "dome in metres": Refused(cap(60.0, 40.0), {"part": {"unit": "m"}}),
     # tools too long, too short, too wide
-    "tool of 450 mm": Refused(cap(60.0, 35.0), {"tool": {"length_mm": 450.0}}),
-    "tool of 700 mm": Refused(plate(60.0, 60.0, 5.0), {"tool": {"length_mm": 700.0}}),
+    "tool of 450 mm on a table": Refused(
+        cap(60.0, 35.0), {"tool": {"length_mm": 450.0}, "placement": {"mode": "table", "table_z_mm": 480.0}}
+    ),
+    "tool of 700 mm on a table": Refused(
+        plate(60.0, 60.0, 5.0), {"tool": {"length_mm": 700.0}, "placement": {"mode": "table", "table_z_mm": 480.0}}
+    ),
     "tool of 380 mm on a table": Refused(
         cap(60.0, 35.0), {"tool": {"length_mm": 380.0}, "placement": {"mode": "table", "table_z_mm": 480.0}}
     ),
@@ -170,7 +174,9 @@ REFUSED: dict[str, Refused] = {
         },
     ),
     # a wrong fixed axis
-    "axis along x on a plate": Refused(plate(60.0, 60.0, 5.0), {"axis": SIDE}),
+    "axis along x on a plate": Refused(
+        plate(60.0, 60.0, 5.0), {"axis": SIDE, "placement": {"mode": "table", "table_z_mm": 480.0}}
+    ),
     "axis along x on a dome": Refused(cap(40.0, 40.0), {"axis": SIDE}),
     "axis along x on a block": Refused(block(50.0, 40.0, 15.0), {"axis": SIDE}),
     "axis downwards": Refused(cap(60.0, 35.0), {"axis": {"mode": "fixed", "direction": [0, 0, -1]}}),
@@ -197,7 +203,7 @@ REFUSED: dict[str, Refused] = {
     ),
     # modified machines
     "short strokes": Refused(cap(60.0, 30.0), {}, edits=(("max_length_mm = 929", "max_length_mm = 660"),)),
-    "long legs": Refused(cap(60.0, 30.0), {}, edits=(("min_length_mm = 489", "min_length_mm = 700"),)),
+    "long legs": Refused(cap(60.0, 30.0), {}, edits=(("min_length_mm = 489", "min_length_mm = 850"),)),
     "narrow base cones": Refused(cap(60.0, 45.0), {}, edits=(("base_cone_deg = 35", "base_cone_deg = 14"),)),
     "narrow platform joints": Refused(
         cap(60.0, 45.0), {}, edits=(("platform_max_deg = 112", "platform_max_deg = 75"),)

@@ -18,8 +18,9 @@ class AdviceOptions(Value):
     and steps of the bisection, for the largest box. most: share of the area from which a region counts as all. flat:
     height, as a share of the largest extent, below which a box keeps it. least: smallest extent of a box, and smallest
     scale, as shares. spare: share of the extent, or of the scale, that is found and taken; the estimate looks at few
-    points. smaller: factor on the extent of a second, smaller box. largest_mm: extent of a part beyond which its unit
-    is doubted. worth_length: what another tool counts beside a region that keeps a share of the area.
+    points. smaller: factor on the extent of a second, smaller box. doubtful: width of a part, as a multiple of the
+    work volume's, beyond which its unit is doubted. worth_length: what another
+    tool counts beside a region that keeps a share of the area.
     """
 
     wanted: int = 1
@@ -38,7 +39,7 @@ class AdviceOptions(Value):
     least: float = 0.1
     spare: float = 0.97
     smaller: float = 0.75
-    largest_mm: float = 2000.0
+    doubtful: float = 5.0
     worth_length: float = 0.7
 
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from pentapod.base.errors import InputError
-from pentapod.base.units import to_si
 from pentapod.job.advice.axes import Changes, taken_out
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.build.region import covers_region, job_region
@@ -47,7 +46,7 @@ def starts(job: Job, machine: Machine, mesh: Mesh, options: AdviceOptions) -> li
 def _of_other_size(job: Job, machine: Machine, mesh: Mesh, options: AdviceOptions) -> list[Start]:
     """Return the job with the unit that brings a part of doubtful size nearest to the work volume."""
     largest, width = float(np.ptp(mesh.bounds, axis=0).max()), machine.work.diameter
-    if largest <= to_si(options.largest_mm, "mm"):
+    if largest <= options.doubtful * width:
         return []
     if states_unit(job.mesh_path):
         keys: dict[str, Any] = {"scale": 1e-3 * job.part.scale}
@@ -55,6 +54,8 @@ def _of_other_size(job: Job, machine: Machine, mesh: Mesh, options: AdviceOption
     else:
         known = UNITS[job.part.unit]
         unit = min(UNITS, key=lambda name: abs(np.log(largest * UNITS[name] / known / width)))
+        if unit == job.part.unit:
+            return []
         keys, words = {"unit": unit}, f"the numbers of the mesh in {unit}, not {job.part.unit}"
     return [found for found in [_start(job, words, keys)] if found is not None]
 
