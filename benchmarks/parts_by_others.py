@@ -113,7 +113,7 @@ def planned(mesh: Path, folder: Path, bounds: Bounds, *, plain: bool) -> Outcome
     job = next(folder.rglob("*.toml"))
     code, said, more, memory = run(["plan", job, "-o", folder / "out"], folder, bounds)
     verdict = next(iter(sorted((folder / "out").rglob("verdict.json"))), None)
-    program = any((folder / "out").rglob("program.csv"))
+    program = any((folder / "out").rglob("withheld.csv"))
     if code < 0 or "MemoryError" in said:
         word, why = "out of time" if code < 0 else "out of memory", last_line(said)
     elif "Traceback" in said:

@@ -13,7 +13,7 @@ from pentapod.base.refusal import Refusal
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.job.advice.options import OPTIONS, AdviceOptions
 from pentapod.job.advice.search import advised
-from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, check_folder, write_arrays, write_json
+from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, check_folder, write_arrays, write_json
 from pentapod.job.build.limits import placement_limits, timing_limits
 from pentapod.job.build.placement import job_weights
 from pentapod.job.build.specification import job_specification
@@ -27,6 +27,7 @@ from pentapod.job.remarks import STRAIGHT, UPRIGHT, explanation, placement_remar
 from pentapod.job.run_folder import staged, unstaged
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import StageRunner
+from pentapod.job.withheld import STAGE, withheld
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
 from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
@@ -64,10 +65,10 @@ def run(
     elsewhere, of which as much is kept as fits. writers: further files, by name, each written from the outcome.
     limits: further limits on the time law. claims: further claims of the verdict. advice: how changes are searched for
     with which a job that cannot be done is planned, and passes; the refusal holds them. None for no search.
-    The program is judged from the file, as it was written. A job that cannot be done gives an outcome with a refusal,
-    a verdict.json that says so, and no program. The folder changes when the run ends: an error or an interruption
-    leaves it as it was. Raises InputError for a bad job, mesh, machine or folder, and where another run is writing into
-    the folder.
+    The program is judged from the file, as it was written; if it fails, it is called withheld.csv. A job that cannot be
+    done gives an outcome with a refusal, a verdict.json that says so, and no program. The folder changes when the run
+    ends: an error or an interruption leaves it as it was. Raises InputError for a bad job, mesh, machine or folder, and
+    where another run is writing into the folder.
     """
     folder = Path(out)
     check_folder(folder)
@@ -85,7 +86,8 @@ def run(
         refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
         if refusal is not None and refusal.stage == "placement" and splits:
             outcome = _split(task, mesh, refusal, staging, writers or {})
-        if (refusal := outcome.refusal) is not None and piece is None and advice is not None:
+        refusal = outcome.refusal
+        if refusal is not None and refusal.stage != STAGE and piece is None and advice is not None:
             again = partial(passes, machine=machine, limits=limits, claims=claims)
             search = (job, used, mesh, task.toolpath, again, advice, progress)
             found = runner.run("advice", lambda: advised(*search))
@@ -128,6 +130,9 @@ def _planned(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outco
         verdict = runner.run(
             "verify", lambda: judged(file, task.specification, claims=task.claims, progress=runner.progress)
         )
+        if (fails := withheld(verdict)) is not None:
+            runner.stages.append(Stage("withheld", 0.0, fails))
+            file.rename(staging / WITHHELD)
     return _written(task, verdict, staging, writers)
 
 

@@ -15,7 +15,8 @@ def withheld(verdict: Verdict) -> Refusal | None:
     failed = [certificate for certificate in verdict.certificates if not certificate.passed]
     if not failed:
         return None
-    more = f"; and {len(failed) - 3} more claims" if len(failed) > 3 else ""
+    rest = len(failed) - 3
+    more = f"; and {rest} more claim{'s' if rest > 1 else ''}" if rest > 0 else ""
     return Refusal(
         STAGE,
         f"the program fails its own verdict: {'; '.join(_said(each) for each in failed[:3])}{more}",

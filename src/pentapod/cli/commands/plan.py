@@ -30,9 +30,10 @@ if TYPE_CHECKING:
 def plan(job: Path, out: Path, explain: bool, advice: int, placement: Path | None, as_json: bool, quiet: bool) -> int:
     """Plan JOB.toml: write program.csv, verdict.json, report.html and plan.npz.
 
-    The folder changes only when the run ends, so that its files are always of one run. A job that cannot be done
-    leaves no program.csv. Then changes of the job are searched for and planned, and those whose verdict passed are
-    printed. A job in several set-ups has a folder of files for each: setup-1, setup-2, and so on.
+    The folder changes only when the run ends, so that its files are always of one run. A job that cannot be done leaves
+    no program.csv, nor does a program that fails its verdict: that one is called withheld.csv. Changes of a job that
+    cannot be done are searched for and planned, and those whose verdict passed are printed. A job in several set-ups
+    has a folder of files for each: setup-1, setup-2, and so on.
 
     Ctrl-C during the search for a placement continues with the best one so far, if that fits. During the
     search for changes it ends that. At any other time it ends the command and changes nothing.

@@ -1,0 +1,47 @@
+"""Withheld programs: a program that fails its own verdict is refused, and no program.csv is written."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from pentapod.cli.commands.new import dome_stl, job_text
+from pentapod.job import Job, run
+from pentapod.job.withheld import withheld
+from pentapod.verify import Claim, Verdict
+from pentapod.verify.replay.claim import Finding
+from pentapod.verify.verdict.verdict import Certificate, Place
+
+
+def certificate(claim, passed, value=0.5):
+    return Certificate(claim, passed, value, 0.1, "mm", Place(1.25, 1250, 3), "measured")
+
+
+def test_a_verdict_without_failures_withholds_nothing():
+    assert withheld(Verdict((certificate("gouge", True), certificate("stops", True)))) is None
+
+
+def test_the_refusal_names_claims_that_fail_with_value_bound_and_time():
+    names = ("gouge", "tip deviation", "leg 1 speed", "leg 2 speed", "leg 3 speed")
+    refusal = withheld(Verdict(tuple(certificate(name, name == "leg 3 speed") for name in names)))
+    assert refusal is not None
+    assert "gouge 0.5 mm (bound 0.1) at 1.250 s; tip deviation" in str(refusal)
+    assert "and 1 more claim" in str(refusal)
+    assert "leg 3" not in str(refusal)
+
+
+@pytest.mark.slow
+def test_a_program_that_fails_its_verdict_is_not_left_as_program(tmp_path):
+    (tmp_path / "part.stl").write_bytes(dome_stl(cells=12))
+    (tmp_path / "job.toml").write_text(job_text(), encoding="utf-8")
+    job, out = Job.load(tmp_path / "job.toml"), tmp_path / "out"
+    never = Claim("never", lambda _: Finding(1.0, 0.0, "", Place(), "always fails"))
+    outcome = run(job, out, claims=(never,))
+    assert not outcome.passed
+    assert "never" in outcome.refusal.cause
+    assert [c.claim for c in outcome.verdict.certificates if not c.passed] == ["never"]
+    assert {path.name for path in out.iterdir()} == {"withheld.csv", "plan.npz", "verdict.json", "manifest.json"}
+    assert json.loads((out / "verdict.json").read_text())["refusal"]["stage"] == "verdict"
+    assert run(job, out).passed
+    assert {path.name for path in out.iterdir()} == {"program.csv", "plan.npz", "verdict.json", "manifest.json"}
