@@ -4,7 +4,7 @@
 
 Each mesh of the folders is scaled to fit the machine `desk`, if it is wider or flatter than a part of 60 mm, and
 planned in a process of its own, with limits on its memory and its seconds. The table says what became of it: passed,
-refused (and what was said first), or a program that its own verdict fails, and what fails. With --plain, the job is
+refused (and what was said first), or a program that was withheld, since its own verdict fails. With --plain, the job is
 written by hand: a ball cutter of 6 mm, 3 mm between passes, and nothing else.
 """
 
@@ -112,18 +112,17 @@ def planned(mesh: Path, folder: Path, bounds: Bounds, *, plain: bool) -> Outcome
             return Outcome("refused by new", last_line(said), seconds, memory)
     job = next(folder.rglob("*.toml"))
     code, said, more, memory = run(["plan", job, "-o", folder / "out"], folder, bounds)
-    verdict = next(iter(sorted((folder / "out").rglob("verdict.json"))), None)
-    program = any((folder / "out").rglob("withheld.csv"))
+    withheld = any((folder / "out").rglob("withheld.csv"))
     if code < 0 or "MemoryError" in said:
         word, why = "out of time" if code < 0 else "out of memory", last_line(said)
     elif "Traceback" in said:
         word, why = "traceback", last_line(said)
+    elif code > 1:
+        word, why = "error", last_line(said)
     elif code == 0:
         word, why = "passed", ""
-    elif program and verdict is not None:
-        word, why = "program FAILED", "; ".join(line[6:] for line in said.splitlines() if line.startswith("  FAIL"))
     else:
-        word, why = "refused", refusal(said)
+        word, why = "program withheld" if withheld else "refused", refusal(said)
     return Outcome(word, why, seconds + more, memory)
 
 
@@ -169,7 +168,7 @@ def main() -> None:
                 scaled(path, folder, options.width_mm), folder, bounds, plain=options.plain
             )
         said = one.why if len(one.why) <= 160 else f"{one.why[:157]}..."
-        print(f"{path.stem:28} {one.word:15} {one.seconds:6.1f} s {one.memory / 2**30:5.2f} GB  {said}", flush=True)
+        print(f"{path.stem:28} {one.word:16} {one.seconds:6.1f} s {one.memory / 2**30:5.2f} GB  {said}", flush=True)
     print(", ".join(f"{count} {word}" for word, count in Counter(one.word for one in found.values()).most_common()))
     if options.json:
         options.json.write_text(
