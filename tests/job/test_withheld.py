@@ -36,7 +36,7 @@ def test_a_program_that_fails_its_verdict_is_not_left_as_program(tmp_path):
     (tmp_path / "part.stl").write_bytes(dome_stl(cells=12))
     (tmp_path / "job.toml").write_text(job_text(), encoding="utf-8")
     job, out = Job.load(tmp_path / "job.toml"), tmp_path / "out"
-    never = Claim("never", lambda _: Finding(1.0, 0.0, "", Place(), "always fails"))
+    never = Claim("never", lambda _: Finding(False, 1.0, 0.0, "", Place(), "always fails"))
     outcome = run(job, out, claims=(never,))
     assert not outcome.passed
     assert "never" in outcome.refusal.cause
