@@ -46,7 +46,7 @@ def test_the_reference_is_what_the_code_says():
 
 
 @pytest.mark.parametrize(
-    "page", [pytest.param(p, marks=[pytest.mark.slow] * (p.stem == "setups"), id=p.stem) for p in GUIDES]
+    "page", [pytest.param(p, marks=[pytest.mark.slow] * (p.stem in ("setups", "register")), id=p.stem) for p in GUIDES]
 )
 def test_every_command_runs_as_written(page, tmp_path, monkeypatch):
     shutil.copytree(ROOT / "toolpaths", tmp_path / "toolpaths")

@@ -339,7 +339,7 @@ def check_touch_off(text, outcome):
         cells = re.findall(r"<td>(.*?)</td>", row.replace("−", "-"))
         on_part, there, tip, axis, legs = (np.array([float(v) for v in cell.split(",")]) for cell in cells[1:])
         joints = 1e-3 * tip + (machine.tool_length - machine.robot.offsets)[:, None] * axis
-        assert 1e3 * np.linalg.norm(joints - machine.robot.base, axis=1) == pytest.approx(legs, abs=0.05)
+        assert 1e3 * np.linalg.norm(joints - machine.robot.base_joints, axis=1) == pytest.approx(legs, abs=0.05)
         assert 1e3 * placed.placement.transform.apply(1e-3 * on_part) == pytest.approx(there, abs=0.02)
         radius = placed.toolpath.tilt_centre
         assert np.linalg.norm(1e-3 * (there - tip) - radius * axis) == pytest.approx(radius, abs=60e-6)
