@@ -14,11 +14,11 @@ MACHINE = Machine.load("desk")
 TOOL = MACHINE.tool_length
 
 
-def true_numbers(seed: int, rings: float = 0.5e-3) -> np.ndarray:
+def true_numbers(seed: int, ring: float = 0.0) -> np.ndarray:
     """The thirty numbers of a machine as built: base x y z, offset, ring, zero of each leg; metres."""
     rng, robot = np.random.default_rng(seed), MACHINE.robot
     base = np.c_[robot.base, np.zeros(5)] + rng.normal(size=(5, 3)) * 0.3e-3
-    errors = rng.normal(size=5) * 0.2e-3, rng.uniform(0.2, 1.0, 5) * rings, rng.normal(size=5) * 0.5e-3
+    errors = rng.normal(size=5) * 0.2e-3, ring + rng.uniform(0.2, 1.0, 5) * 0.5e-3, rng.normal(size=5) * 0.5e-3
     return np.c_[base, robot.offsets + errors[0], errors[1], errors[2]].ravel()
 
 
@@ -44,12 +44,12 @@ def poses(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
 
 
 def measured(instrument: str, n: int, seed: int, *, noise: float = 1.0, given: bool = True, own_frame: bool = False,
-             setups: int = 1, rings: float = 0.5e-3, where: tuple[np.ndarray, np.ndarray] | None = None,
+             setups: int = 1, ring: float = 0.0, where: tuple[np.ndarray, np.ndarray] | None = None,
              rng: np.random.Generator | None = None) -> Measurements:  # fmt: skip
     """What an instrument sees of the machine of a seed: readings to 2 um, positions to 10 um, axes to 20 urad."""
     rng = rng or np.random.default_rng(seed + 1000)
     tips, axes = poses(n, seed + 2000) if where is None else where
-    legs = readings(true_numbers(seed, rings), tips, axes) + 2e-6 * noise * rng.normal(size=(n, 5))
+    legs = readings(true_numbers(seed, ring), tips, axes) + 2e-6 * noise * rng.normal(size=(n, 5))
     places, stations = np.arange(n) % setups, np.random.default_rng(5).normal(size=(setups, 6))
     if instrument == "ballbar":
         balls = MACHINE.work.centre + [0.0, 0.0, 0.15] + 0.2 * stations[:, :3] * (np.arange(setups) > 0)[:, None]

@@ -90,7 +90,7 @@ class Declared:
             return value
         if self.key.unit and isinstance(value, float | np.ndarray):
             value = np.asarray(from_si(np.asarray(value) / self.key.share, self.key.unit), dtype=np.float64)
-            return np.vectorize(_shortest)(value).tolist() if math.inf not in value else None
+            return np.vectorize(_shortest, otypes=[np.float64])(value).tolist() if math.inf not in value else None
         return value.value if isinstance(value, StrEnum) else value.tolist() if isinstance(value, np.ndarray) else value
 
     @property

@@ -10,6 +10,7 @@ from pentapod.machine.identification.identification import Identified, identify
 from pentapod.machine.identification.measurements import Frame, Instrument, Measurements
 from pentapod.machine.identification.measurements_file import read_measurements, write_measurements
 from pentapod.machine.identification.recording import record_of
+from pentapod.machine.leg_model import LegModel
 from pentapod.machine.machine import ARCHITECTURAL_LIMIT, Machine, load_machine, read_machine
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 from pentapod.machine.reader import shipped_machines
@@ -43,6 +44,7 @@ __all__ = [
     "Instrument",
     "JointLimits",
     "LegLimits",
+    "LegModel",
     "Machine",
     "MachineFinding",
     "MachineReport",

@@ -24,6 +24,7 @@ from pentapod.machine.calibration.digest import digest_of
 from pentapod.machine.calibration.record import CalibrationRecord
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.fields import positive
+from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 
 ARCHITECTURAL_LIMIT = 0.005
@@ -38,7 +39,7 @@ class Machine(Value):
     rapid_velocity: largest tip speed on rapids, m/s. drives, masses: for simulation alone; a program does not depend on
     them. guides: of a reconfigurable machine, on which the base joints are set before a program runs; rail_positions
     (n_legs,) metres: where they stand; `robot` is the geometry there. calibration: from which `robot` is the machine as
-    built; None where it is the one that was designed.
+    built; None where it is the one that was designed. leg_model: from readings to what drives are told, in posts.
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
     spindle's nose would be above the lowest platform joint.
@@ -60,6 +61,7 @@ class Machine(Value):
     tool_limits: ToolLimits = field(default_factory=ToolLimits)
     guides: ReconfigurablePentapod | None = None
     calibration: CalibrationRecord | None = None
+    leg_model: LegModel = field(default_factory=LegModel)
     rail_positions: Floats = field(default_factory=lambda: np.zeros(FiveLegs.n_legs))
     architecture: float = field(init=False)
 
@@ -133,6 +135,23 @@ class Machine(Value):
     def calibration_name(self) -> str:
         """What programs name as the machine's calibration; "" where there is none."""
         return "" if self.calibration is None else self.calibration.name
+
+    def commands(self, legs: ArrayLike, branch: ArrayLike) -> Floats:
+        """Return what the drives are told (N, n_legs) so that the legs read `legs` (N, n_legs), in order: `LegModel`.
+
+        branch: signs (2,), or (N, 2) of each row. NaN where readings have no pose in the branch.
+        """
+        return self.leg_model.commands(self.robot, legs, branch, self._home)
+
+    def readings(self, commands: ArrayLike, branch: ArrayLike) -> Floats:
+        """Return what the legs read (N, n_legs) where the drives were told `commands`: the inverse of `commands`."""
+        return self.leg_model.readings(self.robot, commands, branch, self._home)
+
+    @property
+    def _home(self) -> tuple[Floats, Floats]:
+        """The pose in which screws count as not turned: the tool upright in the middle of the work volume."""
+        direction = np.array([0.0, 0.0, 1.0])
+        return self.work.centre - self.tool_length * direction, direction
 
     def with_tool(self, tool_length: float) -> Machine:
         """Return this machine with another tool: metres from p to the tip. Raises MachineError."""

@@ -25,6 +25,7 @@ from pentapod.machine.calibration.calibration_file import read_calibration
 from pentapod.machine.calibration.record import CalibrationRecord
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.families import FAMILIES
+from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 from pentapod.machine.tables import FILE_KEYS, GuideKeys, MachineTables, MachineToolKeys, PlatformJointKeys
 
@@ -133,6 +134,7 @@ def _fields(tables: Any, file: str | Path) -> dict[str, Any]:
         "tool_limits": ToolLimits(**fields_from(ToolLimits, tables.tool)),
         "guides": guides,
         "calibration": calibration,
+        "leg_model": LegModel(**fields_from(LegModel, tables.leg_model)),
         **fields_from(MachineToolKeys, tables.tool),
     }
 

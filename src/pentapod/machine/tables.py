@@ -14,6 +14,7 @@ from pentapod.base.tables import TomlTable, extended, table_of
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.families import OfFamily
 from pentapod.machine.fields import FIVE_PAIRS, PER_LEG, each_leg
+from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 
 
@@ -66,6 +67,7 @@ PARTS: dict[str, tuple[type, ...]] = {
     "calibration": (CalibrationKeys,),
     "guides": (GuideKeys,),
     "legs": (LegLimits,),
+    "leg_model": (LegModel,),
     "joints": (JointLimits, PlatformJointKeys),
     "bodies": (Bodies,),
     "tool": (MachineToolKeys, ToolLimits),

@@ -42,9 +42,11 @@ SETUP_KEYS = (WAYPOINTS, BOX)
 """Keys of programs of several set-ups."""
 CALIBRATION = "calibration"
 """Key of programs for a machine as it was measured."""
+COMMANDS = "commands"
+"""Key of files in which the rows are what drives are told, by a machine's leg model."""
 MADE_ON = ("processor", "libraries")
 """Keys of planned programs: on another kind of processor or with other libraries bits may differ."""
-OPTIONAL_KEYS = (CALIBRATION, GUIDES, *SETUP_KEYS, *MADE_ON)
+OPTIONAL_KEYS = (CALIBRATION, COMMANDS, GUIDES, *SETUP_KEYS, *MADE_ON)
 UNVERIFIED = "UNVERIFIED: no verdict has passed this program"
 """First line, after the comment mark, of files written for a controller without a passed verdict."""
 LARGEST_COUNT = 2**63 - 1
@@ -86,6 +88,8 @@ def header_text(program: Program) -> str:
     }
     if source.calibration:
         values[CALIBRATION] = _string(source.calibration)
+    if source.commands:
+        values[COMMANDS] = _string(source.commands)
     if program.rail_positions is not None:
         values[GUIDES] = f"[{', '.join(_decimal(x, 3) for x in program.rail_positions)}]"
     if source.piece is not None:
@@ -161,7 +165,7 @@ class _Reader:
                 pentapod_version=self._text("pentapod_version"),
                 piece=self._piece(),
                 unverified=self.unverified,
-                **{key: self._text(key) for key in (*MADE_ON, CALIBRATION) if key in self.values},
+                **{key: self._text(key) for key in (*MADE_ON, CALIBRATION, COMMANDS) if key in self.values},
             ),
             rows=self._rows(),
             rail_positions=self._rail_positions(),

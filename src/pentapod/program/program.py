@@ -28,7 +28,8 @@ class Provenance(Value):
 
     piece: of the toolpath, where the program is one of several set-ups. processor, libraries: with which it was made;
     with the same ones it is the same to the bit. unverified: it was written for a controller without a passed verdict.
-    calibration: name of the machine's calibration, "" where there is none.
+    calibration: name of the machine's calibration, "" where there is none. commands: digest of the leg model by which
+    the rows are commands of drives; "" where they are readings of the legs.
     """
 
     machine: str
@@ -40,6 +41,7 @@ class Provenance(Value):
     libraries: str = ""
     unverified: bool = False
     calibration: str = ""
+    commands: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,7 +45,7 @@ def test_a_frame_of_the_instruments_own_is_found(instrument, n):
 def test_the_covariance_in_the_frame_of_the_base_joints(instrument):
     """24 numbers are measured, the frame is defined: squared distances in sigmas are 24 in the mean."""
     ringed = replace(MACHINE, robot=AsBuiltPentapod.of(MACHINE.robot, radii=15e-3))
-    true, squares = true_numbers(6, 20e-3), []
+    true, squares = true_numbers(6, 15e-3), []
     true.reshape(5, 6)[:, :3] = frame_free(true.reshape(5, 6)[:, :3], MACHINE.robot.base_joints) + np.array(
         MACHINE.robot.base_joints
     )
@@ -53,7 +53,7 @@ def test_the_covariance_in_the_frame_of_the_base_joints(instrument):
     for trial in range(100):
         rng = np.random.default_rng(trial)
         made = identify(
-            measured(instrument, n, 6, rings=20e-3, own_frame=own, rng=rng), ringed, keep_outliers=True
+            measured(instrument, n, 6, ring=15e-3, own_frame=own, rng=rng), ringed, keep_outliers=True
         ).calibration
         assert len(made.identified) == 30
         sigma = np.sqrt(np.diag(made.covariance))
@@ -106,8 +106,8 @@ def test_two_sigma_of_the_tip_hold_what_they_should(instrument, n):
     ringed = replace(MACHINE, robot=AsBuiltPentapod.of(MACHINE.robot, radii=15e-3))
     for trial in range(200):
         rng = np.random.default_rng(trial + 5000)
-        found = identify(measured(instrument, n, 5, rings=20e-3, rng=rng), ringed, keep_outliers=True)
-        numbers, made = true_numbers(5, 20e-3), found.calibration
+        found = identify(measured(instrument, n, 5, ring=15e-3, rng=rng), ringed, keep_outliers=True)
+        numbers, made = true_numbers(5, 15e-3), found.calibration
         assert made.converged
         if instrument == "ballbar":  # the frame is free: distances between tips are not
             tips = reached(numbers, made.machine.leg_lengths(*_pose(*near)), near)

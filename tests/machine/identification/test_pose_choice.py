@@ -52,7 +52,7 @@ def test_a_count_that_cannot_be():
 def test_calibrations_from_chosen_poses_are_as_much_better_as_predicted():
     columns, moves, (tips, axes) = candidates(400)
     chosen, rng = choose_poses(columns, moves, 20), np.random.default_rng(2)
-    where, along = (array[::7] for array in sample_work_volume(MACHINE.work, rings=1, around=6, levels=2))
+    where, along = (array[::9] for array in sample_work_volume(MACHINE.work, rings=1, around=6, levels=2))
     errors = {"chosen": [], "chance": []}
     for seed in range(40):
         for name, some in (("chosen", chosen.chosen), ("chance", rng.choice(400, 20, replace=False))):

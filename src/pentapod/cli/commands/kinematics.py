@@ -37,7 +37,8 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -
     """Inverse kinematics: leg lengths in mm of a tip X Y Z in mm and a tool axis I J K, machine frame.
 
     The axis points from the tip to the spindle, as in APT; it need not have unit length. Without numbers, CSV
-    is read from stdin: a header "x_mm,y_mm,z_mm,i,j,k", then a pose in each line.
+    is read from stdin: a header "x_mm,y_mm,z_mm,i,j,k", then a pose in each line. Of a machine with a leg model
+    the commands of the drives follow, for poses that are visited in this order.
     """
     import numpy as np
 
@@ -56,6 +57,9 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -
     within = ((legs >= limits.min_length) & (legs <= limits.max_length)).all(axis=1)
     components = [_component(signs) for signs in machine.robot.branch(position, direction)]
     columns: dict[str, Any] = {name: legs[:, k] * 1e3 for k, name in enumerate(leg_names(machine.robot))}
+    if machine.leg_model.is_needed:
+        told = machine.commands(legs, machine.robot.branch(position, direction))
+        columns |= {f"command{k + 1}_mm": told[:, k] * 1e3 for k in range(told.shape[1])}
     columns |= {"component": components, "within_strokes": within.tolist()}
     _print(columns, as_json=as_json, one=bool(pose), quiet=quiet)
     return 0
@@ -64,10 +68,13 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -
 @click.command(context_settings=_NEGATIVES)
 @click.argument("legs", nargs=-1, type=Real(), metavar="[L1 L2 ...]")
 @click.option("-c", "--component", help='Its signs: "++", "+-", "-+" or "--"; all of the machine when left out.')
+@click.option("--commands", is_flag=True, help="The numbers are what the drives are told (machines with a leg model).")
 @_machine_option
 @json_option
 @quiet_option
-def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_json: bool, quiet: bool) -> int:
+def fk(
+    legs: tuple[float, ...], component: str | None, commands: bool, machine_name: str, as_json: bool, quiet: bool
+) -> int:
     """Forward kinematics: tips in mm, tool axes and distances to singularities of leg lengths in mm.
 
     Five legs have four poses, one in each component, or none. Without numbers, CSV is read from stdin: a
@@ -82,7 +89,10 @@ def fk(legs: tuple[float, ...], component: str | None, machine_name: str, as_jso
     robot = machine.robot
     rows = _rows(legs, leg_names(robot)) * 1e-3
     chosen = list(robot.branches) if component is None else [_named(robot, component)]
-    position, direction = machine.robot.pose(rows[:, None, :], np.array(chosen))
+    each = np.repeat(rows[:, None, :], len(chosen), axis=1)
+    if commands:
+        each = np.stack([machine.readings(rows, branch) for branch in chosen], axis=1)
+    position, direction = machine.robot.pose(each, np.array(chosen))
     position, direction = position.reshape(-1, 3), direction.reshape(-1, 3)
     tips = (position + machine.tool_length * direction) * 1e3
     columns: dict[str, Any] = {"row": np.repeat(np.arange(len(rows)), len(chosen)).tolist()}

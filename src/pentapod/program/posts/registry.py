@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
+
 from pentapod.base.errors import InputError
 from pentapod.base.files import atomic_write
 from pentapod.base.registry import Registry
@@ -15,6 +17,7 @@ from pentapod.machine.machine import Machine
 from pentapod.program.csv import csv_bytes
 from pentapod.program.posts.verified import VerdictContent, check_passed, marked_unverified
 from pentapod.program.program import Program
+from pentapod.program.resolution import quantised
 from pentapod.toolpath.toolpath import Toolpath
 
 GROUP = "pentapod.posts"
@@ -106,8 +109,9 @@ def write_post(
             remedy = "name the verdict.json of the program, or insist with unverified=True"
             raise InputError("there is no verdict on this program", key="verdict", remedy=remedy)
         check_passed(verdict, given.sha256 or sha256(csv_bytes(given.program)).hexdigest())
-    source = replace(given.program.provenance, unverified=unverified)
-    contents = post.write(replace(given, program=replace(given.program, provenance=source)))
+    program = given.program if post.takes_toolpath else commanded(given.program, given.machine)
+    source = replace(program.provenance, unverified=unverified)
+    contents = post.write(replace(given, program=replace(program, provenance=source)))
     if unverified:
         contents = {relative: marked_unverified(relative, content) for relative, content in contents.items()}
     made: list[Path] = []
@@ -126,6 +130,32 @@ def write_post(
     return made
 
 
-def read_post(folder: str | Path, name: str) -> Program | Toolpath:
-    """Return what a post's folder holds. Raises InputError with file and line."""
-    return find_post(name).read(Path(folder))
+def read_post(folder: str | Path, name: str, machine: Machine | None = None) -> Program | Toolpath:
+    """Return what a post's folder holds. machine: whose leg model made commands of readings, where it has one.
+
+    Raises InputError with file and line; where the commands were made by another leg model.
+    """
+    found = find_post(name).read(Path(folder))
+    return found if machine is None or not isinstance(found, Program) else read_back(found, machine)
+
+
+def commanded(program: Program, machine: Machine | None) -> Program:
+    """Return a program with rows as the drives are told them: the one place where a machine's leg model is applied."""
+    if machine is None or not machine.leg_model.is_needed or program.provenance.commands:
+        return program
+    legs = program.machine(machine).commands(program.legs, np.array(program.component))
+    source = replace(program.provenance, commands=machine.leg_model.digest)
+    return replace(program, legs=quantised(legs), provenance=source)
+
+
+def read_back(program: Program, machine: Machine) -> Program:
+    """Return a program with rows as the legs read, of one with commands. Raises InputError: another leg model's."""
+    if not machine.leg_model.is_needed:
+        return program
+    if program.provenance.commands not in ("", machine.leg_model.digest):  # "": a format that loses it
+        raise InputError(
+            "the rows are commands of another leg model", key="commands", value=program.provenance.commands,
+            expected=machine.leg_model.digest, remedy="name the machine's file with which it was posted",
+        )  # fmt: skip
+    legs = program.machine(machine).readings(program.legs, np.array(program.component))
+    return replace(program, legs=quantised(legs), provenance=replace(program.provenance, commands=""))

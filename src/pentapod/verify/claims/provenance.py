@@ -14,6 +14,10 @@ GUIDES = "guides within their travel"
 def machine(replay: Replay) -> Finding:
     """Judge that the program was made for this machine, by name and by digest."""
     made_for, judged = replay.program.provenance, replay.machine
+    if made_for.commands:
+        return Finding.without_value(
+            False, "header: the rows are commands of drives; judge the program that was posted"
+        )
     passed = made_for.machine == judged.name and made_for.machine_digest == judged.digest
     made = f"header: made for {_named(made_for.machine, made_for.machine_digest, made_for.calibration)}"
     return Finding.without_value(
