@@ -24,7 +24,7 @@ from pentapod.machine import CalibrationRecord, Machine, MeasuredGeometry, geome
 from pentapod.program import Program, Provenance, write_csv
 
 ROOT = Path(__file__).parents[2]
-MACHINE_TABLES = ["calibration", "guides"]
+MACHINE_TABLES = ["calibration", "guides", "leg_model"]
 GUIDES = [*sorted(ROOT.glob("docs/howto/*.md")), ROOT / "docs" / "tutorial.md"]
 
 
@@ -96,7 +96,7 @@ def test_every_table_of_a_job_is_one(page, tmp_path):
         if table[1] in MACHINE_TABLES:
             own = tmp_path / "own_machine.toml"
             own.write_text((library / "desk.toml").read_text(encoding="utf-8") + "\n" + block, encoding="utf-8")
-            assert Machine.load(own).digest != Machine.load("desk").digest
+            assert Machine.load(own) != Machine.load("desk")
             continue
         tables = {**usual, table[1]: block[table.end() :]}
         job = tmp_path / "job.toml"
