@@ -1,7 +1,8 @@
-"""Draw the jobs of this folder: `python toolpaths/make_gallery.py [JOB ...]` writes docs/gallery.md and its pictures.
+"""Draw the jobs of this folder: `python toolpaths/make_gallery.py [NAME ...]` writes docs/gallery.md and its pictures.
 
 A picture shows the part from in front and above, the cuts in colour from their first to their last, links and rapids
-thin. The page tells what each job is for, from the remark at its head, and what its toolpath came to.
+thin. The page tells what each job is for, from the remark at its head, and what its toolpath came to. Then follow five
+concave parts of the tests: what a ball leaves on them with contacts on the facets, and with a drive surface.
 """
 
 from __future__ import annotations
@@ -13,15 +14,36 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.collections import LineCollection, PolyCollection
+from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Floats
 from pentapod.job import Job
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_mesh
-from pentapod.toolpath import Mesh, PathReport, SegmentKind, Toolpath
+from pentapod.mesh.patch import Patch
+from pentapod.toolpath import BallCutter, Mesh, PathReport, RasterOptions, SegmentKind, Toolpath, make_toolpath
+from pentapod.toolpath.gouge.gouge import without_gouges
+from pentapod.toolpath.gouge.report import GougeOptions, Remedy
+from pentapod.toolpath.linking.assembly import assembled
+from pentapod.toolpath.strategies.raster import raster_paths
+from pentapod.toolpath.surfaces.part_surface import PartSurface
 
 FOLDER = Path(__file__).parent
 DOCS = FOLDER.parent / "docs"
+sys.path.append(str(FOLDER.parent / "tests"))
+import concave_parts  # noqa: E402
+from left_material import dense  # noqa: E402
+
+BALL = BallCutter(3e-3)
+CONCAVE = {
+    "pocket_boss": "A pocket with a square boss in it.",
+    "crossing_slots": "Two slots of 8 mm that cross, one deeper than the other.",
+    "ribs": "Three ribs. The ball enters one of the gaps, of 10 mm, but not the other, of 5 mm.",
+    "ring_groove": "A groove around a post, half a circle of 4 mm in section.",
+    "egg_crate": "Waves both ways; in the lows the smallest radius of curvature is 2.5 mm.",
+}
+MOST_LEFT = 0.5e-3
+"""From this height on what is left is red, metres."""
 ORDER = [
     "dome", "saddle", "wavy", "hatch", "waterline", "offset", "spiral", "polish", "pencil", "deburr", "text", "flower",
     "outline", "seam", "picture", "laser", "burn",
@@ -34,6 +56,13 @@ as it stands (`pentapod plan toolpaths/NAME.toml -o out/`). Cuts run from blue t
 rapids are thin and grey. `python toolpaths/make_gallery.py` draws this page.
 """
 
+CONCAVE_HEAD = """---
+
+A 6 mm ball on five concave parts, passes 2 mm apart. To the left the contacts lie on the part's facets, and cuts that
+gouge are dropped, as they are for toolpaths from files with `[gouge] remedy = ["drop"]`; to the right the ball rolls
+over the part: lines are drawn on its drive surface. Red is what is left where the part is not steeper than 80°.
+"""
+
 
 def camera() -> Floats:
     """Return the rotation to a view from in front and above: right, up, towards the eye."""
@@ -43,6 +72,47 @@ def camera() -> Floats:
     eye = eye - (eye @ right) * right
     eye /= np.linalg.norm(eye)
     return np.stack([right, np.cross(eye, right), eye])
+
+
+def before_and_after(name: str, file: Path) -> str:
+    """Draw what a ball leaves on a concave part, red from MOST_LEFT on; return a sentence about it.
+
+    To the left its contacts lie on the part's facets, and cuts that gouge are dropped; to the right its centre runs on
+    the drive surface.
+    """
+    mesh = concave_parts.mesh(name)
+    options = RasterOptions(stepover=2e-3)
+    surface = PartSurface(mesh, BALL, options.up)
+    contacts, _ = assembled("raster", surface, BALL, options, raster_paths(surface, options))
+    dropped, _ = without_gouges(contacts, BALL, mesh, GougeOptions((Remedy.DROP,), tolerance=options.chordal))
+    view, patch = camera(), Patch.whole(mesh).refined(0.5e-3)
+    seen = patch.facet_normals[:, 2] > -1e-6
+    patch = Patch(patch.vertices, patch.faces[seen], patch.normals[seen])
+    corners = 1e3 * patch.vertices[patch.faces] @ view.T
+    order = np.argsort(corners[..., 2].mean(axis=1), kind="stable")
+    shade = np.clip(0.35 + 0.6 * np.abs(patch.facet_normals @ (LIGHT / np.linalg.norm(LIGHT))), 0.0, 1.0)
+    figure, pair = plt.subplots(1, 2, figsize=(8.4, 3.4), dpi=80)
+    shares: list[float] = []
+    for axes, toolpath in zip(pair, (dropped, make_toolpath(mesh, BALL, options)), strict=True):
+        cuts = [s.tips + BALL.radius * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT]
+        gap = KDTree(np.concatenate([dense(cut, 1e-4) for cut in cuts])).query(patch.vertices[patch.faces].mean(axis=1))
+        left = np.asarray(gap[0]) - BALL.radius
+        upward = patch.areas * (patch.facet_normals[:, 2] > np.cos(np.radians(80.0)))
+        shares.append(float(upward @ (left > MOST_LEFT) / upward.sum()))
+        red = np.where(upward > 0.0, np.clip(left / MOST_LEFT, 0.0, 1.0), 0.0)[:, None]
+        colours = (np.array([0.93, 0.95, 1.0]) * (1.0 - red) + np.array([0.95, 0.25, 0.2]) * red) * shade[:, None]
+        axes.add_collection(
+            PolyCollection(corners[order][..., :2], facecolors=colours[order], edgecolors="face", lw=0.2)
+        )
+        for cut in cuts:
+            way = 1e3 * (cut - BALL.radius * np.array([0.0, 0.0, 1.0])) @ view.T
+            axes.plot(way[:, 0], way[:, 1], color="0.15", lw=0.4)
+        axes.set_aspect("equal")
+        axes.autoscale_view()
+        axes.axis("off")
+    figure.savefig(file, bbox_inches="tight", metadata={"Software": None})
+    plt.close(figure)
+    return f"{1e3 * MOST_LEFT:g} mm or more is left on {shares[0]:.0%} of the surface, and on {shares[1]:.1%}"
 
 
 def draw(mesh: Mesh, toolpath: Toolpath, file: Path) -> None:
@@ -92,23 +162,45 @@ def said(report: object) -> str:
     return next(str(part).splitlines()[0] for part in parts if isinstance(part, PathReport))
 
 
+def sections() -> dict[str, str]:
+    """Return the sections of the page as it is, by their names."""
+    page = DOCS / "gallery.md"
+    parts = page.read_text(encoding="utf-8").replace(CONCAVE_HEAD, "").split("\n## ")[1:] if page.exists() else []
+    return {part.split("\n", 1)[0]: f"## {part.rstrip()}\n" for part in parts}
+
+
+def job_section(name: str, pictures: Path) -> str:
+    """Draw a job, and return its section of the page."""
+    path = FOLDER / f"{name}.toml"
+    job = Job.load(path)
+    mesh = job_mesh(job)
+    toolpath, report = job_toolpath(job, mesh)
+    draw(mesh, toolpath, pictures / f"{name}.png")
+    told = said(report)
+    return f"## {name}\n\n{remark(path)}\n\n![{name}](gallery/{name}.png)\n\n`toolpaths/{name}.toml` · {told}\n"
+
+
+def concave_section(name: str, pictures: Path) -> str:
+    """Draw a concave part before and after, and return its section of the page."""
+    told = before_and_after(name, pictures / f"{name}.png")
+    title = f"Concave: {name.replace('_', ' ')}"
+    return f"## {title}\n\n{CONCAVE[name]} {told}.\n\n![{title}](gallery/{name}.png)\n"
+
+
 def main(names: list[str]) -> None:
-    """Draw the jobs of some names, or all, and write the page."""
+    """Draw what has one of these names, or all, and write the page; the rest of it stays as it is."""
     pictures = DOCS / "gallery"
     pictures.mkdir(parents=True, exist_ok=True)
-    page = [HEAD]
+    page, known = [HEAD], sections()
     for name in ORDER:
-        path = FOLDER / f"{name}.toml"
-        job = Job.load(path)
-        mesh = job_mesh(job)
-        toolpath, report = job_toolpath(job, mesh)
-        if not names or name in names:
-            draw(mesh, toolpath, pictures / f"{name}.png")
-        print(f"{name}: {said(report)}")
-        page.append(
-            f"## {name}\n\n{remark(path)}\n\n![{name}](gallery/{name}.png)\n\n"
-            f"`toolpaths/{name}.toml` · {said(report)}\n"
-        )
+        kept = names and name not in names and known.get(name)
+        page.append(kept or job_section(name, pictures))
+        print(f"{name}: {'kept' if kept else 'drawn'}")
+    page.append(CONCAVE_HEAD)
+    for name in CONCAVE:
+        kept = names and name not in names and known.get(f"Concave: {name.replace('_', ' ')}")
+        page.append(kept or concave_section(name, pictures))
+        print(f"{name}: {'kept' if kept else 'drawn'}")
     (DOCS / "gallery.md").write_text("\n".join(page), encoding="utf-8")
 
 

@@ -16,8 +16,8 @@ class PathReport(Value):
     first. travel: total distance between the end of each pass and the start of the next; travel_bound: lower bound of
     it for any order. dropped: passes shorter than `PathOptions.shortest`; dropped_length: their total length. hidden:
     waypoints left out because the part lies above them. tight: waypoints where the concave radius of the surface along
-    the pass is below the ball's radius or the stand-off: a ball gouges there, a beam's tip moves backwards. unproven:
-    rapids that are not proven to keep their distance from the part; the verdict judges them. notes: of the strategy.
+    the pass is below the ball's radius or the stand-off: a ball gouges there, a beam's tip moves backwards. notes: of
+    the strategy. Whether links and rapids are clear of the part is told by the gouge check, which knows the final axes.
     """
 
     strategy: str
@@ -34,7 +34,6 @@ class PathReport(Value):
     dropped_length: float
     hidden: int
     tight: int
-    unproven: int
     notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
@@ -52,6 +51,4 @@ class PathReport(Value):
             text += f"\n  note: {self.hidden:,} waypoints left out, the part lies above them"
         if self.tight:
             text += f"\n  problem: at {self.tight:,} waypoints the concave radius is below the ball's or the stand-off"
-        if self.unproven:
-            text += f"\n  note: {self.unproven:,} rapids are close to the part; the verdict judges if they are clear"
         return text

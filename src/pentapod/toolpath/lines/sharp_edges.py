@@ -9,11 +9,14 @@ from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import angle_between
-from pentapod.geometry.polyline import spaced
+from pentapod.geometry.polyline import arc_length, spaced
 from pentapod.geometry.runs import marked_runs
 from pentapod.mesh.normals import unit_or_zero
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
+
+Line = tuple[Floats, Floats]
+"""Points and normals (n, 3) of a line."""
 
 
 @dataclass(frozen=True)
@@ -23,13 +26,16 @@ class CreaseOptions:
     sharpest: angle between both sides, radians, from which a crease counts. corner: a line ends where the crease turns
     by more than this angle, radians. touch: distance from a pass, as a share of the ball's radius, at which the pass
     crosses a crease. gap: distance along a crease between passes that cross it from which it is followed, in stepovers.
-    shortest: line, in radii of the ball.
+    join: longest way between the ends of two lines that are one, in edges of the mesh; where a crease runs aslant
+    through the mesh, some of its edges are blunt. shortest: line, in radii of the ball; closed ones, such as the foot
+    of a narrow pit, may be shorter.
     """
 
     sharpest: float = float(np.radians(30.0))
     corner: float = float(np.radians(60.0))
     touch: float = 0.05
     gap: float = 1.04
+    join: float = 3.0
     shortest: float = 1.0
 
 
@@ -40,7 +46,7 @@ def crease_lines(patch: Patch, sharpest: float | None = None, options: CreaseOpt
     """
     chosen = sharp_edges(patch, options.sharpest if sharpest is None else sharpest, concave=True)
     edges = patch.topology.edges
-    lines: list[tuple[Floats, Floats]] = []
+    lines: list[Line] = []
     normals = np.zeros_like(patch.vertices)
     np.add.at(normals, patch.faces.ravel(), patch.normals.reshape(-1, 3))
     normals = unit_or_zero(normals)
@@ -48,7 +54,60 @@ def crease_lines(patch: Patch, sharpest: float | None = None, options: CreaseOpt
         vertices = [v for _, v in chain]
         vertices.append(other_end(edges, *chain[-1]))
         lines.append((patch.vertices[vertices], normals[vertices]))
+    sides = patch.vertices[edges[chosen, 1]] - patch.vertices[edges[chosen, 0]]
+    longest = options.join * float(np.median(np.linalg.norm(sides, axis=1))) if len(sides) else 0.0
+    lines = joined_ends(lines, longest, options.corner)
     return Passes.of(lines, np.arange(len(lines)))
+
+
+def joined_ends(lines: list[Line], longest: float, corner: float) -> list[Line]:
+    """Return lines, points and normals (n, 3), joined end to end where they go on within `longest` metres.
+
+    The nearest ends first. Neither line turns by more than `corner` radians against the other, or against the way
+    between them.
+    """
+    if len(lines) < 2:
+        return lines
+    ends = np.stack([points[row] for points, _ in lines for row in (0, -1)])
+    # Directions out of a line, seen from as far inside as ends may be apart.
+    out = np.stack([_outwards(points[::step], longest) for points, _ in lines for step in (-1, 1)])
+    pairs = KDTree(ends).query_pairs(longest, output_type="ndarray")
+    pairs = pairs[pairs[:, 0] // 2 != pairs[:, 1] // 2]
+    a, b = pairs.T
+    way = ends[b] - ends[a]
+    length = np.linalg.norm(way, axis=1)
+    on = length > 1e-3 * longest
+    least = np.cos(corner)
+    suits = -(out[a] * out[b]).sum(axis=1) > least
+    suits &= ~on | ((out[a] * way).sum(axis=1) > least * length) & (-(out[b] * way).sum(axis=1) > least * length)
+    other = np.full(len(ends), -1, dtype=np.intp)
+    for k in np.lexsort((b, a, length)).tolist():
+        if suits[k] and other[a[k]] < 0 and other[b[k]] < 0:
+            other[a[k]], other[b[k]] = b[k], a[k]
+    done = np.zeros(len(lines), dtype=np.bool_)
+    result: list[Line] = []
+    # Chains begin at free ends; what is left are rings.
+    for first in [*np.flatnonzero(other < 0).tolist(), *range(0, len(ends), 2)]:
+        at, parts = int(first), list[Line]()
+        while at >= 0 and not done[at // 2]:
+            done[at // 2] = True
+            step = 1 if at % 2 == 0 else -1
+            parts.append((lines[at // 2][0][::step], lines[at // 2][1][::step]))
+            leaving = at ^ 1
+            at = int(other[leaving])
+        if parts:
+            if at >= 0:  # a ring
+                parts.append((parts[0][0][:1], parts[0][1][:1]))
+            result.append(tuple(np.concatenate([part[k] for part in parts]) for k in range(2)))  # type: ignore[arg-type]
+    return result
+
+
+def _outwards(points: Floats, reach: float) -> Floats:
+    """Return the unit direction (3,) in which a line (n, 3) ends, over its last `reach` metres."""
+    away = np.linalg.norm(points - points[-1], axis=1)
+    inside = points[int(np.flatnonzero(away <= max(reach, away[-2]))[0])]
+    direction = points[-1] - inside
+    return direction / max(float(np.linalg.norm(direction)), 1e-300)
 
 
 def uncrossed(
@@ -56,30 +115,42 @@ def uncrossed(
 ) -> Passes:
     """Return the stretches of creases that passes leave out: between crossings, more than a stepover apart.
 
-    A pass beside a crease, even a near one, does not reach into it. radius: of the ball, metres.
+    A pass beside a crease, even a near one, does not reach into it. Beyond the last crossing half a stepover counts. A
+    crease without any crossing is left out where passes beside it are nearer than the ridge between passes is high.
+    radius: of the ball, metres.
     """
     if not len(creases) or not len(passes):
         return creases
-    tree, step = KDTree(passes.points), options.touch * radius
-    parts: list[tuple[Floats, Floats]] = []
-    for k in range(len(creases)):
-        line = creases.points[creases.rows(k)]
-        place = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    tree, step, half = KDTree(passes.points), options.touch * radius, min(0.5 * stepover, radius)
+    ridge, shortest = radius - float(np.sqrt(radius**2 - half**2)), options.shortest * radius
+    parts: list[Line] = []
+    for k, closed in enumerate(creases.closed.tolist()):
+        line, normals = creases.points[creases.rows(k)], creases.normals[creases.rows(k)]
         points = spaced(line, step)
-        at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-        crossed = np.asarray(tree.query(points, distance_upper_bound=step)[0]) <= step
-        for a, b in marked_runs(~crossed).tolist():
+        away = np.asarray(tree.query(points)[0])
+        if away.min() > step:
+            if away.max() > ridge and (closed or creases.lengths[k] > shortest):
+                parts.append((line, normals))
+            continue
+        if closed:  # it begins where a pass crosses it
+            first = int(np.linalg.norm(line[:-1] - points[away.argmin()], axis=1).argmin())
+            line, normals = (np.concatenate([a[first:-1], a[: first + 1]]) for a in (line, normals))
+            points = spaced(line, step)
+            away = np.asarray(tree.query(points)[0])
+        place, at = arc_length(line), arc_length(points)
+        for a, b in marked_runs(away > step).tolist():
             first, last = at[max(a - 1, 0)], at[min(b, len(at) - 1)]
-            if last - first > max(options.gap * stepover, options.shortest * radius):
+            needed = options.gap * stepover * (0.5 if not closed and (a == 0 or b == len(at)) else 1.0)
+            if last - first > max(needed, shortest):
                 inner = (place > first) & (place < last)
                 where = np.concatenate([[first], place[inner], [last]])
-                parts.append(
-                    tuple(  # type: ignore[arg-type]
-                        np.stack([np.interp(where, place, v[:, axis]) for axis in range(3)], axis=1)
-                        for v in (line, creases.normals[creases.rows(k)])
-                    )
-                )
+                parts.append((_interpolated(where, place, line), _interpolated(where, place, normals)))
     return Passes.of(parts, np.arange(len(parts)))
+
+
+def _interpolated(where: Floats, place: Floats, values: Floats) -> Floats:
+    """Return values (n, 3) at places (n,) of a line, between those (N, 3) at `place` (N,)."""
+    return np.stack([np.interp(where, place, values[:, axis]) for axis in range(3)], axis=1)
 
 
 def sharp_edges(patch: Patch, angle: float, *, concave: bool = False) -> Bools:

@@ -88,7 +88,6 @@ def assembled(
         dropped_length=dropped_length,
         hidden=hidden,
         tight=surface.tight(passes),
-        unproven=linker.unproven,
         notes=paths.notes,
     )
     return toolpath, report

@@ -76,8 +76,7 @@ class Linker:
 
     A pass that begins where the previous one ends follows without a link; one within `stay` is reached over the
     surface if the limits of the surface allow; one within `hop` by a rapid just above the part; others by way of
-    the clearance level. `toolpath` counts how many passes are reached on the surface (stay_downs) and by a hop (hops),
-    and how many rapids the collision check does not prove to be clear of the part (unproven).
+    the clearance level. `toolpath` counts how many passes are reached on the surface (stay_downs) and by a hop (hops).
     """
 
     def __init__(
@@ -91,7 +90,7 @@ class Linker:
         choice: LinkingOptions = LinkingOptions(),
     ) -> None:
         self.surface, self.tool, self.options, self.runs, self.choice = surface, tool, options, runs, choice
-        self.stay_downs = self.hops = self.unproven = 0
+        self.stay_downs = self.hops = 0
         self.tips = [tool.tips(run.contacts, run.normals, run.normals) for run in runs]
         view = options.up
         highest = max(float((tips @ view).max()) for tips in self.tips)
@@ -125,8 +124,7 @@ class Linker:
             segments += self._links_to(k)
             segments.append(Segment(SegmentKind.CUT, self.tips[k], run.normals, self.options.feed, run.power))
         up, start = self._lead(links.retract, len(self.runs) - 1)
-        rapid = links.rapid(start, None, self.style)
-        return Toolpath((*segments, up, self._counted(rapid)), self.tool.tilt_centre)
+        return Toolpath((*segments, up, links.rapid(start, None, self.style)), self.tool.tilt_centre)
 
     def _links_to(self, k: int) -> list[Segment]:
         """Return the segments from the end of the previous run to the beginning of run k."""
@@ -137,14 +135,14 @@ class Linker:
                 return direct
         down, end = self._lead(links.approach, k)
         if k == 0:
-            return [self._counted(links.rapid(None, end, self.style)), down]
+            return [links.rapid(None, end, self.style), down]
         up, start = self._lead(links.retract, k - 1)
         if np.linalg.norm(self.tips[k][0] - self.tips[k - 1][-1]) <= self.options.hop:
             hop = self._hop(start, end)
             if hop is not None:
                 self.hops += 1
                 return [up, hop, down]
-        return [up, self._counted(links.rapid(start, end, self.style)), down]
+        return [up, links.rapid(start, end, self.style), down]
 
     def _direct(self, k: int) -> list[Segment] | None:
         """Return the segments on the surface from the previous run to run k; None where the tool must retract."""
@@ -209,9 +207,3 @@ class Linker:
             if self.collision.is_clear(hop, self.margin):
                 return hop
         return None
-
-    def _counted(self, rapid: Segment) -> Segment:
-        """Return a rapid, and count it if it is not proven clear."""
-        if not self.collision.is_clear(rapid, self.margin):
-            self.unproven += 1
-        return rapid
