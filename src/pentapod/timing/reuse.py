@@ -17,7 +17,7 @@ from pentapod.base.refusal import Refusal, stage
 from pentapod.base.values import Value
 from pentapod.machine.machine import Machine
 from pentapod.planning.leg_path.leg_path import LegPath
-from pentapod.timing.certificates import certify
+from pentapod.timing.certificates import LimitUse, certify
 from pentapod.timing.limits.limit import Limit
 from pentapod.timing.pieces.boundary_speeds import whole_periods
 from pentapod.timing.retime import dwells_of, retime
@@ -130,9 +130,18 @@ def _fitting(path: LegPath, k: int, law: MotionLaw, machine: Machine, limits: Se
 
 
 def _excess(trajectory: Trajectory, machine: Machine) -> float:
-    """Return the largest share of a limit; those that rounding may exceed a little count as less by that."""
+    """Return how many times slower the motion must be to keep all limits; at most 1 where it keeps them.
+
+    A motion that is c times slower has 1/c of its speeds, 1/c² of its accelerations and 1/c³ of its jerks. Limits that
+    rounding may exceed a little count as wider by that.
+    """
     uses = certify(trajectory, machine)
-    return max(use.share / (1.0 + OPTIONS.rounding if use.above else 1.0) for use in uses)
+    return max((use.share / (1.0 + OPTIONS.rounding if use.above else 1.0)) ** (1.0 / _order(use)) for use in uses)
+
+
+def _order(use: LimitUse) -> int:
+    """Return which derivative a limit is of; 1 where its quantity does not say it."""
+    return next((k for word, k in (("jerk", 3), ("acceleration", 2)) if word in use.quantity), 1)
 
 
 def _on(law: MotionLaw, length: float) -> MotionLaw:
