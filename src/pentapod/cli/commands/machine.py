@@ -98,3 +98,46 @@ def compare(
     elif not quiet:
         click.echo(drift_text(found))
     return 1 if within_mm is not None and largest > within_mm else 0
+
+
+@machine.group("import")
+def import_machine() -> None:
+    """Make a machine file from another program's configuration."""
+
+
+@import_machine.command("hal")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("-o", "--out", type=click.Path(path_type=Path), required=True, help="Machine file to write.")
+@click.option("--like", default="desk", help="Shipped machine, or a machine file: joints, bodies, limits, controller.")
+@json_option
+@quiet_option
+def import_hal(file: Path, out: Path, like: str, as_json: bool, quiet: bool) -> int:
+    """Make a machine of the pentakins parameters in a HAL FILE of LinuxCNC, rings and all.
+
+    Beside the machine file OUT a calibration file is written, which holds rings and joints as they are. What HAL does
+    not say is that of the machine LIKE: change it in OUT.
+    """
+    import datetime
+
+    from pentapod.base.errors import MachineError
+    from pentapod.base.files import atomic_write
+    from pentapod.base.toml import parsed
+    from pentapod.machine import Machine, write_calibration
+    from pentapod.machine.calibration.pentakins import machine_files, read_pentakins
+    from pentapod.machine.reader import machine_bytes
+
+    Machine.load(like)
+    content = parsed(machine_bytes(like).decode("utf-8-sig"), like, MachineError)
+    measured = out.with_name(f"{out.stem}-calibration.toml")
+    text, record = machine_files(
+        read_pentakins(file), out.stem, content, measured.name, datetime.datetime.now(datetime.UTC).date()
+    )
+    write_calibration(record, measured)
+    with atomic_write(out) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    made = Machine.load(out)
+    if as_json:
+        echo_json({"machine": str(out), "calibration": str(measured), "digest": made.digest})
+    elif not quiet:
+        click.echo(f"{out} and {measured.name}; all but the geometry is that of {like}")
+    return 0
