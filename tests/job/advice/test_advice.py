@@ -91,7 +91,7 @@ def test_the_best_that_passes_comes_first_and_what_fails_is_no_advice(tmp_path):
     (table, keys), *_ = found.advice[0].tables.items()
     assert all(getattr(getattr(planned[2].tables, table), key) == value for key, value in keys.items())
     assert found.advice[0].kept >= found.advice[1].kept
-    assert found.sentence.startswith("What does, planned: ")
+    assert found.sentence.startswith("It can be done with: ")
 
 
 def test_nothing_that_works_is_told(tmp_path):

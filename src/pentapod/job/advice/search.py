@@ -35,7 +35,7 @@ class Advised(Value):
     def sentence(self) -> str:
         """What was found, as a sentence without its point."""
         if self.advice:
-            return "What does, planned: " + "; or ".join(str(each) for each in self.advice)
+            return "It can be done with: " + "; or with: ".join(str(each) for each in self.advice)
         if not self.tried:
             return "Nothing was found to try"
         return f"Tried, by estimate or plan: {'; '.join(self.tried)}: none works"

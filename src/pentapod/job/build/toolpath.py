@@ -163,9 +163,8 @@ def job_toolpath(
     toolpath, gouges = without_gouges(toolpath, tool, mesh, options, progress)
     if not any(segment.kind is SegmentKind.CUT for segment in toolpath.segments):
         raise ToolpathError(
-            "no cut is left: cutter, shank or holder would cut into the part everywhere", key="gouge.remedy",
-            remedy="a thinner or longer tool, or another tool axis",
-        )  # fmt: skip
+            "no cut is left: cutter, shank or holder would cut into the part everywhere", key="gouge.remedy"
+        )
     stem = stem_sentence(job_tool(job, machine))
     reports: list[object] = [*region, report, gouges]
     reports += [f"  note: {stem}"] if stem else []
