@@ -37,6 +37,14 @@ def test_a_law_goes_on_where_its_spline_dips_below_zero_between_gridpoints():
     assert np.isfinite(law.times).all()
 
 
+def test_a_law_goes_on_where_its_spline_is_below_zero_at_a_gridpoint():
+    problem, y = parabola(0.55, -1e-4)
+    assert problem.values(y)[:, 0].min() < 0.0
+    nodes = problem.nodes(y)
+    assert (nodes.x > 0.0).all()
+    assert np.isfinite(MotionLaw.through(nodes.s, nodes.x, nodes.slope).times).all()
+
+
 def test_a_spline_without_dips_is_followed_at_and_between_gridpoints():
     problem, y = parabola(0.525, 1e-2)
     nodes = problem.nodes(y)

@@ -168,11 +168,14 @@ class Subproblem:
     def nodes(self, y: Floats) -> SpeedNodes:
         """Return the law at rests, at gridpoints and halfway between, so that cubics follow the spline closely.
 
-        Rows hold at gridpoints alone; where the spline dips between two of them, it is kept above 0.
+        Where the spline dips to 0 or below, which is possible between gridpoints and at seams of windows, the law goes
+        on slowly.
         """
         v, s = np.empty((2 * len(self.s) - 1, 3)), np.empty(2 * len(self.s) - 1)
         s[::2], s[1::2] = self.s, (self.s[1:] + self.s[:-1]) / 2.0
         v[::2], v[1::2] = self.values(y), self.at(y, s[1::2])
+        stands = 2 * np.flatnonzero(v[::2, 0] < self.options.solver.x_floor * self.top)
+        v[stands, 0], v[stands, 1] = self.options.solver.x_floor * self.top[stands // 2], 0.0
         least = self.options.solver.dip * np.minimum(v[:-2:2, 0], v[2::2, 0])
         dips = 1 + 2 * np.flatnonzero(v[1::2, 0] < least)
         v[dips, 0], v[dips, 1] = least[dips // 2], 0.0
