@@ -61,7 +61,10 @@ def test_unit_and_side_follow_from_size_and_shape(tmp_path, name):
     assert {key: getattr(job.part, key) for key in usual} == usual | expected
     mesh, machine = job_mesh(job), job_machine(job)
     assert mesh.diagnosis.problems == ()
-    assert "problem" not in str(region_report(job, mesh))
+    walls = "block" in name or "plate" in name
+    assert job.part.region_angle_deg == (80.0 if walls else None)
+    assert any("upright walls" in remark for remark in proposal.remarks) == walls
+    assert walls or "problem" not in str(region_report(job, mesh))
     check_reach(job, machine, mesh)
     assert job.axis.mode == "auto"
     assert job.placement.mode == "table"

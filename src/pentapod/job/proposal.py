@@ -32,7 +32,9 @@ class ProposalOptions:
     stepover: as a share of the diameter. steep_deg: slope from which surface counts as steep; waterlines where more
     than `steep` of it is, and less than `flat` of it is too flat for them. sideways: by how much more of the surface
     another side must show than the top. backs: share of an open surface that may face the top where it is turned over.
-    margin: of a box above and below, as a share of the work volume's height.
+    margin: of a box above and below, as a share of the work volume's height. walls_deg, walls: slope from which surface
+    is an upright wall, and share of the region from which walls are left out of a raster, whose passes leave those
+    that are parallel to them.
     """
 
     usual_mm: tuple[float, float] = (5.0, 2000.0)
@@ -46,6 +48,8 @@ class ProposalOptions:
     flat: float = 0.01
     sideways: float = 1.2
     backs: float = 0.05
+    walls_deg: float = 80.0
+    walls: float = 0.001
 
 
 OPTIONS = ProposalOptions()
@@ -101,6 +105,13 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
         raise MeshError("no side of this surface can be machined", file=part, remedy="check the mesh")
     toolpath, tool = _toolpath(patch, direction), _tool(patch, direction)
     toolpath = {**toolpath, "stepover_mm": _rounded(OPTIONS.stepover * tool["diameter_mm"])}
+    if (walls := _walls(patch, direction)) > OPTIONS.walls and toolpath["strategy"] == "raster":
+        table["region_angle_deg"] = OPTIONS.walls_deg
+        reasons["part", "region_angle_deg"] = "upright walls are left out: passes of a raster do not cover all of them"
+        remarks.append(
+            f"upright walls, {100.0 * walls:.2g} % of what faces {side}, are left out (region_angle_deg); "
+            "waterlines with region_angle_deg = 90 machine them"
+        )
     remarks.append(
         f"a ball of {tool['diameter_mm']:g} mm, {toolpath['strategy']}, {toolpath['stepover_mm']:g} mm apart"
     )
@@ -186,6 +197,12 @@ def _toolpath(patch: Patch, direction: Floats) -> dict[str, Any]:
         return {"strategy": "waterline"}
     width, height = np.ptp(patch.vertices[np.unique(patch.faces)] @ np.stack(tangent_frame(direction)).T, axis=0)
     return {"strategy": "raster", "direction_deg": 0.0 if width >= height else 90.0}
+
+
+def _walls(patch: Patch, direction: Floats) -> float:
+    """Return the share of a region's area that is upright, about."""
+    upright = patch.facet_normals @ direction < np.cos(to_si(OPTIONS.walls_deg, "deg"))
+    return float(patch.areas[upright].sum() / patch.areas.sum())
 
 
 def _placement(mesh: Mesh, patch: Patch, direction: Floats, work: WorkVolume) -> dict[str, Any]:
