@@ -112,7 +112,10 @@ def before_and_after(name: str, file: Path) -> str:
         axes.axis("off")
     figure.savefig(file, bbox_inches="tight", metadata={"Software": None})
     plt.close(figure)
-    return f"{1e3 * MOST_LEFT:g} mm or more is left on {shares[0]:.0%} of the surface, and on {shares[1]:.1%}"
+    return (
+        f"{1e3 * MOST_LEFT:g} mm or more stays on {shares[0]:.0%} of the surface to the left, on "
+        f"{shares[1]:.1%} to the right, with what the ball's shape forbids"
+    )
 
 
 def draw(mesh: Mesh, toolpath: Toolpath, file: Path) -> None:
