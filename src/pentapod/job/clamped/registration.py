@@ -33,8 +33,22 @@ from pentapod.registration.result import CutSurface, NotRegistered, Registration
 from pentapod.registration.selection import chosen, rows_of, surface_points
 from pentapod.registration.touches import Touches, read_touches
 
-MOST_PROPOSED = 3
-"""Touches that a refusal proposes."""
+
+@dataclass(frozen=True)
+class ProposalOptions:
+    """Touches that are proposed, and points of the cut surface.
+
+    most: touches at a time. facing: least cosine between a touched surface's normal and the way up. seen: change of a
+    gap for each metre of an open motion from which a touch tells it. facets: of the cut surface, at most.
+    """
+
+    most: int = 3
+    facing: float = -0.1
+    seen: float = 0.05
+    facets: int = 2_000
+
+
+OPTIONS = ProposalOptions()
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +151,7 @@ def cut_surface(job: Job, mesh: Mesh) -> CutSurface:
     """Return points and normals of the surface that a job cuts; of the whole mesh where its region holds nothing."""
     patch = Patch.of(mesh, job_region(job))
     patch = patch if len(patch.faces) else Patch.whole(mesh)
-    count = min(len(patch.faces), 2_000)
+    count = min(len(patch.faces), OPTIONS.facets)
     facets = np.unique(np.linspace(0, len(patch.faces) - 1, count).astype(np.intp))
     points = patch.vertices[patch.faces[facets]].reshape(-1, 3)
     normals = np.repeat(patch.facet_normals[facets], 3, axis=0)
@@ -185,7 +199,7 @@ def _proposals(mesh: Mesh, cut: CutSurface, found: Registration, machine: Machin
     base_is = -1.0 if machine.work.centre[2] > 0.0 else 1.0
     upward = found.placement.rotation.T @ np.array([0.0, 0.0, base_is])
     outward = -1.0 if mesh.diagnosis.inverted else 1.0
-    points, normals = surface_points(mesh, outward * mesh.facet_normals @ upward > -0.1)
+    points, normals = surface_points(mesh, outward * mesh.facet_normals @ upward > OPTIONS.facing)
     if not len(points):
         return points, normals
     rows = rows_of(points, normals, mesh)
@@ -195,9 +209,9 @@ def _proposals(mesh: Mesh, cut: CutSurface, found: Registration, machine: Machin
         goal = open_
         rows = rows @ open_.T @ open_
         seen = np.linalg.norm(rows, axis=1)
-        if seen.max() < 0.05:
+        if seen.max() < OPTIONS.seen:
             return points[:0], normals[:0]
-    take = chosen(rows, goal, found.rows[found.used], MOST_PROPOSED)
+    take = chosen(rows, goal, found.rows[found.used], OPTIONS.most)
     return points[take], normals[take]
 
 
