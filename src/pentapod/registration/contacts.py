@@ -16,10 +16,12 @@ class ContactOptions:
     """edge_deg: angle between the surface's normal and the direction to the ball from which the ball touches an edge.
 
     contact: metres; nearer than this, the direction from the surface to the ball's centre is the surface's normal.
+    around: directions in which a ball is displaced, to see whether it would touch an edge.
     """
 
     edge_deg: float = 20.0
     contact: float = 1e-7
+    around: int = 8
 
 
 OPTIONS = ContactOptions()
@@ -51,6 +53,18 @@ class Contacts:
         on_edge = np.einsum("ij,ij->i", gradients, smooth) < np.cos(np.radians(OPTIONS.edge_deg))
         normals = np.where(on_edge[:, None], gradients, smooth)
         return cls(feet.sides * length - radius, feet.points, gradients, normals, on_edge)
+
+
+def off_edges(surface: MeshDistance, points: Floats, normals: Floats, radius: float, misplaced: float) -> Bools:
+    """Return at which points (N, 3) with normals (N, 3) a ball touches no edge, even if the part is misplaced so far."""
+    sideways = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    first = unit_or_zero(sideways)
+    second = np.cross(normals, first)
+    off = np.ones(len(points), dtype=np.bool_)
+    for angle in 2.0 * np.pi * np.arange(OPTIONS.around) / OPTIONS.around:
+        shift = misplaced * (np.cos(angle) * first + np.sin(angle) * second)
+        off &= ~Contacts.of(surface, points + radius * normals + shift, radius).on_edge
+    return off
 
 
 def smooth_normals(surface: MeshDistance, points: Floats, facets: Ints) -> Floats:

@@ -23,6 +23,7 @@ from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.problem.weights import NEEDED_MARGIN
 from pentapod.program.posts.linuxcnc.trivkins import LETTERS
+from pentapod.registration.contacts import off_edges
 from pentapod.registration.result import CutSurface
 from pentapod.registration.selection import chosen, rows_of, surface_points
 from pentapod.registration.touches import Touches
@@ -38,7 +39,7 @@ class ProbingOptions:
     steepest: angle between the surface's normal and the probe's axis. approach: from the surface, where the slow way to
     it begins; beyond: how far behind the planned surface it ends. above: height over the part between touches; beside:
     free room around the ball there and on the way down. speed, travel: to the surface, and between touches. step:
-    between points at which the way is checked and written.
+    between points at which the way is checked and written. misplaced: how far the part may be from its place.
     """
 
     steepest: float = float(np.radians(80.0))
@@ -49,6 +50,7 @@ class ProbingOptions:
     speed: float = 2e-3
     travel: float = 0.03
     step: float = 2e-3
+    misplaced: float = 3e-3
 
 
 OPTIONS = ProbingOptions()
@@ -113,11 +115,13 @@ def plan_probing(
     world: CollisionWorld,
     head: Touches,
     count: int,
+    misplaced: float = OPTIONS.misplaced,
 ) -> Probing | Refusal:
     """Return touches that tell most of where the cut surface is, and the way to them.
 
     machine: with the probe as its tool; branch: in which it moves; placement: the planned one; world: the probe's body
-    and its obstacles; head: of the list of touches. Refuses where fewer than `count` touches can be reached.
+    and its obstacles; head: of the list of touches; misplaced: how far the part may be from its place, metres: touches
+    stay so far from edges. Refuses where fewer than `count` touches can be reached.
     """
     upright = np.array([0.0, 0.0, -1.0 if branch.w > 0 else 1.0])
     task = _Task(machine, Margins.of(machine, branch, world), surface, placement, upright, head.tip_radius)
@@ -126,12 +130,14 @@ def plan_probing(
     facing = outward * surface.mesh.facet_normals @ axis >= np.cos(OPTIONS.steepest)
     points, normals = surface_points(surface.mesh, facing)
     if len(points):
+        inner = off_edges(surface, points, normals, head.tip_radius, misplaced)
+        points, normals = points[inner], normals[inner]
         free = task.reachable(points, normals)
         points, normals = points[free], normals[free]
     if len(points) < count:
         return Refusal(
             "probing", f"{len(points)} of the tried points can be touched, {count} are asked",
-            remedy="A longer probe, a thinner stylus, fewer touches, or the part elsewhere",
+            remedy="A longer probe, a thinner stylus, fewer touches, a part that is less misplaced, or elsewhere",
         )  # fmt: skip
     rows, goal = rows_of(points, normals, surface.mesh), rows_of(cut.points, cut.normals, surface.mesh)
     take = chosen(rows, goal, np.zeros((0, 6)), count)

@@ -92,6 +92,8 @@ _SIZE = Real(0.0, min_open=True)
               help="Free length of the stylus; it is half as thick as the ball.")  # fmt: skip
 @click.option("--body-diameter", "body_mm", type=_SIZE, default=25.0, show_default=True, metavar="MM",
               help="Of the probe's body above the stylus.")  # fmt: skip
+@click.option("--misplaced", "misplaced_mm", type=_SIZE, default=3.0, show_default=True, metavar="MM",
+              help="How far the part may be from its place: touches stay so far from edges.")  # fmt: skip
 @json_option
 @quiet_option
 def plan(folder: Path, out: Path, count: int, *, as_json: bool, quiet: bool, **given: Any) -> int:
@@ -112,7 +114,7 @@ def plan(folder: Path, out: Path, count: int, *, as_json: bool, quiet: bool, **g
         to_si(given["length_mm"], "mm"), tip, to_si(given["stylus_mm"], "mm"), 0.5 * tip,
         body_radius=0.5 * float(to_si(given["body_mm"], "mm")),
     )  # fmt: skip
-    found = probing_of(folder, probe, count)
+    found = probing_of(folder, probe, count, float(to_si(given["misplaced_mm"], "mm")))
     if isinstance(found, Refusal):
         if as_json:
             echo_json({"planned": False, "refusal": str(found)})

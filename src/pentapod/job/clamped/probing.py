@@ -23,7 +23,7 @@ from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import Component
 from pentapod.machine.clearance.collision_world import CollisionWorld
 from pentapod.mesh.query.distance import MeshDistance
-from pentapod.registration.probing import Probing, plan_probing
+from pentapod.registration.probing import OPTIONS, Probing, plan_probing
 from pentapod.registration.touches import Touches
 
 
@@ -43,8 +43,11 @@ class Probe(Value):
     body_radius: float = 0.0125
 
 
-def probing_of(folder: str | Path, probe: Probe, count: int) -> Probing | Refusal:
-    """Return `count` touches for the part of the run in a folder, clear of part and fixture. Raises InputError."""
+def probing_of(folder: str | Path, probe: Probe, count: int, misplaced: float = OPTIONS.misplaced) -> Probing | Refusal:
+    """Return `count` touches for the part of the run in a folder, clear of part and fixture.
+
+    misplaced: how far the part may be from its place, metres. Raises InputError.
+    """
     file = Path(folder) / ARRAYS
     placement = planned_placement(Path(folder))
     names = (JOB_FILE, "placed.component")
@@ -68,4 +71,4 @@ def probing_of(folder: str | Path, probe: Probe, count: int) -> Probing | Refusa
         empty, machine.tool_length, probe.tip_radius, (), component, machine.name, pose.position_mm, pose.rotation_deg
     )
     surface, cut = MeshDistance.of(mesh), cut_surface(job, mesh)
-    return plan_probing(machine, component, surface, placement, cut, world, head, count)
+    return plan_probing(machine, component, surface, placement, cut, world, head, count, misplaced)
