@@ -140,7 +140,7 @@ def _platform(
             continue
         ring = _add(body, "body", name=f"ring{leg + 1}", pos=height)
         _add(ring, "joint", name=f"ring{leg + 1}", type="hinge", axis="0 0 1", damping=[model.spin_damping])
-        inertia = model.ring_mass * float(real.radii[leg]) ** 2
+        inertia = model.ring_mass * max(float(real.radii[leg]), model.hinge) ** 2  # a speck would not be simulated
         still = [inertia, inertia, inertia]
         _add(ring, "inertial", pos=[0.0, 0.0, 0.0], mass=[model.ring_mass], diaginertia=still)
         for at, place in ((name, off[leg]), (f"{name}side", off[leg] + model.hinge * tangents[leg])):
