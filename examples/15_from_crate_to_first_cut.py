@@ -52,7 +52,7 @@ type = "ball"
 diameter_mm = 6
 
 [toolpath]
-stepover_mm = 6
+stepover_mm = 3
 
 [axis]
 tilt_deg = 15
@@ -161,7 +161,7 @@ def first_cut(out: Path, seed: int) -> tuple[float, float]:
     design = (SHIPPED / "src/pentapod/machine/library/desk.toml").read_text(encoding="utf-8")
     (out / "machine.toml").write_text(design + '\n[calibration]\nfile = "desk-0001.toml"\n', encoding="utf-8")
     # The part: planned where it should stand, found where it stands, planned again.
-    shutil.copy(SHIPPED / "toolpaths/saddle.stl", out / "part.stl")
+    shutil.copy(SHIPPED / "toolpaths/wavy.stl", out / "part.stl")
     (out / "job.toml").write_text(JOB.replace("MACHINE", 'file = "machine.toml"'), encoding="utf-8")
     command("plan", out / "job.toml", "-o", out / "planned", "-q")
     command("register", "plan", out / "planned", "-o", out / "probing", "-q")
