@@ -73,8 +73,9 @@ bench-verify: $(READY)  ## the verdict on a million rows: seconds, memory, again
 bench-view: demo  ## how often a second the viewer judges a part that is dragged, against pose by pose
 	$(BIN)/python benchmarks/view.py
 
-bench-machines: $(READY)  ## figures of the shipped machines, how well power-on tells modes apart, cost of as-built geometry
+bench-machines: $(READY)  ## figures of the shipped machines, how well power-on tells modes apart, cost of as-built geometry, error of a first cut
 	$(BIN)/python benchmarks/machines.py
+	$(BIN)/python examples/15_from_crate_to_first_cut.py
 	$(BIN)/python benchmarks/as_built.py
 
 reference: $(READY)  ## the pages of docs/reference, from the code
