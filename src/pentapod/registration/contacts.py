@@ -56,7 +56,7 @@ class Contacts:
 
 
 def off_edges(surface: MeshDistance, points: Floats, normals: Floats, radius: float, misplaced: float) -> Bools:
-    """Return at which points (N, 3) with normals (N, 3) a ball touches no edge, even if the part is misplaced so far."""
+    """Return at which points (N, 3) with normals (N, 3) a ball touches no edge, though the part is misplaced so far."""
     sideways = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
     first = unit_or_zero(sideways)
     second = np.cross(normals, first)
