@@ -54,8 +54,16 @@ def commands():
     context = click.Context(cli)
     for verb in VERBS:
         command = cli.get_command(context, verb)
-        inner = command.commands.items() if isinstance(command, click.Group) else [(None, command)]
-        yield from ((verb if name is None else f"{verb} {name}", leaf) for name, leaf in inner)
+        yield from leaves(verb, command)
+
+
+def leaves(words, command):
+    """The commands of a group, and of groups in it; or the command itself."""
+    if not isinstance(command, click.Group):
+        yield words, command
+        return
+    for name, inner in command.commands.items():
+        yield from leaves(f"{words} {name}", inner)
 
 
 @pytest.mark.parametrize(

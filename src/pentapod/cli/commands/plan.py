@@ -97,11 +97,15 @@ def shown(outcome: Outcome, out: Path, *, explain: bool, as_json: bool, quiet: b
 
 def _advised(job: Job, options: AdviceOptions, *, as_json: bool, quiet: bool) -> int:
     """Search for advice for a job that is an error, print it, and return the exit code of the error."""
+    from pentapod.base.errors import InputError
     from pentapod.cli.main import EXIT_INPUT
     from pentapod.job.advise import advise
 
-    with progress_bar(quiet=quiet or as_json) as progress:
-        found = advise(job, options=options, progress=progress)
+    try:
+        with progress_bar(quiet=quiet or as_json) as progress:
+            found = advise(job, options=options, progress=progress)
+    except InputError:  # the one that was printed: nothing can be tried before it is mended
+        return EXIT_INPUT
     if as_json:
         echo_json({"advice": [each.to_dict() for each in found.advice], "tried": found.tried})
     click.echo(f"{found.sentence}.", err=True)

@@ -63,7 +63,7 @@ def axis_choices(
         # A cone that is given may be too narrow, or too wide for a tool that cannot tilt.
         cone = {} if own == usual else taken_out(job, "axis", ("tilt_deg",))
         for direction in _directions(job, sketch, constraints):
-            same = axis.mode == "fixed" and np.allclose(normalised(axis.direction), direction, atol=1e-3)
+            same = axis.mode == "fixed" and np.allclose(normalised(axis.direction), direction, atol=0.001)
             # A beam that leans far from the normal burns another spot.
             suits = not 0.0 < lean < float(angle_between(sketch.normals, direction).max())
             if suits and not (same and not cone):

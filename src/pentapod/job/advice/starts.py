@@ -49,7 +49,7 @@ def _of_other_size(job: Job, machine: Machine, mesh: Mesh, options: AdviceOption
     if largest <= options.doubtful * width:
         return []
     if states_unit(job.mesh_path):
-        keys: dict[str, Any] = {"scale": 1e-3 * job.part.scale}
+        keys: dict[str, Any] = {"scale": 0.001 * job.part.scale}
         words = "the numbers of the mesh in mm, not m"
     else:
         known = UNITS[job.part.unit]

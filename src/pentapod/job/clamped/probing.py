@@ -38,7 +38,7 @@ class Probe(Value):
     length: float | None = None
     tip_radius: float = 2e-3
     stylus: float = 0.04
-    stylus_radius: float = 1e-3
+    stylus_radius: float = 0.001
     body: float = 0.03
     body_radius: float = 0.0125
 

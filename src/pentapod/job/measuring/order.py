@@ -13,7 +13,7 @@ from pentapod.base.arrays import Bools, Floats, Ints
 class OrderOptions:
     """blocked: seconds that a way through a limit counts. rounds: of exchanges at most."""
 
-    blocked: float = 1e3
+    blocked: float = 1000.0
     rounds: int = 100
 
 
