@@ -89,6 +89,7 @@ def test_a_part_with_upright_walls_keeps_what_the_raster_left_out(planned):
     assert closest_point(mesh, lifted)[1].min() > 0.98 * radius
 
 
+@pytest.mark.slow  # in the fast lane: refusals of smaller jobs, and their advice
 def test_a_part_too_large_for_the_machine(planned, tmp_path):
     outcome = planned("wavy_vase_open_low_res.stl", 'unit = "mm"', 25)
     assert outcome.refusal is not None

@@ -57,7 +57,11 @@ def test_the_shipped_jobs_show_every_strategy():
     assert shown | {"file"} == set(job_strategies())
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+LONG = ("oversize", "spiral")
+"""Shipped jobs whose toolpaths take long; their strategies have quick tests of their own."""
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in SHIPPED])
 def test_toolpaths_of_shipped_jobs(name):
     job = Job.load(TOOLPATHS / f"{name}.toml")
     toolpath, report = job_toolpath(job, job_mesh(job))
@@ -94,6 +98,7 @@ def test_shipped_jobs(name, tmp_path):
     check_shipped(Job.load(TOOLPATHS / f"{name}.toml"), tmp_path)
 
 
+@pytest.mark.slow  # in the fast lane: refusals of smaller jobs
 def test_the_oversize_job_with_fewer_waypoints(tmp_path):
     shutil.copytree(TOOLPATHS, tmp_path / "toolpaths")
     path = tmp_path / "toolpaths" / "oversize.toml"
