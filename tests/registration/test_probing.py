@@ -47,6 +47,13 @@ def test_the_ball_touches_where_it_should(planned) -> None:
     assert away == pytest.approx(5e-3 * placement.rotate(found.normals), abs=1e-8)
 
 
+def test_touches_stay_off_edges_by_as_much_as_the_part_may_be_misplaced(planned) -> None:
+    given, found = planned[3], planned[4]
+    assert np.abs(found.points[:, :2]).max() <= 0.03 - 2.5e-3  # 3 mm along the surface
+    near = plan_probing(*given, 16, 0.1e-3)
+    assert np.abs(near.points[:, :2]).max() > 0.03 - 1.5e-3
+
+
 def test_the_ways_are_clear_of_the_part_and_within_the_strokes(planned) -> None:
     machine, mesh, placement, _, found = planned
     legs = np.concatenate(found.ways)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self, TypeVar
 
-from pentapod.base.progress import Progress
 from pentapod.base.refusal import Refusal
 from pentapod.base.values import Result, Value
 from pentapod.job.schema.job import Job
@@ -33,24 +31,6 @@ class Stage(Value):
     def with_value(self, value: Any) -> Self:
         """Return the stage with another result."""
         return replace(self, value=value)
-
-
-class StageRunner:
-    """Runs stages and records their names, wall times and results."""
-
-    def __init__(self, progress: Progress) -> None:
-        self.progress = progress
-        self.stages: list[Stage] = []
-
-    def run(self, name: str, stage: Callable[[], T], remark: Callable[[T], str] = lambda _: "") -> T:
-        """Return the result of a stage and record it. remark: returns a text about the result."""
-        self.progress(name, 0.0)
-        start = time.perf_counter()
-        value = stage()
-        seconds = time.perf_counter() - start
-        self.stages.append(Stage(name, seconds, value, remark(value)))
-        self.progress(name, 1.0)
-        return value
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 from scipy.special import stdtrit
 
 from pentapod.base.arrays import Bools, Floats
@@ -35,8 +36,7 @@ class FitOptions:
     there are outliers. many: degrees of freedom that count as all. confidence: of the uncertainties. turns: starts
     about the machine's z axis, for the search of other placements; as_good: how much worse those may fit; same:
     how much worse than the best counts as the same; near, near_angle: metres and radians from the start within which
-    the part is expected. different: standard deviations by which two placements of the
-    surface differ.
+    the part is expected. different: standard deviations by which two placements of the surface differ.
     """
 
     least: int = 7
@@ -154,7 +154,7 @@ class _Task:
         middle = start.apply(self.middle)
         angles = 2.0 * np.pi * np.arange(OPTIONS.turns) / OPTIONS.turns
         over = (np.eye(3), np.diag([1.0, -1.0, -1.0]))
-        turns = [_turn(np.array([0.0, 0.0, angle])) @ half for half in over for angle in angles][1:]
+        turns = [Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix() @ half for half in over for angle in angles][1:]
         return [RigidTransform(turn @ start.rotation, middle - turn @ start.rotation @ self.middle) for turn in turns]
 
     def fitted(self, start: RigidTransform, rows: Bools | None = None) -> _Fitted:
@@ -190,7 +190,7 @@ class _Task:
 
     def _moved(self, placement: RigidTransform, twist: Floats) -> RigidTransform:
         """Return a placement after a motion of the part by a twist (6,), workpiece frame."""
-        turn = _turn(twist[3:] / self.size)
+        turn = Rotation.from_rotvec(twist[3:] / self.size).as_matrix()
         u, _, v = np.linalg.svd(placement.rotation @ turn)
         centre = placement.apply(self.middle + twist[:3])
         return RigidTransform(u @ v, centre - u @ v @ self.middle)
@@ -291,13 +291,3 @@ def _weights(gaps: Floats, rows: Bools | None) -> Floats:
         return rows.astype(np.float64)
     scale = max(1.345 * 1.4826 * float(np.median(np.abs(gaps))), OPTIONS.floor)
     return np.sqrt(np.minimum(1.0, scale / np.maximum(np.abs(gaps), 1e-300)))
-
-
-def _turn(vector: Floats) -> Floats:
-    """Return the rotation (3, 3) about a vector (3,) by its length, radians."""
-    angle = float(np.linalg.norm(vector))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = vector / angle
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * (skew @ skew), dtype=np.float64)

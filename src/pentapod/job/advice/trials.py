@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -169,18 +169,12 @@ class Trials:
 
     def _boxes(self, base: Setting, regions: Regions, *, deep: bool) -> list[Smaller]:
         """Return about the largest box that fits, by bisection, and a smaller one, in case its plan fails."""
-        fits, too_large, near, share = 0.0, 1.0, None, self.options.first
-        for _ in range(self.options.halvings):
+
+        def estimated(share: float, near: Estimate | None) -> Estimate | None:
             smaller = regions.boxed(share, deep=deep)
-            if smaller is not None:
-                near = self._estimated(base.axis, base.place, smaller.sketch, near)
-            if smaller is not None and near is not None and near.margin >= self.options.enough:
-                fits = share
-            else:
-                too_large = share
-            share = 0.5 * (fits + too_large)
-            if share < self.options.least:
-                break
+            return None if smaller is None else self._estimated(base.axis, base.place, smaller.sketch, near)
+
+        fits = self._largest(estimated, self.options.first)
         if fits == 0.0:
             return []
         boxes = (regions.boxed(factor * fits, deep=deep) for factor in (self.options.spare, self.options.smaller))
@@ -221,20 +215,32 @@ class Trials:
     def _scales(self, base: Setting) -> Iterator[Trial]:
         """Yield the largest scale that fits, by bisection; it makes another part."""
         self._tell("a smaller part.scale")
-        fits, too_large, share, near = 0.0, 1.0, 0.5, None
-        for _ in range(self.options.halvings):
-            near = self._estimated(base.axis, base.place, self.sketch.scaled(share), near, obstacles=False)
-            if near.margin >= self.options.enough:
-                fits = share
-            else:
-                too_large = share
-            share = 0.5 * (fits + too_large)
-            if share < self.options.least:
-                break
+
+        def estimated(share: float, near: Estimate | None) -> Estimate:
+            return self._estimated(base.axis, base.place, self.sketch.scaled(share), near, obstacles=False)
+
+        fits = self._largest(estimated, 0.5)
         if fits > 0.0:
             size = self.options.spare * fits
             changes = merged(base.changes, {"part": {"scale": float(f"{size * self.job.part.scale:.3g}")}})
             yield Trial(joined(f"the part at {size:.2g} of its size", base.words), changes, 1.0, 0.0, whole=False)
+
+    def _largest(self, estimated: Callable[[float, Estimate | None], Estimate | None], first: float) -> float:
+        """Return the largest share of the part that fits, by bisection; 0 where none does.
+
+        estimated: takes a share and the estimate before it, None at first, and returns None where nothing is left.
+        """
+        fits, too_large, share, near = 0.0, 1.0, first, None
+        for _ in range(self.options.halvings):
+            found = estimated(share, near)
+            if found is not None and found.margin >= self.options.enough:
+                fits = share
+            else:
+                too_large = share
+            near, share = found or near, 0.5 * (fits + too_large)
+            if share < self.options.least:
+                break
+        return fits
 
     def _estimated(
         self, axis: AxisChoice, place: Place, sketch: Sketch, near: Estimate | None = None, *, obstacles: bool = True
