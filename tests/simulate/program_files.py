@@ -11,7 +11,6 @@ from pentapod.toolpath.formats import write_toolpath
 
 sys.path.append(str(Path(__file__).parents[1] / "program"))
 from short_motion import motion, placed
-
 from usual_job import job_text
 
 

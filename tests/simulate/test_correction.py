@@ -19,6 +19,7 @@ from pentapod.simulate.correction import correction_for
 
 sys.path.append(str(Path(__file__).parents[1] / "program"))
 from servo_runs import contour, played
+
 from short_motion import motion, rise
 
 

@@ -21,6 +21,7 @@ from pentapod.simulate import Reference, contour_errors, simulate_servo
 
 sys.path.append(str(Path(__file__).parents[1] / "program"))
 from servo_runs import LINEAR, played
+
 from short_motion import motion
 
 

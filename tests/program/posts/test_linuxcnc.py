@@ -7,61 +7,26 @@ from __future__ import annotations
 
 import configparser
 import dataclasses
-import fcntl
 import json
 import re
-import shutil
 import subprocess
-import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from short_motion import given, motion, post
 
+from linuxcnc_runs import play, real
 from pentapod.base.errors import InputError, ProgramError
 from pentapod.program import Program
 from pentapod.program.posts import PostInput, write_post
 from pentapod.program.posts.linuxcnc.trivkins import read_gcode
 from pentapod.program.posts.motion import lengths_at
+from short_motion import given, motion, post
 
 MM = 1e3
 AT_THE_LIMIT_S = 0.842
 """So short the motion needs 98 % of the accelerations that the legs have; 0.76 s takes 120 %."""
-
-
-def missing() -> str:
-    if shutil.which("linuxcnc") is None or shutil.which("halrun") is None:
-        return "linuxcnc-uspace is not installed"
-    for words in (["unshare", "--net", "--ipc"], ["unshare", "--map-current-user", "--keep-caps", "--net", "--ipc"]):
-        if subprocess.run([*words, "true"], capture_output=True, check=False).returncode == 0:
-            return ""
-    return "LinuxCNC is only run without a network, and unshare is not allowed here"
-
-
-MISSING = missing()
-real = pytest.mark.skipif(bool(MISSING), reason=MISSING)
-
-
-def play(folder: Path, code: int = 0) -> np.ndarray:
-    """Run a folder's play.sh to its exit code; return what was recorded, without the number of the sample.
-
-    There are no gaps in that number.
-    """
-    log = folder / "test.log"
-    # One at a time on a host: LinuxCNC has one lock file for all.
-    with (Path(tempfile.gettempdir()) / "pentapod-test-linuxcnc.lock").open("w") as lock, log.open("w") as out:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        left = subprocess.run(
-            ["sh", "play.sh"], cwd=folder, stdin=subprocess.DEVNULL, stdout=out, stderr=out, timeout=120, check=False
-        ).returncode
-    text = (folder / "played.txt").read_text() if (folder / "played.txt").exists() else ""
-    assert left == code, log.read_text()[-2000:]
-    assert "overrun" not in text
-    table = np.array([[float(word) for word in line.split()] for line in text.splitlines()])
-    assert (np.diff(table[:, 0]) == 1).all()
-    return table[:, 1:]
 
 
 def ini_of(file: Path) -> configparser.ConfigParser:

@@ -8,7 +8,6 @@ import json
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
-from short_motion import given, passed, post, round_trip
 
 from pentapod.base.errors import InputError, ProgramError
 from pentapod.base.files import packed_arrays
@@ -28,6 +27,7 @@ from pentapod.program.posts import (
 from pentapod.toolpath.formats.npz import toolpath_arrays
 from pentapod.toolpath.linking.partition import Piece
 from plugins import install
+from short_motion import given, passed, post, round_trip
 
 
 def available(name):

@@ -9,13 +9,13 @@ from textwrap import dedent
 
 import numpy as np
 import pytest
-from short_motion import given, passed, post
 
 from pentapod.base.errors import InputError, ProgramError
 from pentapod.cli.main import run
 from pentapod.program import Program, read_csv, write_csv
 from pentapod.program.posts import POSTS, PostInput, read_post, write_post
 from plugins import install
+from short_motion import given, passed, post
 
 MARK = "UNVERIFIED: no verdict has passed this program"
 WITHOUT_COMMENTS = ("cam", "robodk")

@@ -1,0 +1,45 @@
+"""Folders for LinuxCNC, played by the LinuxCNC that is installed, without a network."""
+
+from __future__ import annotations
+
+import fcntl
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+
+def missing() -> str:
+    if shutil.which("linuxcnc") is None or shutil.which("halrun") is None:
+        return "linuxcnc-uspace is not installed"
+    for words in (["unshare", "--net", "--ipc"], ["unshare", "--map-current-user", "--keep-caps", "--net", "--ipc"]):
+        if subprocess.run([*words, "true"], capture_output=True, check=False).returncode == 0:
+            return ""
+    return "LinuxCNC is only run without a network, and unshare is not allowed here"
+
+
+MISSING = missing()
+real = pytest.mark.skipif(bool(MISSING), reason=MISSING)
+
+
+def play(folder: Path, code: int = 0) -> np.ndarray:
+    """Run a folder's play.sh to its exit code; return what was recorded, without the number of the sample.
+
+    There are no gaps in that number.
+    """
+    log = folder / "test.log"
+    # One at a time on a host: LinuxCNC has one lock file for all.
+    with (Path(tempfile.gettempdir()) / "pentapod-test-linuxcnc.lock").open("w") as lock, log.open("w") as out:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        left = subprocess.run(
+            ["sh", "play.sh"], cwd=folder, stdin=subprocess.DEVNULL, stdout=out, stderr=out, timeout=120, check=False
+        ).returncode
+    text = (folder / "played.txt").read_text() if (folder / "played.txt").exists() else ""
+    assert left == code, log.read_text()[-2000:]
+    assert "overrun" not in text
+    table = np.array([[float(word) for word in line.split()] for line in text.splitlines()])
+    assert (np.diff(table[:, 0]) == 1).all()
+    return table[:, 1:]
