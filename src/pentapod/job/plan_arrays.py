@@ -10,9 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pentapod.base.archives import read_arrays
 from pentapod.base.arrays import Floats
+from pentapod.base.errors import InputError
 from pentapod.base.units import from_si, split_key, to_si
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.job.artefacts import ARRAYS
 from pentapod.job.outcome import Outcome
 from pentapod.planning.leg_path.leg_path import LegPath
 from pentapod.planning.placement.placed_path import PlacedPath
@@ -46,6 +49,16 @@ GUIDES = "placed.guides_mm"
 
 WAYPOINTS, BOX = "setup.waypoints", "setup.box_mm"
 """For one of several set-ups: first and last waypoint (2,) and box (2, 3) of its piece of the toolpath."""
+
+
+def job_file_of(folder: Path) -> Path | None:
+    """Return the job file of the run in a folder; None where there is no run, or the file is gone."""
+    file = folder / ARRAYS
+    if not file.is_file():
+        return None
+    arrays = read_arrays(file, (), InputError, optional=(JOB_FILE,))
+    job = folder / str(arrays[JOB_FILE]) if JOB_FILE in arrays else None
+    return job if job is not None and job.is_file() else None
 
 
 def arrays_of(outcome: Outcome, folder: Path) -> Arrays:

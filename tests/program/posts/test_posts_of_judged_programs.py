@@ -118,6 +118,18 @@ def test_a_run_is_posted_as_it_was_planned(make_job, tmp_path, capsys):
     assert not (tmp_path / "jumps").exists()
 
 
+def test_the_run_tells_the_machine_that_has_another_tool(make_job, tmp_path, capsys):
+    job, out = make_job(("diameter_mm = 10", "diameter_mm = 10\nlength_mm = 205")), tmp_path / "out"
+    assert run(["plan", str(job), "-o", str(out), "--quiet"]) == 0
+    words = ["post", str(out / "program.csv"), "--to", "linuxcnc", "-o", str(tmp_path / "posted")]
+    assert run(words) == 0
+    job.rename(tmp_path / "elsewhere.toml")
+    capsys.readouterr()
+    assert run(words) == 2
+    assert "not the machine that the program was made for" in capsys.readouterr().err
+    assert run([*words, "--job", str(tmp_path / "elsewhere.toml")]) == 0
+
+
 def test_the_verdict_may_lie_elsewhere(folder, capsys):
     write_verdict(folder, passed=True)
     (folder / "verdict.json").rename(folder / "mine.json")

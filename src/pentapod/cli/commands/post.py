@@ -60,8 +60,8 @@ def post(
 ) -> int:
     """Write PROGRAM.csv in another format, if a verdict has passed for exactly this file.
 
-    A shipped machine is found by its name in the program. Name another one, or one with another tool or period, by
-    --job or --machine. Installed packages add formats by entry points of the group pentapod.posts.
+    The machine is the shipped one that the program names, or that of the run in PROGRAM's folder. Where the program
+    stands alone, name another one, or one with another tool or period, by --job or --machine. Installed packages add formats by entry points of the group pentapod.posts.
     """
     from pentapod.base.files import sha256_of
     from pentapod.job.artefacts import ARRAYS, VERDICT
@@ -82,7 +82,7 @@ def post(
         toolpath = None if plan is None else placed_toolpath(plan, read)
         progress("reading", 1.0, program.name)
         progress("writing", 0.0, name)
-        given = PostInput(read, _machine(read, job, machine), toolpath, digest)
+        given = PostInput(read, _machine(read, program.parent, job, machine), toolpath, digest)
         files = write_post(given, name, out, verdict=verdict, unverified=unverified)
     if as_json:
         echo_json({"format": name, "verified": not unverified, "files": [str(file) for file in files]})
@@ -92,18 +92,22 @@ def post(
     return 0
 
 
-def _machine(program: Program, job: Path | None, machine: str | None) -> Machine | None:
-    """Return the named machine, or the shipped one that the program names; None where there is none."""
+def _machine(program: Program, folder: Path, job: Path | None, machine: str | None) -> Machine | None:
+    """Return the named machine, the shipped one that the program names, or that of the run in a folder; else None."""
     from pentapod.base.errors import MachineError
     from pentapod.job.build.values import job_machine
+    from pentapod.job.plan_arrays import job_file_of
     from pentapod.job.schema.job import Job
     from pentapod.machine import Machine
 
-    if job is not None:
-        return job_machine(Job.load(job))
-    if machine is not None:
+    if job is None and machine is not None:
         return Machine.load(machine)
-    try:
-        return Machine.load(program.provenance.machine)
-    except MachineError:
-        return None
+    if job is None:
+        try:
+            shipped = Machine.load(program.provenance.machine)
+        except MachineError:
+            shipped = None
+        job = job_file_of(folder)
+        if job is None or (shipped is not None and shipped.digest == program.provenance.machine_digest):
+            return shipped
+    return job_machine(Job.load(job))
