@@ -181,8 +181,7 @@ def first_cut(out: Path, seed: int) -> tuple[float, float]:
     found = out / "found.toml"
     command("register", out / "probing" / "touches.csv", "--job", out / "job.toml", "-o", found)
     command("replan", out / "planned", "--placement", found, "-o", out / "replanned", "-q")
-    command("post", out / "replanned" / "program.csv", "--to", "linuxcnc", "--job",
-            out / "replanned" / "placed-job.toml", "-o", out / "linuxcnc", "-q")  # fmt: skip
+    command("post", out / "replanned" / "program.csv", "--to", "linuxcnc", "-o", out / "linuxcnc", "-q")
     toolpath = job_toolpath(job, mesh, machine=believed)[0]
     calibrated = world.tip_error(read_csv(out / "replanned" / "program.csv"), believed, toolpath)
     # The same as designed, though it is told where the part is.

@@ -122,7 +122,12 @@ def test_outliers_are_named_by_their_lines(usual, capsys) -> None:
 
 WRONG = {
     "millimetres read as metres": ({"scale": 1e-3}, "leg1_mm: a leg beyond its stroke"),
-    "swapped legs": ({"order": [1, 0, 2, 3, 4]}, "the legs do not tell the component"),
+    "swapped legs": ({"order": [1, 0, 2, 3, 4]}, "leg1_mm and leg2_mm are exchanged"),
+    "swapped legs in a known component": (
+        {"order": [0, 4, 2, 3, 1], "head": '# component = "++"\n' + HEAD},
+        "leg2_mm and leg5_mm are exchanged",
+    ),
+    "three legs in wrong order": ({"order": [1, 2, 0, 3, 4]}, "the legs do not tell the component"),
     "no probe": ({"head": HEAD.replace("# probe_length_mm", "# length_mm")}, "unknown key"),
     "a key is missing": ({"head": HEAD.split("\n", 1)[1]}, "probe_length_mm: the key is missing"),
     "another machine": ({"head": '# machine = "steep"\n' + HEAD}, "touches of another machine"),

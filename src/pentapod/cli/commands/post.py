@@ -61,7 +61,8 @@ def post(
     """Write PROGRAM.csv in another format, if a verdict has passed for exactly this file.
 
     The machine is the shipped one that the program names, or that of the run in PROGRAM's folder. Where the program
-    stands alone, name another one, or one with another tool or period, by --job or --machine. Installed packages add formats by entry points of the group pentapod.posts.
+    stands alone, name another one, or one with another tool or period, by --job or --machine. Installed packages add
+    formats by entry points of the group pentapod.posts.
     """
     from pentapod.base.files import sha256_of
     from pentapod.job.artefacts import ARRAYS, VERDICT

@@ -28,6 +28,7 @@ from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.distance import MeshDistance
+from pentapod.registration.exchanged import exchanged_legs
 from pentapod.registration.fit import register
 from pentapod.registration.result import CutSurface, NotRegistered, Registration
 from pentapod.registration.selection import chosen, rows_of, surface_points
@@ -129,10 +130,14 @@ def register_part(
             remedy="name the job of that machine, or take the key out",
         )  # fmt: skip
     start = _start(job, read, near, file)
-    centres = read.centres(used, file)
     progress("registration", 0.0)
     mesh = job_mesh(job, progress)
     surface, cut = MeshDistance.of(mesh), cut_surface(job, mesh)
+    try:
+        centres = read.centres(used, file)
+    except InputError:
+        _check_order(used, read, surface, start, file)
+        raise
     try:
         answer = register(surface, centres, read.tip_radius, start, cut, noise=noise, hold=hold)
     except InputError as error:
@@ -140,11 +145,26 @@ def register_part(
             error.what, file=file, key=error.key, value=error.value, expected=error.expected, remedy=error.remedy
         ) from error
     progress("registration", 1.0)
+    if isinstance(answer, NotRegistered):
+        _check_order(used, read, surface, start, file)
     found = answer.found if isinstance(answer, NotRegistered) else answer
     proposals = _proposals(mesh, cut, found, used) if found is not None else (np.zeros((0, 3)), np.zeros((0, 3)))
     if isinstance(answer, NotRegistered) and found is not None and found.held:
         answer = replace(answer, remedy=_remedy(proposals))
     return FoundPart(job, read, start, answer, proposals)
+
+
+def _check_order(
+    machine: Machine, touches: Touches, surface: MeshDistance, planned: RigidTransform, file: Path | None
+) -> None:
+    """Raise InputError where two legs are in each other's column."""
+    pair = exchanged_legs(machine, touches, surface, planned)
+    if pair is not None:
+        first, second = (f"leg{leg}_mm" for leg in pair)
+        raise InputError(
+            f"{first} and {second} are exchanged: in each other's column, the touches are on the planned part",
+            file=file, line=touches.lines[0] if touches.lines else None, remedy="write each leg into its own column",
+        )  # fmt: skip
 
 
 def cut_surface(job: Job, mesh: Mesh) -> CutSurface:
