@@ -17,8 +17,8 @@ from pentapod.theory.level_set import enclosed_volume
 R = 3e-3
 
 
-def offset(part, distance=R, step=0.25 * R):
-    return offset_surface(FacetTree.of(part), distance, step)
+def offset(part, distance=R, step=0.25 * R, parts=1):
+    return offset_surface(FacetTree.of(part), distance, step, parts)
 
 
 def facets_at_edges(triangles):
@@ -66,6 +66,37 @@ def test_offset_surface_is_sharp_where_two_walls_meet_inside():
     np.testing.assert_allclose(clear, R, atol=1e-9)
 
 
+@pytest.mark.parametrize("shift", [0.0, 2.5e-4])
+def test_a_slot_with_little_play_is_found_between_the_nodes(shift):
+    """Two blocks on a plate, a slot with 0.4 mm of play between them; the step is 0.75 mm."""
+    left, right = 0.02 + shift, 0.02 + shift + 2.0 * R + 4e-4
+    part = joined(
+        box((0.0, 0.0, 0.0), (0.04, 0.01, 0.005)),
+        box((0.0, 0.0, 0.0), (left, 0.01, 0.01)),
+        box((right, 0.0, 0.0), (0.04, 0.01, 0.01)),
+    )
+    found = []
+    for parts in (1, 8):
+        vertices, triangles = offset(part, parts=parts)
+        foot = np.abs(vertices[:, 2] - 0.005 - R) < 1e-6
+        inside = np.abs(vertices[:, 0] - 0.5 * (left + right)) <= 2e-4 + 1e-6
+        found.append(int((foot & inside).sum()))
+        assert all(number % 2 == 0 for number in facets_at_edges(triangles))
+    assert found[0] == 0
+    assert found[1] > 20
+    ends = vertices[foot & inside][:, 1]
+    assert ends.min() < 2e-4
+    assert ends.max() > 0.01 - 2e-4
+    apart = trimesh.proximity.closest_point(trimesh.Trimesh(part.vertices, part.faces, process=False), vertices)[1]
+    np.testing.assert_allclose(apart, R, atol=1e-6)
+
+
+def test_the_grid_stays_as_it_is_where_no_channel_is_narrow():
+    for shape in (trimesh.creation.torus(0.012, 0.004), trimesh.creation.box([0.01] * 3)):
+        part = Mesh.of(shape.vertices, shape.faces)
+        np.testing.assert_array_equal(offset(part)[0], offset(part, parts=8)[0])
+
+
 def test_offset_surface_ignores_what_the_ball_cannot_reach():
     """Neither the mirrored sheet within a part nor that of a cavity is there."""
     outer, inner = box([-0.02] * 3, [0.02] * 3), box([-0.012] * 3, [0.012] * 3)
@@ -100,7 +131,7 @@ def test_offset_of_any_soup_is_closed_and_at_its_distance(seed, count):
     rng = np.random.default_rng(seed)
     corners = rng.uniform(-0.015, 0.015, size=(count, 1, 3)) + rng.uniform(-0.008, 0.008, size=(count, 3, 3))
     part = Mesh.of(corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))
-    vertices, triangles = offset(part)
+    vertices, triangles = offset(part, parts=4)
     assert all(number % 2 == 0 for number in facets_at_edges(triangles))
     apart = trimesh.proximity.closest_point(trimesh.Trimesh(part.vertices, part.faces, process=False), vertices)[1]
     assert np.abs(apart - R).max() < 0.05 * R

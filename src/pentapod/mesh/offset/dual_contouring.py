@@ -3,7 +3,8 @@
 Dual contouring (Ju, Losasso, Schaefer, Warren 2002) puts one vertex into each cell that the surface passes: the
 minimum of the quadric of the points and normals at which it crosses the cell's edges, so that creases and corners come
 out sharp. Where several sheets pass one cell each gets a vertex of its own (Nielson 2004; Schaefer, Ju, Warren 2007).
-Each crossed edge gives two triangles between the vertices of the four cells about it.
+Each crossed edge gives two triangles between the vertices of the four cells about it. Cells may be divided; then the
+edges are the shortest ones, and a cell beside divided ones may be about an edge twice.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ _CORNERS = np.array([[(corner >> axis) & 1 for axis in range(3)] for corner in r
 """The corners (8, 3) of a cell; bit k of a corner's number tells its place along axis k."""
 _EDGES = np.array([(corner, corner | 1 << axis) for axis in range(3) for corner in range(8) if not corner >> axis & 1])
 """The edges (12, 2) of a cell: four along x, four along y, four along z."""
+_AROUND = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+"""How many cells back, along the two axes across an edge, the four cells about it begin, in order about it."""
 _FLAT = 0.05
 """Eigenvalues of the quadric below this share of the largest count as 0: the surface is flat in that direction."""
 
@@ -53,38 +56,70 @@ class Grid:
 class Crossings:
     """Where the surface crosses edges of the grid, one a row.
 
-    keys (E,): of the edges' lower nodes. axes (E,): along which the edges run. outward (E,): whether the lower node is
-    outside. points (E, 3), normals (E, 3): of the surface there, metres and unit, normals outwards.
+    keys (E,): of the edges' lower nodes. axes (E,): along which the edges run. lengths (E,): of the edges, in steps of
+    the grid. outward (E,): whether the lower node is outside. points (E, 3), normals (E, 3): of the surface there,
+    metres and unit, normals outwards.
     """
 
     keys: Ints
     axes: Ints
+    lengths: Ints
     outward: Bools
     points: Floats
     normals: Floats
 
 
-def dual_contour(grid: Grid, keys: Ints, outside: Bools, crossings: Crossings) -> tuple[Floats, Ints, Bools]:
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Cells of a grid, `parts` steps wide, but for some that are divided into cells of one step.
+
+    divided (C,): ascending keys of the lower corners of the divided cells.
+    """
+
+    grid: Grid
+    parts: int
+    divided: Ints
+
+    def about(self, keys: Ints, axes: Ints, lengths: Ints) -> tuple[Ints, Ints]:
+        """Return the keys (E, 4) of the cells about edges (E,), in order about them, and their widths (E, 4) in steps.
+
+        An edge of one step that is not on an edge of an undivided cell has that cell twice.
+        """
+        around = self.grid.strides[np.stack([(axes + 1) % 3, (axes + 2) % 3], axis=1)] @ _AROUND.T
+        cells, width = keys[:, None] - lengths[:, None] * around, np.repeat(lengths[:, None], 4, axis=1)
+        if self.parts > 1:
+            fine = np.flatnonzero(lengths == 1)
+            whole = self.grid.keys(self.grid.nodes(cells[fine]) // self.parts * self.parts)
+            kept = np.isin(whole, self.divided)
+            cells[fine], width[fine] = np.where(kept, cells[fine], whole), np.where(kept, 1, self.parts)
+        return cells, width
+
+
+def dual_contour(cells: Cells, keys: Ints, outside: Bools, crossings: Crossings) -> tuple[Floats, Ints, Bools]:
     """Return vertices (V, 3), triangles (T, 3), facing outwards, and which vertices (V,) lie on a crease or corner.
 
     keys (N,): ascending, of the nodes that are known, among them all corners of the cells about crossings. outside
-    (N,): their states. No vertex lies outside its cell.
+    (N,): their states. No vertex lies outside its cell, but on creases by up to half its width. An undivided cell
+    beside a divided one has one vertex for all sheets of the surface.
     """
+    grid = cells.grid
     strides = grid.strides
-    across = np.stack([(crossings.axes + 1) % 3, (crossings.axes + 2) % 3], axis=1)
-    # The four cells about an edge, in order about it, and the number of the edge within each.
-    around = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
-    cell_keys = crossings.keys[:, None] - strides[across] @ around.T
-    corner = (1 << across[:, :1]) * around[:, 0] + (1 << across[:, 1:]) * around[:, 1]
+    cell_keys, width = cells.about(crossings.keys, crossings.axes, crossings.lengths)
+    # The number of the edge within each of the four cells about it.
+    corner = (1 << (crossings.axes[:, None] + 1) % 3) * _AROUND[:, 0]
+    corner += (1 << (crossings.axes[:, None] + 2) % 3) * _AROUND[:, 1]
     edge = _edge_numbers()[crossings.axes[:, None], corner]
-    cells, cell = np.unique(cell_keys, return_inverse=True)
-    cell = cell.reshape(-1, 4)
-    corners = np.searchsorted(keys, cells[:, None] + _CORNERS @ strides)
+    known, first, cell = np.unique(cell_keys, return_index=True, return_inverse=True)
+    cell, own = cell.reshape(-1, 4), width.ravel()[first]
+    corners = np.searchsorted(keys, known[:, None] + own[:, None] * (_CORNERS @ strides))
     pattern = outside[corners] @ (1 << np.arange(8))
-    sheet = _sheets()[pattern[cell], edge]
+    mixed = np.zeros(len(known), dtype=np.bool_)
+    mixed[cell[width != crossings.lengths[:, None]]] = True
+    sheet = np.where(mixed[cell], 0, _sheets()[pattern[cell], edge])
     vertices, vertex = np.unique(4 * cell + sheet, return_inverse=True)
-    vertex = vertex.reshape(-1, 4)
-    points, sharp = _quadric_minima(crossings, vertex, len(vertices), grid.points(cells[vertices // 4]), grid.step)
+    vertex, of_cell = vertex.reshape(-1, 4), vertices // 4
+    step = (grid.step * own[of_cell][:, None]).astype(np.float64)
+    points, sharp = _quadric_minima(crossings, vertex, len(vertices), grid.points(known[of_cell]), step)
     quads = np.where(crossings.outward[:, None], vertex[:, ::-1], vertex)
     return points, _triangles(points, quads, sharp), sharp
 
@@ -136,10 +171,11 @@ def _sheets() -> Ints:
     return sheets
 
 
-def _quadric_minima(crossings: Crossings, vertex: Ints, count: int, low: Floats, step: float) -> tuple[Floats, Bools]:
+def _quadric_minima(crossings: Crossings, vertex: Ints, count: int, low: Floats, step: Floats) -> tuple[Floats, Bools]:
     """Return for each vertex (V, 3) the point nearest to all its tangent planes, and whether (V,) they form a crease.
 
-    vertex (E, 4): the vertices about each crossing. low (V, 3): the lower corners of their cells.
+    vertex (E, 4): the vertices about each crossing. low (V, 3): the lower corners of their cells, step (V, 1):
+    the cells' widths, metres. On a crease the point may lie half a width outside: the tip of a groove often does.
     """
     owner, row = vertex.ravel(), np.repeat(np.arange(len(vertex)), 4)
 
@@ -159,15 +195,22 @@ def _quadric_minima(crossings: Crossings, vertex: Ints, count: int, low: Floats,
     counts = values > _FLAT * values[:, -1:]
     inverse = np.where(counts, 1.0 / np.where(counts, values, 1.0), 0.0)
     points = middle + np.einsum("vij,vj->vi", ways, inverse * np.einsum("vji,vj->vi", ways, right))
-    return np.clip(points, low, low + step), counts[:, 1]
+    sharp = counts[:, 1]
+    beyond = np.where(sharp[:, None], 0.5 * step, 0.0)
+    return np.clip(points, low - beyond, low + step + beyond), sharp
 
 
 def _triangles(points: Floats, quads: Ints, sharp: Bools) -> Ints:
-    """Return quads (Q, 4) as triangles (2 Q, 3), split between corners on a crease, else along the shorter diagonal."""
+    """Return quads (Q, 4) as triangles (2 Q, 3), split between corners on a crease, else along the shorter diagonal.
+
+    Three corners on one crease are nearly in line: they make no triangle where another split avoids it.
+    """
     a, b, c, d = (points[quads[:, k]] for k in range(4))
-    first = sharp[quads[:, 0]].astype(int) + sharp[quads[:, 2]]
-    second = sharp[quads[:, 1]].astype(int) + sharp[quads[:, 3]]
+    on_a, on_b, on_c, on_d = sharp[quads].T
+    ends = on_a.astype(int) + on_c - on_b - on_d
+    in_line = on_a * on_c * (on_b.astype(int) + on_d) - on_b * on_d * (on_a.astype(int) + on_c)
     shorter = ((a - c) ** 2).sum(axis=1) <= ((b - d) ** 2).sum(axis=1)
-    straight = (first > second) | ((first == second) & shorter)
+    straight = (in_line < 0) | (in_line == 0) & ((ends > 0) | (ends == 0) & shorter)
     p, q, r, s = (np.where(straight, quads[:, k], quads[:, (k + 1) % 4]) for k in range(4))
-    return np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])
+    triangles = np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])
+    return triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]

@@ -16,22 +16,22 @@ _EXACT = 1e-6
 
 @kernel
 def cross_level(
-    starts: Floats, axes: Ints, step: float, level: float, corners: Floats, leaf_starts: Ints, extents: Floats,
+    starts: Floats, axes: Ints, lengths: Floats, level: float, corners: Floats, leaf_starts: Ints, extents: Floats,
     points: Floats, normals: Floats,
 ) -> None:  # fmt: skip
     """Fill where (E, 3) the distance from the mesh is `level` on edges from starts (E, 3), and its gradient there.
 
-    axes (E,): along which the edges run, `step` metres. At one end the distance is above the level, at the other not.
-    Regula falsi with the Illinois rule; bisection where that does not end.
+    axes (E,): along which the edges run. lengths (E,): of the edges, metres. At one end the distance is above the
+    level, at the other not. Regula falsi with the Illinois rule; bisection where that does not end.
     """
     nodes, bounds, away = np.empty(STACK, dtype=np.intp), np.empty(STACK), np.zeros(6)
     p, facet = np.empty(3), -1
     for m in range(len(starts)):
-        axis, low, high, side = axes[m], 0.0, step, 0
+        axis, low, high, side = axes[m], 0.0, lengths[m], 0
         p[:] = starts[m]
         distance, facet = closest(p[0], p[1], p[2], np.inf, facet, corners, leaf_starts, extents, nodes, bounds, away)
         at_low = distance - level
-        p[axis] = starts[m, axis] + step
+        p[axis] = starts[m, axis] + lengths[m]
         distance, facet = closest(p[0], p[1], p[2], np.inf, facet, corners, leaf_starts, extents, nodes, bounds, away)
         at_high = distance - level
         for number in range(_ROUNDS):

@@ -4,6 +4,7 @@ It is where the centre of a ball is that rolls over the part without cutting int
 distance changes by no more than the way, so a block of cells whose middle is further from the level than its corners
 are from the middle holds none of it. Nodes that are not reached from the grid's border are inside, whatever their
 distance: neither the mirrored sheet within a closed part nor cavities count. Any mesh will do, open ones and soups too.
+Where narrow channels run between the nodes, the grid is made finer (`refinement`).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.base.errors import MeshError
 from pentapod.mesh.offset.dual_contouring import Crossings, Grid, dual_contour
+from pentapod.mesh.offset.refinement import Edges, Nodes, divided, indices, missed_cells
 from pentapod.mesh.query.tree import FacetTree
 
 MOST_NODES, MOST_BLOCKS = 30_000_000, 60_000_000
@@ -29,24 +31,41 @@ _ROUNDS, _ON_LEVEL = 3, 1e-11
 """How often a vertex is moved onto the level along the line to its closest point, while it is off by this share."""
 
 
-def offset_surface(tree: FacetTree, distance: float, step: float) -> tuple[Floats, Ints]:
+def offset_surface(tree: FacetTree, distance: float, step: float, parts: int = 1) -> tuple[Floats, Ints]:
     """Return vertices (V, 3) and triangles (T, 3), facing outwards, of what is `distance` metres from a mesh's facets.
 
-    step: metres between the grid's nodes, at most a quarter of the distance; channels in which a ball of that radius
-    has less play than this may be closed. Vertices lie on the level, but near creases, where they are within a share of
-    a step of it. Raises MeshError where the grid would have more nodes than MOST_NODES.
+    step: metres between the grid's nodes, at most a quarter of the distance. parts: how many times finer the grid is
+    where a channel, in which a ball of that radius has less play than a step, runs between the nodes; 1: it may be
+    closed, as one with less play than the finer step may be. Vertices lie on the level, but near creases, where they
+    are within a share of a step of it. Raises MeshError where the grid would have more nodes than MOST_NODES.
     """
     grid, groups = _grid(tree, distance, step)
     keys, outside, wide = _nodes(tree, grid, groups, distance)
-    outside = _reached(grid, keys, outside, wide)
-    rows, axes = _crossed(grid, keys, outside)
-    starts = grid.points(keys[rows])
-    points, normals = np.empty_like(starts), np.empty_like(starts)
+    nodes = Nodes.of(grid, keys, outside)
+    vertices, triangles = _contour(tree, nodes, wide, distance)
+    if parts > 1 and len(missed := missed_cells(tree, nodes, vertices, distance)):
+        parts = min(parts, int((MOST_NODES / len(missed)) ** (1.0 / 3.0)))
+        return _contour(tree, divided(tree, nodes, missed, parts, distance), wide, distance)
+    return vertices, triangles
+
+
+def _contour(tree: FacetTree, nodes: Nodes, wide: Bools, distance: float) -> tuple[Floats, Ints]:
+    """Return vertices (V, 3) and triangles (T, 3) of the level between known nodes, of what is reached from outside.
+
+    wide: blocks of the grid outside and not near the level.
+    """
     from pentapod.mesh.offset.offset_kernels import cross_level  # noqa: PLC0415  loads numba
 
-    cross_level(starts, axes, grid.step, distance, tree.corners, tree.starts, tree.extents, points, normals)
-    crossings = Crossings(keys[rows], axes, outside[rows], points, normals)
-    vertices, triangles, _ = dual_contour(grid, keys, outside, crossings)
+    cells, edges = nodes.cells, nodes.edges()
+    outside = _reached(nodes, edges, wide)
+    crossed = outside[edges.first] != outside[edges.last]
+    rows, axes, lengths = edges.first[crossed], edges.axes[crossed], edges.lengths[crossed]
+    starts = cells.grid.points(nodes.keys[rows])
+    points, normals = np.empty_like(starts), np.empty_like(starts)
+    metres = (cells.grid.step * lengths).astype(np.float64)
+    cross_level(starts, axes, metres, distance, tree.corners, tree.starts, tree.extents, points, normals)
+    crossings = Crossings(nodes.keys[rows], axes, lengths, outside[rows], points, normals)
+    vertices, triangles, _ = dual_contour(cells, nodes.keys, outside, crossings)
     return onto_level(tree, vertices, distance, _ROUNDS, _ON_LEVEL), triangles
 
 
@@ -115,13 +134,11 @@ def _nodes(tree: FacetTree, grid: Grid, groups: Ints, level: float) -> tuple[Int
     return keys, ~tree.within(grid.points(keys), level), wide
 
 
-def _reached(grid: Grid, keys: Ints, outside: Bools, wide: Bools) -> Bools:
+def _reached(nodes: Nodes, edges: Edges, wide: Bools) -> Bools:
     """Return which nodes (N,) outside are connected, along edges of the grid, with what is beyond its border."""
-    pairs: list[Ints] = []
-    for stride in grid.strides:
-        after = _index(keys, keys + stride)
-        first = np.flatnonzero((after >= 0) & outside)
-        pairs.append(np.stack([first, after[first]])[:, outside[after[first]]])
+    keys, outside = nodes.keys, nodes.outside
+    both = outside[edges.first] & outside[edges.last]
+    pairs = [np.stack([edges.first[both], edges.last[both]])]
     # Connected wide blocks are one node of the graph each; the first holds the border, which is padded around them.
     label = np.zeros(np.array(wide.shape) + 2, dtype=np.int32)
     count = int(ndimage.label(np.pad(wide, 1, constant_values=True), output=label))  # pyright: ignore[reportArgumentType]
@@ -131,25 +148,10 @@ def _reached(grid: Grid, keys: Ints, outside: Bools, wide: Bools) -> Bools:
         one = (a > 0) != (b > 0)
         face = _BLOCK * (np.argwhere(one) - 1) + _BLOCK // 2
         face[:, axis] += _BLOCK // 2
-        index = _index(keys, grid.keys(face))
+        index = indices(keys, nodes.cells.grid.keys(nodes.cells.parts * face))
         pairs.append(np.stack([index, len(keys) - 1 + np.maximum(a, b)[one]])[:, index >= 0])
     joined = np.concatenate(pairs, axis=1)
     size = len(keys) + count
     graph = coo_array((np.ones(joined.shape[1], dtype=np.bool_), (joined[0], joined[1])), shape=(size, size))
     piece = connected_components(graph, directed=False)[1]
     return outside & (piece[: len(keys)] == piece[len(keys)])
-
-
-def _index(keys: Ints, wanted: Ints) -> Ints:
-    """Return where (M,) wanted keys stand among ascending ones, −1 where they do not."""
-    at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    return np.where(keys[at] == wanted, at, -1)
-
-
-def _crossed(grid: Grid, keys: Ints, outside: Bools) -> tuple[Ints, Ints]:
-    """Return the edges with one end outside: rows (E,) of their lower nodes, and the axes (E,) along which they run."""
-    rows: list[Ints] = []
-    for stride in grid.strides:
-        after = _index(keys, keys + stride)
-        rows.append(np.flatnonzero((after >= 0) & (outside != outside[after])))
-    return np.concatenate(rows), np.repeat(np.arange(3), [len(r) for r in rows])

@@ -27,8 +27,9 @@ class CreaseOptions:
     by more than this angle, radians. touch: distance from a pass, as a share of the ball's radius, at which the pass
     crosses a crease. gap: distance along a crease between passes that cross it from which it is followed, in stepovers.
     join: longest way between the ends of two lines that are one, in edges of the mesh; where a crease runs aslant
-    through the mesh, some of its edges are blunt. shortest: line, in radii of the ball; closed ones, such as the foot
-    of a narrow pit, may be shorter.
+    through the mesh, some of its edges are blunt. same: ends that are nearer to each other, as a share of that way, are
+    one point, whichever way one lies from the other. shortest: line, in radii of the ball; closed ones, such as the
+    foot of a narrow pit, may be shorter.
     """
 
     sharpest: float = float(np.radians(30.0))
@@ -36,6 +37,7 @@ class CreaseOptions:
     touch: float = 0.05
     gap: float = 1.04
     join: float = 3.0
+    same: float = 0.1
     shortest: float = 1.0
 
 
@@ -56,15 +58,15 @@ def crease_lines(patch: Patch, sharpest: float | None = None, options: CreaseOpt
         lines.append((patch.vertices[vertices], normals[vertices]))
     sides = patch.vertices[edges[chosen, 1]] - patch.vertices[edges[chosen, 0]]
     longest = options.join * float(np.median(np.linalg.norm(sides, axis=1))) if len(sides) else 0.0
-    lines = joined_ends(lines, longest, options.corner)
+    lines = joined_ends(lines, longest, options.corner, options.same * longest)
     return Passes.of(lines, np.arange(len(lines)))
 
 
-def joined_ends(lines: list[Line], longest: float, corner: float) -> list[Line]:
+def joined_ends(lines: list[Line], longest: float, corner: float, same: float = 0.0) -> list[Line]:
     """Return lines, points and normals (n, 3), joined end to end where they go on within `longest` metres.
 
     The nearest ends first. Neither line turns by more than `corner` radians against the other, or against the way
-    between them.
+    between them; ends within `same` metres become one.
     """
     if len(lines) < 2:
         return lines
@@ -76,7 +78,7 @@ def joined_ends(lines: list[Line], longest: float, corner: float) -> list[Line]:
     a, b = pairs.T
     way = ends[b] - ends[a]
     length = np.linalg.norm(way, axis=1)
-    on = length > 1e-3 * longest
+    on = length > same
     least = np.cos(corner)
     suits = -(out[a] * out[b]).sum(axis=1) > least
     suits &= ~on | ((out[a] * way).sum(axis=1) > least * length) & (-(out[b] * way).sum(axis=1) > least * length)
@@ -92,11 +94,15 @@ def joined_ends(lines: list[Line], longest: float, corner: float) -> list[Line]:
         while at >= 0 and not done[at // 2]:
             done[at // 2] = True
             step = 1 if at % 2 == 0 else -1
-            parts.append((lines[at // 2][0][::step], lines[at // 2][1][::step]))
+            points, normals = lines[at // 2][0][::step], lines[at // 2][1][::step]
+            again = int(bool(parts) and float(np.linalg.norm(points[0] - parts[-1][0][-1])) <= same)
+            parts.append((points[again:], normals[again:]))
             leaving = at ^ 1
             at = int(other[leaving])
         if parts:
             if at >= 0:  # a ring
+                again = int(float(np.linalg.norm(parts[0][0][0] - parts[-1][0][-1])) <= same)
+                parts[-1] = parts[-1][0][: len(parts[-1][0]) - again], parts[-1][1][: len(parts[-1][1]) - again]
                 parts.append((parts[0][0][:1], parts[0][1][:1]))
             result.append(tuple(np.concatenate([part[k] for part in parts]) for k in range(2)))  # type: ignore[arg-type]
     return result

@@ -21,18 +21,20 @@ from pentapod.mesh.query.tree import FacetTree
 class DriveOptions(Value):
     """How a drive surface is made and used.
 
-    step: of the grid, as a share of the ball's radius; narrower channels may be closed. on_level: as a
-    share of the radius, how near to the offset a point is put. rounds: of moving it there, and of halving chords.
-    window: length over which normals are averaged along a line, as a share of the radius: at creases they jump.
-    border: how exactly an open border is known, as a share of the radius; enters: how far beyond it the ball gets where
-    it is no hole. longest: of a link on the surface, as a multiple of the straight way; uneven: of its longest step.
-    around: longest link around what is in the way, as a multiple of the straight way and twice the clearance.
-    sideways: distance around a point at which the surface above must hide it, above: by which height, both as
-    shares of the radius: walls, and valleys between steep flanks, do not hide themselves. evened: how often the
-    stepover for a scallop is averaged with that of neighbouring facets, whose curvature is noisy.
+    step: of the grid, as a share of the ball's radius. parts: how many times finer it is in channels between its
+    nodes; narrower ones may be closed. on_level: as a share of the radius, how near to the offset a point is put.
+    rounds: of moving it there, and of halving chords. window: length over which normals are averaged along a line,
+    as a share of the radius: at creases they jump. border: how exactly an open border is known, as a share of the
+    radius; enters: how far beyond it the ball gets where it is no hole. longest: of a link on the surface, as a
+    multiple of the straight way; uneven: of its longest step. around: longest link around what is in the way, as a
+    multiple of the straight way and twice the clearance. sideways: distance around a point at which the surface
+    above must hide it, above: by which height, both as shares of the radius: walls, and valleys between steep
+    flanks, do not hide themselves. evened: how often the stepover for a scallop is averaged with that of
+    neighbouring facets, whose curvature is noisy.
     """
 
     step: float = 0.25
+    parts: int = 8
     on_level: float = 1e-7
     rounds: int = 30
     window: float = 1.0

@@ -65,7 +65,7 @@ class DriveSurface:
         known = _KNOWN.setdefault(part, {})
         if (radius, options) not in known:
             tree = FacetTree.of(part)
-            vertices, faces = offset_surface(tree, radius, options.step * radius)
+            vertices, faces = offset_surface(tree, radius, options.step * radius, options.parts)
             # A line goes on over creases of the drive surface: no edge of it parts passes.
             mesh = Mesh.of(vertices, faces, source=part.diagnosis.source, crease_angle=np.pi)
             known[radius, options] = tree, mesh
