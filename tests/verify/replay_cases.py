@@ -238,11 +238,16 @@ def given_bounds(position, direction, deviations=0.0, axis_deviations=0.0, speed
 
 
 def given_match(samples, waypoints, **given):
-    """A matching of that many samples with that many waypoints, as it is given; what is not is zero."""
+    """A matching of that many samples with that many waypoints, as it is given; what is not is zero.
+
+    Between samples the path turns evenly, unless `waypoint_turned` is given.
+    """
     of_waypoints = ("times", "waypoint_distances", "waypoint_angles")
     of_samples = ("places", "arcs", "turned", "distances", "angles")
     zeros = {name: np.zeros(waypoints) for name in of_waypoints} | {name: np.zeros(samples) for name in of_samples}
-    return PathMatch(**(zeros | {name: np.asarray(values) for name, values in given.items()}))
+    match = zeros | {name: np.asarray(values) for name, values in given.items()}
+    even = {"waypoint_turned": np.interp(match["times"], np.arange(samples), match["turned"])}
+    return PathMatch(**(even | match))
 
 
 def measured(toolpath, tilt_centres, axes=None, *, bounds=None, match=None, machine=STAND, legs=None, **changes):

@@ -92,6 +92,22 @@ def test_what_the_axis_turns_between_samples_counts():
     assert found.passed
 
 
+def test_a_turn_of_the_path_by_way_of_waypoints_counts_in_their_steps():
+    """The path turns by 1 rad between samples 1 and 2 while the tool is still: ten waypoints, 0.1 rad apart."""
+    turns = np.linspace(0.0, 1.0, 11)
+    given = {
+        "times": np.concatenate([[0.0], 1.0 + turns, [4.0]]),
+        "turned": [0.0, 0.0, 1.0, 1.0, 1.0],
+        "waypoint_turned": np.concatenate([[0.0], turns, [1.0]]),
+        "waypoint_distances": np.zeros(13),
+        "waypoint_angles": np.concatenate([[0.5], 0.5 + 0.5 * turns, [1.0]]),
+        "angles": [0.5, 0.5, 1.0, 1.0, 1.0],
+    }
+    found = axis_deviation(replay(waypoints=((0.0,) * 3,) * 3, **given))
+    exact, step = 1.0, 0.01 / 8.0 + 0.001 / 50.0
+    assert exact + 0.03 < np.radians(found.value) < exact + 0.03 + 1.2 * step
+
+
 @pytest.mark.parametrize(("angles", "value"), [([0.0, 0.06, 0.0], 0.06 + 0.02), ([0.0, 0.0, 0.06], 0.06 + 0.01)])
 def test_the_axis_at_a_waypoint_counts_where_it_is_worse(angles, value):
     found = axis_deviation(replay(waypoint_angles=np.array(angles)))

@@ -65,21 +65,22 @@ def coverage(replay: Replay) -> Finding:
 
 def axis_deviation(replay: Replay) -> Finding:
     """Judge the angle between the tool and the nominal axis of the toolpath."""
-    match = replay.match
-    own = in_blocks(angle_between, replay.axes[:-1], replay.axes[1:])
+    match, count = replay.match, len(replay.axes)
+    # Events: samples, and waypoints at their times. Between two of them the path turns on one arc.
+    times = np.concatenate([np.arange(count), match.times])
+    turned = np.concatenate([match.turned, match.waypoint_turned])
+    order = np.lexsort((turned, times))
+    times, angles = times[order], np.concatenate([match.angles, match.waypoint_angles])[order]
+    chord = np.minimum(times[:-1].astype(np.intp), count - 2)
+    own, path = in_blocks(angle_between, replay.axes[:-1], replay.axes[1:])[chord], np.diff(turned[order])
     # Straight lines between vectors are farthest apart at an end. Their distance from the arc of unit vectors is at
     # most its height: an eighth of the angle squared. At the time of a waypoint the motion's vector is off the arc too.
     # Along the arc they lag behind by less than a fiftieth of the angle cubed (lemma 14 of docs/proofs.md).
-    path = np.diff(match.turned)
     rise = 0.25 * own**2 + 0.125 * path**2 + path**3 / 50.0
-    deviations = replay.interval_bounds.axis_deviations
-    at_sample = angle_bound(match.angles, at_samples(rise), at_samples(deviations))
-    chord = np.minimum(match.times.astype(np.intp), len(deviations) - 1)
-    at_waypoint = angle_bound(match.waypoint_angles, rise[chord], deviations[chord])
-    worst, worst_waypoint = int(np.argmax(at_sample)), int(np.argmax(at_waypoint))
-    value, sample = float(at_sample[worst]), float(worst)
-    if at_waypoint[worst_waypoint] > value:
-        value, sample = float(at_waypoint[worst_waypoint]), float(match.times[worst_waypoint])
+    deviations = replay.interval_bounds.axis_deviations[chord]
+    bounds = angle_bound(angles, at_samples(rise), at_samples(deviations))
+    worst = int(np.argmax(bounds))
+    value, sample = float(bounds[worst]), float(times[worst])
     tilt, tolerance = replay.specification.tilt, replay.specification.axis_tolerance
     method = (
         "proven bound for all times on the angle to the nominal axis at the matched place (on great circles between "

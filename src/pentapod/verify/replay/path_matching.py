@@ -48,15 +48,16 @@ class PathMatch:
 
     times (n,): when each waypoint is passed, in samples (2.25 is a quarter of the way from sample 2 to 3),
     non-decreasing. places (M,): the place of each sample, in waypoints, non-decreasing. arcs (M,): the same as arc
-    length of the tilt centre's polyline, metres. turned (M,): how far the path's axis turns up to there, radians.
-    distances (M,), waypoint_distances (n,) in metres and angles (M,), waypoint_angles (n,) in radians: between the
-    matched tilt centres and axes.
+    length of the tilt centre's polyline, metres. turned (M,), waypoint_turned (n,): how far the path's axis turns up to
+    there, radians. distances (M,), waypoint_distances (n,) in metres and angles (M,), waypoint_angles (n,) in radians:
+    between the matched tilt centres and axes.
     """
 
     times: Floats
     places: Floats
     arcs: Floats
     turned: Floats
+    waypoint_turned: Floats
     distances: Floats
     waypoint_distances: Floats
     angles: Floats
@@ -161,12 +162,13 @@ def _measure(
     chord = np.minimum(times.astype(np.intp), len(motion.points) - 2)
     at = (times - chord)[:, None]
     pointed = motion.axes[chord] * (1.0 - at) + motion.axes[chord + 1] * at
-    waypoints = np.arange(len(path.points))
+    waypoints, turned = np.arange(len(path.points)), np.concatenate([[0.0], np.cumsum(turns)])
     return PathMatch(
         times=times,
         places=places,
         arcs=np.interp(places, waypoints, arc_length(path.points)),
-        turned=np.interp(places, waypoints, np.concatenate([[0.0], np.cumsum(turns)])),
+        turned=np.interp(places, waypoints, turned),
+        waypoint_turned=turned,
         distances=distances,
         waypoint_distances=np.linalg.norm(points_at(motion.points, times) - path.points, axis=1),
         angles=angles,
