@@ -15,9 +15,11 @@ from pentapod.job import Job, run
 from pentapod.job.build.placement import job_constraints
 from pentapod.job.build.reach import check_reach
 from pentapod.job.build.region import region_report
+from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.proposal import propose
 from pentapod.machine.machine import Machine
+from pentapod.toolpath import SegmentKind
 
 DESK = Machine.load("desk")
 
@@ -57,14 +59,16 @@ def inside_out(shape):
 def test_unit_and_side_follow_from_size_and_shape(tmp_path, name):
     make, expected = SHAPES[name]
     job, proposal = proposed(tmp_path, make())
-    usual = {"unit": "mm", "flip": False, "repair": False, "region_direction": (0.0, 0.0, 1.0), "region_box_mm": None}
+    usual = {"unit": "mm", "flip": False, "repair": False, "region_direction": (0.0, 0.0, 1.0)}
     assert {key: getattr(job.part, key) for key in usual} == usual | expected
     mesh, machine = job_mesh(job), job_machine(job)
     assert mesh.diagnosis.problems == ()
     walls = "block" in name or "plate" in name
-    assert job.part.region_angle_deg == (80.0 if walls else None)
+    assert job.part.region_angle_deg is None
+    assert job.toolpath.steep_deg == (60.0 if walls else None)
     assert any("upright walls" in remark for remark in proposal.remarks) == walls
-    assert walls or "problem" not in str(region_report(job, mesh))
+    assert (job.part.region_box_mm is not None) == walls
+    assert "problem" not in str(region_report(job, mesh))
     check_reach(job, machine, mesh)
     assert job.axis.mode == "auto"
     assert job.placement.mode == "table"
@@ -81,6 +85,27 @@ def test_the_middle_of_the_region_stands_in_the_middle_of_the_work_volume(tmp_pa
         up = np.ptp(heights) * 0.5 * 1e3
         assert DESK.work.centre[2] * 1e3 == pytest.approx(job.placement.table_z_mm - up, abs=0.02)
         assert constraints.moves
+
+
+def test_walls_are_machined_down_to_where_the_ball_would_reach_into_the_table(tmp_path):
+    job, proposal = proposed(tmp_path, SHAPES["block"][0]())
+    mesh, ball = job_mesh(job), 0.5e-3 * job.tool.diameter_mm
+    low, high = np.sort(1e-3 * np.array(job.part.region_box_mm), axis=0)
+    assert low[2] - mesh.bounds[0][2] == pytest.approx(ball, abs=1e-5)
+    assert (low[:2] < mesh.bounds[0][:2]).all()
+    assert (high > mesh.bounds[1]).all()
+    assert any("into the table" in remark for remark in proposal.remarks)
+    toolpath, _ = job_toolpath(job, mesh)
+    centres = np.concatenate([s.tips + ball * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT])
+    assert centres[:, 2].min() - ball >= mesh.bounds[0][2] - 1e-5
+    beside = centres[centres[:, 2] < mesh.bounds[1][2]]
+    # On all four sides, and from the top of the walls to their foot, in waterlines no farther apart than a stepover.
+    assert {tuple(np.sign(np.round(c[:2] / (mesh.bounds[1][:2] + 0.99 * ball), 0)).astype(int)) for c in beside} >= {
+        (1, 0), (-1, 0), (0, 1), (0, -1)
+    }  # fmt: skip
+    lines = np.unique(np.round(beside[:, 2], 6))
+    assert lines.min() < mesh.bounds[0][2] + ball + 0.6e-3 * job.toolpath.stepover_mm
+    assert np.diff(lines).max() < 1.01e-3 * job.toolpath.stepover_mm
 
 
 def test_steep_surfaces_get_waterlines_and_long_ones_passes_along_them(tmp_path):

@@ -33,8 +33,8 @@ class ProposalOptions:
     than `steep` of it is, and less than `flat` of it is too flat for them. sideways: by how much more of the surface
     another side must show than the top. backs: share of an open surface that may face the top where it is turned over.
     margin: of a box above and below, as a share of the work volume's height. walls_deg, walls: slope from which surface
-    is an upright wall, and share of the region from which walls are left out of a raster, whose passes leave those
-    that are parallel to them.
+    is an upright wall, and share of the region from which walls are machined in waterlines beside a raster, whose
+    passes leave those that are parallel to them.
     """
 
     usual_mm: tuple[float, float] = (5.0, 2000.0)
@@ -106,12 +106,14 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
     toolpath, tool = _toolpath(patch, direction), _tool(patch, direction)
     toolpath = {**toolpath, "stepover_mm": _rounded(OPTIONS.stepover * tool["diameter_mm"])}
     if (walls := _walls(patch, direction)) > OPTIONS.walls and toolpath["strategy"] == "raster":
-        table["region_angle_deg"] = OPTIONS.walls_deg
-        reasons["part", "region_angle_deg"] = "upright walls are left out: passes of a raster do not cover all of them"
-        remarks.append(
-            f"upright walls, {100.0 * walls:.2g} % of what faces {side}, are left out (region_angle_deg); "
-            "waterlines with region_angle_deg = 90 machine them"
-        )
+        toolpath["steep_deg"] = OPTIONS.steep_deg
+        reasons["toolpath", "steep_deg"] = "upright walls get waterlines: passes of a raster do not cover all of them"
+        remarks.append(f"upright walls, {100.0 * walls:.2g} % of what faces {side}, get waterlines (steep_deg)")
+    if box is None and (above := _above_the_foot(mesh, patch, direction, tool)) is not None:
+        table["region_box_mm"] = [[_rounded(v) for v in corner] for corner in from_si(above, "mm")]
+        reasons["part", "region_box_mm"] = "lower down the ball would reach below the part; leave it out on a riser"
+        low = _rounded(0.5 * tool["diameter_mm"])
+        remarks.append(f"the lowest {low:g} mm are left: the ball would reach into the table (region_box_mm)")
     remarks.append(
         f"a ball of {tool['diameter_mm']:g} mm, {toolpath['strategy']}, {toolpath['stepover_mm']:g} mm apart"
     )
@@ -203,6 +205,20 @@ def _walls(patch: Patch, direction: Floats) -> float:
     """Return the share of a region's area that is upright, about."""
     upright = patch.facet_normals @ direction < np.cos(to_si(OPTIONS.walls_deg, "deg"))
     return float(patch.areas[upright].sum() / patch.areas.sum())
+
+
+def _above_the_foot(mesh: Mesh, patch: Patch, direction: Floats, tool: dict[str, Any]) -> Floats | None:
+    """Return the box (2, 3) of a solid without its lowest ball radius; None where no steep surface reaches so low."""
+    radius = 0.5 * float(to_si(tool["diameter_mm"], "mm"))
+    heights, foot = patch.vertices @ direction, float((mesh.vertices @ direction).min())
+    steep = patch.facet_normals @ direction < np.cos(to_si(OPTIONS.steep_deg, "deg"))
+    if not mesh.diagnosis.watertight or not steep.any() or heights[patch.faces[steep]].min() >= foot + radius:
+        return None
+    frame = np.stack([*tangent_frame(direction), direction])
+    points, margin = mesh.vertices @ frame.T, radius
+    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    low[2] = foot + radius
+    return np.sort(np.array([low, high]) @ frame, axis=0)
 
 
 def _placement(mesh: Mesh, patch: Patch, direction: Floats, work: WorkVolume) -> dict[str, Any]:

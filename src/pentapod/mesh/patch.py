@@ -118,7 +118,7 @@ class Patch:
             centres = patch.vertices[patch.faces].mean(axis=1)
             bound = 2.0 * width + size
             close = np.isfinite(np.asarray(tree.query(centres, distance_upper_bound=bound)[0]))
-            patch = Patch(*compacted(patch.vertices, patch.faces[close]), patch.normals[close])
+            patch = patch.only(close)
             if size <= longest:
                 break
             size = max(0.5 * size, longest)
@@ -170,6 +170,10 @@ class Patch:
                     values = (side * (patch.vertices[:, axis] - float(bound)))[patch.faces]
                     patch = patch._trimmed(values, linear_root(values))
         return patch
+
+    def only(self, facets: Bools) -> Patch:
+        """Return the part that consists of the facets (F,) marked."""
+        return Patch(*compacted(self.vertices, self.faces[facets]), self.normals[facets])
 
     def where_normals(self, quantity: Callable[[Floats], Floats]) -> Patch:
         """Return the part where a quantity of the normal, (..., 3) to (...), is not negative."""

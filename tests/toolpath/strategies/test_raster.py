@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,6 +18,7 @@ from pentapod.toolpath import (
     STRATEGIES,
     BallCutter,
     BullNose,
+    CrossHatchOptions,
     FlatEnd,
     HeightField,
     Mesh,
@@ -362,3 +365,30 @@ def test_a_million_facets(tmp_path):
     assert (distance <= 1.05 * 0.5 * 5e-4).mean() >= 0.999
     cuts, _ = of_kind(toolpath, SegmentKind.CUT)
     assert np.abs(cuts[:, 2] - waves(cuts[:, 0], cuts[:, 1])).max() < 1e-6
+
+
+@pytest.mark.parametrize("tool", [BALL, TOOL], ids=["ball", "flat"])
+@pytest.mark.parametrize("kind", [RasterOptions, CrossHatchOptions])
+def test_steep_areas_get_waterlines_in_place_of_passes(kind, tool):
+    """A ridge along the passes, with flanks of 75° and a flat top, over a floor."""
+    mesh = Mesh.of(*surfaces.grid(lambda x, y: np.clip(0.05 - 3.7 * np.abs(y), 0.0, 0.02) + 0.0 * x, 0.04, 74))
+    options = kind(stepover=2e-3, region=Region(angle=np.radians(89.0)), steep=np.radians(60.0))
+    toolpath, report = toolpath_with_report(mesh, tool, options)
+    cuts = [s.tips + tool.tilt_centre * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT]
+    slopes = [s.axes @ options.up for s in toolpath.segments if s.kind is SegmentKind.CUT]
+    steep = [line for line, slope in zip(cuts, slopes, strict=True) if slope.max() < np.cos(np.radians(65.0))]
+    assert any("steeper than 60 deg" in note for note in report.notes)
+    assert len(steep) >= 2 * 8
+    assert max(np.ptp(line[:, 2]) for line in steep) < 1e-4
+    # No pass crosses the flanks: on them all motion is level.
+    for line, slope in zip(cuts, slopes, strict=True):
+        flank = slope < np.cos(np.radians(74.0))
+        assert np.abs(np.diff(line[:, 2])[flank[1:] & flank[:-1]]).max(initial=0.0) < 1e-4
+    without = make_toolpath(mesh, tool, replace(options, steep=None))
+    assert len(without.segments) != len(toolpath.segments)
+
+
+def test_narrow_steep_areas_go_with_what_is_around_them():
+    step = Mesh.of(*surfaces.grid(lambda x, y: 0.001 * (y > 0.0) + 0.0 * x, 0.02, 40))
+    options = RasterOptions(stepover=2e-3, region=Region(angle=np.radians(89.0)), steep=np.radians(60.0))
+    assert toolpath_with_report(step, TOOL, options)[1].notes == ()

@@ -9,7 +9,8 @@ import numpy as np
 
 from pentapod.base.keys import Key
 from pentapod.mesh.passes import Passes
-from pentapod.toolpath.strategies.raster import RasterOptions, raster_paths
+from pentapod.mesh.patch import Patch
+from pentapod.toolpath.strategies.raster import RasterOptions, parallel_paths, with_waterlines
 from pentapod.toolpath.strategy import ContactPaths, Strategy
 from pentapod.toolpath.surface import Surface
 
@@ -25,8 +26,12 @@ class CrossHatchOptions(RasterOptions):
 
 def cross_hatch_paths(surface: Surface, options: CrossHatchOptions) -> ContactPaths:
     """Return the passes of a raster along `direction`, then those of one turned by `angle`. Raises as a raster."""
-    first = raster_paths(surface, options)
-    second = raster_paths(surface, replace(options, direction=options.direction + options.angle)).passes
+    return with_waterlines(surface, options, lambda patch: _crossed(surface, patch, options))
+
+
+def _crossed(surface: Surface, patch: Patch, options: CrossHatchOptions) -> ContactPaths:
+    first = parallel_paths(surface, patch, options)
+    second = parallel_paths(surface, patch, replace(options, direction=options.direction + options.angle)).passes
     # An empty level between both: the second raster does not continue the last pass of the first.
     gap = int(first.passes.levels.max()) + 2
     second = replace(second, levels=second.levels + gap)

@@ -1,9 +1,10 @@
-"""Raster: parallel plane slices of a surface, to and fro, one way, uphill or downhill."""
+"""Raster: parallel plane slices of a surface, to and fro, one way, uphill or downhill; waterlines on steep areas."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated
@@ -19,6 +20,7 @@ from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.slicing import LevelSet
 from pentapod.toolpath.lines.gap_filling import GapOptions, gap_lines, lines_as_sources
 from pentapod.toolpath.lines.scallop import level_values
+from pentapod.toolpath.lines.steep_areas import steep_facets
 from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.strategy import ContactPaths, Order, Strategy, region_patch
 from pentapod.toolpath.surface import Surface
@@ -44,25 +46,60 @@ class RasterOptions(CoverOptions):
     """Parallel plane slices.
 
     direction: of the passes, about the view, from its x axis towards its y axis. For the view +z these are x and y; for
-    other views see `geometry.tangent_frame`. pattern: see `Pattern`.
+    other views see `geometry.tangent_frame`. pattern: see `Pattern`. steep: areas whose normals are farther from the
+    view, radians, are cut in waterlines in place of the passes, which lie beside each other or leave gaps there; None
+    for none.
     """
 
     direction: Annotated[float, Key("deg", "direction of the passes, from +x towards +y", ge=-360.0, le=360.0)] = 0.0
     pattern: Annotated[Pattern | str, Key("", "cut both ways, one way, or only where passes rise or fall")] = (
         Pattern.ZIGZAG
     )
+    steep: Annotated[
+        float | None,
+        Key("deg", "steeper areas are machined in waterlines; none when left out", gt=0.0, lt=90.0),
+    ] = None
 
 
 def raster_paths(surface: Surface, options: RasterOptions) -> ContactPaths:
     """Return parallel passes over the region of a mesh.
 
     The passes lie in planes along the view, closer together where the surface is steep across them, so that the
-    stepover along the surface is nowhere exceeded. The first and last lie half a step inside the region. Raises
-    ToolpathError for an empty region, a scallop that does not suit the tool, or passes that are too dense.
+    stepover along the surface is nowhere exceeded. The first and last lie half a step inside the region. Steep areas
+    may have waterlines instead: see `with_waterlines`. Raises ToolpathError for an empty region, a scallop that does
+    not suit the tool, or passes that are too dense.
     """
+    return with_waterlines(surface, options, lambda patch: parallel_paths(surface, patch, options))
+
+
+def with_waterlines(surface: Surface, options: RasterOptions, paths: Callable[[Patch], ContactPaths]) -> ContactPaths:
+    """Return the paths over the region, with waterlines in place of them on areas steeper than `options.steep`.
+
+    The waterlines come last. Raises as `raster_paths`.
+    """
+    whole = region_patch(surface, options)
+    if options.steep is None:
+        return paths(whole)
+    narrow = float(surface.steps(whole, options.up, options).max())
+    steep = steep_facets(whole, options.up, options.steep, narrow)
+    if not steep.any():
+        return paths(whole)
+    lines, stepover = plane_lines(surface, whole.only(steep), options, options.up)
+    first = None if steep.all() else paths(whole.only(~steep))
+    share, degrees = float(whole.areas[steep].sum() / whole.areas.sum()), np.degrees(options.steep)
+    notes = (f"{100.0 * share:.2g} % of the region is steeper than {degrees:.3g} deg: waterlines there",)
+    if first is None:
+        return ContactPaths(lines, stepover, Order.ZIGZAG, notes=notes)
+    # An empty level between both: the waterlines do not continue the last pass.
+    lines = replace(lines, levels=lines.levels + int(first.passes.levels.max()) + 2)
+    passes = Passes.joined([first.passes, lines])
+    return replace(first, passes=passes, stepover=max(first.stepover, stepover), notes=(*first.notes, *notes))
+
+
+def parallel_paths(surface: Surface, patch: Patch, options: RasterOptions) -> ContactPaths:
+    """Return parallel passes over a patch. Raises as `raster_paths`."""
     x, y = tangent_frame(options.up)
     along = math.cos(options.direction) * x + math.sin(options.direction) * y
-    patch = region_patch(surface, options)
     passes, stepover = plane_lines(surface, patch, options, np.cross(options.up, along))
     if options.pattern is Pattern.ZIGZAG:
         return ContactPaths(passes, stepover, Order.ZIGZAG)
