@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 
 from pentapod.base.errors import ArrayError
-from pentapod.kinematics import Component, LinearPentapod, prove_chords, prove_tip_tube
+from pentapod.kinematics import AsBuiltPentapod, Component, LinearPentapod, prove_chords, prove_tip_tube
 from pentapod.kinematics.proofs.krawczyk_kernels import angle_within
 
 BASE = np.array([[-0.552, -0.229], [-0.312, 0.510], [0.155, 0.577], [0.429, -0.417], [-0.078, -0.563]])
@@ -75,6 +75,25 @@ def test_no_moment_leaves_the_bounds(degree, step):
     assert (found.platform_cosines[..., 0] <= platform.min(axis=0)).all()
     assert (found.platform_cosines[..., 1] >= platform.max(axis=0)).all()
     assert (found.platform_cosines[..., 1] <= platform.max(axis=0) + 6.0 * step + 1e-10).all()
+
+
+def test_speed_of_legs_on_rings_is_bounded_to_a_thousandth():
+    """Straight ways of up to 1 mm."""
+    machine = AsBuiltPentapod.of(ROBOT, radii=[0.03, 0.01, 0.02, 0.025, 0.03], base_errors=2e-4, zeros=3e-4)
+    random = np.random.default_rng(5)
+    pose = POSE + 0.1 * random.uniform(-1, 1, (40, 1, 5))
+    pose = pose + 1e-3 * random.uniform(-1, 1, (40, 1, 5)) * np.linspace(0.0, 1.0, 4)[:, None]
+    readings = machine.leg_lengths(pose[..., :3], direction(pose[..., 3], pose[..., 4]))
+    t, m = np.linspace(0.0, 1.0, 4)[:, None], np.arange(4)
+    bernstein = np.array([1.0, 3.0, 3.0, 1.0]) * t**m * (1.0 - t) ** (3 - m)
+    legs, component = np.einsum("mk,hkj->hjm", np.linalg.inv(bernstein), readings), Component.parse("++")
+    start, end = (machine.pose(legs[..., k], component) for k in (0, -1))
+    found = prove_chords(machine, legs, start, end, component, offsets=OFFSETS, base_axes=BASE_AXES)
+    assert found.proven.all()
+    points = [p[:, None] + OFFSETS[:, None] * i[:, None] for p, i in (start, end)]
+    mean = np.linalg.norm(points[1] - points[0], axis=-1)
+    assert (mean <= found.speeds + 1e-9).all()
+    assert (found.speeds <= 1.001 * mean + 1e-9).all()
 
 
 @pytest.mark.parametrize("degree", [1, 3])

@@ -24,6 +24,9 @@ from pentapod.kinematics.proofs.krawczyk_kernels import (
 from pentapod.kinematics.proofs.ring_kernels import norm, ring_bend, ring_swing
 from pentapod.numerics.kernels import kernel
 
+RING_VALUE, RING_SLOPE = 0.00802, 0.5
+"""Shares of max |ρ'''| by which the quadratic polynomial and its derivative may be off: lemma 15 of docs/proofs.md."""
+
 
 @kernel
 def chords(
@@ -131,7 +134,7 @@ def line_residuals(
 ) -> None:
     """Fill G along the line (6, 2k + 1): ½ (|D|² − l²) of each leg and ½ (|i|² − 1), as Bernstein coefficients.
 
-    For a ring ½ r² − r ρ is added, with ρ interpolated linearly from start to end.
+    For a ring ½ r² − r ρ is added, with ρ interpolated by a quadratic polynomial from start, middle and end.
     """
     for j in range(5):
         _square(first[j], second[j], squares_up, residual[j])
@@ -143,8 +146,9 @@ def line_residuals(
     if rings is not None:
         last = residual.shape[1] - 1
         for j in range(5):
+            middle = 2.0 * rings[j, 2] - 0.5 * (rings[j, 0] + rings[j, 1])
             for m in range(last + 1):
-                far = rings[j, 0] + m / last * (rings[j, 1] - rings[j, 0])
+                far = squares_up[0, m] * rings[j, 0] + squares_up[1, m] * middle + squares_up[2, m] * rings[j, 1]
                 residual[j, m] += rings[j, 8] * (0.5 * rings[j, 8] - far)
 
 
@@ -168,7 +172,7 @@ def line_corrections(
             slack[r] += rounding * abs(inverse[r, n])
         if rings is not None:
             for n in range(5):
-                slack[r] += 0.125 * rings[n, 8] * rings[n, 4] * abs(inverse[r, n])
+                slack[r] += RING_VALUE * rings[n, 8] * rings[n, 4] * abs(inverse[r, n])
         y[r] = 0.0
         for m in range(e.shape[1]):
             e[r, m] = 0.0
@@ -200,6 +204,9 @@ def _derivatives(
     q = C (J(x) − J(x̃)) x̃', and |f + e'| ≤ |q| + |1 − C J| |f|.
     """
     size, degree = geometry[5, 2], de.shape[1]
+    widened = 4.0 * degree  # what the rounding in slack adds to e'
+    if rings is not None:
+        widened = max(widened, RING_SLOPE / RING_VALUE)
     least, q, moved = np.empty(6), np.empty(6), np.zeros(6)
     for n in range(3):
         moved[5] += bound[3 + n] * (abs(step[3 + n]) + ROUND)
@@ -212,7 +219,7 @@ def _derivatives(
                 region, length = ring_region(spread[j], spread_i, abs(geometry[j, 3])), (norm(step[:3]), norm(step[3:]))
                 moved[j] += rings[j, 8] * ring_bend(rings[j], region, (norm(bound[:3]), norm(bound[3:])), length)
     for r in range(6):
-        q[r] = 4.0 * degree * slack[r]  # ρ' is within |ρ''| / 2 of its mean: four times what slack counts of it
+        q[r] = widened * slack[r]
         for j in range(6):
             q[r] += abs(inverse[r, j]) * moved[j]
         largest = 0.0

@@ -25,8 +25,8 @@ def ring_line(
     """Add −r ∇ρ in the middle of the line to the Jacobian's row (6,); fill ring (9,) for one leg.
 
     first, second (3,): the vectors from the base joint to the ring's centre at both ends. ring: ρ at the start, at the
-    end and in the middle, |d| in the middle, a bound of |ρ''| on the line, and the unit vector (3,) in the middle along
-    which the ring's centre is r farther than the point where the leg ends; last r, which is given.
+    end and in the middle, |d| in the middle, a bound of |ρ'''| on the line, and the unit vector (3,) in the middle
+    along which the ring's centre is r farther than the point where the leg ends; last r, which is given.
     """
     i0, i1 = start[3:], end[3:]
     ring[0] = norm(_cross(first, i0))
@@ -40,7 +40,9 @@ def ring_line(
     moved, turned = norm(shift), norm(turn)
     change = LONGEST_DIRECTION * moved + (ring[3] + moved) * turned
     nearest = ring[2] - 0.5 * change
-    ring[4] = 2.0 * moved * turned + change * change / nearest if nearest > NEAREST * ring[3] else np.inf
+    ring[4] = np.inf
+    if nearest > NEAREST * ring[3]:
+        ring[4] = 3.0 * change / nearest * (2.0 * moved * turned + change * change / nearest)
     normal /= ring[2]
     by_position, by_direction = _cross(i, normal), _cross(normal, d)
     for n in range(3):
