@@ -2,7 +2,8 @@
 
 A cutter can clear a point if it can contain the point, stay out of the part, and be retracted straight along the view.
 For a ball only its centre counts: at least a radius from the part, at most a radius from the point. Such a centre is
-searched for by alternating projections. Other cutters are tried in a few positions.
+searched for by alternating projections; for a point that the ball cannot contain, the nearest one, by halving the
+distance. Other cutters are tried in a few positions.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pentapod.base.arrays import Bools, Floats
 from pentapod.geometry.directions import normalised, tangent_frame
 from pentapod.geometry.solids import Solid
 from pentapod.mesh.query.distance import MeshDistance
+from pentapod.mesh.query.heightfield import HeightField
 from pentapod.mesh.query.swept_depth import TouchingBody, sweep, touch
 
 
@@ -25,7 +27,8 @@ class ReachOptions:
     projections: at most so many alternating projections for each start; slack_m: their tolerance. around: directions
     about the normal, or about the axis, that are tried. places: positions on the end of the cutter that are tried, as
     shares of its flat part and of its rounding. depth_m: depth of a cutter that is not a ball that counts as none, as
-    its sweep is not exact.
+    its sweep is not exact. halvings, near_m: of the distance of the nearest centre, and how near to it is enough.
+    above_m: height of the points whose view is tested.
     """
 
     projections: int = 24
@@ -33,45 +36,93 @@ class ReachOptions:
     around: int = 8
     places: tuple[tuple[float, float], ...] = ((0.0, 0.0), (1.0, 0.0), (1.0, 0.6), (1.0, 0.9), (0.5, 0.0))
     depth_m: float = 2e-5
+    halvings: int = 14
+    near_m: float = 5e-6
+    above_m: float = 1e-5
 
 
-def ball_reaches(
+def nearest_centres(
     surface: MeshDistance,
     points: Floats,
     normals: Floats,
     radius: float,
     view: Floats,
+    beyond: Floats,
     options: ReachOptions = ReachOptions(),
-) -> Bools:
-    """Return which points (N, 3) a ball can contain without gouging the part, and be retracted along `view` from there.
+) -> Floats:
+    """Return the centres (N, 3) nearest to points (N, 3) at which a ball gouges nowhere and can be retracted.
 
-    normals (N, 3): unit, of the surface below each point; the search starts along them.
+    The nearest that a search finds, NaN where it finds none. normals (N, 3): unit, of the surface below; the search
+    starts along them. beyond (k ≥ 2,): ascending from 0, metres by which a first centre may be farther than a radius.
     """
-    slack = options.slack_m
-    reached = np.zeros(len(points), dtype=np.bool_)
-    for start in _starts(normals, view, options.around):
-        open_ = np.flatnonzero(~reached)
+    centres, low = np.full(points.shape, np.nan), np.zeros(len(points))
+    field = HeightField(surface.mesh, view)
+    for height in beyond:
+        open_ = np.flatnonzero(np.isnan(centres[:, 0]))
+        # A ball that is retracted along the view sweeps a convex room: from each of its points the view is free. What
+        # is hidden even at the first height is out of reach, and does not answer for what hides it.
+        at = points[open_] + (min(height, float(beyond[1])) + options.above_m) * normals[open_]
+        open_ = open_[~field.hides(at, options.above_m)]
+        for start in _starts(normals[open_], view, options.around)[: None if height > 0.0 else 1]:
+            todo = np.isnan(centres[open_, 0])
+            rows = open_[todo]
+            if len(rows):
+                within = np.full(len(rows), radius + height)
+                first = points[rows] + (radius + height) * start[todo]
+                centres[rows] = _settled(surface, points[rows], normals[rows], first, within, radius, view, options)
+    high = np.linalg.norm(centres - points, axis=1) - radius
+    for _ in range(options.halvings):
+        open_ = np.flatnonzero(high - low > options.near_m)
         if not len(open_):
             break
-        x, c = points[open_], points[open_] + radius * start[open_]
-        todo = np.arange(len(x))
-        for _ in range(options.projections):
-            gap = surface.points(c[todo], within=radius)
-            short, offset = radius - gap.distance, c[todo] - x[todo]
-            far = (short > slack) | (np.linalg.norm(offset, axis=1) > radius + slack)
-            todo, offset = todo[far], offset[far] + np.maximum(short, 0.0)[far, None] * gap.normal[far]
-            if not len(todo):
-                break
-            off = np.linalg.norm(offset, axis=1, keepdims=True)
-            c[todo] = x[todo] + np.where(off > radius, radius / np.maximum(off, 1e-300), 1.0) * offset
-        held = surface.points(c, within=radius).distance >= radius - slack
-        held &= np.linalg.norm(c - x, axis=1) <= radius + slack
-        kept = np.flatnonzero(held)
-        if len(kept):
-            out = c[kept] + _way_out(surface, radius) * view
-            free = surface.segments(c[kept], out, within=radius).distance >= radius - 2.0 * slack
-            reached[open_[kept[free]]] = True
-    return reached
+        middle = 0.5 * (low[open_] + high[open_])
+        within = radius + middle
+        made = _settled(surface, points[open_], normals[open_], centres[open_], within, radius, view, options)
+        better = ~np.isnan(made[:, 0])
+        low[open_[~better]] = middle[~better]
+        hit = open_[better]
+        centres[hit] = made[better]
+        high[hit] = np.minimum(np.linalg.norm(centres[hit] - points[hit], axis=1) - radius, middle[better])
+    return centres
+
+
+def _settled(
+    surface: MeshDistance,
+    points: Floats,
+    normals: Floats,
+    centres: Floats,
+    within: Floats,
+    radius: float,
+    view: Floats,
+    options: ReachOptions,
+) -> Floats:
+    """Return clear centres (N, 3) near the given ones, `within` (N,) metres of points (N, 3), to be retracted; or NaN.
+
+    By alternating projections on what is a radius from the part and on what is within that distance of the point. The
+    part must not be between: a ball behind a thin wall says nothing of this side.
+    """
+    slack, c = options.slack_m, centres.copy()
+    todo = np.arange(len(c))
+    for _ in range(options.projections):
+        gap = surface.points(c[todo], within=radius)
+        short, offset, most = radius - gap.distance, c[todo] - points[todo], within[todo]
+        far = (short > slack) | (np.linalg.norm(offset, axis=1) > most + slack)
+        todo, offset = todo[far], offset[far] + np.maximum(short, 0.0)[far, None] * gap.normal[far]
+        if not len(todo):
+            break
+        off, most = np.linalg.norm(offset, axis=1, keepdims=True), most[far, None]
+        c[todo] = points[todo] + np.where(off > most, most / np.maximum(off, 1e-300), 1.0) * offset
+    held = surface.points(c, within=radius).distance >= radius - slack
+    held &= np.linalg.norm(c - points, axis=1) <= within + slack
+    kept = np.flatnonzero(held)
+    if len(kept):
+        out = c[kept] + _way_out(surface, radius) * view
+        held[kept] = surface.segments(c[kept], out, within=radius).distance >= radius - 2.0 * slack
+        way = c[kept] - points[kept]
+        start = points[kept] + options.above_m * way / np.linalg.norm(way, axis=1, keepdims=True)
+        held[kept] &= surface.segments(start, c[kept], within=slack).distance >= slack
+        held[kept] &= np.einsum("ij,ij->i", way, normals[kept]) > 0.0
+    return np.where(held[:, None], c, np.nan)
 
 
 def body_reaches(

@@ -3,6 +3,10 @@
 The region is subdivided into cells until each is proven covered: at the height that may be left, above every point of
 the cell, one convex piece of the swept volume has been. Cells for which this cannot be proven are halved until they are
 small; then their middle decides. The message gives the area of those cells.
+
+Where the cutter touches the part, such a cell is missed. Where its shape must leave material (a fillet narrower than
+the ball, the foot of a wall), what counts is what is left beyond that: the cell is missed if more than the job allows
+is left above the limit surface (`limit_surface.py`), along the normal of that.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from pentapod.mesh.patch import Patch
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
-from pentapod.verify.surface.reachable import ball_reaches, body_reaches
+from pentapod.verify.surface.limit_surface import LimitSurface, is_ball_end
 from pentapod.verify.surface.swept_cutter import SweptSolid
 from pentapod.verify.verdict.coverage import Coverage
 from pentapod.verify.verdict.cutting import Cutting
@@ -32,8 +36,8 @@ class SurfaceOptions:
     coarse: size of the first cells as a share of what one position of the cutter covers; finest: ratio to the smallest
     ones; cells: no cell is smaller than the region divided by so many. near_m, near_share: deviation of the motion from
     a straight stretch, in metres or as a share of what may be left. balls, bodies: at most so many cells that are left
-    are tested for reachability, for a ball and for other cutters, each for its share of the area. far: radii of the
-    cutter along the normal up to which material is measured. above_m: height of the points whose view is tested.
+    are compared with the limit surface, for a ball and for other cutters, each for its share of the area. far: radii of
+    the cutter along the normal up to which material is measured.
     """
 
     coarse: float = 0.25
@@ -44,7 +48,6 @@ class SurfaceOptions:
     balls: int = 2048
     bodies: int = 256
     far: float = 4.0
-    above_m: float = 1e-5
 
 
 OPTIONS = SurfaceOptions()
@@ -54,14 +57,18 @@ OPTIONS = SurfaceOptions()
 class _Left:
     """What is left on a region.
 
-    Areas, square metres: missed, where the tool could have been; beyond, where it could not; between, where only the
-    middles of cells show that no more is left. cell: largest width of those, metres. deepest: largest height along the
-    normal that is left where the tool could have been, metres, measured up to `far`; place (3,): where. gap: largest
-    distance of the cutter from where it could have been, 0 where nothing is missed.
+    Areas, square metres: missed, where the tool could have been; beyond, where no room for it is found; shaped, where
+    its shape must leave material, and only what is left beyond that was judged; between, where only the middles of
+    cells show that no more is left. shape: the largest height that the shape leaves there. cell: largest width of those
+    cells, metres. deepest: largest height along the normal that is left where the tool could have been, metres,
+    measured up to `far`; place (3,): where. gap: largest distance of the cutter from where it could have been, 0 where
+    nothing is missed.
     """
 
     missed: float
     beyond: float
+    shaped: float
+    shape: float
     between: float
     cell: float
     deepest: float
@@ -120,60 +127,45 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
     met = most <= height
     between = float(areas[met].sum())
     middles, normals, areas = middles[~met], normals[~met], areas[~met]
-    by_ball = all(_is_ball_end(replay, solid) for solid in solids[:1])
-    chosen = _chosen(areas, OPTIONS.balls if by_ball else OPTIONS.bodies)
-    middles, normals, weights = middles[chosen], normals[chosen], areas[chosen]
-    reachable = _reachable(replay, coverage, cutting, middles + height * normals, normals)
-    weights = weights * (areas.sum() / max(weights.sum(), 1e-300))
-    missed = float(weights[reachable].sum())
+    by_ball = all(is_ball_end(replay, solid) for solid in solids[:1])
+    chosen, weights = _chosen(areas, OPTIONS.balls if by_ball else OPTIONS.bodies)
+    middles, normals = middles[chosen], normals[chosen]
+    limit = LimitSurface.above(replay, coverage, cutting, middles, normals)
+    known = np.isfinite(limit.heights)
+    above, middles, weights, unknown = limit.where(known), middles[known], weights[known], float(weights[~known].sum())
     heights, gaps = np.full(len(middles), OPTIONS.far * reach), np.full(len(middles), np.inf)
     for one in swept:
-        one.entries(middles, normals, heights)
-        one.distances(middles, gaps)
+        one.entries(above.points, above.normals, heights)
+        one.distances(above.points, gaps)
+    own = np.flatnonzero((above.heights == 0.0) | (heights > height))
+    shaped = above.heights > 0.0
     deepest, place, gap = float(highest[0]), highest[1:], 0.0
-    if reachable.any():
-        own = np.flatnonzero(reachable)
+    if len(own):
         worst = own[np.lexsort((gaps[own], heights[own] if cutting.cutter else gaps[own]))[-1]]
         gap = max(float(gaps[own].max()), 0.0)
         if heights[worst] > deepest:
             deepest, place = float(heights[worst]), middles[worst]
-    return _Left(missed, float(weights.sum()) - missed, between, 2.0 * fine, deepest, place, gap, OPTIONS.far * reach)
+    return _Left(
+        float(weights[own].sum()),
+        unknown,
+        float(weights[shaped].sum()),
+        float(above.heights.max(initial=0.0)),
+        between,
+        2.0 * fine,
+        deepest,
+        place,
+        gap,
+        OPTIONS.far * reach,
+    )
 
 
-def _chosen(areas: Floats, most: int) -> Ints:
-    """Return a sample of the cells, evenly by area; all where they are few."""
+def _chosen(areas: Floats, most: int) -> tuple[Ints, Floats]:
+    """Return a sample of the cells, evenly by area, and the area that each stands for; all where they are few."""
     if len(areas) <= most:
-        return np.arange(len(areas))
+        return np.arange(len(areas)), areas
     edges = np.cumsum(areas)
-    return np.unique(np.searchsorted(edges, (np.arange(most) + 0.5) * edges[-1] / most))
-
-
-def _reachable(replay: Replay, coverage: Coverage, cutting: Cutting, points: Floats, normals: Floats) -> Bools:
-    """Return which points (N, 3), above the surface with these normals, the tool can reach."""
-    surface = cutting.surface
-    if not len(points):
-        return np.zeros(0, dtype=np.bool_)
-    if not cutting.cutter:
-        # A beam along the view reaches only what the view sees.
-        size = float(np.linalg.norm(np.ptp(surface.bounds, axis=0)))
-        start = points + OPTIONS.above_m * normals
-        return np.asarray(
-            surface.segments(start, start + 2.0 * size * coverage.up, within=OPTIONS.above_m).distance > 0.0
-        )
-    for solid in cutting.cutter:
-        if _is_ball_end(replay, solid):
-            return ball_reaches(surface, points, normals, solid.rounding, coverage.up)
-    axes = replay.axes[_nearest_samples(replay, points)]
-    reached = body_reaches(surface, cutting.cutter, points, axes, normals)
-    rest = np.flatnonzero(~reached)
-    if len(rest):
-        reached[rest] = body_reaches(surface, cutting.cutter, points[rest], normals[rest], normals[rest])
-    return reached
-
-
-def _is_ball_end(replay: Replay, solid: Solid) -> bool:
-    """Return whether a solid is the ball about the tilt centre."""
-    return solid.is_ball and solid.low == replay.toolpath.tilt_centre
+    chosen, hits = np.unique(np.searchsorted(edges, (np.arange(most) + 0.5) * edges[-1] / most), return_counts=True)
+    return chosen, hits * (edges[-1] / most)
 
 
 def _on_cuts(replay: Replay) -> Bools:
@@ -203,11 +195,16 @@ def _method(found: _Left, coverage: Coverage, area: float, *, beam: bool) -> str
         text += f"; deepest found {deepest}{MM * found.deepest:.3g} mm at {where}"
         text += f", where the cutter is up to {MM * found.gap:.3g} mm away" if found.gap > 0.0 else ""
         hidden = "is out of reach for the cutter, as far as the search finds"
+    cells = f"of cells of {MM * found.cell:.2g} mm"
     if found.between > 0.0:
+        text += f"; {100.0 * found.between / area:.3g} % judged only at the middles {cells}"
+    if found.shaped > 0.0:
         text += (
-            f"; {100.0 * found.between / area:.3g} % judged only at the middles of cells of {MM * found.cell:.2g} mm"
+            f"; {100.0 * found.shaped / area:.3g} %, where the cutter's shape leaves up to {MM * found.shape:.3g} mm,"
         )
-    text += ", the rest proven at every point" if found.between > 0.0 else "; proven at every point"
+        text += f" judged by what is left beyond that, at the middles {cells}"
+    some = found.between > 0.0 or found.shaped > 0.0
+    text += ", the rest proven at every point" if some else "; proven at every point"
     return text + (f"; {100.0 * found.beyond / area:.3g} % more {hidden}" if found.beyond > 0.0 else "")
 
 
