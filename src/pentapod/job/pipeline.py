@@ -10,37 +10,32 @@ from pathlib import Path
 
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal
-from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.job.advice.options import OPTIONS, AdviceOptions
 from pentapod.job.advice.search import advised
 from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, check_folder, write_arrays, write_json
-from pentapod.job.build.limits import placement_limits, timing_limits
-from pentapod.job.build.placement import job_weights
+from pentapod.job.build.limits import timing_limits
+from pentapod.job.build.pieces import job_part, job_piece, job_without
+from pentapod.job.build.region import covers_region
 from pentapod.job.build.specification import job_specification
-from pentapod.job.build.toolpath import drops_gouges, job_link_style, job_part, job_piece, job_toolpath
+from pentapod.job.build.toolpath import job_link_style, job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.job.mending import OPTIONS as MENDING
+from pentapod.job.mending import mend_of
 from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
-from pentapod.job.placed_check import Ranges, meetings, refusal_of
 from pentapod.job.plan_arrays import arrays_of
 from pentapod.job.plan_before import PlanBefore
-from pentapod.job.remarks import STRAIGHT, UPRIGHT, explanation, placement_remarks
 from pentapod.job.run_folder import staged, unstaged
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import StageRunner
+from pentapod.job.task import Task
 from pentapod.job.withheld import STAGE, withheld
-from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
-from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
-from pentapod.planning.placement.common_axes import FIXED
-from pentapod.planning.plan import PlacementOptions, fits
-from pentapod.planning.problem.constraints import FREE
+from pentapod.planning import PlacedPath
 from pentapod.planning.setups import setups
-from pentapod.program import Program, Provenance, sample, write_csv
-from pentapod.timing import Limit, Trajectory, retime
-from pentapod.timing.reuse import retime_as_before
+from pentapod.timing import Limit
 from pentapod.toolpath import Mesh, Toolpath
 from pentapod.toolpath.linking.partition import Piece, missed_cuts
-from pentapod.verify import Claim, Specification, Verdict, judged
+from pentapod.verify import Claim, Verdict, judged
 
 Writer = Callable[[Outcome, Path], object]
 
@@ -81,8 +76,12 @@ def run(
         )
         if piece is not None:  # the caller plans the other pieces elsewhere
             specification = dataclasses.replace(specification, setups=max(specification.setups, 2))
-        task = _Task(job, specification, runner, piece, (*timing_limits(job, used), *limits), tuple(claims), before)
+        left_out = () if before is None else before.left_out
+        rules = (*timing_limits(job, used), *limits), tuple(claims)
+        task = Task(job, specification, runner, piece, *rules, before, left_out)
         outcome = _planned(task, staging, writers or {})
+        if outcome.refusal is not None and piece is None and before is None and covers_region(job):
+            outcome = _mended(task, mesh, outcome, staging, writers or {})
         refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
         if refusal is not None and refusal.stage == "placement" and splits:
             outcome = _split(task, mesh, refusal, staging, writers or {})
@@ -120,7 +119,7 @@ def _toolpath(
     return runner.run("toolpath", made, remark=lambda it: str(it[1]))[0]
 
 
-def _planned(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+def _planned(task: Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
     """Run the stages after the toolpath and the verification, write the files, and return the outcome."""
     program, runner = task.program(staging / PROGRAM), task.runner
     if isinstance(program, Refusal):
@@ -136,7 +135,48 @@ def _planned(task: _Task, staging: Path, writers: Mapping[str, Writer]) -> Outco
     return _written(task, verdict, staging, writers)
 
 
-def _written(task: _Task, verdict: Verdict, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+def _mended(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+    """Go back after a run that failed: do in another way what can be, and plan again from there.
+
+    Returns the first outcome that passes, else the failed one.
+    """
+    job, whole, outcome, mend, runner = task.job, task.toolpath, failed, None, task.runner
+    file = staging / WITHHELD
+    first = file.read_bytes() if file.is_file() else None
+    for _ in range(MENDING.rounds):
+        before, mend = mend, mend_of(whole, mend, outcome, job.tolerance.left_share)
+        if mend is None:
+            break
+        own, placed = StageRunner(runner.progress), outcome.find(PlacedPath)
+        own.stages += [stage for stage in outcome.stages if stage.name in ("mesh", "toolpath", "placement")]
+        path = outcome.find(Toolpath) or whole
+        if mend.left_out != (() if before is None else before.left_out):
+            path, placed = job_without(job, mesh, whole, mend.left_out, machine=task.machine), None
+            own.stages = [
+                stage.with_value((path, *stage.value[1:])) if stage.name == "toolpath" else stage
+                for stage in own.stages
+                if stage.name != "placement"
+            ]
+        own.stages.append(Stage("mended", 0.0, mend, str(mend)))
+        specification = dataclasses.replace(task.specification, toolpath=path)
+        law = MENDING.law if mend.law else task.law
+        again = dataclasses.replace(
+            task, specification=specification, runner=own, left_out=mend.left_out, law=law, placed=placed
+        )
+        file.unlink(missing_ok=True)
+        outcome = _planned(again, staging, writers)
+        if outcome.passed:
+            runner.stages = own.stages
+            return outcome
+    if outcome is failed:
+        return failed
+    file.unlink(missing_ok=True)
+    if first is not None:
+        file.write_bytes(first)
+    return _written(task, failed.verdict, staging, writers)
+
+
+def _written(task: Task, verdict: Verdict, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
     """Write the files of a run but its program, and return the outcome."""
     outcome = Outcome(task.job, task.machine, tuple(task.runner.stages), verdict)
     if (placed := outcome.find(PlacedPath)) is not None:
@@ -149,7 +189,7 @@ def _written(task: _Task, verdict: Verdict, staging: Path, writers: Mapping[str,
     return outcome
 
 
-def _split(task: _Task, mesh: Mesh, refusal: Refusal, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+def _split(task: Task, mesh: Mesh, refusal: Refusal, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
     """Split a job that one placement cannot reach into set-ups, each in a folder of its own; or refuse it."""
     job, toolpath, runner = task.job, task.toolpath, task.runner
     # The refusal is not part of the outcome.
@@ -174,121 +214,3 @@ def _split(task: _Task, mesh: Mesh, refusal: Refusal, staging: Path, writers: Ma
     done = SetUps(tuple(parts), cutting, missed, job.placement.setups)
     runner.stages.append(Stage("set-ups planned", sum(part.seconds for part in parts), done, str(done)))
     return _written(task, done.verdict, staging, writers)
-
-
-@dataclasses.dataclass(frozen=True)
-class _Task:
-    """The inputs of the stages after the toolpath. specification: the job's requirements on plan and program."""
-
-    job: Job
-    specification: Specification
-    runner: StageRunner
-    piece: Piece | None = None
-    limits: tuple[Limit, ...] = ()
-    claims: tuple[Claim, ...] = ()
-    before: PlanBefore | None = None
-
-    @property
-    def machine(self) -> Machine:
-        return self.specification.machine
-
-    @property
-    def toolpath(self) -> Toolpath:
-        return self.specification.toolpath
-
-    def program(self, file: Path) -> Program | Refusal:
-        """Plan, write the program to `file` and return it; or return the first refusal."""
-        placed = self.runner.run("placement", self._placed, remark=placement_remarks)
-        if isinstance(placed, Refusal):
-            return placed
-        return self.on(placed.placement).written(placed, file)
-
-    def on(self, placement: Placement) -> _Task:
-        """Return the task with the machine's guides at the rail positions of a placement."""
-        if placement.rail_positions is None:
-            return self
-        machine = self.machine.at(placement.rail_positions)
-        return dataclasses.replace(self, specification=dataclasses.replace(self.specification, machine=machine))
-
-    def written(self, placed: PlacedPath, file: Path) -> Program | Refusal:
-        """Write the program of a placed path to `file` and return it; or return the first refusal."""
-        path = self.runner.run("leg path", lambda: self._path(placed))
-        if isinstance(path, Refusal):
-            return path
-        trajectory = self.runner.run("timing", lambda: self._timed(path))
-        if isinstance(trajectory, Refusal):
-            return trajectory
-        program = self.runner.run("program", lambda: self._program(placed, trajectory, file))
-        self.runner.run(
-            "explain", lambda: explanation(path, trajectory, program, self.machine, self.toolpath), remark=str
-        )
-        return program
-
-    def fits(self, part: Toolpath) -> bool:
-        """Return whether a placement for a part of the toolpath is found."""
-        return fits(part, self.machine, **self._options())
-
-    def _placed(self) -> PlacedPath | Refusal:
-        """Return the placed path. Where leaning makes the tool meet the part, it keeps the toolpath's axes, or one."""
-        options = self._options()
-        if self.before is not None and (kept := self.before.kept(self.toolpath, self.machine, options)) is not None:
-            return kept
-        placed = self._planned(options)
-        met = self._meetings(placed)
-        if met and options["tilt"] > 0.0:
-            common = bool(options["common_axis"])
-            placed = self._planned({**options, "common_axis": FIXED} if common else {**options, "tilt": 0.0})
-            met = self._meetings(placed)
-            if isinstance(placed, PlacedPath):
-                chosen = f"{placed.placement.chosen_by}; {STRAIGHT if common else UPRIGHT}"
-                placed = dataclasses.replace(placed, placement=dataclasses.replace(placed.placement, chosen_by=chosen))
-        return refusal_of(met) if met else placed
-
-    def _timed(self, path: LegPath) -> Trajectory | Refusal:
-        machine, progress = self.machine, self.runner.progress
-        if self.before is not None:
-            return retime_as_before(path, machine, self.before.laws, limits=self.limits, progress=progress)
-        return retime(path, machine, limits=self.limits, progress=progress)
-
-    def _planned(self, options: PlacementOptions) -> PlacedPath | Refusal:
-        objective, progress = self.job.placement.then, self.runner.progress
-        return plan(self.toolpath, self.machine, **options, secondary_objective=objective, progress=progress)
-
-    def _meetings(self, placed: PlacedPath | Refusal) -> Ranges:
-        """Return where the tool meets the part; nowhere for jobs that want gouges reported only."""
-        cutting = self.specification.cutting
-        if isinstance(placed, Refusal) or cutting is None or not drops_gouges(self.job):
-            return ()
-        return meetings(placed, cutting, self.specification.path_tolerance)
-
-    def _options(self) -> PlacementOptions:
-        return {
-            "tilt": self.specification.tilt,
-            "common_axis": self.job.axis.mode == "auto",
-            "constraints": self.specification.constraints or FREE,
-            "component": self.specification.component,
-            "collision_world": self.specification.collision_world or NOTHING,
-            "weights": job_weights(self.job),
-            "limits": placement_limits(self.job),
-            "solver": self.job.placement.solver,
-        }
-
-    def _path(self, placed: PlacedPath) -> LegPath | Refusal:
-        return leg_path(
-            placed,
-            self.machine,
-            path_tolerance=self.specification.path_tolerance,
-            axis_tolerance=self.specification.axis_tolerance,
-            stop_angle=self.job.feed.si.stop_angle,
-        )
-
-    def _program(self, placed: PlacedPath, trajectory: Trajectory, file: Path) -> Program:
-        made_on = (processor_kind(), library_versions())
-        machine = self.machine
-        source = Provenance(
-            machine.name, machine.digest, self.job.digest, __version__, self.piece, *made_on,
-            calibration=machine.calibration_name,
-        )  # fmt: skip
-        program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
-        write_csv(program, file)
-        return program

@@ -61,6 +61,7 @@ class PlanBefore(Value):
     """A run whose part is found elsewhere. job_file: of the run; placement: workpiece → machine.
 
     tips, axes (N, 3): of the tool, workpiece frame, axes unit. toolpath: as it was made; job_digest: of the job then.
+    left_out: pairs of waypoints of the job's toolpath between which it makes no cut.
     """
 
     job_file: Path
@@ -71,6 +72,7 @@ class PlanBefore(Value):
     laws: TimeLaws
     toolpath: Toolpath
     job_digest: str
+    left_out: tuple[tuple[int, int], ...] = ()
 
     @classmethod
     def of(cls, folder: Path) -> PlanBefore:
@@ -99,8 +101,9 @@ class PlanBefore(Value):
         w, s = (int(sign) for sign in arrays["placed.component"])
         tips, axes = back.apply(to_si(arrays["placed.tips_mm"], "mm")), back.rotate(arrays["placed.axes"])
         job = folder / str(arrays[JOB_FILE])
-        digest = read_header(folder / PROGRAM).provenance.job_digest
-        return cls(job, placement, Component(w, s), tips, axes, _laws(arrays), read_toolpath(file, "npz"), digest)
+        made_from, toolpath = read_header(folder / PROGRAM).provenance, read_toolpath(file, "npz")
+        branch, then = Component(w, s), (made_from.job_digest, made_from.left_out)
+        return cls(job, placement, branch, tips, axes, _laws(arrays), toolpath, *then)
 
     def placed(
         self,

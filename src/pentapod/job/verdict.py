@@ -8,8 +8,9 @@ from pathlib import Path
 from pentapod.base.errors import ProgramError
 from pentapod.base.progress import Progress, silent
 from pentapod.job.artefacts import PROGRAM, SETUPS
+from pentapod.job.build.pieces import job_part, program_piece, program_toolpath
 from pentapod.job.build.specification import job_specification
-from pentapod.job.build.toolpath import job_part, job_toolpath, program_piece, program_toolpath
+from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.outcome import setups_verdict
 from pentapod.job.schema.job import Job

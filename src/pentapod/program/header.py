@@ -44,9 +44,11 @@ CALIBRATION = "calibration"
 """Key of programs for a machine as it was measured."""
 COMMANDS = "commands"
 """Key of files in which the rows are what drives are told, by a machine's leg model."""
+LEFT_OUT = "left_out"
+"""Key of programs that leave cuts of the toolpath out: pairs of waypoints."""
 MADE_ON = ("processor", "libraries")
 """Keys of planned programs: on another kind of processor or with other libraries bits may differ."""
-OPTIONAL_KEYS = (CALIBRATION, COMMANDS, GUIDES, *SETUP_KEYS, *MADE_ON)
+OPTIONAL_KEYS = (CALIBRATION, COMMANDS, GUIDES, *SETUP_KEYS, LEFT_OUT, *MADE_ON)
 UNVERIFIED = "UNVERIFIED: no verdict has passed this program"
 """First line, after the comment mark, of files written for a controller without a passed verdict."""
 LARGEST_COUNT = 2**63 - 1
@@ -94,6 +96,8 @@ def header_text(program: Program) -> str:
         values[GUIDES] = f"[{', '.join(_decimal(x, 3) for x in program.rail_positions)}]"
     if source.piece is not None:
         values |= {WAYPOINTS: f"[{source.piece.first}, {source.piece.last}]", BOX: _box(source.piece)}
+    if source.left_out:
+        values[LEFT_OUT] = f"[{', '.join(f'[{first}, {last}]' for first, last in source.left_out)}]"
     made_on = zip(MADE_ON, (source.processor, source.libraries), strict=True)
     values |= {key: _string(value) for key, value in made_on if value}
     mark = f"# {UNVERIFIED}\n" if source.unverified else ""
@@ -164,6 +168,7 @@ class _Reader:
                 job_digest=self._text("job_digest"),
                 pentapod_version=self._text("pentapod_version"),
                 piece=self._piece(),
+                left_out=self._left_out(),
                 unverified=self.unverified,
                 **{key: self._text(key) for key in (*MADE_ON, CALIBRATION, COMMANDS) if key in self.values},
             ),
@@ -213,6 +218,16 @@ class _Reader:
         except ToolpathError:
             self._check(BOX, False, f"{expected}, and increasing waypoints")
             raise
+
+    def _left_out(self) -> tuple[tuple[int, int], ...]:
+        if LEFT_OUT not in self.values:
+            return ()
+        pairs = [_list(pair) for pair in _list(self.values[LEFT_OUT])]
+        good = bool(pairs) and all([type(k) for k in pair] == [int, int] for pair in pairs)
+        flat = [k for pair in pairs for k in pair]
+        good = good and flat == sorted(set(flat)) and flat[0] >= 0 and flat[-1] <= LARGEST_COUNT
+        self._check(LEFT_OUT, good, "pairs of increasing waypoints, [[first, last], ...]")
+        return tuple((first, last) for first, last in pairs)
 
     def _rows(self) -> int:
         rows = self.values["rows"]

@@ -42,6 +42,7 @@ class Provenance(Value):
     unverified: bool = False
     calibration: str = ""
     commands: str = ""
+    left_out: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -50,7 +50,7 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
     Drives and masses are [drives] and [masses] of the machine file; docs/simulation.md describes the models.
     """
     from pentapod.base.refusal import Refusal
-    from pentapod.job.build.toolpath import program_toolpath
+    from pentapod.job.build.pieces import program_toolpath
     from pentapod.job.build.values import job_machine, job_mesh
     from pentapod.job.schema.job import Job
     from pentapod.program import read_csv

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.base.errors import InputError, ToolpathError
+from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import fields_from, file_key
 from pentapod.base.progress import Progress, silent
 from pentapod.base.units import from_si
@@ -31,7 +30,6 @@ from pentapod.mesh.query.swept_depth import RESOLUTION_M
 from pentapod.planning.limits.contacts import tool_comfort
 from pentapod.planning.limits.limit import Comforts
 from pentapod.planning.problem.weights import NEEDED_MARGIN
-from pentapod.program import read_header
 from pentapod.toolpath import toolpath_with_report
 from pentapod.toolpath.axis.modes import AxisMode, Between, Fixed, Normal, Pointed
 from pentapod.toolpath.axis.orientation import REACH_M, Orientation, oriented
@@ -42,7 +40,6 @@ from pentapod.toolpath.gouge.gouge import without_gouges
 from pentapod.toolpath.gouge.report import GougeOptions, Remedy
 from pentapod.toolpath.lines.scallop import stepover_for
 from pentapod.toolpath.linking.links import LinkStyle
-from pentapod.toolpath.linking.partition import Piece, part_of
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.strategies.registry import STRATEGIES
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
@@ -89,7 +86,7 @@ def stem_sentence(tool: Tool) -> str:
     )
 
 
-def _judged_tool(job: Job, machine: Machine | None) -> Tool:
+def judged_tool(job: Job, machine: Machine | None) -> Tool:
     """Return the tool that the toolpath is made for and judged with.
 
     Where the planner chooses the axes, that is the ball alone: it is at the same place whatever the axis. The planner
@@ -149,7 +146,7 @@ def job_toolpath(
 
     Raises ToolpathError where there is nothing to machine, or the toolpath file cannot be read.
     """
-    tool, from_file = _judged_tool(job, machine), job.toolpath.strategy == FILE
+    tool, from_file = judged_tool(job, machine), job.toolpath.strategy == FILE
     region: list[object] = []
     if from_file:
         toolpath, report = _read(job, tool)
@@ -159,7 +156,7 @@ def job_toolpath(
             region.append(region_report(job, mesh))
         toolpath, report = toolpath_with_report(mesh, tool, asked)
         toolpath = stepped(oriented(toolpath, tool, _orientation(job, tool)), job.toolpath.si.axis_step)
-    options = _gouge_options(job, _remedies(job), None if from_file else job_link_style(job, mesh, toolpath))
+    options = gouge_options(job, _remedies(job), None if from_file else job_link_style(job, mesh, toolpath))
     toolpath, gouges = without_gouges(toolpath, tool, mesh, options, progress)
     if not any(segment.kind is SegmentKind.CUT for segment in toolpath.segments):
         raise ToolpathError(
@@ -182,7 +179,7 @@ def _remedies(job: Job) -> tuple[Remedy, ...]:
     return tuple(Remedy(name) for name in job.gouge.remedy or (usual,))
 
 
-def _gouge_options(job: Job, remedies: tuple[Remedy, ...], links: LinkStyle | None) -> GougeOptions:
+def gouge_options(job: Job, remedies: tuple[Remedy, ...], links: LinkStyle | None) -> GougeOptions:
     """Return the options of the job's gouge check. links: style of links that replace others."""
     gouge = fields_from(GougeOptions, job.gouge)
     # An engraving lies below the surface on purpose.
@@ -192,44 +189,6 @@ def _gouge_options(job: Job, remedies: tuple[Remedy, ...], links: LinkStyle | No
 def drops_gouges(job: Job) -> bool:
     """Return whether what gouges is taken out of the toolpath, so that no motion of it should meet the part."""
     return Remedy.DROP in _remedies(job)
-
-
-def job_piece(
-    job: Job, mesh: Mesh, piece: Piece, progress: Progress = silent, *, machine: Machine | None = None
-) -> Toolpath:
-    """Return a piece of the job's toolpath, as `job_part`. Raises ToolpathError as `part_of`."""
-    toolpath, _ = job_toolpath(job, mesh, progress, machine=machine)
-    return job_part(job, mesh, toolpath, piece, machine=machine)
-
-
-def job_part(job: Job, mesh: Mesh, toolpath: Toolpath, piece: Piece, *, machine: Machine | None = None) -> Toolpath:
-    """Return a piece of the job's toolpath as `part_of`, with links that are clear of the part.
-
-    Raises ToolpathError as `part_of`.
-    """
-    style = job_link_style(job, mesh, toolpath)
-    part = part_of(toolpath, piece, style)
-    if not drops_gouges(job):
-        return part
-    return without_gouges(part, _judged_tool(job, machine), mesh, _gouge_options(job, (), style))[0]
-
-
-def program_toolpath(
-    job: Job, mesh: Mesh, program: Path, progress: Progress = silent, *, machine: Machine | None = None
-) -> Toolpath:
-    """Return the toolpath of a program file: the job's, or its set-up's piece of it. machine: as for `job_tool`."""
-    piece = program_piece(program)
-    if piece is None:
-        return job_toolpath(job, mesh, progress, machine=machine)[0]
-    return job_piece(job, mesh, piece, progress, machine=machine)
-
-
-def program_piece(program: Path) -> Piece | None:
-    """Return the piece of the toolpath that a program file is for; None for all of it, or for a broken file."""
-    try:
-        return read_header(program).provenance.piece
-    except InputError:  # the verdict names the error
-        return None
 
 
 def job_link_style(job: Job, mesh: Mesh, toolpath: Toolpath) -> LinkStyle:

@@ -81,15 +81,36 @@ def pass_ends(toolpath: Toolpath) -> Ints:
 
 
 def part_of(toolpath: Toolpath, piece: Piece, style: LinkStyle) -> Toolpath:
-    """Return the motion that makes the cuts of a piece, in their order.
+    """Return the motion that makes the cuts of a piece, in their order, linked as by `with_cuts`.
+
+    Raises ToolpathError where the piece holds no cut.
+    """
+    chosen = piece.cuts(toolpath)
+    if not chosen.any():
+        raise ToolpathError("there is no cut in this piece", value=str(piece))
+    return with_cuts(toolpath, chosen, style)
+
+
+def without_cuts(toolpath: Toolpath, left_out: Sequence[tuple[int, int]], style: LinkStyle) -> Toolpath:
+    """Return a toolpath without its cuts between pairs of waypoints, linked as by `with_cuts`.
+
+    Raises ToolpathError where no cut is left.
+    """
+    chosen = cutting_intervals(toolpath)
+    for first, last in left_out:
+        chosen[first:last] = False
+    if not chosen.any():
+        raise ToolpathError("no cut is left", value=f"{len(left_out)} stretches are left out")
+    return with_cuts(toolpath, chosen, style)
+
+
+def with_cuts(toolpath: Toolpath, chosen: Bools, style: LinkStyle) -> Toolpath:
+    """Return the motion that makes the chosen cuts, of intervals (N − 1,) between waypoints, in their order.
 
     Links between cuts that follow each other in the whole, before its first cut and after its last, are those of the
     whole. Where cuts are left out, the tool retracts, crosses at the clearance level and comes down as `style` says.
-    Raises ToolpathError where the piece holds no cut.
     """
-    chosen, cutting = piece.cuts(toolpath), cutting_intervals(toolpath)
-    if not chosen.any():
-        raise ToolpathError("there is no cut in this piece", value=str(piece))
+    cutting = cutting_intervals(toolpath)
     begins, ends = marked_runs(chosen).T.tolist()
     tips, axes = toolpath.tips, toolpath.axes
     segments: list[Segment] = []

@@ -1,0 +1,162 @@
+"""Mending: what a run goes back for, once it is known that a few places of its toolpath cannot be done.
+
+Cuts at places where no placement and tool axis keeps the limits, or at which a claim of the verdict fails, are left
+out, and the rest is linked and planned again. Whether what is left there is acceptable is for the verdict to say.
+Where the program is slower than it has to be, its time law is searched for longer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.refusal import Refusal
+from pentapod.base.units import from_si
+from pentapod.base.values import Value
+from pentapod.geometry.polyline import arc_length
+from pentapod.geometry.runs import marked_runs
+from pentapod.job.outcome import Outcome
+from pentapod.job.withheld import STAGE
+from pentapod.machine.machine import Machine
+from pentapod.planning import PlacedPath
+from pentapod.program import Program
+from pentapod.timing import JerkOptions
+from pentapod.toolpath import Toolpath
+from pentapod.toolpath.linking.partition import cutting_intervals
+from pentapod.verify.verdict.verdict import Certificate
+
+
+@dataclass(frozen=True)
+class MendOptions:
+    """When and how a run goes back.
+
+    rounds: how often at most. around: length of cut left out on either side of a place, metres. most: length of cut
+    that may be left out in all, as a multiple of the share of the region that may be left. places: beginnings of the
+    names of claims about places that may be left out. slow: claims that a better time law keeps; law: options of the
+    search for it.
+    """
+
+    rounds: int = 3
+    around: float = 0.5e-3
+    most: float = 4.0
+    places: tuple[str, ...] = (
+        "gouge",
+        "legs clear",
+        "spindle clear",
+        "tool body",
+        "clearance",
+        "base joint",
+        "platform joint",
+    )
+    slow: tuple[str, ...] = ("lowest feed", "no unasked stop")
+    law: JerkOptions = field(default_factory=lambda: JerkOptions(passes=24, rough_passes=4, min_gain=1e-5))
+
+
+OPTIONS = MendOptions()
+
+
+@dataclass(frozen=True, eq=False)
+class Mend(Value):
+    """What a run does in another way, and why: limits or claims, in words.
+
+    left_out: cuts of the job's toolpath that are not made, between pairs of waypoints. length: of these cuts, metres;
+    share: of all cuts. law: whether the time law is searched for longer.
+    """
+
+    left_out: tuple[tuple[int, int], ...] = ()
+    length: float = 0.0
+    share: float = 0.0
+    why: tuple[str, ...] = ()
+    law: bool = False
+
+    def __str__(self) -> str:
+        if not self.left_out:
+            return f"went back: the time law was searched for longer, since it was slow ({'; '.join(self.why)})"
+        places = f"{len(self.left_out)} place{'s' if len(self.left_out) > 1 else ''}"
+        return (
+            f"went back: {from_si(self.length, 'mm'):.3g} mm of cut ({100.0 * self.share:.2g} %) at {places} left out, "
+            f"since they cannot be done: {'; '.join(self.why)}"
+        )
+
+
+def mend_of(
+    whole: Toolpath, before: Mend | None, outcome: Outcome, share: float, options: MendOptions = OPTIONS
+) -> Mend | None:
+    """Return what to do in another way after a run of the job's toolpath that failed; None where nothing helps.
+
+    before: what that run did in another way already. share: of the region that may be left.
+    """
+    current, refusal, before = outcome.find(Toolpath), outcome.refusal, before or Mend()
+    if current is None or refusal is None or refusal.stage not in ("placement", STAGE):
+        return None
+    failed = [each for each in outcome.verdict.certificates if not each.passed] if refusal.stage == STAGE else []
+    slow = [each for each in failed if each.claim in options.slow]
+    placed = [each for each in failed if each.claim.startswith(options.places) and each.where.row is not None]
+    if len(slow) + len(placed) < len(failed) or (slow and before.law):
+        return None
+    why = [each.constraint for each in refusal.diagnosis[:3]] + [each.claim for each in failed[:3]]
+    mend = replace(before, why=tuple(dict.fromkeys((*before.why, *why))), law=before.law or bool(slow))
+    bad = _unplaced(current, refusal) if not failed else _waypoints(placed, outcome)
+    if not bad.any():
+        return mend if slow else None
+    places, cutting = arc_length(whole.tilt_centres), cutting_intervals(whole)
+    kept = cutting.copy()
+    for first, last in before.left_out:
+        kept[first:last] = False
+    # The k-th cut of the current toolpath is the k-th that the whole one keeps.
+    rows = np.flatnonzero(kept)[np.cumsum(cutting_intervals(current))[_cuts_at(current, bad)] - 1]
+    firsts = np.searchsorted(places[1:], places[rows] - options.around)
+    lasts = np.searchsorted(places[:-1], places[rows + 1] + options.around, side="right")
+    for first, last in zip(firsts.tolist(), lasts.tolist(), strict=True):
+        kept[first:last] = False
+    length = np.diff(places)
+    lost, all_of_it = float(length[cutting & ~kept].sum()), float(length[cutting].sum())
+    if not kept.any() or lost > options.most * share * all_of_it:
+        return None
+    runs = tuple((int(a), int(b)) for a, b in marked_runs(cutting & ~kept).tolist())
+    return replace(mend, left_out=runs, length=lost, share=lost / all_of_it)
+
+
+def _unplaced(toolpath: Toolpath, refusal: Refusal) -> Bools:
+    """Return the waypoints (N,) that a refused placement names."""
+    bad = np.zeros(len(toolpath), dtype=np.bool_)
+    for shortfall in refusal.diagnosis:
+        for first, last in shortfall.waypoints:
+            bad[first : last + 1] = True
+    return bad
+
+
+def _waypoints(failed: list[Certificate], outcome: Outcome) -> Bools:
+    """Return the waypoints (N,) nearest to the places of claims."""
+    program, placed = outcome.find(Program), outcome.find(PlacedPath)
+    if program is None or placed is None:
+        return np.zeros(0, dtype=np.bool_)
+    bad = np.zeros(len(placed.tips), dtype=np.bool_)
+    for each in failed:
+        bad[_waypoint(each, program, placed, outcome.machine)] = True
+    return bad
+
+
+def _waypoint(certificate: Certificate, program: Program, placed: PlacedPath, machine: Machine) -> int:
+    """Return the waypoint nearest to the place of a claim."""
+    toolpath, where = placed.toolpath, certificate.where
+    row = program.legs[where.row or 0]
+    position, direction = machine.robot.pose(row[None], program.component)
+    centre: Floats = (position + (machine.tool_length - toolpath.tilt_centre) * direction)[0]
+    away = np.linalg.norm(placed.tips + toolpath.tilt_centre * placed.axes - centre, axis=1)
+    if where.segment is not None:
+        first, last = int(toolpath.starts[where.segment]), int(toolpath.starts[where.segment + 1])
+        return first + int(away[first : last + 1].argmin())
+    return int(away.argmin())
+
+
+def _cuts_at(toolpath: Toolpath, bad: Bools) -> Ints:
+    """Return the intervals that are cuts at waypoints (N,); for those of a link, the cuts before and after it."""
+    cutting = cutting_intervals(toolpath)
+    touched = bad[1:] | bad[:-1]
+    cuts = np.flatnonzero(cutting)
+    beside = np.searchsorted(cuts, np.flatnonzero(touched & ~cutting))
+    ends = np.concatenate([cuts[np.maximum(beside - 1, 0)], cuts[np.minimum(beside, len(cuts) - 1)]])
+    return np.union1d(np.flatnonzero(touched & cutting), ends)

@@ -1,0 +1,191 @@
+"""Task: the stages of a run after the toolpath, and what they say of placement and time law."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+from pentapod.base.refusal import Refusal
+from pentapod.base.version import __version__, library_versions, processor_kind
+from pentapod.job.build.limits import placement_limits
+from pentapod.job.build.placement import job_weights
+from pentapod.job.build.toolpath import drops_gouges
+from pentapod.job.placed_check import Ranges, meetings, refusal_of
+from pentapod.job.plan_before import PlanBefore
+from pentapod.job.schema.job import Job
+from pentapod.job.stage_runner import StageRunner
+from pentapod.machine.clearance.collision_world import NOTHING
+from pentapod.machine.machine import Machine
+from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
+from pentapod.planning.placement.common_axes import FIXED
+from pentapod.planning.plan import PlacementOptions, fits
+from pentapod.planning.problem.constraints import FREE
+from pentapod.program import Program, Provenance, sample, write_csv
+from pentapod.timing import Explanation, JerkOptions, Limit, Trajectory, certify, explain, retime, slow_cuts
+from pentapod.timing.jerk.options import DEFAULTS
+from pentapod.timing.reuse import retime_as_before
+from pentapod.toolpath import Toolpath
+from pentapod.toolpath.linking.partition import Piece
+from pentapod.verify import Claim, Specification
+
+UPRIGHT = "the tool does not lean, as it would touch the part"
+"""What is said of a placement with the toolpath's axes."""
+
+STRAIGHT = "the tool keeps one direction, as it would touch the part"
+"""What is said of a placement with one axis everywhere."""
+
+
+def explanation(
+    path: LegPath, trajectory: Trajectory, program: Program, machine: Machine, toolpath: Toolpath
+) -> Explanation:
+    """Return which limits hold a program's motion, and where a beam is slower than its feed."""
+    position, direction = machine.robot.pose(program.legs, program.component)
+    tips = position + machine.tool_length * direction
+    # A beam or a spray needs constant speed on the surface; a cutter only has an upper bound.
+    beam, period = toolpath.tilt_centre < 0.0, machine.controller.period
+    slow = slow_cuts(trajectory, period, path.surface_rate) if beam else ()
+    spot = toolpath.tilt_centre if beam else 0.0
+    uses = certify(trajectory, machine, legs=program.legs, tips=tips, axes=-direction, spot=spot)
+    return explain(trajectory, machine, uses, slow)
+
+
+def placement_remarks(placed: PlacedPath | Refusal) -> str:
+    """Return the positions of guides, a common direction of the tool, and what the choice of placement has to tell."""
+    if isinstance(placed, Refusal):
+        return ""
+    chosen = placed.placement
+    lines = [f"guides 1 to 5 at {chosen.guides}"] if chosen.guides else []
+    lines += [f"tool axis: {placed.common_axis}; {placed.lean}"] if placed.common_axis is not None else []
+    if any(word in chosen.chosen_by for word in ("interrupted", UPRIGHT, STRAIGHT)):
+        lines.append(f"placement: {chosen.chosen_by}; smallest margin {placed.smallest_margin:.3f}")
+    return "\n".join(lines)
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    """The inputs of the stages after the toolpath.
+
+    specification: the job's requirements on plan and program. left_out: pairs of waypoints of the job's toolpath
+    between which the toolpath of the specification makes no cut. law: options of the time law. placed: the placed path,
+    where it is known.
+    """
+
+    job: Job
+    specification: Specification
+    runner: StageRunner
+    piece: Piece | None = None
+    limits: tuple[Limit, ...] = ()
+    claims: tuple[Claim, ...] = ()
+    before: PlanBefore | None = None
+    left_out: tuple[tuple[int, int], ...] = ()
+    law: JerkOptions = DEFAULTS
+    placed: PlacedPath | None = None
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, with the job's tool length and controller settings."""
+        return self.specification.machine
+
+    @property
+    def toolpath(self) -> Toolpath:
+        """The toolpath to be planned, workpiece frame."""
+        return self.specification.toolpath
+
+    def program(self, file: Path) -> Program | Refusal:
+        """Plan, write the program to `file` and return it; or return the first refusal."""
+        placed = self.placed
+        if placed is None:
+            placed = self.runner.run("placement", self._placed, remark=placement_remarks)
+        if isinstance(placed, Refusal):
+            return placed
+        return self.on(placed.placement).written(placed, file)
+
+    def on(self, placement: Placement) -> Task:
+        """Return the task with the machine's guides at the rail positions of a placement."""
+        if placement.rail_positions is None:
+            return self
+        machine = self.machine.at(placement.rail_positions)
+        return dataclasses.replace(self, specification=dataclasses.replace(self.specification, machine=machine))
+
+    def written(self, placed: PlacedPath, file: Path) -> Program | Refusal:
+        """Write the program of a placed path to `file` and return it; or return the first refusal."""
+        path = self.runner.run("leg path", lambda: self._path(placed))
+        if isinstance(path, Refusal):
+            return path
+        trajectory = self.runner.run("timing", lambda: self._timed(path))
+        if isinstance(trajectory, Refusal):
+            return trajectory
+        program = self.runner.run("program", lambda: self._program(placed, trajectory, file))
+        self.runner.run(
+            "explain", lambda: explanation(path, trajectory, program, self.machine, self.toolpath), remark=str
+        )
+        return program
+
+    def fits(self, part: Toolpath) -> bool:
+        """Return whether a placement for a part of the toolpath is found."""
+        return fits(part, self.machine, **self._options())
+
+    def _placed(self) -> PlacedPath | Refusal:
+        """Return the placed path. Where leaning makes the tool meet the part, it keeps the toolpath's axes, or one."""
+        options = self._options()
+        if self.before is not None and (kept := self.before.kept(self.toolpath, self.machine, options)) is not None:
+            return kept
+        placed = self._planned(options)
+        met = self._meetings(placed)
+        if met and options["tilt"] > 0.0:
+            common = bool(options["common_axis"])
+            placed = self._planned({**options, "common_axis": FIXED} if common else {**options, "tilt": 0.0})
+            met = self._meetings(placed)
+            if isinstance(placed, PlacedPath):
+                chosen = f"{placed.placement.chosen_by}; {STRAIGHT if common else UPRIGHT}"
+                placed = dataclasses.replace(placed, placement=dataclasses.replace(placed.placement, chosen_by=chosen))
+        return refusal_of(met) if met else placed
+
+    def _timed(self, path: LegPath) -> Trajectory | Refusal:
+        machine, progress = self.machine, self.runner.progress
+        if self.before is not None:
+            return retime_as_before(path, machine, self.before.laws, limits=self.limits, progress=progress)
+        return retime(path, machine, limits=self.limits, progress=progress, jerk_options=self.law)
+
+    def _planned(self, options: PlacementOptions) -> PlacedPath | Refusal:
+        objective, progress = self.job.placement.then, self.runner.progress
+        return plan(self.toolpath, self.machine, **options, secondary_objective=objective, progress=progress)
+
+    def _meetings(self, placed: PlacedPath | Refusal) -> Ranges:
+        """Return where the tool meets the part; nowhere for jobs that want gouges reported only."""
+        cutting = self.specification.cutting
+        if isinstance(placed, Refusal) or cutting is None or not drops_gouges(self.job):
+            return ()
+        return meetings(placed, cutting, self.specification.path_tolerance)
+
+    def _options(self) -> PlacementOptions:
+        return {
+            "tilt": self.specification.tilt,
+            "common_axis": self.job.axis.mode == "auto",
+            "constraints": self.specification.constraints or FREE,
+            "component": self.specification.component,
+            "collision_world": self.specification.collision_world or NOTHING,
+            "weights": job_weights(self.job),
+            "limits": placement_limits(self.job),
+            "solver": self.job.placement.solver,
+        }
+
+    def _path(self, placed: PlacedPath) -> LegPath | Refusal:
+        return leg_path(
+            placed,
+            self.machine,
+            path_tolerance=self.specification.path_tolerance,
+            axis_tolerance=self.specification.axis_tolerance,
+            stop_angle=self.job.feed.si.stop_angle,
+        )
+
+    def _program(self, placed: PlacedPath, trajectory: Trajectory, file: Path) -> Program:
+        made_on = (processor_kind(), library_versions())
+        machine = self.machine
+        source = Provenance(
+            machine.name, machine.digest, self.job.digest, __version__, self.piece, *made_on,
+            calibration=machine.calibration_name, left_out=self.left_out,
+        )  # fmt: skip
+        program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
+        write_csv(program, file)
+        return program

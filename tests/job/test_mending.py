@@ -1,0 +1,146 @@
+"""Mending: a run goes back, leaves out the few places that cannot be done, and says so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pentapod.base.errors import ToolpathError
+from pentapod.base.refusal import Refusal, Shortfall
+from pentapod.cli.commands.new import dome_stl
+from pentapod.job import Job, pipeline, run
+from pentapod.job.build.pieces import job_without, program_toolpath
+from pentapod.job.build.toolpath import job_toolpath
+from pentapod.job.build.values import job_mesh
+from pentapod.job.mending import mend_of
+from pentapod.job.outcome import Outcome, Stage
+from pentapod.machine.machine import Machine
+from pentapod.toolpath import SegmentKind
+from pentapod.toolpath.linking.partition import cutting_intervals
+from pentapod.verify import Verdict
+from pentapod.verify.verdict.verdict import Certificate, Place
+
+TABLES = {
+    "part": {"mesh": "part.stl", "unit": "mm"},
+    "machine": {"name": "desk"},
+    "tool": {"type": "ball", "diameter_mm": 6.0},
+    "toolpath": {"stepover_mm": 3.0},
+    "axis": {"mode": "fixed", "direction": [0.0, 0.0, 1.0]},
+    "feed": {"cut_mm_min": 1500.0},
+    "placement": {"mode": "table", "table_z_mm": 471.0},
+}
+STRETCHES = ((120, 130), (400, 404))
+
+
+@pytest.fixture(scope="module")
+def dome(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("dome")
+    (folder / "part.stl").write_bytes(dome_stl(cells=12))
+    job = Job.from_dict(TABLES, folder)
+    mesh = job_mesh(job)
+    return job, mesh, job_toolpath(job, mesh)[0]
+
+
+def outcome(job, toolpath, refusal, certificates=()):
+    stages = (Stage("toolpath", 0.0, (toolpath, None)), Stage("placement", 0.0, refusal))
+    return Outcome(job, Machine.load("desk"), stages, Verdict(tuple(certificates)))
+
+
+def refused(*waypoints):
+    return Refusal("placement", "does not fit", (Shortfall("tool body touches the part", waypoints, 0.2, "mm"),))
+
+
+def cut_centres(toolpath):
+    pairs = np.stack([toolpath.tilt_centres[:-1], toolpath.tilt_centres[1:]], axis=1)
+    return np.round(pairs[cutting_intervals(toolpath)], 9)
+
+
+def test_a_toolpath_without_some_cuts_makes_all_others_in_their_order(dome):
+    job, mesh, whole = dome
+    kept = cutting_intervals(whole).copy()
+    for first, last in STRETCHES:
+        kept[first:last] = False
+    part = job_without(job, mesh, whole, STRETCHES)
+    pairs = np.stack([whole.tilt_centres[:-1], whole.tilt_centres[1:]], axis=1)
+    assert np.array_equal(cut_centres(part), np.round(pairs[kept], 9))
+    assert sum(s.kind is SegmentKind.RAPID for s in part.segments) == 2 + 2
+    with pytest.raises(ToolpathError, match="no cut is left"):
+        job_without(job, mesh, whole, ((0, len(whole) - 1),))
+
+
+def test_what_cannot_be_placed_is_left_out_round_by_round(dome):
+    job, mesh, whole = dome
+    middle = int(whole.starts[10:12].mean())
+    first = mend_of(whole, None, outcome(job, whole, refused((middle - 1, middle + 1))), 0.01)
+    assert first is not None
+    (a, b), *rest = first.left_out
+    assert not rest
+    assert a <= middle - 2
+    assert b >= middle + 2
+    assert "tool body touches the part" in str(first)
+    assert 0.5e-3 <= first.length <= 15e-3
+    # The next run numbers its waypoints anew; both are named in those of the job's toolpath.
+    part = job_without(job, mesh, whole, first.left_out)
+    then = int(whole.starts[30:32].mean())
+    at = int(np.linalg.norm(part.tilt_centres - whole.tilt_centres[then], axis=1).argmin())
+    second = mend_of(whole, first, outcome(job, part, refused((at, at))), 0.01)
+    assert second is not None
+    assert second.left_out[0] == (a, b)
+    assert second.left_out[1][0] < then < second.left_out[1][1]
+    assert second.length > first.length
+
+
+def test_where_much_would_be_left_out_or_the_cause_is_another_nothing_is(dome):
+    job, _, whole = dome
+    assert mend_of(whole, None, outcome(job, whole, refused((100, 600))), 0.001) is None
+    assert mend_of(whole, None, outcome(job, whole, Refusal("timing", "cannot")), 0.001) is None
+    left = Certificate("surface left on the region", False, 0.3, 0.1, "%", Place(1.0, 1000, 3), "")
+    assert mend_of(whole, None, outcome(job, whole, Refusal("verdict", "fails"), [left]), 0.001) is None
+
+
+def test_a_slow_program_gets_a_longer_search_for_its_time_law_once(dome):
+    job, _, whole = dome
+    slow = Certificate("lowest feed", False, 61.0, 90.0, "%", Place(1.0, 1000, 3), "")
+    failed = outcome(job, whole, Refusal("verdict", "fails"), [slow])
+    found = mend_of(whole, None, failed, 0.001)
+    assert found is not None
+    assert (found.law, found.left_out) == (True, ())
+    assert "lowest feed" in str(found)
+    assert mend_of(whole, found, failed, 0.001) is None
+
+
+def test_a_link_that_cannot_be_done_takes_the_ends_of_the_cuts_beside_it(dome):
+    job, _, whole = dome
+    links = np.flatnonzero(~cutting_intervals(whole))
+    middle = links[(links > 100) & (links < 500)]
+    middle = int(middle[len(middle) // 2])
+    found = mend_of(whole, None, outcome(job, whole, refused((middle, middle))), 0.05)
+    assert found is not None
+    assert len(found.left_out) == 2
+    assert found.left_out[0][1] <= middle + 1 <= found.left_out[1][0] + 1
+
+
+@pytest.mark.slow
+def test_a_run_that_went_back_passes_and_its_program_names_what_it_leaves_out(dome, tmp_path, monkeypatch):
+    """The first placement is refused for three waypoints, as if the tool touched something there."""
+    job, mesh, whole = dome
+    job = Job.from_dict({**TABLES, "tolerance": {"left_share": 0.01}}, job.mesh_path.parent)
+    real, calls = pipeline.Task.program, []
+
+    def once(self, file):
+        calls.append(self.left_out)
+        if self.left_out:
+            return real(self, file)
+        refusal = refused((123, 125))
+        self.runner.run("placement", lambda: refusal)
+        return refusal
+
+    monkeypatch.setattr(pipeline.Task, "program", once)
+    done = run(job, tmp_path / "out", advice=None)
+    assert done.passed
+    assert calls[0] == ()
+    assert any(stage.name == "mended" and "went back" in stage.remark for stage in done.stages)
+    program = tmp_path / "out" / "program.csv"
+    assert f"left_out = [[{calls[1][0][0]}, {calls[1][0][1]}]]" in program.read_text()[:4000]
+    again = program_toolpath(job, mesh, program)
+    assert np.array_equal(cut_centres(again), cut_centres(job_without(job, mesh, whole, calls[1])))
