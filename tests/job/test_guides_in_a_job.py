@@ -11,7 +11,7 @@ import pytest
 
 from pentapod.base.errors import InputError, MachineError, ProgramError
 from pentapod.base.refusal import Refusal
-from pentapod.job import Job, judge, pipeline, run
+from pentapod.job import Job, judge, run, task
 from pentapod.job.build.values import job_machine
 from pentapod.machine.machine import Machine
 from pentapod.planning import PlacedPath
@@ -87,7 +87,7 @@ def test_guides_from_the_plan_to_the_verdict(job, tmp_path):
 
 def test_where_guides_were_to_stand_is_kept_of_a_job_without_a_program(job, tmp_path, monkeypatch):
     """A time law that is refused leaves a placement, which is looked at with the guides where it wants them."""
-    monkeypatch.setattr(pipeline, "retime", lambda *_, **__: Refusal("timing", "no law"))
+    monkeypatch.setattr(task, "retime", lambda *_, **__: Refusal("timing", "no law"))
     outcome = run(job, tmp_path, advice=None)
     assert outcome.refusal.cause == "no law"
     assert not (tmp_path / "program.csv").exists()

@@ -10,7 +10,7 @@ import pytest
 import toolpath_surfaces as surfaces
 from pentapod.cli.commands.new import dome_stl
 from pentapod.geometry import RigidTransform
-from pentapod.job import Job, pipeline, run
+from pentapod.job import Job, run, task
 from pentapod.job.placed_check import meetings
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.planning import PlacedPath, Placement, plan
@@ -55,7 +55,7 @@ def test_axes_that_lean_into_the_part_are_planned_again_without_leaning_or_refus
         placed = plan(toolpath, machine, **{**options, "tilt": 0.0})
         return leaned(placed, TOO_FAR) if stubborn or options["tilt"] > 0.0 else placed
 
-    monkeypatch.setattr(pipeline, "plan", leaning)
+    monkeypatch.setattr(task, "plan", leaning)
     outcome = run(job, tmp_path / "out")
     assert outcome.passed
     assert asked == [np.radians(15.0), 0.0]

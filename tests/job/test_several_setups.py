@@ -13,7 +13,7 @@ from pentapod.base.errors import InputError, JobError
 from pentapod.cli.commands.new import dome_stl
 from pentapod.cli.main import run as command
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job import Job, pipeline, run
+from pentapod.job import Job, pipeline, run, task
 from pentapod.job.outcome import SetUps
 from pentapod.machine.machine import Machine
 from pentapod.program import read_csv
@@ -194,7 +194,7 @@ def test_an_interruption_changes_nothing(stage, job, pieces, tmp_path, monkeypat
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pipeline, stage, stop)
+    monkeypatch.setattr(pipeline if hasattr(pipeline, stage) else task, stage, stop)
     with pytest.raises(KeyboardInterrupt):
         run(Job.load(job), tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -355,6 +355,23 @@ def test_processor_and_libraries_come_back_and_older_files_lack_them(tmp_path):
     assert read_csv(path).provenance == SOURCE
 
 
+def test_what_is_left_out_comes_back(tmp_path):
+    source = replace(SOURCE, left_out=((3, 9), (120, 122)))
+    path = write_csv(program(provenance=source), tmp_path / "program.csv")
+    assert "# left_out = [[3, 9], [120, 122]]\n" in path.read_text(encoding="utf-8")
+    assert read_csv(path).provenance == source
+    assert "left_out" not in write_csv(program(provenance=SOURCE), tmp_path / "whole.csv").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("bad", ["[]", "[[3]]", "[[9, 3]]", "[[3.0, 9]]", "[3, 9]", "[[3, 9], [8, 12]]", "[[-1, 2]]"])
+def test_bad_pairs_of_what_is_left_out_are_named(tmp_path, bad):
+    path = write_csv(program(provenance=replace(SOURCE, left_out=((3, 9),))), tmp_path / "program.csv")
+    path.write_text(path.read_text(encoding="utf-8").replace("[[3, 9]]", bad), encoding="utf-8")
+    with pytest.raises(ProgramError) as caught:
+        read_csv(path)
+    assert caught.value.key == "left_out"
+
+
 @pytest.mark.parametrize(
     ("old", "new", "key"),
     [

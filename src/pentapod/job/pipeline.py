@@ -80,7 +80,8 @@ def run(
         rules = (*timing_limits(job, used), *limits), tuple(claims)
         task = Task(job, specification, runner, piece, *rules, before, left_out)
         outcome = _planned(task, staging, writers or {})
-        if outcome.refusal is not None and piece is None and before is None and covers_region(job):
+        alone = piece is None and before is None and job.placement.setups == 1
+        if outcome.refusal is not None and alone and covers_region(job):
             outcome = _mended(task, mesh, outcome, staging, writers or {})
         refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
         if refusal is not None and refusal.stage == "placement" and splits:
