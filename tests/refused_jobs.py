@@ -5,8 +5,10 @@ Each is a mesh and the tables of a job. The toolpaths are coarse, so that many c
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,8 @@ import numpy as np
 import trimesh
 
 from concave_parts import GENERATED
+from pentapod.kinematics import AsBuiltPentapod
+from pentapod.machine import CalibrationRecord, Machine, calibrate, record_of, write_calibration
 from pentapod.machine.reader import machine_bytes
 
 Tables = dict[str, dict[str, Any]]
@@ -22,9 +26,10 @@ USUAL: Tables = {
     "part": {"mesh": "part.stl", "unit": "mm"},
     "machine": {"name": "desk"},
     "tool": {"type": "ball", "diameter_mm": 6.0},
-    "toolpath": {"stepover_mm": 6.0, "spacing_mm": 4.0},
+    "toolpath": {"stepover_mm": 10.0, "spacing_mm": 5.0},
     "axis": {},
-    "feed": {"cut_mm_min": 3000.0},
+    "gouge": {},
+    "feed": {"cut_mm_min": 6000.0},
     "tolerance": {"chordal_mm": 0.05, "path_mm": 0.1, "left_share": 1.0},
     "placement": {},
 }
@@ -35,13 +40,16 @@ USUAL: Tables = {
 class Refused:
     """A job that is refused. shape: vertices and faces, in the unit of the job; None for a part by others.
 
-    other: the file of a part by others. edits: of the machine file `desk`, texts to replace.
+    other: the file of a part by others. edits: of the machine file `desk`, texts to replace. calibrated: `desk` as it
+    was built, with a calibration. files: beside the job, by name.
     """
 
     shape: Callable[[], tuple[np.ndarray, np.ndarray]] | None
     tables: Tables
     other: str = ""
     edits: tuple[tuple[str, str], ...] = field(default=())
+    calibrated: bool = False
+    files: dict[str, str] = field(default_factory=dict)
 
     def write(self, folder: Path, parts: Path | None = None) -> Path:
         """Write job, mesh and machine into a folder; return the job's path."""
@@ -52,11 +60,16 @@ class Refused:
         else:
             assert parts is not None
             tables["part"]["mesh"] = str(parts / self.other)
-        if self.edits:
+        for name, text in self.files.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        if self.edits or self.calibrated:
             text = machine_bytes("desk").decode()
             for old, new in self.edits:
                 assert old in text
                 text = text.replace(old, new)
+            if self.calibrated:
+                write_calibration(calibration(), folder / "calibration.toml")
+                text += '\n[calibration]\nfile = "calibration.toml"\n'
             (folder / "machine.toml").write_text(text)
             tables["machine"] = {"file": "machine.toml"}
         lines: list[str] = []
@@ -65,6 +78,19 @@ class Refused:
             lines += [f"[{name}]", *(f"{key} = {literal(value)}" for key, value in given.items()), ""]
         (folder / "job.toml").write_text("\n".join(lines), encoding="utf-8")
         return folder / "job.toml"
+
+
+@cache
+def calibration() -> CalibrationRecord:
+    """Calibration of a machine `desk` whose joints are off by some tenths of a millimetre."""
+    desk, rng = Machine.load("desk"), np.random.default_rng(1)
+    errors = {"base_errors": 2e-4 * rng.normal(size=(5, 3)), "zeros": 5e-4 * rng.normal(size=5)}
+    built = AsBuiltPentapod.of(desk.robot, **errors, radii=[0.0, 0.01, 0.0, 0.03, 0.0])
+    axes = np.column_stack([rng.uniform(-0.4, 0.4, (40, 2)), np.ones(40)])
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    places = rng.uniform((-0.1, -0.1, 0.25), (0.1, 0.1, 0.35), (40, 3))
+    found = calibrate(places, axes, built.leg_lengths(places, axes), desk.robot, leg_sigma=1e-6)
+    return record_of(found, "desk", desk.robot, datetime.date(2026, 1, 31))
 
 
 def literal(value: Any) -> str:
@@ -119,15 +145,47 @@ def block(x: float, y: float, z: float) -> Callable[[], tuple[np.ndarray, np.nda
     return shape
 
 
+def turned_over(shape: Callable[[], tuple[np.ndarray, np.ndarray]]) -> Callable[[], tuple[np.ndarray, np.ndarray]]:
+    """A shape whose facets are wound the other way."""
+
+    def shape_of() -> tuple[np.ndarray, np.ndarray]:
+        vertices, faces = shape()
+        return vertices, faces[:, ::-1]
+
+    return shape_of
+
+
+def under_a_roof() -> tuple[np.ndarray, np.ndarray]:
+    """A block of 40 x 40 x 10 mm on z = 0, and a larger one above it."""
+    (low, below), (high, above) = block(40.0, 40.0, 10.0)(), block(60.0, 60.0, 5.0)()
+    return np.concatenate([low, np.add(high, [0.0, 0.0, 40.0])]), np.concatenate([below, above + len(low)])
+
+
 def at(z: float, turn: tuple[float, float, float] = (180.0, 0.0, 0.0)) -> dict[str, Any]:
     """A fixed placement at a height of the machine."""
     return {"mode": "fixed", "position_mm": [85.0, -17.0, z], "rotation_deg": list(turn)}
 
 
+NO_PASSES = {"stepover_mm": None, "spacing_mm": None}
+APT = """PARTNO/LINES
+UNITS/MM
+CUTTER/6
+MULTAX/ON
+RAPID
+GOTO/-20,0,40,{i},0,{k}
+FEDRAT/600,MMPM
+GOTO/-20,0,1,{i},0,{k}
+GOTO/20,0,1,{i},0,{k}
+GOTO/20,10,1,{i},0,{k}
+GOTO/-20,10,1,{i},0,{k}
+RAPID
+GOTO/-20,10,40,{i},0,{k}
+FINI
+"""
 SIDE = {"mode": "fixed", "direction": [1.0, 0.0, 0.0]}
 STRICT = {"tilt_deg": 0.0}
-LARGE = {"toolpath": {"stepover_mm": 40.0, "spacing_mm": 20.0}}
-SCANT = {"toolpath": {"stepover_mm": 90.0, "spacing_mm": 40.0}}
+LARGE = {"toolpath": {"stepover_mm": 120.0, "spacing_mm": 30.0}, "feed": {"cut_mm_min": 20000.0}}
+SCANT = {"toolpath": {"stepover_mm": 300.0, "spacing_mm": 60.0}, "feed": {"cut_mm_min": 20000.0}}
 
 REFUSED: dict[str, Refused] = {
     # concave blocks, the tool along the normals
@@ -209,6 +267,73 @@ REFUSED: dict[str, Refused] = {
         cap(60.0, 45.0), {}, edits=(("platform_max_deg = 112", "platform_max_deg = 75"),)
     ),
     "thick legs": Refused(cap(60.0, 45.0), {"axis": STRICT}, edits=(("leg_diameter_mm = 16", "leg_diameter_mm = 60"),)),
+    # other machines, and one as it was built
+    "steep: dome of 85 deg, no cone": Refused(cap(20.0, 85.0), {"machine": {"name": "steep"}, "axis": STRICT}),
+    "steep: table too low": Refused(
+        cap(50.0, 30.0), {"machine": {"name": "steep"}, "placement": {"mode": "table", "table_z_mm": 900.0}}
+    ),
+    "steep: tool along x": Refused(block(40.0, 30.0, 15.0), {"machine": {"name": "steep"}, "axis": SIDE}),
+    "general: dome of 60 deg, no cone": Refused(
+        cap(20.0, 60.0), {"machine": {"name": "bench-general"}, "axis": STRICT}
+    ),
+    "general: too near": Refused(cap(50.0, 25.0), {"machine": {"name": "bench-general"}, "placement": at(200.0)}),
+    "general: plate of 900 x 100": Refused(plate(900.0, 100.0), {"machine": {"name": "bench-general"}, **LARGE}),
+    "guide: dome of 65 deg, no cone": Refused(cap(20.0, 65.0), {"machine": {"name": "guide"}, "axis": STRICT}),
+    "guide: table too high": Refused(
+        cap(50.0, 30.0), {"machine": {"name": "guide"}, "placement": {"mode": "table", "table_z_mm": 150.0}}
+    ),
+    "calibrated: dome of 65 deg, no cone": Refused(cap(20.0, 65.0), {"axis": STRICT}, calibrated=True),
+    "calibrated: table too high": Refused(
+        cap(50.0, 30.0), {"placement": {"mode": "table", "table_z_mm": 150.0}}, calibrated=True
+    ),
+    # turned parts
+    "bottom of a block on a table": Refused(
+        block(50.0, 40.0, 30.0),
+        {
+            "part": {"region_direction": [0, 0, -1], "region_angle_deg": 80.0},
+            "placement": {"mode": "table", "table_z_mm": 500.0},
+        },
+    ),
+    "long part, fixed across": Refused(plate(480.0, 40.0), {"placement": at(470.0, (180.0, 0.0, 90.0)), **LARGE}),
+    "fixed, leaning": Refused(cap(50.0, 30.0), {"placement": at(470.0, (225.0, 0.0, 0.0)), "axis": STRICT}),
+    # no toolpath
+    "hidden under a roof": Refused(under_a_roof, {"part": {"region_box_mm": [[-25, -25, -1], [25, 25, 15]]}}),
+    "waterlines on a plate": Refused(plate(60.0, 60.0), {"toolpath": {"strategy": "waterline"}}),
+    "holder wider than a pocket": Refused(
+        GENERATED["pocket_boss"], {"tool": {"holder_mm": [[30.0, 60.0, 60.0]], "flute_mm": 3.5}}
+    ),
+    "closed part, inside out": Refused(turned_over(block(50.0, 40.0, 15.0)), {}),
+    "sheet wound downwards": Refused(turned_over(plate(50.0, 40.0, 3.0)), {}),
+    "toolpath from a file, too far": Refused(
+        plate(60.0, 60.0),
+        {"toolpath": {"strategy": "file", "file": "path.apt", **NO_PASSES}, "placement": at(1200.0)},
+        files={"path.apt": APT.format(i=0.0, k=1.0)},
+    ),
+    "toolpath from a file, leaning": Refused(
+        plate(60.0, 60.0),
+        {"toolpath": {"strategy": "file", "file": "path.apt", **NO_PASSES}, "placement": at(470.0), "axis": STRICT},
+        files={"path.apt": APT.format(i=0.8, k=0.6)},
+    ),
+    # programs that fail their verdict
+    "passes too far apart": Refused(
+        cap(40.0, 25.0), {"toolpath": {"stepover_mm": 3.0}, "tolerance": {"left_mm": 0.2, "left_share": 0.001}}
+    ),
+    "passes too far apart at the rim": Refused(
+        cap(20.0, 70.0),
+        {
+            "axis": {"mode": "auto"},
+            "toolpath": {"stepover_mm": 2.5},
+            "tolerance": {"left_mm": 0.2, "left_share": 0.001},
+        },
+    ),
+    "gouges only reported": Refused(
+        GENERATED["pocket_boss"],
+        {
+            "tool": {"type": "flat"},
+            "gouge": {"remedy": ["report"]},
+            "axis": {"mode": "fixed", "direction": [0, 0, 1], "tilt_deg": 0.0},
+        },
+    ),
     # parts by others
     "torus": Refused(None, {"part": {"scale": 40.0}}, "torus.STL"),
     "sphere": Refused(None, {"part": {"scale": 60.0}}, "unit_sphere.STL"),

@@ -37,7 +37,7 @@ def test_a_program_that_fails_its_verdict_is_not_left_as_program(tmp_path):
     (tmp_path / "job.toml").write_text(job_text(), encoding="utf-8")
     job, out = Job.load(tmp_path / "job.toml"), tmp_path / "out"
     never = Claim("never", lambda _: Finding(False, 1.0, 0.0, "", Place(), "always fails"))
-    outcome = run(job, out, claims=(never,))
+    outcome = run(job, out, claims=(never,), advice=None)
     assert not outcome.passed
     assert "never" in outcome.refusal.cause
     assert [c.claim for c in outcome.verdict.certificates if not c.passed] == ["never"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import wraps
 from typing import Any, Concatenate, Never, ParamSpec, Protocol, TypeVar, cast, overload
 
@@ -115,6 +115,10 @@ class Refusal(Value):
             text += ": " + "; ".join(str(item) for item in self.diagnosis[:3])
             text += f"; and {len(self.diagnosis) - 3} more limits" if len(self.diagnosis) > 3 else ""
         return text + (f". {self.remedy}" if self.remedy else "")
+
+    def with_advice(self, advice: tuple[Advice, ...], sentence: str) -> Refusal:
+        """Return the refusal with advice, and a sentence about it, without its point, after its own remedy."""
+        return replace(self, advice=advice, remedy=". ".join(text for text in (self.remedy, sentence) if text))
 
     def unwrap(self) -> Never:
         """Raise RefusalError with this refusal; a result of a stage returns itself instead."""

@@ -13,7 +13,7 @@ from pentapod.job.pipeline import passes
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 
-_KEYS = frozenset(("region", "gouge.remedy", "part.unit", "part.scale"))
+_KEYS = frozenset(("region", "gouge.remedy", "part.unit", "part.scale", "curve", "shallowest"))
 
 
 def can_help(error: InputError) -> bool:

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal
@@ -27,8 +28,8 @@ from pentapod.job.plan_before import PlanBefore
 from pentapod.job.run_folder import staged, unstaged
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import StageRunner
-from pentapod.job.task import Task
-from pentapod.job.withheld import STAGE, withheld
+from pentapod.job.task import Task, ending_when_interrupted
+from pentapod.job.withheld import STAGE, failures, withheld
 from pentapod.machine.machine import Machine
 from pentapod.planning import PlacedPath
 from pentapod.planning.setups import setups
@@ -87,22 +88,25 @@ def run(
         if refusal is not None and refusal.stage == "placement" and splits:
             outcome = _split(task, mesh, refusal, staging, writers or {})
         refusal = outcome.refusal
-        if refusal is not None and refusal.stage != STAGE and piece is None and advice is not None:
+        if refusal is not None and piece is None and advice is not None:
             again = partial(passes, machine=machine, limits=limits, claims=claims)
             search = (job, used, mesh, task.toolpath, again, advice, progress)
-            found = runner.run("advice", lambda: advised(*search))
-            better = dataclasses.replace(refusal, advice=found.advice, remedy=found.sentence)
+            failed = failures(outcome.verdict) if refusal.stage == STAGE else {}
+            found = runner.run("advice", lambda: advised(*search, failed))
+            better = refusal.with_advice(found.advice, found.sentence)
             runner.stages = [s if s.value is not refusal else s.with_value(better) for s in runner.stages]
-            outcome = _written(task, refusal_verdict(better, specification.sources), staging, writers or {})
+            verdict = outcome.verdict if failed else refusal_verdict(better, specification.sources)
+            outcome = _written(task, verdict, staging, writers or {})
     return outcome
 
 
-def passes(
-    job: Job, *, machine: Machine | None = None, limits: Sequence[Limit] = (), claims: Sequence[Claim] = ()
-) -> bool:
-    """Return whether a job is planned, with a verdict that passes; nothing is kept. Raises InputError as `run`."""
+def passes(job: Job, progress: Progress = silent, **given: Any) -> bool:
+    """Return whether a job is planned, with a verdict that passes; nothing is kept. given: other arguments of `run`.
+
+    Raises InputError as `run`, and KeyboardInterrupt where it would go on with the best that a search found till then.
+    """
     with tempfile.TemporaryDirectory() as folder:
-        return run(job, folder, machine=machine, limits=limits, claims=claims, advice=None).passed
+        return run(job, folder, ending_when_interrupted(progress), advice=None, **given).passed
 
 
 def _toolpath(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+from pentapod.base.progress import Progress
 from pentapod.base.refusal import Refusal
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.job.build.limits import placement_limits
@@ -34,6 +35,20 @@ UPRIGHT = "the tool does not lean, as it would touch the part"
 STRAIGHT = "the tool keeps one direction, as it would touch the part"
 """What is said of a placement with one axis everywhere."""
 
+INTERRUPTED = "interrupted"
+"""The word by which a search says that an interruption ended it, and the best so far is kept."""
+
+
+def ending_when_interrupted(progress: Progress) -> Progress:
+    """Return a progress that raises KeyboardInterrupt once a search was interrupted, instead of going on."""
+
+    def shown(stage: str, fraction: float, note: str = "") -> None:
+        progress(stage, fraction, note)
+        if note.startswith(INTERRUPTED):
+            raise KeyboardInterrupt
+
+    return shown
+
 
 def explanation(
     path: LegPath, trajectory: Trajectory, program: Program, machine: Machine, toolpath: Toolpath
@@ -56,7 +71,7 @@ def placement_remarks(placed: PlacedPath | Refusal) -> str:
     chosen = placed.placement
     lines = [f"guides 1 to 5 at {chosen.guides}"] if chosen.guides else []
     lines += [f"tool axis: {placed.common_axis}; {placed.lean}"] if placed.common_axis is not None else []
-    if any(word in chosen.chosen_by for word in ("interrupted", UPRIGHT, STRAIGHT)):
+    if any(word in chosen.chosen_by for word in (INTERRUPTED, UPRIGHT, STRAIGHT)):
         lines.append(f"placement: {chosen.chosen_by}; smallest margin {placed.smallest_margin:.3f}")
     return "\n".join(lines)
 

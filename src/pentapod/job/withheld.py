@@ -12,7 +12,7 @@ STAGE = "verdict"
 
 def withheld(verdict: Verdict) -> Refusal | None:
     """Return the refusal of a program some claims about which fail; None where all claims that were judged hold."""
-    failed = [certificate for certificate in verdict.certificates if not certificate.passed]
+    failed = list(failures(verdict).values())
     if not failed:
         return None
     rest = len(failed) - 3
@@ -20,8 +20,13 @@ def withheld(verdict: Verdict) -> Refusal | None:
     return Refusal(
         STAGE,
         f"the program fails its own verdict: {'; '.join(_said(each) for each in failed[:3])}{more}",
-        remedy="report.html shows where. Try another strategy, a smaller tool or region, or another axis.mode",
+        remedy="report.html shows where",
     )
+
+
+def failures(verdict: Verdict) -> dict[str, Certificate]:
+    """Return the claims that fail, by name."""
+    return {certificate.claim: certificate for certificate in verdict.certificates if not certificate.passed}
 
 
 def _said(certificate: Certificate) -> str:

@@ -49,18 +49,18 @@ class RegionShare(Value):
 
 
 def why_empty(mesh: Mesh, region: Region) -> str:
-    """Return why nothing in a region of a mesh can be machined, and what to change."""
+    """Return why nothing in a region of a mesh can be machined."""
     found = RegionShare.of(mesh, region)
     degrees = float(np.degrees(found.flattest))
     if mesh.diagnosis.inverted:
-        return "the closed surface is inside out; repair = true turns it over"
+        return "the closed surface is inside out"
     if found.inside > 0.0:
-        return "all of it is hidden from the direction by the part above; turn region_direction"
+        return "all of it is hidden from the direction by the part above"
     if found.flattest <= 0.5 * np.pi + WALL_SLACK:
-        wanted = min(10.0 * np.ceil((degrees + 1.0) / 10.0), 90.0)
-        return f"its flattest place is {degrees:.3g}° from the direction: try region_angle_deg = {wanted:g}"
+        within = float(np.degrees(region.within))
+        return f"its flattest place is {degrees:.3g}° from the direction, and region_angle_deg is {within:.3g}"
     if region.box is not None and not len(Patch.whole(mesh).in_box(region).faces):
         extent = " x ".join(f"{a:.4g}..{b:.4g}" for a, b in zip(*(1e3 * mesh.bounds), strict=True))
-        return f"check the box against the part, which spans {extent} mm"
+        return f"the box holds nothing of the part, which spans {extent} mm"
     share = f"{100.0 * (1.0 - found.facing):.0f} % of the surface" if region.box is None else "the surface in the box"
-    return f"{share} faces away from the direction; flip = true turns the surface over, or turn region_direction"
+    return f"{share} faces away from the direction"

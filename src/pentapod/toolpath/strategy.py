@@ -86,7 +86,7 @@ def empty_region(mesh: Mesh, options: PathOptions, dropped: int = 0) -> Toolpath
     """Return the error of a region in which nothing is left to machine. dropped: passes left out as too short."""
     remedy = why_empty(mesh, options.region)
     if dropped:
-        remedy = f"all {dropped} passes are shorter than {1e3 * options.shortest:.3g} mm; check the unit of the mesh"
+        remedy = f"all {dropped} passes are shorter than {1e3 * options.shortest:.3g} mm"
     return ToolpathError("the region holds nothing to machine", key="region", remedy=remedy)
 
 

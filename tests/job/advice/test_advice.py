@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import signal
 import tomllib
 
 import pytest
@@ -15,9 +16,11 @@ from pentapod.job import AdviceOptions, Job, advise, run
 from pentapod.job.advice.search import Advised, advised
 from pentapod.job.advise import can_help
 from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.job.pipeline import passes
 from refused_jobs import REFUSED
 
 TOO_FAR = ("position_mm = [", "position_mm = [1000.0, 0, 700] # [")
+FIXED = ("mode", "position_mm", "rotation_deg")
 METRES = ('unit = "mm"', 'unit = "m"')
 
 
@@ -79,7 +82,7 @@ def searched(folder, name, passes, **options) -> Advised:
 def test_the_best_that_passes_comes_first_and_what_fails_is_no_advice(tmp_path):
     planned: list[Job] = []
 
-    def passes(job: Job) -> bool:
+    def passes(job: Job, _) -> bool:
         planned.append(job)
         return len(planned) > 2
 
@@ -92,6 +95,37 @@ def test_the_best_that_passes_comes_first_and_what_fails_is_no_advice(tmp_path):
     assert all(getattr(getattr(planned[2].tables, table), key) == value for key, value in keys.items())
     assert found.advice[0].kept >= found.advice[1].kept
     assert found.sentence.startswith("It can be done with: ")
+
+
+def test_an_interruption_ends_the_search_and_keeps_what_was_found(tmp_path):
+    def passes(job: Job, _) -> bool:
+        planned.append(job)
+        if len(planned) > 1:
+            raise KeyboardInterrupt
+        return True
+
+    planned: list[Job] = []
+    found = searched(tmp_path, "table too low", passes, plans=4, wanted=3)
+    assert found.interrupted
+    assert len(planned) == 2
+    assert len(found.advice) == 1
+    again = searched(tmp_path, "table too low", passes, plans=4, wanted=3)
+    assert again.advice == ()
+    assert again.sentence.startswith("The search was interrupted; tried until then: ")
+
+
+def test_a_trial_whose_search_for_a_placement_is_interrupted_ends(tmp_path):
+    """A plan would go on with the best placement so far."""
+    notes: list[str] = []
+
+    def progress(stage: str, fraction: float, note: str = "") -> None:
+        notes.append(note)
+        if "best margin so far" in note:
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        passes(Job.load(REFUSED["too far"].write(tmp_path)).with_(placement=dict.fromkeys(FIXED)), progress)
+    assert any(note.startswith("interrupted") for note in notes)
 
 
 def test_nothing_that_works_is_told(tmp_path):

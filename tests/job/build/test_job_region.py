@@ -39,7 +39,7 @@ def checked(path):
 def test_a_sheet_that_shows_its_back_is_turned_over_by_flip(make_job):
     back = turned_over()
     job = Job.load(make_job(mesh=back))
-    with pytest.raises(ToolpathError, match="flip = true turns the surface over"):
+    with pytest.raises(ToolpathError, match="faces away from the direction"):
         job_toolpath(job, job_mesh(job))
     job = Job.load(make_job((UNIT, UNIT + "\nflip = true"), mesh=back))
     mesh = job_mesh(job)

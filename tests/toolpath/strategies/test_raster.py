@@ -333,7 +333,7 @@ def test_regions_and_tools_that_make_no_sense():
 
 def test_errors_of_regions_and_steps_that_cannot_be_machined():
     mesh = Mesh.of(*surfaces.grid(waves))
-    with pytest.raises(ToolpathError, match=r"100 % of the surface faces away.*flip = true turns"):
+    with pytest.raises(ToolpathError, match=r"100 % of the surface faces away"):
         make_toolpath(mesh, TOOL, RasterOptions(stepover=1e-3, region=Region(direction=(0, 0, -1))))
     make_toolpath(mesh.flipped(), TOOL, RasterOptions(stepover=5e-3, region=Region(direction=(0, 0, -1))))
     with pytest.raises(ToolpathError, match="which spans"):

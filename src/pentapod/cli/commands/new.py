@@ -56,6 +56,7 @@ def _for_part(part: Path, job: Path, machine: str, *, as_json: bool, quiet: bool
     """Write a job for a part."""
     from pentapod.base.errors import InputError
     from pentapod.base.files import atomic_write
+    from pentapod.job.fitting import fitted
     from pentapod.job.proposal import propose
     from pentapod.machine.machine import Machine
 
@@ -63,8 +64,8 @@ def _for_part(part: Path, job: Path, machine: str, *, as_json: bool, quiet: bool
         raise InputError("already exists", file=job, remedy="name another file with -o")
     beside = job.resolve().parent
     name = os.path.relpath(Path(machine).resolve(), beside) if machine.endswith(".toml") else machine
-    proposal = propose(part, Machine.load(machine), name)
     mesh = {"mesh": Path(os.path.relpath(part.resolve(), beside)).as_posix()}
+    proposal = fitted(propose(part, used := Machine.load(machine), name), mesh, beside, used)
     tables = {**proposal.tables, "part": {**mesh, **proposal.tables["part"]}}
     with atomic_write(job) as temporary:
         temporary.write_text(job_text(tables, proposal.reasons), encoding="utf-8")

@@ -25,17 +25,23 @@ from pentapod.planning.problem.samples import ToolpathSamples
 Changes = dict[str, dict[str, Any]]
 Kinds = Callable[[Sketch], list[ToolpathSamples]]
 
-_OF_MODES = ("direction", "point_mm", "line", "places_mm", "directions")
+OF_MODES = ("direction", "point_mm", "line", "places_mm", "directions")
+"""The keys of one mode only."""
+
 _FROM_AXES = ("lead_deg", "side_deg")
 
 
 @dataclass(frozen=True, eq=False)
 class AxisChoice:
-    """Tool axes to try. words: what they are, empty for the job's own; kinds: samples of a sketch, to choose from."""
+    """Tool axes to try. words: what they are, empty for the job's own; kinds: samples of a sketch, to choose from.
+
+    narrow: whether another choice holds these axes, so that they are tried with the job's own placement only.
+    """
 
     words: str
     changes: Changes
     kinds: Kinds
+    narrow: bool = False
 
 
 def taken_out(job: Job, table: str, keys: tuple[str, ...]) -> dict[str, Any]:
@@ -67,9 +73,10 @@ def axis_choices(
             # A beam that leans far from the normal burns another spot.
             suits = not 0.0 < lean < float(angle_between(sketch.normals, direction).max())
             if suits and not (same and not cone):
-                found.append(_fixed(job, direction, usual, cone))
+                narrow = any(choice.changes.get("axis", {}).get("mode") == "fixed" for choice in found)
+                found.append(_fixed(job, direction, usual, cone, narrow=narrow))
         if lean > usual and axis.mode != "auto":
-            keys = taken_out(job, "axis", (*_OF_MODES, *_FROM_AXES, "tilt_deg"))
+            keys = taken_out(job, "axis", (*OF_MODES, *_FROM_AXES, "tilt_deg"))
             found.append(
                 AxisChoice(
                     "the planner chooses the tool axis", {"axis": {"mode": "auto", **keys}},
@@ -78,18 +85,19 @@ def axis_choices(
             )  # fmt: skip
     if tool.can_tilt and axis.mode != "auto":
         wider = [deg for deg in options.cones_deg if deg > axis.tilt_deg]
-        found += [_wider(deg) for deg in wider]
+        widest = None if any(choice.changes.get("axis", {}).get("mode") == "auto" for choice in found) else wider[-1:]
+        found += [_wider(deg, narrow=widest != [deg]) for deg in wider]
     return found
 
 
-def _fixed(job: Job, direction: Floats, cone: float, others: dict[str, Any]) -> AxisChoice:
+def _fixed(job: Job, direction: Floats, cone: float, others: dict[str, Any], *, narrow: bool) -> AxisChoice:
     """Return the choice of one direction for the whole path."""
     rounded = [round(float(v), 4) + 0.0 for v in direction]
-    keys = {**taken_out(job, "axis", (*_OF_MODES, *_FROM_AXES)), **others, "direction": rounded}
+    keys = {**taken_out(job, "axis", (*OF_MODES, *_FROM_AXES)), **others, "direction": rounded}
     upward = normalised(np.array(rounded))
     return AxisChoice(
         "one direction of the tool for the whole path", {"axis": {"mode": "fixed", **keys}},
-        lambda s: [s.samples(upward, cone)],
+        lambda s: [s.samples(upward, cone)], narrow,
     )  # fmt: skip
 
 
@@ -100,7 +108,8 @@ def _directions(job: Job, sketch: Sketch, constraints: PlacementConstraints) -> 
     return [view, *(d for d in others if float(d @ view) < np.cos(to_si(5.0, "deg")) and float(d @ view) > 0.0)]
 
 
-def _wider(degrees: float) -> AxisChoice:
+def _wider(degrees: float, *, narrow: bool) -> AxisChoice:
     """Return the choice of a wider cone around the job's own axes."""
     words = f"the tool may lean by up to {degrees:g} deg"
-    return AxisChoice(words, {"axis": {"tilt_deg": degrees}}, lambda s: [s.samples(s.axes, to_si(degrees, "deg"))])
+    changes: Changes = {"axis": {"tilt_deg": degrees}}
+    return AxisChoice(words, changes, lambda s: [s.samples(s.axes, to_si(degrees, "deg"))], narrow)

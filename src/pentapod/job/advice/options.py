@@ -11,20 +11,25 @@ from pentapod.base.values import Value
 class AdviceOptions(Value):
     """How advice is searched for. Nothing depends on time, so that a job always gets the same advice.
 
-    wanted: number of changes to find. plans: whole plans that are tried for them, at most. points: that stand for the
-    path in estimates. enough: estimated margin from which a change is planned. comfortable: estimated margin beyond
-    which more counts for nothing. cones_deg: wider tilt cones. angles_deg: smaller angles of the region. setups:
-    numbers of set-ups. lengths: of the tool, as shares of the machine's. first, halvings: first share of the extents,
-    and steps of the bisection, for the largest box. most: share of the area from which a region counts as all. flat:
-    height, as a share of the largest extent, below which a box keeps it. least: smallest extent of a box, and smallest
-    scale, as shares. spare: share of the extent, or of the scale, that is found and taken; the estimate looks at few
-    points. smaller: factor on the extent of a second, smaller box. doubtful: width of a part, as a multiple of the
-    work volume's, beyond which its unit is doubted. worth_length: what another
-    tool counts beside a region that keeps a share of the area.
+    wanted: number of changes to find. plans: whole plans that are tried for them, at most; replans: where a program
+    fails its verdict, as long as its plan. points: that stand for the path in estimates. enough: estimated margin from
+    which a change is planned. comfortable: estimated margin beyond which more counts for nothing. cones_deg: wider tilt
+    cones. angles_deg: smaller angles of the region. setups: numbers of set-ups. lengths: of the tool, as shares of the
+    machine's. first, halvings: first share of the extents, and steps of the bisection, for the largest box. most: share
+    of the area from which a region counts as all. flat: height, as a share of the largest extent, below which a box
+    keeps it. least: smallest extent of a box, and smallest scale, as shares. spare: share of the extent, or of the
+    scale, that is found and taken; the estimate looks at few points. smaller: factor on the extent of a second, smaller
+    box. doubtful: width of a part, as a multiple of the work volume's, beyond which its unit is doubted. strategies:
+    that are tried where another makes no toolpath. worth_length: what another tool counts beside a region that keeps a
+    share of the area. other_face_deg: turn of a part on a table from which it lies on another face. Where a program
+    fails its verdict: nearer, thinner, slower: factors on the distance between passes, on the cutter's diameter (with
+    that distance), and on the feed; surface_points: of the region, at which it is estimated what is left; near_share:
+    steps along the toolpath, in radii of the ball; surely: share of what may be left that the estimate must keep to.
     """
 
     wanted: int = 1
     plans: int = 4
+    replans: int = 2
     points: int = 96
     enough: float = 0.04
     comfortable: float = 0.15
@@ -40,7 +45,15 @@ class AdviceOptions(Value):
     spare: float = 0.97
     smaller: float = 0.75
     doubtful: float = 5.0
+    strategies: tuple[str, ...] = ("raster", "offset")
     worth_length: float = 0.7
+    other_face_deg: float = 10.0
+    nearer: tuple[float, ...] = (0.7, 0.5)
+    thinner: float = 0.6
+    slower: float = 0.6
+    surface_points: int = 20_000
+    near_share: float = 0.05
+    surely: float = 0.8
 
 
 OPTIONS = AdviceOptions()

@@ -2,40 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import islice
+from functools import partial
+from itertools import chain, islice
+from types import MappingProxyType
 
 from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress
 from pentapod.base.refusal import Advice, Change
 from pentapod.base.values import Value
+from pentapod.job.advice.failed_claims import FailedClaims
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.advice.starts import starts
-from pentapod.job.advice.trials import FEWEST, Trial, Trials, joined, merged
+from pentapod.job.advice.trials import FEWEST, Tell, Trial, Trials, joined, merged
 from pentapod.job.build.toolpath import job_tool
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.toolpath import Toolpath
+from pentapod.verify.verdict.verdict import Certificate
 
-Passes = Callable[[Job], bool]
-"""Plans a job, all stages, and returns whether its verdict passed."""
+Passes = Callable[[Job, Progress], bool]
+"""Plans a job, all stages, and returns whether its verdict passed. Raises KeyboardInterrupt where it is interrupted."""
 
 
 @dataclass(frozen=True)
 class Advised(Value):
-    """What a search for advice found. tried: words for what was estimated or planned."""
+    """What a search for advice found. tried: words for what was estimated or planned. interrupted: by Ctrl-C."""
 
     advice: tuple[Advice, ...]
     tried: tuple[str, ...]
+    interrupted: bool = False
 
     @property
     def sentence(self) -> str:
         """What was found, as a sentence without its point."""
         if self.advice:
             return "It can be done with: " + "; or with: ".join(str(each) for each in self.advice)
+        if self.interrupted:
+            return f"The search was interrupted; tried until then: {'; '.join(self.tried) or 'nothing'}"
         if not self.tried:
             return "Nothing was found to try"
         return f"Tried, by estimate or plan: {'; '.join(self.tried)}: none works"
@@ -49,47 +56,57 @@ def advised(
     passes: Passes,
     options: AdviceOptions,
     progress: Progress,
+    failed: Mapping[str, Certificate] = MappingProxyType({}),
 ) -> Advised:
     """Return changes with which a job that cannot be done is planned, and its verdict passes.
 
-    machine, mesh: the job's. toolpath: None where none could be made.
+    machine, mesh: the job's. toolpath: None where none could be made. failed: claims about its program that fail.
     """
     found: list[Advice] = []
     tried: dict[str, None] = {}
-    trials = _trials(job, machine, mesh, toolpath, options, progress, tried)
+    count, interrupted = options.replans if failed else options.plans, False
+
+    def tell(words: str) -> None:
+        if words:
+            tried[words] = None
+            progress("advice", 0.0, words)
+
+    trials = _trials(job, machine, mesh, toolpath, options, tell)
+    if failed and toolpath is not None:
+        trials = chain(FailedClaims(job, machine, mesh, toolpath, failed, options, tell).all(), trials)
     try:
-        for trial in islice(trials, options.plans):
+        for number, trial in enumerate(islice(trials, count)):
             tried[trial.words] = None
-            progress("advice", 0.5, f"planning: {trial.words}")
-            if _passes(passes, job, trial):
+            if _passes(passes, job, trial, partial(_told, progress, (number + 0.5) / count, trial.words)):
                 changes = (Change(table, *item) for table, keys in trial.changes.items() for item in keys.items())
                 found.append(Advice(tuple(changes), trial.words, trial.kept, trial.whole))
             if len(found) == options.wanted:
                 break
     except KeyboardInterrupt:
+        interrupted = True
         progress("advice", 1.0, "interrupted: what was found is kept")
-    return Advised(tuple(found), tuple(tried))
+    return Advised(tuple(found), tuple(tried), interrupted)
 
 
-def _passes(passes: Passes, job: Job, trial: Trial) -> bool:
+def _told(progress: Progress, share: float, words: str, stage: str, fraction: float, note: str = "") -> None:
+    """Report a stage of a trial as a report of the search."""
+    progress("advice", share, f"planning: {words}: {stage}")
+
+
+def _passes(passes: Passes, job: Job, trial: Trial, progress: Progress) -> bool:
     """Return whether a job passes with the changes of a trial."""
     try:
-        return passes(job.with_(**trial.changes))
+        return passes(job.with_(**trial.changes), progress)
     except InputError:  # nothing to machine, or values that do not go with each other
         return False
 
 
 def _trials(
-    job: Job,
-    machine: Machine,
-    mesh: Mesh,
-    toolpath: Toolpath | None,
-    options: AdviceOptions,
-    progress: Progress,
-    tried: dict[str, None],
+    job: Job, machine: Machine, mesh: Mesh, toolpath: Toolpath | None, options: AdviceOptions, tell: Tell
 ) -> Iterator[Trial]:
     """Yield the trials of the jobs to begin with."""
-    for start in starts(job, machine, mesh, options):
+    for start in starts(job, machine, mesh, options, has_toolpath=toolpath is not None):
+        tell(start.words)
         tool = job_tool(start.job, machine)
         if toolpath is None or start.changes:
             sketch = Sketch.of_region(start.job, start.mesh, tool, options.points)
@@ -97,7 +114,7 @@ def _trials(
             sketch = Sketch.of_toolpath(job, mesh, tool, toolpath, options.points)
         if sketch is None or len(sketch.contacts) < FEWEST:
             continue
-        trials = Trials(start.job, machine, start.mesh, sketch, options, progress, tried)
+        trials = Trials(start.job, machine, start.mesh, sketch, options, tell)
         for trial in trials.all(own=bool(start.changes)):
             words, changes = joined(start.words, trial.words), merged(start.changes, trial.changes)
             yield replace(trial, words=words, changes=changes, kept=start.kept * trial.kept)

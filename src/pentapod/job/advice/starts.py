@@ -1,22 +1,28 @@
-"""What to begin with where a region holds nothing, or the part is of a doubtful size: other values for [part]."""
+"""What to begin with where a region holds nothing, no toolpath can be made, or the part is of a doubtful size."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pentapod.base.errors import InputError
-from pentapod.job.advice.axes import Changes, taken_out
+from pentapod.geometry.directions import normalised
+from pentapod.job.advice.axes import OF_MODES, Changes, taken_out
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.build.region import covers_region, job_region
+from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_mesh
 from pentapod.job.schema.job import Job
+from pentapod.job.schema.strategies import strategy_table
 from pentapod.machine.machine import Machine
 from pentapod.mesh.io.load import UNITS
 from pentapod.mesh.io.registry import states_unit
 from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.patch import Patch
 from pentapod.mesh.region_share import RegionShare
 
 _SIDES = tuple(tuple(sign if k == axis else 0.0 for k in range(3)) for axis in (2, 0, 1) for sign in (1.0, -1.0))
@@ -33,14 +39,65 @@ class Start:
     kept: float = 1.0
 
 
-def starts(job: Job, machine: Machine, mesh: Mesh, options: AdviceOptions) -> list[Start]:
-    """Return the jobs to begin with, the most promising first; none where no region was found to hold anything."""
+def starts(
+    job: Job, machine: Machine, mesh: Mesh, options: AdviceOptions, *, has_toolpath: bool = True
+) -> Iterator[Start]:
+    """Yield the jobs to begin with, the most promising first; those without a toolpath are left out.
+
+    has_toolpath: whether the toolpath of the job is known to exist.
+    """
     own = Start("", {}, job, mesh)
+    if mesh.diagnosis.inverted and (
+        repaired := _start(job, "the closed surface turned right side out", {"repair": True})
+    ):
+        yield repaired  # any other change would cut into the part from outside its walls
+        return
     if not covers_region(job):
-        return [own]
-    if RegionShare.of(mesh, job_region(job)).inside > 0.0:
-        return [*_of_other_size(job, machine, mesh, options), own]
-    return _with_a_region(job, mesh)
+        yield own
+        return
+    region = RegionShare.of(mesh, job_region(job)).inside > 0.0
+    if region:
+        yield from _of_other_size(job, machine, mesh, options)
+        if has_toolpath or _has_toolpath(own, machine):
+            yield own
+            return
+    others = [*_with_other_paths(job, machine, mesh, options), *_with_a_region(job, mesh)]
+    yield from (start for start in (others if region else _with_a_region(job, mesh)) if _has_toolpath(start, machine))
+
+
+def _has_toolpath(start: Start, machine: Machine) -> bool:
+    try:
+        job_toolpath(start.job, start.mesh, machine=machine)
+    except InputError:
+        return False
+    return True
+
+
+def _with_other_paths(job: Job, machine: Machine, mesh: Mesh, options: AdviceOptions) -> Iterator[Start]:
+    """Yield the job with other passes over its region, with other axes, and with a smaller cutter."""
+    changes: list[tuple[str, Changes]] = [
+        (f'the strategy "{name}"', {"toolpath": _strategy(job, name)})
+        for name in options.strategies
+        if name != job.toolpath.strategy
+    ]
+    view = [float(v) for v in normalised(job.part.si.region_direction)]
+    axis = taken_out(job, "axis", (*OF_MODES, "tilt_deg"))
+    changes.append(
+        ("one direction of the tool for the whole path", {"axis": {**axis, "mode": "fixed", "direction": view}})
+    )
+    if getattr(job.tool, "diameter_mm", None) is not None:
+        diameter = float(f"{options.thinner * job.tool.diameter_mm:.3g}")
+        changes.append(("a smaller cutter", {"tool": {"diameter_mm": diameter}}))
+    for words, tables in changes:
+        with suppress(InputError):
+            yield Start(words, tables, job.with_(**tables), mesh)
+
+
+def _strategy(job: Job, name: str) -> dict[str, Any]:
+    """Return the changes of [toolpath] for another strategy: keys that it does not have are taken out."""
+    known = strategy_table(name).model_fields
+    others = {key: None for key in job.toolpath.model_fields_set if key not in known}
+    return {"strategy": name, **others}
 
 
 def _of_other_size(job: Job, machine: Machine, mesh: Mesh, options: AdviceOptions) -> list[Start]:
@@ -61,7 +118,7 @@ def _of_other_size(job: Job, machine: Machine, mesh: Mesh, options: AdviceOption
 
 
 def _with_a_region(job: Job, mesh: Mesh) -> list[Start]:
-    """Return the job with a region that holds something, the one with most of the surface first."""
+    """Return the job with a region that holds something, the one that shows most of its surface first."""
     tries: list[tuple[str, dict[str, Any]]] = []
     box, angle = (taken_out(job, "part", (key,)) for key in ("region_box_mm", "region_angle_deg"))
     tries += [("no box", box)] if box else []
@@ -71,8 +128,15 @@ def _with_a_region(job: Job, mesh: Mesh) -> list[Start]:
     tries += [("facets wound alike", {"repair": True})] if not job.part.repair else []
     tries += [("another side of the part", {"region_direction": list(side)}) for side in _SIDES]
     found = [start for start in (_start(job, *each) for each in tries) if start is not None and start.kept > 0.0]
-    # Sorting is stable: of changes that keep as much, the first one is tried first.
-    return sorted(found, key=lambda start: -round(start.kept, 2))
+    most = max((_shown(start) for start in found), default=0.0)
+    # Sorting is stable: of changes that show as much, the first one is tried first.
+    return sorted(found, key=lambda start: -round(_shown(start) / max(most, 1e-300), 2))
+
+
+def _shown(start: Start) -> float:
+    """Return the area of a start's region as its direction sees it, square metres."""
+    patch, view = Patch.of(start.mesh, job_region(start.job)), normalised(start.job.part.si.region_direction)
+    return float((patch.areas * np.maximum(patch.facet_normals @ view, 0.0)).sum())
 
 
 def _start(job: Job, words: str, keys: dict[str, Any]) -> Start | None:
@@ -83,4 +147,4 @@ def _start(job: Job, words: str, keys: dict[str, Any]) -> Start | None:
     except InputError:
         return None
     share = RegionShare.of(mesh, job_region(other))
-    return Start(words, {"part": keys}, other, mesh, share.inside / max(share.facing, 1e-300))
+    return Start(words, {"part": keys}, other, mesh, min(share.inside / max(share.facing, 1e-300), 1.0))

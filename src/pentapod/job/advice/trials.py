@@ -10,7 +10,6 @@ from itertools import pairwise
 import numpy as np
 
 from pentapod.base.errors import InputError
-from pentapod.base.progress import Progress
 from pentapod.base.units import from_si, to_si
 from pentapod.job.advice.axes import AxisChoice, Changes, axis_choices
 from pentapod.job.advice.options import AdviceOptions
@@ -27,6 +26,9 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.planning.estimate import Estimate, Estimator
 from pentapod.planning.problem.constraints import FREE
 from pentapod.planning.problem.problem import PlacementProblem
+
+Tell = Callable[[str], None]
+"""Takes words for what is tried."""
 
 FEWEST = 4
 """Points below which a sketch shows nothing."""
@@ -64,15 +66,14 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class Trials:
-    """The trials of one job. tried: words for what was looked at, in order."""
+    """The trials of one job."""
 
     job: Job
     machine: Machine
     mesh: Mesh
     sketch: Sketch
     options: AdviceOptions
-    progress: Progress
-    tried: dict[str, None]
+    tell: Tell
 
     @cached_property
     def estimator(self) -> Estimator:
@@ -88,7 +89,7 @@ class Trials:
     @cached_property
     def places(self) -> list[Place]:
         """The job's own placements, and wider ones."""
-        return places(self.job, self.machine, self.mesh)
+        return places(self.job, self.machine, self.mesh, self.sketch, self.options)
 
     @cached_property
     def axes(self) -> list[AxisChoice]:
@@ -113,7 +114,7 @@ class Trials:
         o = self.options
         for place in self.places:
             scant: list[Setting] = []
-            for axis in self.axes:
+            for axis in (axis for axis in self.axes if place is self.places[0] or not axis.narrow):
                 setting = self._setting(axis, place)
                 if not (own or setting.words) or setting.found.margin < o.enough:
                     continue
@@ -125,7 +126,7 @@ class Trials:
                 yield Trial(setting.words, setting.changes, 1.0, 1.0)
 
     def _setting(self, axis: AxisChoice, place: Place) -> Setting:
-        self._tell(joined(axis.words, place.words))
+        self.tell(joined(axis.words, place.words))
         setting = Setting(axis, place, self._estimated(axis, place, self.sketch))
         self.looked_at.append(setting)
         return setting
@@ -149,7 +150,7 @@ class Trials:
         if regions is None:
             return []
         found: list[Smaller] = []
-        self._tell("a smaller region_angle_deg")
+        self.tell("a smaller region_angle_deg")
         near: Estimate | None = None
         for degrees in self.options.angles_deg:
             if (smaller := regions.flatter(degrees)) is None:
@@ -158,7 +159,7 @@ class Trials:
             if near.margin >= self.options.enough:
                 found.append(smaller)
                 break
-        self._tell("a smaller region_box_mm")
+        self.tell("a smaller region_box_mm")
         for deep in (False, True):
             found += self._boxes(base, regions, deep=deep)
         return [self._of_region(base, smaller) for smaller in found]
@@ -184,7 +185,7 @@ class Trials:
         """Yield the smallest number of set-ups whose slabs fit."""
         if not base.place.constraints.moves:
             return
-        self._tell("more placement.setups")
+        self.tell("more placement.setups")
         for count in self.options.setups:
             for along in np.argsort(-np.ptp(self.sketch.contacts, axis=0))[:2].tolist():
                 at = self.sketch.contacts[:, along]
@@ -199,7 +200,7 @@ class Trials:
 
     def _lengths(self, base: Setting) -> Iterator[Trial]:
         """Yield the first other tool length that fits."""
-        self._tell("another tool.length_mm")
+        self.tell("another tool.length_mm")
         for share in self.options.lengths:
             length = round(float(from_si(share * self.machine.tool_length, "mm")))
             try:
@@ -214,7 +215,7 @@ class Trials:
 
     def _scales(self, base: Setting) -> Iterator[Trial]:
         """Yield the largest scale that fits, by bisection; it makes another part."""
-        self._tell("a smaller part.scale")
+        self.tell("a smaller part.scale")
 
         def estimated(share: float, near: Estimate | None) -> Estimate:
             return self._estimated(base.axis, base.place, self.sketch.scaled(share), near, obstacles=False)
@@ -248,11 +249,6 @@ class Trials:
         """Return the estimate for axes, a placement and a sketch; without obstacles where it is of another part."""
         estimator = self.estimator if obstacles else replace(self.estimator, world=None)
         return estimator.best(axis.kinds(sketch), place.constraints, place.component, self.options.comfortable, near)
-
-    def _tell(self, words: str) -> None:
-        if words:
-            self.tried[words] = None
-            self.progress("advice", 0.0, words)
 
 
 def joined(*words: str) -> str:

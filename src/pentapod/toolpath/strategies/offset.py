@@ -106,9 +106,7 @@ def distance_field(
     if curve is not None:
         from_curve, line = _on_surface(patch, spaced(curve, edge / points_per_edge))
     elif not (region.topology.facets_at_edge == 1).any():
-        raise ToolpathError(
-            "the region has no border to start from", key="curve", remedy="give a curve, or a smaller region"
-        )
+        raise ToolpathError("the region has no border to start from, and no curve is given", key="curve")
     if options.stepover is not None:
         # Over the region's own facets: distances are exact inside them, and there are fewer.
         field = _distance(region, None if from_curve is None else from_curve.placed(drawn), 1.0 / options.stepover)

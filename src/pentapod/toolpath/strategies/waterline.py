@@ -45,12 +45,7 @@ def waterline_paths(surface: Surface, options: WaterlineOptions) -> ContactPaths
     whole = region_patch(surface, options)
     patch = whole.steeper(upright, options.shallowest)
     if not len(patch.faces):
-        raise ToolpathError(
-            "the region is too flat for waterlines",
-            key="shallowest",
-            value=options.shallowest,
-            remedy="use a raster, or turn the direction of the heights",
-        )
+        raise ToolpathError("the region is too flat for waterlines", key="shallowest", value=options.shallowest)
     passes, stepover = plane_lines(surface, patch, options, upright)
     flat = 1.0 - float(patch.areas.sum() / whole.areas.sum())
     degrees = np.degrees(options.shallowest)

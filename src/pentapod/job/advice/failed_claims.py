@@ -1,0 +1,175 @@
+"""Trials for a program that fails its own verdict: finer passes, a smaller cutter or region, less feed, no gouges.
+
+What is left on the surface is estimated before a plan: how much less than before the cutter's ball leaves, on its way
+along the toolpath, at points of the region.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import InputError
+from pentapod.base.units import from_si
+from pentapod.cutters.mounted import BallEnded
+from pentapod.geometry.polyline import spaced
+from pentapod.job.advice.axes import Changes
+from pentapod.job.advice.options import AdviceOptions
+from pentapod.job.advice.parts import Regions
+from pentapod.job.advice.trials import Tell, Trial, merged
+from pentapod.job.build.specification import job_coverage
+from pentapod.job.build.toolpath import job_tool, job_toolpath
+from pentapod.job.schema.job import Job
+from pentapod.machine.machine import Machine
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.patch import Patch
+from pentapod.toolpath.toolpath import SegmentKind, Toolpath
+from pentapod.verify.claims import gouge, slowness
+from pentapod.verify.surface import surface_left
+from pentapod.verify.verdict.coverage import Coverage
+from pentapod.verify.verdict.verdict import Certificate
+
+_LEFT = surface_left.CLAIMS[0].name
+_GOUGES = frozenset(claim.name for claim in gouge.CLAIMS)
+_FEEDS = frozenset(claim.name for claim in slowness.CLAIMS)
+
+
+@dataclass(frozen=True, eq=False)
+class FailedClaims:
+    """Trials for the claims of a job that fail, by name. toolpath: the job's, which its program follows."""
+
+    job: Job
+    machine: Machine
+    mesh: Mesh
+    toolpath: Toolpath
+    failed: Mapping[str, Certificate]
+    options: AdviceOptions
+    tell: Tell
+
+    def all(self) -> Iterator[Trial]:
+        """Yield trials, the ones that keep most first."""
+        if _GOUGES & self.failed.keys():
+            yield from self._without_gouges()
+        if _FEEDS & self.failed.keys():
+            self.tell("a lower feed")
+            feed = round(self.options.slower * self.job.feed.cut_mm_min, 1)
+            yield Trial("a lower feed", {"feed": {"cut_mm_min": feed}}, 1.0, 1.0)
+        if _LEFT in self.failed:
+            yield from self._leaving_less()
+
+    def _without_gouges(self) -> Iterator[Trial]:
+        """Yield the job without the motions that gouge, with the share of its cuts that are kept."""
+        self.tell("without what gouges")
+        changes: Changes = {"gouge": {"remedy": ["drop"]}}
+        other = _toolpath_of(self.job, changes, self.machine, self.mesh)
+        kept = 0.0 if other is None else _cut_length(other) / max(_cut_length(self.toolpath), 1e-300)
+        if kept > 0.0:
+            yield Trial("what gouges is left out", changes, min(kept, 1.0), kept)
+
+    def _leaving_less(self) -> Iterator[Trial]:
+        """Yield changes that leave less than the job now allows, where that can be estimated."""
+        most = self.options.surely * float(self.job.tolerance.left_share)
+        for words, changes in self._finer():
+            self.tell(words)
+            if self._left(changes) <= most:
+                yield Trial(words, changes, 1.0, 1.0)
+        if (regions := Regions.of(self.job, self.mesh, job_tool(self.job, self.machine), self.options)) is None:
+            return
+        self.tell("a smaller region_angle_deg")
+        for degrees in self.options.angles_deg:
+            smaller = regions.flatter(degrees)
+            if smaller is not None and self._left(smaller.changes, self.toolpath) <= most:
+                yield Trial(smaller.words, smaller.changes, smaller.share, smaller.share)
+                return
+
+    def _finer(self) -> Iterator[tuple[str, Changes]]:
+        """Yield passes nearer together, with the same bound of what is left, and a smaller cutter."""
+        table = self.job.toolpath
+        key = "stepover_mm" if getattr(table, "stepover_mm", None) is not None else "scallop_mm"
+        if getattr(table, key, None) is None:
+            return
+        bound: dict[str, Any] = {}
+        if self.job.tolerance.left_mm is None:
+            bound = {"tolerance": {"left_mm": _shorter(float(from_si(self._coverage.left, "mm")))}}
+
+        def nearer(share: float) -> Changes:
+            # The height of a ridge grows with the square of the distance between passes.
+            by = share if key == "stepover_mm" else share**2
+            return merged({"toolpath": {key: _shorter(by * getattr(table, key))}}, bound)
+
+        for share in self.options.nearer:
+            yield "passes nearer together", nearer(share)
+        if isinstance(job_tool(self.job, self.machine), BallEnded):
+            share = self.options.thinner
+            diameter = _shorter(share * self.job.tool.diameter_mm)
+            yield "a smaller cutter", merged(nearer(share), {"tool": {"diameter_mm": diameter}})
+
+    @cached_property
+    def _coverage(self) -> Coverage:
+        return job_coverage(self.job, self.mesh, self.machine)
+
+    @cached_property
+    def _unreached(self) -> float:
+        """Share of the region that the ball leaves, but that the verdict does not count."""
+        found = self.failed[_LEFT].value or 0.0
+        return max(self._uncovered(self._coverage, self.job, self.toolpath) - 0.01 * found, 0.0)
+
+    def _left(self, changes: Changes, toolpath: Toolpath | None = None) -> float:
+        """Return about the share of the region on which a job with changes leaves too much.
+
+        0 for a tool without a ball, 1 where no toolpath can be made. toolpath: one that is nearly that of the changes.
+        """
+        if not isinstance(job_tool(self.job, self.machine), BallEnded):
+            return 0.0
+        toolpath = toolpath or _toolpath_of(self.job, changes, self.machine, self.mesh)
+        if toolpath is None:
+            return 1.0
+        other = self.job.with_(**changes)
+        coverage = job_coverage(other, self.mesh, self.machine)
+        return self._uncovered(coverage, other, toolpath) - self._unreached
+
+    def _uncovered(self, coverage: Coverage, job: Job, toolpath: Toolpath) -> float:
+        """Return the share of points of a region above which a ball never is at the height that may be left."""
+        tool = job_tool(job, self.machine)
+        if coverage.region is None or not isinstance(tool, BallEnded) or not len(coverage.region.faces):
+            return 0.0
+        points, normals = _spread(coverage.region, self.options.surface_points)
+        centres = spaced(toolpath.tilt_centres, self.options.near_share * tool.radius)
+        gaps = KDTree(centres).query(points + coverage.left * normals)[0]
+        return float(np.mean(np.asarray(gaps) > tool.radius))
+
+
+def _toolpath_of(job: Job, changes: Changes, machine: Machine, mesh: Mesh) -> Toolpath | None:
+    """Return the toolpath of a job with changes; None where it has none."""
+    try:
+        return job_toolpath(job.with_(**changes), mesh, machine=machine)[0]
+    except InputError:
+        return None
+
+
+def _cut_length(toolpath: Toolpath) -> float:
+    """Return the length of the cuts of a toolpath, metres."""
+    steps = np.linalg.norm(np.diff(toolpath.tilt_centres, axis=0), axis=1)
+    kinds = np.array([toolpath.segments[k].kind is SegmentKind.CUT for k in toolpath.segment_of_interval])
+    return float(steps[kinds].sum())
+
+
+def _spread(region: Patch, count: int) -> tuple[Floats, Floats]:
+    """Return about `count` points of a region, evenly by area, and the normals there."""
+    corners = region.vertices[region.faces]
+    rng, edges = np.random.default_rng(0), np.cumsum(region.areas)
+    facets = np.searchsorted(edges, (np.arange(count) + 0.5) * edges[-1] / count)
+    root, share = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
+    a, b, c = (corners[facets, k] for k in range(3))
+    return (1.0 - root) * a + root * (1.0 - share) * b + root * share * c, region.facet_normals[facets]
+
+
+def _shorter(length: float) -> float:
+    """Return a length in mm with three digits."""
+    return float(f"{length:.3g}")

@@ -1,0 +1,57 @@
+"""Trials for programs that fail their verdict: what is left is estimated, what gouges is left out."""
+
+from __future__ import annotations
+
+import pytest
+
+from pentapod.job import Job
+from pentapod.job.advice.failed_claims import FailedClaims
+from pentapod.job.advice.options import AdviceOptions
+from pentapod.job.build.toolpath import job_toolpath
+from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.verify.claims import gouge, slowness
+from pentapod.verify.surface import surface_left
+from pentapod.verify.verdict.verdict import Certificate, Place
+from refused_jobs import REFUSED
+
+
+def trials(folder, name, claim, value=None, **options):
+    return trials_of(Job.load(REFUSED[name].write(folder)), claim, value, **options)
+
+
+def trials_of(job, claim, value=None, **options):
+    machine, mesh, told = job_machine(job), job_mesh(job), []
+    failed = {claim.name: Certificate(claim.name, False, value, 0.1, "%", Place(), "")}
+    path, _ = job_toolpath(job, mesh, machine=machine)
+    given = AdviceOptions(surface_points=4000, **options)
+    return job, list(FailedClaims(job, machine, mesh, path, failed, given, told.append).all()), told
+
+
+def test_nearer_passes_are_those_that_leave_as_little_as_was_asked(tmp_path):
+    """Passes 3 mm apart leave 0.40 mm under a ball of 6 mm, 2.1 mm 0.19, 1.5 mm 0.10; 0.2 mm may be left."""
+    job, found, told = trials(tmp_path, "passes too far apart", surface_left.CLAIMS[0], 40.0, nearer=(0.9, 0.5))
+    assert told[:2] == ["passes nearer together", "passes nearer together"]
+    assert next(trial.changes["toolpath"]["stepover_mm"] for trial in found if "toolpath" in trial.changes) == 1.5
+    assert all("tolerance" not in trial.changes for trial in found)
+    assert found[0].kept == 1.0
+    job.with_(**found[0].changes)
+
+
+def test_the_bound_that_follows_from_the_passes_stays(tmp_path):
+    """Else less would be asked of nearer passes, and they would fail again."""
+    job = Job.load(REFUSED["passes too far apart"].write(tmp_path)).with_(tolerance={"left_mm": None})
+    ridge = 3.0 - (9.0 - 1.5**2) ** 0.5
+    _, found, _ = trials_of(job, surface_left.CLAIMS[0], 5.0)
+    (bound,) = {trial.changes["tolerance"]["left_mm"] for trial in found if "toolpath" in trial.changes}
+    assert bound == pytest.approx(1.25 * ridge + 0.05 + 0.1, rel=0.01)
+
+
+def test_gouges_that_were_only_reported_are_left_out(tmp_path):
+    _, (trial,), _ = trials(tmp_path, "gouges only reported", gouge.CLAIMS[0], 0.3)
+    assert trial.changes == {"gouge": {"remedy": ["drop"]}}
+    assert 0.0 < trial.kept < 1.0
+
+
+def test_a_feed_that_is_not_reached_is_lowered(tmp_path):
+    job, (trial,), _ = trials(tmp_path, "too far", slowness.CLAIMS[0], 0.5)
+    assert trial.changes == {"feed": {"cut_mm_min": 0.6 * job.feed.cut_mm_min}}
