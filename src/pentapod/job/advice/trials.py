@@ -24,8 +24,10 @@ from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.estimate import Estimate, Estimator
+from pentapod.planning.problem.common_axis import CommonAxis
 from pentapod.planning.problem.constraints import FREE
 from pentapod.planning.problem.problem import PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
 
 Tell = Callable[[str], None]
 """Takes words for what is tried."""
@@ -127,7 +129,7 @@ class Trials:
 
     def _setting(self, axis: AxisChoice, place: Place) -> Setting:
         self.tell(joined(axis.words, place.words))
-        setting = Setting(axis, place, self._estimated(axis, place, self.sketch))
+        setting = Setting(axis, place, self._best(axis.kinds(self.sketch), place, None, obstacles=True))
         self.looked_at.append(setting)
         return setting
 
@@ -155,7 +157,7 @@ class Trials:
         for degrees in self.options.angles_deg:
             if (smaller := regions.flatter(degrees)) is None:
                 continue
-            near = self._estimated(base.axis, base.place, smaller.sketch, near)
+            near = self._less(base, smaller.sketch, near)
             if near.margin >= self.options.enough:
                 found.append(smaller)
                 break
@@ -173,7 +175,7 @@ class Trials:
 
         def estimated(share: float, near: Estimate | None) -> Estimate | None:
             smaller = regions.boxed(share, deep=deep)
-            return None if smaller is None else self._estimated(base.axis, base.place, smaller.sketch, near)
+            return None if smaller is None else self._less(base, smaller.sketch, near)
 
         fits = self._largest(estimated, self.options.first)
         if fits == 0.0:
@@ -192,7 +194,7 @@ class Trials:
                 borders = pairwise(np.linspace(at.min(), at.max(), count + 1).tolist())
                 parts = [self.sketch.within(low, high, along) for low, high in borders]
                 parts = [part for part in parts if len(part.contacts) >= FEWEST]
-                margins = (self._estimated(base.axis, base.place, part).margin for part in parts)
+                margins = (self._less(base, part).margin for part in parts)
                 if count > self.job.placement.setups and all(margin >= self.options.enough for margin in margins):
                     changes = merged(base.changes, {"placement": {"setups": count}})
                     yield Trial(joined(f"up to {count} set-ups", base.words), changes, 1.0, 1.0)
@@ -205,7 +207,7 @@ class Trials:
             length = round(float(from_si(share * self.machine.tool_length, "mm")))
             try:
                 other = replace(self, machine=self.machine.with_tool(to_si(length, "mm")))
-                margin = other._estimated(base.axis, base.place, self.sketch).margin
+                margin = other._less(base, self.sketch).margin
             except InputError:  # the spindle or the holder would not fit
                 continue
             if margin >= self.options.enough:
@@ -218,7 +220,7 @@ class Trials:
         self.tell("a smaller part.scale")
 
         def estimated(share: float, near: Estimate | None) -> Estimate:
-            return self._estimated(base.axis, base.place, self.sketch.scaled(share), near, obstacles=False)
+            return self._less(base, self.sketch.scaled(share), near, obstacles=False)
 
         fits = self._largest(estimated, 0.5)
         if fits > 0.0:
@@ -243,12 +245,20 @@ class Trials:
                 break
         return fits
 
-    def _estimated(
-        self, axis: AxisChoice, place: Place, sketch: Sketch, near: Estimate | None = None, *, obstacles: bool = True
-    ) -> Estimate:
-        """Return the estimate for axes, a placement and a sketch; without obstacles where it is of another part."""
+    def _less(self, base: Setting, sketch: Sketch, near: Estimate | None = None, *, obstacles: bool = True) -> Estimate:
+        """Return the estimate for less than the whole task, with axes of the kind that was best for it."""
+        own, kinds = base.found.samples.common_axis, base.axis.kinds(sketch)
+        alike = [each for each in kinds if _cone(each.common_axis) == _cone(own)]
+        return self._best(alike or kinds, base.place, near, obstacles=obstacles)
+
+    def _best(self, kinds: list[ToolpathSamples], place: Place, near: Estimate | None, *, obstacles: bool) -> Estimate:
         estimator = self.estimator if obstacles else replace(self.estimator, world=None)
-        return estimator.best(axis.kinds(sketch), place.constraints, place.component, self.options.comfortable, near)
+        return estimator.best(kinds, place.constraints, place.component, self.options.comfortable, near)
+
+
+def _cone(common_axis: CommonAxis | None) -> float | None:
+    """Return the cone of axes around a common direction; None where they are the path's own."""
+    return None if common_axis is None else common_axis.cone
 
 
 def joined(*words: str) -> str:
