@@ -56,7 +56,6 @@ def _for_part(part: Path, job: Path, machine: str, *, as_json: bool, quiet: bool
     """Write a job for a part."""
     from pentapod.base.errors import InputError
     from pentapod.base.files import atomic_write
-    from pentapod.job.fitting import fitted
     from pentapod.job.proposal import propose
     from pentapod.machine.machine import Machine
 
@@ -65,7 +64,7 @@ def _for_part(part: Path, job: Path, machine: str, *, as_json: bool, quiet: bool
     beside = job.resolve().parent
     name = os.path.relpath(Path(machine).resolve(), beside) if machine.endswith(".toml") else machine
     mesh = {"mesh": Path(os.path.relpath(part.resolve(), beside)).as_posix()}
-    proposal = fitted(propose(part, used := Machine.load(machine), name), mesh, beside, used)
+    proposal = propose(part, Machine.load(machine), name)
     tables = {**proposal.tables, "part": {**mesh, **proposal.tables["part"]}}
     with atomic_write(job) as temporary:
         temporary.write_text(job_text(tables, proposal.reasons), encoding="utf-8")
@@ -74,6 +73,7 @@ def _for_part(part: Path, job: Path, machine: str, *, as_json: bool, quiet: bool
     elif not quiet:
         click.echo("\n".join((*(f"{part.name}: {remark}" for remark in proposal.remarks), f"wrote {job}")))
         click.echo(f"next: pentapod plan {job} -o {job.with_suffix('')}-out")
+        click.echo("if that refuses the job, it looks for changes of it and prints those whose plan passed")
     return 0
 
 
