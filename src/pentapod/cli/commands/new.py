@@ -63,8 +63,8 @@ def _for_part(part: Path, job: Path, machine: str, *, as_json: bool, quiet: bool
         raise InputError("already exists", file=job, remedy="name another file with -o")
     beside = job.resolve().parent
     name = os.path.relpath(Path(machine).resolve(), beside) if machine.endswith(".toml") else machine
-    mesh = {"mesh": Path(os.path.relpath(part.resolve(), beside)).as_posix()}
     proposal = propose(part, Machine.load(machine), name)
+    mesh = {"mesh": Path(os.path.relpath(part.resolve(), beside)).as_posix()}
     tables = {**proposal.tables, "part": {**mesh, **proposal.tables["part"]}}
     with atomic_write(job) as temporary:
         temporary.write_text(job_text(tables, proposal.reasons), encoding="utf-8")
