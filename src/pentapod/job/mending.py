@@ -33,7 +33,8 @@ class MendOptions:
     """When and how a run goes back.
 
     rounds: how often at most. around: length of cut left out on either side of a place, metres. most: length of cut
-    that may be left out in all, as a multiple of the share of the region that may be left. places: beginnings of the
+    that may be left out in all, as a multiple of the share of the region that may be left; ever: share of all cuts that
+    is never exceeded. places: beginnings of the
     names of claims about places that may be left out. slow: claims that a better time law keeps; law: options of the
     search for it.
     """
@@ -41,6 +42,7 @@ class MendOptions:
     rounds: int = 3
     around: float = 0.5e-3
     most: float = 4.0
+    ever: float = 0.05
     places: tuple[str, ...] = (
         "gouge",
         "legs clear",
@@ -113,7 +115,7 @@ def mend_of(
         kept[first:last] = False
     length = np.diff(places)
     lost, all_of_it = float(length[cutting & ~kept].sum()), float(length[cutting].sum())
-    if not kept.any() or lost > options.most * share * all_of_it:
+    if not kept.any() or lost > min(options.most * share, options.ever) * all_of_it:
         return None
     runs = tuple((int(a), int(b)) for a, b in marked_runs(cutting & ~kept).tolist())
     return replace(mend, left_out=runs, length=lost, share=lost / all_of_it)
