@@ -3,18 +3,11 @@
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.families.as_built_forward import ProvenPoses, as_built_pose
-from pentapod.kinematics.families.assembly_obstacles import (
-    AssemblyObstacle,
-    AssemblyObstacles,
-    assembly_obstacles,
-    platform_obstacles,
-)
 from pentapod.kinematics.families.conics import Conic, attachment_conic, conic_determinant, forbidden_conic
 from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.path_tracking import FollowedPath, follow
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
-from pentapod.kinematics.families.rolled_platform import RolledPlatform
 from pentapod.kinematics.families.singularities import (
     architectural_measure,
     orientation_distance,
@@ -22,7 +15,6 @@ from pentapod.kinematics.families.singularities import (
     singular_plane,
     singularity_values,
 )
-from pentapod.kinematics.families.six_leg import SixLegPlatform
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.forces import (
     leg_force_map,
@@ -36,6 +28,14 @@ from pentapod.kinematics.forces import (
 from pentapod.kinematics.forward.singularity_polynomial import singularity_cofactors, singularity_polynomial
 from pentapod.kinematics.jacobian import pose_jacobian, square_jacobian
 from pentapod.kinematics.mode import MODES, Mode
+from pentapod.kinematics.platforms.assembly_obstacles import (
+    AssemblyObstacle,
+    AssemblyObstacles,
+    assembly_obstacles,
+    platform_obstacles,
+)
+from pentapod.kinematics.platforms.rolled_platform import RolledPlatform
+from pentapod.kinematics.platforms.six_leg import SixLegPlatform
 from pentapod.kinematics.proof_results import Chords
 from pentapod.kinematics.proofs.certificate import ComponentProof, certify_component
 from pentapod.kinematics.proofs.chords import prove_chords

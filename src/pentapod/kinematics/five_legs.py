@@ -13,6 +13,7 @@ from pentapod.base.arrays import Floats, as_floats, frozen
 from pentapod.base.errors import ArrayError, MachineError
 from pentapod.kinematics.arithmetic import Arithmetic, Joints, Vector, dot
 from pentapod.kinematics.batches import as_poses, joined_poses
+from pentapod.kinematics.legs_on_line import LegsOnLine
 from pentapod.numerics.blocks import blocks
 from pentapod.numerics.kernels import kernels_pay
 
@@ -26,7 +27,7 @@ SINGULAR_CONDITION = 1e-12
 """Reciprocal condition number of a geometry below which forward kinematics has no correct digits."""
 
 
-class FiveLegs:
+class FiveLegs(LegsOnLine):
     """Base attachments a_i = (x_i, y_i, 0), base (5, 2), and platform joints b_i = p + z_i i, offsets (5,), metres."""
 
     base: Floats

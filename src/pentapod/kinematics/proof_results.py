@@ -65,6 +65,8 @@ class Chords(Value):
     speeds (H, A): upper bounds of the point's speed, metres per duration of the chord.
     base_cosines (H, 5): lower bounds of the cosine between each leg (base → platform) and its base axis.
     platform_cosines (H, 5, 2): lower and upper bounds of the cosine between each leg and the line's direction i.
+    beside (H,): upper bounds of how far platform joints beside the line get from where they are at the chord's start,
+    metres; 0 where there are none.
     Infinite, or −1 and 1, where nothing is proven.
     """
 
@@ -74,3 +76,4 @@ class Chords(Value):
     speeds: Floats
     base_cosines: Floats
     platform_cosines: Floats
+    beside: Floats | float = 0.0

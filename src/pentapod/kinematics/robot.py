@@ -61,6 +61,14 @@ class Robot(Protocol):
         ...
 
     @property
+    def arms(self) -> Floats:
+        """The lengths (n_legs,) of the arms on which platform joints stand beside the line; 0 for joints on it.
+
+        An arm is a rigid part of the platform, perpendicular to the line, from the leg's place in `offsets` on.
+        """
+        ...
+
+    @property
     def branches(self) -> tuple[Branch, ...]:
         """The labels of the branches, of two signs each."""
         ...
@@ -105,6 +113,13 @@ class Robot(Protocol):
 
     def jacobian(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return ∂readings/∂(p, i) (..., n_legs, 6) in poses (..., 3): m/m, then metres per change of i."""
+        ...
+
+    def passive_wrenches(self, position: ArrayLike, direction: ArrayLike) -> Floats:
+        """Return what passive joints hold (..., c, 6): force, moment about p, machine frame, by unit of each of them.
+
+        Legs and passive joints together hold six freedoms, or five: then the platform is free to turn about its line.
+        """
         ...
 
     def leg_derivatives(self, tips: Sequence[tuple[Floats, Floats]], tool_length: float) -> list[Floats]:
@@ -154,4 +169,8 @@ class Robot(Protocol):
         legs (N, M, n_legs): readings in whose convex hull those of the legs are at all times. offsets (K,): of the
         points along the line from p. Infinite where nothing is proven.
         """
+        ...
+
+    def enclose_joints(self, poses: Poses, legs: Floats) -> Floats:
+        """Return bounds (N, n_legs) of how far the platform joints get from where they are in N poses, as `enclose`."""
         ...

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, TypeVar, cast
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
@@ -15,12 +16,15 @@ from pentapod.base.errors import MachineError
 from pentapod.kinematics.five_legs import FiveLegs
 
 LEGS = FiveLegs.n_legs
-"""Of the machines that files describe."""
+"""Of a linear pentapod, and of machine files without another family."""
+
+WORDS = {4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
+"""Counts of legs in words."""
 
 
 def each_leg(value: float | list[float]) -> Callable[[], Floats]:
-    """Return a factory of defaults: the same value, or row of values, for each leg."""
-    return lambda: np.array([value] * LEGS)
+    """Return a factory of defaults: one value, or row of values, that counts for every leg."""
+    return lambda: np.array([value])
 
 
 def per_leg(owner: object, *names: str, **widths: int) -> None:
@@ -44,6 +48,20 @@ def per_leg(owner: object, *names: str, **widths: int) -> None:
         set_frozen(owner, **{name: frozen(np.broadcast_to(value, (count, *tails[name])), name)})
 
 
+Part = TypeVar("Part")
+
+
+def for_legs(part: Part, count: int) -> Part:
+    """Return a part for so many legs: a value that is the same for all legs of it is that of each."""
+    fields = {item.name: getattr(part, item.name) for item in dataclasses.fields(cast(Any, part)) if item.init}
+    wider = {
+        name: np.broadcast_to(value[:1], (count, *value.shape[1:]))
+        for name, value in fields.items()
+        if isinstance(value, np.ndarray) and len(value) == LEGS != count and not (value != value[:1]).any()
+    }
+    return cast(Part, dataclasses.replace(cast(Any, part), **wider)) if wider else part
+
+
 def positive(owner: object, *names: str) -> None:
     """Raise MachineError where a field is not finite and positive."""
     for name in names:
@@ -62,43 +80,52 @@ def _require(ok: bool, what: str, expected: str) -> None:
         raise PydanticCustomError("rule", "{what}", {"what": what, "expected": expected})
 
 
-def _one_or_five(value: object) -> list[float]:
-    expected = "one finite number, or five (one for each leg)"
+def _legs(info: ValidationInfo) -> tuple[int, str]:
+    """Return how many legs the file's machine has, and the number in words."""
+    count = int((info.context or {}).get("legs", LEGS))
+    return count, WORDS.get(count, str(count))
+
+
+def _one_or_each(value: object, info: ValidationInfo) -> list[float]:
+    count, word = _legs(info)
+    expected = f"one finite number, or {word} (one for each leg)"
     _require(_numbers(value), "not finite numbers", expected)
     if not isinstance(value, list):
-        return [float(cast(float, value))] * LEGS
+        return [float(cast(float, value))] * count
     items = cast(list[float], value)
-    _require(len(items) == LEGS, f"{len(items)} numbers where there are five legs", expected)
+    _require(len(items) == count, f"{len(items)} numbers where there are {word} legs", expected)
     return [float(x) for x in items]
 
 
-def _five(value: object) -> list[float]:
-    _require(isinstance(value, list), "not a list", "five numbers, one for each leg")
-    return _one_or_five(value)
+def _each(value: object, info: ValidationInfo) -> list[float]:
+    _require(isinstance(value, list), "not a list", f"{_legs(info)[1]} numbers, one for each leg")
+    return _one_or_each(value, info)
 
 
-def _rows(value: object, width: int, words: str) -> list[list[float]]:
+def _rows(value: object, width: int, count: int, word: str, words: str) -> list[list[float]]:
     _require(isinstance(value, list), "not a list", words)
     rows = cast(list[Any], value)
-    _require(len(rows) == LEGS, f"{len(rows)} entries where there are five legs", words)
+    _require(len(rows) == count, f"{len(rows)} entries where there are {word} legs", words)
     for k, row in enumerate(rows, start=1):
         ok = isinstance(row, list) and len(cast(list[Any], row)) == width and _numbers(cast(object, row))
         _require(ok, f"entry {k} is not {width} finite numbers", words)
     return [[float(x) for x in row] for row in rows]
 
 
-def _pairs(value: object) -> list[list[float]]:
-    return _rows(value, 2, "five pairs [x, y], one for each leg")
+def _pairs(value: object, info: ValidationInfo) -> list[list[float]]:
+    count, word = _legs(info)
+    return _rows(value, 2, count, word, f"{word} pairs [x, y], one for each leg")
 
 
-def _axes(value: object) -> list[list[float]]:
-    words = "one unit vector [x, y, z], or five (one for each leg)"
+def _axes(value: object, info: ValidationInfo) -> list[list[float]]:
+    count, word = _legs(info)
+    words = f"one unit vector [x, y, z], or {word} (one for each leg)"
     single = isinstance(value, list) and len(cast(list[Any], value)) == 3 and _numbers(cast(object, value))
-    return _rows([value] * LEGS if single else value, 3, words)
+    return _rows([value] * count if single else value, 3, count, word, words)
 
 
-PER_LEG = Annotated[list[float], BeforeValidator(_one_or_five)]
-FIVE_NUMBERS = Annotated[list[float], BeforeValidator(_five)]
-FIVE_PAIRS = Annotated[list[list[float]], BeforeValidator(_pairs)]
-FIVE_AXES = Annotated[list[list[float]], BeforeValidator(_axes)]
+PER_LEG = Annotated[list[float], BeforeValidator(_one_or_each)]
+LEG_NUMBERS = Annotated[list[float], BeforeValidator(_each)]
+LEG_PAIRS = Annotated[list[list[float]], BeforeValidator(_pairs)]
+LEG_AXES = Annotated[list[list[float]], BeforeValidator(_axes)]
 LIST_OF_3 = Annotated[list[float], Field(min_length=3, max_length=3)]

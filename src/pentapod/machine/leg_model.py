@@ -25,7 +25,7 @@ from pentapod.base.keys import Key, check_fields
 from pentapod.base.values import Value
 from pentapod.kinematics.robot import Poses, Robot
 from pentapod.machine.calibration.digest import digest_of
-from pentapod.machine.fields import FIVE_AXES, LEGS, PER_LEG, each_leg, per_leg
+from pentapod.machine.fields import LEG_AXES, LEGS, PER_LEG, each_leg, per_leg
 
 NO_AXIS = [0.0, 0.0, 0.0]
 
@@ -62,7 +62,7 @@ class LegModel(Value):
         default_factory=each_leg(0.0)
     )
     first_axes: Annotated[
-        Floats, Key("", "axis of the base's universal joint that is fixed to the base", "first_axis", kind=FIVE_AXES)
+        Floats, Key("", "axis of the base's universal joint that is fixed to the base", "first_axis", kind=LEG_AXES)
     ] = field(default_factory=each_leg(NO_AXIS))
     expansion: Annotated[
         Floats, Key("", "thermal expansion of the screw, 1/K; steel 11.5e-6", "expansion_per_k", kind=PER_LEG)

@@ -16,14 +16,12 @@ from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
-from pentapod.kinematics.families.rolled_platform import RolledPlatform
-from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.robot import Robot
 from pentapod.machine import reader
 from pentapod.machine.calibration.digest import digest_of
 from pentapod.machine.calibration.record import CalibrationRecord
 from pentapod.machine.drives import Drives, Masses
-from pentapod.machine.fields import positive
+from pentapod.machine.fields import for_legs, positive
 from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 
@@ -62,13 +60,19 @@ class Machine(Value):
     guides: ReconfigurablePentapod | None = None
     calibration: CalibrationRecord | None = None
     leg_model: LegModel = field(default_factory=LegModel)
-    rail_positions: Floats = field(default_factory=lambda: np.zeros(FiveLegs.n_legs))
+    rail_positions: Floats = field(default_factory=lambda: np.zeros(1))
     architecture: float = field(init=False)
 
     def __post_init__(self) -> None:
         positive(self, "tool_length", "rapid_velocity")
+        count = self.robot.n_legs
+        each = {name: for_legs(getattr(self, name), count) for name in ("legs", "joints", "drives", "leg_model")}
+        set_frozen(self, **each)
         self._check_legs()
-        set_frozen(self, rail_positions=frozen(self.rail_positions, "rail_positions", (self.robot.n_legs,)))
+        rails = (
+            np.broadcast_to(self.rail_positions, (count,)) if np.size(self.rail_positions) == 1 else self.rail_positions
+        )
+        set_frozen(self, rail_positions=frozen(rails, "rail_positions", (count,)))
         measure = self.robot.conditioning
         set_frozen(self, architecture=measure)
         if measure < ARCHITECTURAL_LIMIT:
@@ -90,13 +94,6 @@ class Machine(Value):
 
     def _check_legs(self) -> None:
         """Raise MachineError where a limit is not given for each leg, or the guides are another robot's."""
-        if isinstance(self.robot, RolledPlatform):
-            raise MachineError(
-                "no machine has six legs yet: clearances of legs are known for legs that end on the tool's line",
-                key="robot",
-                value=type(self.robot).__name__,
-                expected="a linear pentapod",
-            )
         count = self.robot.n_legs
         rows = {
             "min_length": self.legs.min_length,

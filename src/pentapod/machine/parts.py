@@ -13,7 +13,7 @@ from pentapod.base.errors import MachineError
 from pentapod.base.keys import Key, check_fields
 from pentapod.base.values import Value
 from pentapod.geometry.interpolant import Interpolation
-from pentapod.machine.fields import FIVE_AXES, LIST_OF_3, PER_LEG, per_leg, positive
+from pentapod.machine.fields import LEG_AXES, LIST_OF_3, PER_LEG, per_leg, positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class JointLimits(Value):
 
     base_axes: Annotated[
         Floats,
-        Key("", "unit axis of each base joint's cone, from the base into the work", "base_axis", kind=FIVE_AXES),
+        Key("", "unit axis of each base joint's cone, from the base into the work", "base_axis", kind=LEG_AXES),
     ]
     base_cone: Annotated[Floats, Key("deg", "largest angle between leg and that axis", kind=PER_LEG)]
     platform_range: Floats

@@ -24,7 +24,7 @@ from pentapod.kinematics.robot import Robot
 from pentapod.machine.calibration.calibration_file import read_calibration
 from pentapod.machine.calibration.record import CalibrationRecord
 from pentapod.machine.drives import Drives, Masses
-from pentapod.machine.families import FAMILIES
+from pentapod.machine.families.registry import FAMILIES, legs_of
 from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 from pentapod.machine.tables import FILE_KEYS, GuideKeys, MachineTables, MachineToolKeys, PlatformJointKeys
@@ -89,7 +89,7 @@ def read(text: str, file: str | Path, make: Callable[..., Made]) -> Made:
     """Return the machine that TOML text describes, made by `make`; `file` is named in errors. Raises MachineError."""
     content = parsed(text, file, MachineError)
     try:
-        return make(**_fields(MachineTables.model_validate(content), file))
+        return make(**_fields(MachineTables.model_validate(content, context={"legs": legs_of(content)}), file))
     except ValidationError as error:
         where, details = problem_of(error, MachineTables, _table)
         raise MachineError(file=file, line=line_of(text, where), **details) from error
@@ -162,7 +162,7 @@ def _as_built(
 
 def _guides(robot: Robot, direction: Any, least: Any, greatest: Any) -> ReconfigurablePentapod | None:
     """Return the guides of a robot; None where none of them can move."""
-    travel = np.stack([least, greatest], axis=1)
+    travel = np.stack(np.broadcast_arrays(least, greatest), axis=1)
     if not travel.any():
         return None
     if not isinstance(robot, LinearPentapod):
@@ -175,7 +175,7 @@ def _guides(robot: Robot, direction: Any, least: Any, greatest: Any) -> Reconfig
             value=travel.tolist(),
             expected="least_mm at most 0, greatest_mm at least 0",
         )
-    return ReconfigurablePentapod(robot, np.asarray(direction), travel)
+    return ReconfigurablePentapod(robot, np.broadcast_to(direction, (robot.n_legs, 2)), travel)
 
 
 def _table(name: str) -> type[BaseModel] | None:

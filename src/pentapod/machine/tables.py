@@ -12,8 +12,8 @@ from pentapod.base.arrays import Floats
 from pentapod.base.keys import Key, declared
 from pentapod.base.tables import TomlTable, extended, table_of
 from pentapod.machine.drives import Drives, Masses
-from pentapod.machine.families import OfFamily
-from pentapod.machine.fields import FIVE_PAIRS, PER_LEG, each_leg
+from pentapod.machine.families.registry import OfFamily
+from pentapod.machine.fields import LEG_PAIRS, PER_LEG, each_leg
 from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 
@@ -24,7 +24,7 @@ class GuideKeys:
 
     direction: Annotated[
         Floats,
-        Key("", "direction of each guide in the base plane, unit [x, y]; [0, 0] for a fixed joint", kind=FIVE_PAIRS),
+        Key("", "direction of each guide in the base plane, unit [x, y]; [0, 0] for a fixed joint", kind=LEG_PAIRS),
     ] = field(default_factory=each_leg([0.0, 1.0]))
     least: Annotated[Floats, Key("mm", "least position on the guide, from base_mm", kind=PER_LEG)] = field(
         default_factory=each_leg(0.0)

@@ -11,6 +11,7 @@ import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.base.errors import InputError
+from pentapod.kinematics.forces import FREEDOMS, held_wrenches
 from pentapod.kinematics.jacobian import pose_jacobian
 from pentapod.numerics.blocks import blocks
 from pentapod.simulate.bodies import Capsule, leg_cylinder, leg_rod, spindle
@@ -43,7 +44,7 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
         return mass * (np.diff(places, n=2, axis=0) / period**2 - gravity)
 
     robot = machine.robot
-    vectors = robot.leg_vectors(position, direction)
+    vectors, joints = robot.leg_vectors(position, direction), robot.platform_joints(position, direction)
     lengths = np.linalg.norm(vectors, axis=2, keepdims=True)
     along = vectors / lengths
     base = robot.base_joints
@@ -51,6 +52,8 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
     loads = np.zeros((len(rows) - 2, robot.n_legs))
     # Masses on the platform line at offsets z; masses of legs, across the leg, as a share of the joint's motion.
     at_p, at_i = np.zeros((2, len(loads), 3))
+    held = robot.n_legs + robot.passive_wrenches(position[:1], direction[:1]).shape[-2] == FREEDOMS
+    turning = np.zeros((len(loads), 3))  # moment about p of forces beside the line
     for mass, z in _masses(spindle(machine, float(robot.offsets.min()))):
         force = needed(mass, position + z * direction)
         at_p, at_i = at_p + force, at_i + z * force
@@ -63,7 +66,17 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
                 push = np.einsum("ni,ni->n", force, u[middle])
                 loads[:, leg] += push * float(slides)
                 across = (out / length)[middle] * (force - push[:, None] * u[middle])
-                at_p, at_i = at_p + across, at_i + robot.offsets[leg] * across
+                if held:
+                    lever = joints[middle, leg] - position[middle]
+                    at_p, turning = at_p + across, turning + np.cross(lever, across)
+                else:
+                    at_p, at_i = at_p + across, at_i + robot.offsets[leg] * across
+    if held:
+        turning += np.cross(direction[middle], at_i)
+        wrenches = held_wrenches(robot, position[middle], direction[middle])
+        wrench = np.concatenate([at_p, turning], axis=1)[..., None]
+        held_by = np.linalg.solve(np.swapaxes(wrenches, 1, 2), wrench)[:, : robot.n_legs, 0]
+        return loads + np.asarray(held_by, dtype=np.float64)
     jacobian = pose_jacobian(robot, position[middle], direction[middle])
     return loads + np.einsum("ni,nil->nl", at_p, jacobian[:, :3]) + np.einsum("ni,nil->nl", at_i, jacobian[:, 3:])
 

@@ -26,7 +26,7 @@ from pentapod.base.arrays import as_floats
 from pentapod.base.errors import ArrayError, MachineError
 from pentapod.base.values import Value
 from pentapod.kinematics.families.quadratic import LinearPentapod
-from pentapod.kinematics.families.six_leg import SixLegPlatform
+from pentapod.kinematics.platforms.six_leg import SixLegPlatform
 from pentapod.theory.cell_poses import cell_of
 from pentapod.theory.cells import Cell, cell_decomposition
 

@@ -20,12 +20,13 @@ from pentapod.kinematics.families.as_built_quick import quick_poses
 from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.kinematics.legs_on_line import LegsOnLine
 from pentapod.kinematics.proofs.by_leg_equations import ProvenByLegEquations
 from pentapod.kinematics.robot import Branch, Robot, SingularSurface
 
 
 @dataclass(frozen=True, eq=False)
-class AsBuiltPentapod(Value, ProvenByLegEquations):
+class AsBuiltPentapod(Value, LegsOnLine, ProvenByLegEquations):
     """Five legs from a_k in space to rings around the platform line; all in metres, machine frame.
 
     base (5, 3): where the base joints are, off the plane z = 0 too. offsets (5,): z_k, the positions of the platform

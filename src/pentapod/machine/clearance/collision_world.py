@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Bools, Floats
 from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
 from pentapod.cutters.tool import Tool
@@ -88,7 +88,9 @@ class MovingBodies:
     """Positions of the moving bodies in N poses, in an obstacle's frame, metres.
 
     starts, ends (N, n_legs + 1, 3): axes of the legs, base joint to platform joint, and of the spindle. tips, axes
-    (N, 3): of the tool, the axis unit, tip → spindle. radii (n_legs + 1,): of legs and spindle.
+    (N, 3): of the tool, the axis unit, tip → spindle. radii (n_legs + 1,): of legs and spindle. feet (N, n_legs + 1,
+    3): of the legs' arms, on the platform line; arms (n_legs + 1,): which bodies have one. An arm counts as part of its
+    leg: a capsule of its radius from platform joint to foot.
     """
 
     starts: Floats
@@ -96,6 +98,8 @@ class MovingBodies:
     tips: Floats
     axes: Floats
     radii: Floats
+    feet: Floats
+    arms: Bools
 
     @classmethod
     def at(
@@ -109,17 +113,42 @@ class MovingBodies:
         starts = np.concatenate([bases, (position + top * direction)[:, None]], axis=1)
         ends = np.concatenate([joints, (position + nose * direction)[:, None]], axis=1)
         tips, axes = position + machine.tool_length * direction, -direction
+        heights = np.append(robot.offsets, nose)
+        arms = np.append(robot.arms > 0.0, False)
+        feet = position[:, None] + heights[:, None] * direction[:, None] if arms.any() else ends
         if frame is not None:
             back = frame.inverse()
             starts, ends, tips, axes = back.apply(starts), back.apply(ends), back.apply(tips), back.rotate(axes)
+            feet = back.apply(feet) if arms.any() else ends
         radii = np.append(np.full(robot.n_legs, machine.bodies.leg_radius), machine.bodies.shaft_radius)
-        return cls(starts, ends, tips, axes, radii)
+        return cls(starts, ends, tips, axes, radii, feet, arms)
+
+    def only(self, columns: Sequence[int]) -> MovingBodies:
+        """Return some of the legs and the spindle."""
+        of = list(columns)
+        return MovingBodies(
+            self.starts[:, of], self.ends[:, of], self.tips, self.axes, self.radii[of], self.feet[:, of], self.arms[of]
+        )
 
     def segments(self, surface: MeshDistance, within: float) -> Gap:
         """Return the gaps of legs and spindle, (N · (n_legs + 1),), surface to surface, none above `within`."""
-        axes = surface.segments(self.starts.reshape(-1, 3), self.ends.reshape(-1, 3), within + float(self.radii.max()))
+        far = within + float(self.radii.max())
+        axes = surface.segments(self.starts.reshape(-1, 3), self.ends.reshape(-1, 3), far)
+        if self.arms.any():
+            axes = self._with_arms(axes, surface, far)
         distance = axes.distance - np.tile(self.radii, len(self.tips))
         return Gap(np.minimum(distance, within), axes.place, axes.normal)
+
+    def _with_arms(self, axes: Gap, surface: MeshDistance, far: float) -> Gap:
+        """Return the gaps with those of arms where they are nearer: there the place counts from 1 to 2."""
+        chosen = np.flatnonzero(np.tile(self.arms, len(self.tips)))
+        ends, feet = self.ends.reshape(-1, 3)[chosen], self.feet.reshape(-1, 3)[chosen]
+        arms = surface.segments(ends, feet, far)
+        nearer = arms.distance < axes.distance[chosen]
+        distance, place, normal = axes.distance.copy(), axes.place.copy(), axes.normal.copy()
+        rows = chosen[nearer]
+        distance[rows], place[rows], normal[rows] = arms.distance[nearer], 1.0 + arms.place[nearer], arms.normal[nearer]
+        return Gap(distance, place, normal)
 
     def gaps(self, obstacle: Obstacle, tool: Sequence[Solid], within: float) -> Floats:
         """Return the gaps (N, K) of all moving bodies, in the order of `CollisionWorld.names`; none above `within`.

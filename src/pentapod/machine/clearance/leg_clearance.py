@@ -21,8 +21,9 @@ def pair_names(machine: Machine) -> tuple[str, ...]:
 def clearances(machine: Machine, position: ArrayLike, direction: ArrayLike) -> Floats:
     """Return surface-to-surface distances (..., pairs) in metres of poses (..., 3), negative in an overlap.
 
-    First the pairs of legs, each a capsule from base joint to platform joint. Then the legs and the shaft (`Bodies`):
-    there a leg ends `joint_radius` short of its platform joint. Where axes cross the distance is −(sum of the radii),
+    First the pairs of legs, each a capsule from base joint to platform joint, and with its arm, a capsule of the same
+    radius, where it ends beside the line. Then the legs and the shaft (`Bodies`): there a leg that ends on the line
+    ends `joint_radius` short of its platform joint. Where axes cross the distance is −(sum of the radii),
     whatever the depth.
     """
     p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
@@ -31,10 +32,19 @@ def clearances(machine: Machine, position: ArrayLike, direction: ArrayLike) -> F
     base = robot.base_joints
     ends = base + vectors
     a, b = np.array(list(combinations(range(robot.n_legs), 2))).T
-    legs = segment_distance(base[a], ends[..., a, :], base[b], ends[..., b, :]) - 2.0 * bodies.leg_radius
+    apart = segment_distance(base[a], ends[..., a, :], base[b], ends[..., b, :])
+    beside = robot.arms > 0.0
+    for one, other in ((a, b), (b, a)):
+        pairs = beside[other] & ~beside[one]
+        leg, arm = one[pairs], other[pairs]
+        feet = p[..., None, :] + robot.offsets[arm][:, None] * i[..., None, :]
+        to_arm = segment_distance(base[leg], ends[..., leg, :], ends[..., arm, :], feet)
+        apart[..., pairs] = np.minimum(apart[..., pairs], to_arm)
+    legs = apart - 2.0 * bodies.leg_radius
 
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    short = base + vectors * np.maximum(1.0 - bodies.joint_radius / length, 0.0)
+    joined = np.where(beside, 0.0, bodies.joint_radius)[:, None]
+    short = base + vectors * np.maximum(1.0 - joined / length, 0.0)
     top = p + robot.offsets.min() * i
     nose = p + (machine.tool_length - bodies.shaft_end) * i
     shaft = segment_distance(base, short, top[..., None, :], nose[..., None, :])

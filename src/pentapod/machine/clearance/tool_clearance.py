@@ -1,8 +1,8 @@
 """Clearances between each leg and the bodies on its own platform line: spindle, shank and holder.
 
-A leg begins on the line, at its platform joint: leg and line lie in a plane, and bodies of revolution about the line
-are nearest to the leg in that plane. So the problem is two-dimensional and has a closed form: a leg crosses the line
-only where it lies along it, that is where the line runs through its base joint.
+A leg that begins on the line, at its platform joint, lies with the line in a plane, and bodies of revolution about the
+line are nearest to the leg in that plane. So the problem is two-dimensional and has a closed form: a leg crosses the
+line only where it lies along it, that is where the line runs through its base joint.
 
 With θ the angle between leg (seen from its platform joint) and tool axis, the leg runs from (0, h) along
 (sin θ, cos θ) in coordinates (distance from the line, height over the tip). The formulas use element-wise
@@ -20,6 +20,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.geometry.solids import Solid
 from pentapod.kinematics.arithmetic import NUMPY, Arithmetic
+from pentapod.machine.clearance.leg_clearance import segment_distance
 from pentapod.machine.machine import Machine
 
 _TINY = 1e-18
@@ -66,12 +67,26 @@ def leg_tool_gap(machine: Machine, solids: Sequence[Solid], leg: int, cosine: An
     return reduce(do.least, gaps) - machine.bodies.leg_radius
 
 
+def widest_stretch(solids: Sequence[Solid]) -> tuple[float, float, float]:
+    """Return lowest and highest end, heights over the tip, and radius of a capsule that holds a tool's solids.
+
+    Legs that end beside the line run out of the planes through it, where the exact distance from such solids has no
+    simple form; they keep clear of this capsule.
+    """
+    return min(s.low for s in solids), max(s.high for s in solids), max(s.largest_radius for s in solids)
+
+
 def leg_tool_gaps(machine: Machine, solids: Sequence[Solid], position: Floats, direction: Floats) -> Floats:
-    """Return the gaps (N, 5) in metres of the legs from a tool's solids in poses (N, 3)."""
+    """Return the gaps (N, n_legs) in metres of the legs from a tool's solids in poses (N, 3)."""
     vectors = machine.robot.leg_vectors(position, direction)
     lengths = np.linalg.norm(vectors, axis=-1)
     cosines = np.einsum("nji,ni->nj", vectors, direction) / lengths
     gaps = [leg_tool_gap(machine, solids, k, cosines[:, k], lengths[:, k], NUMPY) for k in range(len(lengths.T))]
+    base, (low, high, radius) = machine.robot.base_joints, widest_stretch(solids)
+    for k in np.flatnonzero(machine.robot.arms).tolist():
+        ends = (position + (machine.tool_length - height) * direction for height in (low, high))
+        apart = segment_distance(base[k], base[k] + vectors[:, k], *ends)
+        gaps[k] = apart - radius - machine.bodies.leg_radius
     return np.stack(gaps, axis=1)
 
 

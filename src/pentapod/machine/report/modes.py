@@ -80,6 +80,8 @@ def admissible_modes(machine: Machine, legs: ArrayLike, *, leg_error: float = 1e
     hull = np.broadcast_to(readings + leg_error * signs, (len(branches), len(signs), count))
     points = np.array([*robot.offsets, machine.tool_length])
     moved, turned = robot.enclose((position, direction), hull, points)
+    if robot.arms.any():
+        moved[:, :-1] = robot.enclose_joints((position, direction), hull)
     if not np.isfinite(moved).all():
         near = [str(branch) for branch, by in zip(branches, moved, strict=True) if not np.isfinite(by).all()]
         return Refusal(

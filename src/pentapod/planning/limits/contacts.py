@@ -111,43 +111,60 @@ def contacts(
 
 
 def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts: Sequence[float]) -> list[Floats]:
-    """Return for legs and spindle the gaps and the numbers of their contacts, each (N, 1 + NUMBERS)."""
-    count = len(bodies.tips)
+    """Return for legs and spindle the gaps and the numbers of their contacts, each (N, 1 + NUMBERS).
+
+    Places: from 0 to 1 along a leg, from 1 to 2 along its arm; along the spindle, heights over the tip.
+    """
     top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
     columns, n_legs = list[Floats](), machine.robot.n_legs
     for body in range(n_legs + 1):
-        radius = float(bodies.radii[body])
-        cap = OPTIONS.cap * comforts[body]
-        column = np.zeros((count, 1 + NUMBERS))
-        column[:, 0], column[:, -1] = cap, -cap
+        radius, cap = float(bodies.radii[body]), OPTIONS.cap * comforts[body]
+        places = (0.0, 1.0) if body < n_legs else (top, nose)
+        column = _column(obstacle, bodies.starts[:, body], bodies.ends[:, body], radius, cap, places)
+        if bodies.arms[body]:
+            arm = _column(obstacle, bodies.ends[:, body], bodies.feet[:, body], radius, cap, (1.0, 2.0))
+            column = np.where((arm[:, 0] < column[:, 0])[:, None], arm, column)
         columns.append(column)
-        rows = np.flatnonzero(_box_gap(obstacle, bodies.starts[:, body], bodies.ends[:, body]) < cap + radius)
-        if not len(rows):
-            continue
-        starts, ends = bodies.starts[rows, body], bodies.ends[rows, body]
-        found = obstacle.surface.segments(starts, ends, cap + radius)
-        near = found.distance < cap + radius
-        at = starts + found.place[:, None] * (ends - starts)
-        place = found.place if body < n_legs else top + found.place * (nose - top)
-        # Without a normal the gap is taken as constant.
-        known, gap = found.normal.any(axis=1), found.distance - radius
-        numbers = (gap, place, *found.normal.T, *(at - found.distance[:, None] * found.normal).T)
-        exact = np.column_stack([*numbers, np.where(known, radius, -gap)])
-        column[rows[near]] = exact[near]
     return columns
+
+
+def _column(
+    obstacle: Obstacle, starts: Floats, ends: Floats, radius: float, cap: float, places: tuple[float, float]
+) -> Floats:
+    """Return the gaps of one line (N, 3) and the numbers of its contacts (N, 1 + NUMBERS); places: of its ends."""
+    column = np.zeros((len(starts), 1 + NUMBERS))
+    column[:, 0], column[:, -1] = cap, -cap
+    rows = np.flatnonzero(_box_gap(obstacle, starts, ends) < cap + radius)
+    if not len(rows):
+        return column
+    starts, ends, (first, last) = starts[rows], ends[rows], places
+    found = obstacle.surface.segments(starts, ends, cap + radius)
+    near = found.distance < cap + radius
+    at = starts + found.place[:, None] * (ends - starts)
+    place = found.place if places == (0.0, 1.0) else first + found.place * (last - first)
+    # Without a normal the gap is taken as constant.
+    known, gap = found.normal.any(axis=1), found.distance - radius
+    numbers = (gap, place, *found.normal.T, *(at - found.distance[:, None] * found.normal).T)
+    exact = np.column_stack([*numbers, np.where(known, radius, -gap)])
+    column[rows[near]] = exact[near]
+    return column
 
 
 def _near(scene: Scene, obstacle: Obstacle, tips: Floats, axes: Floats, frame: RigidTransform | None) -> Ints:
     """Return the indices of those poses (N, 3) in which a body's bounding box is near the obstacle's."""
     machine, tool, comforts = scene.machine, scene.collision_world.tool, scene.comforts
     robot, bodies = machine.robot, machine.bodies
-    base, joints = robot.base_joints, robot.platform_joints(tips + machine.tool_length * axes, -axes)
+    position = tips + machine.tool_length * axes
+    base, joints, arms = robot.base_joints, robot.platform_joints(position, -axes), np.flatnonzero(robot.arms).tolist()
+    feet = {k: position - robot.offsets[k] * axes for k in arms}
     if frame is not None:
         back = frame.inverse()
         tips, axes, base, joints = back.apply(tips), back.rotate(axes), back.apply(base), back.apply(joints)
+        feet = {k: back.apply(foot) for k, foot in feet.items()}
     top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
     lines = [(base[k], joints[:, k]) for k in range(robot.n_legs)]
-    reaches = [OPTIONS.cap * comforts.leg_obstacle + bodies.leg_radius] * robot.n_legs
+    lines += [(joints[:, k], foot) for k, foot in feet.items()]
+    reaches = [OPTIONS.cap * comforts.leg_obstacle + bodies.leg_radius] * len(lines)
     lines.append((tips + nose * axes, tips + top * axes))
     reaches.append(OPTIONS.cap * comforts.spindle_obstacle + bodies.shaft_radius)
     if tool:

@@ -43,8 +43,12 @@ class ObstacleClearance(LengthLimit):
         s, *rest = contacts.numbers[NUMBERS * self.column : NUMBERS * (self.column + 1)]
         normal, point, radius = rest[:3], rest[3:6], rest[6]
         tip, axis = pose.tip, pose.axis
-        if self.body < len(pose.heights):
-            start = [*pose.bases[self.body], 0.0][:3]
+        if self.body < len(pose.heights) and pose.machine.robot.arms[self.body] > 0.0:
+            on_leg, on_arm = pose.xp.least(s, 1.0), pose.xp.most(s - 1.0, 0.0)
+            start, leg, arm = pose.base(self.body), pose.vectors[self.body], pose.arm(self.body)
+            x = [start[k] + on_leg * leg[k] + on_arm * arm[k] for k in range(3)]
+        elif self.body < len(pose.heights):
+            start = pose.base(self.body)
             joints = pose.bases, [pose.machine.tool_length - z for z in pose.heights]  # heights from the tip
             leg = pose.machine.robot.vectors_of(tip, axis, pose.xp, joints)[self.body]
             x = [start[k] + s * leg[k] for k in range(3)]

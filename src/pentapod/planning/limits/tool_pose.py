@@ -67,6 +67,20 @@ class ToolPose:
         """The legs (n_legs) from base joint to platform joint."""
         return self.machine.robot.vectors_of(self.position, self.direction, self.xp, self.joints)
 
+    def base(self, leg: int) -> Vector:
+        """Return the base joint of a leg, three components."""
+        return [*self.bases[leg], 0.0][:3]
+
+    def joint(self, leg: int) -> Vector:
+        """Return the platform joint of a leg."""
+        base, vector = self.base(leg), self.vectors[leg]
+        return [base[k] + vector[k] for k in range(3)]
+
+    def arm(self, leg: int) -> Vector:
+        """Return the way from a platform joint beside the line to the foot of its arm on the line."""
+        joint, height = self.joint(leg), self.heights[leg]
+        return [self.position[k] + height * self.direction[k] - joint[k] for k in range(3)]
+
     @cached_property
     def readings(self) -> list[Any]:
         """The leg lengths (n_legs) as the controller reads them, metres: with the zeros of the scales."""

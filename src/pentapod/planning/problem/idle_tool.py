@@ -68,6 +68,8 @@ def joints_are_nearer(
 ) -> bool:
     """Return whether a leg's margin from solids of the tool is never below that of its platform joint, or 1."""
     comfort = Comforts().tool
+    if machine.robot.arms.any():  # the angle at the joint of a leg beside the line tells nothing of its gap
+        return False
     for leg, (low, high) in enumerate(machine.joints.platform_range):
         angles, length = np.linspace(low, high, options.angles), float(machine.legs.max_length[leg])
         cosines = np.cos(angles)

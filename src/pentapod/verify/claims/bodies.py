@@ -17,9 +17,9 @@ STRETCH = 32
 def clearance(replay: Replay) -> Finding:
     """Judge that legs and shaft do not touch each other, at any time.
 
-    Every point of a leg or of the shaft moves by no more than the faster of the platform line's two ends, whose speeds
-    are proven; so the distance between two bodies changes by no more than twice the travel of that end. Stretches of
-    samples whose middle is farther apart than this bound can use up are skipped.
+    Every point of a leg or of the shaft moves by no more than the faster of the platform line's two ends, or a platform
+    joint beside the line, whose speeds are proven; so the distance between two bodies changes by no more than twice the
+    travel of that end. Stretches of samples whose middle is farther apart than this bound can use up are skipped.
     """
     machine, (position, direction) = replay.machine, replay.pose
     chords = 0.5 * replay.program.period * replay.interval_bounds.speeds[:, 2]

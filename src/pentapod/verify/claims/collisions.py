@@ -69,10 +69,7 @@ def _clear(replay: Replay, *, obstacle: Obstacle, collision_world: CollisionWorl
         bodies = MovingBodies.at(machine, position, direction, frame)
         if tool:
             return obstacle.surface.bodies(tool, bodies.tips, bodies.axes, TOOL_FAR_M)[0][:, None]
-        chosen = MovingBodies(
-            bodies.starts[:, columns], bodies.ends[:, columns], bodies.tips, bodies.axes, bodies.radii[columns]
-        )
-        return chosen.segments(obstacle.surface, FAR_M).distance.reshape(-1, len(columns))
+        return bodies.only(columns).segments(obstacle.surface, FAR_M).distance.reshape(-1, len(columns))
 
     offsets = line_offsets(machine, collision_world.tool)
 
@@ -121,9 +118,13 @@ def line_offsets(machine: Machine, tool: tuple[Solid, ...]) -> Floats:
 
 
 def body_displacements(displacement: Displacement, tool: tuple[Solid, ...], legs: int) -> Floats:
-    """Return bounds (n, K) on the displacement of the bodies; points of a leg move no more than its platform joint."""
+    """Return bounds (n, K) on the displacement of the bodies; points of a leg move no more than its platform joint.
+
+    Of a leg with an arm: no more than its platform joint and the arm's foot.
+    """
     line = displacement.points
-    moved = [line[:, :legs], line[:, legs : legs + 2].max(axis=1, keepdims=True)]
+    joints = line[:, :legs] if displacement.joints is None else np.maximum(line[:, :legs], displacement.joints)
+    moved = [joints, line[:, legs : legs + 2].max(axis=1, keepdims=True)]
     if tool:
         wide = max(solid.largest_radius for solid in tool)
         moved.append((line[:, legs + 2 :].max(axis=1) + wide * displacement.turn)[:, None])

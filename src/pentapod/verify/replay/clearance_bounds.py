@@ -39,11 +39,13 @@ class ClearanceOptions:
 class Displacement:
     """Bounds on the displacement of the platform within n stretches, from where it is in the middle of each.
 
-    points (n, K): of points on the platform line, metres. turn (n,): of unit vectors along the line.
+    points (n, K): of points on the platform line, metres. turn (n,): of unit vectors along the line. joints (n,
+    n_legs): of the platform joints, where some are beside the line; else None, and points of the line tell.
     """
 
     points: Floats
     turn: Floats
+    joints: Floats | None = None
 
 
 Gaps = Callable[[Ints], Floats]
@@ -119,13 +121,17 @@ def displacements(
 ) -> Displacement:
     """Return the displacements within `size` intervals from each start, from the middle of each stretch."""
     (position, direction), last = replay.pose, len(replay.program.legs) - 2
+    robot = replay.machine.robot
     points, turn = np.empty((len(starts), len(offsets))), np.empty(len(starts))
+    joints = np.empty((len(starts), robot.n_legs)) if robot.arms.any() else None
     for rows in blocks(len(starts), options.enclosed_at_once):
         intervals = np.minimum(starts[rows, None] + np.arange(size), last)
         middle = starts[rows] + np.minimum(starts[rows] + size, last + 1)
         pose, lengths = (position[middle], direction[middle]), leg_control_points(replay, intervals)
-        points[rows], turn[rows] = replay.machine.robot.enclose(pose, lengths, offsets)
-    return Displacement(points, turn)
+        points[rows], turn[rows] = robot.enclose(pose, lengths, offsets)
+        if joints is not None:
+            joints[rows] = robot.enclose_joints(pose, lengths)
+    return Displacement(points, turn, joints)
 
 
 def leg_control_points(replay: Replay, intervals: Ints) -> Floats:

@@ -74,7 +74,7 @@ class IntervalBounds:
     position, direction (M, 3): the poses at the samples, NaN where there are none. Proven upper bounds on each chord,
     infinite where there is no proof: deviations (M − 1,) of the tilt centre from the chord, metres; axis_deviations
     (M − 1,) of the axis from it, radians; speeds (M − 1, 3) of the tip, the tilt centre and the faster end of the
-    platform's line with the tool, m/s.
+    platform's line with the tool, or of joints beside it, m/s.
     shortest: of the negative leg lengths; longest, rates, jerks: of the legs on each interval; accelerations: at each
     row. Metres and seconds; exact on the controller's polynomials. base_widest, platform_closed, platform_open: proven,
     −cos of the largest angle at the base joint, cos of the smallest and −cos of the largest one at the platform joint.
@@ -141,7 +141,8 @@ def interval_bounds(
         chords = _chords(found, machine, program, part, between, tilt_centre)
         found.deviations[between], found.axis_deviations[between] = chords.deviations[:, 1], chords.angles
         found.speeds[between, :2] = chords.speeds[:, :2]
-        found.speeds[between, 2] = chords.speeds[:, 2:].max(axis=1)
+        # A joint beside the line gets no farther from its place at the start than at twice the speed in half a chord.
+        found.speeds[between, 2] = np.maximum(chords.speeds[:, 2:].max(axis=1), 2.0 * chords.beside)
         found.speeds[between] /= 0.5 * program.period
         found.base_widest.update(-chords.base_cosines, 2 * first)
         found.platform_closed.update(chords.platform_cosines[..., 1], 2 * first)

@@ -12,11 +12,11 @@ from pentapod.base.arrays import Bools, Floats, as_batch
 from pentapod.base.values import Value
 from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
-from pentapod.kinematics.families.six_leg import SixLegPlatform
 from pentapod.kinematics.forward.line_equations import LineEquations
 from pentapod.kinematics.forward.line_roots import interior
 from pentapod.kinematics.forward.quadratic_near import self_motions
 from pentapod.kinematics.forward.solution_line import SolutionLine
+from pentapod.kinematics.platforms.six_leg import SixLegPlatform
 from pentapod.numerics.blocks import blocks
 
 _EPS = float(np.finfo(np.float64).eps)

@@ -6,26 +6,28 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, cast
 
-from pydantic import BeforeValidator, Field, SerializeAsAny
+from pydantic import BeforeValidator, Field, SerializeAsAny, ValidationInfo
 
 from pentapod.base.errors import InputError, MachineError
 from pentapod.base.registry import Registry
 from pentapod.base.tables import TomlTable, wrong
 from pentapod.base.values import Value
 from pentapod.kinematics.robot import Robot
-from pentapod.machine.fields import FIVE_NUMBERS, FIVE_PAIRS
+from pentapod.machine.fields import LEG_NUMBERS, LEG_PAIRS, LEGS
 
-QUADRATIC, GENERAL = "quadratic", "general"
+QUADRATIC, GENERAL, HEXA = "quadratic", "general", "hexa"
 
 
 class GeometryTable(TomlTable):
     """Where the joints are. The quadratic family: delta, or platform_mm, or both if they agree; others: platform_mm."""
 
-    family: str = Field(default=QUADRATIC, description="robot family: quadratic or general; packages can add others")
-    base_mm: FIVE_PAIRS = Field(description="base joints [x, y] in the base plane z = 0, leg 1 to leg 5")
+    family: str = Field(
+        default=QUADRATIC, description="robot family: quadratic, general or hexa; packages can add others"
+    )
+    base_mm: LEG_PAIRS = Field(description="base joints [x, y] in the base plane z = 0, leg by leg")
     delta: float | None = Field(default=None, description="platform joint i is at delta · x_i along the tool axis")
-    platform_mm: FIVE_NUMBERS | None = Field(
-        default=None, description="platform joints along the line towards the tip, leg 1 to leg 5"
+    platform_mm: LEG_NUMBERS | None = Field(
+        default=None, description="platform joints along the line towards the tip, leg by leg"
     )
 
 
@@ -34,11 +36,13 @@ class Family(Value):
     """A robot family in machine files.
 
     robot: table [geometry] → robot; `table.si` has the table's values in SI units. Raises MachineError where they make
-    no robot. table: a subclass of `GeometryTable`, where the family has further keys.
+    no robot. table: a subclass of `GeometryTable`, where the family has further keys. n_legs: lists with a value for
+    each leg have so many.
     """
 
     robot: Callable[[Any], Robot]
     table: type[GeometryTable] = GeometryTable
+    n_legs: int = LEGS
 
 
 FAMILIES = Registry(
@@ -46,13 +50,17 @@ FAMILIES = Registry(
     "pentapod.families",
     Family,
     MachineError,
-    homes={QUADRATIC: "pentapod.machine.quadratic", GENERAL: "pentapod.machine.general"},
+    homes={
+        QUADRATIC: "pentapod.machine.families.quadratic",
+        GENERAL: "pentapod.machine.families.general",
+        HEXA: "pentapod.machine.families.hexa",
+    },
     constant="FAMILY",
 )
 """A new family of pentapod's own is a file with `FAMILY = Family(...)`, and its name here."""
 
 
-def _of_family(value: Any) -> Any:
+def _of_family(value: Any, info: ValidationInfo) -> Any:
     """Validate [geometry] by the keys of its family."""
     if not isinstance(value, Mapping):
         return value
@@ -61,7 +69,16 @@ def _of_family(value: Any) -> Any:
         model = FAMILIES.find(str(table.get("family", QUADRATIC))).table
     except InputError as error:
         wrong("family", error.what, error.expected, value=table["family"], remedy=error.remedy)
-    return model.model_validate(table)
+    return model.model_validate(table, context=info.context)
+
+
+def legs_of(content: Mapping[str, Any]) -> int:
+    """Return how many legs the machine of a file's content has; those of the quadratic family where it is unclear."""
+    geometry: Any = content.get("geometry")
+    try:
+        return FAMILIES.find(str(cast("Mapping[str, Any]", geometry).get("family", QUADRATIC))).n_legs
+    except (InputError, AttributeError):  # told when [geometry] is read
+        return LEGS
 
 
 OfFamily = Annotated[SerializeAsAny[GeometryTable], BeforeValidator(_of_family)]

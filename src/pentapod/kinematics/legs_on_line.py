@@ -1,0 +1,31 @@
+"""LegsOnLine: what every robot has in common whose legs all end on the platform line."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.base.arrays import Floats
+from pentapod.kinematics.batches import as_poses, common_batch
+
+
+class LegsOnLine:
+    """A robot without arms: nothing but its legs holds the platform, which is free to turn about its line."""
+
+    n_legs: int
+
+    @property
+    def arms(self) -> Floats:
+        """There are none: zeros (n_legs,)."""
+        return np.zeros(self.n_legs)
+
+    def passive_wrenches(self, position: ArrayLike, direction: ArrayLike) -> Floats:
+        """Return an array (..., 0, 6): there are no passive joints that hold anything."""
+        return np.zeros((*common_batch(*as_poses(position, direction), ("position", "direction")), 0, 6))
+
+    def enclose_joints(self, poses: tuple[Floats, Floats], legs: Floats) -> Floats:
+        """Return bounds (N, n_legs) of how far the platform joints get: they are points of the line."""
+        robot = cast("Any", self)
+        return robot.enclose(poses, legs, robot.offsets)[0]
