@@ -1,4 +1,4 @@
-"""Program files: a header, then `time_s,leg1_mm,…,leg5_mm`, one row each period. Writer and reader."""
+"""Program files: a header, then `time_s,leg1_mm,leg2_mm,…`, one row each period. Writer and reader."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from pentapod.base.errors import ProgramError
 from pentapod.base.files import atomic_write
 from pentapod.base.refusal import stage
-from pentapod.program.csv_rows import COLUMNS, TimeCheck, read_rows
+from pentapod.program.csv_rows import TimeCheck, columns_of, read_rows
 from pentapod.program.header import MAGIC, Header, header_text, parse_header
 from pentapod.program.program import FORMAT_VERSION, Program
 from pentapod.program.resolution import MM_DECIMALS, to_millimetres
@@ -48,7 +48,8 @@ def read_csv(path: str | Path) -> Program:
     file = Path(path)
     with _opened(file) as source:
         header, first_line = _header(source, file)
-        legs = read_rows(source, header.rows, TimeCheck(header.period, _time_decimals(header.period)), first_line, file)
+        times = TimeCheck(header.period, _time_decimals(header.period))
+        legs = read_rows(source, header.rows, header.legs, times, first_line, file)
     return header.program(legs)
 
 
@@ -63,7 +64,7 @@ def _pieces(program: Program) -> Iterator[bytes]:
     """Yield the file in pieces, so that a long program is never in memory as text as a whole."""
     decimals = _time_decimals(program.period)
     row = f"%.{decimals}f" + f",%.{MM_DECIMALS}f" * program.legs.shape[1] + "\n"
-    yield (header_text(program) + COLUMNS + "\n").encode()
+    yield (header_text(program) + columns_of(program.legs.shape[1]) + "\n").encode()
     for start in range(0, len(program.legs), ROWS_AT_ONCE):
         legs = to_millimetres(program.legs[start : start + ROWS_AT_ONCE])
         times = np.arange(start, start + len(legs)) * program.period
@@ -109,6 +110,6 @@ def _header(source: BufferedReader, file: Path) -> tuple[Header, int]:
         line = source.readline(LONGEST_LINE)
     header = parse_header(lines, file)
     names = line.decode(errors="replace").rstrip("\r\n")
-    if names != COLUMNS:
-        raise ProgramError("wrong column names", file=file, line=len(lines) + 1, value=names[:80], expected=COLUMNS)
+    if names != (expected := columns_of(header.legs)):
+        raise ProgramError("wrong column names", file=file, line=len(lines) + 1, value=names[:80], expected=expected)
     return header, len(lines) + 2

@@ -16,13 +16,14 @@ from pentapod.base.errors import ProgramError
 from pentapod.base.files import number_in
 from pentapod.program.resolution import LARGEST_M, from_millimetres
 
-COLUMNS = "time_s,leg1_mm,leg2_mm,leg3_mm,leg4_mm,leg5_mm"
-_NAMES = COLUMNS.split(",")
-_WIDTH = len(_NAMES)
 BLOCK_BYTES = 1 << 22
-_SHORTEST = len("0,1,1,1,1,1\n")
 _PLAIN = b"0123456789+-.eE,\n\r"
 _TO_COMMAS = bytes.maketrans(b"\n", b",")
+
+
+def columns_of(legs: int) -> str:
+    """Return the line that names the columns of a program for so many legs."""
+    return ",".join(["time_s", *(f"leg{leg + 1}_mm" for leg in range(legs))])
 
 
 @dataclass(frozen=True)
@@ -59,10 +60,14 @@ class TimeCheck:
         raise ProgramError(what, file=file, line=line, value=value, expected=f"{expected[k]:.9g} s")
 
 
-def read_rows(source: BufferedReader, rows: int, times: TimeCheck, first_line: int, file: Path) -> Floats:
-    """Return leg lengths (rows, n_legs) in metres from the source's position to its end. Raises ProgramError."""
+def read_rows(
+    source: BufferedReader, rows: int, legs_of_row: int, times: TimeCheck, first_line: int, file: Path
+) -> Floats:
+    """Return leg lengths (rows, legs_of_row) in metres from the source's position to its end. Raises ProgramError."""
+    names = columns_of(legs_of_row).split(",")
+    shortest = 2 * len(names)  # bytes of a row
     size = os.fstat(source.fileno()).st_size - source.tell()
-    legs = np.empty((0, _WIDTH - 1))
+    legs = np.empty((0, legs_of_row))
     count, rest = 0, b""
     while block := source.read(BLOCK_BYTES):
         end = block.rfind(b"\n") + 1
@@ -75,12 +80,12 @@ def read_rows(source: BufferedReader, rows: int, times: TimeCheck, first_line: i
             remedy = "it was truncated, or is no program"
             raise ProgramError(what, file=file, line=first_line + count, remedy=remedy)
         data, rest = rest + block[:end], block[end:]
-        table = _table(data, first_line + count, file)
+        table = _table(data, names, first_line + count, file)
         times.check(table[:, 0], count, first_line, file)
-        _check_lengths(table, first_line + count, file)
+        _check_lengths(table, names, first_line + count, file)
         if not count:
             # The header may give more rows than the file can hold: no memory for those.
-            legs = np.empty((min(rows, size // _SHORTEST + 1), _WIDTH - 1))
+            legs = np.empty((min(rows, size // shortest + 1), legs_of_row))
         kept = max(0, min(len(table), len(legs) - count))
         legs[count : count + kept] = from_millimetres(table[:kept, 1:])
         count += len(table)
@@ -97,13 +102,13 @@ def read_rows(source: BufferedReader, rows: int, times: TimeCheck, first_line: i
     return legs
 
 
-def _table(data: bytes, first_line: int, file: Path) -> Floats:
+def _table(data: bytes, names: Sequence[str], first_line: int, file: Path) -> Floats:
     """Return the numbers (n, 1 + n_legs) of whole lines: fast where they are plain, else row by row."""
     letters = np.frombuffer(data, np.uint8)
     ends = letters[np.flatnonzero((letters == ord(",")) | (letters == ord("\n")))]
     plain = not data.translate(None, _PLAIN) and data.count(b"\r") == data.count(b"\r\n")
-    if plain and len(ends) % _WIDTH == 0:
-        columns = ends.reshape(-1, _WIDTH)
+    if plain and len(ends) % len(names) == 0:
+        columns = ends.reshape(-1, len(names))
         if (columns[:, -1] == ord("\n")).all() and (columns[:, :-1] == ord(",")).all():
             with warnings.catch_warnings():
                 warnings.simplefilter("error", DeprecationWarning)  # raised for text that is not a number
@@ -112,9 +117,9 @@ def _table(data: bytes, first_line: int, file: Path) -> Floats:
                 except (DeprecationWarning, ValueError):
                     numbers = np.empty(0)
             if numbers.size == columns.size and np.isfinite(numbers).all():
-                return numbers.reshape(-1, _WIDTH)
+                return numbers.reshape(-1, len(names))
     lines = [line.decode(errors="replace") for line in data.split(b"\n")[:-1]]
-    return numbers_in(lines, _NAMES, ",", first_line, file)
+    return numbers_in(lines, names, ",", first_line, file)
 
 
 def numbers_in(lines: list[str], names: Sequence[str], separator: str, first_line: int, file: Path) -> Floats:
@@ -135,9 +140,9 @@ def numbers_in(lines: list[str], names: Sequence[str], separator: str, first_lin
     return np.array(table)
 
 
-def _check_lengths(table: Floats, first_line: int, file: Path) -> None:
+def _check_lengths(table: Floats, names: Sequence[str], first_line: int, file: Path) -> None:
     wrong = (table[:, 1:] <= 0.0) | (table[:, 1:] > 1e3 * LARGEST_M)
     if wrong.any():
         row, leg = np.argwhere(wrong)[0]
         what, line, value = "a leg length that no machine has", first_line + int(row), float(table[row, leg + 1])
-        raise ProgramError(what, file=file, line=line, key=_NAMES[leg + 1], value=value, expected="between 0 and 10 km")
+        raise ProgramError(what, file=file, line=line, key=names[leg + 1], value=value, expected="between 0 and 10 km")

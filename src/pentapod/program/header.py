@@ -46,12 +46,15 @@ COMMANDS = "commands"
 """Key of files in which the rows are what drives are told, by a machine's leg model."""
 LEFT_OUT = "left_out"
 """Key of programs that leave cuts of the toolpath out: pairs of waypoints."""
+LEGS = "legs"
+"""Key of programs for machines that have not as many legs as a linear pentapod."""
 MADE_ON = ("processor", "libraries")
 """Keys of planned programs: on another kind of processor or with other libraries bits may differ."""
-OPTIONAL_KEYS = (CALIBRATION, COMMANDS, GUIDES, *SETUP_KEYS, LEFT_OUT, *MADE_ON)
+OPTIONAL_KEYS = (LEGS, CALIBRATION, COMMANDS, GUIDES, *SETUP_KEYS, LEFT_OUT, *MADE_ON)
 UNVERIFIED = "UNVERIFIED: no verdict has passed this program"
 """First line, after the comment mark, of files written for a controller without a passed verdict."""
 LARGEST_COUNT = 2**63 - 1
+MOST_LEGS = 64
 _LINE = re.compile(r"# ([a-z0-9_]+) = (\S.*)")
 
 
@@ -66,6 +69,7 @@ class Header:
     provenance: Provenance
     rows: int
     rail_positions: tuple[float, ...] | None = None
+    legs: int = FiveLegs.n_legs
 
     def program(self, legs: Floats) -> Program:
         """Return the program of this header and its rows (N, n_legs), metres."""
@@ -88,6 +92,8 @@ def header_text(program: Program) -> str:
         "placement_mm": _matrix(program.placement),
         "rows": str(len(program.legs)),
     }
+    if program.legs.shape[1] != FiveLegs.n_legs:
+        values[LEGS] = str(program.legs.shape[1])
     if source.calibration:
         values[CALIBRATION] = _string(source.calibration)
     if source.commands:
@@ -174,6 +180,7 @@ class _Reader:
             ),
             rows=self._rows(),
             rail_positions=self._rail_positions(),
+            legs=self._legs(),
         )
 
     def _check(self, key: str, holds: bool, expected: str) -> None:
@@ -200,9 +207,16 @@ class _Reader:
         if GUIDES not in self.values:
             return None
         positions = tuple(_number(entry, shift=-3) for entry in _list(self.values[GUIDES]))
-        good = len(positions) == FiveLegs.n_legs and all(map(math.isfinite, positions))
-        self._check(GUIDES, good, "five numbers of mm, one for each guide")
+        good = len(positions) == self._legs() and all(map(math.isfinite, positions))
+        self._check(GUIDES, good, f"{self._legs()} numbers of mm, one for each guide")
         return positions
+
+    def _legs(self) -> int:
+        if LEGS not in self.values:
+            return FiveLegs.n_legs
+        legs = self.values[LEGS]
+        self._check(LEGS, type(legs) is int and 1 <= legs <= MOST_LEGS, f"a count of 1 to {MOST_LEGS}")
+        return legs
 
     def _piece(self) -> Piece | None:
         if WAYPOINTS not in self.values:

@@ -28,7 +28,7 @@ from pentapod.registration.result import CutSurface
 from pentapod.registration.selection import chosen, rows_of, surface_points
 from pentapod.registration.touches import Touches
 
-PROBE_RESULTS = {"X": 5061, "Y": 5062, "Z": 5063, "U": 5067, "V": 5068}
+PROBE_RESULTS = {"X": 5061, "Y": 5062, "Z": 5063, "U": 5067, "V": 5068, "W": 5069}
 """LinuxCNC's parameters that hold the axes at the trip."""
 
 
@@ -87,13 +87,14 @@ class Probing(Result):
     def gcode(self, log: str) -> str:
         """Return the program for LinuxCNC with the legs as axes X Y Z U V (trivkins); it appends to the file `log`."""
         here = from_si(self.ways[0][0], "mm")
+        letters = LETTERS[: len(here)]
         lines = [
-            f"({len(self.legs)} touches; legs as axes {' '.join(LETTERS)}: trivkins coordinates={LETTERS})",
+            f"({len(self.legs)} touches; legs as axes {' '.join(letters)}: trivkins coordinates={letters})",
             f"(begin near {_words(here)}, above the part)",
             "G21 G90 G40 G49 G61", "G94", f"G1 {_words(here)} F{_feed_mm_min(OPTIONS.travel):.3f}",
             f"(LOGAPPEND,{log})",
         ]  # fmt: skip
-        logged = ",".join(f"#{PROBE_RESULTS[letter]}" for letter in LETTERS)
+        logged = ",".join(f"#{PROBE_RESULTS[letter]}" for letter in letters)
         for way, beyond in zip(self.ways, self.beyond, strict=True):
             lines.append("G93")
             per_minute = 60.0 * OPTIONS.travel / OPTIONS.step
@@ -232,7 +233,7 @@ def _tour(points: Floats) -> Ints:
 
 
 def _words(legs_mm: Floats) -> str:
-    return " ".join(f"{letter}{value:.6f}" for letter, value in zip(LETTERS, legs_mm.tolist(), strict=True))
+    return " ".join(f"{letter}{value:.6f}" for letter, value in zip(LETTERS, legs_mm.tolist(), strict=False))
 
 
 def _feed_mm_min(speed: float) -> float:

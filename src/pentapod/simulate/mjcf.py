@@ -1,10 +1,10 @@
 """The machine as MJCF, MuJoCo's model format: bodies, joints, closed loops and drives.
 
 Each leg is a cylinder on two hinges at its base joint, and a rod that slides out of it, as long as the slide's
-position says; `connect` constraints close the five loops at the platform's joints. A leg that ends on a ring hangs on
-it by a hinge along the ring's tangent, which keeps it in a plane with the line. A little damping acts on the one
-freedom that legs do not constrain, the spin of the tool about its own line. The constraints are as stiff as the step
-allows, solved by Newton's method to convergence: MuJoCo's defaults, meant for soft contacts, leave millimetres.
+position says; `connect` constraints close the loops at the platform's joints. A leg that ends on a ring hangs on it by
+a hinge along the ring's tangent, which keeps it in a plane with the line. Where the legs do not hold the spin of the
+tool about its own line, a little damping acts on it. The constraints are as stiff as the step allows, solved by
+Newton's method to convergence: MuJoCo's defaults, meant for soft contacts, leave millimetres.
 """
 
 from __future__ import annotations
@@ -17,6 +17,9 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.kinematics.forces import FREEDOMS
+from pentapod.kinematics.robot import Robot
+from pentapod.machine.leg_model import robot_zeros
 from pentapod.machine.machine import Machine
 from pentapod.simulate.bodies import Capsule, leg_cylinder, leg_rod, spindle
 
@@ -44,7 +47,7 @@ DEFAULTS = MujocoModelOptions()
 
 def mjcf(
     machine: Machine,
-    real: AsBuiltPentapod,
+    real: Robot,
     position: Floats,
     direction: Floats,
     *,
@@ -58,7 +61,7 @@ def mjcf(
     """
     vectors = real.leg_vectors(position, direction)
     lengths = np.linalg.norm(vectors, axis=1)
-    readings = lengths + real.zeros
+    readings, radii = lengths + robot_zeros(real), _radii(real)
     tangents = _tangents(real, position, direction)
     root = Xml.Element("mujoco", model=machine.name)
     _add(root, "compiler", angle="radian", autolimits="true")
@@ -73,9 +76,7 @@ def mjcf(
     for leg in range(real.n_legs):
         pose = (real.base_joints[leg], vectors[leg] / lengths[leg], lengths[leg])
         rod = _leg(world, machine, leg, *pose, reading=readings[leg])
-        if (
-            real.radii[leg] > 0.0
-        ):  # the rod hangs on the ring by a hinge along the ring's tangent: it may turn in itself
+        if radii[leg] > 0.0:  # the rod hangs on the ring by a hinge along the ring's tangent: it may turn in itself
             _add(rod, "joint", name=f"turn{leg + 1}", type="hinge", axis="0 0 1")
             tangent = _turned_back(_rotation_from_z(pose[1]), model.hinge * tangents[leg])
             _add(rod, "site", name=f"rod{leg + 1}side", pos=tangent)
@@ -88,11 +89,13 @@ def mjcf(
         damping = drives.moving_mass[leg] * drives.velocity_gain[leg]
         stiffness = damping * drives.position_gain[leg]
         _add(actuators, "position", name=f"drive{leg + 1}", joint=f"leg{leg + 1}", kp=[stiffness], kv=[damping])
-    for leg in np.flatnonzero(real.radii).tolist():  # after all loops, whose forces are read by their places
+    for leg in np.flatnonzero(radii).tolist():  # after all loops, whose forces are read by their places
         name = f"{leg + 1}side"
         _add(loops, "connect", name=f"hinge{leg + 1}", site1=f"rod{name}", site2=f"platform{name}")
-    _add(actuators, "velocity", name="spin", site="origin", gear="0 0 0 0 0 1", kv=[model.spin_damping])
-    _add(_add(root, "keyframe"), "key", name="start", ctrl=[*readings, 0.0])
+    free = real.n_legs + real.passive_wrenches(position, direction).shape[-2] < FREEDOMS
+    if free:
+        _add(actuators, "velocity", name="spin", site="origin", gear="0 0 0 0 0 1", kv=[model.spin_damping])
+    _add(_add(root, "keyframe"), "key", name="start", ctrl=[*readings, *([0.0] if free else [])])
     Xml.indent(root)
     return Xml.tostring(root, encoding="unicode") + "\n"
 
@@ -118,7 +121,7 @@ def _leg(
 def _platform(
     world: Xml.Element,
     machine: Machine,
-    real: AsBuiltPentapod,
+    real: Robot,
     position: Floats,
     direction: Floats,
     model: MujocoModelOptions,
@@ -132,15 +135,16 @@ def _platform(
     _add(body, "site", name="origin")
     _add(body, "site", name="tip", pos=[0.0, 0.0, tool])
     off = real.platform_joints(position, direction) - position - real.offsets[:, None] * direction
-    tangents = _tangents(real, position, direction)
+    tangents, radii = _tangents(real, position, direction), _radii(real)
     for leg in range(real.n_legs):
-        height, name = [0.0, 0.0, float(real.offsets[leg])], f"platform{leg + 1}"
-        if real.radii[leg] == 0.0:
-            _add(body, "site", name=name, pos=height)
+        height, name = np.array([0.0, 0.0, float(real.offsets[leg])]), f"platform{leg + 1}"
+        if radii[leg] == 0.0:
+            place = _turned_back(_rotation_from_z(direction), off[leg]) if real.arms[leg] > 0.0 else np.zeros(3)
+            _add(body, "site", name=name, pos=height + place)
             continue
         ring = _add(body, "body", name=f"ring{leg + 1}", pos=height)
         _add(ring, "joint", name=f"ring{leg + 1}", type="hinge", axis="0 0 1", damping=[model.spin_damping])
-        inertia = model.ring_mass * max(float(real.radii[leg]), model.hinge) ** 2  # a speck would not be simulated
+        inertia = model.ring_mass * max(float(radii[leg]), model.hinge) ** 2  # a speck would not be simulated
         still = [inertia, inertia, inertia]
         _add(ring, "inertial", pos=[0.0, 0.0, 0.0], mass=[model.ring_mass], diaginertia=still)
         for at, place in ((name, off[leg]), (f"{name}side", off[leg] + model.hinge * tangents[leg])):
@@ -163,8 +167,13 @@ def _rotation_from_z(direction: Floats) -> Floats:
     return quaternion / np.linalg.norm(quaternion)
 
 
-def _tangents(real: AsBuiltPentapod, position: Floats, direction: Floats) -> Floats:
-    """Return the unit tangents (5, 3) of rings where the legs end; anything for legs without a ring."""
+def _radii(real: Robot) -> Floats:
+    """Return the radii (n_legs,) of rings on which legs end, which turn freely about the line; 0 for others."""
+    return real.radii if isinstance(real, AsBuiltPentapod) else np.zeros(real.n_legs)
+
+
+def _tangents(real: Robot, position: Floats, direction: Floats) -> Floats:
+    """Return the unit tangents (n_legs, 3) of rings where the legs end; anything for legs without a ring."""
     across = np.cross(direction, real.base_joints - position)
     return np.asarray(across / np.linalg.norm(across, axis=1, keepdims=True), dtype=np.float64)
 

@@ -15,6 +15,7 @@ from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal, stage
 from pentapod.base.values import Result
 from pentapod.kinematics.families.as_built import AsBuiltPentapod, as_pentapod
+from pentapod.kinematics.robot import Robot
 from pentapod.simulate.forces import leg_loads
 from pentapod.simulate.measures import Measure
 from pentapod.simulate.mjcf import mjcf
@@ -64,7 +65,7 @@ class Physics(Result):
     def measures(self) -> tuple[Measure, ...]:
         """Measures beside the tool's errors."""
         return (
-            Measure("closure error", "mm", 1e3 * self.closure, "largest gap of the five loops"),
+            Measure("closure error", "mm", 1e3 * self.closure, "largest gap of the loops"),
             Measure("leg force", "N", np.abs(self.leg_forces).max(axis=1), "push or pull of any leg"),
         )
 
@@ -88,18 +89,20 @@ def plant(
     *,
     base_errors: ArrayLike = 0.0,
     offset_errors: ArrayLike = 0.0,
-    true: AsBuiltPentapod | None = None,
+    true: Robot | None = None,
 ) -> Plant | Refusal:
     """Return the machine as MJCF, with the leg lengths of the program's first row; MuJoCo itself is not needed.
 
-    base_errors (n, 3) and offset_errors (n,): deviations of the real joints from the machine, as designed or as its
-    calibration has it, metres, or one number for all. true: the machine that plays, where it is known: it takes the
-    place of the reference's, and the errors are added to it. A Refusal says that the real machine has no proven pose
-    there.
+    base_errors (n, 3) and offset_errors (n,): deviations of the real joints of a linear pentapod from the machine, as
+    designed or as its calibration has it, metres, or one number for all. true: the machine that plays, where it is
+    known: it takes the place of the reference's, and the errors are added to it. A Refusal says that the real machine
+    has no proven pose there. Raises MachineError for errors of another robot.
     """
     program, machine = reference.program, reference.machine
-    robot = as_pentapod(machine.robot if true is None else true, "the rigid-body model")
-    real = AsBuiltPentapod.of(robot, base_errors=base_errors, offset_errors=offset_errors)
+    real: Robot = machine.robot if true is None else true
+    if not real.arms.any() or np.any(base_errors) or np.any(offset_errors):
+        built = as_pentapod(real, "the rigid-body model with errors")
+        real = AsBuiltPentapod.of(built, base_errors=base_errors, offset_errors=offset_errors)
     position, direction = real.pose(program.legs[0], program.component)
     if not np.isfinite(position).all():
         return Refusal("simulation", "the machine with these errors has no proven pose at the program's start")

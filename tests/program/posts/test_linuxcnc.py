@@ -210,7 +210,7 @@ def test_g_code_of_the_legs_reads_back(tmp_path):
     assert np.abs(legs - lengths_at(what.program, times)).max() < 1e-11
     file = tmp_path / "trivkins/program.ngc"
     text = file.read_text()
-    for broken, words in ((text[:-3], "M2"), (text.replace(" U", " W", 1), "five legs"), ("M2\n", "no moves")):
+    for broken, words in ((text[:-3], "M2"), (text.replace(" U", " W", 1), "all legs"), ("M2\n", "no moves")):
         file.write_text(broken)
         with pytest.raises(ProgramError, match=words):
             read_gcode(file)

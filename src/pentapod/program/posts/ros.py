@@ -16,7 +16,6 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ProgramError
-from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.program.header import UNVERIFIED, Header, header_text
 from pentapod.program.posts.motion import accelerations, velocities
 from pentapod.program.posts.registry import Post, PostInput, register
@@ -26,7 +25,12 @@ from pentapod.program.program import Program
 
 Style = Literal["json", "yaml"]
 _STEM = "joint_trajectory"
-_LEGS = [f"leg{leg}" for leg in range(1, 6)]
+
+
+def _joints(legs: int) -> list[str]:
+    return [f"leg{leg + 1}" for leg in range(legs)]
+
+
 NANOSECONDS = 1_000_000_000  # in a second
 
 
@@ -51,7 +55,15 @@ def _message(program: Program) -> str:
         points.append(f'{{{fields}"time_from_start": {{"sec": {seconds}, "nanosec": {nanoseconds}}}}}')
     frame = json.dumps(UNVERIFIED if program.provenance.unverified else "")
     head = f'"header": {{"stamp": {{"sec": 0, "nanosec": 0}}, "frame_id": {frame}}}'
-    return "{" + head + ',\n"joint_names": ' + json.dumps(_LEGS) + ',\n"points": [\n' + ",\n".join(points) + "\n]}\n"
+    return (
+        "{"
+        + head
+        + ',\n"joint_names": '
+        + json.dumps(_joints(program.legs.shape[1]))
+        + ',\n"points": [\n'
+        + ",\n".join(points)
+        + "\n]}\n"
+    )
 
 
 def _lists(values: Floats, digits: int) -> list[str]:
@@ -81,8 +93,8 @@ def _read(folder: Path, style: Style) -> Program:
 
 
 def _program(message: Any, header: Header, file: Path) -> Program:
-    if message["joint_names"] != _LEGS:
-        raise ProgramError("wrong joints", file=file, key="joint_names", expected=", ".join(_LEGS))
+    if message["joint_names"] != (joints := _joints(header.legs)):
+        raise ProgramError("wrong joints", file=file, key="joint_names", expected=", ".join(joints))
     points = message["points"]
     check_rows(len(points), header, file)
     stamps = [point["time_from_start"] for point in points]
@@ -98,7 +110,7 @@ def _program(message: Any, header: Header, file: Path) -> Program:
             value=times[row] / NANOSECONDS, expected=f"{row * header.period:.9g} s",
         )  # fmt: skip
     legs = np.array([point["positions"] for point in points], dtype=np.float64)
-    if legs.shape != (shape := (len(points), FiveLegs.n_legs)):
+    if legs.shape != (shape := (len(points), header.legs)):
         what = "not a position for each leg"
         raise ProgramError(what, file=file, key="positions", value=legs.shape, expected=str(shape))
     return header.program(check_legs(legs, file))

@@ -12,7 +12,6 @@ from pentapod.base.archives import check_array
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ProgramError
 from pentapod.base.files import read_bytes
-from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.program.header import Header, parse_header
 from pentapod.program.program import Program
 from pentapod.program.resolution import LARGEST_M, quantised
@@ -50,7 +49,7 @@ def check_legs(legs: Floats, file: Path) -> Floats:
 def of_archive(header: NDArray[Any], legs_mm: NDArray[Any], file: Path) -> Program:
     """Return the program of an archive: its header's text and its legs (N, n), millimetres. Raises ProgramError."""
     check_array(header, "header", file, ProgramError, "U", ())
-    check_array(legs_mm, "legs_mm", file, ProgramError, "fi", (None, FiveLegs.n_legs))
     found = header_of(str(header).splitlines(), file)
+    check_array(legs_mm, "legs_mm", file, ProgramError, "fi", (None, found.legs))
     check_rows(len(legs_mm), found, file)
     return found.program(check_legs(legs_mm / 1e3, file))

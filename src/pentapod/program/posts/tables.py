@@ -11,12 +11,12 @@ The table of another controller takes a few lines in a package of one's own, nam
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import takewhile
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -41,8 +41,8 @@ UNITS: dict[Kind, dict[str, float]] = {
 }
 """Units by kind, and how many make one SI unit."""
 
-LEGS = range(1, FiveLegs.n_legs + 1)
-"""The numbers of the legs of a program file."""
+LEGS = FiveLegs.n_legs
+"""Legs of the tables that are not told how many there are."""
 
 SIDECAR = "program.header"
 """File with the header where a table has no comments."""
@@ -50,7 +50,7 @@ SIDECAR = "program.header"
 
 @dataclass(frozen=True)
 class Column(Value):
-    """A column: title, kind, unit, decimals; leg 1 to 5 for lengths and velocities.
+    """A column: title, kind, unit, decimals; leg, from 1 on, for lengths and velocities.
 
     Raises InputError for an unknown kind or unit, and where the leg is missing, or given for a time.
     """
@@ -66,8 +66,8 @@ class Column(Value):
             raise InputError("unknown kind", key=self.title, value=self.kind, expected=", ".join(UNITS))
         if self.unit not in UNITS[self.kind]:
             raise InputError("unknown unit", key=self.title, value=self.unit, expected=", ".join(UNITS[self.kind]))
-        if (self.leg is None) != (self.kind == "time") or self.leg not in (None, *LEGS):
-            raise InputError("wrong leg", key=self.title, value=self.leg, expected="1 to 5; none for a time")
+        if (self.leg is None) != (self.kind == "time") or (self.leg is not None and self.leg < 1):
+            raise InputError("wrong leg", key=self.title, value=self.leg, expected="1, 2, ...; none for a time")
 
     @property
     def factor(self) -> float:
@@ -90,36 +90,49 @@ class Column(Value):
         return np.rint(program.legs[:, self.leg - 1] * QUANTA_PER_M) / (QUANTA_PER_M / self.factor)
 
 
+Files: TypeAlias = Mapping[str, tuple[Column, ...]]
+"""Columns by file name."""
+
+
 @dataclass(frozen=True)
 class Table(Value):
     """The files of a post: columns by file name, and how rows are written.
 
-    comment: mark of lines that the controller skips, for the header; None: the header is a file of its own. titles:
-    whether a row of titles precedes the numbers. Raises InputError unless every leg's length is in one of the files.
+    files: or a function that returns them for a number of legs. comment: mark of lines that the controller skips, for
+    the header; None: the header is a file of its own. titles: whether a row of titles precedes the numbers. Raises
+    InputError unless every leg's length is in one of the files.
     """
 
-    files: Mapping[str, tuple[Column, ...]]
+    files: Files | Callable[[int], Files]
     separator: str = ","
     comment: str | None = "#"
     titles: bool = True
 
     def __post_init__(self) -> None:
-        legs = {c.leg for columns in self.files.values() for c in columns if c.kind == "length"}
-        if legs != set(LEGS):
+        self.files_for(LEGS)
+
+    def files_for(self, legs: int) -> Files:
+        """Return the columns by file name for so many legs. Raises InputError where they are of others."""
+        files = self.files(legs) if callable(self.files) else self.files
+        found = {c.leg for columns in files.values() for c in columns if c.kind == "length"}
+        if found != set(range(1, legs + 1)):
             raise InputError(
-                "the length of a leg is missing", key="files", value=sorted(x for x in legs if x),
-                expected="a length column for each of the legs 1 to 5",
+                "the length of a leg is missing", key="files", value=sorted(x for x in found if x),
+                expected=f"a length column for each of the legs 1 to {legs}",
+                remedy="files can be a function of the number of legs",
             )  # fmt: skip
+        return files
 
 
-def leg_columns(title: str, kind: Kind, unit: str, decimals: int) -> tuple[Column, ...]:
-    """Return five columns; "{leg}" in the title becomes the leg's number."""
-    return tuple(Column(title.format(leg=leg), kind, unit, decimals, leg) for leg in LEGS)
+def leg_columns(title: str, kind: Kind, unit: str, decimals: int, legs: int = LEGS) -> tuple[Column, ...]:
+    """Return a column for each leg; "{leg}" in the title becomes the leg's number."""
+    return tuple(Column(title.format(leg=leg), kind, unit, decimals, leg) for leg in range(1, legs + 1))
 
 
 def table_post(name: str, about: str, table: Table) -> Post:
     """Return the post that a table describes."""
-    rounded = any(c.kind == "length" and not c.exact for columns in table.files.values() for c in columns)
+    every = table.files_for(LEGS).values()
+    rounded = any(c.kind == "length" and not c.exact for columns in every for c in columns)
     loses = frozenset({"digits"} if rounded else ())
     return Post(name, about, partial(_write, table=table), partial(_read, table=table), loses)
 
@@ -127,7 +140,7 @@ def table_post(name: str, about: str, table: Table) -> Post:
 def _write(given: PostInput, table: Table) -> dict[str, bytes]:
     header, mark = header_text(given.program), table.comment
     files = {SIDECAR: header.encode()} if mark is None else {}
-    for name, columns in table.files.items():
+    for name, columns in table.files_for(given.program.legs.shape[1]).items():
         text = "" if mark is None else "".join(f"{mark}{line.removeprefix('#')}\n" for line in header.splitlines())
         if table.titles:
             text += table.separator.join(column.title for column in columns) + "\n"
@@ -139,11 +152,15 @@ def _write(given: PostInput, table: Table) -> dict[str, bytes]:
 
 
 def _read(folder: Path, table: Table) -> Program:
-    texts = {folder / name: read_file(folder / name).decode(errors="replace").splitlines() for name in table.files}
-    header, above = _header(folder, texts, table)
+    first = folder / next(iter(table.files_for(LEGS)))
+    header, above = _header(folder, {first: _lines(first)}, table)
+    files = table.files_for(header.legs)
+    texts = {folder / name: _lines(folder / name) for name in files}
+    if len(texts) > 1:
+        _header(folder, texts, table)
     legs: dict[int, Floats] = {}
     rates: list[tuple[Path, Column, Floats]] = []
-    for (file, lines), columns in zip(texts.items(), table.files.values(), strict=True):
+    for (file, lines), columns in zip(texts.items(), files.values(), strict=True):
         numbers = _numbers(lines[above:], columns, table, file, above + 1)
         check_rows(len(numbers), header, file)
         for column, values in zip(columns, numbers.T, strict=True):
@@ -154,10 +171,14 @@ def _read(folder: Path, table: Table) -> Program:
                 legs[column.leg] = values / column.factor
             else:
                 rates.append((file, column, values))
-    program = header.program(check_legs(np.column_stack([legs[leg] for leg in LEGS]), folder))
+    program = header.program(check_legs(np.column_stack([legs[leg + 1] for leg in range(header.legs)]), folder))
     for file, column, values in rates:
         _check_close(values, column.values(program), column, file, "not the velocity of the spline through the rows")
     return program
+
+
+def _lines(file: Path) -> list[str]:
+    return read_file(file).decode(errors="replace").splitlines()
 
 
 def _header(folder: Path, texts: Mapping[Path, list[str]], table: Table) -> tuple[Header, int]:

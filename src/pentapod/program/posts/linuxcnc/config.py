@@ -10,12 +10,8 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError
-from pentapod.kinematics.five_legs import FiveLegs
 
 Words = Mapping[str, object]
-
-LEGS = FiveLegs.n_legs
-"""Joints of the kinematics that LinuxCNC is given."""
 
 
 def servo_period_ns(period: float) -> int:
@@ -49,7 +45,7 @@ def ini_text(
         "HAL": {"HALFILE": "pentapod.hal", "# HALFILE": "record.hal"},
         "TRAJ": {"COORDINATES": " ".join(axes), "LINEAR_UNITS": "mm", "ANGULAR_UNITS": "degree", "NO_FORCE_HOMING": 1,
                  "ARC_BLEND_ENABLE": 1, **traj},
-        "KINS": {"KINEMATICS": kinematics, "JOINTS": LEGS},
+        "KINS": {"KINEMATICS": kinematics, "JOINTS": len(joints)},
     }  # fmt: skip
     tables |= {f"AXIS_{letter}": words for letter, words in axes.items()}
     tables |= {f"JOINT_{k}": words for k, words in enumerate(joints)}
@@ -80,11 +76,11 @@ def joint_words(home: Floats, low: Floats, high: Floats, velocity: Floats, accel
     return joints
 
 
-def hal_text(parameters: Mapping[str, float] | None = None, zeros: Floats | None = None) -> str:
+def hal_text(legs: int, parameters: Mapping[str, float] | None = None, zeros: Floats | None = None) -> str:
     """Return the HAL of a simulation: a command is its own feedback. parameters: name → value, set at the end.
 
-    zeros (n,): mm by which the scales read more than the lengths that the kinematics computes. Where there are any, the
-    signals scale1, scale2, ... are what the scales read: commands for drives with absolute scales.
+    legs: how many. zeros (n,): mm by which the scales read more than the lengths that the kinematics computes. Where
+    there are any, the signals scale1, scale2, ... are what the scales read: commands for drives with absolute scales.
     """
     lines = [
         "loadrt [KINS]KINEMATICS",
@@ -94,7 +90,7 @@ def hal_text(parameters: Mapping[str, float] | None = None, zeros: Floats | None
         "net estop-loop iocontrol.0.user-enable-out iocontrol.0.emc-enable-in",
         "net tool-prep-loop iocontrol.0.tool-prepare iocontrol.0.tool-prepared",
         "net tool-change-loop iocontrol.0.tool-change iocontrol.0.tool-changed",
-        *(f"net leg{k + 1} joint.{k}.motor-pos-cmd => joint.{k}.motor-pos-fb" for k in range(LEGS)),
+        *(f"net leg{k + 1} joint.{k}.motor-pos-cmd => joint.{k}.motor-pos-fb" for k in range(legs)),
         *(f"setp {name} {number(value)}" for name, value in (parameters or {}).items()),
         *(_scales(zeros) if zeros is not None and zeros.any() else ()),
     ]
@@ -113,25 +109,25 @@ def _scales(zeros: Floats) -> list[str]:
     return lines
 
 
-def record_text(*, scales: bool = False) -> str:
+def record_text(legs: int, *, scales: bool = False) -> str:
     """Return the HAL that records each joint's command, and the kind of motion; scales: what the scales read."""
     command = "net scale{0}" if scales else "net command{0} joint.{1}.pos-cmd"
     lines = [
-        "loadrt sampler depth=16000 cfg=fffffs",
+        f"loadrt sampler depth=16000 cfg={'f' * legs}s",
         "addf sampler.0 servo-thread",
-        *(f"{command.format(k + 1, k)} => sampler.0.pin.{k}" for k in range(LEGS)),
-        f"net kind-of-motion motion.motion-type => sampler.0.pin.{LEGS}",
+        *(f"{command.format(k + 1, k)} => sampler.0.pin.{k}" for k in range(legs)),
+        f"net kind-of-motion motion.motion-type => sampler.0.pin.{legs}",
     ]
     return "\n".join(lines) + "\n"
 
 
-def files_of(ini: str, hal: str, program: str, code: bytes, *, scales: bool = False) -> dict[str, bytes]:
+def files_of(ini: str, hal: str, program: str, code: bytes, legs: int, *, scales: bool = False) -> dict[str, bytes]:
     """Return the files of a configuration's folder; program: the name of the G-code file; scales: as `record_text`."""
     return {
         program: code,
         "pentapod.ini": ini.encode(),
         "pentapod.hal": hal.encode(),
-        "record.hal": record_text(scales=scales).encode(),
+        "record.hal": record_text(legs, scales=scales).encode(),
         "tool.tbl": b"T1 P1 Z0 D0 ;\n",
         "linuxcnc.var": b"",
         "headless": packaged("headless"),

@@ -94,8 +94,10 @@ def pentakins_files(given: PostInput) -> dict[str, bytes]:
         },
         servo_period_ns(given.program.period),
     )
-    hal = hal_text(parameters(machine, frame), zeros)
-    return files_of(ini, hal, FILE, scales=bool(zeros.any()), code=_code(_within(path, machine.rapid_velocity)))
+    hal = hal_text(machine.robot.n_legs, parameters(machine, frame), zeros)
+    return files_of(
+        ini, hal, FILE, _code(_within(path, machine.rapid_velocity)), machine.robot.n_legs, scales=bool(zeros.any())
+    )
 
 
 def controller_frame(machine: Machine, component: Branch) -> RigidTransform:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pentapod.machine.machine import Machine
 from pentapod.program.posts.drives import HALSTREAMER
-from pentapod.program.posts.linuxcnc.config import LEGS, number, packaged, servo_period_ns
+from pentapod.program.posts.linuxcnc.config import number, packaged, servo_period_ns
 from pentapod.program.posts.registry import PostInput
 
 ROUNDING = 1e-9
@@ -18,23 +18,24 @@ def stream_files(given: PostInput) -> dict[str, bytes]:
 
 
 def _hal(machine: Machine, period_ns: int) -> str:
+    count = machine.robot.n_legs
     lines = [
         f"loadrt threads name1=servo-thread period1={period_ns}",
-        "loadrt streamer depth=16000 cfg=fffff",
-        "loadrt limit3 names=leg1,leg2,leg3,leg4,leg5",
-        "loadrt sampler depth=16000 cfg=ffffffffff",
+        f"loadrt streamer depth=16000 cfg={'f' * count}",
+        f"loadrt limit3 names={','.join(f'leg{k + 1}' for k in range(count))}",
+        f"loadrt sampler depth=16000 cfg={'f' * 2 * count}",
         "setp streamer.0.enable 0",
         "setp sampler.0.enable 0",
         "addf streamer.0 servo-thread",
-        *(f"addf leg{leg} servo-thread" for leg in range(1, 6)),
+        *(f"addf leg{leg} servo-thread" for leg in range(1, count + 1)),
         "addf sampler.0 servo-thread",
     ]
     limits = machine.legs
-    for k in range(LEGS):
+    for k in range(count):
         leg = f"leg{k + 1}"
         lines += [
             f"net setpoint{k + 1} streamer.0.pin.{k} => {leg}.in sampler.0.pin.{k}",
-            f"net limited{k + 1} {leg}.out => sampler.0.pin.{k + LEGS}",
+            f"net limited{k + 1} {leg}.out => sampler.0.pin.{k + count}",
             f"setp {leg}.min {number(1e3 * limits.min_length[k])}",
             f"setp {leg}.max {number(1e3 * limits.max_length[k])}",
             f"setp {leg}.maxv {number(1e3 * limits.max_velocity[k] * (1.0 + ROUNDING))}",

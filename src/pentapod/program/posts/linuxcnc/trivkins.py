@@ -1,4 +1,4 @@
-"""LinuxCNC with the legs as axes X Y Z U V: G-code in inverse time, with its ini and HAL.
+"""LinuxCNC with the legs as axes X Y Z U V (W): G-code in inverse time, with its ini and HAL.
 
 LinuxCNC's planner looks one segment ahead, so its speed is at most √(ds·a/2) for segments of length ds. A program keeps
 its own time only if a ≥ 2·v/dt and dt is at least ten servo periods. The planner uses this acceleration at the points,
@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.base.errors import ProgramError
+from pentapod.base.errors import InputError, ProgramError
 from pentapod.machine.machine import Machine
 from pentapod.program.posts.linuxcnc.config import (
     axis_words,
@@ -32,9 +32,13 @@ from pentapod.program.posts.rows import read_file
 from pentapod.program.program import Program
 from pentapod.program.resolution import quantised
 
-LETTERS = "XYZUV"
+LETTERS = "XYZUVW"
+"""Linear axes of LinuxCNC, in the order of the legs."""
 FILE = "program.ngc"
-_BLOCK = re.compile("G1" + "".join(rf" {letter}([0-9]+\.[0-9]+)" for letter in LETTERS) + r" F([0-9]+\.[0-9]+)")
+
+
+def _block(letters: str) -> re.Pattern[str]:
+    return re.compile("G1" + "".join(rf" {letter}([0-9]+\.[0-9]+)" for letter in letters) + r" F([0-9]+\.[0-9]+)")
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,7 @@ OPTIONS = TrivkinsOptions()
 def trivkins_files(given: PostInput) -> dict[str, bytes]:
     """Return the files of the folder. Raises InputError."""
     program, machine = given.program, given.the_machine()
+    letters = letters_of(program)
     times = knots(program)
     legs = 1e3 * lengths_at(program, times)
     dt = float(times[1])
@@ -63,23 +68,34 @@ def trivkins_files(given: PostInput) -> dict[str, bytes]:
     velocity = 1e3 * machine.legs.max_velocity
     acceleration = planner_acceleration(program, machine)
     # The speed of a block is that of X, Y and Z together: this high, only the axes limit it.
-    fastest = 5.0 * float(velocity.max())
+    fastest = len(letters) * float(velocity.max())
     limits = zip(legs[0], low, high, velocity, acceleration, strict=True)
-    axes = {letter: axis_words(*values) for letter, values in zip(LETTERS, limits, strict=True)}
+    axes = {letter: axis_words(*values) for letter, values in zip(letters, limits, strict=True)}
     ini = ini_text(
         f"{machine.name} (trivkins)",
-        f"trivkins coordinates={LETTERS} kinstype=BOTH",
+        f"trivkins coordinates={letters} kinstype=BOTH",
         FILE,
         axes,
         joint_words(legs[0], low, high, velocity, acceleration),
         {
             "DEFAULT_LINEAR_VELOCITY": number(velocity.min()),
             "MAX_LINEAR_VELOCITY": number(fastest),
-            "MAX_LINEAR_ACCELERATION": number(5.0 * acceleration.max()),
+            "MAX_LINEAR_ACCELERATION": number(len(letters) * acceleration.max()),
         },
         servo_period_ns(program.period),
     )
-    return files_of(ini, hal_text(), FILE, gcode(legs, dt))
+    return files_of(ini, hal_text(len(letters)), FILE, gcode(legs, dt), len(letters))
+
+
+def letters_of(program: Program) -> str:
+    """Return the axes that are the legs. Raises InputError where LinuxCNC has fewer linear axes than there are legs."""
+    count = program.legs.shape[1]
+    if count > len(LETTERS):
+        raise InputError(
+            "LinuxCNC has no linear axis for each leg", key="legs", value=count, expected=f"at most {len(LETTERS)}",
+            remedy="play the setpoints: post halstreamer",
+        )  # fmt: skip
+    return LETTERS[:count]
 
 
 def planner_acceleration(program: Program, machine: Machine) -> Floats:
@@ -96,7 +112,7 @@ def knots(program: Program) -> Floats:
 
 def gcode(legs_mm: Floats, dt: float) -> bytes:
     """Return G-code through leg lengths (M, n_legs) in mm, dt seconds apart, from the current lengths."""
-    words = " ".join(f"{letter}%.8f" for letter in LETTERS)
+    words = " ".join(f"{letter}%.8f" for letter in LETTERS[: legs_mm.shape[1]])
     lines = ["G21 G90 G40 G49", "G64", "G93"]
     block = f"G1 {words} F{60.0 / dt:.9f}"
     lines += [block % tuple(row) for row in legs_mm.tolist()]
@@ -109,12 +125,14 @@ def read_gcode(file: Path) -> tuple[Floats, Floats]:
     if not lines or lines[-1] != "M2":
         raise ProgramError("M2 is missing: the file was cut off", file=file, line=max(len(lines), 1))
     rows: list[list[float]] = []
+    first = next((text for text in lines if text.startswith("G1 ")), "")
+    block = _block(LETTERS[: max(len(first.split()) - 2, 1)])
     for line, text in enumerate(lines, start=1):
         if not text.startswith("G1 "):
             continue
-        match = _BLOCK.fullmatch(text)
-        if match is None or float(match[6]) == 0.0:
-            raise ProgramError("not a move of all five legs", file=file, line=line, value=text[:80])
+        match = block.fullmatch(text)
+        if match is None or float(match.groups()[-1]) == 0.0:
+            raise ProgramError("not a move of all legs", file=file, line=line, value=text[:80])
         rows.append([float(value) for value in match.groups()])
     if len(rows) < 2:
         raise ProgramError("there are no moves", file=file, expected="at least two")

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Plays the program in simulation, without a screen; writes played.txt: number, five joints (mm), moving or not.
+# Plays the program in simulation, without a screen; writes played.txt: number, the joints (mm), moving or not.
 set -eu
 cd "$(dirname "$0")"
 command -v linuxcnc >/dev/null || { echo "play.sh needs LinuxCNC: the package linuxcnc-uspace" >&2; exit 1; }
@@ -24,9 +24,9 @@ if ! grep -qx DONE linuxcnc.log; then
   exit 1
 fi
 awk -v period="$(sed -n 's/^SERVO_PERIOD = //p' pentapod.ini)" '
-$7 != 0 {
+$NF != 0 {
   moving++
-  for (k = 2; k <= 6; k++) {
+  for (k = 2; k < NF; k++) {
     d = $k - 2 * one[k] + two[k]
     if (moving > 2 && d < 0) d = -d
     if (moving > 2 && d > most) most = d
