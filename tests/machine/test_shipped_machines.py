@@ -47,7 +47,9 @@ def test_all_modes_have_the_legs(machine: Machine) -> None:
     legs = machine.robot.leg_lengths(*poses(machine, 100, 2))
     for branch in machine.robot.branches:
         found = machine.robot.pose(legs, np.array(branch, dtype=float))
-        np.testing.assert_allclose(machine.robot.leg_lengths(*found), legs, atol=1e-9)
+        there = np.isfinite(found[0]).all(axis=1)
+        assert there.all() or machine.robot.arms.any()  # a leg beside the line fits some modes only
+        np.testing.assert_allclose(machine.robot.leg_lengths(*found)[there], legs[there], atol=1e-9)
 
 
 def test_true_mode_is_admissible_at_power_on(machine: Machine) -> None:

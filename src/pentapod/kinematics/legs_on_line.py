@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, cast
 
 import numpy as np
@@ -24,6 +25,10 @@ class LegsOnLine:
     def passive_wrenches(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return an array (..., 0, 6): there are no passive joints that hold anything."""
         return np.zeros((*common_batch(*as_poses(position, direction), ("position", "direction")), 0, 6))
+
+    def hinges(self, position: ArrayLike, direction: ArrayLike) -> Mapping[int, Floats]:
+        """Return nothing: no leg hangs in a revolute joint."""
+        return {}
 
     def enclose_joints(self, poses: tuple[Floats, Floats], legs: Floats) -> Floats:
         """Return bounds (N, n_legs) of how far the platform joints get: they are points of the line."""

@@ -122,6 +122,13 @@ class Robot(Protocol):
         """
         ...
 
+    def hinges(self, position: ArrayLike, direction: ArrayLike) -> Mapping[int, Floats]:
+        """Return the axes (..., 3) of the revolute joints in which legs hang on the platform, by index of the leg.
+
+        The other legs hang in joints that transmit no moment.
+        """
+        ...
+
     def leg_derivatives(self, tips: Sequence[tuple[Floats, Floats]], tool_length: float) -> list[Floats]:
         """Return the readings (n, n_legs) and their derivatives along a curve, of as many orders as are given.
 

@@ -39,7 +39,7 @@ class MujocoModelOptions:
     ring_mass: float = 0.02
     """Mass of a ring on which a leg ends, kg."""
     hinge: float = 0.03
-    """Half the length of the hinge by which a leg hangs on a ring, m."""
+    """Half the length of the hinge by which a leg hangs on a ring or in a revolute joint, m."""
 
 
 DEFAULTS = MujocoModelOptions()
@@ -61,8 +61,8 @@ def mjcf(
     """
     vectors = real.leg_vectors(position, direction)
     lengths = np.linalg.norm(vectors, axis=1)
-    readings, radii = lengths + robot_zeros(real), _radii(real)
-    tangents = _tangents(real, position, direction)
+    readings = lengths + robot_zeros(real)
+    hinges = _hinges(real, position, direction)
     root = Xml.Element("mujoco", model=machine.name)
     _add(root, "compiler", angle="radian", autolimits="true")
     option = _add(root, "option", timestep=[step], gravity=machine.masses.gravity, integrator="implicitfast")
@@ -76,10 +76,10 @@ def mjcf(
     for leg in range(real.n_legs):
         pose = (real.base_joints[leg], vectors[leg] / lengths[leg], lengths[leg])
         rod = _leg(world, machine, leg, *pose, reading=readings[leg])
-        if radii[leg] > 0.0:  # the rod hangs on the ring by a hinge along the ring's tangent: it may turn in itself
+        if leg in hinges:  # the rod may turn in itself, and hangs on the platform or its ring by a hinge
             _add(rod, "joint", name=f"turn{leg + 1}", type="hinge", axis="0 0 1")
-            tangent = _turned_back(_rotation_from_z(pose[1]), model.hinge * tangents[leg])
-            _add(rod, "site", name=f"rod{leg + 1}side", pos=tangent)
+            aside = _turned_back(_rotation_from_z(pose[1]), model.hinge * hinges[leg])
+            _add(rod, "site", name=f"rod{leg + 1}side", pos=aside)
     _platform(world, machine, real, position, direction, model)
     loops = _add(root, "equality")
     actuators = _add(root, "actuator")
@@ -89,7 +89,7 @@ def mjcf(
         damping = drives.moving_mass[leg] * drives.velocity_gain[leg]
         stiffness = damping * drives.position_gain[leg]
         _add(actuators, "position", name=f"drive{leg + 1}", joint=f"leg{leg + 1}", kp=[stiffness], kv=[damping])
-    for leg in np.flatnonzero(radii).tolist():  # after all loops, whose forces are read by their places
+    for leg in hinges:  # after all loops, whose forces are read by their places
         name = f"{leg + 1}side"
         _add(loops, "connect", name=f"hinge{leg + 1}", site1=f"rod{name}", site2=f"platform{name}")
     free = real.n_legs + real.passive_wrenches(position, direction).shape[-2] < FREEDOMS
@@ -135,19 +135,22 @@ def _platform(
     _add(body, "site", name="origin")
     _add(body, "site", name="tip", pos=[0.0, 0.0, tool])
     off = real.platform_joints(position, direction) - position - real.offsets[:, None] * direction
-    tangents, radii = _tangents(real, position, direction), _radii(real)
+    hinges, radii = _hinges(real, position, direction), _radii(real)
     for leg in range(real.n_legs):
         height, name = np.array([0.0, 0.0, float(real.offsets[leg])]), f"platform{leg + 1}"
         if radii[leg] == 0.0:
-            place = _turned_back(_rotation_from_z(direction), off[leg]) if real.arms[leg] > 0.0 else np.zeros(3)
-            _add(body, "site", name=name, pos=height + place)
+            turn = _rotation_from_z(direction)
+            at = height + (_turned_back(turn, off[leg]) if real.arms[leg] > 0.0 else 0.0)
+            _add(body, "site", name=name, pos=at)
+            if leg in hinges:
+                _add(body, "site", name=f"{name}side", pos=at + _turned_back(turn, model.hinge * hinges[leg]))
             continue
         ring = _add(body, "body", name=f"ring{leg + 1}", pos=height)
         _add(ring, "joint", name=f"ring{leg + 1}", type="hinge", axis="0 0 1", damping=[model.spin_damping])
         inertia = model.ring_mass * max(float(radii[leg]), model.hinge) ** 2  # a speck would not be simulated
         still = [inertia, inertia, inertia]
         _add(ring, "inertial", pos=[0.0, 0.0, 0.0], mass=[model.ring_mass], diaginertia=still)
-        for at, place in ((name, off[leg]), (f"{name}side", off[leg] + model.hinge * tangents[leg])):
+        for at, place in ((name, off[leg]), (f"{name}side", off[leg] + model.hinge * hinges[leg])):
             _add(ring, "site", name=at, pos=_turned_back(_rotation_from_z(direction), place))
 
 
@@ -172,10 +175,14 @@ def _radii(real: Robot) -> Floats:
     return real.radii if isinstance(real, AsBuiltPentapod) else np.zeros(real.n_legs)
 
 
-def _tangents(real: Robot, position: Floats, direction: Floats) -> Floats:
-    """Return the unit tangents (n_legs, 3) of rings where the legs end; anything for legs without a ring."""
+def _hinges(real: Robot, position: Floats, direction: Floats) -> dict[int, Floats]:
+    """Return the axes (3,) of hinges in which legs hang on the platform or, along the tangent, on their ring."""
+    radii = _radii(real)
+    if not radii.any():
+        return dict(real.hinges(position, direction))
     across = np.cross(direction, real.base_joints - position)
-    return np.asarray(across / np.linalg.norm(across, axis=1, keepdims=True), dtype=np.float64)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return {leg: across[leg] for leg in np.flatnonzero(radii).tolist()}
 
 
 def _turned_back(quaternion: Floats, vector: Floats) -> Floats:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from math import comb
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.legs_on_line import LegsOnLine
+from pentapod.kinematics.leibniz import cross_products, scalar_products, square_roots
 from pentapod.kinematics.proofs.by_leg_equations import ProvenByLegEquations
 from pentapod.kinematics.robot import Branch, Robot, SingularSurface
 
@@ -163,15 +163,15 @@ class AsBuiltPentapod(Value, LegsOnLine, ProvenByLegEquations):
         axes = [np.broadcast_to(axis[:, None, :], (len(axis), 5, 3)) for _, axis in tips]
         e = [tip[:, None, :] + lever * axis for (tip, _), axis in zip(tips, axes, strict=True)]
         e[0] -= self.base
-        squares = _scalar_products(e, e)
+        squares = scalar_products(e, e)
         ringed = np.flatnonzero(self.radii)
         if ringed.size:
-            normal = _cross_products([x[:, ringed] for x in e], [x[:, ringed] for x in axes])
-            radii, rho = self.radii[ringed], _roots(_scalar_products(normal, normal))
+            normal = cross_products([x[:, ringed] for x in e], [x[:, ringed] for x in axes])
+            radii, rho = self.radii[ringed], square_roots(scalar_products(normal, normal))
             for square, by in zip(squares, rho, strict=True):
                 square[:, ringed] -= 2.0 * radii * by
             squares[0][:, ringed] += radii**2
-        lengths = _roots(squares)
+        lengths = square_roots(squares)
         lengths[0] += self.zeros
         return lengths
 
@@ -241,28 +241,3 @@ def _given(value: ArrayLike, key: str, shape: tuple[int, ...]) -> Floats:
         raise MachineError(error.what, key=key, value=error.value, expected=error.expected) from error
     except ValueError as error:
         raise MachineError(f"{key} has shape {np.shape(value)}", key=key, expected=f"shape {shape}") from error
-
-
-# Leibniz's rule. A quantity is a list: at [k] its derivative of order k, arrays of one shape.
-
-
-def _scalar_products(a: Sequence[Floats], b: Sequence[Floats]) -> list[Floats]:
-    """Return the scalar products (...) of vectors (..., 3) and their derivatives."""
-    return [
-        np.sum([comb(n, k) * np.einsum("...c,...c->...", a[k], b[n - k]) for k in range(n + 1)], axis=0)
-        for n in range(len(a))
-    ]
-
-
-def _cross_products(a: Sequence[Floats], b: Sequence[Floats]) -> list[Floats]:
-    """Return the vector products (..., 3) and their derivatives."""
-    return [np.sum([comb(n, k) * np.cross(a[k], b[n - k]) for k in range(n + 1)], axis=0) for n in range(len(a))]
-
-
-def _roots(square: Sequence[Floats]) -> list[Floats]:
-    """Return the square roots and their derivatives: (r²)⁽ⁿ⁾ = 2 r r⁽ⁿ⁾ + products of lower ones."""
-    found = [np.sqrt(square[0])]
-    for n in range(1, len(square)):
-        lower = [comb(n, k) * found[k] * found[n - k] for k in range(1, n)]
-        found.append((square[n] - np.sum(lower, axis=0) if lower else square[n]) / (2.0 * found[0]))
-    return found

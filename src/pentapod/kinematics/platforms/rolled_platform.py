@@ -137,6 +137,10 @@ class RolledPlatform(Value, ProvenRoll):
         """Return an array (..., 0, 6): six legs hold the platform, no passive joint does."""
         return np.zeros((*joined_poses(position, direction)[0].shape[:-1], 0, 6))
 
+    def hinges(self, position: ArrayLike, direction: ArrayLike) -> Mapping[int, Floats]:
+        """Return nothing: no leg hangs in a revolute joint."""
+        return {}
+
     def leg_derivatives(self, tips: Sequence[tuple[Floats, Floats]], tool_length: float) -> list[Floats]:
         """Return leg lengths (n, 6) and their derivatives along a curve, of as many orders as are given."""
         d = [tip + (tool_length - self.foot) * axis for tip, axis in tips]

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.base.arrays import Floats, as_floats, frozen, set_frozen
+from pentapod.base.arrays import Bools, Floats, as_floats, frozen, set_frozen
 from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal, stage
 from pentapod.base.values import Result, Value
@@ -60,7 +60,8 @@ def admissible_modes(machine: Machine, legs: ArrayLike, *, leg_error: float = 1e
     leg_error: metres by which each reading may be wrong. A pose is excluded only where it breaks a limit for all
     lengths within that error, so the true one is among the admissible ones; a Refusal says where this cannot be proven:
     lengths without a pose, or close to a singularity, where two modes meet. Of a machine as built the poses are those
-    that continue the nominal ones; that base joints off the plane add none is not proven. Raises InputError.
+    that continue the nominal ones; that base joints off the plane add none is not proven. Where legs end beside the
+    line, the platform counts as turned about it by the machine's law, as every program leaves it. Raises InputError.
     """
     robot, count = machine.robot, machine.robot.n_legs
     readings = as_floats(legs, "legs")
@@ -73,7 +74,10 @@ def admissible_modes(machine: Machine, legs: ArrayLike, *, leg_error: float = 1e
     branches = robot.branches
     all_readings = np.broadcast_to(readings, (len(branches), count))
     position, direction = robot.pose(all_readings, np.array(branches, dtype=np.float64))
-    known = np.isfinite(position).all(axis=1)
+    known: Bools = np.asarray(np.isfinite(position).all(axis=1), dtype=np.bool_)
+    if robot.arms.any() and known.any():  # the other modes turn the platform about its line otherwise than the machine
+        branches = tuple(branch for branch, there in zip(branches, known, strict=True) if there)
+        position, direction, known = position[known], direction[known], known[known]
     if not known.all():
         return Refusal("modes", *_without_pose(machine, readings, leg_error))
     signs = np.array(list(product((-1.0, 1.0), repeat=count)))
