@@ -20,7 +20,7 @@ PROVEN_MOTION = {
 }
 WITHOUT_POSES = {
     *("machine", "job", "guides within their travel", "component kept, w", "component kept, S"),
-    "component kept",
+    *("component kept, roll", "component kept"),
     *("legs not too short", "legs not too long", "leg rates", "leg accelerations", "leg jerks"),
     *("starts at rest", "ends at rest", "legs, spindle and tool clear of the surroundings"),
     *("placement as the job asks", "component as asked", "controller", "every cut is made in one set-up"),

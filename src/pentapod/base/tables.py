@@ -180,4 +180,5 @@ def _meaning(where: tuple[str, ...], root: type[BaseModel], table: TableOf) -> s
     if len(where) == 1:
         needed = [name for name, field in model.model_fields.items() if field.is_required()]
         return f"[{where[0]}]" + (" with " + ", ".join(needed) if needed else "")
-    return model.model_fields[where[1]].description or ""
+    field = model.model_fields.get(where[1])  # none: a key that one robot family has more than others
+    return (field.description if field else None) or "see the reference"

@@ -10,7 +10,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.display import html_table, load_extra
-from pentapod.base.errors import ProgramError
+from pentapod.base.errors import MachineError, ProgramError
 from pentapod.base.values import Result, Value
 from pentapod.geometry.interpolant import Interpolation
 from pentapod.geometry.rigid import RigidTransform
@@ -72,7 +72,15 @@ class Program(Result):
             raise ProgramError("the period must be positive", value=self.period)
 
     def machine(self, machine: Machine) -> Machine:
-        """Return a machine with its guides at the positions of the program. Raises MachineError."""
+        """Return a machine with its guides at the positions of the program.
+
+        Raises MachineError: it has another number of legs, or is architecturally singular there.
+        """
+        if machine.robot.n_legs != self.legs.shape[1]:
+            raise MachineError(
+                "the program is for a machine with another number of legs", key="machine", value=machine.name,
+                expected=f"{self.legs.shape[1]} legs, as the program has; this machine has {machine.robot.n_legs}",
+            )  # fmt: skip
         return machine if self.rail_positions is None or machine.guides is None else machine.at(self.rail_positions)
 
     @cached_property

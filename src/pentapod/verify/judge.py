@@ -39,6 +39,7 @@ from pentapod.verify.verdict.specification import Asked, Specification
 from pentapod.verify.verdict.verdict import Certificate, NotJudged, Place, Verdict
 
 READABLE = "readable"
+MACHINE = "machine"
 CLAIMS: tuple[Claim, ...] = (
     *provenance.CLAIMS,
     *placement.CLAIMS,
@@ -118,7 +119,10 @@ def judged(
     try:
         specification = replace(specification, machine=program.machine(specification.machine))
     except MachineError as error:
-        return Verdict((*read, _certificate(provenance.GUIDES, False, str(error))), sources=sources)
+        fits = specification.machine.robot.n_legs == program.legs.shape[1]
+        return Verdict(
+            (*read, _certificate(provenance.GUIDES if fits else MACHINE, False, str(error))), sources=sources
+        )
     replay, unjudged = Replay(program, specification, progress), list[NotJudged]()
     _ = replay.interval_bounds  # first, because its progress is the first share
     around = collisions.claims(specification.collision_world, specification.machine.robot.n_legs)

@@ -69,7 +69,7 @@ class ProvenByKrawczyk:
     proven_measures = (
         ProvenMeasure("w", "deg", 1.0, "least angle between tool axis and base plane,", "enclosure of the pose"),
         ProvenMeasure(
-            "regular", "mm/mm", 1.0, "least change of some leg for each mm that the platform shifts along an axis,",
+            "", "mm/mm", 1.0, "least change of some leg for each mm that the platform shifts along an axis,",
             "by Krawczyk's operator on the equations of legs, frame and passive joint",
         ),
     )  # fmt: skip

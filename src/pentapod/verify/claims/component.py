@@ -1,6 +1,7 @@
 """Claims that the component is kept, proven for all times on every interval between rows.
 
-The robot names what its proof bounds: |w| and |S| in the quadratic family, elsewhere the stiffness of the pose.
+The robot names what its proof bounds: |w| and |S| in the quadratic family, the roll of a platform with a sixth leg,
+elsewhere the stiffness of the pose.
 """
 
 from __future__ import annotations
@@ -18,11 +19,18 @@ _METHOD = (
 
 
 def kept(replay: Replay, *, measure: str) -> Finding | Idle:
-    """Judge that the measure of this name keeps the sign of the component; idle for a robot with other measures."""
-    for column, proven in enumerate(replay.machine.robot.proven_measures):
-        if proven.name == measure:
-            return _finding(replay, proven, column)
-    return Idle("this kind of robot proves its component by another measure")
+    """Judge that the measure of this name keeps the sign of the component; idle for a robot with other measures.
+
+    The claim without a name judges all measures that have no claim of their own.
+    """
+    found = [
+        _finding(replay, proven, column)
+        for column, proven in enumerate(replay.machine.robot.proven_measures)
+        if proven.name == measure or (not measure and proven.name not in NAMED)
+    ]
+    if not found:
+        return Idle("this kind of robot proves its component by another measure")
+    return next((finding for finding in found if not finding.passed), found[0])
 
 
 def _finding(replay: Replay, measure: ProvenMeasure, column: int) -> Finding:
@@ -48,7 +56,10 @@ def _finding(replay: Replay, measure: ProvenMeasure, column: int) -> Finding:
     return Finding(passed, least, 0.0, measure.unit, replay.place(2 * interval), method)
 
 
+NAMED = ("w", "S", "roll")
+"""Measures with a claim of their own."""
+
 CLAIMS = tuple(
-    Claim(name, partial(kept, measure=measure), needs_pose=False)
-    for name, measure in (("component kept, w", "w"), ("component kept, S", "S"), ("component kept", ""))
+    Claim(f"component kept{', ' if measure else ''}{measure}", partial(kept, measure=measure), needs_pose=False)
+    for measure in (*NAMED, "")
 )
