@@ -2,8 +2,8 @@
 
     python examples/16_a_sixth_leg.py --tries 2000 --seed 1
 
-Leg 6 holds the platform's turn about the tool axis. Its base joint, the length of its arm and the place of the arm on the
-tool axis are drawn at random; a design counts by the smallest clearance of all legs, arm and spindle over the work
+Leg 6 holds the platform's turn about the tool axis. Its base joint, the length of its arm and the place of the arm on
+the tool axis are drawn at random; a design counts by the smallest clearance of all legs, arm and spindle over the work
 volume, less a price where the leg's lengths or its base cone spread. Legs 1 to 5 and all limits are those of `desk`.
 Printed are designs that are better than those before, and the figures of the shipped one.
 """
@@ -73,7 +73,8 @@ def main() -> None:
         score = found["clearance"] - 20.0 * max(0.0, found["ratio"] - 1.8) - max(0.0, found["cone"] - 30.0)
         if score > best:
             best = score
-            place = f"base {1e3 * base[0]:.0f}, {1e3 * base[1]:.0f}, foot {1e3 * foot:.0f}, arm {1e3 * arm:.0f} mm, side {side:+d}"
+            x, y = 1e3 * base
+            place = f"base {x:.0f}, {y:.0f}, foot {1e3 * foot:.0f}, arm {1e3 * arm:.0f} mm, side {side:+d}"
             print(place, *(f"{name} {value:.3g}" for name, value in found.items()), sep="; ")
     print(
         "shipped:",
