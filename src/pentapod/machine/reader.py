@@ -24,7 +24,7 @@ from pentapod.kinematics.robot import Robot
 from pentapod.machine.calibration.calibration_file import read_calibration
 from pentapod.machine.calibration.record import CalibrationRecord
 from pentapod.machine.drives import Drives, Masses
-from pentapod.machine.families.registry import FAMILIES, legs_of
+from pentapod.machine.families import FAMILIES, legs_of
 from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 from pentapod.machine.tables import FILE_KEYS, GuideKeys, MachineTables, MachineToolKeys, PlatformJointKeys

@@ -12,7 +12,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.keys import Key, declared
 from pentapod.base.tables import TomlTable, extended, table_of
 from pentapod.machine.drives import Drives, Masses
-from pentapod.machine.families.registry import OfFamily
+from pentapod.machine.families import OfFamily
 from pentapod.machine.fields import LEG_PAIRS, PER_LEG, each_leg
 from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume

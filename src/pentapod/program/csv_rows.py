@@ -145,4 +145,6 @@ def _check_lengths(table: Floats, names: Sequence[str], first_line: int, file: P
     if wrong.any():
         row, leg = np.argwhere(wrong)[0]
         what, line, value = "a leg length that no machine has", first_line + int(row), float(table[row, leg + 1])
-        raise ProgramError(what, file=file, line=line, key=names[leg + 1], value=value, expected="between 0 and 10 km")
+        raise ProgramError(
+            what, file=file, line=line, key=names[int(leg) + 1], value=value, expected="between 0 and 10 km"
+        )

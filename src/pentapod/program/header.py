@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 import tomllib
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Any, get_args
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.base.errors import ArrayError, InputError, ProgramError, ToolpathError
+from pentapod.base.errors import ArrayError, ProgramError, ToolpathError
 from pentapod.geometry.interpolant import Interpolation
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.program.header_values import (
+    bound_of,
+    box_text,
+    decimal_text,
+    list_of,
+    matrix_text,
+    number_of,
+    string_text,
+)
 from pentapod.program.program import FORMAT_VERSION, Program, Provenance
 from pentapod.toolpath.linking.partition import Piece
 
@@ -82,30 +90,30 @@ def header_text(program: Program) -> str:
     source = program.provenance
     values = {
         MAGIC: str(FORMAT_VERSION),
-        "pentapod_version": _string(source.pentapod_version),
-        "machine": _string(source.machine),
-        "machine_digest": _string(source.machine_digest),
-        "job_digest": _string(source.job_digest),
+        "pentapod_version": string_text(source.pentapod_version),
+        "machine": string_text(source.machine),
+        "machine_digest": string_text(source.machine_digest),
+        "job_digest": string_text(source.job_digest),
         "period_s": repr(float(program.period)),
-        "interpolation": _string(program.interpolation),
-        "component": _string(str(program.component)),
-        "placement_mm": _matrix(program.placement),
+        "interpolation": string_text(program.interpolation),
+        "component": string_text(str(program.component)),
+        "placement_mm": matrix_text(program.placement),
         "rows": str(len(program.legs)),
     }
     if program.legs.shape[1] != FiveLegs.n_legs:
         values[LEGS] = str(program.legs.shape[1])
     if source.calibration:
-        values[CALIBRATION] = _string(source.calibration)
+        values[CALIBRATION] = string_text(source.calibration)
     if source.commands:
-        values[COMMANDS] = _string(source.commands)
+        values[COMMANDS] = string_text(source.commands)
     if program.rail_positions is not None:
-        values[GUIDES] = f"[{', '.join(_decimal(x, 3) for x in program.rail_positions)}]"
+        values[GUIDES] = f"[{', '.join(decimal_text(x, 3) for x in program.rail_positions)}]"
     if source.piece is not None:
-        values |= {WAYPOINTS: f"[{source.piece.first}, {source.piece.last}]", BOX: _box(source.piece)}
+        values |= {WAYPOINTS: f"[{source.piece.first}, {source.piece.last}]", BOX: box_text(source.piece)}
     if source.left_out:
         values[LEFT_OUT] = f"[{', '.join(f'[{first}, {last}]' for first, last in source.left_out)}]"
     made_on = zip(MADE_ON, (source.processor, source.libraries), strict=True)
-    values |= {key: _string(value) for key, value in made_on if value}
+    values |= {key: string_text(value) for key, value in made_on if value}
     mark = f"# {UNVERIFIED}\n" if source.unverified else ""
     return mark + "".join(f"# {key} = {value}\n" for key, value in values.items())
 
@@ -199,14 +207,14 @@ class _Reader:
         return self.values[key]
 
     def _period(self) -> float:
-        period = _number(self.values["period_s"])
+        period = number_of(self.values["period_s"])
         self._check("period_s", 0.0 < period < math.inf, "a positive number of seconds")
         return period
 
     def _rail_positions(self) -> tuple[float, ...] | None:
         if GUIDES not in self.values:
             return None
-        positions = tuple(_number(entry, shift=-3) for entry in _list(self.values[GUIDES]))
+        positions = tuple(number_of(entry, shift=-3) for entry in list_of(self.values[GUIDES]))
         good = len(positions) == self._legs() and all(map(math.isfinite, positions))
         self._check(GUIDES, good, f"{self._legs()} numbers of mm, one for each guide")
         return positions
@@ -221,12 +229,12 @@ class _Reader:
     def _piece(self) -> Piece | None:
         if WAYPOINTS not in self.values:
             return None
-        pair, corners = _list(self.values[WAYPOINTS]), _list(self.values[BOX])
+        pair, corners = list_of(self.values[WAYPOINTS]), list_of(self.values[BOX])
         good = [type(k) for k in pair] == [int, int] and max(map(abs, pair)) <= LARGEST_COUNT
         self._check(WAYPOINTS, good, "the first and the last waypoint")
         expected = "two opposite corners, [[x, y, z], [x, y, z]]"
-        self._check(BOX, [len(_list(corner)) for corner in corners] == [3, 3], expected)
-        low, high = ((_bound(x), _bound(y), _bound(z)) for x, y, z in corners)
+        self._check(BOX, [len(list_of(corner)) for corner in corners] == [3, 3], expected)
+        low, high = ((bound_of(x), bound_of(y), bound_of(z)) for x, y, z in corners)
         try:
             return Piece(pair[0], pair[1], low, high)
         except ToolpathError:
@@ -236,7 +244,7 @@ class _Reader:
     def _left_out(self) -> tuple[tuple[int, int], ...]:
         if LEFT_OUT not in self.values:
             return ()
-        pairs = [_list(pair) for pair in _list(self.values[LEFT_OUT])]
+        pairs = [list_of(pair) for pair in list_of(self.values[LEFT_OUT])]
         good = bool(pairs) and all([type(k) for k in pair] == [int, int] for pair in pairs)
         flat = [k for pair in pairs for k in pair]
         good = good and flat == sorted(set(flat)) and flat[0] >= 0 and flat[-1] <= LARGEST_COUNT
@@ -250,61 +258,12 @@ class _Reader:
 
     def _placement(self) -> RigidTransform:
         expected = "a rigid 4x4 matrix, translation in mm"
-        rows = [_list(row) for row in _list(self.values["placement_mm"])]
+        rows = [list_of(row) for row in list_of(self.values["placement_mm"])]
         self._check("placement_mm", [len(row) for row in rows] == [4, 4, 4, 4], expected)
         shift = [[-3 if j == 3 and k < 3 else 0 for j in range(4)] for k in range(4)]
-        matrix = [[_number(x, n) for x, n in zip(row, by, strict=True)] for row, by in zip(rows, shift, strict=True)]
+        matrix = [[number_of(x, n) for x, n in zip(row, by, strict=True)] for row, by in zip(rows, shift, strict=True)]
         try:
             return RigidTransform.from_matrix(np.array(matrix))
         except ArrayError as error:
             key, line = "placement_mm", self.places["placement_mm"]
             raise ProgramError(error.what, file=self.file, line=line, key=key, expected=expected) from error
-
-
-def _number(value: Any, shift: int = 0) -> float:
-    """Return a TOML number times 10^shift, rounded once; NaN for anything else, and for what no double holds."""
-    if type(value) is not int and not isinstance(value, Decimal):
-        return math.nan
-    exact = Decimal(value)
-    # Beyond this a double overflows anyway, and Decimal's own arithmetic would raise.
-    if not exact.is_finite() or exact.adjusted() > 400:
-        return math.nan
-    return float(exact.scaleb(shift)) if exact.adjusted() > -400 else 0.0
-
-
-def _list(value: Any) -> list[Any]:
-    """Return a list as it is, and an empty one for anything else."""
-    return cast("list[Any]", value) if isinstance(value, list) else []
-
-
-def _bound(value: Any) -> float:
-    """Return millimetres, or ±inf, as metres; NaN for anything else."""
-    if isinstance(value, Decimal) and value.is_infinite():
-        return float(value)
-    return _number(value, shift=-3)
-
-
-def _string(text: str) -> str:
-    """Return a TOML basic string; JSON's escapes are TOML's, but for DEL."""
-    try:
-        text.encode()
-    except UnicodeEncodeError as error:
-        raise InputError("a name in the header is not text that UTF-8 can hold", value=text) from error
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _matrix(placement: RigidTransform) -> str:
-    shifts = [[3 if j == 3 and k < 3 else 0 for j in range(4)] for k in range(4)]
-    rows = (", ".join(map(_decimal, row.tolist(), shift)) for row, shift in zip(placement.matrix, shifts, strict=True))
-    return "[" + ", ".join(f"[{row}]" for row in rows) + "]"
-
-
-def _box(piece: Piece) -> str:
-    corners = (", ".join(_decimal(x, 3) if math.isfinite(x) else str(x) for x in c) for c in (piece.low, piece.high))
-    return "[" + ", ".join(f"[{corner}]" for corner in corners) + "]"
-
-
-def _decimal(value: float, shift: int) -> str:
-    """Return the shortest digits that give `value` back, times 10^shift, as a TOML float."""
-    text = format(Decimal(repr(value)).scaleb(shift), "f")
-    return text if "." in text else text + ".0"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pentapod.base.errors import MachineError
 from pentapod.kinematics.families.general import GeneralPentapod
-from pentapod.machine.families.registry import Family, GeometryTable
+from pentapod.machine.families import Family, GeometryTable
 
 
 def _robot(table: GeometryTable) -> GeneralPentapod:

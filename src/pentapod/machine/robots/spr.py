@@ -9,7 +9,7 @@ from pydantic import Field
 
 from pentapod.base.errors import MachineError
 from pentapod.kinematics.platforms.constrained import ConstrainedPlatform
-from pentapod.machine.families.registry import Family, GeometryTable
+from pentapod.machine.families import Family, GeometryTable
 from pentapod.machine.fields import LEG_PAIRS, LIST_OF_3
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pentapod.base.errors import MachineError
 from pentapod.kinematics.families.quadratic import LinearPentapod
-from pentapod.machine.families.registry import Family, GeometryTable
+from pentapod.machine.families import Family, GeometryTable
 
 OFFSET_TOLERANCE_M = 1e-6  # offsets in a file are rounded; beyond a micrometre they mean another machine
 

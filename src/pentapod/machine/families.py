@@ -51,10 +51,10 @@ FAMILIES = Registry(
     Family,
     MachineError,
     homes={
-        QUADRATIC: "pentapod.machine.families.quadratic",
-        GENERAL: "pentapod.machine.families.general",
-        HEXA: "pentapod.machine.families.hexa",
-        SPR: "pentapod.machine.families.spr",
+        QUADRATIC: "pentapod.machine.robots.quadratic",
+        GENERAL: "pentapod.machine.robots.general",
+        HEXA: "pentapod.machine.robots.hexa",
+        SPR: "pentapod.machine.robots.spr",
     },
     constant="FAMILY",
 )

@@ -12,8 +12,8 @@ from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.platforms.rolled_platform import RolledPlatform
 from pentapod.kinematics.platforms.six_leg import SixLegPlatform
-from pentapod.machine.families.quadratic import OFFSET_TOLERANCE_M
-from pentapod.machine.families.registry import Family, GeometryTable
+from pentapod.machine.families import Family, GeometryTable
+from pentapod.machine.robots.quadratic import OFFSET_TOLERANCE_M
 
 
 class HexaTable(GeometryTable):

@@ -1,0 +1,1 @@
+"""The robot families of machine files: a file each, with its keys of [geometry]."""
