@@ -31,12 +31,12 @@ def _robot(table: Any) -> RolledPlatform:
         raise MachineError("the platform is missing", key="geometry", expected="platform_mm with six numbers")
     base, (*offsets, foot) = table.si.base, table.si.platform
     if table.delta is None:
-        line = GeneralPentapod(base[:5], np.array(offsets))
+        line = GeneralPentapod(base[:-1], np.array(offsets))
     else:
-        line = LinearPentapod.from_offsets(base[:5], offsets, table.delta, tolerance=OFFSET_TOLERANCE_M)
+        line = LinearPentapod.from_offsets(base[:-1], offsets, table.delta, tolerance=OFFSET_TOLERANCE_M)
     return RolledPlatform(
-        SixLegPlatform(line, np.array([*base[5], 0.0]), np.array([table.si.arm, 0.0, foot])), table.side
+        SixLegPlatform(line, np.array([*base[-1], 0.0]), np.array([table.si.arm, 0.0, foot])), table.side
     )
 
 
-FAMILY = Family(_robot, HexaTable, n_legs=6)
+FAMILY = Family(_robot, HexaTable, n_legs=RolledPlatform.n_legs)
