@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from short_motion import poses, round_trip
 
 from pentapod.base.errors import ProgramError
 from pentapod.geometry.rigid import RigidTransform
@@ -10,6 +9,7 @@ from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine import Machine
 from pentapod.program import Program, Provenance, quantised, read_csv, write_csv
 from pentapod.program.posts import POSTS, PostInput, write_post
+from short_motion import poses, round_trip
 
 HEXA = Machine.load("hexa")
 
