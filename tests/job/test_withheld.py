@@ -6,9 +6,13 @@ import json
 
 import pytest
 
+import concave_parts
 from pentapod.cli.commands.new import dome_stl, job_text
 from pentapod.job import Job, run
-from pentapod.job.withheld import withheld
+from pentapod.job.build.toolpath import job_toolpath
+from pentapod.job.build.values import job_mesh
+from pentapod.job.withheld import foreseen, withheld
+from pentapod.mesh.io.stl import write_stl
 from pentapod.verify import Claim, Verdict
 from pentapod.verify.replay.claim import Finding
 from pentapod.verify.verdict.verdict import Certificate, Place
@@ -45,3 +49,23 @@ def test_a_program_that_fails_its_verdict_is_not_left_as_program(tmp_path):
     assert json.loads((out / "verdict.json").read_text())["refusal"]["stage"] == "verdict"
     assert run(job, out).passed
     assert {path.name for path in out.iterdir()} == {"program.csv", "plan.npz", "verdict.json", "manifest.json"}
+
+
+def test_a_toolpath_that_leaves_out_what_the_shank_forbids_is_refused_before_it_is_planned(tmp_path):
+    mesh = concave_parts.mesh("pocket_boss")
+    (tmp_path / "part.stl").write_bytes(write_stl(1e3 * mesh.vertices[mesh.faces], "pocket"))
+    tables = {
+        "part": {"mesh": "part.stl", "unit": "mm"},
+        "machine": {"name": "desk"},
+        "tool": {"type": "ball", "diameter_mm": 6.0},
+        "toolpath": {"stepover_mm": 4.0},
+        "axis": {"mode": "fixed", "direction": [0.3, 0.0, 1.0]},
+        "feed": {"cut_mm_min": 1500.0},
+    }
+    outcome = run(Job.from_dict(tables, tmp_path), tmp_path / "out", advice=None)
+    assert outcome.refusal.stage == "toolpath"
+    assert "shank or holder would cut into the part" in outcome.refusal.cause
+    assert [stage.name for stage in outcome.stages] == ["mesh", "toolpath", "foreseen"]
+    assert not (tmp_path / "out" / "program.csv").exists()
+    upright = Job.from_dict({**tables, "axis": {"mode": "auto"}}, tmp_path)
+    assert foreseen(upright, job_toolpath(upright, job_mesh(upright))[1]) is None

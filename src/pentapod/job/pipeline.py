@@ -18,7 +18,7 @@ from pentapod.job.build.limits import timing_limits
 from pentapod.job.build.pieces import job_part, job_piece, job_without
 from pentapod.job.build.region import covers_region
 from pentapod.job.build.specification import job_specification
-from pentapod.job.build.toolpath import job_link_style, job_toolpath
+from pentapod.job.build.toolpath import Reports, job_link_style, job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.mending import OPTIONS as MENDING
 from pentapod.job.mending import mend_of
@@ -29,7 +29,7 @@ from pentapod.job.run_folder import staged, unstaged
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import StageRunner
 from pentapod.job.task import Task, ending_when_interrupted
-from pentapod.job.withheld import STAGE, failures, withheld
+from pentapod.job.withheld import STAGE, failures, foreseen, withheld
 from pentapod.machine.machine import Machine
 from pentapod.planning import PlacedPath
 from pentapod.planning.setups import setups
@@ -80,7 +80,7 @@ def run(
         left_out = () if before is None else before.left_out
         rules = (*timing_limits(job, used), *limits), tuple(claims)
         task = Task(job, specification, runner, piece, *rules, before, left_out)
-        outcome = _planned(task, staging, writers or {})
+        outcome = _foreseen(task, staging, writers or {}) or _planned(task, staging, writers or {})
         alone = piece is None and before is None and job.placement.setups == 1
         if outcome.refusal is not None and alone and covers_region(job):
             outcome = _mended(task, mesh, outcome, staging, writers or {})
@@ -122,6 +122,18 @@ def _toolpath(
         return job_piece(job, mesh, piece, runner.progress, machine=machine), piece
 
     return runner.run("toolpath", made, remark=lambda it: str(it[1]))[0]
+
+
+def _foreseen(task: Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome | None:
+    """Return the outcome of a toolpath whose program would fail its verdict; None where that is not known yet."""
+    made = next((stage.value for stage in task.runner.stages if stage.name == "toolpath"), None)
+    if made is None or not isinstance(made[1], Reports):  # a piece, or the toolpath of the run before
+        return None
+    refusal = foreseen(task.job, made[1])
+    if refusal is None:
+        return None
+    task.runner.stages.append(Stage("foreseen", 0.0, refusal))
+    return _written(task, refusal_verdict(refusal, task.specification.sources), staging, writers)
 
 
 def _planned(task: Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome:

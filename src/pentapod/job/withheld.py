@@ -1,13 +1,39 @@
-"""Withheld programs: what a run says of a program that would fail its own verdict."""
+"""Withheld programs: what a run says of a program that fails its own verdict, or of a toolpath whose program would."""
 
 from __future__ import annotations
 
 from pentapod.base.refusal import Refusal
+from pentapod.job.build.region import rolls
+from pentapod.job.build.toolpath import Reports
+from pentapod.job.schema.job import Job
+from pentapod.toolpath.gouge.report import GougeReport
 from pentapod.verify import Verdict
 from pentapod.verify.verdict.verdict import Certificate
 
 STAGE = "verdict"
 """The stage of the refusal."""
+
+CERTAIN = 50.0
+"""Share of the motions of cuts that are dropped, as a multiple of the share of the region that may be left, from which
+the verdict would find the region missed."""
+
+
+def foreseen(job: Job, reports: Reports) -> Refusal | None:
+    """Return the refusal of a toolpath that leaves out much of what its ball reaches, as shank or holder would gouge.
+
+    The ball's own places count as reached, so the verdict would find them missed; other cutters may not reach them.
+    """
+    for report in reports.parts:
+        if not isinstance(report, GougeReport) or not report.motions or not rolls(job):
+            continue
+        share = report.dropped / report.motions
+        if share > CERTAIN * job.tolerance.left_share:
+            return Refusal(
+                "toolpath",
+                f"with these tool axes shank or holder would cut into the part on {100.0 * share:.2g} % of the cuts, "
+                f"which are left out; {100.0 * job.tolerance.left_share:.2g} % of the region may be left",
+            )
+    return None
 
 
 def withheld(verdict: Verdict) -> Refusal | None:

@@ -41,10 +41,10 @@ class RegionReport(Value):
 def job_region(job: Job) -> Region:
     """Return the part of the surface that a job machines; its angle is given."""
     region = Region(**fields_from(Region, job.part))
-    return replace(region, angle=0.5 * np.pi if _rolls(job) else ON_PART) if region.angle is None else region
+    return replace(region, angle=0.5 * np.pi if rolls(job) else ON_PART) if region.angle is None else region
 
 
-def _rolls(job: Job) -> bool:
+def rolls(job: Job) -> bool:
     """Return whether the job's strategy draws on the drive surface of a ball."""
     strategy = job.toolpath.strategy
     return (
