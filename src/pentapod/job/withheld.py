@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from pentapod.base.refusal import Refusal
 from pentapod.job.build.region import rolls
 from pentapod.job.build.toolpath import Reports
@@ -13,12 +15,18 @@ from pentapod.verify.verdict.verdict import Certificate
 STAGE = "verdict"
 """The stage of the refusal."""
 
-CERTAIN = 50.0
-"""Share of the motions of cuts that are dropped, as a multiple of the share of the region that may be left, from which
-the verdict would find the region missed."""
+
+@dataclass(frozen=True)
+class ForesightOptions:
+    """certain: share of the motions of cuts that are dropped from which the verdict would find the region missed.
+
+    As a multiple of the share of the region that may be left.
+    """
+
+    certain: float = 50.0
 
 
-def foreseen(job: Job, reports: Reports) -> Refusal | None:
+def foreseen(job: Job, reports: Reports, options: ForesightOptions = ForesightOptions()) -> Refusal | None:
     """Return the refusal of a toolpath that leaves out much of what its ball reaches, as shank or holder would gouge.
 
     The ball's own places count as reached, so the verdict would find them missed; other cutters may not reach them.
@@ -27,7 +35,7 @@ def foreseen(job: Job, reports: Reports) -> Refusal | None:
         if not isinstance(report, GougeReport) or not report.motions or not rolls(job):
             continue
         share = report.dropped / report.motions
-        if share > CERTAIN * job.tolerance.left_share:
+        if share > options.certain * job.tolerance.left_share:
             return Refusal(
                 "toolpath",
                 f"with these tool axes shank or holder would cut into the part on {100.0 * share:.2g} % of the cuts, "
