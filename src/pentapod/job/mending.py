@@ -36,7 +36,7 @@ class MendOptions:
     that may be left out in all, as a multiple of the share of the region that may be left; ever: share of all cuts that
     is never exceeded. places: beginnings of the
     names of claims about places that may be left out. slow: claims that a better time law keeps; law: options of the
-    search for it.
+    search for it. apart: claims that a leg path nearer to the toolpath keeps; closer: its share of the tolerances.
     """
 
     rounds: int = 3
@@ -53,6 +53,8 @@ class MendOptions:
         "platform joint",
     )
     slow: tuple[str, ...] = ("lowest feed", "no unasked stop")
+    apart: tuple[str, ...] = ("tip deviation", "axis deviation", "toolpath covered")
+    closer: float = 0.8
     law: JerkOptions = field(default_factory=lambda: JerkOptions(passes=24, rough_passes=4, min_gain=1e-5))
 
 
@@ -64,7 +66,8 @@ class Mend(Value):
     """What a run does in another way, and why: limits or claims, in words.
 
     left_out: cuts of the job's toolpath that are not made, between pairs of waypoints. length: of these cuts, metres;
-    share: of all cuts. law: whether the time law is searched for longer.
+    share: of all cuts. law: whether the time law is searched for longer. closer: whether the motion
+    keeps a share of the tolerances.
     """
 
     left_out: tuple[tuple[int, int], ...] = ()
@@ -72,10 +75,13 @@ class Mend(Value):
     share: float = 0.0
     why: tuple[str, ...] = ()
     law: bool = False
+    closer: bool = False
 
     def __str__(self) -> str:
         if not self.left_out:
-            return f"went back: the time law was searched for longer, since it was slow ({'; '.join(self.why)})"
+            ways = ["the time law was searched for longer"] if self.law else []
+            ways += ["the motion keeps nearer to the toolpath"] if self.closer else []
+            return f"went back: {' and '.join(ways)}, since the verdict would fail: {'; '.join(self.why)}"
         places = f"{len(self.left_out)} place{'s' if len(self.left_out) > 1 else ''}"
         return (
             f"went back: {from_si(self.length, 'mm'):.3g} mm of cut ({100.0 * self.share:.2g} %) at {places} left out, "
@@ -95,14 +101,20 @@ def mend_of(
         return None
     failed = [each for each in outcome.verdict.certificates if not each.passed] if refusal.stage == STAGE else []
     slow = [each for each in failed if each.claim in options.slow]
+    apart = [each for each in failed if each.claim in options.apart]
     placed = [each for each in failed if each.claim.startswith(options.places) and each.where.row is not None]
-    if len(slow) + len(placed) < len(failed) or (slow and before.law):
+    if len(slow) + len(apart) + len(placed) < len(failed) or (slow and before.law) or (apart and before.closer):
         return None
     why = [each.constraint for each in refusal.diagnosis[:3]] + [each.claim for each in failed[:3]]
-    mend = replace(before, why=tuple(dict.fromkeys((*before.why, *why))), law=before.law or bool(slow))
+    mend = replace(
+        before,
+        why=tuple(dict.fromkeys((*before.why, *why))),
+        law=before.law or bool(slow),
+        closer=before.closer or bool(apart),
+    )
     bad = _unplaced(current, refusal) if not failed else _waypoints(placed, outcome)
     if not bad.any():
-        return mend if slow else None
+        return mend if slow or apart else None
     places, cutting = arc_length(whole.tilt_centres), cutting_intervals(whole)
     kept = cutting.copy()
     for first, last in before.left_out:

@@ -176,9 +176,9 @@ def _mended(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Map
             ]
         own.stages.append(Stage("mended", 0.0, mend, str(mend)))
         specification = dataclasses.replace(task.specification, toolpath=path)
-        law = MENDING.law if mend.law else task.law
+        law, share = MENDING.law if mend.law else task.law, MENDING.closer if mend.closer else 1.0
         again = dataclasses.replace(
-            task, specification=specification, runner=own, left_out=mend.left_out, law=law, placed=placed
+            task, specification=specification, runner=own, left_out=mend.left_out, law=law, closer=share, placed=placed
         )
         file.unlink(missing_ok=True)
         outcome = _planned(again, staging, writers)

@@ -81,8 +81,8 @@ class Task:
     """The inputs of the stages after the toolpath.
 
     specification: the job's requirements on plan and program. left_out: pairs of waypoints of the job's toolpath
-    between which the toolpath of the specification makes no cut. law: options of the time law. placed: the placed path,
-    where it is known.
+    between which the toolpath of the specification makes no cut. law: options of the time law. closer: share of the
+    tolerances of path and axis that the leg path keeps. placed: the placed path, where it is known.
     """
 
     job: Job
@@ -94,6 +94,7 @@ class Task:
     before: PlanBefore | None = None
     left_out: tuple[tuple[int, int], ...] = ()
     law: JerkOptions = DEFAULTS
+    closer: float = 1.0
     placed: PlacedPath | None = None
 
     @property
@@ -189,8 +190,8 @@ class Task:
         return leg_path(
             placed,
             self.machine,
-            path_tolerance=self.specification.path_tolerance,
-            axis_tolerance=self.specification.axis_tolerance,
+            path_tolerance=self.closer * self.specification.path_tolerance,
+            axis_tolerance=self.closer * self.specification.axis_tolerance,
             stop_angle=self.job.feed.si.stop_angle,
         )
 
