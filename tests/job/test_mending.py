@@ -93,6 +93,7 @@ def test_what_cannot_be_placed_is_left_out_round_by_round(dome):
 def test_where_much_would_be_left_out_or_the_cause_is_another_nothing_is(dome):
     job, _, whole = dome
     assert mend_of(whole, None, outcome(job, whole, refused((100, 600))), 0.001) is None
+    assert mend_of(whole, None, outcome(job, whole, refused((100, 600))), 1.0) is None
     assert mend_of(whole, None, outcome(job, whole, Refusal("timing", "cannot")), 0.001) is None
     left = Certificate("surface left on the region", False, 0.3, 0.1, "%", Place(1.0, 1000, 3), "")
     assert mend_of(whole, None, outcome(job, whole, Refusal("verdict", "fails"), [left]), 0.001) is None
