@@ -1,5 +1,6 @@
 """Kinematics of the robots: leg lengths, assembly modes, singularities, Jacobian, statics, proofs."""
 
+from pentapod.kinematics.all_modes.all_modes import AllPoses, SearchOptions, all_poses
 from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.families.as_built_forward import ProvenPoses, as_built_pose
@@ -47,6 +48,7 @@ from pentapod.kinematics.robot import Branch, Robot, SingularSurface
 __all__ = [
     "COMPONENTS",
     "MODES",
+    "AllPoses",
     "AsBuiltPentapod",
     "AssemblyObstacle",
     "AssemblyObstacles",
@@ -65,9 +67,11 @@ __all__ = [
     "ReconfigurablePentapod",
     "Robot",
     "RolledPlatform",
+    "SearchOptions",
     "SingularSurface",
     "SixLegPlatform",
     "TipTube",
+    "all_poses",
     "architectural_measure",
     "as_built_pose",
     "assembly_obstacles",

@@ -11,6 +11,7 @@ import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.base.errors import InputError
+from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.forces import FREEDOMS, held_wrenches
 from pentapod.kinematics.jacobian import pose_jacobian
 from pentapod.numerics.blocks import blocks
@@ -69,8 +70,11 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
                 if held:
                     lever = joints[middle, leg] - position[middle]
                     at_p, turning = at_p + across, turning + np.cross(lever, across)
-                else:
-                    at_p, at_i = at_p + across, at_i + robot.offsets[leg] * across
+                    continue
+                on_p, on_i = across, robot.offsets[leg] * across
+                if isinstance(robot, AsBuiltPentapod):
+                    on_p, on_i = robot.pose_loads(position[middle], direction[middle], leg, across)
+                at_p, at_i = at_p + on_p, at_i + on_i
     if held:
         turning += np.cross(direction[middle], at_i)
         wrenches = held_wrenches(robot, position[middle], direction[middle])

@@ -8,6 +8,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.machine.clearance.collision_world import mounted
 from pentapod.report.decimate import thinned_mesh
 from pentapod.report.figure import LIMIT_COLOUR, leg_colour
@@ -59,6 +60,10 @@ class ViewerScene:
         self._legs = [
             self._cylinder(f"/legs/{k + 1}", radius, _rgb(leg_colour(k))) for k in range(run.machine.robot.n_legs)
         ]
+        self._joints = [
+            api.add_icosphere(f"/joints/{k + 1}", 1.6 * radius, color=_rgb(leg_colour(k)))
+            for k in range(run.machine.robot.n_legs)
+        ]
 
     @property
     def placement(self) -> RigidTransform:
@@ -82,6 +87,7 @@ class ViewerScene:
         with self._server.atomic():
             self._tool.position, self._tool.wxyz = machine_pose.tip, quaternion(along(machine_pose.axis))
             for k, leg in enumerate(self._legs):
+                self._joints[k].position = machine_pose.joints[k]
                 leg.position, way = machine_pose.bases[k], machine_pose.joints[k] - machine_pose.bases[k]
                 length = float(np.linalg.norm(way))
                 leg.wxyz, leg.scale = quaternion(along(way / length)), (1.0, 1.0, length)
@@ -103,26 +109,26 @@ class ViewerScene:
         base = self._run.machine.robot.base_joints
         centre = base.mean(axis=0)
         radius = 1.12 * float(np.linalg.norm(base - centre, axis=1).max())
-        turn = np.linspace(0.0, 2.0 * np.pi, 97)
-        rim = centre + radius * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
-        rims = np.stack([rim[:-1], rim[1:]], axis=1)
-        self._server.scene.add_line_segments("/base/rim", rims, DARK, thickness=3.0, thickness_units="screen")
+        rim = _circle(centre, radius)
+        self._server.scene.add_line_segments("/base/rim", rim, DARK, thickness=3.0, thickness_units="screen")
         ball = 1.8 * self._run.machine.bodies.leg_radius
         for k, joint in enumerate(base):
             self._server.scene.add_icosphere(f"/base/{k + 1}", ball, color=_rgb(leg_colour(k)), position=joint)
             self._server.scene.add_label(f"/base/{k + 1}/name", f"{k + 1}")
 
     def _add_tool(self) -> None:
-        """Everything that is fixed to the tool: spindle, platform joints, shank and cutter, beam."""
+        """Everything that is fixed to the tool: spindle, rings outside it, shank and cutter, beam."""
         run, api = self._run, self._server.scene
         machine = run.machine
         heights = machine.tool_length - machine.robot.offsets
         top, nose = float(heights.max()), machine.bodies.shaft_end
         self._cylinder("/tool/spindle", machine.bodies.shaft_radius, STEEL, nose, top)
         self._cylinder("/tool/shaft", SHAFT_SHARE * machine.bodies.shaft_radius, DARK, 0.0, nose)
-        for k, height in enumerate(heights.tolist()):
-            ball = 1.6 * machine.bodies.leg_radius
-            api.add_icosphere(f"/tool/joint{k + 1}", ball, color=_rgb(leg_colour(k)), position=(0.0, 0.0, height))
+        if isinstance(machine.robot, AsBuiltPentapod):
+            for k in np.flatnonzero(machine.robot.radii > machine.bodies.shaft_radius).tolist():
+                rim = _circle(np.array([0.0, 0.0, heights[k]]), float(machine.robot.radii[k]))
+                colour = _rgb(leg_colour(k))
+                api.add_line_segments(f"/tool/ring{k + 1}", rim, colour, thickness=3.0, thickness_units="screen")
         cutter = [solid for solid in run.tool.solids if solid.kind == "cutter"]
         for name, solids, colour in (("cutter", cutter, DARK), ("body", mounted(run.tool.solids, machine), STEEL)):
             if solids:
@@ -134,6 +140,13 @@ class ViewerScene:
     def _cylinder(self, name: str, radius: float, colour: Rgb, low: float = 0.0, high: float = 1.0) -> viser.MeshHandle:
         profile: Floats = np.array([[0.0, low], [radius, low], [radius, high], [0.0, high]])
         return self._server.scene.add_mesh_simple(name, *revolved(profile), color=colour)
+
+
+def _circle(centre: Floats, radius: float) -> Floats:
+    """Return the sides (96, 2, 3) of a circle square to z."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 97)
+    rim = centre + radius * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
+    return np.stack([rim[:-1], rim[1:]], axis=1)
 
 
 def _rgb(colour: str) -> Rgb:

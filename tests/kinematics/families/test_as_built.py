@@ -141,3 +141,22 @@ def test_bad_shapes(paper):
 def test_it_is_read_only(built):
     with pytest.raises(ValueError, match="read-only"):
         built.base[0, 0] = 1.0
+
+
+def test_loads_on_the_ends_of_legs_are_those_of_virtual_work():
+    base = np.array([(0.586, -0.120), (0.224, 0.554), (-0.326, 0.498), (-0.597, -0.039), (-0.055, -0.595)])
+    machine = AsBuiltPentapod.of(LinearPentapod.quadratic(base, 0.185), radii=[0.03, 0.0, 0.1, 0.05, 0.2])
+    size, rng = 1e-6, np.random.default_rng(2)
+    position, direction = rng.uniform(0.2, 0.6, (6, 3)), rng.normal((0.0, 0.0, 4.0), 1.0, (6, 3))
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    shift, turn = rng.normal(size=(6, 3)), np.cross(rng.normal(size=(6, 3)), direction)
+    for leg in range(5):
+        force = rng.normal(size=(6, 3))
+        on_p, on_i = machine.pose_loads(position, direction, leg, force)
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = direction + sign * size * turn
+            moved /= np.linalg.norm(moved, axis=1)[:, None]
+            ends.append(machine.platform_joints(position + sign * size * shift, moved)[:, leg])
+        work = np.einsum("nc,nc->n", force, ends[0] - ends[1]) / (2.0 * size)
+        np.testing.assert_allclose((on_p * shift).sum(axis=1) + (on_i * turn).sum(axis=1), work, atol=1e-7)

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pentapod.kinematics import AsBuiltPentapod
+from pentapod.base.errors import MachineError
+from pentapod.kinematics import AsBuiltPentapod, Component
 from pentapod.machine import identify
 from pentapod.machine.identification.identification import believed
 from pentapod.machine.identification.least_squares import GROUPS, solved
@@ -116,3 +117,9 @@ def test_two_sigma_hold_what_they_should_of_partial_measurements_too(instrument,
 
 def _pose(tips, axes):
     return tips + MACHINE.tool_length * axes, -axes
+
+
+def test_a_ball_bar_in_another_component_is_told_so():
+    seen = replace(measured("ballbar", 60, 3, setups=3), component=Component(1, -1))
+    with pytest.raises(MachineError, match=r'in component .*, the file says "\+-"; write .*"\+\+".*"--"'):
+        identify(seen, MACHINE)

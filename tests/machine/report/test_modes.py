@@ -8,6 +8,7 @@ import pytest
 from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal
 from pentapod.geometry.directions import angle_between
+from pentapod.kinematics import AsBuiltPentapod
 from pentapod.machine import Machine, admissible_modes, clearances
 from pentapod.machine.report.modes import AssemblyPoses
 
@@ -93,3 +94,18 @@ def test_legs_beyond_their_strokes_are_refused_by_name() -> None:
     found = admissible_modes(DESK, [0.6, 0.6, 0.6, 0.6, 6.0])
     assert isinstance(found, Refusal)
     assert "leg 5 reads 6000 mm, stroke 489 to 929" in str(found)
+
+
+def test_modes_of_a_calibrated_machine_are_proven_complete() -> None:
+    rng = np.random.default_rng(4)
+    robot = AsBuiltPentapod.of(
+        DESK.robot, base_errors=rng.uniform(-2e-4, 2e-4, (5, 3)), radii=rng.uniform(0.0, 0.03, 5), zeros=5e-4
+    )
+    machine, i = dataclasses.replace(DESK, robot=robot), np.array([0.1, -0.2, 1.0])
+    i /= np.linalg.norm(i)
+    found = admissible_modes(machine, robot.leg_lengths(DESK.work.centre - DESK.tool_length * i, i))
+    assert isinstance(found, AssemblyPoses)
+    assert found.complete
+    assert [str(pose.branch) for pose in found.poses] == ["++", "+-", "-+", "--"]
+    (true,) = found.admissible
+    np.testing.assert_allclose(true.tip, DESK.work.centre, atol=1e-9)

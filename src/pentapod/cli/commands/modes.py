@@ -47,9 +47,13 @@ def modes(legs: str, rails: str | None, error_mm: float, machine_name: str, as_j
     fitting = len(found.admissible)
     if as_json:
         rows = [_row(pose) for pose in found.poses]
-        echo_json({"machine": machine.name, "proven": True, "fitting": fitting, "modes": rows})
+        echo_json(
+            {"machine": machine.name, "proven": True, "complete": found.complete, "fitting": fitting, "modes": rows}
+        )
     elif not quiet:
-        click.echo(f"{machine.name}: {len(found.poses)} modes, {fitting} " + ("fits" if fitting == 1 else "fit"))
+        known = "proven complete" if found.complete else "that there is no other is not proven"
+        count = len(found.poses)
+        click.echo(f"{machine.name}: {count} modes ({known}), {fitting} " + ("fits" if fitting == 1 else "fit"))
         for pose in found.poses:
             tip, axis = (
                 ", ".join(f"{x:{form}}" for x in v) for v, form in ((1e3 * pose.tip, ".3f"), (pose.axis, "+.4f"))

@@ -211,6 +211,23 @@ class AsBuiltPentapod(Value, LegsOnLine, ProvenByLegEquations):
         length = np.sqrt(np.einsum("...c,...c->...", by_position, by_position))
         return np.concatenate([by_position, by_direction], axis=-1) / length[..., None]
 
+    def pose_loads(self, position: Floats, direction: Floats, leg: int, force: Floats) -> tuple[Floats, Floats]:
+        """Return what forces (N, 3) on the end of a leg do on p and on i (N, 3), by virtual work; poses (N, 3).
+
+        As in `jacobian`: i counts as a free vector. On a ring the end turns about the line as the base joint asks.
+        """
+        d, z, radius = self.base[leg] - position, self.offsets[leg], self.radii[leg]
+        if not radius:
+            return force, z * force
+        along = np.einsum("nc,nc->n", d, direction)[:, None]
+        normal = d - along * direction
+        rho = np.linalg.norm(normal, axis=1, keepdims=True)
+        m = normal / rho  # the ring's radius; it changes by what moves the base joint across the plane of m and i
+        across = force - np.einsum("nc,nc->n", force, m)[:, None] * m
+        lean = np.einsum("nc,nc->n", across, direction)[:, None]
+        share = radius / rho
+        return force - share * (across - lean * direction), z * force - share * (lean * d + along * across)
+
     def _in_tool_frame(self, p: Floats, i: Floats) -> tuple[Floats, Floats, Floats]:
         """Return t = i·(a − p), r / ρ (..., 5), and the perpendiculars from the line to a (..., 5, 3)."""
         d = self.base - p[..., None, :]

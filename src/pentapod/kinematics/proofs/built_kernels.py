@@ -54,12 +54,12 @@ def built_poses(
             for r in range(6):
                 x[r] += poses[h - 1, r] - last[r]
         last[:] = nominal
-        if not _solved(x, lengths[h], geometry, rings, first, second, change, step, jacobian, work, inverse, g):
+        if not solved(x, lengths[h], geometry, rings, first, second, change, step, jacobian, work, inverse, g):
             x[:] = np.nan
             continue
         fill_line(x, x, geometry, first, second, change, step, jacobian, rings)
         fill_defect(inverse, jacobian, defect)
-        _equations(x, lengths[h], first, rings, g)
+        equations(x, lengths[h], first, rings, g)
         rounding = ROUND * geometry[5, 2] * geometry[5, 2]
         for r in range(6):
             total = inverse[r, 5] * g[5]
@@ -83,7 +83,7 @@ def built_poses(
 
 
 @kernel
-def _solved(
+def solved(
     x: Floats,
     lengths: Floats,
     geometry: Floats,
@@ -102,17 +102,17 @@ def _solved(
         fill_line(x, x, geometry, first, second, change, step, jacobian, rings)
         if not invert(jacobian, work, inverse):
             return False
-        _equations(x, lengths, first, rings, g)
+        equations(x, lengths, first, rings, g)
         if _newton_step(inverse, g, x) < SETTLED:
             fill_line(x, x, geometry, first, second, change, step, jacobian, rings)
-            _equations(x, lengths, first, rings, g)
+            equations(x, lengths, first, rings, g)
             _newton_step(inverse, g, x)
             return True
     return False
 
 
 @kernel
-def _equations(x: Floats, lengths: Floats, vectors: Floats, rings: Floats, g: Floats) -> None:
+def equations(x: Floats, lengths: Floats, vectors: Floats, rings: Floats, g: Floats) -> None:
     """Fill G (6,) at a pose whose leg vectors and ring distances `fill_line` has filled."""
     for j in range(5):
         r = rings[j, 8]

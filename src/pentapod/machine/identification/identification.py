@@ -25,7 +25,7 @@ from pentapod.machine.identification.observations import Observations, in_machin
 from pentapod.machine.identification.outliers import Outlier, without_outliers
 from pentapod.machine.identification.pose_choice import Tolerances
 from pentapod.machine.identification.sensitivity import tip_by_parameters
-from pentapod.machine.identification.suspicions import check_measurements
+from pentapod.machine.identification.suspicions import check_measurements, name_better_reading
 from pentapod.machine.machine import Machine
 from pentapod.machine.work_volume import sample_work_volume
 
@@ -92,6 +92,7 @@ def identify(
     try:
         return _identified(measured, machine, design, groups, file, options, keep_outliers=keep_outliers)
     except ArrayError as error:
+        name_better_reading(measured, design, file)
         raise MachineError(
             error.what, file=file, key=error.key, value=error.value, expected=error.expected, remedy=error.remedy
         ) from error

@@ -26,11 +26,13 @@ from pentapod.machine.parts import LegLimits
 class SuspicionOptions:
     """largest_error: of the tip, metres, that errors of building may cause; beyond it something else is wrong.
 
+    better: share of the error to which another reading of the file must bring it to be named where no geometry fits.
     slack: share of a leg's longest length by which readings may be beyond the strokes. units: what a number would be in
     millimetres.
     """
 
     largest_error: float = 0.015
+    better: float = 0.5
     slack: float = 0.25
     units: tuple[tuple[str, float], ...] = (("metres", 1e3), ("micrometres", 1e-3), ("inches", 25.4))
 
@@ -61,6 +63,25 @@ def check_measurements(
         expected=f"at most {float(from_si(options.largest_error, 'mm')):.4g} mm",
         remedy="check machine, component, target_mm, frame, and which leg is which",
     )
+
+
+def name_better_reading(
+    measured: Measurements,
+    machine: AsBuiltPentapod,
+    file: str | Path | None = None,
+    options: SuspicionOptions = SuspicionOptions(),
+) -> None:
+    """Raise MachineError where another reading of measurements that no geometry fits comes much nearer to the machine.
+
+    Distances alone may seem to fit in a wrong component, to within the errors of building.
+    """
+    hypotheses = _hypotheses(measured, machine, options)
+    errors = [_mismatch(other(), machine) for _, _, other in hypotheses]
+    if min(errors) > options.better * _mismatch(measured, machine):
+        return
+    # To distances a pose and its mirror image are alike: both are named.
+    best = [hypothesis for hypothesis, error in zip(hypotheses, errors, strict=True) if error <= 1.001 * min(errors)]
+    raise MachineError(best[0][0], file=file, remedy=", or ".join(remedy for _, remedy, _ in best))
 
 
 def _check_lengths(measured: Measurements, legs: LegLimits, file: str | Path | None, options: SuspicionOptions) -> None:

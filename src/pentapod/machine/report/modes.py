@@ -13,7 +13,10 @@ from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal, stage
 from pentapod.base.values import Result, Value
 from pentapod.geometry.directions import angle_between
-from pentapod.kinematics.robot import Branch
+from pentapod.kinematics.all_modes.all_modes import all_poses
+from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.kinematics.robot import Branch, Robot
 from pentapod.machine.clearance.leg_clearance import clearances, pair_names
 from pentapod.machine.machine import Machine
 
@@ -43,9 +46,13 @@ class AssemblyPose(Value):
 
 @dataclass(frozen=True, eq=False)
 class AssemblyPoses(Result):
-    """All poses that the legs allow, by branches of the robot."""
+    """All poses that the legs allow, by branches of the robot.
+
+    complete: whether it is proven that there is no other one.
+    """
 
     poses: tuple[AssemblyPose, ...]
+    complete: bool
 
     @property
     def admissible(self) -> tuple[AssemblyPose, ...]:
@@ -59,9 +66,10 @@ def admissible_modes(machine: Machine, legs: ArrayLike, *, leg_error: float = 1e
 
     leg_error: metres by which each reading may be wrong. A pose is excluded only where it breaks a limit for all
     lengths within that error, so the true one is among the admissible ones; a Refusal says where this cannot be proven:
-    lengths without a pose, or close to a singularity, where two modes meet. Of a machine as built the poses are those
-    that continue the nominal ones; that base joints off the plane add none is not proven. Where legs end beside the
-    line, the platform counts as turned about it by the machine's law, as every program leaves it. Raises InputError.
+    lengths without a pose, or close to a singularity, where two modes meet. With base joints in a plane there are no
+    other poses (lemma 1 of docs/proofs.md); for a machine as built all are searched (lemma 17), and where that proves
+    nothing the poses are those that continue the nominal ones. Where legs end beside the line, the platform counts as
+    turned about it by the machine's law, as every program leaves it. Raises InputError.
     """
     robot, count = machine.robot, machine.robot.n_legs
     readings = as_floats(legs, "legs")
@@ -71,14 +79,8 @@ def admissible_modes(machine: Machine, legs: ArrayLike, *, leg_error: float = 1e
         )
     if not 0.0 <= leg_error < np.inf:
         raise InputError("must not be negative", key="leg_error", value=leg_error, expected="metres")
-    branches = robot.branches
-    all_readings = np.broadcast_to(readings, (len(branches), count))
-    position, direction = robot.pose(all_readings, np.array(branches, dtype=np.float64))
-    known: Bools = np.asarray(np.isfinite(position).all(axis=1), dtype=np.bool_)
-    if robot.arms.any() and known.any():  # the other modes turn the platform about its line otherwise than the machine
-        branches = tuple(branch for branch, there in zip(branches, known, strict=True) if there)
-        position, direction, known = position[known], direction[known], known[known]
-    if not known.all():
+    branches, position, direction, complete = _all_modes(robot, readings, leg_error)
+    if not len(position) or not np.isfinite(position).all():
         return Refusal("modes", *_without_pose(machine, readings, leg_error))
     signs = np.array(list(product((-1.0, 1.0), repeat=count)))
     hull = np.broadcast_to(readings + leg_error * signs, (len(branches), len(signs), count))
@@ -99,8 +101,29 @@ def admissible_modes(machine: Machine, legs: ArrayLike, *, leg_error: float = 1e
         tuple(
             AssemblyPose(branch, tips[k], -direction[k], float(moved[k, -1]), excluded[k])
             for k, branch in enumerate(branches)
-        )
+        ),
+        complete,
     )
+
+
+def _all_modes(robot: Robot, legs: Floats, leg_error: float) -> tuple[tuple[Branch, ...], Floats, Floats, bool]:
+    """Return branches, positions and directions (K, 3) of all modes, and whether these are proven to be all."""
+    branches = robot.branches
+    if isinstance(robot, AsBuiltPentapod):
+        found = all_poses(robot, legs, leg_error=leg_error)
+        named = {tuple(branch): branch for branch in branches}
+        signs = [tuple(pair) for pair in robot.branch(found.position, found.direction).tolist()]
+        if found.complete and all(pair in named for pair in signs):
+            order = sorted(range(len(signs)), key=lambda k: list(named).index(signs[k]))
+            labels = tuple(named[signs[k]] for k in order)
+            return labels, found.position[order], found.direction[order], True
+    all_legs = np.broadcast_to(legs, (len(branches), robot.n_legs))
+    position, direction = robot.pose(all_legs, np.array(branches, dtype=np.float64))
+    known: Bools = np.asarray(np.isfinite(position).all(axis=1), dtype=np.bool_)
+    if robot.arms.any() and known.any():  # the other modes turn the platform about its line otherwise than the machine
+        branches = tuple(branch for branch, there in zip(branches, known, strict=True) if there)
+        position, direction = position[known], direction[known]
+    return branches, position, direction, isinstance(robot, FiveLegs)
 
 
 def _without_pose(machine: Machine, legs: Floats, leg_error: float) -> tuple[str, tuple[()], str]:

@@ -1,0 +1,1 @@
+"""All poses of leg readings, by exhaustive search with proof."""
