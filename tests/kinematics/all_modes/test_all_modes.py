@@ -128,7 +128,7 @@ def test_errors_of_the_legs_are_counted():
 
 @pytest.mark.parametrize("legs", [np.full(4, 0.6), np.array([0.6, 0.6, np.nan, 0.6, 0.6]), np.full(5, -1.0)])
 def test_what_is_no_set_of_legs_is_an_error(legs):
-    with pytest.raises(ArrayError, match="five"):
+    with pytest.raises(ArrayError, match="legs"):
         all_poses(DESK, legs)
 
 
