@@ -72,5 +72,9 @@ def test_the_foot_of_a_narrow_pit_is_followed_where_passes_stay_above_it():
         assert len(lengths(passes(foot), passes(foot + np.array([0.0, 0.0, above])))) == kept
 
 
-def test_a_short_open_crease_is_noise():
-    assert not lengths(passes(straight([0.0, 0.0, 0.0], [0.002, 0.0, 0.0])), crossing(0.02))
+def test_a_short_open_crease_is_noise_unless_passes_leave_much_under_it():
+    """Passes half a stepover beside it leave no more than their ridge there; those far above leave all of the rest."""
+    crease = passes(straight([0.0, 0.0, 0.0], [0.002, 0.0, 0.0]))
+    beside = [straight([-0.01, y, 0.0], [0.01, y, 0.0]) for y in (-0.5 * STEPOVER, 0.5 * STEPOVER)]
+    assert not lengths(crease, passes(*beside))
+    assert lengths(crease, passes(*(line + np.array([0.0, 0.0, 0.5 * R]) for line in beside))) == [2.0]

@@ -65,14 +65,17 @@ class Sources:
         return cls(facet, corners[s], corners[(s + 1) % 3])
 
     @classmethod
-    def along(cls, level_set: LevelSet, spacing: float) -> Sources:
-        """Return the level lines of a quantity on a patch.
+    def along(cls, level_set: LevelSet, spacing: float, shortest: float = 0.0) -> Sources:
+        """Return the level lines of a quantity on a patch; those shorter than `shortest` metres are left out.
 
         Where facets cut them into shorter pieces than `spacing` metres, points at that spacing stand for them.
         """
         facets, begins, ends, line = level_set.segments()
         corners = level_set.patch.vertices[level_set.patch.faces[facets]]
         length = np.linalg.norm(((ends - begins)[:, :, None] * corners).sum(axis=1), axis=1)
+        if shortest > 0.0 and len(line):
+            long = np.bincount(line, weights=length)[line] >= shortest
+            facets, begins, ends, line, length = (a[long] for a in (facets, begins, ends, line, length))
         short = length < spacing
         last = np.append(line[1:] != line[:-1], True)[: len(line)]
         part = np.floor(np.cumsum(length) / spacing)

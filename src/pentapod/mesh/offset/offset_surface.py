@@ -27,6 +27,8 @@ _BLOCK, _GROUP = 4, 8
 """Steps along the side of a block, blocks along that of a group: a group far from the level needs one query."""
 _SHIFT = np.array([0.3819660, 0.2679492, 0.4142136])
 """Shares of a step by which the grid is off the part, so that flat faces do not lie in its planes."""
+_STEEPEST = 0.01
+"""Square of the sine of the least angle between walls along which a point is moved to where both are as far."""
 _ROUNDS, _ON_LEVEL = 3, 1e-11
 """How often a vertex is moved onto the level along the line to its closest point, while it is off by this share."""
 
@@ -72,16 +74,25 @@ def _contour(tree: FacetTree, nodes: Nodes, wide: Bools, distance: float) -> tup
 def onto_level(tree: FacetTree, points: Floats, distance: float, rounds: int, accuracy: float = 0.0) -> Floats:
     """Return points (N, 3) moved to `distance` from the mesh, each along the line to its closest point, repeatedly.
 
-    accuracy: error of the distance, as a share of it, at which a point is no longer moved.
+    Between steep walls a step away from one leads back to the other: then a point moves along the one it just came
+    from, to where it is at the distance from both. accuracy: error of the distance, as a share of it, at which a point
+    is no longer moved.
     """
     points, rows = points.copy(), np.arange(len(points))
+    before = np.zeros_like(points)
     for _ in range(rounds):
         gap, away, _ = tree.closest(points[rows])
         off = np.abs(gap - distance) > accuracy * distance
-        rows, gap, away = rows[off], gap[off], away[off]
+        rows, gap, away, before = rows[off], gap[off], away[off], before[off]
         if not len(rows):
             break
-        points[rows] += (distance / np.where(gap > 0.0, gap, 1.0) - 1.0)[:, None] * away
+        normals = away / np.where(gap > 0.0, gap, 1.0)[:, None]
+        back = (normals * before).sum(axis=1)
+        along = normals - np.where(back < 0.0, back, 0.0)[:, None] * before
+        square = (along * along).sum(axis=1)
+        along = np.where((square > _STEEPEST)[:, None], along / np.maximum(square, _STEEPEST)[:, None], normals)
+        points[rows] += (distance - gap)[:, None] * along
+        before = normals
     return points
 
 

@@ -43,7 +43,7 @@ class GapOptions:
         return float(steps.min()) / self.facets_per_step
 
 
-FRONTS = GapOptions(facets_per_step=5.0, negligible=2e-4, slack=1.04)
+FRONTS = GapOptions(facets_per_step=5.0, negligible=2e-4, slack=1.01)
 """For lines that are themselves at a geodesic distance: they turn sharp corners, which finer facets keep sharp."""
 
 
@@ -66,9 +66,14 @@ def slowness_of(patch: Patch, steps: Floats, options: GapOptions = FRONTS) -> Fl
     return slowness
 
 
-def lines_as_sources(level_set: LevelSet, steps: Floats, options: GapOptions = FRONTS) -> Sources:
-    """Return level lines as sources of distances, for stepovers (F,)."""
-    return Sources.along(level_set, options.spacing * float(steps.min()))
+def lines_as_sources(
+    level_set: LevelSet, steps: Floats, options: GapOptions = FRONTS, *, shortest: float = 0.0
+) -> Sources:
+    """Return level lines as sources of distances, for stepovers (F,).
+
+    shortest: metres; shorter lines are no passes and leave gaps.
+    """
+    return Sources.along(level_set, options.spacing * float(steps.min()), shortest)
 
 
 def gap_lines(

@@ -29,7 +29,7 @@ class CreaseOptions:
     join: longest way between the ends of two lines that are one, in edges of the mesh; where a crease runs aslant
     through the mesh, some of its edges are blunt. same: ends that are nearer to each other, as a share of that way, are
     one point, whichever way one lies from the other. shortest: line, in radii of the ball; closed ones, such as the
-    foot of a narrow pit, may be shorter.
+    foot of a narrow pit, may be shorter, and those under which passes leave more than `left` ridges between passes.
     """
 
     sharpest: float = float(np.radians(30.0))
@@ -39,6 +39,7 @@ class CreaseOptions:
     join: float = 3.0
     same: float = 0.1
     shortest: float = 1.0
+    left: float = 1.1
 
 
 def crease_lines(patch: Patch, sharpest: float | None = None, options: CreaseOptions = CreaseOptions()) -> Passes:
@@ -122,8 +123,8 @@ def uncrossed(
     """Return the stretches of creases that passes leave out: between crossings, more than a stepover apart.
 
     A pass beside a crease, even a near one, does not reach into it. Beyond the last crossing half a stepover counts. A
-    crease without any crossing is left out where passes beside it are nearer than the ridge between passes is high.
-    radius: of the ball, metres.
+    crease without any crossing is left out where passes beside it are nearer than the ridge between passes is high, and
+    a short one where no more than such a ridge is left under it. radius: of the ball, metres.
     """
     if not len(creases) or not len(passes):
         return creases
@@ -135,7 +136,8 @@ def uncrossed(
         points = spaced(line, step)
         away = np.asarray(tree.query(points)[0])
         if away.min() > step:
-            if away.max() > ridge and (closed or creases.lengths[k] > shortest):
+            under = np.asarray(tree.query(line - radius * normals)[0]) - radius
+            if away.max() > ridge and (closed or creases.lengths[k] > shortest or under.max() > options.left * ridge):
                 parts.append((line, normals))
             continue
         if closed:  # it begins where a pass crosses it

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -70,14 +71,13 @@ def _offset(surface: Surface, options: SpiralOptions) -> ContactPaths:
     centre = field.drawn.patch.vertices[finite.argmax()] if options.centre is None else np.asarray(options.centre)
     # One closed turn at half a step from the border, and the spiral from there inwards.
     ring = LevelSet(field.drawn.patch, finite, np.array([0.5]), inside=field.inside)
+    cuts = partial(lines_as_sources, steps=field.steps, shortest=options.shortest)
     inner = PatchOn.of(field.drawn.patch, lambda patch: patch.above(finite, 0.5)[0])
     if not len(inner.patch.faces):
-        gaps = gap_lines(field.drawn.patch, lines_as_sources(ring, field.steps), field.steps)
+        gaps = gap_lines(field.drawn.patch, cuts(ring), field.steps)
         return ContactPaths(Passes.joined([ring.lines(), gaps]), float(field.steps.max()), Order.ZIGZAG)
     spiral, kept = _wound(inner, field.inside, 0.5, centre, options.up)
-    sources = Sources.joined(
-        [lines_as_sources(ring, field.steps), lines_as_sources(spiral, field.steps).placed(inner.where(kept))]
-    )
+    sources = Sources.joined([cuts(ring), cuts(spiral).placed(inner.where(kept))])
     passes = Passes.joined([ring.lines(), spiral.lines(), gap_lines(field.drawn.patch, sources, field.steps)])
     return ContactPaths(passes, float(field.steps.max()), Order.ZIGZAG)
 
@@ -109,7 +109,7 @@ def _planar(surface: Surface, options: SpiralOptions) -> ContactPaths:
 
     itself = PatchOn.of(patch, lambda same: same)
     spiral, kept = _wound(itself, turn, 0.0, centre, options.up)
-    sources = lines_as_sources(spiral, steps).placed(itself.where(kept))
+    sources = lines_as_sources(spiral, steps, shortest=options.shortest).placed(itself.where(kept))
     passes = Passes.joined([spiral.lines(), gap_lines(patch, sources, steps)])
     return ContactPaths(passes, float(steps.max()), Order.ZIGZAG)
 
