@@ -10,6 +10,9 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats, Ints, set_frozen
 from pentapod.geometry.runs import run_starts
 
+SAME_NORMAL = 1e-6
+"""Difference of two normals up to which they are the same."""
+
 
 @dataclass(frozen=True, eq=False)
 class Passes:
@@ -57,9 +60,11 @@ class Passes:
 
     @cached_property
     def closed(self) -> Bools:
-        """Whether (P,) each pass ends where it begins."""
-        ends = self.points[self.starts[1:] - 1] - self.points[self.starts[:-1]]
-        return (ends == 0.0).all(axis=1) & (np.diff(self.starts) > 3)
+        """Whether (P,) each pass ends where it begins, with the same normal: a tool turns about a corner in one point."""
+        first, last = self.starts[:-1], self.starts[1:] - 1
+        same = (self.points[first] == self.points[last]).all(axis=1)
+        turned = np.abs(self.normals[first] - self.normals[last]).max(axis=1, initial=0.0)
+        return same & (turned < SAME_NORMAL) & (np.diff(self.starts) > 3)
 
     def where(self, keep: Bools) -> Passes:
         """Return the passes (P,) marked in `keep`."""

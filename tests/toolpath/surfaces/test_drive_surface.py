@@ -152,3 +152,11 @@ def test_normals_turn_evenly_where_the_offset_has_a_crease():
     steps = np.arccos(np.clip((turned[1:] * turned[:-1]).sum(axis=1), -1.0, 1.0))
     assert steps.max() < np.radians(4.0)
     np.testing.assert_allclose(turned[np.abs(t) > 2.1e-3], normals[np.abs(t) > 2.1e-3], atol=1e-12)
+
+
+def test_a_pass_is_not_closed_where_both_ends_touch_one_corner_of_the_part():
+    """The contacts are the same, but the ball turned about the corner in between: its centre is elsewhere."""
+    contacts = np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0], [1e-3, 1e-3, 0.0], [0.0, 0.0, 0.0]])
+    upright = np.tile(UP, (4, 1))
+    turned = np.concatenate([upright[:-1], [[0.6, 0.0, 0.8]]])
+    assert Passes.of([(contacts, upright), (contacts, turned)]).closed.tolist() == [True, False]
