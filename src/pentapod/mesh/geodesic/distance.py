@@ -75,7 +75,7 @@ class Sources:
         length = np.linalg.norm(((ends - begins)[:, :, None] * corners).sum(axis=1), axis=1)
         if shortest > 0.0 and len(line):
             long = np.bincount(line, weights=length)[line] >= shortest
-            facets, begins, ends, line, length = (a[long] for a in (facets, begins, ends, line, length))
+            facets, line, begins, ends, length = facets[long], line[long], begins[long], ends[long], length[long]
         short = length < spacing
         last = np.append(line[1:] != line[:-1], True)[: len(line)]
         part = np.floor(np.cumsum(length) / spacing)
