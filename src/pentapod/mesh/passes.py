@@ -60,7 +60,7 @@ class Passes:
 
     @cached_property
     def closed(self) -> Bools:
-        """Whether (P,) each pass ends where it begins, with the same normal: a ball turns about a corner of the part."""
+        """Whether (P,) each pass ends where it begins, with the same normal: balls turn about corners."""
         first, last = self.starts[:-1], self.starts[1:] - 1
         same = (self.points[first] == self.points[last]).all(axis=1)
         turned = np.abs(self.normals[first] - self.normals[last]).max(axis=1, initial=0.0)
