@@ -24,7 +24,7 @@ from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.parts import Regions
 from pentapod.job.advice.trials import Tell, Trial, merged
 from pentapod.job.build.specification import job_coverage
-from pentapod.job.build.toolpath import job_tool, job_toolpath
+from pentapod.job.build.toolpath import drops_gouges, job_tool, job_toolpath
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
@@ -53,8 +53,8 @@ class FailedClaims:
     tell: Tell
 
     def all(self) -> Iterator[Trial]:
-        """Yield trials, the ones that keep most first."""
-        if _GOUGES & self.failed.keys():
+        """Yield trials, the ones that keep most first. What gouges fails any verdict, so it is left out at once."""
+        if _GOUGES & self.failed.keys() or not drops_gouges(self.job):
             yield from self._without_gouges()
         if _FEEDS & self.failed.keys():
             self.tell("a lower feed")
@@ -69,7 +69,7 @@ class FailedClaims:
         changes: Changes = {"gouge": {"remedy": ["drop"]}}
         other = _toolpath_of(self.job, changes, self.machine, self.mesh)
         kept = 0.0 if other is None else _cut_length(other) / max(_cut_length(self.toolpath), 1e-300)
-        if kept > 0.0:
+        if 0.0 < kept < self.options.most:
             yield Trial("what gouges is left out", changes, min(kept, 1.0), kept)
 
     def _leaving_less(self) -> Iterator[Trial]:

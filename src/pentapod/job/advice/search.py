@@ -72,7 +72,7 @@ def advised(
             progress("advice", 0.0, words)
 
     trials = _trials(job, machine, mesh, toolpath, options, tell)
-    if failed and toolpath is not None:
+    if toolpath is not None:
         trials = chain(FailedClaims(job, machine, mesh, toolpath, failed, options, tell).all(), trials)
     try:
         for number, trial in enumerate(islice(trials, count)):
