@@ -12,6 +12,7 @@ from pentapod.base.registry import Registry
 from pentapod.cutters.tool import Tool
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.passes import Passes
+from pentapod.toolpath.lines.rest_lines import rest_lines
 from pentapod.toolpath.lines.sharp_edges import crease_lines, uncrossed
 from pentapod.toolpath.linking.assembly import assembled
 from pentapod.toolpath.options import CoverOptions, PathOptions
@@ -68,7 +69,7 @@ def toolpath_with_report(mesh: Mesh, tool: Tool, options: PathOptions) -> tuple[
     check_size(options, float(np.ptp(mesh.bounds, axis=0).max()), ToolpathError)
     surface = surface_for(mesh, tool, options)
     return assembled(
-        strategy.name, surface, tool, options, with_creases(surface, strategy.paths(surface, options), options)
+        strategy.name, surface, tool, options, with_fills(surface, strategy.paths(surface, options), options)
     )
 
 
@@ -84,16 +85,19 @@ def surface_for(mesh: Mesh, tool: Tool, options: PathOptions) -> Surface:
     return PartSurface(mesh, tool, options.up)
 
 
-def with_creases(surface: Surface, paths: ContactPaths, options: PathOptions) -> ContactPaths:
-    """Return the paths with lines along concave corners between passes, if the strategy fills gaps and a ball rolls.
+def with_fills(surface: Surface, paths: ContactPaths, options: PathOptions) -> ContactPaths:
+    """Return the paths with lines along concave corners between passes, and over what is left by all these.
 
-    What a pass beside a corner leaves in it is much higher than the ridge between passes.
+    If the strategy fills gaps and a ball rolls. What a pass beside a corner leaves in it is much higher than the ridge
+    between passes.
     """
     if not (surface.slides and isinstance(options, CoverOptions) and options.fill):
         return paths
-    creases = crease_lines(surface.patch(options.region))
-    left = uncrossed(creases, paths.passes, paths.stepover, surface.radius)
-    return replace(paths, passes=Passes.joined([paths.passes, left])) if len(left) else paths
+    patch = surface.patch(options.region)
+    creases = uncrossed(crease_lines(patch), paths.passes, paths.stepover, surface.radius)
+    passes = Passes.joined([paths.passes, creases])
+    rest = rest_lines(patch, passes, surface.radius, paths.stepover, lambda x: surface.hides(x, options.chordal))
+    return replace(paths, passes=Passes.joined([passes, rest])) if len(creases) + len(rest) else paths
 
 
 def make_toolpath(mesh: Mesh, tool: Tool, options: PathOptions) -> Toolpath:

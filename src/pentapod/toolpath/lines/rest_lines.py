@@ -1,0 +1,186 @@
+"""Rest lines: further passes where a ball still leaves more than the ridge between passes, measured on its offset.
+
+At a centre on the offset surface with normal n, what is higher than t above the limit of what the ball can cut is
+cleared where a pass comes within a radius r of centre − (r − t) n. In hollows hardly wider than the ball, and at the
+ends of creases, passes that keep their distance along the offset surface do not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import KDTree
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.geometry.directions import normalised
+from pentapod.geometry.runs import members
+from pentapod.mesh.passes import Passes
+from pentapod.mesh.patch import Patch
+from pentapod.mesh.topology import components
+
+
+@dataclass(frozen=True)
+class RestOptions:
+    """How rest is found.
+
+    allowed: height of what may be left, in ridges between passes on a plane. coarse: share of that with which facets
+    are looked at first; edge: of the facets that are looked at again, in stepovers. sample: distance of the points that
+    stand for a pass, in radii. bent: angle between facets, radians, from which directions between their normals are
+    looked at. negligible: share of the area that rest without lines may have in total. rounds: of lines. rings: facets
+    around rest through which its line may run. core: share of the most that is left from which a line begins and ends.
+    shortest: line, in stepovers; shorter ones run through all of their piece. smoothing: rounds in which points of a
+    line are averaged with both neighbours.
+    """
+
+    allowed: float = 1.22
+    coarse: float = 0.85
+    edge: float = 0.15
+    sample: float = 0.05
+    bent: float = float(np.radians(10.0))
+    negligible: float = 1e-4
+    rounds: int = 3
+    rings: int = 2
+    core: float = 0.7
+    shortest: float = 0.5
+    smoothing: int = 3
+
+
+def rest_lines(
+    patch: Patch,
+    passes: Passes,
+    radius: float,
+    stepover: float,
+    hides: Callable[[Floats], Bools],
+    options: RestOptions = RestOptions(),
+) -> Passes:
+    """Return lines over what passes leave on a patch of the offset surface of a ball of `radius` metres.
+
+    stepover: between the passes, metres. hides: tells which points (N, 3) cannot be machined.
+    """
+    half = min(0.5 * stepover, radius)
+    height = options.allowed * (radius - float(np.sqrt(radius**2 - half**2)))
+    step, whole = options.sample * radius, float(patch.areas.sum())
+    centres, parts = _dense(passes.split(~hides(passes.points)), step), list[Passes]()
+    coarse = _left(patch, KDTree(centres), radius, options.coarse * height, options) > 0.0
+    near = patch.only(_grown(patch, coarse, 1)).refined(options.edge * stepover)
+    for _ in range(options.rounds):
+        left = _left(near, KDTree(centres), radius, height, options)
+        left[left > 0.0] *= ~hides(near.vertices[near.faces[left > 0.0]].mean(axis=1))
+        lines = _lines(near, left, options.negligible * whole, options.shortest * stepover, options)
+        if not len(lines):
+            break
+        parts.append(lines)
+        centres = np.concatenate([centres, _dense(lines, step)])
+    return Passes.joined(parts)
+
+
+def _dense(passes: Passes, step: float) -> Floats:
+    """Return points (N, 3) along passes, at most `step` metres apart."""
+    rows = np.flatnonzero(passes.within)
+    start, along = passes.points[rows], passes.points[rows + 1] - passes.points[rows]
+    counts = np.ceil(np.linalg.norm(along, axis=1) / step).astype(np.intp) + 1
+    owner, number = members(counts)
+    return start[owner] + (number / np.maximum(counts - 1, 1)[owner])[:, None] * along[owner]
+
+
+def _left(patch: Patch, tree: KDTree, radius: float, height: float, options: RestOptions) -> Floats:
+    """Return by how much (F,) each facet is not cleared down to a height, metres; 0 where it is."""
+    normals, corners = patch.facet_normals, patch.vertices[patch.faces]
+    depth, left = radius - height, np.zeros(len(patch.faces))
+    if not len(left):
+        return left
+    places = corners.mean(axis=1) - depth * normals
+    far = np.asarray(tree.query(places, distance_upper_bound=2.0 * radius)[0])
+    left = np.maximum(np.minimum(far, 2.0 * radius) - radius, 0.0)
+    # Between the normals of two facets at a concave edge the ball's arc answers, not the facets.
+    a, b = (side // 3 for side in patch.topology.side_pairs)
+    edges = patch.vertices[patch.topology.edges[patch.topology.pair_edges]].mean(axis=1)
+    bent = np.flatnonzero(np.einsum("ij,ij->i", normals[a], normals[b]) < np.cos(options.bent))
+    a, b, edges = a[bent], b[bent], edges[bent]
+    for share in (0.25, 0.5, 0.75):
+        between = normalised((1.0 - share) * normals[a] + share * normals[b])
+        far = np.asarray(tree.query(edges - depth * between, distance_upper_bound=2.0 * radius)[0])
+        more = np.maximum(np.minimum(far, 2.0 * radius) - radius, 0.0)
+        np.maximum.at(left, a, more)
+        np.maximum.at(left, b, more)
+    return left
+
+
+def _grown(patch: Patch, wanted: Bools, rings: int) -> Bools:
+    """Return the facets (F,) that are wanted, or in one of the rings around them."""
+    for _ in range(rings):
+        at = np.zeros(len(patch.vertices), dtype=np.bool_)
+        at[patch.faces[wanted]] = True
+        wanted = np.asarray(at[patch.faces].any(axis=1))
+    return wanted
+
+
+def _lines(patch: Patch, left: Floats, negligible: float, shortest: float, options: RestOptions) -> Passes:
+    """Return a line through each connected piece of the facets on which something is left (F,)."""
+    rest = left > 0.0
+    if not rest.any():
+        return Passes.of([])
+    grown = _grown(patch, rest, options.rings)
+    faces = patch.faces[grown]
+    sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+    piece = components(len(patch.vertices), *sides.T)[1]
+    owner = piece[patch.faces[:, 0]]
+    area = np.bincount(owner[rest], weights=patch.areas[rest], minlength=int(piece.max()) + 1)
+    order = np.argsort(area, kind="stable")
+    needed = order[np.cumsum(area[order]) > negligible]
+    height = np.zeros(len(patch.vertices))
+    np.maximum.at(height, patch.faces[rest].ravel(), np.repeat(left[rest], 3))
+    normals = np.zeros_like(patch.vertices)
+    np.add.at(normals, patch.faces.ravel(), np.repeat(patch.facet_normals * patch.areas[:, None], 3, axis=0))
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    found: list[tuple[Floats, Floats]] = []
+    for one in needed[area[needed] > 0.0].tolist():
+        own = sides[piece[sides[:, 0]] == one]
+        line = _middle_line(patch.vertices, own, height, shortest, options)
+        points = patch.vertices[line]
+        for _ in range(options.smoothing):
+            points[1:-1] = 0.25 * points[:-2] + 0.5 * points[1:-1] + 0.25 * points[2:]
+        if len(points) > 1:
+            found.append((points, normals[line]))
+    return Passes.of(found, np.arange(len(found)))
+
+
+def _middle_line(vertices: Floats, sides: Ints, height: Floats, shortest: float, options: RestOptions) -> Ints:
+    """Return the vertices (n,) of a line from end to end of a piece, given by its sides (S, 2), where most is left.
+
+    It is at least `shortest` metres long where the piece allows it.
+    """
+    used, index = np.unique(sides, return_inverse=True)
+    a, b = index.reshape(sides.shape).T
+    length = np.linalg.norm(vertices[used[b]] - vertices[used[a]], axis=1)
+    most = float(height[used].max())
+    # Where nothing is left a way counts ten times.
+    cost = length / np.maximum(0.5 * (height[used[a]] + height[used[b]]) / most, 0.1)
+    plain, weighed = (_graph(a, b, weights, len(used)) for weights in (length, cost))
+    inner = height[used] >= options.core * most
+    first = _farthest(plain, int(height[used].argmax()), inner)
+    last = _farthest(plain, first, inner)
+    if float(dijkstra(plain, directed=False, indices=first)[last]) < shortest:
+        first = _farthest(plain, first, inner | True)
+        last = _farthest(plain, first, inner | True)
+    _, before = dijkstra(weighed, directed=False, indices=first, return_predecessors=True)
+    line = [last]
+    while line[-1] != first:
+        line.append(int(before[line[-1]]))
+    return used[line]
+
+
+def _graph(a: Ints, b: Ints, weights: Floats, count: int) -> csr_array:
+    """Return the graph of `count` vertices with weights on its sides, each once."""
+    pairs, first = np.unique(np.stack([np.minimum(a, b), np.maximum(a, b)]), axis=1, return_index=True)
+    return csr_array((weights[first], tuple(pairs)), shape=(count, count))
+
+
+def _farthest(graph: csr_array, start: int, wanted: Bools) -> int:
+    """Return the wanted vertex that is farthest from a vertex, of those that it is connected to."""
+    away = dijkstra(graph, directed=False, indices=start)
+    return int(np.where(wanted & np.isfinite(away), away, -1.0).argmax())

@@ -1,0 +1,99 @@
+"""Rest lines: over what passes leave, and nowhere else; what is left is measured at dense samples of the surface."""
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from concave_parts import mesh
+from left_material import Reachable, dense, left
+from pentapod import BallCutter, Mesh
+from pentapod.mesh.passes import Passes
+from pentapod.mesh.patch import Patch
+from pentapod.toolpath import RasterOptions, make_toolpath
+from pentapod.toolpath.lines.rest_lines import rest_lines
+from pentapod.toolpath.strategies import registry
+
+R, STEP = 3e-3, 3e-3
+RIDGE = R - np.sqrt(R**2 - 0.25 * STEP**2)
+
+
+def sheet(height, width=0.03, length=0.02, cells=40):
+    """A surface of centres over a rectangle."""
+    x, y = np.meshgrid(np.linspace(0.0, length, cells + 1), np.linspace(0.0, width, cells + 1), indexing="ij")
+    k = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
+    points = np.stack([x.ravel(), y.ravel(), height(x, y).ravel()], axis=1)
+    return Patch.whole(Mesh.of(points, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])))
+
+
+def along_x(ys, height):
+    x = np.linspace(0.0, 0.02, 81)
+    lines = [np.stack([x, 0 * x + y, height(x, 0 * x + y)], axis=1) for y in ys]
+    return Passes.of([(line, np.tile([0.0, 0.0, 1.0], (len(x), 1))) for line in lines], np.arange(len(lines)))
+
+
+def none(points):
+    return np.zeros(len(points), dtype=np.bool_)
+
+
+def flat(x, y):
+    return 0.0 * x + 0.0 * y
+
+
+def hollow(x, y):
+    """Centres of a ball in a groove whose radius is 1 mm larger than its own, with slopes of 45° beside it."""
+    side = np.abs(y - 0.015)
+    inner = 1e-3 / np.sqrt(2.0)
+    return (
+        np.where(side < inner, 1e-3 - np.sqrt(np.maximum(1e-6 - side**2, 0.0)), 1e-3 - inner + side - inner) + 0.0 * x
+    )
+
+
+YS = np.arange(0.5 * STEP, 0.03, STEP)
+
+
+def test_passes_a_stepover_apart_leave_no_rest_on_a_plane():
+    assert len(rest_lines(sheet(flat), along_x(YS, flat), R, STEP, none)) == 0
+
+
+def test_a_pass_left_out_is_put_back_in_the_middle_of_the_gap():
+    patch = sheet(flat)
+    found = rest_lines(patch, along_x(np.delete(YS, 4), flat), R, STEP, none)
+    assert len(found) == 1
+    assert np.abs(found.points[:, 1] - YS[4]).max() < 0.3 * STEP
+    assert np.ptp(found.points[:, 0]) > 0.018
+    assert (
+        len(rest_lines(patch, along_x(np.delete(YS, 4), flat), R, STEP, lambda x: np.abs(x[:, 1] - YS[4]) < STEP)) == 0
+    )
+
+
+def test_the_bottom_of_a_hollow_gets_a_line_where_passes_beside_it_leave_too_much():
+    """Passes on both flanks, a stepover apart along the surface of centres; the ball's own bottom lies between them."""
+    apart = 0.5 * (STEP - 0.5 * np.pi * 1e-3) / np.sqrt(2.0) + 1e-3 / np.sqrt(2.0)
+    beside = apart + np.arange(0.0, 0.016, STEP / np.sqrt(2.0))
+    ys = np.concatenate([0.015 + beside, 0.015 - beside])
+    passes = along_x(ys, hollow)
+    found = rest_lines(sheet(hollow, cells=120), passes, R, STEP, none)
+    bottom = np.stack([np.linspace(2e-3, 0.018, 50), np.full(50, 0.015), np.full(50, -R)], axis=1)
+    before = KDTree(np.concatenate([dense(passes.points[passes.rows(k)]) for k in range(len(passes))]))
+    assert before.query(bottom)[0].min() - R > 1.3 * RIDGE
+    assert len(found) == 1
+    assert np.abs(found.points[:, 1] - 0.015).max() < 5e-4
+    after = KDTree(np.concatenate([dense(found.points[found.rows(k)]) for k in range(len(found))]))
+    assert after.query(bottom)[0].max() - R < 0.5 * RIDGE
+
+
+@pytest.mark.slow
+def test_hollows_of_an_egg_crate_are_machined(monkeypatch):
+    """Lows of 2.5 mm for a ball of 2 mm: without rest lines much more is left in them than the ridge."""
+    part, ball, options = mesh("egg_crate"), BallCutter(2e-3), RasterOptions(stepover=2e-3)
+    samples = Reachable(part, 2e-3, 2e-4).samples(8000)
+    ridge = 2e-3 - np.sqrt(3e-6)
+
+    def most():
+        found = left(samples, make_toolpath(part, ball, options), 2e-3)
+        return float(np.quantile(found.excess, 0.9999))
+
+    assert most() < 1.25 * ridge
+    monkeypatch.setattr(registry, "rest_lines", lambda *_: Passes.of([]))
+    assert most() > 1.3 * ridge
