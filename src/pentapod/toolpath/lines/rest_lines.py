@@ -41,7 +41,7 @@ class RestOptions:
     edge: float = 0.15
     sample: float = 0.05
     bent: float = float(np.radians(10.0))
-    negligible: float = 1e-4
+    negligible: float = 2.5e-4
     rounds: int = 3
     rings: int = 2
     core: float = 0.7
