@@ -36,7 +36,7 @@ class RestOptions:
     line are averaged with both neighbours.
     """
 
-    allowed: float = 1.22
+    allowed: float = 1.25
     coarse: float = 0.85
     edge: float = 0.15
     sample: float = 0.05
