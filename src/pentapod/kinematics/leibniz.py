@@ -12,15 +12,29 @@ from pentapod.base.arrays import Floats
 
 def scalar_products(a: Sequence[Floats], b: Sequence[Floats]) -> list[Floats]:
     """Return the scalar products (...) of vectors (..., 3) and their derivatives."""
-    return [
-        np.sum([comb(n, k) * np.einsum("...c,...c->...", a[k], b[n - k]) for k in range(n + 1)], axis=0)
-        for n in range(len(a))
-    ]
+    found = list[Floats]()
+    for n in range(len(a)):
+        total = np.zeros(np.broadcast_shapes(a[0].shape, b[0].shape)[:-1])
+        for k in range(n + 1) if a is not b else range(n // 2 + 1):  # of a square two terms are equal
+            times = float(comb(n, k) * (2 if a is b and 2 * k < n else 1))
+            x, y = a[k], b[n - k]
+            total += times * (x[..., 0] * y[..., 0] + x[..., 1] * y[..., 1] + x[..., 2] * y[..., 2])
+        found.append(total)
+    return found
 
 
 def cross_products(a: Sequence[Floats], b: Sequence[Floats]) -> list[Floats]:
     """Return the vector products (..., 3) and their derivatives."""
-    return [np.sum([comb(n, k) * np.cross(a[k], b[n - k]) for k in range(n + 1)], axis=0) for n in range(len(a))]
+    found = list[Floats]()
+    for n in range(len(a)):
+        total = np.zeros((3, *np.broadcast_shapes(a[0].shape, b[0].shape)[:-1]))  # whole components in one piece
+        for k in range(n + 1):
+            x, y = a[k], b[n - k]
+            for c in range(3):
+                d, e = (c + 1) % 3, (c + 2) % 3
+                total[c] += float(comb(n, k)) * (x[..., d] * y[..., e] - x[..., e] * y[..., d])
+        found.append(np.moveaxis(total, 0, -1))
+    return found
 
 
 def square_roots(square: Sequence[Floats]) -> list[Floats]:

@@ -159,14 +159,18 @@ class AsBuiltPentapod(Value, LegsOnLine, ProvenByLegEquations):
 
         tips: at [k] the derivatives of order k ≤ 3 of the tip and of the tool axis (tip → spindle), (n, 3) each.
         """
-        lever = (tool_length - self.offsets)[:, None]
-        axes = [np.broadcast_to(axis[:, None, :], (len(axis), 5, 3)) for _, axis in tips]
-        e = [tip[:, None, :] + lever * axis for (tip, _), axis in zip(tips, axes, strict=True)]
-        e[0] -= self.base
+        lever = tool_length - self.offsets
+        axes = [axis[:, None, :] for _, axis in tips]
+        e = [np.empty((3, len(tip), 5)) for tip, _ in tips]  # whole components in one piece
+        for out, (tip, axis) in zip(e, tips, strict=True):
+            for c in range(3):
+                out[c] = tip[:, c, None] + lever * axis[:, c, None]
+        e[0] -= self.base.T[:, None, :]
+        e = [np.moveaxis(out, 0, -1) for out in e]
         squares = scalar_products(e, e)
         ringed = np.flatnonzero(self.radii)
         if ringed.size:
-            normal = cross_products([x[:, ringed] for x in e], [x[:, ringed] for x in axes])
+            normal = cross_products([x[:, ringed] for x in e], axes)
             radii, rho = self.radii[ringed], square_roots(scalar_products(normal, normal))
             for square, by in zip(squares, rho, strict=True):
                 square[:, ringed] -= 2.0 * radii * by
