@@ -47,7 +47,7 @@ class ConstrainedPlatform(Value, ProvenByKrawczyk):
     along +z, in the component in which the robot is mounted; forward kinematics begins there.
 
     A branch is named by the sign of the Jacobian's determinant and that of w (a `Mode`). Several poses can have the
-    same legs and the same name: `pose` returns the one that continues the pose at home.
+    same legs and the same name: `pose` returns the one that continues the pose at home, and none in the other branches.
 
     Raises MachineError: wrong shapes, a fifth leg beside the tool axis, a home that is singular.
     """

@@ -17,7 +17,7 @@ class NewtonOptions:
     """steps: at most. settled: metres, largest error of a leg that ends it. shift, turn: longest step, m and rad.
 
     apart: rows between those that are solved from home; the others begin between their neighbours. starts: random poses
-    from which a branch other than that of home is looked for; spread: of these, metres and of directions.
+    from which all modes are looked for; spread: of these, metres and of directions.
     """
 
     steps: int = 40
@@ -35,8 +35,8 @@ OPTIONS = NewtonOptions()
 def continued_poses(robot: Any, legs: Floats, signs: Floats) -> tuple[Floats, Floats]:
     """Return positions and directions (N, 3) of legs (N, 5) in branches (N, 2); NaN where there are none.
 
-    In the branch of home: the pose to which Newton's method leads from home, or from between the poses of rows before
-    and after, which are those of a motion. In another: of the poses found from random starts the nearest to home.
+    Poses are those to which Newton's method leads from home, or from between the poses of rows before and after, which
+    are those of a motion. In branches other than that of home there are none; `all_poses` looks for them.
     """
     up = np.array([0.0, 0.0, 1.0])
     home = robot.branch(robot.home, up)
@@ -45,12 +45,6 @@ def continued_poses(robot: Any, legs: Floats, signs: Floats) -> tuple[Floats, Fl
     rows = np.flatnonzero(usual)
     if len(rows):
         p[rows], i[rows] = _along(robot, legs[rows], up)
-    for row in np.flatnonzero(np.isfinite(legs).all(axis=1) & ~usual & (np.abs(signs) == 1.0).all(axis=1)):
-        found = all_poses(robot, legs[row])
-        mine = (robot.branch(*found) == signs[row]).all(axis=1)
-        if mine.any():
-            near = np.flatnonzero(mine)[np.argmin(np.linalg.norm(found[0][mine] - robot.home, axis=1))]
-            p[row], i[row] = found[0][near], found[1][near]
     with np.errstate(invalid="ignore"):
         wrong = ~(robot.branch(p, i) == signs).all(axis=1)
     p[wrong] = i[wrong] = np.nan

@@ -69,7 +69,8 @@ def admissible_modes(machine: Machine, legs: ArrayLike, *, leg_error: float = 1e
     lengths without a pose, or close to a singularity, where two modes meet. With base joints in a plane there are no
     other poses (lemma 1 of docs/proofs.md); for a machine as built all are searched (lemma 17), and where that proves
     nothing the poses are those that continue the nominal ones. Where legs end beside the line, the platform counts as
-    turned about it by the machine's law, as every program leaves it. Raises InputError.
+    turned about it by the machine's law, as every program leaves it; where passive joints turn it, the pose is the one
+    that continues the machine's home, and others are not looked for. Raises InputError.
     """
     robot, count = machine.robot, machine.robot.n_legs
     readings = as_floats(legs, "legs")
