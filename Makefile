@@ -75,7 +75,7 @@ bench-view: demo  ## how often a second the viewer judges a part that is dragged
 
 bench-machines: $(READY)  ## figures of the shipped machines, how well power-on tells modes apart, cost of as-built geometry, error of a first cut
 	$(BIN)/python benchmarks/machines.py
-	$(BIN)/python examples/14_machines.py --out out/machines.png
+	mkdir -p out && $(BIN)/python examples/14_machines.py --out out/machines.png
 	$(BIN)/python examples/15_from_crate_to_first_cut.py
 	$(BIN)/python benchmarks/as_built.py
 
