@@ -1,7 +1,5 @@
 """The six-leg platform as a robot: its roll is where the twist is largest, and no roll leaves what is proven."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from scipy.interpolate import BPoly
@@ -9,7 +7,6 @@ from scipy.interpolate import BPoly
 from pentapod.base.errors import MachineError
 from pentapod.kinematics import GeneralPentapod, LinearPentapod, RolledPlatform, SixLegPlatform
 from pentapod.kinematics.arithmetic import NUMPY
-from pentapod.machine import Machine
 
 UP, MIDDLE = np.array([0.0, 0.0, 1.0]), np.array([0.08, 0.01, 0.45])
 BASE = np.array([[-0.552, -0.229], [-0.312, 0.510], [0.155, 0.577], [0.429, -0.417], [-0.078, -0.563]])
@@ -133,10 +130,3 @@ def test_a_line_through_the_sixth_base_joint_is_singular(robot: RolledPlatform) 
 def test_there_are_two_sides() -> None:
     with pytest.raises(MachineError, match="two sides"):
         RolledPlatform(ROBOTS["quadratic"].platform, 0)
-
-
-def test_no_machine_takes_it_yet(robot: RolledPlatform) -> None:
-    """The clearance of a leg from the spindle is a formula for legs that end on the line; the sixth does not."""
-    desk = Machine.load("desk")
-    with pytest.raises(MachineError, match="no machine has six legs yet"):
-        dataclasses.replace(desk, robot=robot)
