@@ -99,7 +99,7 @@ class Equations:
             rounding = np.einsum("nij,nj->ni", np.abs(c), error)
             rate = np.abs(first_order).max(axis=2) + rounding
             by_q = np.einsum("nij,nj->ni", q, rate + q.sum(axis=2) * (rate.max(axis=1) / most)[:, None])
-            # J changes along the line by a known amount; what is left of 1 − C J is that of the radius, and second order.
+            # J changes along the line by a known amount; what is left of 1 − C J is small.
             way = second - first
             along = c @ _pattern(
                 self._vectors(second) - self._vectors(first), way, self.joints, self.h, self.h * way[:, :3]
