@@ -20,7 +20,7 @@ def test_the_mode_that_fits_is_shown(capsys):
     legs = legs_in_the_middle("desk")
     assert run(["modes", "--legs", legs]) == 0
     text = capsys.readouterr().out
-    assert text.startswith("desk: 4 modes, 1 fits")
+    assert text.startswith("desk: 4 modes (proven complete), 1 fits")
     assert re.search(r"\+\+  tip \(85\.000, -17\.000, 467\.000\) mm, tool axis .*: fits", text)
     assert run(["modes", "--legs", legs, "--json"]) == 0
     content = json.loads(capsys.readouterr().out)

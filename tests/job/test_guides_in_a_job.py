@@ -81,7 +81,7 @@ def test_guides_from_the_plan_to_the_verdict(job, tmp_path):
     assert verdict_of(job, changed)["guides within their travel"] is False
     for stand in ("[0.0, 0.0]", '["a", 0, 0, 0, 0]', "3"):
         changed.write_text(text.replace(line, f"# guides_mm = {stand}\n"))
-        with pytest.raises(ProgramError, match="five numbers of mm"):
+        with pytest.raises(ProgramError, match="5 numbers of mm"):
             read_csv(changed)
 
 

@@ -9,7 +9,7 @@ from pentapod.cli.commands.new import dome_stl
 from pentapod.program import write_csv
 from pentapod.toolpath.formats import write_toolpath
 
-sys.path.append(str(Path(__file__).parents[1] / "program"))
+sys.path.append(str(Path(__file__).parents[1]))
 from short_motion import motion, placed
 from usual_job import job_text
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from pentapod.simulate import Reference, contour_errors, simulate_servo
 
-sys.path.append(str(Path(__file__).parents[1] / "program"))
+sys.path.append(str(Path(__file__).parents[1]))
 from short_motion import motion
 
 LINEAR = {"encoder_step": 0.0, "ripple_force": 0.0, "dead_time": 0.0}

@@ -1,8 +1,6 @@
 """A machine as built plays its own program in MuJoCo: rings that turn, scales with zeros, joints off the plane."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +8,6 @@ import pytest
 from pentapod.geometry.directions import angle_between
 from pentapod.kinematics import AsBuiltPentapod
 from pentapod.simulate import Reference, plant, simulate_mujoco, simulate_servo
-
-sys.path.append(str(Path(__file__).parents[1] / "program"))
 from short_motion import motion
 
 

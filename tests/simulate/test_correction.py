@@ -1,11 +1,11 @@
 """Correction by the pose: what it is worth on several motions, where it must hold, what it must leave alone."""
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from servo_runs import contour, played
 
 from pentapod.base.errors import MachineError
 from pentapod.base.refusal import Refusal
@@ -16,10 +16,6 @@ from pentapod.machine.drives import Drives
 from pentapod.program import Program, quantised, read_csv
 from pentapod.simulate import Reference, servo, simulate_servo
 from pentapod.simulate.correction import correction_for
-
-sys.path.append(str(Path(__file__).parents[1] / "program"))
-from servo_runs import contour, played
-
 from short_motion import motion, rise
 
 

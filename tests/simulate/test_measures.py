@@ -1,14 +1,9 @@
 """Measures: a tool that is where it should be, and one that is off by a known way."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from pentapod.simulate import Played, Reference, Tracking
-
-sys.path.append(str(Path(__file__).parents[1] / "program"))
 from short_motion import motion, placed
 
 

@@ -2,7 +2,6 @@
 
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,8 +16,6 @@ from pentapod.kinematics.forces import leg_force_map
 from pentapod.program import Program
 from pentapod.simulate import Reference, cutting_forces, load_mujoco, plant, simulate_mujoco
 from pentapod.simulate.forces import leg_loads
-
-sys.path.append(str(Path(__file__).parents[1] / "program"))
 from short_motion import motion
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.signal import cont2discrete, dlsim, lsim
+from servo_runs import LINEAR, played
 
 from pentapod.base.errors import InputError, ProgramError
 from pentapod.base.refusal import Refusal
@@ -18,10 +19,6 @@ from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine import Machine
 from pentapod.program import Program
 from pentapod.simulate import Reference, contour_errors, simulate_servo
-
-sys.path.append(str(Path(__file__).parents[1] / "program"))
-from servo_runs import LINEAR, played
-
 from short_motion import motion
 
 

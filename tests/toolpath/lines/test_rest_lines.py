@@ -56,6 +56,10 @@ def test_passes_a_stepover_apart_leave_no_rest_on_a_plane():
     assert len(rest_lines(sheet(flat), along_x(YS, flat), R, STEP, none)) == 0
 
 
+def test_passes_wider_apart_than_the_ball_are_meant_so():
+    assert len(rest_lines(sheet(flat), along_x(YS[::3], flat), R, 3.0 * STEP, none)) == 0
+
+
 def test_a_pass_left_out_is_put_back_in_the_middle_of_the_gap():
     patch = sheet(flat)
     found = rest_lines(patch, along_x(np.delete(YS, 4), flat), R, STEP, none)

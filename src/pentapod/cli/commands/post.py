@@ -108,7 +108,9 @@ def _machine(program: Program, folder: Path, job: Path | None, machine: str | No
             shipped = Machine.load(program.provenance.machine)
         except MachineError:
             shipped = None
+        if shipped is not None and shipped.digest == program.provenance.machine_digest:
+            return shipped
         job = job_file_of(folder)
-        if job is None or (shipped is not None and shipped.digest == program.provenance.machine_digest):
+        if job is None:
             return shipped
     return job_machine(Job.load(job))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.base.units import from_si
+from pentapod.base.units import from_si, to_si
 from pentapod.geometry.directions import angle_between, normalised
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.advice.axes import Changes, taken_out
@@ -51,7 +51,7 @@ def places(job: Job, machine: Machine, mesh: Mesh, sketch: Sketch, options: Advi
             found.append(table.place("turned about the vertical", table.up, moving=False))
         found.append(table.place("another height of the table", table.up, moving=True))
         for face in _faces(job, sketch):
-            if float(angle_between(face, table.up)) > np.radians(options.other_face_deg):
+            if float(angle_between(face, table.up)) > to_si(options.other_face_deg, "deg"):
                 found.append(table.place("lying on another face", face, moving=True))
     if own is not FREE or keys:
         bounds = taken_out(job, "placement", ("table_z_mm", *_BOUNDS))

@@ -30,10 +30,10 @@ class RestOptions:
     allowed: height of what may be left, in ridges between passes on a plane. coarse: share of that with which facets
     are looked at first; edge: of the facets that are looked at again, in stepovers. sample: distance of the points that
     stand for a pass, in radii. bent: angle between facets, radians, from which directions between their normals are
-    looked at. negligible: share of the area that rest without lines may have in total. rounds: of lines. rings: facets
-    around rest through which its line may run. core: share of the most that is left from which a line begins and ends.
-    shortest: line, in stepovers; shorter ones run through all of their piece. smoothing: rounds in which points of a
-    line are averaged with both neighbours.
+    looked at; folded: from which there are none. negligible: share of the area that rest without lines may have in
+    total. rounds: of lines. rings: facets around rest through which its line may run. core: share of the most that is
+    left from which a line begins and ends. shortest: line, in stepovers; shorter ones run through all of their piece.
+    smoothing: rounds in which points of a line are averaged with both neighbours.
     """
 
     allowed: float = 1.25
@@ -41,6 +41,7 @@ class RestOptions:
     edge: float = 0.15
     sample: float = 0.05
     bent: float = float(np.radians(10.0))
+    folded: float = float(np.radians(179.0))
     negligible: float = 2.5e-4
     rounds: int = 3
     rings: int = 2
@@ -63,6 +64,8 @@ def rest_lines(
     """
     half = min(0.5 * stepover, radius)
     height = options.allowed * (radius - float(np.sqrt(radius**2 - half**2)))
+    if height >= radius:  # passes so far apart are meant to leave the surface between them
+        return Passes.joined([])
     step, whole = options.sample * radius, float(patch.areas.sum())
     centres, parts = _dense(passes.split(~hides(passes.points)), step), list[Passes]()
     coarse = _left(patch, KDTree(centres), radius, options.coarse * height, options) > 0.0
@@ -99,7 +102,9 @@ def _left(patch: Patch, tree: KDTree, radius: float, height: float, options: Res
     # Between the normals of two facets at a concave edge the ball's arc answers, not the facets.
     a, b = (side // 3 for side in patch.topology.side_pairs)
     edges = patch.vertices[patch.topology.edges[patch.topology.pair_edges]].mean(axis=1)
-    bent = np.flatnonzero(np.einsum("ij,ij->i", normals[a], normals[b]) < np.cos(options.bent))
+    cosine = np.einsum("ij,ij->i", normals[a], normals[b])
+    flat = ~normals.any(axis=1)  # facets without an area
+    bent = (cosine < np.cos(options.bent)) & (cosine > np.cos(options.folded)) & ~flat[a] & ~flat[b]
     a, b, edges = a[bent], b[bent], edges[bent]
     for share in (0.25, 0.5, 0.75):
         between = normalised((1.0 - share) * normals[a] + share * normals[b])
