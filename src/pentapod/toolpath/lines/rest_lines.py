@@ -103,7 +103,7 @@ def _left(patch: Patch, tree: KDTree, radius: float, height: float, options: Res
     a, b = (side // 3 for side in patch.topology.side_pairs)
     edges = patch.vertices[patch.topology.edges[patch.topology.pair_edges]].mean(axis=1)
     cosine = np.einsum("ij,ij->i", normals[a], normals[b])
-    flat = ~normals.any(axis=1)  # facets without an area
+    flat: Bools = np.asarray(~normals.any(axis=1))  # facets without an area
     bent = (cosine < np.cos(options.bent)) & (cosine > np.cos(options.folded)) & ~flat[a] & ~flat[b]
     a, b, edges = a[bent], b[bent], edges[bent]
     for share in (0.25, 0.5, 0.75):
