@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from pentapod.base.errors import ToolpathError
+from pentapod.base.errors import ProgramError, ToolpathError
 from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.cli.commands.new import dome_stl
 from pentapod.job import Job, pipeline, run
 from pentapod.job.build.pieces import job_without, program_toolpath
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_mesh
-from pentapod.job.mending import mend_of
+from pentapod.job.mending import mend_of, most_left_out
 from pentapod.job.outcome import Outcome, Stage
 from pentapod.machine.machine import Machine
+from pentapod.program import write_csv
 from pentapod.toolpath import SegmentKind
 from pentapod.toolpath.linking.partition import cutting_intervals
 from pentapod.verify import Verdict
 from pentapod.verify.verdict.verdict import Certificate, Place
+from short_motion import motion
 
 TABLES = {
     "part": {"mesh": "part.stl", "unit": "mm"},
@@ -71,7 +75,7 @@ def test_a_toolpath_without_some_cuts_makes_all_others_in_their_order(dome):
 def test_what_cannot_be_placed_is_left_out_round_by_round(dome):
     job, mesh, whole = dome
     middle = int(whole.starts[10:12].mean())
-    first = mend_of(whole, None, outcome(job, whole, refused((middle - 1, middle + 1))), 0.01)
+    first = mend_of(whole, None, outcome(job, whole, refused((middle - 1, middle + 1))), 0.04)
     assert first is not None
     (a, b), *rest = first.left_out
     assert not rest
@@ -83,7 +87,7 @@ def test_what_cannot_be_placed_is_left_out_round_by_round(dome):
     part = job_without(job, mesh, whole, first.left_out)
     then = int(whole.starts[30:32].mean())
     at = int(np.linalg.norm(part.tilt_centres - whole.tilt_centres[then], axis=1).argmin())
-    second = mend_of(whole, first, outcome(job, part, refused((at, at))), 0.01)
+    second = mend_of(whole, first, outcome(job, part, refused((at, at))), 0.04)
     assert second is not None
     assert second.left_out[0] == (a, b)
     assert second.left_out[1][0] < then < second.left_out[1][1]
@@ -92,11 +96,11 @@ def test_what_cannot_be_placed_is_left_out_round_by_round(dome):
 
 def test_where_much_would_be_left_out_or_the_cause_is_another_nothing_is(dome):
     job, _, whole = dome
-    assert mend_of(whole, None, outcome(job, whole, refused((100, 600))), 0.001) is None
-    assert mend_of(whole, None, outcome(job, whole, refused((100, 600))), 1.0) is None
-    assert mend_of(whole, None, outcome(job, whole, Refusal("timing", "cannot")), 0.001) is None
+    assert mend_of(whole, None, outcome(job, whole, refused((100, 600))), 0.004) is None
+    assert mend_of(whole, None, outcome(job, whole, refused((100, 600))), 0.05) is None
+    assert mend_of(whole, None, outcome(job, whole, Refusal("timing", "cannot")), 0.004) is None
     left = Certificate("surface left on the region", False, 0.3, 0.1, "%", Place(1.0, 1000, 3), "")
-    assert mend_of(whole, None, outcome(job, whole, Refusal("verdict", "fails"), [left]), 0.001) is None
+    assert mend_of(whole, None, outcome(job, whole, Refusal("verdict", "fails"), [left]), 0.004) is None
 
 
 @pytest.mark.parametrize(("claim", "way"), [("lowest feed", "law"), ("toolpath covered", "closer")])
@@ -104,11 +108,11 @@ def test_a_slow_program_or_one_that_is_off_is_made_again_in_a_better_way_once(do
     job, _, whole = dome
     bad = Certificate(claim, False, 61.0, 90.0, "", Place(1.0, 1000, 3), "")
     failed = outcome(job, whole, Refusal("verdict", "fails"), [bad])
-    found = mend_of(whole, None, failed, 0.001)
+    found = mend_of(whole, None, failed, 0.004)
     assert found is not None
     assert (found.law, found.closer, found.left_out) == (way == "law", way == "closer", ())
     assert claim in str(found)
-    assert mend_of(whole, found, failed, 0.001) is None
+    assert mend_of(whole, found, failed, 0.004) is None
 
 
 def test_a_link_that_cannot_be_done_takes_the_ends_of_the_cuts_beside_it(dome):
@@ -120,6 +124,26 @@ def test_a_link_that_cannot_be_done_takes_the_ends_of_the_cuts_beside_it(dome):
     assert found is not None
     assert len(found.left_out) == 2
     assert found.left_out[0][1] <= middle + 1 <= found.left_out[1][0] + 1
+
+
+def test_no_cut_may_be_left_out_where_nothing_judges_what_is_left(dome):
+    job = dome[0]
+    assert most_left_out(job) == pytest.approx(4.0 * job.tolerance.left_share)
+    wide = Job.from_dict({**TABLES, "tolerance": {"left_share": 1.0}}, job.mesh_path.parent)
+    assert most_left_out(wide) == 0.05
+    lines = {**TABLES, "toolpath": {"strategy": "edges"}}
+    assert most_left_out(Job.from_dict(lines, job.mesh_path.parent)) == 0.0
+
+
+def test_a_program_that_says_it_leaves_out_much_is_refused(dome, tmp_path):
+    job, mesh, whole = dome
+    program, _ = motion(0.1)
+    for stretches, most in (((0, len(whole) - 1),), 0.05), (STRETCHES, 0.0):
+        source = replace(program.provenance, left_out=stretches)
+        file = write_csv(replace(program, provenance=source), tmp_path / "program.csv")
+        with pytest.raises(ProgramError, match="leaves out more cuts than it may"):
+            program_toolpath(job, mesh, file, most=most)
+    assert len(program_toolpath(job, mesh, file, most=0.05)) != len(whole)
 
 
 @pytest.mark.slow

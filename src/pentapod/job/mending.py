@@ -17,7 +17,9 @@ from pentapod.base.units import from_si
 from pentapod.base.values import Value
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import marked_runs
+from pentapod.job.build.region import covers_region
 from pentapod.job.outcome import Outcome
+from pentapod.job.schema.job import Job
 from pentapod.job.withheld import STAGE
 from pentapod.machine.machine import Machine
 from pentapod.planning import PlacedPath
@@ -34,9 +36,9 @@ class MendOptions:
 
     rounds: how often at most. around: length of cut left out on either side of a place, metres. most: length of cut
     that may be left out in all, as a multiple of the share of the region that may be left; ever: share of all cuts that
-    is never exceeded. places: beginnings of the
-    names of claims about places that may be left out. slow: claims that a better time law keeps; law: options of the
-    search for it. apart: claims that a leg path nearer to the toolpath keeps; closer: its share of the tolerances.
+    is never exceeded. places: beginnings of the names of claims about places that may be left out. slow: claims that a
+    better time law keeps; law: options of the search for it. apart: claims that a leg path nearer to the toolpath
+    keeps; closer: its share of the tolerances.
     """
 
     rounds: int = 3
@@ -89,12 +91,19 @@ class Mend(Value):
         )
 
 
+def most_left_out(job: Job, options: MendOptions = OPTIONS) -> float:
+    """Return the share of its cuts that a job's program may leave out: none where no claim judges what is left."""
+    if not covers_region(job) and job.tolerance.si.left is None:
+        return 0.0
+    return min(options.most * job.tolerance.left_share, options.ever)
+
+
 def mend_of(
-    whole: Toolpath, before: Mend | None, outcome: Outcome, share: float, options: MendOptions = OPTIONS
+    whole: Toolpath, before: Mend | None, outcome: Outcome, most: float, options: MendOptions = OPTIONS
 ) -> Mend | None:
     """Return what to do in another way after a run of the job's toolpath that failed; None where nothing helps.
 
-    before: what that run did in another way already. share: of the region that may be left.
+    before: what that run did in another way already. most: share of the cuts that may be left out.
     """
     current, refusal, before = outcome.find(Toolpath), outcome.refusal, before or Mend()
     if current is None or refusal is None or refusal.stage not in ("placement", STAGE):
@@ -127,7 +136,7 @@ def mend_of(
         kept[first:last] = False
     length = np.diff(places)
     lost, all_of_it = float(length[cutting & ~kept].sum()), float(length[cutting].sum())
-    if not kept.any() or lost > min(options.most * share, options.ever) * all_of_it:
+    if not kept.any() or lost > most * all_of_it:
         return None
     runs = tuple((int(a), int(b)) for a, b in marked_runs(cutting & ~kept).tolist())
     return replace(mend, left_out=runs, length=lost, share=lost / all_of_it)

@@ -21,7 +21,7 @@ from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import Reports, job_link_style, job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.mending import OPTIONS as MENDING
-from pentapod.job.mending import mend_of
+from pentapod.job.mending import mend_of, most_left_out
 from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
 from pentapod.job.plan_arrays import arrays_of
 from pentapod.job.plan_before import PlanBefore
@@ -161,7 +161,7 @@ def _mended(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Map
     file = staging / WITHHELD
     first = file.read_bytes() if file.is_file() else None
     for _ in range(MENDING.rounds):
-        before, mend = mend, mend_of(whole, mend, outcome, job.tolerance.left_share)
+        before, mend = mend, mend_of(whole, mend, outcome, most_left_out(job))
         if mend is None:
             break
         own, placed = StageRunner(runner.progress), outcome.find(PlacedPath)

@@ -12,6 +12,7 @@ from pentapod.job.build.pieces import job_part, program_piece, program_toolpath
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.job.mending import most_left_out
 from pentapod.job.outcome import setups_verdict
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
@@ -43,7 +44,7 @@ def judge(
             job,
             used,
             mesh,
-            lambda: program_toolpath(job, mesh, files[0], progress, machine=used),
+            lambda: program_toolpath(job, mesh, files[0], progress, machine=used, most=most_left_out(job)),
             own_machine=own_machine,
         )
         return judged(files[0], specification, strict=strict, progress=progress)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from pentapod.base.errors import InputError
+from pentapod.base.errors import InputError, ProgramError
 from pentapod.base.progress import Progress, silent
 from pentapod.job.build.toolpath import drops_gouges, gouge_options, job_link_style, job_toolpath, judged_tool
 from pentapod.job.schema.job import Job
@@ -15,7 +15,7 @@ from pentapod.program import read_header
 from pentapod.program.program import Provenance
 from pentapod.toolpath.gouge.gouge import without_gouges
 from pentapod.toolpath.linking.links import LinkStyle
-from pentapod.toolpath.linking.partition import Piece, part_of, without_cuts
+from pentapod.toolpath.linking.partition import Piece, part_of, share_left_out, without_cuts
 from pentapod.toolpath.toolpath import Toolpath
 
 
@@ -51,11 +51,18 @@ def _cleared(job: Job, mesh: Mesh, part: Toolpath, style: LinkStyle, machine: Ma
 
 
 def program_toolpath(
-    job: Job, mesh: Mesh, program: Path, progress: Progress = silent, *, machine: Machine | None = None
+    job: Job,
+    mesh: Mesh,
+    program: Path,
+    progress: Progress = silent,
+    *,
+    machine: Machine | None = None,
+    most: float = 1.0,
 ) -> Toolpath:
     """Return the toolpath of a program file: the job's, its set-up's piece of it, or what it does not leave out.
 
-    machine: as for `job_tool`. Raises ToolpathError for a program whose header names no cuts of the toolpath.
+    machine: as for `job_tool`. most: share of the cuts that the program may leave out. Raises ProgramError where it
+    leaves out more, ToolpathError where its header names no cuts of the toolpath.
     """
     made_from = _provenance(program)
     if made_from is not None and made_from.piece is not None:
@@ -63,6 +70,14 @@ def program_toolpath(
     toolpath = job_toolpath(job, mesh, progress, machine=machine)[0]
     if made_from is None or not made_from.left_out:
         return toolpath
+    share = share_left_out(toolpath, made_from.left_out)
+    if share > most:
+        raise ProgramError(
+            "the program leaves out more cuts than it may", file=program, key="left_out",
+            value=f"{100.0 * share:.3g} %",
+            expected=f"at most {100.0 * most:.3g} % of the cuts" if most else "all cuts of this job",
+            remedy="plan the job again",
+        )  # fmt: skip
     return job_without(job, mesh, toolpath, made_from.left_out, machine=machine)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from pentapod.base.arrays import Bools, Ints
 from pentapod.base.errors import ToolpathError
+from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import marked_runs
 from pentapod.toolpath.linking.links import LinkStyle, connection
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
@@ -102,6 +103,15 @@ def without_cuts(toolpath: Toolpath, left_out: Sequence[tuple[int, int]], style:
     if not chosen.any():
         raise ToolpathError("no cut is left", value=f"{len(left_out)} stretches are left out")
     return with_cuts(toolpath, chosen, style)
+
+
+def share_left_out(toolpath: Toolpath, left_out: Sequence[tuple[int, int]]) -> float:
+    """Return the share of the length of all cuts that lies between pairs of waypoints."""
+    length = np.where(cutting_intervals(toolpath), np.diff(arc_length(toolpath.tilt_centres)), 0.0)
+    marked = np.zeros(len(length), dtype=np.bool_)
+    for first, last in left_out:
+        marked[first:last] = True
+    return float(length[marked].sum() / length.sum())
 
 
 def with_cuts(toolpath: Toolpath, chosen: Bools, style: LinkStyle) -> Toolpath:
