@@ -87,6 +87,19 @@ def test_the_middle_of_the_region_stands_in_the_middle_of_the_work_volume(tmp_pa
         assert constraints.moves
 
 
+def test_a_plate_thinner_than_the_ball_is_machined_where_the_ball_stays_above_its_foot(tmp_path):
+    job, proposal = proposed(tmp_path, trimesh.creation.box((45, 45, 0.4)))
+    mesh, ball = job_mesh(job), 0.5e-3 * job.tool.diameter_mm
+    assert job.part.region_box_mm is None
+    assert ball * (1.0 - np.cos(np.radians(job.part.region_angle_deg))) <= 0.4e-3
+    assert job.toolpath.steep_deg is None
+    assert any("into the table" in remark for remark in proposal.remarks)
+    toolpath, _ = job_toolpath(job, mesh)
+    centres = np.concatenate([s.tips + ball * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT])
+    assert centres[:, 2].min() - ball >= mesh.bounds[0][2]
+    assert np.ptp(centres[:, :2], axis=0).min() > 0.04
+
+
 def test_walls_are_machined_down_to_where_the_ball_would_reach_into_the_table(tmp_path):
     job, proposal = proposed(tmp_path, SHAPES["block"][0]())
     mesh, ball = job_mesh(job), 0.5e-3 * job.tool.diameter_mm

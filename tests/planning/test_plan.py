@@ -54,6 +54,22 @@ def test_axis_is_smooth_along_the_path(cap, placed):
     assert rate.max() <= 1.5 * nominal.max()
 
 
+def test_nearly_the_same_path_is_placed_from_the_plan_before(desk, cap, placed):
+    """Without a pass, no worse than before; there is no other search, so a start elsewhere leads elsewhere."""
+    first = cap.segments[0]
+    shorter = replace(cap, segments=(replace(first, tips=first.tips[:-20], axes=first.axes[:-20]), *cap.segments[1:]))
+    again = plan(shorter, desk, tilt=TILT, start=placed)
+    assert again.component == placed.component
+    assert again.smallest_margin >= 0.9 * placed.smallest_margin - 1e-3
+    centre = cap.tilt_centres.mean(axis=0)
+    apart = again.placement.transform.apply(centre) - placed.placement.transform.apply(centre)
+    assert np.linalg.norm(apart) < 0.02
+    moved = RigidTransform(placed.placement.transform.rotation, placed.placement.transform.translation + 0.05)
+    elsewhere = replace(placed, placement=replace(placed.placement, transform=moved))
+    other = plan(shorter, desk, tilt=TILT, start=elsewhere)
+    assert isinstance(other, Refusal) or other.smallest_margin <= again.smallest_margin + 1e-3
+
+
 def test_placement_is_not_beaten_by_small_moves(desk, cap, placed):
     """Random small placement moves, each with the best tilt at each waypoint alone, gain little."""
     rng = np.random.default_rng(5)

@@ -32,6 +32,7 @@ from pentapod.job.task import Task, ending_when_interrupted
 from pentapod.job.withheld import STAGE, failures, foreseen, withheld
 from pentapod.machine.machine import Machine
 from pentapod.planning import PlacedPath
+from pentapod.planning.placement.placed_path import UnplacedPath
 from pentapod.planning.setups import setups
 from pentapod.timing import Limit
 from pentapod.toolpath import Mesh, Toolpath
@@ -164,7 +165,8 @@ def _mended(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Map
         before, mend = mend, mend_of(whole, mend, outcome, most_left_out(job))
         if mend is None:
             break
-        own, placed = StageRunner(runner.progress), outcome.find(PlacedPath)
+        own, placed, refused = StageRunner(runner.progress), outcome.find(PlacedPath), outcome.find(UnplacedPath)
+        start = placed if refused is None else refused.attempt
         own.stages += [stage for stage in outcome.stages if stage.name in ("mesh", "toolpath", "placement")]
         path = outcome.find(Toolpath) or whole
         if mend.left_out != (() if before is None else before.left_out):
@@ -178,7 +180,14 @@ def _mended(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Map
         specification = dataclasses.replace(task.specification, toolpath=path)
         law, share = MENDING.law if mend.law else task.law, MENDING.closer if mend.closer else 1.0
         again = dataclasses.replace(
-            task, specification=specification, runner=own, left_out=mend.left_out, law=law, closer=share, placed=placed
+            task,
+            specification=specification,
+            runner=own,
+            left_out=mend.left_out,
+            law=law,
+            closer=share,
+            placed=placed,
+            start=start,
         )
         file.unlink(missing_ok=True)
         outcome = _planned(again, staging, writers)

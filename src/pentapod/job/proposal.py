@@ -34,7 +34,8 @@ class ProposalOptions:
     another side must show than the top. backs: share of an open surface that may face the top where it is turned over.
     margin: of a box above and below, as a share of the work volume's height. walls_deg, walls: slope from which surface
     is an upright wall, and share of the region from which walls are machined in waterlines beside a raster, whose
-    passes leave those that are parallel to them.
+    passes leave those that are parallel to them. above_foot: share of the region below which a box above the foot is no
+    use, and flatter_deg: angles of the region of which the largest is taken then.
     """
 
     usual_mm: tuple[float, float] = (5.0, 2000.0)
@@ -50,6 +51,8 @@ class ProposalOptions:
     backs: float = 0.05
     walls_deg: float = 80.0
     walls: float = 0.001
+    above_foot: float = 0.5
+    flatter_deg: tuple[float, ...] = (80.0, 70.0, 60.0, 50.0, 40.0, 30.0, 20.0, 10.0)
 
 
 OPTIONS = ProposalOptions()
@@ -105,15 +108,15 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
         raise MeshError("no side of this surface can be machined", file=part, remedy="check the mesh")
     toolpath, tool = _toolpath(patch, direction), _tool(patch, direction)
     toolpath = {**toolpath, "stepover_mm": _rounded(OPTIONS.stepover * tool["diameter_mm"])}
-    if (walls := _walls(patch, direction)) > OPTIONS.walls and toolpath["strategy"] == "raster":
+    foot = _foot(mesh, patch, direction, tool) if box is None else None
+    if foot is not None:
+        key, table[key], reasons["part", key], remark = foot
+        remarks.append(remark)
+    flatter = "region_angle_deg" in table
+    if not flatter and toolpath["strategy"] == "raster" and (walls := _walls(patch, direction)) > OPTIONS.walls:
         toolpath["steep_deg"] = OPTIONS.steep_deg
         reasons["toolpath", "steep_deg"] = "upright walls get waterlines: passes of a raster do not cover all of them"
         remarks.append(f"upright walls, {100.0 * walls:.2g} % of what faces {side}, get waterlines (steep_deg)")
-    if box is None and (above := _above_the_foot(mesh, patch, direction, tool)) is not None:
-        table["region_box_mm"] = [[_rounded(v) for v in corner] for corner in from_si(above, "mm")]
-        reasons["part", "region_box_mm"] = "lower down the ball would reach below the part; leave it out on a riser"
-        low = _rounded(0.5 * tool["diameter_mm"])
-        remarks.append(f"the lowest {low:g} mm are left: the ball would reach into the table (region_box_mm)")
     remarks.append(
         f"a ball of {tool['diameter_mm']:g} mm, {toolpath['strategy']}, {toolpath['stepover_mm']:g} mm apart"
     )
@@ -207,18 +210,54 @@ def _walls(patch: Patch, direction: Floats) -> float:
     return float(patch.areas[upright].sum() / patch.areas.sum())
 
 
-def _above_the_foot(mesh: Mesh, patch: Patch, direction: Floats, tool: dict[str, Any]) -> Floats | None:
-    """Return the box (2, 3) of a solid without its lowest ball radius; None where no steep surface reaches so low."""
+def _foot(mesh: Mesh, patch: Patch, direction: Floats, tool: dict[str, Any]) -> tuple[str, Any, str, str] | None:
+    """Return the key of [part] that keeps the ball above the foot of a solid, its value, why, and a remark; or None."""
     radius = 0.5 * float(to_si(tool["diameter_mm"], "mm"))
-    heights, foot = patch.vertices @ direction, float((mesh.vertices @ direction).min())
     steep = patch.facet_normals @ direction < np.cos(to_si(OPTIONS.steep_deg, "deg"))
-    if not mesh.diagnosis.watertight or not steep.any() or heights[patch.faces[steep]].min() >= foot + radius:
+    if not mesh.diagnosis.watertight or _heights(mesh, patch, direction)[steep].min(initial=np.inf) >= radius:
+        return None
+    if (above := _above_the_foot(mesh, patch, direction, radius)) is not None:
+        value = [[_rounded(v) for v in corner] for corner in from_si(above, "mm")]
+        why = "lower down the ball would reach below the part; leave it out on a riser"
+        low = _rounded(0.5 * tool["diameter_mm"])
+        remark = f"the lowest {low:g} mm are left: the ball would reach into the table (region_box_mm)"
+        return "region_box_mm", value, why, remark
+    if (angle := _flatter(mesh, patch, direction, radius)) is not None:
+        why = "at steeper places the ball would reach below this thin part"
+        remark = f"only where it is flatter than {angle:g} deg: at steeper places the ball would reach into the table"
+        return "region_angle_deg", angle, why, f"{remark} (region_angle_deg)"
+    return None
+
+
+def _heights(mesh: Mesh, patch: Patch, direction: Floats) -> Floats:
+    """Return how high (F,) the lowest corner of each facet of a region is above the foot of the part, metres."""
+    heights: Floats = (patch.vertices @ direction)[patch.faces].min(axis=1)
+    return heights - float((mesh.vertices @ direction).min())
+
+
+def _above_the_foot(mesh: Mesh, patch: Patch, direction: Floats, radius: float) -> Floats | None:
+    """Return the box (2, 3) of a solid without its lowest ball radius; None where it would leave out most of it."""
+    seen = patch.areas * np.maximum(patch.facet_normals @ direction, 0.0)
+    if seen[_heights(mesh, patch, direction) >= radius].sum() < OPTIONS.above_foot * seen.sum():
         return None
     frame = np.stack([*tangent_frame(direction), direction])
     points, margin = mesh.vertices @ frame.T, radius
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
-    low[2] = foot + radius
+    low[2] += margin + radius
     return np.sort(np.array([low, high]) @ frame, axis=0)
+
+
+def _flatter(mesh: Mesh, patch: Patch, direction: Floats, radius: float) -> float | None:
+    """Return the largest angle of the region, degrees, at which the ball stays above the foot of a part; or None."""
+    heights = _heights(mesh, patch, direction)
+    upright = patch.facet_normals @ direction
+    for angle in OPTIONS.flatter_deg:
+        least = np.cos(to_si(angle, "deg"))
+        inside = upright >= least
+        # The ball's lowest point is below its contact by r (1 - cos).
+        if inside.any() and heights[inside].min() >= radius * (1.0 - least):
+            return angle
+    return None
 
 
 def _placement(mesh: Mesh, patch: Patch, direction: Floats, work: WorkVolume) -> dict[str, Any]:

@@ -82,7 +82,8 @@ class Task:
 
     specification: the job's requirements on plan and program. left_out: pairs of waypoints of the job's toolpath
     between which the toolpath of the specification makes no cut. law: options of the time law. closer: share of the
-    tolerances of path and axis that the leg path keeps. placed: the placed path, where it is known.
+    tolerances of path and axis that the leg path keeps. placed: the placed path, where it is known; start: that of
+    nearly the same toolpath, from which the placement starts.
     """
 
     job: Job
@@ -96,6 +97,7 @@ class Task:
     law: JerkOptions = DEFAULTS
     closer: float = 1.0
     placed: PlacedPath | None = None
+    start: PlacedPath | None = None
 
     @property
     def machine(self) -> Machine:
@@ -146,7 +148,7 @@ class Task:
         options = self._options()
         if self.before is not None and (kept := self.before.kept(self.toolpath, self.machine, options)) is not None:
             return kept
-        placed = self._planned(options)
+        placed = self._planned(options, self.start)
         met = self._meetings(placed)
         if met and options["tilt"] > 0.0:
             common = bool(options["common_axis"])
@@ -163,9 +165,11 @@ class Task:
             return retime_as_before(path, machine, self.before.laws, limits=self.limits, progress=progress)
         return retime(path, machine, limits=self.limits, progress=progress, jerk_options=self.law)
 
-    def _planned(self, options: PlacementOptions) -> PlacedPath | Refusal:
+    def _planned(self, options: PlacementOptions, start: PlacedPath | None = None) -> PlacedPath | Refusal:
         objective, progress = self.job.placement.then, self.runner.progress
-        return plan(self.toolpath, self.machine, **options, secondary_objective=objective, progress=progress)
+        return plan(
+            self.toolpath, self.machine, **options, secondary_objective=objective, start=start, progress=progress
+        )
 
     def _meetings(self, placed: PlacedPath | Refusal) -> Ranges:
         """Return where the tool meets the part; nowhere for jobs that want gouges reported only."""

@@ -20,7 +20,7 @@ from pentapod.planning.placement.common_axes import OPTIONS as COMMON_AXES
 from pentapod.planning.placement.common_axes import CommonAxesOptions, Searched, with_common_axis
 from pentapod.planning.placement.placed_path import PlacedPath, Placement, UnplacedPath
 from pentapod.planning.placement.sampling import best_tilted_margins
-from pentapod.planning.placement.search import SOLVERS, SearchOptions, SolverName, search
+from pentapod.planning.placement.search import SOLVERS, SearchOptions, SolverName, improved_from, search
 from pentapod.planning.placement.secondary_objective import SecondaryObjective, improved, objective_of
 from pentapod.planning.placement.sequential import SequentialSolver
 from pentapod.planning.problem.constraints import FREE, PlacementConstraints
@@ -64,6 +64,7 @@ def plan(
     limits: Sequence[LimitKind] = (),
     seed: int = 0,
     solver: SolverName = "sequential",
+    start: PlacedPath | None = None,
     progress: Progress = silent,
 ) -> PlacedPath | Refusal:
     """Return placement, component and tool axes that maximise the smallest margin of the machine's limits on the path.
@@ -73,7 +74,8 @@ def plan(
     is then the largest angle from the toolpath's axis. constraints: the allowed placements. component: all are searched
     where none is given. collision_world: obstacles of legs, spindle and tool. weights: of the groups of margins. The
     rail positions of a reconfigurable machine are optimised, too. secondary_objective: up to a tenth of the margin is
-    given up for it. limits: kinds of limits besides pentapod's own. Deterministic for a seed.
+    given up for it. limits: kinds of limits besides pentapod's own. Deterministic for a seed. start: plan of nearly the
+    same path on this machine; its placement and leans are improved, and there is no other search.
 
     Returns a Refusal that names limits, waypoints and shortfalls where the part does not fit. An interruption (Ctrl-C)
     ends the search with the best placement so far, if that fits; else KeyboardInterrupt is raised.
@@ -82,7 +84,10 @@ def plan(
         _samples(toolpath, tilt, common_axis), machine, constraints, weights,
         component=component, collision_world=collision_world, limits=limits,
     )  # fmt: skip
-    problem, found = _searched(problem, tilt, common_axis, seed, solver, progress)
+    if start is None:
+        problem, found = _searched(problem, tilt, common_axis, seed, solver, progress)
+    else:
+        problem, found = _improved(problem, start)
     best = found.best
     if best.smallest < NEEDED_MARGIN:
         return _refusal(toolpath, problem, best)
@@ -150,6 +155,15 @@ def _searched(
     return with_common_axis(
         problem, limit, searched, without_idle=without_idle, seed=seed, progress=progress, options=options
     )
+
+
+def _improved(problem: PlacementProblem, start: PlacedPath) -> Searched:
+    """Return the search from one plan of nearly the same path alone: in its branch, with its common direction."""
+    if start.placement.rail_positions is not None:
+        problem = problem.on(problem.machine.at(start.placement.rail_positions))
+    if start.common_axis is not None:
+        problem = problem.along(problem.samples.towards(start.common_axis))
+    return problem, improved_from(problem, start.component, start.placement.transform)
 
 
 def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: Floats, chosen_by: str) -> PlacedPath:

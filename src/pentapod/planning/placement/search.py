@@ -11,6 +11,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.progress import Progress, silent
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.ipopt import IpoptSolver
@@ -29,13 +30,14 @@ class SearchOptions:
 
     refined: number in any case. tried: maximum while none is good enough. hopeless: where all guesses are below this
     margin, the search is first made without obstacles. beyond_reach: best margin after the first `refined` starts below
-    which no other start is expected to lead to a placement that fits.
+    which no other start is expected to lead to a placement that fits. waypoints: used in every step from a given start.
     """
 
     refined: int = 4
     tried: int = 10
     hopeless: float = -0.5
     beyond_reach: float = -0.1
+    waypoints: int = 600
 
 
 Start = tuple[Margins, RigidTransform]
@@ -126,6 +128,17 @@ def search(
     if best is None:  # not reached: there are components, and first_guesses returns some for each
         raise RuntimeError("no first guess was made")
     return Search(best, tried, count, interrupted, constraints)
+
+
+def improved_from(
+    problem: PlacementProblem, branch: Branch, transform: RigidTransform, options: SearchOptions = SearchOptions()
+) -> Search:
+    """Return the search from one start alone: an allowed placement near `transform`, in a branch of the problem."""
+    margins = next(each for each in problem.margins if each.scene.branch == branch)
+    first = first_candidate(problem, margins, problem.constraints.nearest_to(transform), fitted_gaps(problem))
+    rows = np.sort(problem.samples.representatives(options.waypoints))
+    best = SequentialSolver(problem, problem.constraints.moves, rows=rows).raise_margin(first)
+    return Search(best, 1, 1, False, problem.constraints)
 
 
 def _is_decided(best: Candidate, options: SearchOptions) -> bool:

@@ -68,8 +68,8 @@ def rapid_chords(replay: Replay) -> Bools:
     ends = arc_length(toolpath.tilt_centres)[toolpath.starts]
     other = np.array([segment.kind is not SegmentKind.RAPID for segment in toolpath.segments])
     before = np.concatenate([[0], np.cumsum(other)])
-    first = np.searchsorted(ends[1:], arcs[:-1] - replay.path_tolerance, side="left")
-    behind = np.minimum(np.searchsorted(ends, arcs[1:] + replay.path_tolerance, side="right"), len(other))
+    first = np.searchsorted(ends[1:], arcs[:-1] - replay.match_radius, side="left")
+    behind = np.minimum(np.searchsorted(ends, arcs[1:] + replay.match_radius, side="right"), len(other))
     return np.asarray(before[behind] == before[first])
 
 

@@ -107,8 +107,8 @@ def _feeds(replay: Replay) -> Floats:
     """Return the feed (N − 1,) from row to row, m/s; infinite where more than one cut or link is near, or a rapid."""
     toolpath, arcs = replay.toolpath, replay.match.arcs[::2]
     ends, rapid = arc_length(toolpath.tilt_centres)[toolpath.starts], replay.machine.rapid_velocity
-    first = np.searchsorted(ends, arcs[:-1] - replay.path_tolerance, side="right")
-    behind = np.searchsorted(ends, arcs[1:] + replay.path_tolerance, side="left")
+    first = np.searchsorted(ends, arcs[:-1] - replay.match_radius, side="right")
+    behind = np.searchsorted(ends, arcs[1:] + replay.match_radius, side="left")
     feeds = [np.inf if s.kind is SegmentKind.RAPID else min(s.feed, rapid) for s in toolpath.segments]
     # No feed before the first end and behind the last one: there a program may be at rest.
     of_gap = np.array([np.inf, *feeds, np.inf])
@@ -154,7 +154,7 @@ def _reasons(replay: Replay, runs: Ints, least: float) -> tuple[Bools, Floats]:
     """
     path, match = replay.toolpath, replay.match
     arc = arc_length(path.tilt_centres)
-    arcs, within = match.arcs[::2], replay.path_tolerance
+    arcs, within = match.arcs[::2], replay.match_radius
     low, high = arcs[runs[:, 0]] - within, arcs[np.minimum(runs[:, 1], len(arcs) - 1)] + within
     ends = arc[path.starts]
     reasons = np.searchsorted(ends, high, "right") > np.searchsorted(ends, low, "left")

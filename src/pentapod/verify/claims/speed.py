@@ -66,8 +66,8 @@ def speed_limits(replay: Replay) -> tuple[Floats, Ints]:
     rapid = replay.machine.rapid_velocity
     limits = np.array([rapid if s.kind == SegmentKind.RAPID else min(s.feed, rapid) for s in segments])
     bounds = arc_length(replay.toolpath.tilt_centres)[replay.toolpath.starts]
-    low = np.searchsorted(bounds[1:], arcs[:-1] - replay.path_tolerance, side="left")
-    high = np.searchsorted(bounds[1:-1], arcs[1:] + replay.path_tolerance, side="right")
+    low = np.searchsorted(bounds[1:], arcs[:-1] - replay.match_radius, side="left")
+    high = np.searchsorted(bounds[1:-1], arcs[1:] + replay.match_radius, side="right")
     governing = low.copy()
     for step in range(int((high - low).max()) + 1):
         other = np.minimum(low + step, high)

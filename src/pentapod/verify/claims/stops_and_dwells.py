@@ -58,7 +58,7 @@ def required_stops(replay: Replay) -> list[tuple[int, int, float]]:
     # Where the tool turns on the spot, arc length does not distinguish one waypoint from the next; turning does.
     turns = np.append(0.0, np.cumsum(angle_between(path.axes[:-1], path.axes[1:])))
     measures = (
-        (match.arcs[::2], arc_length(path.tilt_centres)[path.starts], replay.path_tolerance),
+        (match.arcs[::2], arc_length(path.tilt_centres)[path.starts], replay.match_radius),
         (match.turned[::2], turns[path.starts], replay.specification.axis_tolerance),
     )
     low = np.maximum(*(np.searchsorted(measure, places - within, "left") for measure, places, within in measures))

@@ -42,6 +42,9 @@ class MatchOptions:
     search: FreeSpaceOptions = field(default_factory=FreeSpaceOptions)
 
 
+OPTIONS = MatchOptions()
+
+
 @dataclass(frozen=True, eq=False)
 class PathMatch:
     """A monotone matching of M samples of the program with the n waypoints of the toolpath.
@@ -71,7 +74,7 @@ def match(
     *,
     axis_bound: float = np.pi,
     chord_deviations: Floats | None = None,
-    options: MatchOptions = MatchOptions(),
+    options: MatchOptions = OPTIONS,
 ) -> PathMatch:
     """Return the monotone matching of a sampled motion with a path that minimises the largest distance.
 
@@ -141,7 +144,7 @@ def _places(
     return pairing.ordered_places(places)
 
 
-def turns_on_spot(path: PosedPolyline, tolerance: float, options: MatchOptions = MatchOptions()) -> Bools:
+def turns_on_spot(path: PosedPolyline, tolerance: float, options: MatchOptions = OPTIONS) -> Bools:
     """Return the intervals (n − 1,) on which the axis turns while the tilt centre hardly moves."""
     length = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
     turn = np.linalg.norm(np.diff(path.axes, axis=0), axis=1)
@@ -182,7 +185,7 @@ def interval_fractions(
     turning: Bools,
     tolerance: float,
     interval: Ints,
-    options: MatchOptions = MatchOptions(),
+    options: MatchOptions = OPTIONS,
 ) -> Floats:
     """Return the fraction in [0, 1] of its interval at which each sample is: by tilt centre, in turns by axis too."""
     step = np.diff(path.points, axis=0)

@@ -19,6 +19,7 @@ from pentapod.program.program import Program
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify.replay.free_space import PosedPolyline
 from pentapod.verify.replay.interval_bounds import IntervalBounds, interval_bounds
+from pentapod.verify.replay.path_matching import OPTIONS as MATCHING
 from pentapod.verify.replay.path_matching import PathMatch, match
 from pentapod.verify.verdict.specification import Specification
 from pentapod.verify.verdict.verdict import Place
@@ -54,6 +55,11 @@ class Replay(Value):
     def path_tolerance(self) -> float:
         """Allowed deviation of the program from the toolpath, metres."""
         return self.specification.path_tolerance
+
+    @property
+    def match_radius(self) -> float:
+        """How far a sample may be from its place in the matching, metres: the path tolerance and a little more."""
+        return MATCHING.within * self.path_tolerance
 
     @cached_property
     def interval_bounds(self) -> IntervalBounds:

@@ -23,8 +23,8 @@ for leg in $(seq "$legs"); do halcmd setp leg$leg.load 1; done
 grep -v '^#' legs.halstream | head -n 1 | halstreamer
 halcmd setp streamer.0.enable 1
 halcmd start
-while [ "$(halcmd getp streamer.0.curr-depth)" != 0 ]; do sleep 0.02; done
-sleep 0.05
+# The last leg in the thread's order: once it stands somewhere, all do, however late the thread begins.
+while [ "$(halcmd getp "leg$legs.out")" = 0 ]; do sleep 0.02; done
 halcmd setp streamer.0.enable 0
 for leg in $(seq "$legs"); do halcmd setp leg$leg.load 0; done
 grep -v '^#' legs.halstream | halstreamer &
