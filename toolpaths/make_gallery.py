@@ -168,8 +168,9 @@ def said(report: object) -> str:
 def sections() -> dict[str, str]:
     """Return the sections of the page as it is, by their names."""
     page = DOCS / "gallery.md"
-    parts = page.read_text(encoding="utf-8").replace(CONCAVE_HEAD, "").split("\n## ")[1:] if page.exists() else []
-    return {part.split("\n", 1)[0]: f"## {part.rstrip()}\n" for part in parts}
+    parts = page.read_text(encoding="utf-8").split("\n## ")[1:] if page.exists() else []
+    rule = "\n---\n"  # what follows it is the head of the next sections
+    return {part.split("\n", 1)[0]: f"## {part.split(rule)[0].rstrip()}\n" for part in parts}
 
 
 def job_section(name: str, pictures: Path) -> str:

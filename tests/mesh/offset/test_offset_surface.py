@@ -8,9 +8,10 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from left_material import facet_distances
 from pentapod import Mesh
 from pentapod.base.errors import MeshError
-from pentapod.mesh.offset.offset_surface import offset_surface
+from pentapod.mesh.offset.offset_surface import offset_surface, onto_level
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.theory.level_set import enclosed_volume
 
@@ -149,3 +150,56 @@ def test_faces_in_line_with_the_grid_do_no_harm(low):
 def test_a_part_too_large_for_the_ball_is_refused():
     with pytest.raises(MeshError, match="too fine for this part"):
         offset(Mesh.of(*box([0.0] * 3, [3.0] * 3)), 1e-4, 2.5e-5)
+
+
+def wedge(angle, length=0.04, high=0.03):
+    """Two flanks that meet at the bottom of a groove along x, `angle` radians between them."""
+    y, z = high * np.tan(0.5 * angle), high
+    vertices = [(x, sign * y, z) for x in (0.0, length) for sign in (-1.0, 1.0)] + [(0.0, 0.0, 0.0), (length, 0.0, 0.0)]
+    return Mesh.of(np.array(vertices), np.array([[0, 4, 5], [0, 5, 2], [1, 3, 5], [1, 5, 4]]))
+
+
+def distances(part, points):
+    """Distances from a mesh, by brute force."""
+    return np.array([facet_distances(part.vertices[part.faces], point).min() for point in points])
+
+
+@pytest.mark.parametrize("degrees", [5.0, 20.0, 60.0, 120.0])
+def test_points_between_two_flanks_are_moved_to_where_the_ball_touches_them(degrees):
+    """Where the flanks are steep, that is straight above the groove's bottom, at the same place along it."""
+    half, count = 0.5 * np.radians(degrees), 100
+    part, height, rng = wedge(2.0 * half, high=0.15), R / np.sin(half), np.random.default_rng(4)
+    below = rng.uniform(0.0, 0.2 * R, count)
+    aside = below * min(np.tan(half), 1.0 / np.tan(half)) * rng.uniform(-0.9, 0.9, count)
+    start = np.stack([rng.uniform(0.015, 0.025, count), aside, height - below], axis=1)
+    points, gaps = onto_level(FacetTree.of(part), start, R, 30, 1e-9)
+    np.testing.assert_allclose(gaps, R, rtol=1e-9)
+    np.testing.assert_allclose(distances(part, points), R, rtol=1e-8)
+    both = np.stack([start[:, 0], np.zeros(count), np.full(count, height)], axis=1)
+    if degrees < 90.0:
+        np.testing.assert_allclose(points, both, atol=1e-9)
+    assert (np.linalg.norm(points - start, axis=1) <= 1.2 * np.linalg.norm(both - start, axis=1)).all()
+
+
+def test_points_in_a_pit_of_many_facets_are_moved_onto_the_level():
+    """At the bottom of a cone of 24 facets, steep and shallow: the ball touches three or more of them."""
+    for steep in (0.5, 2.0, 8.0):
+        cone = trimesh.creation.cone(0.01, steep * 0.01, sections=24)
+        part = Mesh.of(cone.vertices * [1.0, 1.0, -1.0], cone.faces[:, ::-1])
+        side = part.facet_normals[:, 2] < 0.99
+        part = Mesh.of(part.vertices, part.faces[side])
+        tip = R * np.sqrt(1.0 + steep**2) - steep * 0.01
+        start = np.array([0.0, 0.0, tip]) + 0.1 * R * np.random.default_rng(1).uniform(-1.0, 1.0, (200, 3))
+        points, gaps = onto_level(FacetTree.of(part), start, R, 30, 1e-9)
+        np.testing.assert_allclose(gaps, R, rtol=1e-9)
+        np.testing.assert_allclose(distances(part, points), R, rtol=1e-8)
+        assert np.linalg.norm(points - start, axis=1).max() < 0.5 * R
+
+
+def test_a_point_in_a_gap_too_narrow_for_the_ball_is_told():
+    walls = joined(box((0.0, 0.0, 0.0), (0.01, 0.04, 0.04)), box((0.01 + 1.9 * R, 0.0, 0.0), (0.03, 0.04, 0.04)))
+    inside, above = (0.01 + 0.9 * R, 0.02, 0.02), (0.01 + 0.9 * R, 0.02, 0.04 + 0.2 * R)
+    points, gaps = onto_level(FacetTree.of(walls), np.array([inside, above]), R, 30, 1e-9)
+    assert gaps[0] < 0.96 * R
+    assert gaps[1] == pytest.approx(R, rel=1e-9)
+    np.testing.assert_allclose(gaps, distances(walls, points), rtol=1e-9)

@@ -61,6 +61,20 @@ def test_centres_lie_on_the_offset_and_chords_are_clear(pocket, passes):
     assert gaps(pocket.part, dense(lines_of(passes))).min() >= R - CHORDAL
 
 
+def test_a_pass_ends_where_no_centre_is_found_and_another_begins():
+    """A line dips deep into a gap narrower than the ball: nothing there is a place for its centre."""
+    walls = [[(0, 0, 0), (20, 30, 40)], [(20 + 5.6, 0, 0), (40, 30, 40)], [(0, 0, 0), (40, 30, 2)]]
+    ribs = DriveSurface.of(part(blocks(*(1e-3 * np.array(b, dtype=float) for b in walls))), R, UP)
+    x = 1e-3 * np.array([10.0, 15.0, 22.8, 22.8, 22.8, 30.0, 35.0])
+    z = 1e-3 * np.array([43.0, 43.0, 30.0, 25.0, 30.0, 43.0, 43.0])
+    line = np.stack([x, np.full(7, 0.015), z], axis=1)
+    both = Passes(np.concatenate([line, line[:2]]), np.tile(UP, (9, 1)), np.array([0, 7, 9]), np.array([3, 8]))
+    found = ribs.centres.exact(both, CHORDAL, 1e-5)
+    assert found.levels.tolist() == [3, 3, 8]
+    np.testing.assert_allclose(gaps(ribs.part, found.points), R, atol=1e-9)
+    assert gaps(ribs.part, dense(lines_of(found))).min() >= R - CHORDAL
+
+
 def test_passes_reach_the_floor_and_the_feet_of_the_walls(passes):
     """Centres over the floor are R above it and up to R from the walls."""
     floor = passes.points[np.abs(passes.points[:, 2] - (6e-3 + R)) < 1e-8]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 from raster_cases import UP, along, judged, pocket, raster
 
 from concave_parts import mesh
@@ -120,3 +121,51 @@ def test_a_fillet_narrower_than_the_ball_must_be_cut_along():
     assert shaped(found)[1] == pytest.approx((np.sqrt(2.0) - 1.0) * (R - 1.5e-3), rel=0.02)
     assert judged(along(*lines[2:], tool=BALL), part, BALL, left, region=fillet).value > 60.0
     assert judged(along(*lines[3:], tool=BALL), part, BALL, left, region=fillet).value == pytest.approx(100.0)
+
+
+def ledge(out=2e-3, height=0.01):
+    """A floor of 40 × 30 mm with a wall at x = 0 and a ledge above that stands out from it, 5 mm thick."""
+    blocks = [
+        [(0.0, 0.0, -5e-3), (0.04, 0.03, 0.0)],
+        [(-5e-3, 0.0, -5e-3), (0.0, 0.03, height)],
+        [(-5e-3, 0.0, height), (out, 0.03, height + 5e-3)],
+    ]
+    parts = [trimesh.creation.box(bounds=b) for b in blocks]
+    first = np.cumsum([0] + [len(part.vertices) for part in parts])
+    faces = [part.faces + k for part, k in zip(parts, first, strict=False)]
+    return Mesh.of(np.concatenate([part.vertices for part in parts]), np.concatenate(faces))
+
+
+def floor_lines(first):
+    """Lines along y over the floor of `ledge`, the tips at z = 0, from x = first on; from above, where it is free."""
+    xs = np.arange(first, 0.036, 1e-3)
+    return along(*(np.array([[x, -5e-3, 0.0], [x, 0.035, 0.0]])[:: (-1) ** k] for k, x in enumerate(xs)), tool=BALL)
+
+
+def test_a_floor_that_the_view_sees_must_be_cut_up_to_a_ledge_and_no_farther():
+    """From above the ball stands 5 mm from the wall: 2 mm of ledge and its radius. It could go on under the ledge."""
+    left, floor = 0.25e-3, Region(box=((0.0, 0.0145, -1e-3), (0.02, 0.0155, 1e-3)), angle=0.5)
+    up_to_it = judged(floor_lines(2e-3 + R), ledge(), BALL, left, region=floor)
+    assert up_to_it.value == 0.0
+    hidden = float(up_to_it.method.split(" % more is hidden by overhangs")[0].split("; ")[-1])
+    assert hidden == pytest.approx(10.0, rel=0.03)  # 2 of 20 mm
+    assert judged(floor_lines(R), ledge(), BALL, left, region=floor).value == 0.0
+    # A pass too few leaves all from the ledge's edge to where the ball on the next one reaches down.
+    short = judged(floor_lines(2e-3 + R + 2e-3), ledge(), BALL, left, region=floor)
+    reached = R + 4e-3 - np.sqrt(R**2 - (R - left) ** 2)
+    assert short.value == pytest.approx(100.0 * (reached - 2e-3) / 0.02, rel=0.1)
+
+
+def test_a_wall_that_leans_under_must_be_cut_as_far_down_as_a_ball_from_above_comes_near():
+    """It leans by 3 degrees under its upper edge; a quarter of what may be left hides nothing."""
+    high, left = 0.01, 0.2e-3
+    under = high * np.tan(np.radians(3.0))
+    corners = [(x, y, z) for y in (0.0, 0.03) for x, z in ((under, 0.0), (0.0, high), (0.02, high), (0.02, 0.0))]
+    block = trimesh.convex.convex_hull(np.array(corners))
+    part = Mesh.of(block.vertices, block.faces)
+    wall = Region(box=((-1e-3, 5e-3, 0.5e-3), (0.019, 0.025, 0.0095)), angle=np.radians(100.0))
+    assert part.diagnosis.watertight
+    found = judged(along(np.array([[-0.01, 0.0, 0.02], [-0.01, 0.01, 0.02]]), tool=BALL), part, BALL, left, region=wall)
+    # From 0.5 mm below the edge to where the wall is a quarter of that behind it.
+    seen = 0.25 * left / np.tan(np.radians(3.0)) - 0.5e-3
+    assert found.value == pytest.approx(100.0 * seen / 9e-3, rel=0.15)

@@ -27,10 +27,8 @@ _BLOCK, _GROUP = 4, 8
 """Steps along the side of a block, blocks along that of a group: a group far from the level needs one query."""
 _SHIFT = np.array([0.3819660, 0.2679492, 0.4142136])
 """Shares of a step by which the grid is off the part, so that flat faces do not lie in its planes."""
-_STEEPEST = 0.01
-"""Square of the sine of the least angle between walls along which a point is moved to where both are as far."""
 _ROUNDS, _ON_LEVEL = 3, 1e-11
-"""How often a vertex is moved onto the level along the line to its closest point, while it is off by this share."""
+"""How often a vertex is moved towards the level, while it is off by this share."""
 
 
 def offset_surface(tree: FacetTree, distance: float, step: float, parts: int = 1) -> tuple[Floats, Ints]:
@@ -68,32 +66,23 @@ def _contour(tree: FacetTree, nodes: Nodes, wide: Bools, distance: float) -> tup
     cross_level(starts, axes, metres, distance, tree.corners, tree.starts, tree.extents, points, normals)
     crossings = Crossings(nodes.keys[rows], axes, lengths, outside[rows], points, normals)
     vertices, triangles, _ = dual_contour(cells, nodes.keys, outside, crossings)
-    return onto_level(tree, vertices, distance, _ROUNDS, _ON_LEVEL), triangles
+    return onto_level(tree, vertices, distance, _ROUNDS, _ON_LEVEL)[0], triangles
 
 
-def onto_level(tree: FacetTree, points: Floats, distance: float, rounds: int, accuracy: float = 0.0) -> Floats:
-    """Return points (N, 3) moved to `distance` from the mesh, each along the line to its closest point, repeatedly.
+def onto_level(
+    tree: FacetTree, points: Floats, distance: float, rounds: int, accuracy: float = 0.0
+) -> tuple[Floats, Floats]:
+    """Return points (N, 3) moved to `distance` from the mesh, the shortest way, and the distances (N,) that they reach.
 
-    Between steep walls a step away from one leads back to the other: then a point moves along the one it just came
-    from, to where it is at the distance from both. accuracy: error of the distance, as a share of it, at which a point
-    is no longer moved.
+    Where two or three walls bound a ball, its centre is moved to where it touches them at once. accuracy: error of the
+    distance, as a share of it, at which a point is no longer moved. rounds: of moving it; some places, such as a gap
+    that is too narrow for the ball, are not left in any number of them.
     """
-    points, rows = points.copy(), np.arange(len(points))
-    before = np.zeros_like(points)
-    for _ in range(rounds):
-        gap, away, _ = tree.closest(points[rows])
-        off = np.abs(gap - distance) > accuracy * distance
-        rows, gap, away, before = rows[off], gap[off], away[off], before[off]
-        if not len(rows):
-            break
-        normals = away / np.where(gap > 0.0, gap, 1.0)[:, None]
-        back = (normals * before).sum(axis=1)
-        along = normals - np.where(back < 0.0, back, 0.0)[:, None] * before
-        square = (along * along).sum(axis=1)
-        along = np.where((square > _STEEPEST)[:, None], along / np.maximum(square, _STEEPEST)[:, None], normals)
-        points[rows] += (distance - gap)[:, None] * along
-        before = normals
-    return points
+    from pentapod.mesh.offset.level_kernels import move_onto_level  # noqa: PLC0415  loads numba
+
+    points, gaps = np.array(points, dtype=np.float64), np.empty(len(points))
+    move_onto_level(points, distance, rounds, accuracy * distance, tree.corners, tree.starts, tree.extents, gaps)
+    return points, gaps
 
 
 def _grid(tree: FacetTree, distance: float, step: float) -> tuple[Grid, Ints]:

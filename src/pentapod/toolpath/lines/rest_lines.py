@@ -56,18 +56,23 @@ def rest_lines(
     radius: float,
     stepover: float,
     hides: Callable[[Floats], Bools],
+    shortest: float = 0.0,
     options: RestOptions = RestOptions(),
 ) -> Passes:
     """Return lines over what passes leave on a patch of the offset surface of a ball of `radius` metres.
 
-    stepover: between the passes, metres. hides: tells which points (N, 3) cannot be machined.
+    stepover: between the passes, metres. hides: tells which points (N, 3) cannot be machined. shortest: metres; what is
+    shorter is no pass.
     """
     half = min(0.5 * stepover, radius)
     height = options.allowed * (radius - float(np.sqrt(radius**2 - half**2)))
     if height >= radius:  # passes so far apart are meant to leave the surface between them
         return Passes.joined([])
     step, whole = options.sample * radius, float(patch.areas.sum())
-    centres, parts = _dense(passes.split(~hides(passes.points)), step), list[Passes]()
+    passes = passes.split(~hides(passes.points))
+    centres, parts = _dense(passes.where(passes.lengths >= shortest), step), list[Passes]()
+    if not len(centres):
+        return Passes.joined([])
     coarse = _left(patch, KDTree(centres), radius, options.coarse * height, options) > 0.0
     near = patch.only(_grown(patch, coarse, 1)).refined(options.edge * stepover)
     for _ in range(options.rounds):

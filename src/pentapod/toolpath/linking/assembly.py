@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pentapod.base.arrays import Ints
+from pentapod.base.arrays import Floats, Ints
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
+from pentapod.geometry.runs import run_starts
 from pentapod.mesh.passes import Passes
 from pentapod.toolpath.lines.resampling import resample
 from pentapod.toolpath.linking.linking import Linker, Run
@@ -25,12 +26,14 @@ from pentapod.toolpath.toolpath import Toolpath
 class AssemblyOptions:
     """reach: distance in stepovers up to which links stay on the surface, if `PathOptions.stay` is None.
 
-    hidden_slack: height of the part above a waypoint, metres, from which it is hidden. least_cosine: of the region's
-    angle, for the height of the surface above lines below it.
+    hidden_slack: height of the part above a waypoint, metres, from which it is hidden. halvings: of the step between a
+    waypoint that is hidden and one that is not, to find where the pass ends. least_cosine: of the region's angle, for
+    the height of the surface above lines below it.
     """
 
     reach: float = 3.0
     hidden_slack: float = 1e-6
+    halvings: int = 6
     least_cosine: float = 0.05
 
 
@@ -53,7 +56,12 @@ def assembled(
     passes, source = passes.where(long), source[long]
     if not len(passes):
         raise empty_region(surface.part, options, dropped)
-    passes = surface.waypoints(passes, options)
+    # A pass may become several: levels carry its number meanwhile.
+    levels = passes.levels
+    passes = surface.waypoints(replace(passes, levels=np.arange(len(passes))), options)
+    if not len(passes):
+        raise empty_region(surface.part, options, dropped)
+    source, passes = source[passes.levels], replace(passes, levels=levels[passes.levels])
     power = np.ones(len(passes)) if paths.power is None else paths.power[source]
     reach = assembly.reach * paths.stepover if options.stay is None else options.stay
     # A proven link may be of any length, but not back along a pass that is cut one way.
@@ -112,8 +120,35 @@ def _waypoints(
     if not paths.visible:
         # A line below the surface is hidden by the surface itself, up to its depth measured along the view.
         slack = assembly.hidden_slack + paths.depth / max(np.cos(options.region.within), assembly.least_cosine)
-        keep = ~surface.hides(passes.points, slack)
-        hidden = int((~keep).sum())
-        passes = passes.split(keep) if hidden else passes
+        passes, hidden = _seen(passes, surface, slack, options.closest, assembly.halvings)
     source = passes.levels
     return replace(passes, levels=levels[source]), source, hidden
+
+
+def _seen(passes: Passes, surface: Surface, slack: float, closest: float, halvings: int) -> tuple[Passes, int]:
+    """Return the passes as far as the part does not hide them, and how many waypoints it hides.
+
+    They end where it begins to, as far as halving finds the place; no waypoint is nearer than `closest` metres to it.
+    """
+    keep = ~surface.hides(passes.points, slack)
+    if keep.all():
+        return passes, 0
+    rows = np.flatnonzero(passes.within & (keep[1:] != keep[:-1]))
+    out, into = np.where(keep[rows], rows, rows + 1), np.where(keep[rows], rows + 1, rows)
+    low, high = np.zeros(len(rows)), np.ones(len(rows))
+
+    def between(values: Floats, share: Floats) -> Floats:
+        return values[out] + share[:, None] * (values[into] - values[out])
+
+    for _ in range(halvings):
+        middle = 0.5 * (low + high)
+        seen = ~surface.hides(between(passes.points, middle), slack)
+        low, high = np.where(seen, middle, low), np.where(seen, high, middle)
+    far = low * passes.steps[rows] > closest
+    points, normals = (
+        np.insert(values, rows[far] + 1, between(values, low)[far], axis=0)
+        for values in (passes.points, passes.normals)
+    )
+    counts = np.diff(passes.starts) + np.bincount(passes.pass_of_point[rows[far]], minlength=len(passes))
+    whole = Passes(points, normals, run_starts(counts), passes.levels)
+    return whole.split(np.insert(keep, rows[far] + 1, True)), int((~keep).sum())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -96,7 +97,8 @@ def with_fills(surface: Surface, paths: ContactPaths, options: PathOptions) -> C
     patch = surface.patch(options.region)
     creases = uncrossed(crease_lines(patch), paths.passes, paths.stepover, surface.radius)
     passes = Passes.joined([paths.passes, creases])
-    rest = rest_lines(patch, passes, surface.radius, paths.stepover, lambda x: surface.hides(x, options.chordal))
+    hides = partial(surface.hides, slack=options.chordal)
+    rest = rest_lines(patch, passes, surface.radius, paths.stepover, hides, options.shortest)
     return replace(paths, passes=Passes.joined([passes, rest])) if len(creases) + len(rest) else paths
 
 

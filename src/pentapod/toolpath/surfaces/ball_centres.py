@@ -43,7 +43,7 @@ class DriveOptions(Value):
     longest: float = 2.5
     uneven: float = 3.0
     around: float = 3.0
-    sideways: float = 0.01
+    sideways: float = 0.2
     above: float = 0.2
     evened: int = 2
 
@@ -57,18 +57,27 @@ class BallCentres:
     options: DriveOptions
 
     def on_level(self, points: Floats) -> Floats:
-        """Return points (N, 3) moved onto the offset, along the lines to their closest points of the part."""
-        return onto_level(self.tree, points, self.radius, self.options.rounds, self.options.on_level)
+        """Return points (N, 3) moved onto the offset, as far as that is possible: see `onto_level`."""
+        return self._settled(points)[0]
+
+    def _settled(self, points: Floats) -> tuple[Floats, Bools]:
+        """Return points (N, 3) moved onto the offset, and which of them are on it then."""
+        off = self.options.on_level
+        points, gaps = onto_level(self.tree, points, self.radius, self.options.rounds, off)
+        return points, np.abs(gaps - self.radius) <= off * self.radius
 
     def exact(self, passes: Passes, chordal: float, closest: float) -> Passes:
         """Return passes with their points on the offset, and with more where a chord leaves it by more than `chordal`.
 
         No chord comes nearer to the part than radius − chordal: that is proven. How far it is from the offset outwards
-        is measured in its middle. closest: metres; shorter chords are not halved, if they are clear for their length.
+        is measured in its middle. Where no centre is found between two points, a pass ends and another begins.
+        closest: metres; shorter chords are not halved: they are clear for their length.
         """
         shortest = min(closest, 2.0 * chordal)
-        points, owner = self.on_level(passes.points), passes.pass_of_point
-        live = owner[1:] == owner[:-1]
+        points, held = self._settled(passes.points)
+        points, owner = points[held], passes.pass_of_point[held]
+        torn = owner[1:] != owner[:-1]
+        live = ~torn
         for _ in range(self.options.rounds):
             rows = np.flatnonzero(live)
             rows = rows[np.linalg.norm(points[rows + 1] - points[rows], axis=1) > shortest]
@@ -76,15 +85,20 @@ class BallCentres:
             if not len(rows):
                 break
             middles = 0.5 * (points[rows] + points[rows + 1])
-            bad = ~self.tree.within(middles, self.radius + chordal)
-            bad |= ~self.clear(points[rows], points[rows + 1], self.radius - chordal)
-            at = rows[bad] + 1
-            live[rows[bad]] = True
-            points = np.insert(points, at, self.on_level(middles[bad]), axis=0)
-            owner = np.insert(owner, at, owner[at])
-            live = np.insert(live, at, True)
-        starts = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1, [len(owner)]])
-        return Passes(points, self.normals(points), starts, passes.levels)
+            cut = ~self.clear(points[rows], points[rows + 1], self.radius - chordal)
+            bad = cut | ~self.tree.within(middles, self.radius + chordal)
+            rows, cut = rows[bad], cut[bad]
+            middles, held = self._settled(middles[bad])
+            torn[rows[cut & ~held]] = True
+            rows = rows[held]
+            live[rows] = True
+            points = np.insert(points, rows + 1, middles[held], axis=0)
+            owner, torn = (np.insert(array, rows + 1, array[rows]) for array in (owner, torn))
+            live = np.insert(live, rows + 1, True)
+        torn |= live
+        begins, ends = np.flatnonzero(np.append(True, torn)), np.flatnonzero(np.append(torn, True))
+        whole = Passes(points, self.normals(points), np.append(begins, len(points)), passes.levels[owner[begins]])
+        return whole.where(ends > begins)
 
     def ways(self, starts: Floats, ends: Floats, spacing: float, chordal: float, closest: float) -> list[Floats | None]:
         """Return for each pair of centres (L, 3) the points (n, 3) of a way on or above the surface, ends included.

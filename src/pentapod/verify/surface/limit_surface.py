@@ -16,6 +16,7 @@ from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats
 from pentapod.geometry.solids import Solid
+from pentapod.mesh.query.heightfield import HeightField
 from pentapod.verify.replay.replay import Replay
 from pentapod.verify.surface.reachable import body_reaches, nearest_centres
 from pentapod.verify.verdict.coverage import Coverage
@@ -28,13 +29,21 @@ class LimitOptions:
 
     touches: height of the limit surface that counts as none, metres. far: radii of a ball up to which it is searched
     for. steps: heights at which cutters that are no balls are tried, up to what may be left. above_m: height of points
-    whose view is tested, for a beam.
+    whose view is tested, for a beam. hidden: share of what may be left by which an overhang must keep a ball off;
+    hangs: metres from the part from which on a ball touches nothing.
     """
 
     touches: float = 1e-6
     far: float = 4.0
     steps: int = 8
     above_m: float = 1e-5
+    hidden: float = 0.25
+    hangs: float = 2e-5
+
+    def first_heights(self, radius: float, coverage: Coverage) -> Floats:
+        """Return heights (k,), metres, at which a ball is searched for one after the other."""
+        far, first = self.far * radius, min(coverage.left, self.far * radius)
+        return np.array([0.0, *(first * 2.0 ** np.arange(np.ceil(np.log2(far / first)))), far])
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +93,7 @@ class LimitSurface:
         radius: float,
         options: LimitOptions,
     ) -> LimitSurface:
-        far, first = options.far * radius, min(coverage.left, options.far * radius)
-        beyond = np.array([0.0, *(first * 2.0 ** np.arange(np.ceil(np.log2(far / first)))), far])
+        beyond = options.first_heights(radius, coverage)
         offset = nearest_centres(cutting.surface, points, normals, radius, coverage.up, beyond) - points
         away = np.linalg.norm(offset, axis=1)
         heights = np.where(away <= radius + options.touches, 0.0, away - radius)
@@ -116,6 +124,31 @@ class LimitSurface:
                     at, up = points[open_] + height * normals[open_], normals[open_]
                     heights[open_[body_reaches(cutting.surface, cutting.cutter, at, along[open_], up)]] = below
         return cls(heights, points + heights[:, None] * normals, normals)
+
+
+def under_overhangs(
+    cutting: Cutting,
+    coverage: Coverage,
+    points: Floats,
+    normals: Floats,
+    limit: LimitSurface,
+    options: LimitOptions = LimitOptions(),
+) -> Bools:
+    """Return which points (N, 3) only an overhang keeps a ball off, since it is retracted along the view.
+
+    limit: the limit surface above them. The point is hidden from the view, or a ball at the nearest centre touches
+    nothing; and if it had not to be retracted, it would come nearer by more than a share of what may be left.
+    """
+    field, radius = HeightField(cutting.surface.mesh, coverage.up), cutting.cutter[0].rounding
+    found = field.hides(points + options.above_m * normals, options.above_m)
+    within = radius + options.hangs
+    found |= cutting.surface.points(limit.points + radius * limit.normals, within=within).distance >= within
+    points, normals, heights = points[found], normals[found], limit.heights[found]
+    beyond = options.first_heights(radius, coverage)
+    centres = nearest_centres(cutting.surface, points, normals, radius, coverage.up, beyond, retracted=False)
+    nearer = heights - (np.linalg.norm(centres - points, axis=1) - radius)
+    found[found] = nearer > options.hidden * coverage.left
+    return found
 
 
 def is_ball_end(replay: Replay, solid: Solid) -> bool:

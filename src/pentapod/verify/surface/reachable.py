@@ -49,27 +49,31 @@ def nearest_centres(
     view: Floats,
     beyond: Floats,
     options: ReachOptions = ReachOptions(),
+    *,
+    retracted: bool = True,
 ) -> Floats:
     """Return the centres (N, 3) nearest to points (N, 3) at which a ball gouges nowhere and can be retracted.
 
     The nearest that a search finds, NaN where it finds none. normals (N, 3): unit, of the surface below; the search
     starts along them. beyond (k ≥ 2,): ascending from 0, metres by which a first centre may be farther than a radius.
+    retracted: False for centres that need not be retracted, such as those under an overhang.
     """
     centres, low = np.full(points.shape, np.nan), np.zeros(len(points))
-    field = HeightField(surface.mesh, view)
+    field, out = HeightField(surface.mesh, view), view if retracted else None
     for height in beyond:
         open_ = np.flatnonzero(np.isnan(centres[:, 0]))
         # A ball that is retracted along the view sweeps a convex room: from each of its points the view is free. What
         # is hidden even at the first height is out of reach, and does not answer for what hides it.
-        at = points[open_] + (min(height, float(beyond[1])) + options.above_m) * normals[open_]
-        open_ = open_[~field.hides(at, options.above_m)]
+        if retracted:
+            at = points[open_] + (min(height, float(beyond[1])) + options.above_m) * normals[open_]
+            open_ = open_[~field.hides(at, options.above_m)]
         for start in _starts(normals[open_], view, options.around)[: None if height > 0.0 else 1]:
             todo = np.isnan(centres[open_, 0])
             rows = open_[todo]
             if len(rows):
                 within = np.full(len(rows), radius + height)
                 first = points[rows] + (radius + height) * start[todo]
-                centres[rows] = _settled(surface, points[rows], normals[rows], first, within, radius, view, options)
+                centres[rows] = _settled(surface, points[rows], normals[rows], first, within, radius, out, options)
     high = np.linalg.norm(centres - points, axis=1) - radius
     for _ in range(options.halvings):
         open_ = np.flatnonzero(high - low > options.near_m)
@@ -77,7 +81,7 @@ def nearest_centres(
             break
         middle = 0.5 * (low[open_] + high[open_])
         within = radius + middle
-        made = _settled(surface, points[open_], normals[open_], centres[open_], within, radius, view, options)
+        made = _settled(surface, points[open_], normals[open_], centres[open_], within, radius, out, options)
         better = ~np.isnan(made[:, 0])
         low[open_[~better]] = middle[~better]
         hit = open_[better]
@@ -93,13 +97,14 @@ def _settled(
     centres: Floats,
     within: Floats,
     radius: float,
-    view: Floats,
+    out: Floats | None,
     options: ReachOptions,
 ) -> Floats:
-    """Return clear centres (N, 3) near the given ones, `within` (N,) metres of points (N, 3), to be retracted; or NaN.
+    """Return clear centres (N, 3) near the given ones, `within` (N,) metres of points (N, 3); NaN where none is found.
 
-    By alternating projections on what is a radius from the part and on what is within that distance of the point. The
-    part must not be between: a ball behind a thin wall says nothing of this side.
+    From them the ball can be retracted along `out` (3,), if that is given. By alternating projections on what is a
+    radius from the part and on what is within that distance of the point. The part must not be between: a ball behind a
+    thin wall says nothing of this side.
     """
     slack, c = options.slack_m, centres.copy()
     todo = np.arange(len(c))
@@ -116,8 +121,9 @@ def _settled(
     held &= np.linalg.norm(c - points, axis=1) <= within + slack
     kept = np.flatnonzero(held)
     if len(kept):
-        out = c[kept] + _way_out(surface, radius) * view
-        held[kept] = surface.segments(c[kept], out, within=radius).distance >= radius - 2.0 * slack
+        if out is not None:
+            ends = c[kept] + _way_out(surface, radius) * out
+            held[kept] = surface.segments(c[kept], ends, within=radius).distance >= radius - 2.0 * slack
         way = c[kept] - points[kept]
         start = points[kept] + options.above_m * way / np.linalg.norm(way, axis=1, keepdims=True)
         held[kept] &= surface.segments(start, c[kept], within=slack).distance >= slack

@@ -23,7 +23,7 @@ from pentapod.mesh.patch import Patch
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
-from pentapod.verify.surface.limit_surface import LimitSurface, is_ball_end
+from pentapod.verify.surface.limit_surface import LimitSurface, is_ball_end, under_overhangs
 from pentapod.verify.surface.swept_cutter import SweptSolid
 from pentapod.verify.verdict.coverage import Coverage
 from pentapod.verify.verdict.cutting import Cutting
@@ -57,7 +57,8 @@ OPTIONS = SurfaceOptions()
 class _Left:
     """What is left on a region.
 
-    Areas, square metres: missed, where the tool could have been; beyond, where no room for it is found; shaped, where
+    Areas, square metres: missed, where the tool could have been; beyond, where no room for it is found, or only
+    where an overhang hides the surface from the view; shaped, where
     its shape must leave material, and only what is left beyond that was judged; between, where only the middles of
     cells show that no more is left. shape: the largest height that the shape leaves there. cell: largest width of those
     cells, metres. deepest: largest height along the normal that is left where the tool could have been, metres,
@@ -137,8 +138,14 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
     for one in swept:
         one.entries(above.points, above.normals, heights)
         one.distances(above.points, gaps)
-    own = np.flatnonzero((above.heights == 0.0) | (heights > height))
-    shaped = above.heights > 0.0
+    own, shaped = (above.heights == 0.0) | (heights > height), above.heights > 0.0
+    kept_off = np.flatnonzero(own & shaped) if by_ball else np.zeros(0, dtype=np.intp)
+    if len(kept_off):
+        at, its_normals, limit = middles[kept_off], normals[known][kept_off], above.where(own & shaped)
+        kept_off = kept_off[under_overhangs(cutting, coverage, at, its_normals, limit)]
+        own[kept_off] = shaped[kept_off] = False
+        unknown += float(weights[kept_off].sum())
+    own = np.flatnonzero(own)
     deepest, place, gap = float(highest[0]), highest[1:], 0.0
     if len(own):
         worst = own[np.lexsort((gaps[own], heights[own] if cutting.cutter else gaps[own]))[-1]]
@@ -149,7 +156,7 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
         float(weights[own].sum()),
         unknown,
         float(weights[shaped].sum()),
-        float(above.heights.max(initial=0.0)),
+        float(above.heights[shaped].max(initial=0.0)),
         between,
         2.0 * fine,
         deepest,
@@ -194,7 +201,7 @@ def _method(found: _Left, coverage: Coverage, area: float, *, beam: bool) -> str
         deepest = "more than " if found.deepest >= found.far else ""
         text += f"; deepest found {deepest}{MM * found.deepest:.3g} mm at {where}"
         text += f", where the cutter is up to {MM * found.gap:.3g} mm away" if found.gap > 0.0 else ""
-        hidden = "is out of reach for the cutter, as far as the search finds"
+        hidden = "is hidden by overhangs or out of reach for the cutter, as far as the search finds"
     cells = f"of cells of {MM * found.cell:.2g} mm"
     if found.between > 0.0:
         text += f"; {100.0 * found.between / area:.3g} % judged only at the middles {cells}"
