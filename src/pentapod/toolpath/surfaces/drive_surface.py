@@ -143,7 +143,7 @@ class DriveSurface:
         )
         starts, stops = (contacts + self.radius * normals for contacts, normals in (first, last))
         told = options.spacing, options.chordal, min(options.closest, options.chordal)
-        ways = self.centres.ways(starts, stops, *told)
+        ways = self._seen(self.centres.ways(starts, stops, *told), options)
         missed = [row for row, way in enumerate(ways) if way is None]
         for row, way in zip(missed, self._around(starts[missed], stops[missed], options), strict=True):
             ways[row] = way
@@ -173,7 +173,16 @@ class DriveSurface:
         told = options.spacing, options.chordal, min(options.closest, options.chordal)
         for row, way in zip(rows, drawn_taut(self.centres, found, *told), strict=True):
             lines[row] = way
-        return lines
+        return self._seen(lines, options)
+
+    def _seen(self, ways: list[Floats | None], options: PathOptions) -> list[Floats | None]:
+        """Return ways (n, 3) of centres, None for those on which the part lies above: there only the ball has room."""
+        kept = [way for way in ways if way is not None]
+        if not kept:
+            return ways
+        ends = np.cumsum([len(way) for way in kept])
+        hidden = iter(np.add.reduceat(self.hides(np.concatenate(kept), options.chordal), [0, *ends[:-1]]))
+        return [None if way is None or next(hidden) else way for way in ways]
 
     def is_clear(self, centres: Floats, chordal: float) -> bool:
         """Return whether the ball is clear of the part but for `chordal` metres along a line of centres (n, 3)."""
