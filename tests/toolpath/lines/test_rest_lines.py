@@ -87,6 +87,23 @@ def test_the_bottom_of_a_hollow_gets_a_line_where_passes_beside_it_leave_too_muc
     assert after.query(bottom)[0].max() - R < 0.5 * RIDGE
 
 
+def test_the_bottom_of_a_pit_gets_a_line_where_passes_beside_it_leave_too_much():
+    """Three walls meet at a point midway between two passes: the ball at the bottom touches all three at once."""
+
+    def pit(x, y):
+        away = [np.cos(a) * (x - 0.01) + np.sin(a) * (y - 0.015) for a in np.radians([90.0, 210.0, 330.0])]
+        return 0.6 * np.maximum.reduce(away)
+
+    beside = STEP * np.arange(0.5, 5.0)
+    found = rest_lines(
+        sheet(pit, cells=150), along_x(np.concatenate([0.015 + beside, 0.015 - beside]), pit), R, STEP, none
+    )
+    bottom = np.array([0.01, 0.015, -R])
+    assert np.linalg.norm(found.points - bottom - [0.0, 0.0, R], axis=1).min() < 3e-4
+    near = KDTree(np.concatenate([dense(found.points[found.rows(k)]) for k in range(len(found))]))
+    assert near.query(bottom)[0] - R < 0.5 * RIDGE
+
+
 @pytest.mark.slow
 def test_hollows_of_an_egg_crate_are_machined(monkeypatch):
     """Lows of 2.5 mm for a ball of 2 mm: without rest lines much more is left in them than the ridge."""

@@ -10,8 +10,9 @@ import trimesh
 from pentapod import Mesh, RasterOptions, Region
 from pentapod.cutters.ball import BallCutter
 from pentapod.mesh.passes import Passes
+from pentapod.toolpath import SegmentKind, make_toolpath
 from pentapod.toolpath.strategies.raster import raster_paths
-from pentapod.toolpath.surfaces.ball_centres import smoothed
+from pentapod.toolpath.surfaces.ball_centres import DriveOptions, smoothed
 from pentapod.toolpath.surfaces.drive_surface import DriveSurface
 from pentapod.toolpath.surfaces.part_surface import PartSurface
 
@@ -132,6 +133,36 @@ def test_no_link_leaves_the_region_or_is_too_long(post):
     assert not post.links(pair, RasterOptions(stepover=2e-3, region=Region(angle=np.radians(80.0))), 2e-3)
     lazy = replace(post, centres=replace(post.centres, options=replace(post.options, around=0.5)))
     assert not lazy.links(pair, RasterOptions(stepover=2e-3), 2e-3)
+
+
+@pytest.fixture(scope="module")
+def bridge():
+    """A floor of 40 × 20 mm, and above it a slab from x = 15 to 25 mm: 12 mm of room below it."""
+    both = [[(0, 0, -4), (40, 20, 0)], [(15, -5, 12), (25, 25, 14)]]
+    return part(blocks(*(1e-3 * np.array(b, dtype=float) for b in both)))
+
+
+def test_no_link_leads_under_what_hides_the_surface(bridge):
+    """The straight way is clear of the part, but the tool above the ball has no room there."""
+    surface = DriveSurface.of(bridge, R, UP)
+    ends = contacts_at(surface, np.array([[8e-3, 10e-3, R], [32e-3, 10e-3, R]]))
+    straight = surface.centres.ways(*(contacts + R * normals for contacts, normals in ends), 5e-4, CHORDAL, 1e-5)
+    assert straight[0] is not None
+    found = surface.links({1: (ends[0], ends[1])}, RasterOptions(stepover=2e-3, chordal=CHORDAL), 2e-3)
+    for contacts, normals in found.values():
+        x, _, z = (contacts + R * normals).T
+        assert (z[(x > 14e-3) & (x < 26e-3)] > 12e-3).all()
+
+
+def test_passes_go_on_to_where_the_part_begins_to_hide_them(bridge):
+    """As seen from above a ball is hidden from a radius beside the slab on; walls that lean under a little are not."""
+    tool, hidden = BallCutter(R), 15e-3 - R + DriveOptions().sideways * R
+    options = RasterOptions(stepover=2e-3, region=Region(angle=np.radians(30.0)), spacing=4e-3)
+    cuts = [s.tips + R * s.axes for s in make_toolpath(bridge, tool, options).segments if s.kind is SegmentKind.CUT]
+    last = np.array([cut[cut[:, 0].argmax()] for cut in cuts])
+    ends = last[(np.abs(last[:, 2] - R) < 1e-6) & (last[:, 0] < 20e-3), 0]
+    assert len(ends) >= 10
+    np.testing.assert_allclose(ends, hidden, atol=4e-3 / 2**6 + 1e-6)
 
 
 def test_region_box_bounds_the_contacts_not_the_centres(pocket):

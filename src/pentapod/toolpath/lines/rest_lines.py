@@ -42,7 +42,7 @@ class RestOptions:
     sample: float = 0.05
     bent: float = float(np.radians(10.0))
     folded: float = float(np.radians(179.0))
-    negligible: float = 2.5e-4
+    negligible: float = 5e-5
     rounds: int = 3
     rings: int = 2
     core: float = 0.7
@@ -117,6 +117,22 @@ def _left(patch: Patch, tree: KDTree, radius: float, height: float, options: Res
         more = np.maximum(np.minimum(far, 2.0 * radius) - radius, 0.0)
         np.maximum.at(left, a, more)
         np.maximum.at(left, b, more)
+    return np.maximum(left, _left_in_pits(patch, tree, radius, depth, options)[patch.faces].max(axis=1))
+
+
+def _left_in_pits(patch: Patch, tree: KDTree, radius: float, depth: float, options: RestOptions) -> Floats:
+    """Return by how much (V,) each vertex is not cleared along the mean of the normals around it, metres.
+
+    At the bottom of a pit, where the ball touches three walls, that is where most is left. 0 where it is not bent.
+    """
+    corners, normals = patch.faces.ravel(), np.repeat(patch.facet_normals, 3, axis=0)
+    mean = np.stack([np.bincount(corners, weights=normals[:, k], minlength=len(patch.vertices)) for k in range(3)], 1)
+    mean = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+    least = np.ones(len(mean))
+    np.minimum.at(least, corners, np.einsum("ij,ij->i", normals, mean[corners]))
+    left, bent = np.zeros(len(mean)), least < np.cos(0.5 * options.bent)
+    far = tree.query(patch.vertices[bent] - depth * mean[bent], distance_upper_bound=2.0 * radius)[0]
+    left[bent] = np.maximum(np.minimum(far, 2.0 * radius) - radius, 0.0)
     return left
 
 

@@ -79,9 +79,12 @@ class DriveSurface:
 
     def hides(self, points: Floats, slack: float) -> Bools:
         """Return whether the drive surface lies above points (N, 3) on it by more than `slack` metres."""
+        return self._hides(points, slack, self.options.sideways)
+
+    def _hides(self, points: Floats, slack: float, sideways: float) -> Bools:
         height = points @ self.view + max(slack, self.options.above * self.radius)
         # Walls and corners along the view do not hide themselves: one of four points around is free.
-        x, y = (self.options.sideways * self.radius * side for side in tangent_frame(self.view))
+        x, y = (sideways * self.radius * side for side in tangent_frame(self.view))
         around = (0.83 * x + 0.56 * y, 0.56 * x - 0.83 * y)
         hidden = np.ones(len(points), dtype=np.bool_)
         for aside in (*around, *(-step for step in around)):
@@ -181,7 +184,8 @@ class DriveSurface:
         if not kept:
             return ways
         ends = np.cumsum([len(way) for way in kept])
-        hidden = iter(np.add.reduceat(self.hides(np.concatenate(kept), options.chordal), [0, *ends[:-1]]))
+        under = self._hides(np.concatenate(kept), options.chordal, self.options.under)
+        hidden = iter(np.add.reduceat(under, [0, *ends[:-1]]))
         return [None if way is None or next(hidden) else way for way in ways]
 
     def is_clear(self, centres: Floats, chordal: float) -> bool:
