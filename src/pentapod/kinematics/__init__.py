@@ -9,6 +9,7 @@ from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.path_tracking import FollowedPath, follow
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
+from pentapod.kinematics.families.ringed import RingedPentapod
 from pentapod.kinematics.families.singularities import (
     architectural_measure,
     orientation_distance,
@@ -65,6 +66,7 @@ __all__ = [
     "MotionProof",
     "ProvenPoses",
     "ReconfigurablePentapod",
+    "RingedPentapod",
     "Robot",
     "RolledPlatform",
     "SearchOptions",

@@ -15,14 +15,15 @@ from pentapod.base.values import Value
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.fields import LEG_NUMBERS, LEG_PAIRS, LEGS
 
-QUADRATIC, GENERAL, HEXA, SPR = "quadratic", "general", "hexa", "4-ups-spr"
+QUADRATIC, GENERAL, PENTAKINS, HEXA, SPR = "quadratic", "general", "pentakins", "hexa", "4-ups-spr"
 
 
 class GeometryTable(TomlTable):
     """Where the joints are. The quadratic family: delta, or platform_mm, or both if they agree; others: platform_mm."""
 
     family: str = Field(
-        default=QUADRATIC, description="robot family: quadratic, general, hexa or 4-ups-spr; packages can add others"
+        default=QUADRATIC,
+        description="robot family: quadratic, general, pentakins, hexa or 4-ups-spr; packages can add others",
     )
     base_mm: LEG_PAIRS = Field(description="base joints [x, y] in the base plane z = 0, leg by leg")
     delta: float | None = Field(default=None, description="platform joint i is at delta · x_i along the tool axis")
@@ -53,6 +54,7 @@ FAMILIES = Registry(
     homes={
         QUADRATIC: "pentapod.machine.robots.quadratic",
         GENERAL: "pentapod.machine.robots.general",
+        PENTAKINS: "pentapod.machine.robots.pentakins",
         HEXA: "pentapod.machine.robots.hexa",
         SPR: "pentapod.machine.robots.spr",
     },

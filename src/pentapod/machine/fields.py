@@ -117,6 +117,11 @@ def _pairs(value: object, info: ValidationInfo) -> list[list[float]]:
     return _rows(value, 2, count, word, f"{word} pairs [x, y], one for each leg")
 
 
+def _points(value: object, info: ValidationInfo) -> list[list[float]]:
+    count, word = _legs(info)
+    return _rows(value, 3, count, word, f"{word} points [x, y, z], one for each leg")
+
+
 def _axes(value: object, info: ValidationInfo) -> list[list[float]]:
     count, word = _legs(info)
     words = f"one unit vector [x, y, z], or {word} (one for each leg)"
@@ -127,5 +132,6 @@ def _axes(value: object, info: ValidationInfo) -> list[list[float]]:
 PER_LEG = Annotated[list[float], BeforeValidator(_one_or_each)]
 LEG_NUMBERS = Annotated[list[float], BeforeValidator(_each)]
 LEG_PAIRS = Annotated[list[list[float]], BeforeValidator(_pairs)]
+LEG_POINTS = Annotated[list[list[float]], BeforeValidator(_points)]
 LEG_AXES = Annotated[list[list[float]], BeforeValidator(_axes)]
 LIST_OF_3 = Annotated[list[float], Field(min_length=3, max_length=3)]

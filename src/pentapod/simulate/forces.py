@@ -11,9 +11,9 @@ import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.base.errors import InputError
-from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.forces import FREEDOMS, held_wrenches
 from pentapod.kinematics.jacobian import pose_jacobian
+from pentapod.kinematics.legs_on_rings import LegsOnRings
 from pentapod.numerics.blocks import blocks
 from pentapod.simulate.bodies import Capsule, leg_cylinder, leg_rod, spindle
 from pentapod.simulate.reference import Reference
@@ -72,7 +72,7 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
                     at_p, turning = at_p + across, turning + np.cross(lever, across)
                     continue
                 on_p, on_i = across, robot.offsets[leg] * across
-                if isinstance(robot, AsBuiltPentapod):
+                if isinstance(robot, LegsOnRings):
                     on_p, on_i = robot.pose_loads(position[middle], direction[middle], leg, across)
                 at_p, at_i = at_p + on_p, at_i + on_i
     if held:

@@ -16,8 +16,8 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.forces import FREEDOMS
+from pentapod.kinematics.legs_on_rings import LegsOnRings
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.leg_model import robot_zeros
 from pentapod.machine.machine import Machine
@@ -172,7 +172,7 @@ def _rotation_from_z(direction: Floats) -> Floats:
 
 def _radii(real: Robot) -> Floats:
     """Return the radii (n_legs,) of rings on which legs end, which turn freely about the line; 0 for others."""
-    return real.radii if isinstance(real, AsBuiltPentapod) else np.zeros(real.n_legs)
+    return real.radii if isinstance(real, LegsOnRings) else np.zeros(real.n_legs)
 
 
 def _hinges(real: Robot, position: Floats, direction: Floats) -> dict[int, Floats]:

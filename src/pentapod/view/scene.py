@@ -8,7 +8,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.kinematics.legs_on_rings import LegsOnRings
 from pentapod.machine.clearance.collision_world import mounted
 from pentapod.report.decimate import thinned_mesh
 from pentapod.report.figure import LIMIT_COLOUR, leg_colour
@@ -124,7 +124,7 @@ class ViewerScene:
         top, nose = float(heights.max()), machine.bodies.shaft_end
         self._cylinder("/tool/spindle", machine.bodies.shaft_radius, STEEL, nose, top)
         self._cylinder("/tool/shaft", SHAFT_SHARE * machine.bodies.shaft_radius, DARK, 0.0, nose)
-        if isinstance(machine.robot, AsBuiltPentapod):
+        if isinstance(machine.robot, LegsOnRings):
             for k in np.flatnonzero(machine.robot.radii > machine.bodies.shaft_radius).tolist():
                 rim = _circle(np.array([0.0, 0.0, heights[k]]), float(machine.robot.radii[k]))
                 colour = _rgb(leg_colour(k))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BPoly
 
-from pentapod.kinematics import AsBuiltPentapod, GeneralPentapod, LinearPentapod, Robot
+from pentapod.kinematics import AsBuiltPentapod, GeneralPentapod, LinearPentapod, RingedPentapod, Robot
 
 BASE = np.array([[-0.552, -0.229], [-0.312, 0.510], [0.155, 0.577], [0.429, -0.417], [-0.078, -0.563]])
 QUADRATIC = LinearPentapod.quadratic(BASE, 0.2125)
@@ -17,6 +17,9 @@ ROBOTS: dict[str, Robot] = {
         QUADRATIC, base_errors=ERRORS, radii=[0.02, 0.0, 0.01, 0.015, 0.0], zeros=[5e-4, -5e-4, 0.0, 5e-4, 5e-4]
     ),
     "as built, general": AsBuiltPentapod.of(GENERAL, base_errors=ERRORS, radii=0.004, zeros=5e-4),
+    "pentakins": RingedPentapod(
+        np.column_stack([BASE, [0.1, -0.05, 0.0, 0.05, 0.1]]), QUADRATIC.offsets, np.full(5, 0.03), [0.08, 0.01, 0.45]
+    ),
 }
 OFFSETS = np.array([-0.1, 0.0, 0.19])
 BASE_AXES = np.tile([0.0, 0.6, 0.8], (5, 1))

@@ -108,36 +108,31 @@ def import_machine() -> None:
 @import_machine.command("hal")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("-o", "--out", type=click.Path(path_type=Path), required=True, help="Machine file to write.")
-@click.option("--like", default="desk", help="Shipped machine, or a machine file: joints, bodies, limits, controller.")
+@click.option("--ini", type=click.Path(path_type=Path), help="Ini file of LinuxCNC: strokes and limits of the legs.")
+@click.option("--like", default="desk", help="Shipped machine, or a machine file: joints, bodies, controller.")
 @json_option
 @quiet_option
-def import_hal(file: Path, out: Path, like: str, as_json: bool, quiet: bool) -> int:
+def import_hal(file: Path, out: Path, ini: Path | None, like: str, as_json: bool, quiet: bool) -> int:
     """Make a machine of the pentakins parameters in a HAL FILE of LinuxCNC, rings and all.
 
-    Beside the machine file OUT a calibration file is written, which holds rings and joints as they are. What HAL does
-    not say is that of the machine LIKE: change it in OUT.
+    What HAL and the ini file do not say is that of the machine LIKE: change it in OUT.
     """
-    import datetime
-
     from pentapod.base.errors import MachineError
     from pentapod.base.files import atomic_write
     from pentapod.base.toml import parsed
-    from pentapod.machine import Machine, write_calibration
-    from pentapod.machine.calibration.pentakins import machine_files, read_pentakins
+    from pentapod.machine import Machine, read_machine
+    from pentapod.machine.hal_import import LEGS, machine_text, read_limits, read_pentakins
     from pentapod.machine.reader import machine_bytes
 
-    Machine.load(like)
+    if (count := Machine.load(like).robot.n_legs) != LEGS:
+        raise MachineError("not a machine of five legs", key="--like", value=like, expected=f"{LEGS} legs, not {count}")
     content = parsed(machine_bytes(like).decode("utf-8-sig"), like, MachineError)
-    measured = out.with_name(f"{out.stem}-calibration.toml")
-    text, record = machine_files(
-        read_pentakins(file), out.stem, content, measured.name, datetime.datetime.now(datetime.UTC).date()
-    )
-    write_calibration(record, measured)
+    text = machine_text(read_pentakins(file), out.stem, content, read_limits(ini) if ini else {})
+    made = read_machine(text, out)
     with atomic_write(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    made = Machine.load(out)
     if as_json:
-        echo_json({"machine": str(out), "calibration": str(measured), "digest": made.digest})
+        echo_json({"machine": str(out), "digest": made.digest})
     elif not quiet:
-        click.echo(f"{out} and {measured.name}; all but the geometry is that of {like}")
+        click.echo(f"{out}; all but the geometry{' and the limits of the legs' if ini else ''} is that of {like}")
     return 0

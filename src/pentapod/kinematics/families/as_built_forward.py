@@ -3,12 +3,14 @@
 Let the geometry change linearly from the nominal one (s = 0) to the real one (s = 1) while the leg readings stay. The
 *intended* pose of the real machine is the end of the continuous curve of solutions that starts at the nominal pose of
 the chosen component and meets no singularity. It is unique where it exists, and does not depend on any solver.
-`as_built_pose` finds it by Newton's method and proves it with tubes (`continuation`).
+`as_built_pose` finds it by Newton's method and proves it with tubes (`continuation`). Where the nominal machine has no
+closed form, its own pose is one that is continued from its home.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,11 +21,15 @@ from pentapod.base.values import Value
 from pentapod.kinematics.batches import broadcast
 from pentapod.kinematics.families.general import GeneralPentapod
 from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.kinematics.families.ringed import RingedPentapod
 from pentapod.kinematics.tubes.continuation import ContinuationOptions, Pose, continue_poses
 from pentapod.kinematics.tubes.leg_equations import BuiltLegs, Legs, length_scale
 from pentapod.kinematics.tubes.tube import LegFamily, Tube, determinant_sign
 from pentapod.numerics.balls import Ball
 from pentapod.numerics.blocks import blocks
+
+Nominal: TypeAlias = LinearPentapod | GeneralPentapod | RingedPentapod
+"""What a machine as built can have been designed as."""
 
 STEPS = ContinuationOptions(shortest=2.0**-16)
 """Of the way from the nominal geometry to the real one."""
@@ -50,9 +56,7 @@ class ProvenPoses(Value):
             array.flags.writeable = False
 
 
-def as_built_pose(
-    machine: BuiltLegs, nominal: LinearPentapod | GeneralPentapod, legs: ArrayLike, component: ArrayLike
-) -> ProvenPoses:
+def as_built_pose(machine: BuiltLegs, nominal: Nominal, legs: ArrayLike, component: ArrayLike) -> ProvenPoses:
     """Return the poses of leg readings (..., 5), metres, that belong to a branch of the nominal machine.
 
     component: as for the nominal `pose`, a `Component` or a `Mode`, or signs (..., 2). A pose that comes without proof
@@ -90,15 +94,19 @@ def as_built_pose(
 class _GeometryHomotopy:
     """The linear change of a nominal geometry into one as built, for leg readings (5, N)."""
 
-    def __init__(self, machine: BuiltLegs, nominal: LinearPentapod | GeneralPentapod, readings: Floats) -> None:
+    def __init__(self, machine: BuiltLegs, nominal: Nominal, readings: Floats) -> None:
         self.nominal, self.readings = nominal, readings
         self.scale = length_scale(machine)
-        self.rings = (machine.radii != 0.0)[:, None]
+        self.rings = ((machine.radii != 0.0) | (nominal.radii != 0.0))[:, None]
         offsets = Ball.exact(nominal.offsets)
         if isinstance(nominal, LinearPentapod):
             x = nominal.base[:, 0]
             offsets = (Ball.exact(x) - x[2]) * nominal.delta + nominal.offsets[2]
-        self.start = (Ball.exact(nominal.base_joints.T[..., None]), offsets[:, None], Ball.exact(np.zeros((5, 1))))
+        self.start = (
+            Ball.exact(nominal.base_joints.T[..., None]),
+            offsets[:, None],
+            Ball.exact(nominal.radii[:, None]),
+        )
         end = (machine.base_joints.T[..., None], machine.offsets[:, None], machine.radii[:, None])
         self.end = tuple(Ball.exact(array) for array in end)
         self.shift = tuple(b - a for a, b in zip(self.start, self.end, strict=True))
@@ -129,15 +137,15 @@ class _GeometryHomotopy:
     def in_component(self, nominal_pose: Pose, tube: Tube) -> Bools:
         """Return where the exact nominal pose is of the branch (N,): all that is in the tube's ball is.
 
-        w and S keep their signs there; of a general pentapod w and the Jacobian's determinant, whose sign is the order.
+        w and S keep their signs there; of other families w and the Jacobian's determinant, whose sign is the order.
         """
         (x, _, z), (u, _, w) = (
             Ball(centre, np.broadcast_to(tube.radius * size * (1.0 + 2.0**-48), centre.shape))
             for centre, size in zip(nominal_pose, (self.scale, 1.0), strict=True)
         )
         same_image = np.abs(w.mid) > w.rad
-        if isinstance(self.nominal, GeneralPentapod):
-            computed = np.sign(self.nominal.order_value(nominal_pose[0].T, nominal_pose[1].T))
+        if not isinstance(self.nominal, LinearPentapod):
+            computed = self.nominal.branch(nominal_pose[0].T, nominal_pose[1].T)[:, 0]
             return same_image & (determinant_sign(tube.inverse) == computed)  # det ∂G/∂(p, i) > 0 where the order is +1
         delta, x3 = self.nominal.delta, float(self.nominal.base[2, 0])
         lever = Ball.exact(self.nominal.offsets[2]) - Ball.exact(delta) * x3

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Bools, Floats, as_batch
 from pentapod.base.errors import ArrayError
 from pentapod.kinematics.batches import broadcast
-from pentapod.kinematics.families.general import GeneralPentapod
+from pentapod.kinematics.families.as_built_forward import Nominal
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.proofs.chords import kernel_geometry
 from pentapod.kinematics.tubes.leg_equations import BuiltLegs, length_scale
@@ -18,7 +18,7 @@ HALVINGS = 4
 
 
 def quick_poses(
-    machine: BuiltLegs, nominal: LinearPentapod | GeneralPentapod, legs: ArrayLike, component: ArrayLike
+    machine: BuiltLegs, nominal: Nominal, legs: ArrayLike, component: ArrayLike
 ) -> tuple[Floats, Floats, Bools]:
     """Return positions and directions (..., 3) of leg readings (..., 5), and where (...) the pose is proven.
 
@@ -36,20 +36,17 @@ def quick_poses(
     lengths = readings.reshape(-1, 5) - machine.zeros
     lengths = np.where((lengths > 0.0).all(axis=-1, keepdims=True), lengths, np.nan)
     poses = np.concatenate(nominal.pose(lengths, signs), axis=-1)
-    general = isinstance(nominal, GeneralPentapod)
-    order = np.ascontiguousarray(signs[:, 0]) if general else np.zeros(len(signs))
+    order = np.zeros(len(signs)) if isinstance(nominal, LinearPentapod) else np.ascontiguousarray(signs[:, 0])
     proven = np.zeros(len(poses), dtype=np.bool_)
     stages = _stages(machine, nominal, lengths)
     built_poses(lengths, poses, *stages, signs, order, length_scale(machine), proven)
     return poses[:, :3].reshape(*batch, 3), poses[:, 3:].reshape(*batch, 3), proven.reshape(batch)
 
 
-def _stages(
-    machine: BuiltLegs, nominal: LinearPentapod | GeneralPentapod, lengths: Floats
-) -> tuple[Floats, Floats, Floats]:
+def _stages(machine: BuiltLegs, nominal: Nominal, lengths: Floats) -> tuple[Floats, Floats, Floats]:
     """Return stages, ring_stages and shift as `built_poses` takes them."""
     real = np.column_stack([machine.base_joints, machine.offsets, machine.radii])
-    design = np.column_stack([nominal.base_joints, nominal.offsets, np.zeros(5)])
+    design = np.column_stack([nominal.base_joints, nominal.offsets, nominal.radii])
     middles = [(2 * n + 1) / 2 ** (k + 1) for k in range(HALVINGS + 1) for n in range(2**k)]
     last = np.maximum(kernel_geometry(machine, lengths)[5], kernel_geometry(nominal, lengths)[5])
     if isinstance(nominal, LinearPentapod):

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
@@ -34,6 +33,7 @@ from pentapod.kinematics.mode import MODES, Mode
 from pentapod.kinematics.platforms.constrained_poses import continued_poses
 from pentapod.kinematics.platforms.constrained_proofs import ProvenByKrawczyk
 from pentapod.kinematics.robot import Branch, SingularSurface
+from pentapod.kinematics.wrench_determinant import Wrench, cross, leg_wrenches, wrench_determinant, zero_distance
 
 Constraint = Literal["revolute leg", "universal joint"]
 
@@ -110,7 +110,8 @@ class ConstrainedPlatform(Value, ProvenByKrawczyk):
     def conditioning(self) -> float:
         """The reciprocal condition number of the wrenches at home, with the largest arm as the unit of length."""
         p, i = self.home, np.array([0.0, 0.0, 1.0])
-        wrenches = np.array(self._wrenches(list(p), list(i), NUMPY), dtype=np.float64)
+        rows = self._wrenches(list(p), list(i), NUMPY)
+        wrenches = np.array([[*(force or (0.0, 0.0, 0.0)), *moment] for force, moment in rows], dtype=np.float64)
         wrenches[:, 3:] /= max(float(np.linalg.norm(self.joints, axis=1).max()), 1e-300)
         wrenches /= np.linalg.norm(wrenches, axis=1, keepdims=True)
         values = np.linalg.svd(wrenches, compute_uv=False)
@@ -221,60 +222,31 @@ class ConstrainedPlatform(Value, ProvenByKrawczyk):
 
         The second is the distance by which the platform can shift unturned to the singular surface, to first order.
         """
-        mode, step = Mode(*branch), GRADIENT_STEP
-        value, slopes = self._determinant(p, i, do), []
-        for k in range(3):
-            moved = [p[j] + (step if j == k else 0.0) for j in range(3)]
-            slopes.append((self._determinant(moved, i, do) - value) / step)
-        distance = value / do.sqrt(dot(slopes, slopes) + 1e-30)
+        mode = Mode(*branch)
+        distance = zero_distance(lambda at: self._determinant(at, i, do), p, do)
         n = self._normal(p, i)
         return [mode.image * i[2], mode.order * distance, do.sqrt(dot(n, n))]
 
     def _normal(self, p: Vector, i: Vector) -> Vector:
         (h, g) = self.law
-        return _cross([h * p[k] + float(g[k]) for k in range(3)], i)
+        return cross([h * p[k] + float(g[k]) for k in range(3)], i)
 
     def _frame(self, p: Vector, i: Vector, do: Arithmetic) -> tuple[Vector, Vector]:
         n = self._normal(p, i)
         size = do.sqrt(dot(n, n))
         y = [n[k] / size for k in range(3)]
-        return _cross(y, i), y
+        return cross(y, i), y
 
-    def _wrenches(self, p: Vector, i: Vector, do: Arithmetic) -> list[list[Any]]:
+    def _wrenches(self, p: Vector, i: Vector, do: Arithmetic) -> list[Wrench]:
         """Return the wrenches of legs and passive joint, force and moment about p: `held_wrenches` as one formula."""
         h, g = self.law
         _, y = self._frame(p, i, do)
-        rows: list[list[Any]] = []
-        for d, base in zip(self.vectors_of(p, i, do), self.base_joints.tolist(), strict=True):
-            size = do.sqrt(dot(d, d))
-            unit = [d[k] / size for k in range(3)]
-            rows.append([*unit, *_cross([base[k] - p[k] for k in range(3)], unit)])
         at = [float(-g[k]) - p[k] for k in range(3)]
-        rows.append([*y, *_cross(at, y)] if h else [0.0, 0.0, 0.0, *_cross(g.tolist(), y)])
-        return rows
+        passive: Wrench = (y, cross(at, y)) if h else (None, cross(g.tolist(), y))
+        return [*leg_wrenches(p, self.vectors_of(p, i, do), self.base_joints.tolist(), do), passive]
 
     def _determinant(self, p: Vector, i: Vector, do: Arithmetic) -> Any:
-        """Return the determinant of the wrenches, by Laplace's expansion along the forces."""
-        rows = self._wrenches(p, i, do)
-        total: Any = 0.0
-        for chosen in combinations(range(6), 3):
-            if not self.law[0] and 5 in chosen:  # a pure moment
-                continue
-            rest = [k for k in range(6) if k not in chosen]
-            sign = -1.0 if sum(chosen) % 2 == 0 else 1.0
-            forces, moments = [rows[k][:3] for k in chosen], [rows[k][3:] for k in rest]
-            total = total + sign * dot(forces[0], _cross(forces[1], forces[2])) * dot(
-                moments[0], _cross(moments[1], moments[2])
-            )
-        return total
-
-
-GRADIENT_STEP = 1e-4
-"""Metres, of the differences that stand for the determinant's gradient."""
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+        return wrench_determinant(self._wrenches(p, i, do))
 
 
 def _split(p: Floats, i: Floats) -> tuple[list[Floats], list[Floats]]:

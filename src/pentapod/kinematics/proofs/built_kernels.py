@@ -34,8 +34,8 @@ def built_poses(
 
     stages (M, 6, 4), ring_stages (M, 5, 9): the real geometry, then those in the middle of the whole way, of its halves
     and of its quarters, then the nominal one. shift (5, 5): by how much a, z and r of each leg change on the whole way.
-    signs (N, 2): the nominal component; order (N,): for a general nominal machine the sign of the Jacobian's
-    determinant, else 0. weight: metres that count as much as a radian.
+    signs (N, 2): the nominal component; order (N,): the sign of the Jacobian's determinant, 0 for
+    a nominal machine of the quadratic family. weight: metres that count as much as a radian.
     """
     first, second, change, step = np.empty((5, 3)), np.empty((5, 3)), np.empty((5, 3)), np.empty(6)
     jacobian, inverse, work, defect = np.zeros((6, 6)), np.empty((6, 6)), np.empty((6, 12)), np.empty((6, 6))
@@ -77,7 +77,7 @@ def built_poses(
             continue
         proven[h] = True
         if order[h] != 0.0:  # the determinant does not vanish near x
-            fill_line(x, x, stages[-1], first, second, change, step, jacobian, None)
+            fill_line(x, x, stages[-1], first, second, change, step, jacobian, ring_stages[-1])
             image = signs[h, 1] * x[5] - bound[5] > 4.0 * ROUND
             proven[h] = image and _determinant_sign(jacobian, work) == order[h]
 

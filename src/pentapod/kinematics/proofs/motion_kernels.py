@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats
+from pentapod.kinematics.proofs.built_kernels import solved
 from pentapod.kinematics.proofs.chords_kernels import line_corrections, line_residuals, sane
 from pentapod.kinematics.proofs.krawczyk_kernels import (
     ROUND,
@@ -19,6 +20,70 @@ from pentapod.kinematics.proofs.krawczyk_kernels import (
     invert,
 )
 from pentapod.numerics.kernels import kernel
+
+
+@kernel
+def continued_poses(
+    lengths: Floats,
+    home_lengths: Floats,
+    home: Floats,
+    geometry: Floats,
+    rings: Floats,
+    weight: float,
+    bases: tuple[Floats, Floats, Floats, Floats],
+    shortest: float,
+    poses: Floats,
+) -> None:
+    """Fill the poses (N, 6) to which the motion along straight lines of lengths (N, 5) leads, NaN where not proven.
+
+    Each begins at the pose before it, and where this proves nothing at home (6,). shortest: step, as a share of a line,
+    below which it is given up.
+    """
+    known = False
+    for h in range(len(lengths)):
+        if known and _continued(
+            lengths[h - 1], poses[h - 1], lengths[h], geometry, rings, weight, bases, shortest, poses[h]
+        ):
+            continue
+        known = _continued(home_lengths, home, lengths[h], geometry, rings, weight, bases, shortest, poses[h])
+        if not known:
+            poses[h] = np.nan
+
+
+@kernel
+def _continued(
+    start: Floats,
+    pose: Floats,
+    end: Floats,
+    geometry: Floats,
+    rings: Floats,
+    weight: float,
+    bases: tuple[Floats, Floats, Floats, Floats],
+    shortest: float,
+    x: Floats,
+) -> bool:
+    """Fill the pose x (6,) to which a pose leads while the lengths go from start to end (5,); whether it is proven."""
+    first, second, change, step = np.empty((5, 3)), np.empty((5, 3)), np.empty((5, 3)), np.empty(6)
+    jacobian, inverse, work, g = np.zeros((6, 6)), np.empty((6, 6)), np.empty((6, 12)), np.empty(6)
+    line, ends, proven, sensitivity = np.empty((1, 5, 2)), np.empty((2, 6)), np.zeros(1, np.bool_), np.empty(1)
+    ends[0], line[0, :, 0] = pose, start
+    done, share = 0.0, 1.0
+    while done < 1.0:
+        if share < shortest:
+            return False
+        to = min(done + share, 1.0)
+        for j in range(5):
+            line[0, j, 1] = end[j] if to == 1.0 else start[j] + to * (end[j] - start[j])
+        x[:] = ends[0]
+        if solved(x, line[0, :, 1], geometry, rings, first, second, change, step, jacobian, work, inverse, g):
+            ends[1] = x
+            motions(line, ends, geometry, rings, 0.0, weight, bases, proven, sensitivity)
+            if proven[0]:
+                done, share = to, 2.0 * share
+                ends[0], line[0, :, 0] = x, line[0, :, 1]
+                continue
+        share *= 0.5
+    return True
 
 
 @kernel

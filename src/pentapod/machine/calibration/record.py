@@ -16,8 +16,7 @@ from pentapod.base.keys import Key, check_fields, declared
 from pentapod.base.units import from_si
 from pentapod.base.values import Value
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
-from pentapod.kinematics.families.general import GeneralPentapod
-from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.kinematics.families.as_built_forward import Nominal
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.calibration.digest import digest_of
 from pentapod.machine.calibration.parameters import LEGS, PARAMETERS
@@ -145,7 +144,7 @@ class CalibrationRecord(Value):
         robot is no linear pentapod.
         """
         design = nominal.nominal if isinstance(nominal, AsBuiltPentapod) else nominal
-        if not isinstance(design, LinearPentapod | GeneralPentapod):
+        if not isinstance(design, Nominal):
             family = type(nominal).__name__
             raise MachineError("calibration files are for linear pentapods", key="calibration", value=family)
         if (found := geometry_digest(nominal)) != self.nominal:

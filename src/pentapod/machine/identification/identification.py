@@ -13,8 +13,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.errors import ArrayError, InputError, MachineError
 from pentapod.base.values import Value
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
-from pentapod.kinematics.families.general import GeneralPentapod
-from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.kinematics.families.as_built_forward import Nominal
 from pentapod.machine.calibration.parameters import PARAMETERS
 from pentapod.machine.calibration.record import geometry_digest
 from pentapod.machine.identification.alignment import in_base_frame, rigid_motions
@@ -139,10 +138,10 @@ def believed(machine: Machine) -> AsBuiltPentapod:
     return machine.robot if isinstance(machine.robot, AsBuiltPentapod) else AsBuiltPentapod.of(design)
 
 
-def designed(machine: Machine) -> LinearPentapod | GeneralPentapod:
+def designed(machine: Machine) -> Nominal:
     """Return a machine's geometry as designed. Raises MachineError: it is no linear pentapod."""
     robot = machine.robot.nominal if isinstance(machine.robot, AsBuiltPentapod) else machine.robot
-    if not isinstance(robot, LinearPentapod | GeneralPentapod):
+    if not isinstance(robot, Nominal):
         family = type(machine.robot).__name__
         raise MachineError("calibration is for linear pentapods", key="geometry.family", value=family)
     if machine.guides is not None:

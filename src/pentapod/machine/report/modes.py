@@ -14,8 +14,9 @@ from pentapod.base.refusal import Refusal, stage
 from pentapod.base.values import Result, Value
 from pentapod.geometry.directions import angle_between
 from pentapod.kinematics.all_modes.all_modes import all_poses
-from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.kinematics.legs_on_rings import LegsOnRings
+from pentapod.kinematics.mode import Mode
 from pentapod.kinematics.robot import Branch, Robot
 from pentapod.machine.clearance.leg_clearance import clearances, pair_names
 from pentapod.machine.machine import Machine
@@ -110,13 +111,15 @@ def admissible_modes(machine: Machine, legs: ArrayLike, *, leg_error: float = 1e
 def _all_modes(robot: Robot, legs: Floats, leg_error: float) -> tuple[tuple[Branch, ...], Floats, Floats, bool]:
     """Return branches, positions and directions (K, 3) of all modes, and whether these are proven to be all."""
     branches = robot.branches
-    if isinstance(robot, AsBuiltPentapod):
+    if isinstance(robot, LegsOnRings):
         found = all_poses(robot, legs, leg_error=leg_error)
         named = {tuple(branch): branch for branch in branches}
         signs = [tuple(pair) for pair in robot.branch(found.position, found.direction).tolist()]
-        if found.complete and all(pair in named for pair in signs):
-            order = sorted(range(len(signs)), key=lambda k: list(named).index(signs[k]))
-            labels = tuple(named[signs[k]] for k in order)
+        if found.complete and not any(0 in pair for pair in signs):
+            # Of a machine that knows the branch of home alone there can be poses in others.
+            labels = [named.get(pair, Mode(*pair)) for pair in signs]
+            order = sorted(range(len(signs)), key=lambda k: branches.index(labels[k]) if labels[k] in branches else 4)
+            labels = tuple(labels[k] for k in order)
             return labels, found.position[order], found.direction[order], True
     all_legs = np.broadcast_to(legs, (len(branches), robot.n_legs))
     position, direction = robot.pose(all_legs, np.array(branches, dtype=np.float64))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.kinematics.legs_on_rings import LegsOnRings
 from pentapod.program.posts.drives import HALSTREAMER
 from pentapod.program.posts.linuxcnc import pentakins, stream, trivkins
 from pentapod.program.posts.linuxcnc.config import packaged
@@ -18,7 +18,7 @@ __all__ = ["LINUXCNC", "pentakins", "stream", "trivkins"]
 
 def _write(given: PostInput) -> dict[str, bytes]:
     folders = {"stream": stream.stream_files(given), "trivkins": trivkins.trivkins_files(given)}
-    if given.toolpath is not None and isinstance(given.the_machine().robot, FiveLegs | AsBuiltPentapod):
+    if given.toolpath is not None and isinstance(given.the_machine().robot, FiveLegs | LegsOnRings):
         folders["pentakins"] = pentakins.pentakins_files(given)
     files = {f"{folder}/{name}": content for folder, files in folders.items() for name, content in files.items()}
     machine = given.the_machine()

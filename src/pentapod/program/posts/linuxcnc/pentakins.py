@@ -15,8 +15,8 @@ import numpy as np
 
 from pentapod.base.errors import InputError, MachineError
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.five_legs import FiveLegs
+from pentapod.kinematics.legs_on_rings import LegsOnRings
 from pentapod.kinematics.robot import Branch
 from pentapod.machine.machine import Machine
 from pentapod.program.posts.linuxcnc.config import (
@@ -107,10 +107,10 @@ def controller_frame(machine: Machine, component: Branch) -> RigidTransform:
     return RigidTransform(turned, -turned @ machine.work.centre)
 
 
-def built_legs(machine: Machine) -> FiveLegs | AsBuiltPentapod:
+def built_legs(machine: Machine) -> FiveLegs | LegsOnRings:
     """Return the robot where pentakins can be told of it. Raises MachineError."""
     robot = machine.robot
-    if not isinstance(robot, FiveLegs | AsBuiltPentapod):
+    if not isinstance(robot, FiveLegs | LegsOnRings):
         raise MachineError(
             "pentakins has no such kinematics", key="robot", value=type(robot).__name__,
             expected="a linear pentapod", remedy="play the setpoints instead",

@@ -7,8 +7,9 @@ import pytest
 
 from pentapod.base.errors import MachineError
 from pentapod.cli.main import run
+from pentapod.geometry.directions import angle_between
 from pentapod.machine import Machine
-from pentapod.machine.calibration.pentakins import read_pentakins
+from pentapod.machine.hal_import import read_pentakins
 
 BASE = [
     (586.1, -120.0, 466.8),
@@ -17,6 +18,7 @@ BASE = [
     (-597.0, -38.8, 467.2),
     (-55.1, -595.2, 467.0),
 ]
+UP = np.array([0.0, 0.0, 1.0])
 RINGS, HEIGHTS = [12.0, 0.0, 20.0, 12.5, 30.0], [88.0, 158.0, 258.5, 310.0, 206.0]
 
 
@@ -56,13 +58,35 @@ def test_legs_are_those_of_pentakins_and_poses_come_back(machine):
         assert np.abs(found[0] - p).max() < 1e-9
 
 
-def test_a_base_along_the_tool_is_refused(tmp_path, capsys):
-    """As in LinuxCNC's own sample, whose base joints are in the plane y = 500."""
-    sample = [(-418, 500, -140), (418, 500, -140), (0, 500, -310), (418, 500, 510), (-418, 500, 510)]
-    (tmp_path / "kinematics.hal").write_text(hal(sample), encoding="utf-8")
-    assert run(["machine", "import", "hal", str(tmp_path / "kinematics.hal"), "-o", str(tmp_path / "mine.toml")]) == 2
-    assert "off a plane across the tool" in capsys.readouterr().err
-    assert not (tmp_path / "mine.toml").exists()
+def test_legs_at_home_are_in_the_middle_of_cones_and_ranges(machine):
+    vectors = machine.robot.leg_vectors(machine.robot.home, UP)
+    assert angle_between(vectors, machine.joints.base_axes).max() < 1e-8
+    np.testing.assert_allclose(angle_between(vectors, UP), machine.joints.platform_range.mean(axis=1), atol=1e-8)
+    np.testing.assert_allclose(machine.robot.home + machine.tool_length * UP, machine.work.centre)
+
+
+def test_limits_of_the_legs_are_those_of_the_ini_file(tmp_path, capsys):
+    (tmp_path / "kinematics.hal").write_text(hal(), encoding="utf-8")
+    rows = "MIN_LIMIT = 400\nMAX_LIMIT = 1{k}00.5\nMAX_VELOCITY = 90\nMAX_ACCELERATION = 800\n"
+    text = "[HAL]\nHALFILE = a.hal\nHALFILE = b.hal\n" + "".join(f"[JOINT_{k}]\n{rows.format(k=k)}" for k in range(5))
+    (tmp_path / "pentapod.ini").write_text(text, encoding="utf-8")
+    words = ["machine", "import", "hal", str(tmp_path / "kinematics.hal"), "--ini", str(tmp_path / "pentapod.ini")]
+    assert run([*words, "-o", str(tmp_path / "mine.toml")]) == 0
+    legs = Machine.load(tmp_path / "mine.toml").legs
+    np.testing.assert_allclose(legs.max_length, [1.0005, 1.1005, 1.2005, 1.3005, 1.4005])
+    assert (legs.min_length == 0.4).all()
+    assert (legs.max_acceleration == 0.8).all()
+    (tmp_path / "pentapod.ini").write_text(text.replace("MAX_LIMIT = 1300.5", ""), encoding="utf-8")
+    assert run([*words, "-o", str(tmp_path / "other.toml")]) == 2
+    assert "[JOINT_3] MAX_LIMIT: no number" in capsys.readouterr().err
+    assert not (tmp_path / "other.toml").exists()
+
+
+def test_only_a_machine_of_five_legs_fills_the_rest(tmp_path, capsys):
+    (tmp_path / "kinematics.hal").write_text(hal(), encoding="utf-8")
+    words = ["machine", "import", "hal", str(tmp_path / "kinematics.hal"), "-o", str(tmp_path / "mine.toml")]
+    assert run([*words, "--like", "hexa"]) == 2
+    assert "5 legs, not 6" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
