@@ -146,6 +146,13 @@ def test_of_a_part_larger_than_the_machine_a_box_in_its_middle_is_machined(tmp_p
     assert any("larger than the work volume" in remark for remark in proposal.remarks)
 
 
+def test_facets_that_do_not_join_are_an_error(tmp_path):
+    corners = np.random.default_rng(1).uniform(0.0, 40.0, (20, 3, 3))
+    loose = trimesh.Trimesh(**trimesh.triangles.to_kwargs(corners), process=False)
+    with pytest.raises(MeshError, match=r"the facets do not join.*20 bodies of 20 facets"):
+        proposed(tmp_path, loose)
+
+
 def test_a_file_that_states_its_unit_is_not_guessed(tmp_path):
     job, proposal = proposed(tmp_path, trimesh.Scene(dome(1e-3)), "part.glb")
     assert job.part.unit is None

@@ -78,6 +78,14 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
     unit = None if states_unit(part) else _unit(part, machine.work)
     mesh, broken = _loaded(part, unit)
     faults = mesh.diagnosis
+    if faults.shattered:
+        raise MeshError(
+            "the facets do not join, so there is no surface to machine",
+            file=part,
+            value=f"{faults.bodies:,} bodies of {faults.facets:,} facets",
+            expected="facets that share their edges",
+            remedy="merge close vertices in the program that wrote the mesh, or write the job by hand: pentapod new DIR",
+        )
     table: dict[str, Any] = {} if unit is None else {"unit": unit}
     reasons: dict[tuple[str, str], str] = {}
     size = " x ".join(f"{from_si(extent, 'mm'):.4g}" for extent in faults.extents)

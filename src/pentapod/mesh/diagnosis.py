@@ -46,6 +46,11 @@ class MeshDiagnosis(Value):
     notes: tuple[str, ...] = ()
 
     @property
+    def shattered(self) -> bool:
+        """Whether the facets are no surface: nearly each of them is a body of its own."""
+        return self.facets > 1 and self.bodies > SHATTERED * self.facets
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """Findings that do not disturb machining."""
         thin = f"{_count(self.slivers, 'sliver')}, a thousand times as long as high"
@@ -65,7 +70,7 @@ class MeshDiagnosis(Value):
             found.append("the closed surface is inside out: normals point inwards; load with repair = true")
         if self.non_manifold_edges:
             found.append(f"{_count(self.non_manifold_edges, 'edge')} with more than two facets: passes end there")
-        if self.facets > 1 and self.bodies > SHATTERED * self.facets:
+        if self.shattered:
             found.append(
                 f"the facets do not join: {self.bodies:,} bodies of {self.facets:,} facets; "
                 "merge close vertices in the program that wrote the mesh"

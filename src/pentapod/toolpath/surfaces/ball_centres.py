@@ -30,8 +30,8 @@ class DriveOptions(Value):
     multiple of the straight way and twice the clearance. sideways: distance around a point at which the surface
     above must hide it, above: by which height, both as shares of the radius: walls, and valleys between steep
     flanks, do not hide themselves, nor do walls that lean under by less. under: the same as `sideways` for links, which
-    may lead a little farther. evened: how often the stepover for a scallop is averaged with that of
-    neighbouring facets, whose curvature is noisy.
+    may lead a little farther; upright: and for those between ends over which nothing leans. evened: how often the
+    stepover for a scallop is averaged with that of neighbouring facets, whose curvature is noisy.
     """
 
     step: float = 0.25
@@ -46,6 +46,7 @@ class DriveOptions(Value):
     around: float = 3.0
     sideways: float = 0.2
     under: float = 0.3
+    upright: float = 0.01
     above: float = 0.2
     evened: int = 2
 

@@ -179,14 +179,20 @@ class DriveSurface:
         return self._seen(lines, options)
 
     def _seen(self, ways: list[Floats | None], options: PathOptions) -> list[Floats | None]:
-        """Return ways (n, 3) of centres, None for those on which the part lies above: there only the ball has room."""
+        """Return ways (n, 3) of centres, None for those on which the part lies above: there only the ball has room.
+
+        Between ends over which nothing leans, nothing may lean over a link: it is not worth a lean of the tool.
+        """
         kept = [way for way in ways if way is not None]
         if not kept:
             return ways
-        ends = np.cumsum([len(way) for way in kept])
-        under = self._hides(np.concatenate(kept), options.chordal, self.options.under)
-        hidden = iter(np.add.reduceat(under, [0, *ends[:-1]]))
-        return [None if way is None or next(hidden) else way for way in ways]
+        begins = np.cumsum([0, *(len(way) for way in kept[:-1])])
+        ends, points = np.append(begins[1:], sum(len(way) for way in kept)) - 1, np.concatenate(kept)
+        hidden = np.add.reduceat(self._hides(points, options.chordal, self.options.under), begins) > 0
+        leant = self._hides(points, options.chordal, self.options.upright)
+        hidden |= (np.add.reduceat(leant, begins) > 0) & ~leant[begins] & ~leant[ends]
+        gone = iter(hidden.tolist())
+        return [None if way is None or next(gone) else way for way in ways]
 
     def is_clear(self, centres: Floats, chordal: float) -> bool:
         """Return whether the ball is clear of the part but for `chordal` metres along a line of centres (n, 3)."""
