@@ -84,7 +84,7 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
             file=part,
             value=f"{faults.bodies:,} bodies of {faults.facets:,} facets",
             expected="facets that share their edges",
-            remedy="merge close vertices in the program that wrote the mesh, or write the job by hand: pentapod new DIR",
+            remedy="merge close vertices in the program that wrote the mesh, or mend it there",
         )
     table: dict[str, Any] = {} if unit is None else {"unit": unit}
     reasons: dict[tuple[str, str], str] = {}
