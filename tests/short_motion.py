@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.component import COMPONENTS
+from pentapod.kinematics.component import COMPONENTS, Component
 from pentapod.machine import Machine
 from pentapod.program import Program, Provenance, quantised
 from pentapod.program.csv import csv_bytes
@@ -41,6 +41,21 @@ def motion(duration=1.2, interpolation="cubic", component=COMPONENTS[0]):
     placement = RigidTransform(np.diag([1.0, -1.0, -1.0]), np.array([0.085, -0.017, 0.1 + 1 / 3]))
     source = Provenance("desk", machine.digest, "job µ", "0.1.0", None, "x86_64 znver4", "numpy 2.4.0")
     return Program(period, quantised(legs), interpolation, component, placement, source), machine
+
+
+def loop(machine: Machine, seconds: float) -> Program:
+    """A leaning loop in the work volume, from rest to rest."""
+    u = np.linspace(0.0, 1.0, round(1e3 * seconds) + 1)
+    rise = u**4 * (35 - 84 * u + 70 * u**2 - 20 * u**3)
+    turn, lean = 2.0 * np.pi * rise, np.radians(12.0)
+    tips = machine.work.centre + 0.01 * np.stack([np.sin(turn), 1.0 - np.cos(turn), rise], axis=1)
+    i = np.stack([np.sin(lean) * np.sin(turn), np.sin(0.6 * lean) * rise, np.ones_like(rise)], axis=1)
+    i /= np.linalg.norm(i, axis=1, keepdims=True)
+    p = tips - machine.tool_length * i
+    component = Component(*machine.robot.branch(p, i)[0].tolist())
+    legs = quantised(machine.robot.leg_lengths(p, i))
+    source = Provenance(machine.name, machine.digest, "job", "0", None)
+    return Program(1e-3, legs, "cubic", component, RigidTransform(np.eye(3), np.zeros(3)), source)
 
 
 def placed():

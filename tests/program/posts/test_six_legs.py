@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+from linuxcnc_runs import play, real
 from pentapod.base.errors import ProgramError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine import Machine
 from pentapod.program import Program, Provenance, quantised, read_csv, write_csv
 from pentapod.program.posts import POSTS, PostInput, write_post
-from short_motion import poses, round_trip
+from short_motion import loop, poses, post, round_trip
 
 HEXA = Machine.load("hexa")
 
@@ -50,3 +51,22 @@ def test_linuxcnc_has_an_axis_for_each_leg(tmp_path) -> None:
     assert "JOINTS = 6" in (tmp_path / "trivkins/pentapod.ini").read_text()
     assert "names=leg1,leg2,leg3,leg4,leg5,leg6" in (tmp_path / "stream/stream.hal").read_text()
     assert not (tmp_path / "pentakins").exists()
+
+
+@pytest.mark.slow
+@real
+@pytest.mark.parametrize("name", ["hexa", "spr"])
+def test_linuxcnc_plays_the_legs_of_platforms(name: str, tmp_path) -> None:
+    """As setpoints, unchanged by the limits of the legs, and as axes of their own, to the last row."""
+    machine = Machine.load(name)
+    moved = loop(machine, 2.0)
+    post(PostInput(moved, machine), "linuxcnc", tmp_path)
+    legs, plan = machine.robot.n_legs, 1e3 * moved.legs
+    table = play(tmp_path / "stream")
+    before, after = table[:, :legs], table[:, legs : 2 * legs]
+    np.testing.assert_array_equal(before, after)
+    first = int(np.flatnonzero(np.abs(np.diff(after, axis=0)).max(axis=1) > 0.0)[0])
+    starts = range(max(0, first - 100), first + 2)
+    assert min(np.abs(after[k : k + len(plan)] - plan).max() for k in starts if k + len(plan) <= len(after)) < 1e-6
+    axes = play(tmp_path / "trivkins")
+    assert np.abs(axes[-1, :legs] - plan[-1]).max() < 1e-6
