@@ -31,7 +31,7 @@ PARTS = {  # mesh, [part], stepover of a ball of 6 mm in mm
     ),
 }
 CLAIM = "surface left on the region"
-QUICK = {"a patch of a facade", "a small torus"}
+QUICK = {"a small torus"}
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from pentapod.program import Provenance, sample, write_csv
 from pentapod.timing import Trajectory, retime
 from pentapod.verify import verify
 
-FEW, MANY = instances(3), instances(300)
+FEW, MANY = instances(2), instances(300)
 CLEARLY_FEASIBLE = 0.05
 AXIS_TOLERANCE = np.radians(0.5)
 

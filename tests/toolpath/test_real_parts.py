@@ -44,7 +44,10 @@ def test_every_part_is_diagnosed(parts, name):
         assert str(diagnosis).count("\n") >= 1
 
 
-@pytest.mark.parametrize("name", FILES)
+# A hundred loose facets that cross each other: their drive surface takes half a minute.
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "soup.stl" else []) for name in FILES]
+)
 @pytest.mark.parametrize("tool", [BallCutter(6e-3), FlatEnd(3e-3)], ids=["ball", "flat"])
 def test_every_part_is_rastered_on_its_surface(parts, name, tool):
     """The ball's centre is a radius from the part; the flat end's contacts are on it."""
