@@ -74,6 +74,7 @@ def rest_lines(
     if not len(centres):
         return Passes.joined([])
     coarse = _left(patch, KDTree(centres), radius, options.coarse * height, options) > 0.0
+    coarse[coarse] = ~hides(patch.vertices[patch.faces[coarse]].mean(axis=1))
     near = patch.only(_grown(patch, coarse, 1)).refined(options.edge * stepover)
     for _ in range(options.rounds):
         left = _left(near, KDTree(centres), radius, height, options)

@@ -27,10 +27,10 @@ class DriveOptions(Value):
     as a share of the radius: at creases they jump. border: how exactly an open border is known, as a share of the
     radius; enters: how far beyond it the ball gets where it is no hole. longest: of a link on the surface, as a
     multiple of the straight way; uneven: of its longest step. around: longest link around what is in the way, as a
-    multiple of the straight way and twice the clearance. sideways: distance around a point at which the surface
-    above must hide it, above: by which height, both as shares of the radius: walls, and valleys between steep
-    flanks, do not hide themselves, nor do walls that lean under by less. under: the same as `sideways` for links, which
-    may lead a little farther; upright: and for those between ends over which nothing leans. evened: how often the
+    multiple of the straight way and twice the clearance. beside, sideways: distances around a point at both of which
+    the surface above must hide it, above: by which height, all as shares of the radius: walls, and valleys between
+    steep flanks, do not hide themselves, nor do walls that lean under by less. under: the same as `sideways` for links,
+    which may lead a little farther; upright: and for those between ends over which nothing leans. evened: how often the
     stepover for a scallop is averaged with that of neighbouring facets, whose curvature is noisy.
     """
 
@@ -44,6 +44,7 @@ class DriveOptions(Value):
     longest: float = 2.5
     uneven: float = 3.0
     around: float = 3.0
+    beside: float = 0.01
     sideways: float = 0.2
     under: float = 0.3
     upright: float = 0.01

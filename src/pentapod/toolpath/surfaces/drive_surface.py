@@ -83,12 +83,14 @@ class DriveSurface:
 
     def _hides(self, points: Floats, slack: float, sideways: float) -> Bools:
         height = points @ self.view + max(slack, self.options.above * self.radius)
-        # Walls and corners along the view do not hide themselves: one of four points around is free.
-        x, y = (sideways * self.radius * side for side in tangent_frame(self.view))
-        around = (0.83 * x + 0.56 * y, 0.56 * x - 0.83 * y)
+        # Walls and corners along the view do not hide themselves: one of four points around is free, close to the
+        # point where a channel is narrow, farther from it where a wall leans under.
         hidden = np.ones(len(points), dtype=np.bool_)
-        for aside in (*around, *(-step for step in around)):
-            hidden[hidden] = self.field.topmost(points[hidden] + aside)[2] > height[hidden]
+        for step in (self.options.beside, sideways):
+            x, y = (step * self.radius * side for side in tangent_frame(self.view))
+            around = (0.83 * x + 0.56 * y, 0.56 * x - 0.83 * y)
+            for aside in (*around, *(-one for one in around)):
+                hidden[hidden] = self.field.topmost(points[hidden] + aside)[2] > height[hidden]
         return hidden
 
     def patch(self, region: Region) -> Patch:
@@ -146,7 +148,7 @@ class DriveSurface:
         )
         starts, stops = (contacts + self.radius * normals for contacts, normals in (first, last))
         told = options.spacing, options.chordal, min(options.closest, options.chordal)
-        ways = self._seen(self.centres.ways(starts, stops, *told), options)
+        ways = self._seen(self.centres.ways(starts, stops, *told), options.chordal)
         missed = [row for row, way in enumerate(ways) if way is None]
         for row, way in zip(missed, self._around(starts[missed], stops[missed], options), strict=True):
             ways[row] = way
@@ -174,23 +176,27 @@ class DriveSurface:
         rows = [row for row, line in enumerate(lines) if line is not None]
         found = [line for line in lines if line is not None]
         told = options.spacing, options.chordal, min(options.closest, options.chordal)
-        for row, way in zip(rows, drawn_taut(self.centres, found, *told), strict=True):
+        allowed = partial(self._seen, slack=options.chordal)
+        for row, way in zip(rows, drawn_taut(self.centres, found, *told, allowed), strict=True):
             lines[row] = way
-        return self._seen(lines, options)
+        return lines
 
-    def _seen(self, ways: list[Floats | None], options: PathOptions) -> list[Floats | None]:
+    def _seen(self, ways: list[Floats | None], slack: float) -> list[Floats | None]:
         """Return ways (n, 3) of centres, None for those on which the part lies above: there only the ball has room.
 
-        Between ends over which nothing leans, nothing may lean over a link: it is not worth a lean of the tool.
+        Between ends over which nothing leans, nothing may lean over a link: it is not worth a lean of the tool. Beside
+        its ends, where cuts are, nothing counts.
         """
         kept = [way for way in ways if way is not None]
         if not kept:
             return ways
-        begins = np.cumsum([0, *(len(way) for way in kept[:-1])])
-        ends, points = np.append(begins[1:], sum(len(way) for way in kept)) - 1, np.concatenate(kept)
-        hidden = np.add.reduceat(self._hides(points, options.chordal, self.options.under), begins) > 0
-        leant = self._hides(points, options.chordal, self.options.upright)
-        hidden |= (np.add.reduceat(leant, begins) > 0) & ~leant[begins] & ~leant[ends]
+        begins, points = np.cumsum([0, *(len(way) for way in kept[:-1])]), np.concatenate(kept)
+        ends = np.append(begins[1:], len(points)) - 1
+        to_ends = [np.minimum(*(np.linalg.norm(way - way[end], axis=1) for end in (0, -1))) for way in kept]
+        apart = np.concatenate(to_ends) > self.options.under * self.radius
+        hidden = np.logical_or.reduceat(self._hides(points, slack, self.options.under) & apart, begins)
+        leant = self._hides(points, slack, self.options.upright)
+        hidden |= np.logical_or.reduceat(leant & apart, begins) & ~leant[begins] & ~leant[ends]
         gone = iter(hidden.tolist())
         return [None if way is None or next(gone) else way for way in ways]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -47,12 +47,17 @@ def shortest_ways(patch: Patch, open_to: Bools, starts: Floats, ends: Floats, lo
 
 
 def drawn_taut(
-    centres: BallCentres, lines: list[Floats], spacing: float, chordal: float, closest: float
+    centres: BallCentres,
+    lines: list[Floats],
+    spacing: float,
+    chordal: float,
+    closest: float,
+    allowed: Callable[[list[Floats | None]], list[Floats | None]],
 ) -> list[Floats | None]:
     """Return ways of a ball's centre along lines (n, 3), with corners only where it cannot go straight.
 
-    Between corners, which are points of the line, they are those of `BallCentres.ways`, and proven as these are. None
-    where even neighbouring points have no such way.
+    Between corners, which are points of the line, they are those of `BallCentres.ways`, and proven as these are.
+    allowed: returns ways, None for those that are not to be taken. None where even neighbouring points have no way.
     """
     lines = [np.concatenate([line[:1], centres.on_level(line[1:-1]), line[-1:]]) for line in lines]
     known: dict[Pair, Floats | None] = {}
@@ -61,7 +66,7 @@ def drawn_taut(
         pairs = [pair for pair in pairs if pair not in known]
         if pairs:
             starts, ends = (np.stack([lines[pair[0]][pair[side]] for pair in pairs]) for side in (1, 2))
-            known.update(zip(pairs, centres.ways(starts, ends, spacing, chordal, closest), strict=True))
+            known.update(zip(pairs, allowed(centres.ways(starts, ends, spacing, chordal, closest)), strict=True))
 
     corners: list[list[int]] = [[0, len(line) - 1] for line in lines]
     while open_pairs := [pair for pair in _pairs(corners) if pair not in known]:
