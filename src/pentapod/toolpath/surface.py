@@ -8,6 +8,7 @@ from pentapod.base.arrays import Bools, Floats
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
+from pentapod.mesh.query.heightfield import HeightField
 from pentapod.mesh.region import Region
 from pentapod.toolpath.options import CoverOptions, PathOptions
 
@@ -21,6 +22,11 @@ class Surface(Protocol):
     @property
     def part(self) -> Mesh:
         """The part."""
+        ...
+
+    @property
+    def part_field(self) -> HeightField:
+        """Ray casting onto the part along the view."""
         ...
 
     @property

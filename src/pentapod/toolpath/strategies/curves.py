@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
 from typing import Annotated
 
 import numpy as np
@@ -14,8 +15,8 @@ from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import VECTOR, Key
 from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.geodesic.tracing import SurfaceRays, neighbours, traced
+from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.closest import closest, normals_at
-from pentapod.mesh.query.heightfield import HeightField
 from pentapod.toolpath.lines.projection import SurfaceHits, SurfaceMap, below, projected, topmost_in_region
 from pentapod.toolpath.options import PathOptions, check_positive
 from pentapod.toolpath.strategy import ContactPaths, Order, Strategy, bounds_centre, region_patch
@@ -96,10 +97,11 @@ def surface_map(
     along the view; "wrap" follows a straightest geodesic for x, then one square to it for y, from the surface point
     under the position, seen along the view, or nearest to it.
     """
-    field, x = HeightField(surface.part, options.up), tangent_frame(options.up)[0]
-    origin = bounds_centre(region_patch(surface, options)) if position is None else frozen(position, "position", (3,))
+    field, x = surface.part_field, tangent_frame(options.up)[0]
+    region = cache(lambda: region_patch(surface, options))
+    origin = bounds_centre(region()) if position is None else frozen(position, "position", (3,))
     if laying is Laying.WRAP:
-        return _wrapping(surface, options, origin, field.topmost(origin[None])[0], x)
+        return _wrapping(region(), origin, field.topmost(origin[None])[0], x)
     y = tangent_frame(options.up)[1]
 
     def project(plane: Floats) -> SurfaceHits:
@@ -109,9 +111,8 @@ def surface_map(
     return project
 
 
-def _wrapping(surface: Surface, options: PathOptions, origin: Floats, top: Floats, x: Floats) -> SurfaceMap:
+def _wrapping(patch: Patch, origin: Floats, top: Floats, x: Floats) -> SurfaceMap:
     """Return the map for wrapped lines. top (1, 3): surface over the origin (3,). x (3,): direction of the x axis."""
-    patch = region_patch(surface, options)
     facet, _, weights = closest(patch, np.where(np.isfinite(top).all(), top, origin[None]))
     beside = neighbours(patch)
     normal = patch.facet_normals[facet[0]]

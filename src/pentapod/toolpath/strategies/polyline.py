@@ -14,7 +14,6 @@ from pentapod.base.arrays import Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import Key
 from pentapod.mesh.query.closest import closest, normals_at
-from pentapod.mesh.query.heightfield import HeightField
 from pentapod.toolpath.inputs.points import read_points
 from pentapod.toolpath.lines.projection import SurfaceHits, below, projected, topmost_in_region
 from pentapod.toolpath.options import PathOptions
@@ -55,7 +54,7 @@ class PolylineOptions(PathOptions):
 
 def polyline_paths(surface: Surface, options: PolylineOptions) -> ContactPaths:
     """Return the given lines on the surface, in their order. Raises ToolpathError if none meets the region."""
-    field, patch = HeightField(surface.part, options.up), region_patch(surface, options)
+    field, patch = surface.part_field, region_patch(surface, options)
     visible = options.towards is Towards.VIEW
 
     def mapped(points: Floats) -> SurfaceHits:

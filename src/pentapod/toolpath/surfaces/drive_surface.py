@@ -77,6 +77,11 @@ class DriveSurface:
         """Ray casting along the view."""
         return HeightField(self.mesh, self.view)
 
+    @property
+    def part_field(self) -> HeightField:
+        """Ray casting onto the part along the view."""
+        return HeightField(self.part, self.view)
+
     def hides(self, points: Floats, slack: float) -> Bools:
         """Return whether the drive surface lies above points (N, 3) on it by more than `slack` metres."""
         return self._hides(points, slack, self.options.sideways)

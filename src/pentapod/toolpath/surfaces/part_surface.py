@@ -41,6 +41,11 @@ class PartSurface:
         """Ray casting along the view."""
         return HeightField(self.part, self.view)
 
+    @property
+    def part_field(self) -> HeightField:
+        """The same."""
+        return self.field
+
     def hides(self, points: Floats, slack: float) -> Bools:
         """Return whether the part lies above points (N, 3) by more than `slack` metres."""
         return self.field.hides(points, slack)
