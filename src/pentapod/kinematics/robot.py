@@ -181,3 +181,11 @@ class Robot(Protocol):
     def enclose_joints(self, poses: Poses, legs: Floats) -> Floats:
         """Return bounds (N, n_legs) of how far the platform joints get from where they are in N poses, as `enclose`."""
         ...
+
+
+def own_branch(robot: Robot, branch: Branch) -> Branch:
+    """Return a robot's label of a branch that comes from a file: two signs, which say of which z the direction is.
+
+    Where the robot has no branch of these signs it is returned as it is.
+    """
+    return next((own for own in robot.branches if tuple(own) == tuple(branch)), branch)

@@ -16,7 +16,7 @@ from pentapod.base.refusal import Refusal
 from pentapod.base.units import from_si
 from pentapod.base.values import Result
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.kinematics.robot import Branch
+from pentapod.kinematics.robot import Branch, own_branch
 from pentapod.machine.clearance.collision_world import CollisionWorld
 from pentapod.machine.machine import Machine
 from pentapod.mesh.query.distance import MeshDistance
@@ -124,7 +124,7 @@ def plan_probing(
     and its obstacles; head: of the list of touches; misplaced: how far the part may be from its place, metres: touches
     stay so far from edges. Refuses where fewer than `count` touches can be reached.
     """
-    upright = np.array([0.0, 0.0, -1.0 if branch.w > 0 else 1.0])
+    upright = np.array([0.0, 0.0, -float(own_branch(machine.robot, branch).w)])
     task = _Task(machine, Margins.of(machine, branch, world), surface, placement, upright, head.tip_radius)
     axis = placement.rotation.T @ upright
     outward = -1.0 if surface.mesh.diagnosis.inverted else 1.0

@@ -65,11 +65,12 @@
 
   const along = (p, a, s) => p.map((value, k) => value + s * a[k]);
 
-  // The ends of what moves: the legs, the platform line, the tool, the tip (in the order of the report's scene).
+  // The ends of what moves: the legs, their arms, the platform line, the tool, the tip (in the order of the report's scene).
   function lines({ tip, axis, joints }) {
     const top = along(tip, axis, machine.line_top), nose = along(tip, axis, machine.shaft_end);
     const legs = machine.base.map((base, k) => [base, joints[k]]);
-    return [...legs, [top, nose], [nose, tip], [tip, tip]];
+    const arms = machine.arms.map(([k, height]) => [along(tip, axis, height), joints[k]]);
+    return [...legs, ...arms, [top, nose], [nose, tip], [tip, tip]];
   }
 
   const nearest = (t) => poses.reduce((best, pose, k) => Math.abs(pose.t - t) < Math.abs(poses[best].t - t) ? k : best, 0);

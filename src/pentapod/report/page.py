@@ -18,7 +18,7 @@ from pentapod.job.outcome import Outcome, SetUps
 from pentapod.job.plan_arrays import matrix_mm
 from pentapod.job.schema.job import Job
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
-from pentapod.machine.leg_ends import leg_ends
+from pentapod.machine.leg_ends import arms_beside, leg_ends
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.placed_path import PlacedPath, UnplacedPath
 from pentapod.program.program import Program
@@ -168,6 +168,9 @@ def _poses(outcome: Outcome, signals: Signals | None) -> dict[str, Any]:
         "moving": scene.moving_traces(machine),
         "colours": scene.CUTS_BY,
         "base": np.round(1e3 * base, 3).tolist(),
+        "arms": [
+            [k, round(1e3 * height, 3)] for k, height in zip(*(x.tolist() for x in arms_beside(machine)), strict=True)
+        ],
         "line_top": 1e3 * (machine.tool_length - float(machine.robot.offsets.min())),
         "shaft_end": 1e3 * machine.bodies.shaft_end,
     }

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
-from pentapod.machine.leg_ends import leg_ends, line_top
+from pentapod.base.arrays import Floats, Ints
+from pentapod.machine.leg_ends import arms_beside, leg_ends, line_top
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.placed_path import PlacedPath
@@ -28,6 +28,7 @@ class _Subject:
     """What is drawn, machine frame, metres.
 
     facets (F, 3, 3); tips (K, 3); base, joints (n_legs, 3); far, tip, origin (3,).
+    arms: which legs end beside the line, and where their arms meet it (m, 3).
     hangs: whether the base is above the work, so that the machine's z points down. table: z of its surface, if any.
     around (G, 3, 3): facets of the fixture; holder: its name.
     """
@@ -36,6 +37,7 @@ class _Subject:
     tips: Floats
     base: Floats
     joints: Floats
+    arms: tuple[Ints, Floats]
     far: Floats
     tip: Floats
     origin: Floats
@@ -82,7 +84,9 @@ def _subject(
         vertices, faces = thinned_mesh(held.vertices, held.faces, DETAIL.view_facets)
         around = vertices[faces]
     origin, name = transform.translation, "" if held is None else held.name
-    return _Subject(facets, tips, base, joints, far, tip, origin, hangs, table, around, name)
+    beside, heights = arms_beside(machine)
+    arms = beside, tip + heights[:, None] * axis
+    return _Subject(facets, tips, base, joints, arms, far, tip, origin, hangs, table, around, name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +166,8 @@ def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool =
     if not close:
         base, legs = flat(subject.base), flat(np.stack([subject.base, subject.joints], axis=1))
         parts += [paper.line(leg, leg_colour(k), 2.4) for k, leg in enumerate(legs)]
+        for k, foot in zip(*subject.arms, strict=True):
+            parts.append(paper.line(flat(np.stack([subject.joints[k], foot])), leg_colour(k), 1.6))
         parts += [paper.numbered(joint, k + 1, leg_colour(k)) for k, joint in enumerate(base)]
         parts.append(paper.line(flat(np.stack([subject.far, subject.tip])), "currentColor", 3.0))
     parts.append(paper.cross(flat(subject.origin), "origin of the mesh"))

@@ -10,7 +10,7 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.base.refusal import Refusal
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.machine.leg_ends import leg_ends, line_top
+from pentapod.machine.leg_ends import arms_beside, base_rim, leg_ends, line_top
 from pentapod.machine.machine import Machine
 from pentapod.mesh.diagnosis import fault_edges
 from pentapod.mesh.mesh import Mesh
@@ -169,11 +169,8 @@ def piece_traces(toolpath: Toolpath, pieces: Sequence[Piece]) -> list[dict[str, 
 
 
 def machine_traces(machine: Machine, tip: Floats, axis: Floats) -> list[dict[str, Any]]:
-    """Return the base, and then the traces that move: legs, platform line, tool and tip, at one pose."""
+    """Return the base, and then the traces that move: legs, arms, platform line, tool and tip, at one pose."""
     base = 1e3 * machine.robot.base_joints
-    radius = 1.12 * float(np.linalg.norm(base - base.mean(axis=0), axis=1).max())
-    angle = np.linspace(0.0, 2.0 * np.pi, 73)
-    rim = base.mean(axis=0) + radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(73)])
     joints = _line3d(base, "base joints", QUIET_COLOUR, 1.0)
     joints |= {
         "mode": "markers+text", "showlegend": False,
@@ -181,28 +178,31 @@ def machine_traces(machine: Machine, tip: Floats, axis: Floats) -> list[dict[str
         "text": [f"{k + 1}" for k in range(len(base))], "textposition": "top center",
     }  # fmt: skip
     return [
-        _line3d(rim, "base plane", QUIET_COLOUR, 2.0),
+        _line3d(1e3 * base_rim(machine, 73), "base plane", QUIET_COLOUR, 2.0),
         joints,
-        *(_line3d(line, *look) for line, look in zip(_pose_lines(machine, tip, axis), _looks(len(base)), strict=True)),
+        *(_line3d(line, *look) for line, look in zip(_pose_lines(machine, tip, axis), _looks(machine), strict=True)),
     ]
 
 
 def moving_traces(machine: Machine) -> int:
-    """Return how many traces move with the pose (legs, platform line, tool and tip); they are the last ones."""
-    return len(_looks(machine.robot.n_legs))
+    """Return how many traces move with the pose (legs, arms, platform line, tool and tip); they are the last ones."""
+    return len(_looks(machine))
 
 
-def _looks(n_legs: int) -> list[tuple[str, str, float]]:
+def _looks(machine: Machine) -> list[tuple[str, str, float]]:
     """Return name, colour and width of each moving line."""
-    legs = [(f"leg {k + 1}", leg_colour(k), 8.0) for k in range(n_legs)]
-    return [*legs, ("platform", "#6d7480", 14.0), ("tool", "#b9a36b", 8.0), ("tip", LIMIT_COLOUR, 3.0)]
+    legs = [(f"leg {k + 1}", leg_colour(k), 8.0) for k in range(machine.robot.n_legs)]
+    arms = [(f"arm {k + 1}", leg_colour(k), 5.0) for k in arms_beside(machine)[0].tolist()]
+    return [*legs, *arms, ("platform", "#6d7480", 14.0), ("tool", "#b9a36b", 8.0), ("tip", LIMIT_COLOUR, 3.0)]
 
 
 def _pose_lines(machine: Machine, tip: Floats, axis: Floats) -> list[Floats]:
     """Return the two ends of each moving line, mm; the page's script does the same for other poses."""
     nose = tip + machine.bodies.shaft_end * axis
     legs, far = np.stack(leg_ends(machine, tip, axis), axis=1), line_top(machine, tip, axis)
-    return [1e3 * line for line in (*legs, np.array([far, nose]), np.array([nose, tip]), np.array([tip, tip]))]
+    beside, heights = arms_beside(machine)
+    arms = np.stack([tip + heights[:, None] * axis, legs[beside, 1]], axis=1)
+    return [1e3 * line for line in (*legs, *arms, np.array([far, nose]), np.array([nose, tip]), np.array([tip, tip]))]
 
 
 def scene_figure(traces: list[dict[str, Any]], *, down: bool) -> Figure:

@@ -25,8 +25,8 @@ from pentapod.job.outcome import Outcome, SetUp
 from pentapod.job.plan_arrays import BOX, GUIDES, JOB_FILE, WAYPOINTS, guides_in, piece_in
 from pentapod.job.run_folder import check_run
 from pentapod.job.schema.job import Job
-from pentapod.kinematics.component import COMPONENTS, Component
-from pentapod.kinematics.robot import Branch
+from pentapod.kinematics.component import Component
+from pentapod.kinematics.robot import Branch, own_branch
 from pentapod.machine.clearance.collision_world import CollisionWorld
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
@@ -99,7 +99,7 @@ def open_run(folder: str | Path, job: str | Path | None = None, progress: Progre
     rail_positions = guides_in(arrays) if program is None else program.rail_positions
     machine = machine if rail_positions is None or machine.guides is None else machine.at(rail_positions)
     wanted = loaded.placement.component
-    asked = COMPONENTS[0] if wanted is None else Component.parse(wanted)
+    asked = machine.robot.branches[0] if wanted is None else Component.parse(wanted)
     placement, component, axes = _placed(arrays, toolpath, machine, asked)
     return OpenedRun(
         folder, loaded, machine, mesh, job_tool(loaded, machine), toolpath, job_collision_world(loaded, machine, mesh),
@@ -141,8 +141,8 @@ def _job_file(folder: Path, arrays: dict[str, NDArray[Any]]) -> Path:
 
 
 def _placed(
-    arrays: dict[str, NDArray[Any]], toolpath: Toolpath, machine: Machine, component: Component
-) -> tuple[RigidTransform, Component, Floats]:
+    arrays: dict[str, NDArray[Any]], toolpath: Toolpath, machine: Machine, component: Branch
+) -> tuple[RigidTransform, Branch, Floats]:
     """Return the run's placement, component and axes; without one the middle of the work volume, in `component`."""
     if "placed.axes" not in arrays:
         return _middle(toolpath, machine, component), component, toolpath.axes
@@ -153,12 +153,12 @@ def _placed(
     return placement, Component(w, s), placement.inverse().rotate(arrays["placed.axes"])
 
 
-def _middle(toolpath: Toolpath, machine: Machine, component: Component) -> RigidTransform:
+def _middle(toolpath: Toolpath, machine: Machine, component: Branch) -> RigidTransform:
     """Return the placement with the path in the middle of the work volume, its mean axis along the machine's z."""
     mean = toolpath.axes.mean(axis=0)
     length = float(np.linalg.norm(mean))
     axis = mean / length if length > 1e-6 else np.array([0.0, 0.0, 1.0])
-    upward = np.array([0.0, 0.0, -float(component.w)])
+    upward = np.array([0.0, 0.0, -float(own_branch(machine.robot, component).w)])
     to, back = (np.column_stack([*tangent_frame(a), a]) for a in (upward, axis))
     u, _, v = np.linalg.svd(to @ back.T)
     rotation = u @ v

@@ -10,6 +10,7 @@ from pentapod.base.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.legs_on_rings import LegsOnRings
 from pentapod.machine.clearance.collision_world import mounted
+from pentapod.machine.leg_ends import arms_beside, base_rim
 from pentapod.report.decimate import thinned_mesh
 from pentapod.report.figure import LIMIT_COLOUR, leg_colour
 from pentapod.view.motion import MachinePose
@@ -60,6 +61,10 @@ class ViewerScene:
         self._legs = [
             self._cylinder(f"/legs/{k + 1}", radius, _rgb(leg_colour(k))) for k in range(run.machine.robot.n_legs)
         ]
+        self._beside, self._heights = arms_beside(run.machine)
+        self._arms = [
+            self._cylinder(f"/arms/{k + 1}", 0.6 * radius, _rgb(leg_colour(k))) for k in self._beside.tolist()
+        ]
         self._joints = [
             api.add_icosphere(f"/joints/{k + 1}", 1.6 * radius, color=_rgb(leg_colour(k)))
             for k in range(run.machine.robot.n_legs)
@@ -88,10 +93,11 @@ class ViewerScene:
             self._tool.position, self._tool.wxyz = machine_pose.tip, quaternion(along(machine_pose.axis))
             for k, leg in enumerate(self._legs):
                 self._joints[k].position = machine_pose.joints[k]
-                leg.position, way = machine_pose.bases[k], machine_pose.joints[k] - machine_pose.bases[k]
-                length = float(np.linalg.norm(way))
-                leg.wxyz, leg.scale = quaternion(along(way / length)), (1.0, 1.0, length)
+                _stretch(leg, machine_pose.bases[k], machine_pose.joints[k])
                 leg.color = _rgb(leg_colour(k) if machine_pose.within[k] else LIMIT_COLOUR)
+
+            for arm, k, height in zip(self._arms, self._beside, self._heights, strict=True):
+                _stretch(arm, machine_pose.tip + height * machine_pose.axis, machine_pose.joints[k])
 
     def _set_up(self, server: viser.ViserServer) -> None:
         """Set the camera: the work from the side, the base above it."""
@@ -107,9 +113,8 @@ class ViewerScene:
 
     def _add_base(self) -> None:
         base = self._run.machine.robot.base_joints
-        centre = base.mean(axis=0)
-        radius = 1.12 * float(np.linalg.norm(base - centre, axis=1).max())
-        rim = _circle(centre, radius)
+        rim = base_rim(self._run.machine, 97)
+        rim = np.stack([rim[:-1], rim[1:]], axis=1)
         self._server.scene.add_line_segments("/base/rim", rim, DARK, thickness=3.0, thickness_units="screen")
         ball = 1.8 * self._run.machine.bodies.leg_radius
         for k, joint in enumerate(base):
@@ -140,6 +145,13 @@ class ViewerScene:
     def _cylinder(self, name: str, radius: float, colour: Rgb, low: float = 0.0, high: float = 1.0) -> viser.MeshHandle:
         profile: Floats = np.array([[0.0, low], [radius, low], [radius, high], [0.0, high]])
         return self._server.scene.add_mesh_simple(name, *revolved(profile), color=colour)
+
+
+def _stretch(cylinder: viser.MeshHandle, start: Floats, end: Floats) -> None:
+    """Put a cylinder of unit length between two points (3,)."""
+    way = end - start
+    length = float(np.linalg.norm(way))
+    cylinder.position, cylinder.wxyz, cylinder.scale = start, quaternion(along(way / length)), (1.0, 1.0, length)
 
 
 def _circle(centre: Floats, radius: float) -> Floats:

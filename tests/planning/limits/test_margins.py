@@ -8,6 +8,8 @@ import pytest
 from scipy.optimize import minimize
 
 from pentapod.kinematics.component import COMPONENTS, Component
+from pentapod.kinematics.mode import Mode
+from pentapod.machine import Machine
 from pentapod.planning.limits.limit import Comforts
 from pentapod.planning.limits.margins import Margins
 
@@ -31,6 +33,18 @@ def test_numpy_and_casadi_agree(desk, component):
     tips, axes = poses(desk, 200, spread=0.3)
     expected = np.array([np.asarray(function(t, a)).ravel() for t, a in zip(tips, axes, strict=True)])
     np.testing.assert_allclose(margins(tips, axes), expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["bench-general", "spr"])
+def test_margins_know_a_branch_by_the_signs_of_a_file(name):
+    """A file has two signs alone; of robots with an order the second one says where the tool points."""
+    machine = Machine.load(name)
+    tips, axes = poses(machine, 50)
+    (branch,) = np.unique(machine.robot.branch(tips + machine.tool_length * axes, -axes), axis=0).tolist()
+    values = Margins.of(machine, Component(*branch))(tips, axes)
+    np.testing.assert_array_equal(values, Margins.of(machine, Mode(*branch))(tips, axes))
+    assert branch[0] == -1 or name == "bench-general"
+    assert (values > 0.0).all()
 
 
 def test_signs_are_those_of_the_limits_themselves(desk):

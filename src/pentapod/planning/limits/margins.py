@@ -17,7 +17,7 @@ from pentapod.base.errors import ArrayError
 from pentapod.base.registry import Registry
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.arithmetic import NUMPY, Arithmetic, Joints
-from pentapod.kinematics.robot import Branch
+from pentapod.kinematics.robot import Branch, own_branch
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.base_joints import BaseJointCone
@@ -68,9 +68,9 @@ class Margins:
         collision_world: CollisionWorld = NOTHING,
         limits: Sequence[LimitKind] = (),
     ) -> Margins:
-        """Return the margins of `machine` in a branch. limits: kinds of limits besides pentapod's own."""
+        """Return the margins of `machine` in a branch, two signs. limits: kinds of limits besides pentapod's own."""
         kinds = tuple(dict.fromkeys((*LIMITS.own.values(), *limits)))
-        scene = Scene(machine, branch, collision_world)
+        scene = Scene(machine, own_branch(machine.robot, branch), collision_world)
         own = tuple(limit for kind in kinds for limit in kind.of(scene))
         return cls(scene, kinds, own, (*own, *ObstacleClearance.of(scene)))
 

@@ -17,7 +17,7 @@ from pentapod.base.errors import InputError, MachineError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.legs_on_rings import LegsOnRings
-from pentapod.kinematics.robot import Branch
+from pentapod.kinematics.robot import Branch, own_branch
 from pentapod.machine.machine import Machine
 from pentapod.program.posts.linuxcnc.config import (
     axis_words,
@@ -103,7 +103,7 @@ def pentakins_files(given: PostInput) -> dict[str, bytes]:
 def controller_frame(machine: Machine, component: Branch) -> RigidTransform:
     """Return the transform machine frame → the controller's: z along the upright tool, zero in the work volume."""
     # Where the direction points to +z, half a turn about x puts the tool upright.
-    turned = np.diag([1.0, -1.0, -1.0]) if component.w > 0 else np.eye(3)
+    turned = np.diag([1.0, -1.0, -1.0]) if own_branch(machine.robot, component).w > 0 else np.eye(3)
     return RigidTransform(turned, -turned @ machine.work.centre)
 
 
