@@ -111,6 +111,7 @@ FILE_KEYS = {
     "base": "geometry.base_mm",
     "delta": "geometry.delta",
     "offsets": "geometry.platform_mm",
+    "home": "geometry.home_mm",
     "guides": "guides.direction",
     "travel": "guides.least_mm",
 }

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from pentapod.base.errors import ArrayError
-from pentapod.kinematics import AsBuiltPentapod, GeneralPentapod, LinearPentapod, SearchOptions, all_poses
+from pentapod.kinematics import (
+    AsBuiltPentapod,
+    GeneralPentapod,
+    LinearPentapod,
+    RingedPentapod,
+    SearchOptions,
+    all_poses,
+)
 
 BASE = np.array([(0.586, -0.120), (0.224, 0.554), (-0.326, 0.498), (-0.597, -0.039), (-0.055, -0.595)])
 DESK = LinearPentapod.quadratic(BASE, 0.185)
@@ -135,3 +142,19 @@ def test_what_is_no_set_of_legs_is_an_error(legs):
 @pytest.mark.slow
 def test_the_modes_of_a_thousand_machines_are_proven_complete_and_those_of_3000_newton_starts():
     assert {check_modes(seed, 0 if seed % 10 else 3000) for seed in range(1000)} <= {2, 3, 4}
+
+
+@pytest.mark.slow
+def test_large_rings_have_eight_modes_where_a_linear_pentapod_has_four():
+    """LinuxCNC's sample of pentakins, base in a plane: a counterexample to four modes with rings."""
+    base = 1e-3 * np.array([[-418, -500, 226], [418, -500, 226], [0, -500, 396], [418, -500, -424], [-418, -500, -424]])
+    offsets = 1e-3 * np.array([111, 83.5, 57.5, -34.5, -60.5])
+    sample = RingedPentapod(base, offsets, np.full(5, 0.0803), np.array([0.0, 0.0, -0.112]))
+    i = np.array([0.05, 0.02, 1.0]) / np.linalg.norm([0.05, 0.02, 1.0])
+    legs = sample.leg_lengths(sample.home + [0.01, 0.02, 0.005], i)
+    found = all_poses(sample, legs)
+    assert found.complete
+    assert len(found.position) == 8
+    np.testing.assert_allclose(sample.leg_lengths(found.position, found.direction), np.tile(legs, (8, 1)), atol=1e-11)
+    mirrored = found.position * [1.0, -1.0, 1.0] - [0.0, 1.0, 0.0]  # in the plane of the base
+    assert (np.linalg.norm(mirrored[:, None] - found.position, axis=2).min(axis=1) < 1e-9).all()

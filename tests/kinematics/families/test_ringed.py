@@ -109,4 +109,6 @@ def test_wrong_geometries_are_refused() -> None:
         RingedPentapod(BASE, SAMPLE.offsets, -SAMPLE.radii, SAMPLE.home)
     with pytest.raises(MachineError, match="home has shape"):
         RingedPentapod(BASE, SAMPLE.offsets, SAMPLE.radii, np.zeros(2))
+    with pytest.raises(MachineError, match="home is singular"):
+        RingedPentapod(BASE, SAMPLE.offsets, SAMPLE.radii, [0.0, -0.5, 0.0])
     assert SAMPLE.conditioning > 0.1

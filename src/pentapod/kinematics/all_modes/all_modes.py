@@ -23,7 +23,7 @@ class SearchOptions(Value):
     most_poses: room for poses. depth: room for boxes that wait.
     """
 
-    most_boxes: int = 200_000
+    most_boxes: int = 600_000
     narrow: float = 0.1
     gain: float = 0.7
     most_poses: int = 64

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pentapod.base.arrays import Floats, as_batch, frozen, set_frozen
+from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
 from pentapod.kinematics.arithmetic import NUMPY, Arithmetic, Vector
 from pentapod.kinematics.batches import broadcast, joined_poses
@@ -37,7 +38,7 @@ class RingedPentapod(Value, LegsOnRings, ProvenByLegEquations):
     A branch is named by the sign of the Jacobian's determinant and that of w (a `Mode`). Several poses can have the
     same legs and the same name: `pose` returns the one that is continued from home, and none in the other branches.
 
-    Raises MachineError as `LegsOnRings`.
+    Raises MachineError as `LegsOnRings`, and for a home that is singular.
     """
 
     base: Floats
@@ -53,6 +54,11 @@ class RingedPentapod(Value, LegsOnRings, ProvenByLegEquations):
     def __post_init__(self) -> None:
         super().__post_init__()
         set_frozen(self, home=frozen(given(self.home, "home", (3,)), "home"))
+        if 0 in self.branches[0]:
+            raise MachineError(
+                "home is singular: the legs do not hold the platform there", key="home", value=self.home.tolist(),
+                expected="a pose with the tool along +z, in which the machine stands firmly",
+            )  # fmt: skip
 
     @property
     def branches(self) -> tuple[Branch, ...]:
