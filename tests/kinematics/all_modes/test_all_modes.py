@@ -151,7 +151,7 @@ def test_large_rings_have_eight_modes_where_a_linear_pentapod_has_four():
     offsets = 1e-3 * np.array([111, 83.5, 57.5, -34.5, -60.5])
     sample = RingedPentapod(base, offsets, np.full(5, 0.0803), np.array([0.0, 0.0, -0.112]))
     i = np.array([0.05, 0.02, 1.0]) / np.linalg.norm([0.05, 0.02, 1.0])
-    legs = sample.leg_lengths(sample.home + [0.01, 0.02, 0.005], i)
+    legs = sample.leg_lengths(sample.home + np.array([0.01, 0.02, 0.005]), i)
     found = all_poses(sample, legs)
     assert found.complete
     assert len(found.position) == 8
