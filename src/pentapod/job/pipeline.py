@@ -93,7 +93,7 @@ def run(
             again = partial(passes, machine=machine, limits=limits, claims=claims)
             search = (job, used, mesh, task.toolpath, again, advice, progress)
             failed = failures(outcome.verdict) if refusal.stage == STAGE else {}
-            found = runner.run("advice", lambda: advised(*search, failed))
+            found = runner.run("advice", lambda: advised(*search, failed, refusal.diagnosis))
             better = refusal.with_advice(found.advice, found.sentence)
             runner.stages = [s if s.value is not refusal else s.with_value(better) for s in runner.stages]
             verdict = outcome.verdict if failed else refusal_verdict(better, specification.sources)

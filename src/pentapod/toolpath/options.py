@@ -90,6 +90,15 @@ class CoverOptions(PathOptions):
     ] = None
     scallop: Annotated[float | None, Key("mm", "height of the ridge left between passes", gt=0.0, of_part=1.0)] = None
     fill: Annotated[bool, Key("", "additional lines where regular passes leave gaps")] = True
+    under: Annotated[
+        float | None,
+        Key(
+            "mm",
+            "by how much surface may lean over a ball's centre; a fifth of its radius when left out, 0 for what an "
+            "upright tool reaches",
+            ge=0.0,
+        ),
+    ] = None
 
     rolls: ClassVar[bool] = True
 

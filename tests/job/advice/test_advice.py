@@ -10,11 +10,12 @@ import tomllib
 import pytest
 
 from pentapod.base.errors import JobError
-from pentapod.base.refusal import Advice, Change
+from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.cli.main import run as run_cli
 from pentapod.job import AdviceOptions, Job, advise, run
 from pentapod.job.advice.search import Advised, advised
 from pentapod.job.advise import can_help
+from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.pipeline import passes
 from refused_jobs import REFUSED
@@ -95,6 +96,19 @@ def test_the_best_that_passes_comes_first_and_what_fails_is_no_advice(tmp_path):
     assert all(getattr(getattr(planned[2].tables, table), key) == value for key, value in keys.items())
     assert found.advice[0].kept >= found.advice[1].kept
     assert found.sentence.startswith("It can be done with: ")
+
+
+def test_where_the_tool_body_touches_an_upright_tool_comes_first(make_job):
+    job = Job.load(make_job())
+    machine, mesh = job_machine(job), job_mesh(job)
+    toolpath = job_toolpath(job, mesh, machine=machine)[0]
+    touch = [Shortfall("tool body touches the part", ((3, 5),), 0.3, "mm")]
+    for under in (None, 0.0):
+        job = job.with_(toolpath={"under_mm": under})
+        given = (job, machine, mesh, toolpath, lambda *_: True, AdviceOptions(plans=1), lambda *_: None)
+        found = advised(*given, short=touch).advice
+        upright = [each for each in found if each.toml == "[toolpath]\nunder_mm = 0.0"]
+        assert [each.kept for each in upright] == pytest.approx([1.0] if under is None else [])
 
 
 def test_an_interruption_ends_the_search_and_keeps_what_was_found(tmp_path):

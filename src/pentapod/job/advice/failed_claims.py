@@ -18,6 +18,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError
 from pentapod.base.units import from_si
 from pentapod.cutters.mounted import BallEnded
+from pentapod.cutters.tool import Tool
 from pentapod.geometry.polyline import spaced
 from pentapod.job.advice.axes import Changes
 from pentapod.job.advice.options import AdviceOptions
@@ -63,14 +64,32 @@ class FailedClaims:
         if _LEFT in self.failed:
             yield from self._leaving_less()
 
+    def upright(self) -> Iterator[Trial]:
+        """Yield the job without what a ball reaches only under an overhang, where the tool touches the part."""
+        if getattr(self.job.toolpath, "under_mm", 0.0) == 0.0 or not isinstance(self._tool, BallEnded):
+            return
+        self.tell("only where an upright tool has room")
+        changes: Changes = {"toolpath": {"under_mm": 0.0}}
+        kept = self._kept(changes)
+        if kept > 0.0:
+            yield Trial("only where an upright tool has room", changes, min(kept, 1.0), kept)
+
     def _without_gouges(self) -> Iterator[Trial]:
         """Yield the job without the motions that gouge, with the share of its cuts that are kept."""
         self.tell("without what gouges")
         changes: Changes = {"gouge": {"remedy": ["drop"]}}
-        other = _toolpath_of(self.job, changes, self.machine, self.mesh)
-        kept = 0.0 if other is None else _cut_length(other) / max(_cut_length(self.toolpath), 1e-300)
+        kept = self._kept(changes)
         if 0.0 < kept < self.options.most:
             yield Trial("what gouges is left out", changes, min(kept, 1.0), kept)
+
+    def _kept(self, changes: Changes) -> float:
+        """Return the share of the length of the cuts that is kept with changes; 0 where no toolpath can be made."""
+        other = _toolpath_of(self.job, changes, self.machine, self.mesh)
+        return 0.0 if other is None else _cut_length(other) / max(_cut_length(self.toolpath), 1e-300)
+
+    @cached_property
+    def _tool(self) -> Tool:
+        return job_tool(self.job, self.machine)
 
     def _leaving_less(self) -> Iterator[Trial]:
         """Yield changes that leave less than the job now allows, where that can be estimated."""
@@ -79,7 +98,7 @@ class FailedClaims:
             self.tell(words)
             if self._left(changes) <= most:
                 yield Trial(words, changes, 1.0, 1.0)
-        if (regions := Regions.of(self.job, self.mesh, job_tool(self.job, self.machine), self.options)) is None:
+        if (regions := Regions.of(self.job, self.mesh, self._tool, self.options)) is None:
             return
         self.tell("a smaller region_angle_deg")
         for degrees in self.options.angles_deg:
@@ -105,7 +124,7 @@ class FailedClaims:
 
         for share in self.options.nearer:
             yield "passes nearer together", nearer(share)
-        if isinstance(job_tool(self.job, self.machine), BallEnded):
+        if isinstance(self._tool, BallEnded):
             share = self.options.thinner
             diameter = _shorter(share * self.job.tool.diameter_mm)
             yield "a smaller cutter", merged(nearer(share), {"tool": {"diameter_mm": diameter}})
@@ -125,7 +144,7 @@ class FailedClaims:
 
         0 for a tool without a ball, 1 where no toolpath can be made. toolpath: one that is nearly that of the changes.
         """
-        if not isinstance(job_tool(self.job, self.machine), BallEnded):
+        if not isinstance(self._tool, BallEnded):
             return 0.0
         toolpath = toolpath or _toolpath_of(self.job, changes, self.machine, self.mesh)
         if toolpath is None:

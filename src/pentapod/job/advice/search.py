@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, islice
@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress
-from pentapod.base.refusal import Advice, Change
+from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.base.values import Value
 from pentapod.job.advice.failed_claims import FailedClaims
 from pentapod.job.advice.options import AdviceOptions
@@ -26,6 +26,10 @@ from pentapod.verify.verdict.verdict import Certificate
 
 Passes = Callable[[Job, Progress], bool]
 """Plans a job, all stages, and returns whether its verdict passed. Raises KeyboardInterrupt where it is interrupted."""
+
+
+TOUCHES = ("tool body touches", "the tool touches")
+"""Beginnings of the names of the limits that keep shank, stem and holder from the part."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +61,12 @@ def advised(
     options: AdviceOptions,
     progress: Progress,
     failed: Mapping[str, Certificate] = MappingProxyType({}),
+    short: Sequence[Shortfall] = (),
 ) -> Advised:
     """Return changes with which a job that cannot be done is planned, and its verdict passes.
 
-    machine, mesh: the job's. toolpath: None where none could be made. failed: claims about its program that fail.
+    machine, mesh: the job's. toolpath: None where none could be made. failed: claims about its program that fail;
+    short: limits that its placement exceeds.
     """
     found: list[Advice] = []
     tried: dict[str, None] = {}
@@ -73,7 +79,9 @@ def advised(
 
     trials = _trials(job, machine, mesh, toolpath, options, tell)
     if toolpath is not None:
-        trials = chain(FailedClaims(job, machine, mesh, toolpath, failed, options, tell).all(), trials)
+        claims = FailedClaims(job, machine, mesh, toolpath, failed, options, tell)
+        touches = any(each.constraint.startswith(TOUCHES) for each in short)
+        trials = chain(claims.upright() if touches else (), claims.all(), trials)
     try:
         for number, trial in enumerate(islice(trials, count)):
             tried[trial.words] = None

@@ -20,6 +20,7 @@ from pentapod.toolpath.options import CoverOptions, PathOptions
 from pentapod.toolpath.path_report import PathReport
 from pentapod.toolpath.strategy import ContactPaths, Strategy
 from pentapod.toolpath.surface import Surface
+from pentapod.toolpath.surfaces.ball_centres import DriveOptions
 from pentapod.toolpath.surfaces.drive_surface import DriveSurface
 from pentapod.toolpath.surfaces.part_surface import PartSurface
 from pentapod.toolpath.toolpath import Toolpath
@@ -82,7 +83,9 @@ def rolls_over(tool: Tool, options: PathOptions) -> bool:
 def surface_for(mesh: Mesh, tool: Tool, options: PathOptions) -> Surface:
     """Return the surface on which a strategy draws: for a ball that covers a part, its drive surface."""
     if rolls_over(tool, options):
-        return DriveSurface.of(mesh, tool.tilt_centre, options.up)
+        under = options.under if isinstance(options, CoverOptions) else None
+        drive = DriveOptions() if under is None else DriveOptions().leaning(under / tool.tilt_centre)
+        return DriveSurface.of(mesh, tool.tilt_centre, options.up, drive)
     return PartSurface(mesh, tool, options.up)
 
 

@@ -5,7 +5,7 @@ A ball is clear at a centre whatever its axis. Chords are proven by their exact 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,6 +50,11 @@ class DriveOptions(Value):
     upright: float = 0.01
     above: float = 0.2
     evened: int = 2
+
+    def leaning(self, share: float) -> DriveOptions:
+        """Return options by which the surface may lean over a point by a share of the radius."""
+        sideways = max(share, self.upright)
+        return replace(self, sideways=sideways, under=self.under / self.sideways * sideways)
 
 
 @dataclass(frozen=True, eq=False)
