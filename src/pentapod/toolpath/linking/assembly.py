@@ -128,11 +128,14 @@ def _waypoints(
 def _seen(passes: Passes, surface: Surface, slack: float, closest: float, halvings: int) -> tuple[Passes, int]:
     """Return the passes as far as the part does not hide them, and how many waypoints it hides.
 
-    They end where it begins to, as far as halving finds the place; no waypoint is nearer than `closest` metres to it.
+    On a drive surface they end where it begins to, as far as halving finds the place; no waypoint is nearer than
+    `closest` metres to it. On the part itself they end at the last waypoint: a chord between two is not on the part.
     """
     keep = ~surface.hides(passes.points, slack)
     if keep.all():
         return passes, 0
+    if not surface.slides:
+        return passes.split(keep), int((~keep).sum())
     rows = np.flatnonzero(passes.within & (keep[1:] != keep[:-1]))
     out, into = np.where(keep[rows], rows, rows + 1), np.where(keep[rows], rows + 1, rows)
     low, high = np.zeros(len(rows)), np.ones(len(rows))
