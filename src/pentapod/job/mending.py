@@ -43,7 +43,7 @@ class MendOptions:
 
     rounds: int = 3
     around: float = 0.5e-3
-    most: float = 10.0
+    most: float = 4.0
     ever: float = 0.05
     places: tuple[str, ...] = (
         "gouge",

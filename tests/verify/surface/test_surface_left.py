@@ -120,7 +120,8 @@ def test_what_the_view_does_not_see_is_told_apart():
     taken = np.sqrt(R**2 - (R - 1e-4) ** 2)
     assert found.value == pytest.approx(100.0 * (6e-3 - taken) / 0.02, rel=0.03)
     told = re.search(r"; (\S+) % more is hidden by overhangs or out of reach", found.method)
-    assert float(told[1]) == pytest.approx(50.0, abs=0.2)  # at the lid's edge a ball may touch nothing
+    # Half of the plate; and at most a strip of 0.02 mm along the lid's edge, where the nearest ball touches nothing.
+    assert 50.0 <= float(told[1]) <= 50.1
 
 
 def test_a_beam_covers_what_is_near_its_lines_on_cuts_alone():
