@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.timing.jerk.interval import End, Interval
@@ -212,12 +213,14 @@ def _updated_rows(interval: Interval, grid: Floats, before: Subproblem) -> JerkR
     """Return the rows at gridpoints (N,); those of gridpoints that another problem has are taken from there."""
     near = np.minimum(np.searchsorted(before.s, grid), len(before.s) - 1)
     new = before.s[near] != grid
-    fresh = interval.rows_at(grid[new])
+    # Rows depend on the stations beside them.
+    beside = maximum_filter1d(new, 4 * interval.options.solver.gridpoints_per_knot + 1)
+    fresh, within = interval.rows_at(grid[beside]), new[beside]
     columns: list[Floats] = []
     for name in ROW_NAMES:
         column = getattr(before.rows, name)
         if len(column) == len(before.s):  # else one row for all
             column = column[near]
-            column[new] = getattr(fresh, name)
+            column[new] = getattr(fresh, name)[within]
         columns.append(column)
     return JerkRows(*columns)

@@ -9,7 +9,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
 from pentapod.timing.limits.limit import MachineLimit, Motion, Reserve
-from pentapod.timing.path.path import PathDerivatives
+from pentapod.timing.path.path import PathDerivatives, third_derivatives
 from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
 OVERSHOOT = "the spline through the setpoints overshoots where the law's jerk steps"
@@ -33,7 +33,8 @@ class LegJerk(MachineLimit):
 
     def jerk_rows(self, path: PathDerivatives) -> Floats:
         """Return the rows (n, legs, 3)."""
-        one, two, three = (y / self.limit for y in path.legs)
+        one, two = (y / self.limit for y in path.legs[:2])
+        three = third_derivatives(path.s, *path.legs[1:]) / self.limit
         return np.stack([three, 1.5 * two, 0.5 * one], axis=-1)
 
     def share(self, path: PathDerivatives, motion: Motion) -> Floats:

@@ -12,7 +12,7 @@ from pentapod.machine.rounding import TIP_ROUNDING
 from pentapod.timing.limits.leg_jerk import OVERSHOOT
 from pentapod.timing.limits.limit import MachineLimit, Motion, Reserve
 from pentapod.timing.limits.polytopes import polyhedron
-from pentapod.timing.path.path import PathDerivatives
+from pentapod.timing.path.path import PathDerivatives, third_derivatives
 from pentapod.timing.path.setpoints import InterpolatedSetpoints
 
 
@@ -34,7 +34,8 @@ class TipJerk(MachineLimit):
 
     def jerk_rows(self, path: PathDerivatives) -> Floats:
         """Return the rows of a polyhedron around the sphere."""
-        return polyhedron(path.tip[0], path.tip[1], path.tip[2], self.limit.item())
+        one, two, three = path.tip
+        return polyhedron(one, two, third_derivatives(path.s, two, three), self.limit.item())
 
     def share(self, path: PathDerivatives, motion: Motion) -> Floats:
         """Return the shares (n, 1), none where the motion's jerk is not known."""

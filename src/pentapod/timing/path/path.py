@@ -93,3 +93,23 @@ class PathDerivatives(Value):
         """
         axis = self.piece.pose(self.s, 0)[1]
         return tuple(np.cross(axis, self.piece.pose(self.s, k)[1]) for k in (1, 2))
+
+
+UNSEEN = 2.0
+"""Ratio of a third derivative's mean over a stage to those at its ends above which these do not see what is inside."""
+
+
+def third_derivatives(s: Floats, second: Floats, third: Floats) -> Floats:
+    """Return third derivatives (n, k) at sorted stations s (n,) that see bends of the path between them.
+
+    A bend shorter than a stage has a third derivative that no station sees. Where its mean over the stage, from the
+    second derivatives at both ends, is far above those at the ends, they get the mean.
+    """
+    means = np.diff(second, axis=0) / np.diff(s)[:, None]
+    size = np.abs(third)
+    k, column = np.nonzero(np.abs(means) > UNSEEN * np.maximum(size[1:], size[:-1]))
+    seen, means = third.copy(), means[k, column]
+    for end in (k, k + 1):
+        here = seen[end, column]
+        seen[end, column] = np.where(np.abs(means) > np.abs(here), means, here)
+    return seen
