@@ -108,8 +108,8 @@ def third_derivatives(s: Floats, second: Floats, third: Floats) -> Floats:
     means = np.diff(second, axis=0) / np.diff(s)[:, None]
     size = np.abs(third)
     k, column = np.nonzero(np.abs(means) > UNSEEN * np.maximum(size[1:], size[:-1]))
-    seen, means = third.copy(), means[k, column]
+    seen, found = third.copy(), means[k, column]
     for end in (k, k + 1):
         here = seen[end, column]
-        seen[end, column] = np.where(np.abs(means) > np.abs(here), means, here)
+        seen[end, column] = np.where(np.abs(found) > np.abs(here), found, here)
     return seen
