@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.timing.jerk.interval import End, Interval
 from pentapod.timing.jerk.jerk_kernels import minimise_duration
 from pentapod.timing.jerk.options import JerkOptions
@@ -214,7 +214,7 @@ def _updated_rows(interval: Interval, grid: Floats, before: Subproblem) -> JerkR
     near = np.minimum(np.searchsorted(before.s, grid), len(before.s) - 1)
     new = before.s[near] != grid
     # Rows depend on the stations beside them.
-    beside = maximum_filter1d(new, 4 * interval.options.solver.gridpoints_per_knot + 1)
+    beside: Bools = np.asarray(maximum_filter1d(new, 4 * interval.options.solver.gridpoints_per_knot + 1), dtype=bool)
     fresh, within = interval.rows_at(grid[beside]), new[beside]
     columns: list[Floats] = []
     for name in ROW_NAMES:
