@@ -16,8 +16,8 @@ from pentapod.cutters.bull_nose import BullNose
 from pentapod.cutters.flat_end import FlatEnd
 from pentapod.cutters.lollipop import Lollipop
 from pentapod.cutters.stand_off import StandOff
-from pentapod.geometry.solids import Cone
-from pentapod.mesh.query.swept_depth import RESOLUTION_M, is_clear, meets, sweep, touch
+from pentapod.geometry.solids import Cone, Solid
+from pentapod.mesh.query.swept_depth import RESOLUTION_M, TouchingBody, is_clear, meets, sweep, touch
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath import Mesh, load_mesh
 
@@ -230,6 +230,29 @@ def test_depth_matches_the_drop_cutter_of_opencamlib_on_real_parts(parts, name):
     pressed = touch(tree, tool, tips - 5e-5 * UP, axes).depths[:, 0]
     assert (pressed > 0.0).all()
     assert (pressed <= 5e-5 + 2e-6).all()
+
+
+def test_gap_of_a_stem_from_long_facets_is_that_of_dense_samples():
+    """Stems beside, along and across facets: many points of a facet are nearly as near as the nearest."""
+    rng = np.random.default_rng(3)
+    radius, low, high, thinnest = 2e-3, 2e-3, 0.06, 1e-4
+    stem = TouchingBody((Solid("shank", low, high, radius, radius),))
+    share = np.array([(i, j) for i in range(301) for j in range(301 - i)]) / 300.0
+    for _ in range(60):
+        middle = np.array([rng.uniform(2.05e-3, 4e-3), 0.0, rng.uniform(-0.01, 0.07)])
+        corners = middle + rng.normal(scale=[thinnest, 0.02, 0.02], size=(3, 3))
+        lean = rng.normal(scale=0.02, size=3) + UP
+        axis = lean / np.linalg.norm(lean)
+        points = corners[0] + share @ (corners[1:] - corners[0])
+        height = points @ axis
+        beside = np.linalg.norm(points - height[:, None] * axis, axis=1) - radius
+        beyond = np.maximum(low - height, height - high)
+        outside = np.hypot(np.maximum(beside, 0.0), np.maximum(beyond, 0.0))
+        sampled = (outside + np.minimum(np.maximum(beside, beyond), 0.0)).min()
+        tree = FacetTree.of(Mesh.of(corners, np.array([[0, 1, 2]])))
+        found = -touch(tree, stem, np.zeros((1, 3)), axis[None], threshold=-1.0).depths[0].max()
+        spacing = np.ptp(corners, axis=0).max() / 300.0
+        assert sampled - spacing <= found <= sampled + 2 * RESOLUTION_M + 0.011 * abs(min(sampled, 0.0))
 
 
 def test_sweep_refuses_a_single_pose():

@@ -166,8 +166,9 @@ def _swept(
     resolution: float,
     progress: Progress,
 ) -> Sweep:
+    from pentapod.mesh.query.facet_kernels import RELATIVE_ERROR  # noqa: PLC0415
     from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415 - loads numba
-    from pentapod.mesh.query.sweep_kernels import RELATIVE_ERROR, sweep_all  # noqa: PLC0415
+    from pentapod.mesh.query.sweep_kernels import sweep_all  # noqa: PLC0415
 
     solids = tool.solids
     motions = _motions(start, end, tool.tilt_centre)

@@ -1,0 +1,96 @@
+"""Signed distance of mesh points from a moving convex solid of revolution, with derivatives; compiled."""
+
+from __future__ import annotations
+
+import math
+
+from pentapod.base.arrays import Floats
+from pentapod.numerics.kernels import kernel
+
+AXIS = 3
+"""Index of the axis in a pose."""
+
+VALUE, RATE, RADIUS = range(3, 6)
+"""Indices of f, ∂f/∂t and W in what `derivatives` writes."""
+
+
+@kernel
+def meridian_distance(solid: Floats, r: float, z: float) -> tuple[float, float, float]:
+    """Return the signed distance of (r, z), radius and height, from a solid (5,), and its derivatives by r and z."""
+    low, high, low_radius, high_radius, rounding = solid[0], solid[1], solid[2], solid[3], solid[4]
+    side_r, side_z = high_radius - low_radius, high - low
+    length = math.sqrt(side_r * side_r + side_z * side_z)
+    normal_r, normal_z = 1.0, 0.0
+    if length > 0.0:
+        normal_r, normal_z = side_z / length, -side_r / length
+    beyond = (r - low_radius) * normal_r + (z - low) * normal_z
+    if low <= z <= high and beyond <= 0.0:
+        below, above = low - z, z - high
+        if beyond >= below and beyond >= above:
+            return beyond - rounding, normal_r, normal_z
+        if below >= above:
+            return below - rounding, 0.0, -1.0
+        return above - rounding, 0.0, 1.0
+    # Outside: the nearest point of the outline: lower disc, slanted side, or upper disc.
+    near_r, near_z = min(r, low_radius), low
+    best = (r - near_r) ** 2 + (z - near_z) ** 2
+    other_r = min(r, high_radius)
+    other = (r - other_r) ** 2 + (z - high) ** 2
+    if other < best:
+        best, near_r, near_z = other, other_r, high
+    if length > 0.0:
+        along = ((r - low_radius) * side_r + (z - low) * side_z) / (length * length)
+        if 0.0 < along < 1.0:
+            other_r, other_z = low_radius + along * side_r, low + along * side_z
+            other = (r - other_r) ** 2 + (z - other_z) ** 2
+            if other < best:
+                best, near_r, near_z = other, other_r, other_z
+    distance = math.sqrt(best)
+    if distance < 1e-15:
+        return distance - rounding, normal_r, normal_z
+    return distance - rounding, (r - near_r) / distance, (z - near_z) / distance
+
+
+@kernel
+def pose_at(motion: Floats, t: float, pose: Floats) -> None:
+    """Write tilt centre and axis at time t into pose (6,). motion: see `deepest`."""
+    angle = motion[16]
+    for k in range(3):
+        pose[k] = motion[k] + t * motion[6 + k]
+    if angle == 0.0:
+        for k in range(3):
+            pose[3 + k] = motion[3 + k]
+    else:
+        first, second = math.cos(t * angle), math.sin(t * angle)
+        for k in range(3):
+            pose[3 + k] = first * motion[3 + k] + second * motion[9 + k]
+
+
+@kernel
+def derivatives(solid: Floats, motion: Floats, pose: Floats, x: float, y: float, z: float, g: Floats) -> None:
+    """Write into g (6,): the gradient in the mesh's frame, f, ∂f/∂t and W, at a mesh point and a pose."""
+    wx, wy, wz = x - pose[0], y - pose[1], z - pose[2]
+    i, j, k = pose[AXIS], pose[AXIS + 1], pose[AXIS + 2]
+    height = wx * i + wy * j + wz * k
+    rx, ry, rz = wx - height * i, wy - height * j, wz - height * k
+    r = math.sqrt(rx * rx + ry * ry + rz * rz)
+    f, by_r, by_z = meridian_distance(solid, r, height + motion[17])
+    scale = by_r / r if r > 1e-15 else 0.0
+    g[0] = scale * rx + by_z * i
+    g[1] = scale * ry + by_z * j
+    g[2] = scale * rz + by_z * k
+    g[VALUE] = f
+    # The body moves with velocity V + ω × w at the point; in its frame the point moves the opposite way.
+    vx = motion[6] + motion[13] * wz - motion[14] * wy
+    vy = motion[7] + motion[14] * wx - motion[12] * wz
+    vz = motion[8] + motion[12] * wy - motion[13] * wx
+    g[RATE] = -(g[0] * vx + g[1] * vy + g[2] * vz)
+    g[RADIUS] = math.sqrt(wx * wx + wy * wy + wz * wz)
+
+
+@kernel
+def deviation_bound(motion: Floats, g: Floats, tau: float, size: float) -> float:
+    """Return the bound on how far f falls below its tangent plane within ± tau, for offsets up to `size`."""
+    angle, travel = motion[16], motion[15]
+    bend = angle * angle * (g[RADIUS] + travel * tau + size) + 2.0 * angle * travel
+    return abs(g[RATE]) * tau + 0.5 * tau * tau * bend + angle * tau * size

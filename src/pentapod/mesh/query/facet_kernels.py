@@ -1,0 +1,202 @@
+"""Deepest point of one facet in a moving convex body, by branch and bound; compiled. Bounds: see `sweep_kernels`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.mesh.query.body_kernels import VALUE, derivatives, deviation_bound, pose_at
+from pentapod.numerics.kernels import kernel
+
+STACK = 512
+"""Pieces that wait to be searched: far more than halving a kilometre down to a tenth of a micrometre needs."""
+
+WORK = 21
+"""Numbers of a waiting piece of a facet: three corners with value and gradient; or three corners and times."""
+
+RELATIVE_ERROR = 1e-2
+"""Share of a depth that may be missed, besides `eps`."""
+
+
+@kernel
+def _deepest_in_motion(
+    solid: Floats,
+    motion: Floats,
+    corners: Floats,
+    s: float,
+    tau: float,
+    best: Floats,
+    work: Floats,
+    eps: float,
+    enough: float,
+    pose: Floats,
+    g: Floats,
+) -> bool:
+    """Lower best (5,): f, time and point, within one facet (3, 3) and the times s ± tau; return whether it did."""
+    found = False
+    for k in range(9):
+        work[0, k] = corners[k // 3, k % 3]
+    work[0, 9], work[0, 10] = s, tau
+    count = 1
+    while count > 0:
+        count -= 1
+        a, b, c = work[count, 0:3].copy(), work[count, 3:6].copy(), work[count, 6:9].copy()
+        s, tau = work[count, 9], work[count, 10]
+        x, y, z = (a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0, (a[2] + b[2] + c[2]) / 3.0
+        pose_at(motion, s, pose)
+        derivatives(solid, motion, pose, x, y, z, g)
+        if g[VALUE] < best[0]:
+            best[0], best[1], best[2], best[3], best[4] = g[VALUE], s, x, y, z
+            found = True
+            if -best[0] >= enough:
+                return True
+        lowest, size = 0.0, 0.0
+        for p in (a, b, c):
+            dx, dy, dz = p[0] - x, p[1] - y, p[2] - z
+            lowest = min(lowest, g[0] * dx + g[1] * dy + g[2] * dz)
+            size = max(size, dx * dx + dy * dy + dz * dz)
+        deviation = deviation_bound(motion, g, tau, math.sqrt(size))
+        if g[VALUE] + lowest - deviation >= best[0] - eps + RELATIVE_ERROR * min(best[0], 0.0) or count + 2 > STACK:
+            continue
+        if deviation > -lowest:
+            for half in range(2):
+                work[count, 0:3], work[count, 3:6], work[count, 6:9] = a, b, c
+                work[count, 9], work[count, 10] = s + (half - 0.5) * tau, 0.5 * tau
+                count += 1
+        else:
+            # Halve the longest side.
+            ab = (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
+            bc = (b[0] - c[0]) ** 2 + (b[1] - c[1]) ** 2 + (b[2] - c[2]) ** 2
+            ca = (c[0] - a[0]) ** 2 + (c[1] - a[1]) ** 2 + (c[2] - a[2]) ** 2
+            if bc >= ab and bc >= ca:
+                a, b, c = b, c, a
+            elif ca >= ab:
+                a, b, c = c, a, b
+            middle = 0.5 * (a + b)
+            work[count, 0:3], work[count, 3:6], work[count, 6:9] = a, middle, c
+            work[count + 1, 0:3], work[count + 1, 3:6], work[count + 1, 6:9] = middle, b, c
+            work[count, 9], work[count, 10] = s, tau
+            work[count + 1, 9], work[count + 1, 10] = s, tau
+            count += 2
+    return found
+
+
+@kernel
+def deepest_at_rest(
+    solid: Floats,
+    motion: Floats,
+    corners: Floats,
+    best: Floats,
+    work: Floats,
+    eps: float,
+    enough: float,
+    pose: Floats,
+    g: Floats,
+) -> bool:
+    """Lower best (5,): f, time and point, within one facet (3, 3), where the body rests; return whether it did.
+
+    f is convex: its tangent planes at the corners of a piece, and their mean, bound it from below. Pieces are cut
+    across the side along which the slope changes most, about where the slopes say that it is 0: beside a long stem
+    they become long and narrow.
+    """
+    x = (corners[0, 0] + corners[1, 0] + corners[2, 0]) / 3.0
+    y = (corners[0, 1] + corners[1, 1] + corners[2, 1]) / 3.0
+    z = (corners[0, 2] + corners[1, 2] + corners[2, 2]) / 3.0
+    derivatives(solid, motion, pose, x, y, z, g)
+    found, lowest = _lowered(best, g, x, y, z), 0.0
+    for i in range(3):
+        lowest = min(lowest, g[0] * (corners[i, 0] - x) + g[1] * (corners[i, 1] - y) + g[2] * (corners[i, 2] - z))
+    if -best[0] >= enough or g[VALUE] + lowest >= _threshold(best, eps):
+        return found
+    for i in range(3):
+        x, y, z = corners[i, 0], corners[i, 1], corners[i, 2]
+        derivatives(solid, motion, pose, x, y, z, g)
+        found = _lowered(best, g, x, y, z) or found
+        _keep(work[0], 7 * i, g, x, y, z)
+    count, cut = 1, work[STACK]
+    while count > 0 and -best[0] < enough:
+        count -= 1
+        piece = work[count]
+        if _least(piece, cut) >= _threshold(best, eps) or count + 2 > STACK:
+            continue
+        a, b, share = int(cut[0]), int(cut[1]), cut[2]
+        x = piece[a] + share * (piece[b] - piece[a])
+        y = piece[a + 1] + share * (piece[b + 1] - piece[a + 1])
+        z = piece[a + 2] + share * (piece[b + 2] - piece[a + 2])
+        derivatives(solid, motion, pose, x, y, z, g)
+        found = _lowered(best, g, x, y, z) or found
+        for j in range(WORK):
+            work[count + 1, j] = piece[j]
+        _keep(work[count], a, g, x, y, z)
+        _keep(work[count + 1], b, g, x, y, z)
+        count += 2
+    return found
+
+
+@kernel
+def _threshold(best: Floats, eps: float) -> float:
+    """Return the lower bound from which on a piece holds nothing that counts as deeper."""
+    return best[0] - eps + RELATIVE_ERROR * min(best[0], 0.0)
+
+
+@kernel
+def _lowered(best: Floats, g: Floats, x: float, y: float, z: float) -> bool:
+    """Lower best (5,) to f at a point, where it is lower; return whether it is."""
+    if g[VALUE] >= best[0]:
+        return False
+    best[0], best[1], best[2], best[3], best[4] = g[VALUE], 0.5, x, y, z
+    return True
+
+
+@kernel
+def _keep(piece: Floats, at: int, g: Floats, x: float, y: float, z: float) -> None:
+    """Write a corner of a piece (21,), from index `at` on: the point, f and its gradient."""
+    piece[at], piece[at + 1], piece[at + 2], piece[at + 3] = x, y, z, g[VALUE]
+    piece[at + 4], piece[at + 5], piece[at + 6] = g[0], g[1], g[2]
+
+
+@kernel
+def _least(piece: Floats, cut: Floats) -> float:
+    """Return a lower bound of f on a piece (21,); write into cut: corners of the side to cut, and the share."""
+    bound, bend = -np.inf, -1.0
+    mean = cut[3:6]
+    mean[0] = mean[1] = mean[2] = 0.0
+    for i in range(3):
+        a, b, c = 7 * i, 7 * ((i + 1) % 3), 7 * ((i + 2) % 3)
+        to_b, to_c, back = 0.0, 0.0, 0.0
+        for j in range(3):
+            to_b += piece[a + 4 + j] * (piece[b + j] - piece[a + j])
+            to_c += piece[a + 4 + j] * (piece[c + j] - piece[a + j])
+            back += piece[b + 4 + j] * (piece[b + j] - piece[a + j])
+        f = piece[a + 3]
+        bound = max(bound, f + min(0.0, to_b, to_c))
+        mean[i] += f / 3.0
+        mean[(i + 1) % 3] += (f + to_b) / 3.0
+        mean[(i + 2) % 3] += (f + to_c) / 3.0
+        if back - to_b > bend:
+            bend, cut[0], cut[1], cut[2] = back - to_b, a, b, 0.5
+            if to_b < 0.0 < back:
+                cut[2] = min(max(to_b / (to_b - back), 0.1), 0.9)
+    return max(bound, min(mean[0], mean[1], mean[2]))
+
+
+@kernel
+def deepest_in_facet(
+    solid: Floats,
+    motion: Floats,
+    corners: Floats,
+    s: float,
+    tau: float,
+    best: Floats,
+    work: Floats,
+    eps: float,
+    enough: float,
+    pose: Floats,
+    g: Floats,
+) -> bool:
+    """Lower best (5,): f, time and point, within one facet (3, 3) and the times s ± tau; return whether it did."""
+    if tau == 0.0:
+        return deepest_at_rest(solid, motion, corners, best, work, eps, enough, pose, g)
+    return _deepest_in_motion(solid, motion, corners, s, tau, best, work, eps, enough, pose, g)
